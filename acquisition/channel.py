@@ -1,0 +1,70 @@
+"""What is known of one input of the data acquisition device (DAQ), and a run of its samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+ChannelQuantity = Literal["force", "acceleration"]
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One sensor on one input: all that turns a voltage into a force or an acceleration."""
+
+    quantity: ChannelQuantity
+    """What the sensor measures."""
+    sensitivity: float
+    """V per N (force) or V per m/s^2 (acceleration); signed."""
+    full_scale: float
+    """Voltage of the positive rail (V)."""
+    adc_bits: int = 16
+    """Resolution; codes run from -2^(bits-1) to 2^(bits-1) - 1."""
+    direction: str = ""
+    """Direction at the tool tip, "x" or "y"."""
+    serial_number: str = ""
+    """Of the sensor."""
+    calibration_date: str = ""
+    """ISO date of the sensor's calibration; empty where not known."""
+    skew: float = 0.0
+    """Sampling delay against channel 0 (s)."""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be a channel."""
+        if self.quantity not in get_args(ChannelQuantity):
+            raise ValueError(f"quantity={self.quantity!r} is none of {', '.join(get_args(ChannelQuantity))}")
+        if not np.isfinite(self.sensitivity) or self.sensitivity == 0:
+            raise ValueError(f"{self.quantity} sensitivity={self.sensitivity} is not a finite number other than 0")
+        if not (np.isfinite(self.full_scale) and self.full_scale > 0):
+            raise ValueError(f"{self.quantity} full_scale={self.full_scale} V is not > 0")
+
+    @property
+    def scale(self) -> float:
+        """Engineering units (N or m/s^2) per ADC code."""
+        return self.full_scale / 2 ** (self.adc_bits - 1) / self.sensitivity
+
+    @property
+    def rails(self) -> tuple[int, int]:
+        """Lowest and highest ADC code."""
+        return -(2 ** (self.adc_bits - 1)), 2 ** (self.adc_bits - 1) - 1
+
+    def encode(self, values: NDArray[np.float64]) -> NDArray[np.int32]:
+        """ADC codes of values (N or m/s^2), rounded and clipped at the rails as the converter does."""
+        return np.clip(np.rint(values / self.scale), *self.rails).astype(np.int32)
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Consecutive scans as they came from a source."""
+
+    first_scan: int
+    """Index of the first scan since the start of the stream."""
+    codes: NDArray[np.int32]
+    """ADC codes, shape (n_channels, n_scans)."""
+    overload: int = 0
+    """Bit i set: the device reports channel i overloaded."""
+    lost_before: int = 0
+    """Scans lost between the block before and this one."""

@@ -1,0 +1,100 @@
+"""The emulator's end of the cable: a pseudo-terminal or a TCP port on loopback, both without blocking."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import socket
+from typing import Protocol
+
+
+class Wire(Protocol):
+    """Bytes both ways."""
+
+    port: str
+    """What the host opens."""
+    pending: bytearray
+    """Bytes that wait to be sent."""
+
+    def exchange(self, timeout: float) -> bytes:
+        """Send what fits of `pending` and return what has come, after at most timeout (s)."""
+        ...
+
+    def close(self) -> None:
+        """Hang up."""
+        ...
+
+
+class PtyWire:
+    """A pseudo-terminal in raw mode."""
+
+    def __init__(self) -> None:
+        """Open it; the host's end stays open here too, so that a host may come and go."""
+        import pty
+        import tty
+
+        self._master, self._slave = pty.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        self.port = os.ttyname(self._slave)
+        self.pending = bytearray()
+
+    def exchange(self, timeout: float) -> bytes:
+        """See Wire."""
+        sending = [self._master] if self.pending else []
+        readable, writable, _ = select.select([self._master], sending, [], timeout)
+        with contextlib.suppress(BlockingIOError):
+            if writable:
+                del self.pending[: os.write(self._master, memoryview(self.pending)[:65536].tobytes())]
+        return os.read(self._master, 65536) if readable else b""
+
+    def close(self) -> None:
+        """See Wire."""
+        for handle in (self._master, self._slave):
+            with contextlib.suppress(OSError):
+                os.close(handle)
+
+
+class TcpWire:
+    """A listening socket on 127.0.0.1; one host at a time."""
+
+    def __init__(self) -> None:
+        """Listen on a free port."""
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._host: socket.socket | None = None
+        self.port = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
+        self.pending = bytearray()
+
+    def exchange(self, timeout: float) -> bytes:
+        """See Wire."""
+        if self._host is None:
+            return self._accept(timeout)
+        sending = [self._host] if self.pending else []
+        readable, writable, _ = select.select([self._host], sending, [], timeout)
+        try:
+            if writable:
+                del self.pending[: self._host.send(memoryview(self.pending)[:65536].tobytes())]
+            data = self._host.recv(65536) if readable else None
+        except ConnectionError:
+            data = b""
+        if data == b"":
+            self._hang_up()
+        return data or b""
+
+    def close(self) -> None:
+        """See Wire."""
+        self._hang_up()
+        self._listener.close()
+
+    def _accept(self, timeout: float) -> bytes:
+        self.pending.clear()
+        if select.select([self._listener], [], [], timeout)[0]:
+            self._host = self._listener.accept()[0]
+            self._host.setblocking(False)
+        return b""
+
+    def _hang_up(self) -> None:
+        if self._host is not None:
+            self._host.close()
+            self._host = None

@@ -1,0 +1,80 @@
+"""Averaged FRF from hammer hits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.frf import Frf, from_accelerance
+from acquisition.hit import Hit
+from acquisition.pulse import find_pulse
+
+Estimator = Literal["H1", "H2", "Hv"]
+
+Spectra = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128]]
+
+
+def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
+    """FRF of hits that share sample rate and length, with coherence and usable band.
+
+    H1 = S_fx / S_ff (noise on the response), H2 = S_xx / S_xf (noise on the force), Hv their geometric mean with
+    the phase of S_fx. S_fx = mean of conj(F) X. The response window is rectangular; the force is tapered to zero
+    after its pulse, which keeps its noise out. Source: ISO 7626-5; Bendat & Piersol, Random Data, ch. 6.
+
+    Raises ValueError for no hits, hits of different length or rate, and hits without a pulse.
+    """
+    if estimator not in get_args(Estimator):
+        raise ValueError(f"estimator={estimator!r} is none of {', '.join(get_args(Estimator))}")
+    s_ff, s_xx, s_fx = cross_spectra(hits)
+    forms: dict[Estimator, Callable[[], NDArray[np.complex128]]] = {
+        "H1": lambda: s_fx / s_ff,
+        "H2": lambda: s_xx / np.conj(s_fx),
+        "Hv": lambda: np.sqrt(s_xx / s_ff) * s_fx / np.abs(s_fx),
+    }
+    frequency = np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate)
+    coherence = np.minimum(np.abs(s_fx) ** 2 / (s_ff * s_xx), 1.0) if len(hits) > 1 else None
+    return from_accelerance(frequency, forms[estimator](), coherence, len(hits), _usable_band(frequency, s_ff))
+
+
+def cross_spectra(hits: Sequence[Hit]) -> Spectra:
+    """Mean auto-spectra S_ff (N^2), S_xx ((m/s^2)^2) and cross-spectrum S_fx of the hits, each (n // 2 + 1,)."""
+    if not hits:
+        raise ValueError("there is no hit to average; at least one is needed")
+    shapes = {(hit.force.size, hit.sample_rate) for hit in hits}
+    if len(shapes) > 1:
+        raise ValueError(f"hits differ in length or sample rate: {sorted(shapes)}; average only hits of one set-up")
+    force = np.fft.rfft([_windowed_force(hit) for hit in hits])
+    response = np.fft.rfft([hit.acceleration for hit in hits])
+    skew = _skew(hits[0])
+    if skew:
+        response *= np.exp(2j * np.pi * np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate) * skew)
+    return (
+        np.mean(np.abs(force) ** 2, axis=0),
+        np.mean(np.abs(response) ** 2, axis=0),
+        np.mean(np.conj(force) * response, axis=0),
+    )
+
+
+def _windowed_force(hit: Hit) -> NDArray[np.float64]:
+    """The pulse kept whole for three of its widths, then tapered to zero over three more (raised cosine)."""
+    pulse = find_pulse(hit)
+    if pulse is None:
+        raise ValueError("a hit has no force pulse; check hits with check_hit before averaging")
+    width = max(pulse.end - pulse.start, 8)
+    distance = np.arange(pulse.force.size) - (pulse.end + 3 * width)
+    before = (pulse.start - width) - np.arange(pulse.force.size)
+    outside = np.clip(np.maximum(distance, before) / (3 * width), 0.0, 1.0)
+    return pulse.force * 0.5 * (1 + np.cos(np.pi * outside))
+
+
+def _skew(hit: Hit) -> float:
+    return hit.channels[1].skew - hit.channels[0].skew if hit.channels else 0.0
+
+
+def _usable_band(frequency: NDArray[np.float64], s_ff: NDArray[np.float64]) -> tuple[float, float]:
+    """From the first line to the first one where the force spectrum has fallen 20 dB below its largest value."""
+    weak = np.flatnonzero(s_ff[1:] < 0.01 * np.max(s_ff[1:]))
+    return float(frequency[1]), float(frequency[weak[0] if weak.size else -1])

@@ -1,0 +1,118 @@
+"""The frequency response function (FRF) and its three forms."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Quantity = Literal["receptance", "mobility", "accelerance"]
+
+
+@dataclass(frozen=True, eq=False)
+class Frf:
+    """One averaged frequency response function, displacement over force.
+
+    Raises ValueError where shapes differ, the frequency axis does not rise, or a value is not finite.
+    """
+
+    frequency: NDArray[np.float64]
+    """Frequency lines, rising, >= 0 (Hz), shape (n,)."""
+    receptance: NDArray[np.complex128]
+    """Displacement over force (m/N), shape (n,)."""
+    coherence: NDArray[np.float64] | None = None
+    """Ordinary coherence, 0 to 1, shape (n,); None where it is not known."""
+    n_averages: int = 1
+    """Number of hits averaged."""
+    measured_as: Quantity = "receptance"
+    """The quantity that the sensors gave: it says in which form the noise is flat."""
+    usable_band: tuple[float, float] | None = None
+    """Contiguous band where the force spectrum is within 20 dB of its largest value (Hz)."""
+
+    def __post_init__(self) -> None:
+        """Convert to arrays and check shapes and values."""
+        object.__setattr__(self, "frequency", np.asarray(self.frequency, dtype=np.float64))
+        object.__setattr__(self, "receptance", np.asarray(self.receptance, dtype=np.complex128))
+        if self.coherence is not None:
+            object.__setattr__(self, "coherence", np.asarray(self.coherence, dtype=np.float64))
+        self._check_axis()
+        self._check_values()
+
+    def _check_axis(self) -> None:
+        f = self.frequency
+        if f.ndim != 1 or f.size < 2:
+            raise ValueError(f"frequency has shape {f.shape}; a 1-D array of at least 2 lines (Hz) is needed")
+        if not np.all(np.isfinite(f)) or f[0] < 0 or not np.all(np.diff(f) > 0):
+            raise ValueError("frequency must be finite, >= 0 Hz and strictly rising")
+        if self.measured_as not in get_args(Quantity):
+            raise ValueError(f"measured_as={self.measured_as!r} is none of {', '.join(get_args(Quantity))}")
+        if self.n_averages < 1:
+            raise ValueError(f"n_averages={self.n_averages} is not at least 1")
+
+    def _check_values(self) -> None:
+        if self.receptance.shape != self.frequency.shape:
+            raise ValueError(f"receptance {self.receptance.shape} and frequency {self.frequency.shape} differ in shape")
+        bad = np.flatnonzero(~np.isfinite(self.receptance))
+        if bad.size:
+            line = self.frequency[bad[0]]
+            raise ValueError(f"receptance is not finite at {bad.size} lines, first at {line:g} Hz")
+        if self.coherence is None:
+            return
+        if self.coherence.shape != self.frequency.shape:
+            raise ValueError(f"coherence {self.coherence.shape} and frequency {self.frequency.shape} differ in shape")
+        if not np.all((self.coherence >= 0) & (self.coherence <= 1 + 1e-9)):
+            raise ValueError("coherence must lie between 0 and 1")
+
+    @property
+    def mobility(self) -> NDArray[np.complex128]:
+        """Velocity over force (m/s/N), shape (n,)."""
+        return 2j * np.pi * self.frequency * self.receptance
+
+    @property
+    def accelerance(self) -> NDArray[np.complex128]:
+        """Acceleration over force (m/s^2/N), shape (n,)."""
+        return -((2 * np.pi * self.frequency) ** 2) * self.receptance
+
+    @property
+    def random_error(self) -> NDArray[np.float64] | None:
+        """Normalised random error of |H|, sqrt((1 - g2)/(2 n g2)), shape (n,); None below three averages.
+
+        Source: Bendat & Piersol, Random Data, H1 estimate. One or two hits give a coherence of no meaning.
+        """
+        if self.coherence is None or self.n_averages < 3:
+            return None
+        g2 = np.clip(self.coherence, 1e-12, 1.0)
+        return np.sqrt((1 - g2) / (2 * self.n_averages * g2))
+
+    def in_band(self, band: tuple[float, float] | None) -> Frf:
+        """The lines between band[0] and band[1] (Hz), ends included; all of it for None."""
+        if band is None:
+            return self
+        low, high = band
+        keep = (self.frequency >= low) & (self.frequency <= high)
+        if not low < high or keep.sum() < 2:
+            raise ValueError(
+                f"band {low:g}..{high:g} Hz holds {keep.sum()} lines of this FRF, which spans "
+                f"{self.frequency[0]:g}..{self.frequency[-1]:g} Hz; choose a wider band inside it"
+            )
+        coherence = None if self.coherence is None else self.coherence[keep]
+        return Frf(
+            self.frequency[keep], self.receptance[keep], coherence, self.n_averages, self.measured_as, self.usable_band
+        )
+
+
+def from_accelerance(
+    frequency: ArrayLike,
+    accelerance: ArrayLike,
+    coherence: ArrayLike | None = None,
+    n_averages: int = 1,
+    usable_band: tuple[float, float] | None = None,
+) -> Frf:
+    """FRF from acceleration over force (m/s^2/N) by division with -(2 pi f)^2; a line at 0 Hz is left out."""
+    f = np.asarray(frequency, dtype=np.float64)
+    keep = f > 0
+    receptance = -np.asarray(accelerance)[keep] / (2 * np.pi * f[keep]) ** 2
+    g2 = None if coherence is None else np.asarray(coherence, dtype=np.float64)[keep]
+    return Frf(f[keep], receptance, g2, n_averages, "accelerance", usable_band)

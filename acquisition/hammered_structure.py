@@ -1,0 +1,136 @@
+"""What hammer and accelerometer would give on a structure of known modes, exact in continuous time.
+
+One pulse is F(t) = A sin^4(pi t/T), 0 <= t <= T: a sum of three cosines, so that the response of every mode is
+known in closed form (a forced part and a free one while the pulse lasts, a free one after it) and no integration
+error stands between the truth and the samples. What the modes leave out is a static residual flexibility.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+_HARMONICS = np.array([3 / 8, -1 / 2, 1 / 8])
+"""sin^4(pi t/T) = 3/8 - 1/2 cos(2 pi t/T) + 1/8 cos(4 pi t/T)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """Driving-point dynamics: modes with viscous damping and a static residual."""
+
+    frequency: NDArray[np.float64]
+    """Undamped natural frequencies (Hz), shape (n,)."""
+    damping_ratio: NDArray[np.float64]
+    """Viscous damping ratios (-), shape (n,)."""
+    stiffness: NDArray[np.float64]
+    """Modal stiffnesses at the tapped point (N/m), shape (n,)."""
+    residual: float = 0.0
+    """Static flexibility of all other modes (m/N)."""
+
+    def response(self, time: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+        """Acceleration (m/s^2) at times (s) after the start of a pulse of 1 N and this width T (s)."""
+        w = 2 * np.pi * self.frequency
+        nu = 2 * np.pi / width * np.arange(3)
+        decay = self.damping_ratio * w
+        root = -decay + 1j * w * np.sqrt(1 - self.damping_ratio**2)
+        r = nu / w[:, None]
+        forced = _HARMONICS / (self.stiffness[:, None] * (1 - r**2 + 2j * self.damping_ratio[:, None] * r))
+        start = -_free_amplitude(forced.sum(1).real, (forced * 1j * nu).sum(1).real, root)
+        end = start * np.exp(root * width)
+        after = _free_amplitude(
+            forced.sum(1).real + end.real, (forced * 1j * nu).sum(1).real + (root * end).real, root
+        )
+        during, later = (time >= 0) & (time < width), time >= width
+        result = np.zeros_like(time)
+        wave = np.exp(1j * np.outer(nu, time[during]))
+        quasi_static = (self.residual * _HARMONICS * -(nu**2)) @ wave
+        result[during] = (
+            ((forced * -(nu**2)).sum(0) @ wave).real
+            + quasi_static.real
+            + ((start * root**2) @ np.exp(np.outer(root, time[during]))).real
+        )
+        result[later] = ((after * root**2) @ np.exp(np.outer(root, time[later] - width))).real
+        return result
+
+
+def _free_amplitude(
+    displacement: NDArray[np.float64], velocity: NDArray[np.float64], root: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """C such that Re(C exp(root t)) has this displacement and velocity at t = 0, shape (n,)."""
+    return displacement + 1j * (root.real * displacement - velocity) / root.imag
+
+
+@dataclass(frozen=True)
+class Hammering:
+    """How somebody taps."""
+
+    force_range: tuple[float, float] = (150.0, 350.0)
+    """Peak force (N)."""
+    width_range: tuple[float, float] = (0.55e-3, 0.75e-3)
+    """Foot width of the pulse (s)."""
+    interval_range: tuple[float, float] = (0.4, 0.5)
+    """Time between hits (s)."""
+    double_hits: float = 0.05
+    """Share of hits with a second touch."""
+    overloads: float = 0.05
+    """Share of hits far too hard."""
+    force_noise: float = 0.05
+    """rms (N)."""
+    response_noise: float = 0.2
+    """rms (m/s^2)."""
+
+
+@dataclass(eq=False)
+class HammeredStructure:
+    """Signal function: (first_scan, n) -> force (N) and acceleration (m/s^2), shape (2, n); call it in order."""
+
+    structure: Structure
+    """What is hit."""
+    sample_rate: float
+    """Samples a second (Hz)."""
+    random: np.random.Generator
+    """Source of every random number."""
+    hammering: Hammering = field(default_factory=Hammering)
+    """How it is hit."""
+    _next_hit: float = field(default=0.0, init=False)
+    _waves: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list, init=False)
+
+    def __call__(self, first_scan: int, n_scans: int) -> NDArray[np.float64]:
+        """The next n_scans scans."""
+        while self._next_hit < first_scan + n_scans:
+            self._next_hit += self.random.uniform(*self.hammering.interval_range) * self.sample_rate
+            self._waves.append(self._hit(self._next_hit))
+        noise = [[self.hammering.force_noise], [self.hammering.response_noise]]
+        signals = self.random.normal(scale=noise, size=(2, n_scans))
+        self._waves = [(start, wave) for start, wave in self._waves if start + wave.shape[1] > first_scan]
+        for start, wave in self._waves:
+            low, high = max(start, first_scan), min(start + wave.shape[1], first_scan + n_scans)
+            if low < high:
+                signals[:, low - first_scan : high - first_scan] += wave[:, low - start : high - start]
+        return signals
+
+    def _hit(self, scan: float) -> tuple[int, NDArray[np.float64]]:
+        peak = self.random.uniform(*self.hammering.force_range)
+        width = self.random.uniform(*self.hammering.width_range)
+        fault = self.random.uniform()
+        if fault > 1 - self.hammering.overloads:
+            peak *= 20
+        start = int(np.ceil(scan))
+        time = (start - scan + np.arange(self._length(width))) / self.sample_rate
+        wave = peak * self._pulse(time, width)
+        if fault < self.hammering.double_hits:
+            delay = self.random.uniform(4, 12) * width
+            wave += self.random.uniform(0.1, 0.4) * peak * self._pulse(time - delay, width)
+        return start, wave
+
+    def _length(self, width: float) -> int:
+        """Samples until the slowest mode has fallen to a millionth."""
+        slowest = np.min(2 * np.pi * self.structure.frequency * self.structure.damping_ratio)
+        return int((13 * width + 14 / slowest) * self.sample_rate)
+
+    def _pulse(self, time: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+        force = np.where((time >= 0) & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)
+        return np.stack([force, self.structure.response(time, width)])

@@ -1,0 +1,118 @@
+"""One hammer hit: what was recorded and what is wrong with it."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from acquisition.channel import Channel
+
+
+class HitFlags(enum.Flag):
+    """Why a hit is refused; falsy when all is well. `str()` gives words with the cure."""
+
+    OK = 0
+    DOUBLE_HIT = enum.auto()
+    OVERLOAD_FORCE = enum.auto()
+    OVERLOAD_RESPONSE = enum.auto()
+    TOO_SOFT = enum.auto()
+    NOT_DECAYED = enum.auto()
+    LOST_SCANS = enum.auto()
+    NO_HIT = enum.auto()
+    SWAPPED_CHANNELS = enum.auto()
+
+    @property
+    def words(self) -> str:
+        """The verdict alone, e.g. "double hit, overload (force)"."""
+        return ", ".join(_WORDS[flag][0] for flag in self) or "good"
+
+    @classmethod
+    def from_words(cls, words: str) -> HitFlags:
+        """The flags whose `words` these are; ValueError for unknown ones."""
+        by_words = {verdict: flag for flag, (verdict, _) in _WORDS.items()}
+        flags = cls.OK
+        for word in filter(None, words.removeprefix("good").split(", ")):
+            if word not in by_words:
+                raise ValueError(f"{word!r} is no hit verdict; known are {', '.join(by_words)}")
+            flags |= by_words[word]
+        return flags
+
+    def __str__(self) -> str:
+        """Verdict and cure in words."""
+        return " ".join(f"{word}: {cure}" for word, cure in (_WORDS[flag] for flag in self)) or "good"
+
+
+_WORDS: Mapping[HitFlags, tuple[str, str]] = {
+    HitFlags.DOUBLE_HIT: ("double hit", "Let the hammer bounce back after the first touch."),
+    HitFlags.OVERLOAD_FORCE: ("overload (force)", "Hit softer or choose a larger force range."),
+    HitFlags.OVERLOAD_RESPONSE: ("overload (response)", "Hit softer or choose a larger acceleration range."),
+    HitFlags.TOO_SOFT: ("too soft", "Hit harder."),
+    HitFlags.NOT_DECAYED: ("not decayed", "Use a longer record; wait until the tool is still before the next hit."),
+    HitFlags.LOST_SCANS: ("lost scans", "Hit again; if it stays, lower the sample rate or use another cable."),
+    HitFlags.NO_HIT: ("no hit", "No hammer pulse in this record: check the hammer cable and the trigger level."),
+    HitFlags.SWAPPED_CHANNELS: ("swapped channels", "The force rings and the response does not: swap the two cables."),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Hit:
+    """Force and response of one hammer hit on one time axis.
+
+    Raises ValueError where the records differ in length, are too short, or hold NaN or inf.
+    """
+
+    force: NDArray[np.float64]
+    """Hammer force (N), shape (n,)."""
+    acceleration: NDArray[np.float64]
+    """Response (m/s^2), shape (n,)."""
+    sample_rate: float
+    """Samples a second (Hz)."""
+    pre_trigger: int = 0
+    """Number of samples before the trigger."""
+    lost_scans: int = 0
+    """Scans missing inside the record."""
+    channels: tuple[Channel, Channel] | None = None
+    """Force and response channel, where the hit came from a DAQ."""
+    codes: NDArray[np.int32] | None = None
+    """Raw ADC codes, shape (2, n), force first; None where the recording has none."""
+
+    def __post_init__(self) -> None:
+        """Convert to arrays and check them."""
+        for name in ("force", "acceleration"):
+            values = np.asarray(getattr(self, name), dtype=np.float64)
+            object.__setattr__(self, name, values)
+            bad = np.flatnonzero(~np.isfinite(values))
+            if bad.size:
+                raise ValueError(f"{name} is not finite at {bad.size} samples, first at sample {bad[0]}")
+        if self.force.shape != self.acceleration.shape or self.force.ndim != 1 or self.force.size < 8:
+            raise ValueError(
+                f"force {self.force.shape} and acceleration {self.acceleration.shape} "
+                "must be 1-D records of equal length, at least 8 samples"
+            )
+        if not (np.isfinite(self.sample_rate) and self.sample_rate > 0):
+            raise ValueError(f"sample_rate={self.sample_rate} Hz is not > 0")
+
+    @classmethod
+    def from_codes(
+        cls,
+        codes: ArrayLike,
+        channels: tuple[Channel, Channel],
+        sample_rate: float,
+        pre_trigger: int = 0,
+        lost_scans: int = 0,
+    ) -> Hit:
+        """A hit from ADC codes (2, n), force first, scaled by the sensitivities of its channels."""
+        raw = np.asarray(codes, dtype=np.int32)
+        force, response = channels
+        return cls(
+            raw[0] * force.scale, raw[1] * response.scale, sample_rate, pre_trigger, lost_scans, channels, raw
+        )
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time from the trigger (s), shape (n,)."""
+        return (np.arange(self.force.size) - self.pre_trigger) / self.sample_rate

@@ -1,0 +1,50 @@
+"""Where the hammer pulse stands in a hit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.hit import Hit
+
+FALLEN = 0.05
+"""The pulse ends where the force has first fallen below this share of its peak."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pulse:
+    """The main force pulse of a hit."""
+
+    force: NDArray[np.float64]
+    """Force with the baseline's mean taken off (N), shape (n,)."""
+    peak: float
+    """Largest force (N)."""
+    start: int
+    """First sample above 5 % of the peak."""
+    end: int
+    """First sample below 5 % of the peak after it."""
+    baseline_rms: float
+    """rms of the force before the pulse, or after it where nothing was recorded before (N)."""
+
+
+def find_pulse(hit: Hit) -> Pulse | None:
+    """The highest force pulse; None where no sample stands out of the baseline by 6 times its rms."""
+    top = int(np.argmax(hit.force))
+    baseline = _baseline(hit, top)
+    force = hit.force - np.mean(baseline)
+    rms, peak = float(np.std(baseline)), float(force[top])
+    if peak <= 6 * rms or peak <= 0:
+        return None
+    below = force < FALLEN * peak
+    start = top - int(np.argmax(below[top::-1])) + 1 if below[: top + 1].any() else 0
+    end = top + int(np.argmax(below[top:])) if below[top:].any() else force.size
+    return Pulse(force, peak, start, end, rms)
+
+
+def _baseline(hit: Hit, top: int) -> NDArray[np.float64]:
+    """Samples before the pulse (the first four fifths of the pre-trigger), else the last tenth of the record."""
+    before = hit.pre_trigger or top
+    quiet = hit.force[: int(0.8 * before)]
+    return quiet if quiet.size >= 8 else hit.force[-max(hit.force.size // 10, 8) :]

@@ -1,0 +1,191 @@
+"""A TAPS/1 device made of software: the same bytes on a pseudo-terminal or a TCP port."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import threading
+import time
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+
+from acquisition.channel import Channel
+from acquisition.emulator_wire import PtyWire, TcpWire, Wire
+from acquisition.simulated_source import Signal, quantise
+from acquisition.taps import LOST_BEFORE, Frame, FrameDecoder, MessageType, Status, encode_data, encode_frame
+
+BUFFER_SECONDS = 1.0
+"""What the device keeps for a slow host before it drops scans (s)."""
+STATUS_INTERVAL = 0.5
+"""Time between STATUS frames (s)."""
+
+
+@dataclass(frozen=True)
+class Faults:
+    """What goes wrong on purpose; all off."""
+
+    unplug_after: int | None = None
+    """Hang up after so many scans."""
+    drop_every: int | None = None
+    """Every so many frames, one is lost on the wire."""
+    corrupt_every: int | None = None
+    """Every so many frames, one byte of one is altered."""
+    stall_after: int | None = None
+    """Send nothing more after so many scans."""
+
+
+class TapsEmulator:
+    """Serves one signal function as a DAQ; a context manager whose `port` can be opened like a real one."""
+
+    def __init__(
+        self,
+        signal: Signal,
+        channels: tuple[Channel, ...],
+        sample_rate: float,
+        *,
+        realtime: bool = True,
+        tcp: bool = os.name == "nt",
+        faults: Faults | None = None,
+    ) -> None:
+        """realtime=False sends as fast as the host reads; tcp listens on loopback instead of a pseudo-terminal."""
+        self._signal, self._channels, self._rate = signal, channels, sample_rate
+        self._realtime, self._faults = realtime, faults or Faults()
+        self._wire: Wire = TcpWire() if tcp else PtyWire()
+        self.port = self._wire.port
+        self._decoder = FrameDecoder()
+        self._seq = self._session = self._frames = self._scan = self._overruns = 0
+        self._streaming = self._lost = False
+        self._n_scans, self._started, self._status_due = 0, 0.0, 0.0
+        self._per_frame = 512
+        self._stopping = False
+        self._thread = threading.Thread(target=self._serve, name="TAPS emulator", daemon=True)
+
+    def __enter__(self) -> Self:
+        """Start serving."""
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Hang up."""
+        self._stopping = True
+        self._thread.join(timeout=5.0)
+        self._wire.close()
+
+    def wait(self) -> None:
+        """Serve until interrupted or unplugged."""
+        while self._thread.is_alive():
+            self._thread.join(timeout=0.2)
+
+    def _serve(self) -> None:
+        while not self._stopping:
+            for frame in self._decoder.feed(self._wire.exchange(0.0 if self._streaming else 0.05)):
+                self._answer(frame)
+            if self._streaming:
+                self._stream()
+            if self._faults.unplug_after is not None and self._scan >= self._faults.unplug_after:
+                self._wire.close()
+                return
+
+    def _send(self, kind: MessageType, body: bytes = b"", flags: int = 0) -> None:
+        encoded = encode_frame(Frame(kind, self._seq, body, self._session, flags))
+        self._seq += 1
+        if kind == MessageType.DATA:
+            self._frames += 1
+            if self._faults.drop_every and self._frames % self._faults.drop_every == 0:
+                return
+            if self._faults.corrupt_every and self._frames % self._faults.corrupt_every == 0:
+                encoded = encoded[:40] + bytes([encoded[40] ^ 0x55 or 1]) + encoded[41:]
+        self._wire.pending += encoded
+
+    def _answer(self, frame: Frame) -> None:
+        about = frame.seq.to_bytes(4, "little")
+        try:
+            if frame.type == MessageType.HELLO:
+                self._send(MessageType.INFO, json.dumps(self._info()).encode())
+                return
+            if frame.type == MessageType.CONFIG:
+                self._configure(json.loads(frame.body))
+            elif frame.type == MessageType.START:
+                self._start(int.from_bytes(frame.body, "little"))
+            elif frame.type == MessageType.STOP:
+                self._streaming = False
+            else:
+                raise ValueError(f"unknown command {frame.type:#04x}")
+        except (ValueError, KeyError, TypeError) as error:
+            self._send(MessageType.NACK, about + struct.pack("<H", 1) + str(error).encode())
+        else:
+            self._send(MessageType.ACK, about + struct.pack("<H", 0))
+
+    def _info(self) -> dict[str, Any]:
+        return {
+            "proto": 1,
+            "model": "lobewatch emulator",
+            "serial": "EMU-1",
+            "fw": "1.0",
+            "adc_bits": self._channels[0].adc_bits,
+            "fs_choices": [self._rate],
+            "simultaneous": True,
+            "clock_ppm": 0,
+            "channels": [
+                {
+                    "i": i,
+                    "name": channel.quantity,
+                    "quantity": channel.quantity,
+                    "sens_V_per_EU": channel.sensitivity,
+                    "sens_date": channel.calibration_date,
+                    "fs_V": channel.full_scale,
+                    "gain": 1.0,
+                    "coupling": "IEPE",
+                    "skew_s": channel.skew,
+                    "delay_s": 0.0,
+                }
+                for i, channel in enumerate(self._channels)
+            ],
+        }
+
+    def _configure(self, wish: dict[str, Any]) -> None:
+        if self._streaming:
+            raise ValueError("CONFIG while streaming; send STOP first")
+        if wish["fs"] != self._rate or wish["channels"] != list(range(len(self._channels))):
+            raise ValueError(f"CONFIG asks for what this device does not have: {wish}")
+        self._per_frame = int(wish["samples_per_frame"])
+
+    def _start(self, n_scans: int) -> None:
+        self._session = (self._session + 1) % 0x10000
+        self._n_scans, self._scan, self._streaming, self._lost = n_scans, 0, True, False
+        self._started = self._status_due = time.monotonic()
+
+    def _stream(self) -> None:
+        """Send the frames that are due, drop them where the host has fallen behind, report now and then."""
+        now = time.monotonic()
+        due = self._scan + self._per_frame if not self._realtime else int((now - self._started) * self._rate)
+        backlog = int(BUFFER_SECONDS * self._rate) * 4 if self._realtime else 1 << 16
+        if not self._realtime and len(self._wire.pending) > backlog:
+            self._wire.exchange(0.05)
+            return
+        if self._faults.stall_after is not None and self._scan >= self._faults.stall_after:
+            return
+        while self._scan + self._per_frame <= due:
+            self._send_scans(len(self._wire.pending) > backlog)
+        if now >= self._status_due:
+            self._status_due = now + STATUS_INTERVAL
+            self._send(MessageType.STATUS, Status(self._scan, self._scan, 0, self._overruns, 31.5).encode())
+        if self._realtime:
+            time.sleep(0.5 * self._per_frame / self._rate)
+
+    def _send_scans(self, overrun: bool) -> None:
+        codes = quantise(self._signal(self._scan, self._per_frame), self._channels)
+        if overrun:
+            self._lost = True
+            self._overruns += 1
+        else:
+            body = encode_data(self._scan, codes, 16 if self._channels[0].adc_bits <= 16 else 32)
+            self._send(MessageType.DATA, body, LOST_BEFORE if self._lost else 0)
+            self._lost = False
+        self._scan += self._per_frame
+        if self._n_scans and self._scan >= self._n_scans:
+            self._streaming = False

@@ -1,0 +1,1 @@
+"""Data of the simulated example: the surrogate spindle as a machine file."""

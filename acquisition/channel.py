@@ -44,7 +44,7 @@ class Channel:
     @property
     def scale(self) -> float:
         """Engineering units (N or m/s^2) per ADC code."""
-        return self.full_scale / 2 ** (self.adc_bits - 1) / self.sensitivity
+        return float(self.full_scale / 2 ** (self.adc_bits - 1) / self.sensitivity)
 
     @property
     def rails(self) -> tuple[int, int]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,8 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
     s_ff, s_xx, s_fx = cross_spectra(hits)
     forms: dict[Estimator, Callable[[], NDArray[np.complex128]]] = {
         "H1": lambda: s_fx / s_ff,
-        "H2": lambda: s_xx / np.conj(s_fx),
-        "Hv": lambda: np.sqrt(s_xx / s_ff) * s_fx / np.abs(s_fx),
+        "H2": lambda: s_xx * s_fx / np.abs(s_fx) ** 2,
+        "Hv": lambda: np.sqrt(s_xx / s_ff) * np.exp(1j * np.angle(s_fx)),
     }
     frequency = np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate)
     coherence = np.minimum(np.abs(s_fx) ** 2 / (s_ff * s_xx), 1.0) if len(hits) > 1 else None
@@ -67,14 +67,14 @@ def _windowed_force(hit: Hit) -> NDArray[np.float64]:
     distance = np.arange(pulse.force.size) - (pulse.end + 3 * width)
     before = (pulse.start - width) - np.arange(pulse.force.size)
     outside = np.clip(np.maximum(distance, before) / (3 * width), 0.0, 1.0)
-    return pulse.force * 0.5 * (1 + np.cos(np.pi * outside))
+    return np.asarray(pulse.force * 0.5 * (1 + np.cos(np.pi * outside)))
 
 
 def _skew(hit: Hit) -> float:
     return hit.channels[1].skew - hit.channels[0].skew if hit.channels else 0.0
 
 
-def _usable_band(frequency: NDArray[np.float64], s_ff: NDArray[np.float64]) -> tuple[float, float]:
+def _usable_band(frequency: NDArray[np.floating[Any]], s_ff: NDArray[np.float64]) -> tuple[float, float]:
     """From the first line to the first one where the force spectrum has fallen 20 dB below its largest value."""
     weak = np.flatnonzero(s_ff[1:] < 0.01 * np.max(s_ff[1:]))
     return float(frequency[1]), float(frequency[weak[0] if weak.size else -1])

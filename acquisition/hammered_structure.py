@@ -7,8 +7,8 @@ error stands between the truth and the samples. What the modes leave out is a st
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ class Structure:
     residual: float = 0.0
     """Static flexibility of all other modes (m/N)."""
 
-    def response(self, time: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+    def response(self, time: NDArray[np.floating[Any]], width: float) -> NDArray[np.float64]:
         """Acceleration (m/s^2) at times (s) after the start of a pulse of 1 N and this width T (s)."""
         w = 2 * np.pi * self.frequency
         nu = 2 * np.pi / width * np.arange(3)
@@ -40,11 +40,9 @@ class Structure:
         forced = _HARMONICS / (self.stiffness[:, None] * (1 - r**2 + 2j * self.damping_ratio[:, None] * r))
         start = -_free_amplitude(forced.sum(1).real, (forced * 1j * nu).sum(1).real, root)
         end = start * np.exp(root * width)
-        after = _free_amplitude(
-            forced.sum(1).real + end.real, (forced * 1j * nu).sum(1).real + (root * end).real, root
-        )
+        after = _free_amplitude(forced.sum(1).real + end.real, (forced * 1j * nu).sum(1).real + (root * end).real, root)
         during, later = (time >= 0) & (time < width), time >= width
-        result = np.zeros_like(time)
+        result = np.zeros(time.shape)
         wave = np.exp(1j * np.outer(nu, time[during]))
         quasi_static = (self.residual * _HARMONICS * -(nu**2)) @ wave
         result[during] = (
@@ -131,6 +129,6 @@ class HammeredStructure:
         slowest = np.min(2 * np.pi * self.structure.frequency * self.structure.damping_ratio)
         return int((13 * width + 14 / slowest) * self.sample_rate)
 
-    def _pulse(self, time: NDArray[np.float64], width: float) -> NDArray[np.float64]:
+    def _pulse(self, time: NDArray[np.floating[Any]], width: float) -> NDArray[np.float64]:
         force = np.where((time >= 0) & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)
         return np.stack([force, self.structure.response(time, width)])

@@ -51,10 +51,22 @@ _WORDS: Mapping[HitFlags, tuple[str, str]] = {
     HitFlags.OVERLOAD_FORCE: ("overload (force)", "Hit softer or choose a larger force range."),
     HitFlags.OVERLOAD_RESPONSE: ("overload (response)", "Hit softer or choose a larger acceleration range."),
     HitFlags.TOO_SOFT: ("too soft", "Hit harder."),
-    HitFlags.NOT_DECAYED: ("not decayed", "Use a longer record; wait until the tool is still before the next hit."),
-    HitFlags.LOST_SCANS: ("lost scans", "Hit again; if it stays, lower the sample rate or use another cable."),
-    HitFlags.NO_HIT: ("no hit", "No hammer pulse in this record: check the hammer cable and the trigger level."),
-    HitFlags.SWAPPED_CHANNELS: ("swapped channels", "The force rings and the response does not: swap the two cables."),
+    HitFlags.NOT_DECAYED: (
+        "not decayed",
+        "Use a longer record; wait until the tool is still before the next hit.",
+    ),
+    HitFlags.LOST_SCANS: (
+        "lost scans",
+        "Hit again; if it stays, lower the sample rate or use another cable.",
+    ),
+    HitFlags.NO_HIT: (
+        "no hit",
+        "No hammer pulse in this record: check the hammer cable and the trigger level.",
+    ),
+    HitFlags.SWAPPED_CHANNELS: (
+        "swapped channels",
+        "The force rings and the response does not: swap the two cables.",
+    ),
 }
 
 
@@ -108,9 +120,7 @@ class Hit:
         """A hit from ADC codes (2, n), force first, scaled by the sensitivities of its channels."""
         raw = np.asarray(codes, dtype=np.int32)
         force, response = channels
-        return cls(
-            raw[0] * force.scale, raw[1] * response.scale, sample_rate, pre_trigger, lost_scans, channels, raw
-        )
+        return cls(raw[0] * force.scale, raw[1] * response.scale, sample_rate, pre_trigger, lost_scans, channels, raw)
 
     @property
     def time(self) -> NDArray[np.float64]:

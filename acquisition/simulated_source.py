@@ -22,7 +22,12 @@ class SimulatedSource:
     """Scans of a signal function, as fast as they are asked for."""
 
     def __init__(
-        self, signal: Signal, channels: tuple[Channel, ...], sample_rate: float, n_scans: int, block: int = 512
+        self,
+        signal: Signal,
+        channels: tuple[Channel, ...],
+        sample_rate: float,
+        n_scans: int,
+        block: int = 512,
     ) -> None:
         """A stream of n_scans scans, cut into blocks."""
         self.channels = channels

@@ -140,7 +140,9 @@ class TapsSource:
     def _answers(self, frame: Frame, answer: MessageType) -> bool:
         about = int.from_bytes(frame.body[:4], "little")
         if frame.type == MessageType.NACK and about == self._seq:
-            raise DeviceError(f"the DAQ on {self._link.port} refuses a command: {frame.body[6:].decode(errors='replace')}")
+            raise DeviceError(
+                f"the DAQ on {self._link.port} refuses a command: {frame.body[6:].decode(errors='replace')}"
+            )
         return frame.type == answer and (answer != MessageType.ACK or about == self._seq)
 
 

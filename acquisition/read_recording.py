@@ -1,0 +1,57 @@
+"""Recorded files of other programs and our own, told apart by their content."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from acquisition.errors import DataError
+from acquisition.frf import Frf
+from acquisition.hit import Hit
+from acquisition.read_csv import frf_of, hit_of, is_frf, read_table
+from acquisition.read_lvm import MAGIC, read_lvm
+from acquisition.tap_file import read_tap, read_tap_hits
+from acquisition.tap_test import average_good
+
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+def read_hits(path: Path | str) -> list[Hit]:
+    """The hits in a tap file (HDF5), an LVM file or a text table. DataError where there are none or they are unusable."""
+    recording = read_recording(path)
+    if isinstance(recording, Frf):
+        raise DataError(f"{path}: holds an FRF, not the hits it was made from")
+    return recording
+
+
+def read_frf(path: Path | str) -> Frf:
+    """The FRF in a tap file or a text table, or estimated (H1) from the good hits of a time-history file."""
+    if _magic(Path(path)) == _HDF5:
+        return read_tap(path).frf
+    recording = read_recording(path)
+    if isinstance(recording, Frf):
+        return recording
+    try:
+        return average_good(recording)[0]
+    except DataError as error:
+        raise DataError(f"{path}: {error}") from error
+
+
+def _magic(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(len(_HDF5))
+
+
+def read_recording(path: Path | str) -> list[Hit] | Frf:
+    """Hits where the file holds time histories, an FRF where it holds only that."""
+    path = Path(path)
+    magic = _magic(path)
+    if not magic:
+        raise DataError(f"{path}: the file is empty")
+    if magic == _HDF5:
+        return list(read_tap_hits(path)) or read_tap(path).frf
+    if MAGIC.encode().startswith(magic):
+        return read_lvm(path)
+    if b"\x00" in path.read_bytes()[:4096]:
+        raise DataError(f"{path}: neither HDF5 nor LVM nor a text table; export it as one of these")
+    table = read_table(path)
+    return frf_of(path, table) if is_frf(table) else [hit_of(path, table)]

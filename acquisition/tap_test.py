@@ -1,0 +1,91 @@
+"""One tap test: every hit, which of them were averaged, and the FRF they gave."""
+
+from __future__ import annotations
+
+import re
+import secrets
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from acquisition.check_hit import check_hit
+from acquisition.errors import DataError
+from acquisition.estimate_frf import estimate_frf
+from acquisition.frf import Frf
+from acquisition.hit import Hit, HitFlags
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """Who tapped what, when and where."""
+
+    machine: str
+    """Name of the machine."""
+    created: datetime
+    """When (timezone-aware)."""
+    tool: str = ""
+    """Name of the tool or assembly."""
+    direction: str = "x"
+    """Direction at the tool tip, "x" or "y"."""
+    operator: str = ""
+    """Who held the hammer."""
+    machine_toml: str = ""
+    """Text of the machine file at that time."""
+
+    def __post_init__(self) -> None:
+        """Refuse a direction that is none, and a time without its zone."""
+        if self.direction not in ("x", "y"):
+            raise ValueError(f'direction={self.direction!r} is neither "x" nor "y"')
+        if self.created.tzinfo is None:
+            raise ValueError(f"created={self.created} has no time zone; give one, e.g. datetime.now(UTC)")
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """The recording that a replayed tap test was read from."""
+
+    name: str
+    """Its name, without folder."""
+    content: bytes
+    """Its bytes."""
+
+
+@dataclass(frozen=True, eq=False)
+class TapTest:
+    """A finished tap test."""
+
+    id: str
+    """UTC time to the microsecond, machine, tool, direction and four random hex digits."""
+    circumstances: Circumstances
+    """Who, what, when."""
+    frf: Frf
+    """The averaged FRF."""
+    hits: tuple[Hit, ...] = ()
+    """All hits, also the refused ones; empty for a recorded FRF."""
+    flags: tuple[HitFlags, ...] = ()
+    """The verdict on each hit."""
+    source: SourceFile | None = None
+    """Where it was read from, for a replay."""
+
+    @property
+    def accepted(self) -> tuple[Hit, ...]:
+        """The hits that were averaged."""
+        return tuple(hit for hit, flags in zip(self.hits, self.flags, strict=True) if not flags)
+
+
+def new_tap_id(circumstances: Circumstances) -> str:
+    """An identity that sorts by time and is a file name on every system."""
+    stamp = circumstances.created.astimezone(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
+    names = (circumstances.machine, circumstances.tool, circumstances.direction)
+    slugs = [re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-")[:24] for name in names]
+    return "_".join([stamp, *filter(None, slugs), secrets.token_hex(2)])
+
+
+def average_good(hits: Sequence[Hit]) -> tuple[Frf, tuple[HitFlags, ...]]:
+    """H1 FRF of the good hits, and the verdict on each; DataError with the reasons where no hit is good."""
+    flags = tuple(check_hit(hit) for hit in hits)
+    good = [hit for hit, flag in zip(hits, flags, strict=True) if not flag]
+    if not good:
+        reasons = "; ".join(f"hit {i}: {flag}" for i, flag in enumerate(flags, 1))
+        raise DataError(f"none of {len(hits)} hits can be used ({reasons})")
+    return estimate_frf(good), flags

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +40,7 @@ def _read_segment(path: Path, lines: list[str], places: tuple[int, int, int], co
         step = float(header["Delta_X"][0].replace(",", "."))
     except (KeyError, ValueError, IndexError) as error:
         raise DataError(
-            f"{path}: line {before + 2}: the segment's header lacks a readable Samples, Delta_X or Y_Unit_Label ({error})"
+            f"{path}: line {before + 2}: the segment's header lacks Samples, Delta_X or Y_Unit_Label ({error})"
         ) from error
     first = end + 2
     rows = lines[first : first + n_samples]
@@ -61,3 +63,14 @@ def _numbers(path: Path, rows: list[str], first_line: int, n: int, comma: bool) 
         except ValueError as error:
             raise DataError(f"{path}: line {first_line + i}: {row.strip()!r} are not {n} numbers") from error
     return values
+
+
+def lvm_time(path: Path) -> datetime | None:
+    """Date and Time of the header, in the local time zone; None where it has none that can be read."""
+    with path.open(encoding="latin-1") as file:
+        words = dict(line.rstrip("\n").split("\t")[:2] for line in itertools.islice(file, 12) if "\t" in line)
+    try:
+        clock = words["Time"].replace(",", ".").partition(".")[0]
+        return datetime.strptime(f"{words['Date']} {clock}", "%Y/%m/%d %H:%M:%S").astimezone()
+    except (KeyError, ValueError):
+        return None

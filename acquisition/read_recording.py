@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from pathlib import Path
 
 from acquisition.errors import DataError
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.read_csv import frf_of, hit_of, is_frf, read_table
-from acquisition.read_lvm import MAGIC, read_lvm
+from acquisition.read_lvm import MAGIC, lvm_time, read_lvm
 from acquisition.tap_file import read_tap, read_tap_hits
 from acquisition.tap_test import average_good
 
@@ -16,7 +17,7 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def read_hits(path: Path | str) -> list[Hit]:
-    """The hits in a tap file (HDF5), an LVM file or a text table. DataError where there are none or they are unusable."""
+    """The hits in a tap file (HDF5), an LVM file or a text table; DataError where there are none."""
     recording = read_recording(path)
     if isinstance(recording, Frf):
         raise DataError(f"{path}: holds an FRF, not the hits it was made from")
@@ -48,10 +49,20 @@ def read_recording(path: Path | str) -> list[Hit] | Frf:
     if not magic:
         raise DataError(f"{path}: the file is empty")
     if magic == _HDF5:
-        return list(read_tap_hits(path)) or read_tap(path).frf
+        return list(read_tap_hits(path)[0]) or read_tap(path).frf
     if MAGIC.encode().startswith(magic):
         return read_lvm(path)
     if b"\x00" in path.read_bytes()[:4096]:
         raise DataError(f"{path}: neither HDF5 nor LVM nor a text table; export it as one of these")
     table = read_table(path)
     return frf_of(path, table) if is_frf(table) else [hit_of(path, table)]
+
+
+def recording_time(path: Path | str) -> datetime:
+    """When it was recorded: from the file itself where it says so, else its time of modification."""
+    path = Path(path)
+    magic = _magic(path)
+    if magic == _HDF5:
+        return read_tap_hits(path)[1].created
+    written = lvm_time(path) if magic and MAGIC.encode().startswith(magic) else None
+    return written or datetime.fromtimestamp(path.stat().st_mtime).astimezone()

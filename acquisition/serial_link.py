@@ -93,7 +93,7 @@ class SerialLink:
 
     def _unplugged(self, error: Exception) -> DeviceError:
         return DeviceError(
-            f"the DAQ on {self.port} was unplugged or switched off ({error}); plug it in and give the same command again"
+            f"the DAQ on {self.port} was unplugged or switched off ({error}); plug it in and repeat the command"
         )
 
 
@@ -140,7 +140,7 @@ def _explain(port: str, error: Exception) -> str:
     text = str(error)
     hints = {
         "lock": "another program uses it: close that program",
-        "Permission denied": "add yourself to the group that owns it (Linux: sudo usermod -aG dialout $USER, log in again)",
+        "Permission denied": "you may not use it (Linux: sudo usermod -aG dialout $USER, then log in again)",
         "Access is denied": "another program uses it: close that program",
         "No such file": "check the cable and the port's name",
         "FileNotFound": "check the cable and the port's name",

@@ -59,19 +59,20 @@ def read_tap(path: Path | str) -> TapTest:
             raise DataError(f"{path}: incomplete tap file ({error}); take it again from a backup") from error
 
 
-def write_hit(path: Path | str, hit: Hit) -> None:
+def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances) -> None:
     """One hit of a test in progress, on the disk when this returns."""
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         file.attrs.update(format=FORMAT, version=VERSION)
+        _write_circumstances(file, circumstances)
         _write_raw(file, [hit], [HitFlags.OK])
     atomic_write(Path(path), memory.getvalue())
 
 
-def read_tap_hits(path: Path | str) -> tuple[Hit, ...]:
-    """The hits of a tap file or of a hit file."""
+def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances]:
+    """The hits of a tap file or of a hit file, and their circumstances."""
     with _open(Path(path)) as file:
-        return _read_raw(file)[0]
+        return _read_raw(file)[0], _read_circumstances(file)
 
 
 def _open(path: Path) -> h5py.File:

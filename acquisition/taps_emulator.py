@@ -46,13 +46,13 @@ class TapsEmulator:
         sample_rate: float,
         *,
         realtime: bool = True,
-        tcp: bool = os.name == "nt",
+        tcp: bool = False,
         faults: Faults | None = None,
     ) -> None:
         """realtime=False sends as fast as the host reads; tcp listens on loopback instead of a pseudo-terminal."""
         self._signal, self._channels, self._rate = signal, channels, sample_rate
         self._realtime, self._faults = realtime, faults or Faults()
-        self._wire: Wire = TcpWire() if tcp else PtyWire()
+        self._wire: Wire = TcpWire() if tcp or os.name == "nt" else PtyWire()
         self.port = self._wire.port
         self._decoder = FrameDecoder()
         self._seq = self._session = self._frames = self._scan = self._overruns = 0

@@ -1,0 +1,82 @@
+"""lobewatch lobes."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from acquisition import DataError
+from lobes import StabilityLobes, average_angle
+from lobewatch.describe import lobes_json, program_json, program_table
+from lobewatch.figures import lobes_figure, save_figure
+from lobewatch.history import measure
+from lobewatch.machine import REFERENCE_CUT
+from lobewatch.machine_folder import MachineFolder
+from lobewatch.output import Json, emit
+from lobewatch.pipeline import speed_grid
+
+
+class Dynamics(StrEnum):
+    """What the lobes are computed from."""
+
+    MODES = "modes"
+    FRF = "frf"
+
+
+def lobes(
+    machine: Annotated[Path, typer.Argument(help="Machine folder with at least one tap test.")],
+    cut: Annotated[str, typer.Option(help="Name of a [[program]], or the reference cut.")] = REFERENCE_CUT,
+    source: Annotated[Dynamics, typer.Option(help="From the modes found, or straight from the FRF.")] = Dynamics.MODES,
+    figure: Annotated[Path | None, typer.Option(help="Draw the diagram to this file (.svg, .png, .pdf).")] = None,
+    as_json: Json = False,
+) -> None:
+    """Stability lobes of the newest tap test, by the average tooth angle.
+
+    Examples:
+
+      lobewatch lobes trial --figure lobes.png
+
+      lobewatch lobes trial --cut "bracket, slot" --source frf --json
+    """
+    folder = MachineFolder(machine)
+    setup = folder.machine
+    taps = folder.taps()
+    if not taps:
+        raise DataError(f"{folder.path}: no tap test yet; take one with lobewatch tap, or replay a recorded file")
+    measurement = measure(folder, taps[-1])
+    cuts = setup.cuts(measurement.tool)
+    if cut not in cuts:
+        raise DataError(
+            f"--cut {cut!r} is none of the cuts with tool {measurement.tool!r}: {', '.join(cuts) or 'none'}"
+        )
+    if cut not in measurement.lobes:
+        raise DataError("; ".join(measurement.notes))
+    found: StabilityLobes = measurement.lobes[cut]
+    if source is Dynamics.FRF:
+        frf = folder.read(taps[-1]).frf.in_band(setup.mode.band_hz)
+        pair = (frf, None) if measurement.direction == "x" else (None, frf)
+        found = average_angle(*pair, cuts[cut], speed_grid(setup))
+    programs = program_json({cut: found}, setup)
+    if figure is not None:
+        title = f"{setup.machine.name}: {cut}, {measurement.time:%Y-%m-%d}, from {source}"
+        save_figure(lobes_figure(found.speed_rpm, {"limit": found.depth}, programs, title), figure)
+    low = found.minimum
+    payload = lobes_json(cut, found) | {
+        "tap_id": measurement.tap_id,
+        "source": str(source),
+        "speed_rpm": found.speed_rpm,
+        "depth_mm": found.depth * 1e3,
+        "programs": programs,
+        "notes": list(measurement.notes),
+    }
+    emit(
+        payload,
+        as_json,
+        f"{cut}: {found.method}, from the {source} of {measurement.tap_id}",
+        f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm, chatter at {low.chatter_frequency:.1f} Hz",
+        *([program_table(programs)] if programs else []),
+        *(f"note: {note}" for note in measurement.notes),
+    )

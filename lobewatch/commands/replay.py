@@ -1,0 +1,74 @@
+"""lobewatch replay."""
+
+from __future__ import annotations
+
+import hashlib
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from acquisition import Circumstances, DataError, Frf, SourceFile, TapTest, average_good, new_tap_id, read_recording
+from acquisition import recording_time as time_of
+from lobewatch.describe import measurement_json, measurement_texts
+from lobewatch.history import update_history
+from lobewatch.machine_folder import MachineFolder
+from lobewatch.output import Json, emit, notes
+
+
+def replay(
+    machine: Annotated[Path, typer.Argument(help="Machine folder.")],
+    files: Annotated[list[Path], typer.Argument(help="Recorded hits or FRFs: tap file (HDF5), LVM, CSV.")],
+    tool: Annotated[str, typer.Option(help="What was in the spindle; [tap] tool where not given.")] = "",
+    direction: Annotated[str, typer.Option(help="Direction at the tool tip, x or y.")] = "x",
+    date: Annotated[
+        datetime | None, typer.Option(help="When it was recorded, local time; from the file where not given.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Recorded files through the same pipeline as a live test; each is stored once.
+
+    All files are read and judged before the first one is stored.
+
+    Examples:
+
+      lobewatch replay mill-3 acceleration.lvm
+
+      lobewatch replay mill-3 2024/*.h5 --tool "shrink-fit 20"
+    """
+    folder = MachineFolder(machine)
+    setup = folder.machine
+    with folder.locked():
+        stored = {entry.source_sha256: entry.id for entry in folder.taps()}
+        fresh: dict[str, TapTest] = {}
+        for file in files:
+            content = file.read_bytes()
+            digest = hashlib.sha256(content).hexdigest()
+            if digest in stored or digest in fresh:
+                notes.print(f"{file.name}: stored already as {stored.get(digest) or fresh[digest].id}", markup=False)
+                continue
+            created = date.astimezone() if date else time_of(file)
+            about = Circumstances(
+                setup.machine.name, created, tool or setup.tap.tool, direction, "", folder.toml.read_text("utf-8")
+            )
+            fresh[digest] = _tap_test(file, about, SourceFile(file.name, content))
+        for recorded in fresh.values():
+            folder.commit(recorded)
+        _, measurements = update_history(folder)
+    wanted = {recorded.id for recorded in fresh.values()}
+    shown = [m for m in measurements if m.tap_id in wanted]
+    texts = [text for m in shown for text in measurement_texts(m, setup)]
+    payload = {"measurements": [measurement_json(m, setup) for m in shown]}
+    emit(payload, as_json, *texts, f"{len(shown)} of {len(files)} file(s) stored in {folder.path}")
+
+
+def _tap_test(file: Path, about: Circumstances, source: SourceFile) -> TapTest:
+    recording = read_recording(file)
+    if isinstance(recording, Frf):
+        return TapTest(new_tap_id(about), about, recording, source=source)
+    try:
+        frf, flags = average_good(recording)
+    except DataError as error:
+        raise DataError(f"{file}: {error}") from error
+    return TapTest(new_tap_id(about), about, frf, tuple(recording), flags, source)

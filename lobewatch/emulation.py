@@ -1,0 +1,43 @@
+"""The emulated spindle: the model's modes behind a TAPS/1 emulator. Its truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from acquisition import Channel, HammeredStructure, Hammering, Structure, TapsEmulator
+from dsm import Bearing, Spindle, natural_modes, static_stiffness
+
+MODES = 8
+"""Modes integrated; the rest is their static flexibility."""
+SAMPLE_RATE = 25600.0
+"""Hz."""
+CHANNELS = (
+    Channel("force", sensitivity=2.25e-3, full_scale=5.0, calibration_date="2026-01-15"),
+    Channel("acceleration", sensitivity=1.02e-3, full_scale=5.0, calibration_date="2026-01-15"),
+)
+"""A 2.2 kN hammer and a 500 g accelerometer on a 16-bit converter."""
+
+
+def emulated_structure(spindle: Spindle, damping_ratio: float, position: float = 0.0) -> Structure:
+    """What a hammer meets at a position (m from the tool tip): modes and static residual of the model."""
+    modes = natural_modes(spindle, MODES)
+    stiffness = modes.stiffness_at(position)
+    return Structure(
+        frequency=modes.frequency,
+        damping_ratio=np.full(MODES, damping_ratio),
+        stiffness=stiffness,
+        residual=1 / static_stiffness(spindle, position) - float(np.sum(1 / stiffness)),
+    )
+
+
+def with_bearing_stiffness(spindle: Spindle, stiffness: float) -> Spindle:
+    """The spindle with every bearing at this stiffness (N/m)."""
+    return replace(spindle, bearings=[Bearing(bearing.position, stiffness) for bearing in spindle.bearings])
+
+
+def emulator(structure: Structure, random: np.random.Generator, *, realtime: bool, tcp: bool = False) -> TapsEmulator:
+    """Somebody taps this structure, again and again, on a TAPS/1 device."""
+    signal = HammeredStructure(structure, SAMPLE_RATE, random, Hammering())
+    return TapsEmulator(signal, CHANNELS, SAMPLE_RATE, realtime=realtime, tcp=tcp)

@@ -1,0 +1,161 @@
+"""Every picture: the same colours for the same thing, told apart in grey too (dashes and marks)."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from acquisition import Frf
+from lobewatch.machine import Limits
+from modal import Mode, synthesize
+
+NOW = "#0072B2"
+THEN = "#777777"
+ALARM = "#D55E00"
+GOOD = "#009E73"
+STYLE = {
+    "font.size": 10,
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "svg.hashsalt": "lobewatch",
+    "svg.fonttype": "none",
+}
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a picture in the format that the ending names; ValueError for one that is not known."""
+    with mpl.rc_context(STYLE):
+        try:
+            figure.savefig(path, dpi=150)
+        except ValueError as error:
+            raise ValueError(f"{path}: {error}; name a file that ends in .svg, .png or .pdf") from error
+
+
+def svg(figure: Figure) -> str:
+    """The picture as an <svg> element."""
+    text = io.StringIO()
+    with mpl.rc_context(STYLE):
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    return text.getvalue()[text.getvalue().index("<svg") :]
+
+
+def modes_figure(frf: Frf, modes: Sequence[Mode], title: str) -> Figure:
+    """Magnitude of accelerance, measured and synthesised from the modes alone."""
+    figure, (axes,) = _axes(1, (8.0, 4.0))
+    shown = frf.in_band(frf.usable_band)
+    axes.semilogy(shown.frequency, np.abs(shown.accelerance), color=THEN, lw=0.8, label="measured")
+    if modes:
+        fitted = synthesize(modes, shown.frequency)
+        axes.semilogy(shown.frequency, np.abs(fitted.accelerance), color=NOW, ls="--", label="modes found, alone")
+    for mode in modes:
+        axes.axvline(mode.frequency, color=NOW, lw=0.6)
+        axes.annotate(
+            f"{mode.frequency:.0f}", (mode.frequency, 0.98), xycoords=("data", "axes fraction"), rotation=90, va="top"
+        )
+    axes.set(title=title, xlabel="frequency (Hz)", ylabel="|accelerance| (m/s²/N)")
+    axes.legend(loc="lower right")
+    return figure
+
+
+def frf_figure(then: Frf | None, now: Frf, band: tuple[float, float]) -> Figure:
+    """Real and imaginary part of receptance and coherence, the newest and the first test."""
+    rows = 2 if now.coherence is None else 3
+    figure, axes = _axes(rows, (8.0, 2.1 * rows))
+    tests = [(now, "now", NOW, "-"), *([(then, "first", THEN, "--")] if then is not None else [])]
+    for frf, label, colour, dashes in tests:
+        inside = frf.in_band(band)
+        style: dict[str, Any] = {"color": colour, "ls": dashes, "lw": 1.3, "label": label}
+        axes[0].plot(inside.frequency, inside.receptance.real * 1e9, **style)
+        axes[1].plot(inside.frequency, inside.receptance.imag * 1e9, **style)
+        if rows == 3 and inside.coherence is not None:
+            axes[2].plot(inside.frequency, inside.coherence, **style)
+    axes[0].set(ylabel="Re (nm/N)")
+    axes[1].set(ylabel="Im (nm/N)")
+    if rows == 3:
+        axes[2].set(ylabel="coherence", ylim=(min(0.9, axes[2].get_ylim()[0]), 1.005))
+    axes[-1].set(xlabel="frequency (Hz)", xlim=band)
+    axes[0].legend(loc="upper right", ncols=2)
+    return figure
+
+
+def trend_figure(
+    times: Sequence[datetime],
+    values: NDArray[np.float64],
+    stds: NDArray[np.float64],
+    label: str,
+    limits: Limits | None = None,
+) -> Figure:
+    """A value over time with its 95 % interval; with limits, where its fall calls for attention."""
+    figure, (axes,) = _axes(1, (8.0, 2.8))
+    days = date2num(times)
+    axes.errorbar(days, values, yerr=1.96 * np.nan_to_num(stds), fmt="o", ms=4, color=NOW, capsize=2)
+    if limits is not None:
+        for percent, colour, dashes in (
+            (limits.frequency_warn_percent, THEN, "--"),
+            (limits.frequency_alarm_percent, ALARM, "-"),
+        ):
+            level = values[0] * (1 - percent / 100)
+            axes.axhline(level, color=colour, ls=dashes, lw=1)
+            axes.annotate(
+                f"-{percent:g} %", (1, level), xycoords=("axes fraction", "data"), ha="right", va="bottom", color=colour
+            )
+    locator = AutoDateLocator()
+    axes.xaxis.set_major_locator(locator)
+    axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
+    axes.set(ylabel=label)
+    return figure
+
+
+def lobes_figure(
+    speed_rpm: NDArray[np.float64],
+    depths: Mapping[str, NDArray[np.float64]],
+    programs: Sequence[Mapping[str, Any]] = (),
+    title: str = "",
+) -> Figure:
+    """Stability lobe diagram: the last of `depths` (m, by label) is now, those before it are earlier ones."""
+    figure, (axes,) = _axes(1, (8.0, 4.2))
+    *earlier, now = depths.items()
+    for label, depth in earlier:
+        axes.plot(speed_rpm, depth * 1e3, color=THEN, ls="--", lw=1.2, label=label)
+    axes.plot(speed_rpm, now[1] * 1e3, color=NOW, lw=1.6, label=now[0])
+    finite = now[1][np.isfinite(now[1])] * 1e3
+    top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * p["depth_mm"] for p in programs)])
+    axes.fill_between(speed_rpm, np.minimum(now[1] * 1e3, top), top, color=NOW, alpha=0.10, lw=0)
+    for program in programs:
+        _draw_program(axes, program)
+    axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
+    axes.set(xlabel="spindle speed (rpm)", ylabel="limiting depth (mm)")
+    axes.legend(loc="upper left", ncols=2)
+    return figure
+
+
+def _draw_program(axes: Axes, program: Mapping[str, Any]) -> None:
+    colour, mark = (GOOD, "o") if program["stable"] else (ALARM, "X")
+    axes.plot(program["speed_rpm"], program["depth_mm"], mark, color=colour, ms=9, mec="white")
+    axes.annotate(
+        program["name"],
+        (program["speed_rpm"], program["depth_mm"]),
+        xytext=(7, 5),
+        textcoords="offset points",
+        fontsize=9,
+    )
+
+
+def _axes(rows: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=size, layout="constrained")
+        axes = figure.subplots(rows, 1, sharex=True, squeeze=False)
+    return figure, list(axes[:, 0])

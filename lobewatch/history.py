@@ -1,0 +1,172 @@
+"""The history of a machine: one row a measurement, derived from its tap tests and its machine file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from datetime import datetime, timedelta
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import TapTest
+from dsm import Calibration
+from lobes import SldHistory, read_history, write_history
+from lobewatch.machine import Machine
+from lobewatch.machine_folder import MachineFolder, TapEntry
+from lobewatch.pipeline import Measurement, analyse, speed_grid
+from modal import Mode
+
+MAX_MODES = 12
+"""Modes kept of one measurement."""
+PAIRING = timedelta(hours=24)
+"""x and y taps of one tool within this time belong together."""
+UNITS = {
+    "frequency": "Hz",
+    "frequency_std": "Hz",
+    "stiffness": "N/m",
+    "stiffness_std": "N/m",
+    "bearing_stiffness": "N/m",
+    "bearing_stiffness_std": "N/m",
+    "static_tip_stiffness": "N/m",
+    "modal_tip_stiffness": "N/m",
+    "mode_frequency": "Hz",
+    "mode_stiffness": "N/m",
+    "program_limit": "m",
+}
+TEXTS = ("tap_id", "time", "tool", "direction", "notes")
+NUMBERS = (
+    "frequency",
+    "frequency_std",
+    "damping_ratio",
+    "damping_ratio_std",
+    "stiffness",
+    "stiffness_std",
+    "bearing_stiffness",
+    "bearing_stiffness_std",
+    "static_tip_stiffness",
+    "modal_tip_stiffness",
+)
+MODE_COLUMNS = ("mode_frequency", "mode_damping_ratio", "mode_stiffness")
+
+
+def update_history(
+    folder: MachineFolder, progress: Callable[[int, int], None] = lambda _done, _of: None
+) -> tuple[SldHistory, list[Measurement]]:
+    """The history with every committed tap in it, on the disk, and the measurements that were new to it.
+
+    What is there is kept as long as it was made by these settings and this version; else all is analysed again.
+    """
+    history = _read_current(folder)
+    known = set(history.columns["tap_id"])
+    new = [entry for entry in folder.taps() if entry.id not in known]
+    measurements: list[Measurement] = []
+    for i, entry in enumerate(new):
+        measurements.append(measure(folder, entry))
+        history = history.append(*_row(measurements[-1], folder.machine))
+        progress(i + 1, len(new))
+    if new or not folder.history.exists():
+        write_history(folder.history, history)
+    return history, measurements
+
+
+def measure(folder: MachineFolder, entry: TapEntry) -> Measurement:
+    """The measurement of one committed tap, together with its partner in the other direction."""
+    return analyse(folder.read(entry), folder.machine, _partner(folder, entry))
+
+
+def series(history: SldHistory, tool: str, direction: str) -> NDArray[np.int64]:
+    """Rows of one tool and direction, oldest first."""
+    columns = history.columns
+    rows = np.flatnonzero((columns["tool"] == tool) & (columns["direction"] == direction))
+    return rows[np.argsort([_time(text) for text in columns["time"][rows]], kind="stable")]
+
+
+def _time(text: str) -> float:
+    return datetime.fromisoformat(text).timestamp()
+
+
+def _software() -> str:
+    return f"lobewatch {version('lobewatch')}"
+
+
+def _read_current(folder: MachineFolder) -> SldHistory:
+    """The stored history where it still holds, else an empty one."""
+    empty = _empty(folder.machine)
+    if not folder.history.exists():
+        return empty
+    try:
+        stored = read_history(folder.history)
+    except ValueError:
+        return empty
+    same = stored.settings_hash == empty.settings_hash and stored.software == empty.software
+    ids = {entry.id for entry in folder.taps()}
+    return stored if same and ids.issuperset(stored.columns["tap_id"]) else empty
+
+
+def _empty(machine: Machine) -> SldHistory:
+    speeds = speed_grid(machine)
+    programs = len(machine.program)
+    columns: dict[str, NDArray[Any]] = {name: np.empty(0, np.str_) for name in TEXTS}
+    columns |= {name: np.empty(0) for name in NUMBERS}
+    columns |= {name: np.empty((0, MAX_MODES)) for name in MODE_COLUMNS}
+    if programs:
+        columns["program_limit"] = np.empty((0, programs))
+    depth = {name: np.empty((0, speeds.size)) for name in machine.cut_names}
+    units = {name: unit for name, unit in UNITS.items() if name in columns}
+    return SldHistory(machine.settings_hash, _software(), speeds, columns, depth, units)
+
+
+def _row(m: Measurement, machine: Machine) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
+    speeds = speed_grid(machine)
+    unknown = np.full(speeds.size, np.nan)
+    columns: dict[str, Any] = {
+        "tap_id": m.tap_id,
+        "time": m.time.isoformat(),
+        "tool": m.tool,
+        "direction": m.direction,
+        "notes": "\n".join(m.notes),
+        **_mode_values(m.dynamics.followed),
+        **_calibration_values(m.dynamics.calibration),
+        **_mode_table(m.dynamics.modes),
+    }
+    if machine.program:
+        columns["program_limit"] = [
+            m.lobes[program.name].depth_at(program.speed_rpm) if program.name in m.lobes else np.nan
+            for program in machine.program
+        ]
+    return columns, {name: m.lobes[name].depth if name in m.lobes else unknown for name in machine.cut_names}
+
+
+def _mode_values(mode: Mode | None) -> dict[str, float]:
+    values = np.full(6, np.nan)
+    if mode is not None:
+        values[::2] = mode.frequency, mode.damping_ratio, mode.stiffness
+        values[1::2] = mode.standard_error
+    return dict(zip(NUMBERS[:6], values.tolist(), strict=True))
+
+
+def _calibration_values(c: Calibration | None) -> dict[str, float]:
+    if c is None:
+        return dict.fromkeys(NUMBERS[6:], float("nan"))
+    std = np.nan if c.bearing_stiffness_std is None else c.bearing_stiffness_std
+    values = (c.bearing_stiffness, std, c.static_stiffness_after, c.modal_stiffness_after)
+    return dict(zip(NUMBERS[6:], values, strict=True))
+
+
+def _mode_table(modes: Sequence[Mode]) -> dict[str, NDArray[np.float64]]:
+    table = np.full((3, MAX_MODES), np.nan)
+    for i, mode in enumerate(modes[:MAX_MODES]):
+        table[:, i] = mode.frequency, mode.damping_ratio, mode.stiffness
+    return dict(zip(MODE_COLUMNS, table, strict=True))
+
+
+def _partner(folder: MachineFolder, entry: TapEntry) -> TapTest | None:
+    """The newest tap of the other direction and the same tool, at most a day before."""
+    time = datetime.fromisoformat(entry.time)
+    for other in reversed(folder.taps()):
+        age = time - datetime.fromisoformat(other.time)
+        if other.tool == entry.tool and other.direction != entry.direction and timedelta(0) <= age <= PAIRING:
+            return folder.read(other)
+    return None

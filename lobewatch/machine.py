@@ -1,0 +1,243 @@
+"""machine.toml: what is known of one machine, hand-editable, in the units of the shop (each key names its own)."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import re
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+import msgspec
+from msgspec import Meta, Struct
+
+from acquisition import DataError
+from dsm import Bearing, Segment, Spindle
+from lobes import Cut
+
+Positive = Annotated[float, Meta(gt=0)]
+NotNegative = Annotated[float, Meta(ge=0)]
+Direction = Literal["up", "down"]
+REFERENCE_CUT = "reference cut"
+
+
+class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A table of machine.toml: unknown keys are refused."""
+
+
+class Identity(_Table):
+    """[machine]."""
+
+    name: Annotated[str, Meta(min_length=1)]
+    tap_interval_days: Positive = 30.0
+
+
+class TapSetup(_Table):
+    """[tap]: how the tap test is done."""
+
+    tool: str = "reference"
+    hits: Annotated[int, Meta(ge=3, le=1000)] = 10
+    record_s: Positive = 0.25
+    pre_trigger_s: Positive = 0.02
+    trigger_n: Positive = 20.0
+    position_mm: NotNegative = 0.0
+
+
+class Daq(_Table):
+    """[daq]: the port is remembered here by hand, never written by the program."""
+
+    port: str = ""
+    sample_rate_hz: Positive | None = None
+
+
+class ModeChoice(_Table):
+    """[mode]: which mode is followed."""
+
+    band_hz: tuple[NotNegative, Positive] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse an empty band."""
+        if self.band_hz is not None and not self.band_hz[0] < self.band_hz[1]:
+            raise ValueError(f"band_hz={list(self.band_hz)} does not rise; give [lowest, highest] in Hz")
+
+
+class Limits(_Table):
+    """[limits]: fall of the frequency that calls for attention; the defaults are the paper's."""
+
+    frequency_warn_percent: Positive = 5.0
+    frequency_alarm_percent: Positive = 10.0
+
+
+class SegmentTable(_Table):
+    """One of [spindle] segments."""
+
+    length_mm: Positive
+    outer_mm: Positive
+    bore_mm: NotNegative = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse a bore that leaves no wall."""
+        if self.bore_mm >= self.outer_mm:
+            raise ValueError(f"bore_mm={self.bore_mm:g} is not smaller than outer_mm={self.outer_mm:g}")
+
+
+class BearingTable(_Table):
+    """One of [spindle] bearings."""
+
+    position_mm: NotNegative
+
+
+class SpindleTable(_Table):
+    """[spindle]: the model; optional."""
+
+    segments: Annotated[list[SegmentTable], Meta(min_length=1)]
+    bearings: Annotated[list[BearingTable], Meta(min_length=2)]
+    bearing_stiffness_n_per_um: Positive
+    youngs_modulus_gpa: Positive = 210.0
+    density_kg_per_m3: Positive = 7850.0
+    damping_ratio: Annotated[float, Meta(gt=0, lt=1)] = 0.03
+    label: str = ""
+
+    def build(self) -> Spindle:
+        """The spindle in SI units."""
+        stiffness = self.bearing_stiffness_n_per_um * 1e6
+        return Spindle(
+            [Segment(s.length_mm / 1e3, s.outer_mm / 1e3, s.bore_mm / 1e3) for s in self.segments],
+            [Bearing(b.position_mm / 1e3, stiffness) for b in self.bearings],
+            youngs_modulus=self.youngs_modulus_gpa * 1e9,
+            density=self.density_kg_per_m3,
+        )
+
+
+class CutTable(_Table):
+    """[reference_cut], and what it shares with a program."""
+
+    teeth: Annotated[int, Meta(ge=1)]
+    radial_depth_mm: Positive
+    tool_diameter_mm: Positive
+    direction: Direction
+    tangential_n_per_mm2: Positive
+    radial_n_per_mm2: NotNegative
+
+    def __post_init__(self) -> None:
+        """Refuse a cut wider than the tool."""
+        if self.radial_depth_mm > self.tool_diameter_mm:
+            raise ValueError(
+                f"radial_depth_mm={self.radial_depth_mm:g} is larger than tool_diameter_mm={self.tool_diameter_mm:g}"
+            )
+
+    def build(self) -> Cut:
+        """The cut in SI units."""
+        return Cut(
+            teeth=self.teeth,
+            immersion=self.radial_depth_mm / self.tool_diameter_mm,
+            direction=self.direction,
+            tangential=self.tangential_n_per_mm2 * 1e6,
+            radial=self.radial_n_per_mm2 * 1e6,
+        )
+
+
+class Program(CutTable, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """[[program]]: one cut that the shop runs."""
+
+    name: Annotated[str, Meta(min_length=1)]
+    tool: str = "reference"
+    speed_rpm: Positive
+    depth_mm: Positive
+
+
+class SpeedRange(_Table):
+    """[speed]: the range of the lobe diagrams."""
+
+    low_rpm: Positive = 1000.0
+    high_rpm: Positive = 24000.0
+    steps: Annotated[int, Meta(ge=50, le=100_000)] = 1151
+
+    def __post_init__(self) -> None:
+        """Refuse an empty range."""
+        if not self.low_rpm < self.high_rpm:
+            raise ValueError(f"low_rpm={self.low_rpm:g} is not below high_rpm={self.high_rpm:g}")
+
+
+class Machine(_Table):
+    """All of machine.toml."""
+
+    machine: Identity
+    tap: TapSetup = TapSetup()
+    daq: Daq = Daq()
+    mode: ModeChoice = ModeChoice()
+    limits: Limits = Limits()
+    speed: SpeedRange = SpeedRange()
+    reference_cut: CutTable | None = None
+    program: list[Program] = []
+    spindle: SpindleTable | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse programs that cannot be told apart or lie outside the speed range."""
+        names = [program.name for program in self.program]
+        for i, program in enumerate(self.program, 1):
+            if program.name in (*names[: i - 1], REFERENCE_CUT):
+                raise ValueError(f"program {i}: name={program.name!r} stands twice; give each program its own")
+            if not self.speed.low_rpm <= program.speed_rpm <= self.speed.high_rpm:
+                raise ValueError(
+                    f"program {i}: speed_rpm={program.speed_rpm:g} is outside [speed] "
+                    f"{self.speed.low_rpm:g}..{self.speed.high_rpm:g} rpm"
+                )
+
+    def cuts(self, tool: str) -> dict[str, Cut]:
+        """The reference cut and the programs that run with a tool, by name."""
+        reference = {REFERENCE_CUT: self.reference_cut.build()} if self.reference_cut else {}
+        return reference | {program.name: program.build() for program in self.program if program.tool == tool}
+
+    @property
+    def cut_names(self) -> list[str]:
+        """The reference cut and all programs, whatever their tool."""
+        return [*([REFERENCE_CUT] if self.reference_cut else []), *(program.name for program in self.program)]
+
+    @property
+    def settings_hash(self) -> str:
+        """SHA-256 of all that decides what a history holds."""
+        settings = (self.mode, self.speed, self.reference_cut, self.program, self.spindle, self.tap.position_mm)
+        return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
+
+
+def read_machine(path: Path) -> Machine:
+    """The machine file; DataError with the place for what is wrong in it."""
+    try:
+        return parse_machine(path.read_text(encoding="utf-8"), str(path))
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: no UTF-8 text at byte {error.start}; save it as UTF-8") from error
+
+
+def parse_machine(text: str, name: str = "machine.toml") -> Machine:
+    """The machine file from its text; DataError with the place for what is wrong in it."""
+    try:
+        return msgspec.convert(tomllib.loads(text), Machine)
+    except tomllib.TOMLDecodeError as error:
+        raise DataError(f"{name}: {error}{_comma_hint(text)}") from error
+    except msgspec.ValidationError as error:
+        raise DataError(f"{name}: {_readable(str(error))}") from error
+
+
+def _comma_hint(text: str) -> str:
+    """A decimal comma is the usual cause."""
+    match = re.search(r"=\s*(-?\d+),(\d+)\s*(#|\n|,|\})", text)
+    return f"; write {match[1]}.{match[2]} with a point" if match else ""
+
+
+def _readable(message: str) -> str:
+    """The message of msgspec with its place first and a known key for a mistyped one."""
+    text, _, place = message.partition(" - at `$")
+    where = re.sub(r"\.?(\w+?)s?\[(\d+)\]", lambda m: f" {m[1]} {int(m[2]) + 1}", place.rstrip("`")).strip(" .")
+    unknown = re.search(r"unknown field `(\w+)`", text)
+    if unknown:
+        text = f"unknown key {unknown[1]!r}{_suggestion(unknown[1])}"
+    return f"{where.replace('.', ' ')}: {text}" if where else text
+
+
+def _suggestion(key: str) -> str:
+    tables = [Machine, Identity, TapSetup, Daq, ModeChoice, Limits, SpeedRange, SpindleTable, SegmentTable]
+    known = {field for table in [*tables, BearingTable, Program] for field in table.__struct_fields__}
+    near = difflib.get_close_matches(key, known, n=1)
+    return f"; is {near[0]!r} meant?" if near else ""

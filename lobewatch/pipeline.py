@@ -1,0 +1,157 @@
+"""From one tap test to one measurement: modes, bearing stiffness, stability lobes. A step that cannot be done is
+recorded with its reason, and the pipeline goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+
+import numpy as np
+from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
+
+from acquisition import TapTest
+from dsm import Calibration, calibrate, modal_stiffness
+from lobes import StabilityLobes, average_angle
+from lobewatch.machine import Machine
+from modal import Mode, fit_modes, predominant
+
+
+@dataclass(frozen=True, eq=False)
+class Dynamics:
+    """Modes of one tap test and the model recalibrated to them."""
+
+    modes: Sequence[Mode]
+    """All modes found, as measured."""
+    followed: Mode | None
+    """The mode that calibration and trend follow."""
+    calibration: Calibration | None
+    """The recalibrated model."""
+    at_tip: Sequence[Mode]
+    """The modes that lobes are computed from, at the tool tip; empty where there are none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """What one tap test says of the spindle."""
+
+    tap_id: str
+    """Of the tap test."""
+    time: datetime
+    """When it was taken."""
+    tool: str
+    """What was in the spindle."""
+    direction: str
+    """Direction at the tool tip, "x" or "y"."""
+    dynamics: Dynamics
+    """Modes and model."""
+    lobes: Mapping[str, StabilityLobes]
+    """Stability lobes by name of the cut."""
+    notes: Sequence[str]
+    """What could not be done, and why."""
+
+
+def analyse(tap: TapTest, machine: Machine, partner: TapTest | None = None) -> Measurement:
+    """All that follows from a tap test; partner: the one in the other direction with the same tool, within a day."""
+    notes: list[str] = []
+    about = tap.circumstances
+    with threadpool_limits(limits=1):
+        seen = _dynamics(tap, machine, notes)
+        other = _dynamics(partner, machine, []).at_tip if partner is not None else []
+        lobes = _lobes(seen.at_tip, other, tap, machine, notes)
+    return Measurement(tap.id, about.created, about.tool, about.direction, seen, lobes, notes)
+
+
+def speed_grid(machine: Machine) -> NDArray[np.float64]:
+    """The common speeds of all diagrams of a machine (rpm), shape ([speed] steps,)."""
+    return np.linspace(machine.speed.low_rpm, machine.speed.high_rpm, machine.speed.steps)
+
+
+def _in_band(modes: Sequence[Mode], machine: Machine) -> list[Mode]:
+    low, high = machine.mode.band_hz or (0.0, np.inf)
+    return [mode for mode in modes if low <= mode.frequency <= high]
+
+
+def _no_mode(modes: Sequence[Mode], machine: Machine) -> str:
+    found = ", ".join(f"{mode.frequency:.0f}" for mode in modes) or "none"
+    if machine.mode.band_hz is None:
+        return f"no mode to follow: none with positive stiffness was found (modes at {found} Hz)"
+    low, high = machine.mode.band_hz
+    return (
+        f"no mode to follow: none with positive stiffness in [mode] band_hz {low:g}..{high:g} Hz (modes at {found} Hz)"
+    )
+
+
+def _dynamics(tap: TapTest, machine: Machine, notes: list[str]) -> Dynamics:
+    modes = fit_modes(tap.frf)
+    followed = predominant(modes, machine.mode.band_hz)
+    if followed is None:
+        notes.append(_no_mode(modes, machine))
+    calibration = _calibrate(followed, machine, notes)
+    return Dynamics(modes, followed, calibration, _modes_at_tip(modes, followed, calibration, machine, notes))
+
+
+def _calibrate(followed: Mode | None, machine: Machine, notes: list[str]) -> Calibration | None:
+    if machine.spindle is None:
+        notes.append("no bearing stiffness: no model ([spindle] is missing in machine.toml)")
+        return None
+    if followed is None:
+        return None
+    std = float(followed.standard_error[0])
+    try:
+        return calibrate(machine.spindle.build(), followed.frequency, std if np.isfinite(std) else None)
+    except ValueError as error:
+        notes.append(f"no bearing stiffness: {error}")
+        return None
+
+
+def _modes_at_tip(
+    modes: Sequence[Mode],
+    followed: Mode | None,
+    calibration: Calibration | None,
+    machine: Machine,
+    notes: list[str],
+) -> list[Mode]:
+    """Modes in the band, carried to the tip by the model where the tap was elsewhere; none where K < 0."""
+    candidates = _in_band(modes, machine)
+    against = [mode for mode in candidates if not mode.is_driving_point]
+    if followed is None:
+        return []
+    if against:
+        where = ", ".join(f"{mode.frequency:.0f}" for mode in against)
+        notes.append(
+            f"no stability lobes: not a driving point, the stiffness of the modes at {where} Hz is negative; hit and "
+            "measure at one point in one direction, or leave these modes out with [mode] band_hz"
+        )
+        return []
+    if machine.tap.position_mm == 0:
+        return candidates
+    if calibration is None:
+        notes.append("no stability lobes: the tap was not at the tool tip ([tap] position_mm), and there is no model")
+        return []
+    return [_carried_to_tip(followed, calibration, machine.tap.position_mm / 1e3)]
+
+
+def _carried_to_tip(mode: Mode, calibration: Calibration, position: float) -> Mode:
+    ratio = modal_stiffness(calibration.spindle) / modal_stiffness(calibration.spindle, position=position)
+    scale = np.array([1.0, 1.0, ratio])
+    covariance = None if mode.covariance is None else mode.covariance * np.outer(scale, scale)
+    return replace(mode, stiffness=mode.stiffness * ratio, covariance=covariance, method=f"{mode.method}, model to tip")
+
+
+def _lobes(
+    at_tip: Sequence[Mode], other: Sequence[Mode], tap: TapTest, machine: Machine, notes: list[str]
+) -> dict[str, StabilityLobes]:
+    if not at_tip:
+        return {}
+    cuts = machine.cuts(tap.circumstances.tool)
+    if not cuts:
+        notes.append("no stability lobes: no [reference_cut] and no [[program]] in machine.toml")
+        return {}
+    direction = tap.circumstances.direction
+    if not other:
+        notes.append(f"stability lobes in the {direction} direction alone: the other one was not tapped within a day")
+    rigid: list[Mode] = []
+    x, y = (at_tip, other) if direction == "x" else (other, at_tip)
+    return {name: average_angle(x or rigid, y or None, cut, speed_grid(machine)) for name, cut in cuts.items()}

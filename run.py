@@ -1,0 +1,95 @@
+#!/usr/bin/env python3
+"""Start lobewatch from a checkout: the demo, its tests, or any command, in an environment of its own (.venv).
+
+    python3 run.py               the demo
+    python3 run.py test [...]    the tests (--long: the long ones too); the rest goes to pytest
+    python3 run.py ARGS          lobewatch ARGS
+
+Needs nothing but Python's standard library; runs far enough under an old Python to say which one is needed.
+"""
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+
+NEEDED = (3, 11)
+ROOT = os.path.dirname(os.path.abspath(__file__))
+VENV = os.path.join(ROOT, ".venv")
+SCRIPTS = os.path.join(VENV, "Scripts" if os.name == "nt" else "bin")
+PYTHON = os.path.join(SCRIPTS, "python.exe" if os.name == "nt" else "python")
+
+
+def stamp(extras):
+    """Digest of all that decides what the environment holds."""
+    digest = hashlib.sha256((sys.version + sys.executable + ROOT).encode())
+    for name in ("pyproject.toml", "run.py"):
+        with open(os.path.join(ROOT, name), "rb") as file:
+            digest.update(file.read())
+    return digest.hexdigest() + extras
+
+
+def installer():
+    """Command that installs into the environment: pip of this Python, else uv; None where there is neither."""
+    pip = [sys.executable, "-m", "pip"]
+    if subprocess.call(pip + ["--version"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) == 0:
+        return pip + ["--python", PYTHON, "--disable-pip-version-check", "install", "--quiet"]
+    uv = shutil.which("uv")
+    return [uv, "pip", "install", "--quiet", "--python", PYTHON] if uv else None
+
+
+def make_environment(extras):
+    """Make .venv and install lobewatch in it, unless it is there already; extras is "" or "[dev]"."""
+    marker = os.path.join(VENV, "lobewatch-stamp")
+    if os.path.exists(marker):
+        with open(marker) as file:
+            present = file.read()
+        if present in (stamp(extras), stamp("[dev]")):
+            return
+    command = installer()
+    if command is None:
+        sys.exit("lobewatch needs pip or uv to install its packages: "
+                 "install one of them (Debian: sudo apt install python3-pip) and start again.")
+    import venv
+
+    print("Setting up %s (once; a minute or two) ..." % VENV, file=sys.stderr)
+    venv.create(VENV, with_pip=False, clear=True)
+    for packages in (["--upgrade", "pip"], ["--editable", ROOT + extras]):
+        status = subprocess.call(command + packages)
+        if status:
+            sys.exit("lobewatch could not install its packages (see above); check the network and start again.")
+    with open(marker, "w") as file:
+        file.write(stamp(extras))
+
+
+def tests(arguments):
+    """Commands that run the tests under coverage and judge it."""
+    run = [PYTHON, "-m", "coverage", "run", "-m", "pytest"]
+    if "--long" in arguments:
+        arguments = ["-m", "long or not long", "--timeout", "3600"] + [a for a in arguments if a != "--long"]
+    whole = not [a for a in arguments if a.endswith(".py") or "::" in a or a == "-k"]
+    return [run + arguments] + ([[PYTHON, "-m", "coverage", "report"]] if whole else [])
+
+
+def main():
+    """Run what the arguments name; the exit status is that of the first command that fails."""
+    if sys.version_info < NEEDED:
+        sys.exit("lobewatch needs Python %d.%d or newer; this is %s." % (NEEDED + (sys.version.split()[0],)))
+    arguments = sys.argv[1:] or ["demo"]
+    testing = arguments[0] == "test"
+    make_environment("[dev]" if testing else "")
+    if testing:
+        os.chdir(ROOT)
+    commands = tests(arguments[1:]) if testing else [[PYTHON, "-m", "lobewatch.cli"] + arguments]
+    for command in commands:
+        try:
+            status = subprocess.call(command)
+        except KeyboardInterrupt:
+            status = 130
+        if status:
+            sys.exit(status)
+
+
+if __name__ == "__main__":
+    main()

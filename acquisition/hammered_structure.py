@@ -93,8 +93,13 @@ class HammeredStructure:
     """Source of every random number."""
     hammering: Hammering = field(default_factory=Hammering)
     """How it is hit."""
+    _noise: np.random.Generator = field(init=False)
     _next_hit: float = field(default=0.0, init=False)
     _waves: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list, init=False)
+
+    def __post_init__(self) -> None:
+        """Noise has a generator of its own, so that hits do not depend on how the stream is cut into blocks."""
+        self._noise = self.random.spawn(1)[0]
 
     def __call__(self, first_scan: int, n_scans: int) -> NDArray[np.float64]:
         """The next n_scans scans."""
@@ -102,7 +107,7 @@ class HammeredStructure:
             self._next_hit += self.random.uniform(*self.hammering.interval_range) * self.sample_rate
             self._waves.append(self._hit(self._next_hit))
         noise = [[self.hammering.force_noise], [self.hammering.response_noise]]
-        signals = self.random.normal(scale=noise, size=(2, n_scans))
+        signals = self._noise.normal(scale=noise, size=(2, n_scans))
         self._waves = [(start, wave) for start, wave in self._waves if start + wave.shape[1] > first_scan]
         for start, wave in self._waves:
             low, high = max(start, first_scan), min(start + wave.shape[1], first_scan + n_scans)

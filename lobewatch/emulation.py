@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from acquisition import Channel, HammeredStructure, Hammering, Structure, TapsEmulator
-from dsm import Bearing, Spindle, natural_modes, static_stiffness
+from dsm import Spindle, modes_at, static_stiffness
 
 MODES = 8
 """Modes integrated; the rest is their static flexibility."""
@@ -22,10 +22,9 @@ CHANNELS = (
 
 def emulated_structure(spindle: Spindle, damping_ratio: float, position: float = 0.0) -> Structure:
     """What a hammer meets at a position (m from the tool tip): modes and static residual of the model."""
-    modes = natural_modes(spindle, MODES)
-    stiffness = modes.stiffness_at(position)
+    frequency, stiffness = modes_at(spindle, MODES, position)
     return Structure(
-        frequency=modes.frequency,
+        frequency=frequency,
         damping_ratio=np.full(MODES, damping_ratio),
         stiffness=stiffness,
         residual=1 / static_stiffness(spindle, position) - float(np.sum(1 / stiffness)),
@@ -34,7 +33,7 @@ def emulated_structure(spindle: Spindle, damping_ratio: float, position: float =
 
 def with_bearing_stiffness(spindle: Spindle, stiffness: float) -> Spindle:
     """The spindle with every bearing at this stiffness (N/m)."""
-    return replace(spindle, bearings=[Bearing(bearing.position, stiffness) for bearing in spindle.bearings])
+    return replace(spindle, bearings=[replace(bearing, stiffness=stiffness) for bearing in spindle.bearings])
 
 
 def emulator(structure: Structure, random: np.random.Generator, *, realtime: bool, tcp: bool = False) -> TapsEmulator:

@@ -1,0 +1,1 @@
+"""The application: tap tests through the whole pipeline, their history, reports and the command line."""

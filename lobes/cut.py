@@ -1,0 +1,88 @@
+"""The cut: cutter, immersion and material, and the conventions of all lobes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+Direction = Literal["up", "down"]
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A milling cut with straight, evenly spaced teeth. Conventions, kept everywhere in this package:
+
+    x is the feed, y the normal to it; the tooth angle phi runs clockwise from +y (rad). A tooth at phi in a cut
+    of depth b answers the displacement q = (x, y) with the force F = -b H(phi) (q(t) - q(t - tau)),
+    H = [[(Kt c + Kr s) s, (Kt c + Kr s) c], [(-Kt s + Kr c) s, (-Kt s + Kr c) c]], s = sin phi, c = cos phi,
+    tau the tooth period. Raises ValueError for a value that is no cut.
+    """
+
+    teeth: int
+    """Number of teeth N."""
+    immersion: float
+    """Radial depth of cut over cutter diameter, above 0 up to 1 (a slot)."""
+    direction: Direction
+    """"up" (conventional) or "down" (climb) milling; no difference in a slot."""
+    tangential: float
+    """Tangential cutting coefficient Kt (Pa)."""
+    radial: float
+    """Radial cutting coefficient Kr (Pa)."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no cut."""
+        if not (self.teeth >= 1 and self.teeth == int(self.teeth)):
+            raise ValueError(f"teeth={self.teeth} is not a whole number >= 1; give the number of cutting edges")
+        if not 0 < self.immersion <= 1:
+            raise ValueError(
+                f"immersion={self.immersion} is not in (0, 1]; give radial depth divided by cutter diameter"
+            )
+        if self.direction not in get_args(Direction):
+            raise ValueError(f'direction={self.direction!r} is neither "up" nor "down"; either will do for a slot')
+        if not (np.isfinite(self.tangential) and self.tangential > 0):
+            raise ValueError(f"tangential={self.tangential} Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
+        if not (np.isfinite(self.radial) and self.radial >= 0):
+            raise ValueError(f"radial={self.radial} Pa is not a finite number >= 0; 1 MPa (N/mm^2) is 1e6 Pa")
+
+    @property
+    def entry_angle(self) -> float:
+        """Angle phi_st at which a tooth enters the cut (rad)."""
+        return 0.0 if self.direction == "up" else float(np.arccos(2 * self.immersion - 1))
+
+    @property
+    def exit_angle(self) -> float:
+        """Angle phi_ex at which a tooth leaves the cut (rad)."""
+        return float(np.arccos(1 - 2 * self.immersion)) if self.direction == "up" else float(np.pi)
+
+    @property
+    def mean_angle(self) -> float:
+        """Average angle of a tooth in the cut (rad)."""
+        return (self.entry_angle + self.exit_angle) / 2
+
+    @property
+    def teeth_in_cut(self) -> float:
+        """Average number of teeth in the cut, Nt* = (phi_ex - phi_st) N / (2 pi)."""
+        return (self.exit_angle - self.entry_angle) * self.teeth / (2 * np.pi)
+
+    @property
+    def specific_force(self) -> float:
+        """Specific cutting force Ks = sqrt(Kt^2 + Kr^2) (Pa)."""
+        return float(np.hypot(self.tangential, self.radial))
+
+    @property
+    def force_angle(self) -> float:
+        """Angle beta between cutting force and surface normal, tan beta = Kt/Kr (rad)."""
+        return float(np.arctan2(self.tangential, self.radial))
+
+    @property
+    def orientation_factors(self) -> tuple[float, float]:
+        """Share of x and of y in the chatter loop of a tooth at the mean angle phi, signed (-).
+
+        mu_x = sin(phi + beta) sin(phi), mu_y = cos(phi + beta) cos(phi). They are H_xx/Ks and H_yy/Ks, to 15 decimals:
+        in a slot mu_y is 0, not the rounding of pi/2.
+        Source: Tlusty; Schmitz & Smith, Machining Dynamics, ch. 4.
+        """
+        phi, force = self.mean_angle, self.mean_angle + self.force_angle
+        return round(float(np.sin(force) * np.sin(phi)), 15), round(float(np.cos(force) * np.cos(phi)), 15)

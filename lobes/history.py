@@ -1,0 +1,115 @@
+"""The stability-lobe diagrams (SLD) of one machine, measurement after measurement."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lobes.speeds import check_speeds
+
+Column = NDArray[np.float64] | NDArray[np.str_]
+SomeColumn = TypeVar("SomeColumn", NDArray[np.float64], Column)
+
+
+@dataclass(frozen=True, eq=False)
+class SldHistory:
+    """Limiting depths of n measurements over one speed grid, for each cut, with what was measured beside them.
+
+    A history begins with arrays of no rows (n = 0): they fix the names and the row shapes. Raises ValueError for
+    names that cannot be stored, arrays of different n, values that are neither numbers nor text, and depths <= 0.
+    """
+
+    settings_hash: str
+    """Hash of the settings that the depths were computed with."""
+    software: str
+    """Name and version of the program that computed them."""
+    speed_rpm: NDArray[np.float64]
+    """Common speed grid (rpm), rising, shape (m,)."""
+    columns: Mapping[str, Column]
+    """Values by name (letters, digits, underscore), one row a measurement: numbers (n,) or (n, k), or text (n,)."""
+    depth: Mapping[str, NDArray[np.float64]]
+    """Limiting depth by name of the cut (m), shape (n, m); inf where stable at any depth, nan where not computed."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """Unit by name of column; a column without one is a plain number or text."""
+
+    def __post_init__(self) -> None:
+        """Convert to arrays and check names, shapes and values."""
+        object.__setattr__(self, "speed_rpm", check_speeds(self.speed_rpm))
+        object.__setattr__(self, "columns", {name: _column(name, c) for name, c in self.columns.items()})
+        object.__setattr__(self, "depth", {name: np.asarray(d, dtype=np.float64) for name, d in self.depth.items()})
+        object.__setattr__(self, "units", dict(self.units))
+        if np.any(np.diff(self.speed_rpm) <= 0):
+            raise ValueError("speed_rpm does not rise from speed to speed; sort the grid")
+        for text in (self.settings_hash, self.software, *self.units.values(), *self.depth):
+            _check_text(text)
+        stray = sorted(self.units.keys() - self.columns.keys())
+        if stray:
+            raise ValueError(f"units has {stray}, but there are only the columns {sorted(self.columns)}")
+        for name, depth in self.depth.items():
+            self._check_depth(name, depth)
+        rows = {name: len(values) for name, values in (*self.columns.items(), *self.depth.items())}
+        if len(set(rows.values())) > 1:
+            raise ValueError(f"columns and depths differ in their number of measurements: {rows}; give one row of each")
+
+    def _check_depth(self, name: str, depth: NDArray[np.float64]) -> None:
+        if not name:
+            raise ValueError("a cut has an empty name; give each cut a name")
+        if depth.ndim != 2 or depth.shape[1] != self.speed_rpm.size:
+            raise ValueError(f"depth of {name!r} has shape {depth.shape}, not (n, {self.speed_rpm.size})")
+        if np.any(depth <= 0):
+            raise ValueError(
+                f"depth of {name!r} has values that are not > 0 m; "
+                "give inf where there is no limit and nan where none was computed"
+            )
+
+    def __len__(self) -> int:
+        """Number of measurements n."""
+        return len(next(iter((*self.columns.values(), *self.depth.values())), ()))
+
+    def append(self, row_columns: Mapping[str, ArrayLike], row_depth: Mapping[str, ArrayLike]) -> SldHistory:
+        """A new history with one more measurement: a value (or (k,) values) for each column, (m,) depths for each cut.
+
+        Raises ValueError where names or shapes are not those of this history.
+        """
+        return replace(self, columns=_extended(self.columns, row_columns), depth=_extended(self.depth, row_depth))
+
+
+def _extended(table: Mapping[str, SomeColumn], row: Mapping[str, ArrayLike]) -> dict[str, SomeColumn]:
+    if table.keys() != row.keys():
+        raise ValueError(f"the new row has {sorted(row)}, the history {sorted(table)}; give a value for each of these")
+    return {name: _with_row(name, values, row[name]) for name, values in table.items()}
+
+
+def _with_row(name: str, values: SomeColumn, row: ArrayLike) -> SomeColumn:
+    new = np.asarray(row)
+    if new.shape != values.shape[1:]:
+        raise ValueError(f"the new row of {name!r} has shape {new.shape}, the history {values.shape[1:]} a row")
+    if (new.dtype.kind == "U") != (values.dtype.kind == "U"):
+        raise ValueError(f"the new row of {name!r} is {new.dtype}, the history {values.dtype}; keep text and numbers")
+    return np.concatenate((values, new[np.newaxis]))
+
+
+def _column(name: str, values: ArrayLike) -> Column:
+    if not name.isidentifier():
+        raise ValueError(f"column name {name!r} is not made of letters, digits and underscores; rename it")
+    column = np.asarray(values)
+    if column.dtype.kind not in "biufU" or column.ndim not in ((1,) if column.dtype.kind == "U" else (1, 2)):
+        raise ValueError(
+            f"column {name!r} is {column.dtype} of shape {column.shape}; give numbers (n,) or (n, k), or text (n,)"
+        )
+    if column.dtype.kind == "U":
+        for text in column:
+            _check_text(text)
+        return column
+    return column.astype(np.float64)
+
+
+def _check_text(text: str) -> None:
+    """Refuse what UTF-8 text in HDF5 cannot hold: a zero character or half a surrogate pair."""
+    if re.search("[\0\ud800-\udfff]", text):
+        raise ValueError(f"text {text!r} holds a character that cannot be stored; leave it out")

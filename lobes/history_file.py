@@ -1,0 +1,96 @@
+"""The SLD history as an HDF5 file.
+
+bytes 0..511           (HDF5 user block) "lobewatch-history 1 sha256 ..." of all that follows
+/                      format "lobewatch-history", version, settings_hash, software
+/speed_rpm             (m,), rpm, the dimension scale of every limiting_depth
+/columns/NAME          (n,) or (n, k), with units; text as variable-length UTF-8
+/cuts/0, /cuts/1 ...   name
+/cuts/0/limiting_depth (n, m), m
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from acquisition import atomic_write
+from lobes.history import Column, SldHistory
+
+FORMAT = "lobewatch-history"
+VERSION = 1
+HEAD_SIZE = 512
+"""Smallest user block of HDF5 (bytes)."""
+
+
+def write_history(path: str | os.PathLike[str], history: SldHistory) -> None:
+    """Write the whole file anew: complete under its name, or the old one as it was. OSError where that fails."""
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w", userblock_size=HEAD_SIZE) as file:
+        file.attrs.update(
+            format=FORMAT, version=VERSION, settings_hash=history.settings_hash, software=history.software
+        )
+        speed = file.create_dataset("speed_rpm", data=history.speed_rpm)
+        speed.attrs["units"] = "rpm"
+        speed.make_scale("speed_rpm")
+        columns = file.create_group("columns", track_order=True)
+        for name, values in history.columns.items():
+            _write_column(columns, name, values, history.units.get(name))
+        cuts = file.create_group("cuts")
+        for i, (name, depth) in enumerate(history.depth.items()):
+            cut = cuts.create_group(str(i))
+            cut.attrs["name"] = name
+            dataset = cut.create_dataset("limiting_depth", data=depth)
+            dataset.attrs["units"] = "m"
+            dataset.dims[1].attach_scale(speed)
+    body = buffer.getvalue()[HEAD_SIZE:]
+    atomic_write(Path(path), _head(body) + body)
+
+
+def read_history(path: str | os.PathLike[str]) -> SldHistory:
+    """The history of a file. FileNotFoundError where there is none, ValueError where it is no sound history.
+
+    The checksum is verified before HDF5 sees the file: one flipped bit can make it hang, or pass unnoticed.
+    """
+    content = Path(path).read_bytes()
+    if content[:HEAD_SIZE] != _head(content[HEAD_SIZE:]):
+        raise ValueError(
+            f"{os.fspath(path)}: damaged, or no {FORMAT} file of version {VERSION}; "
+            "a history is derived from the taps: rebuild it"
+        )
+    with h5py.File(io.BytesIO(content), "r") as file:
+        return _read(file)
+
+
+def _head(body: bytes) -> bytes:
+    return f"{FORMAT} {VERSION} sha256 {hashlib.sha256(body).hexdigest()}\n".encode().ljust(HEAD_SIZE, b"\0")
+
+
+def _write_column(columns: h5py.Group, name: str, values: Column, units: str | None) -> None:
+    if values.dtype.kind == "U":
+        dataset = columns.create_dataset(name, data=values.astype(object), dtype=h5py.string_dtype())
+    else:
+        dataset = columns.create_dataset(name, data=values)
+    if units is not None:
+        dataset.attrs["units"] = units
+
+
+def _read(file: h5py.File) -> SldHistory:
+    columns, cuts = file["columns"], file["cuts"]
+    return SldHistory(
+        settings_hash=file.attrs["settings_hash"],
+        software=file.attrs["software"],
+        speed_rpm=file["speed_rpm"][...],
+        columns={name: _read_column(dataset) for name, dataset in columns.items()},
+        depth={cuts[i].attrs["name"]: cuts[i]["limiting_depth"][...] for i in sorted(cuts, key=int)},
+        units={name: dataset.attrs["units"] for name, dataset in columns.items() if "units" in dataset.attrs},
+    )
+
+
+def _read_column(dataset: h5py.Dataset) -> Column:
+    text = h5py.check_string_dtype(dataset.dtype) is not None
+    return np.asarray(dataset.asstr()[...], dtype=np.str_) if text else np.asarray(dataset[...])

@@ -1,0 +1,103 @@
+"""The receptance at the tool tip as a function of frequency, from modes or from a measured FRF."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from acquisition import Frf
+from modal import Mode
+
+Tip = Frf | Sequence[Mode]
+"""What is known of the tool tip in one direction: its measured FRF, or its modes."""
+
+MODE_STEP = 0.02
+"""Spacing of the grid: in half-power half-widths near a mode, relative to the distance from it further away."""
+FAR = 100
+"""Modes are followed up to this many times the highest natural frequency ..."""
+FAR_TEETH = 2
+"""... and this many tooth frequencies: with in-phase modes, the deciding crossing comes within the first two."""
+STEPS_PER_LINE = 4
+"""Grid points from one line of an FRF to the next."""
+
+
+@dataclass(frozen=True, eq=False)
+class TipResponse:
+    """Receptance of one direction, or a weighted sum of two."""
+
+    grid: NDArray[np.float64]
+    """Frequencies that show every turn of the receptance, rising (Hz), shape (p,); known nowhere outside."""
+    receptance: Callable[[NDArray[np.float64]], NDArray[np.complex128]]
+    """Receptance (m/N) at any frequencies (Hz) between the ends of the grid, same shape."""
+
+
+def tip_response(tip: Tip, direction: str, tooth_frequency: float) -> TipResponse:
+    """Receptance of one direction, for lobes up to a tooth frequency (Hz).
+
+    An FRF counts inside its usable band, between its lines by a cubic spline. With two lines in zeta f_n straight
+    lines would cut up to 3 % off the extreme real part, the spline changes it by up to 0.4 %; with one line in
+    zeta f_n neither will do (11 % and 8 %): record longer. Raises ValueError for no modes and for a mode that is
+    not of a driving point; `direction` names the culprit.
+    """
+    if isinstance(tip, Frf):
+        return _from_frf(tip.in_band(tip.usable_band))
+    if not tip:
+        raise ValueError(f"{direction} has no modes; give at least one mode, or the FRF itself")
+    for mode in tip:
+        if not mode.is_driving_point:
+            raise ValueError(
+                f"the mode at {mode.frequency:g} Hz of {direction} has stiffness {mode.stiffness:g} N/m, which is not "
+                "of a driving point; leave it out, or tap where the sensor sits"
+            )
+    return _from_modes(tip, tooth_frequency)
+
+
+def weighted_sum(parts: Sequence[tuple[float, TipResponse]]) -> TipResponse:
+    """Sum of weight times receptance, known where all parts are; ValueError where their bands do not overlap."""
+    low = max(part.grid[0] for _, part in parts)
+    high = min(part.grid[-1] for _, part in parts)
+    if not low < high:
+        raise ValueError(
+            f"x and y have no band in common: one ends at {high:g} Hz, the other begins at {low:g} Hz; "
+            "give FRFs that overlap"
+        )
+    grid = np.unique(np.concatenate([part.grid for _, part in parts]))
+
+    def receptance(frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+        total = np.zeros(np.shape(frequency), dtype=np.complex128)
+        for weight, part in parts:
+            total += weight * part.receptance(frequency)
+        return total
+
+    return TipResponse(grid[(grid >= low) & (grid <= high)], receptance)
+
+
+def _from_frf(frf: Frf) -> TipResponse:
+    lines = np.arange(frf.frequency.size)
+    steps = np.arange(lines[-1] * STEPS_PER_LINE + 1) / STEPS_PER_LINE
+    return TipResponse(np.interp(steps, lines, frf.frequency), CubicSpline(frf.frequency, frf.receptance))
+
+
+def _from_modes(modes: Sequence[Mode], tooth_frequency: float) -> TipResponse:
+    highest = FAR * max(mode.frequency for mode in modes) + FAR_TEETH * tooth_frequency
+    grid = np.unique(np.concatenate([[0.0, highest], *(_around(mode, highest) for mode in modes)]))
+
+    def receptance(frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+        total = np.zeros(np.shape(frequency), dtype=np.complex128)
+        for mode in modes:
+            total += mode.receptance(frequency)
+        return total
+
+    return TipResponse(grid, receptance)
+
+
+def _around(mode: Mode, highest: float) -> NDArray[np.float64]:
+    """Frequencies up to `highest` (Hz), dense at the mode."""
+    width = mode.damping_ratio * mode.frequency
+    distance = width * np.sinh(np.arange(0.0, np.arcsinh(highest / width), MODE_STEP))
+    around = mode.frequency + np.concatenate((-distance[::-1], distance))
+    return around[(around > 0) & (around < highest)]

@@ -30,6 +30,11 @@ class HitFlags(enum.Flag):
         """The verdict alone, e.g. "double hit, overload (force)"."""
         return ", ".join(_WORDS[flag][0] for flag in self) or "good"
 
+    @property
+    def cure(self) -> str:
+        """What to do about it, a sentence a fault; empty when all is well."""
+        return " ".join(_WORDS[flag][1] for flag in self)
+
     @classmethod
     def from_words(cls, words: str) -> HitFlags:
         """The flags whose `words` these are; ValueError for unknown ones."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import select
 import socket
 import threading
@@ -47,7 +48,7 @@ class SerialLink:
         try:
             self._serial.write(data)
         except (OSError, TermiosError) as error:
-            raise self._unplugged(error) from error
+            raise self._unplugged() from error
 
     def read(self, timeout: float) -> bytes:
         """All that has arrived, after at most timeout (s); empty where nothing came. DeviceError: unplugged."""
@@ -55,7 +56,7 @@ class SerialLink:
         with self._arrived:
             while not self._chunks:
                 if self._failure is not None:
-                    raise self._unplugged(self._failure) from self._failure
+                    raise self._unplugged() from self._failure
                 if not self._arrived.wait(max(deadline - time.monotonic(), 0)):
                     return b""
             data = b"".join(self._chunks)
@@ -91,10 +92,8 @@ class SerialLink:
                 self._waiting += len(data)
                 self._arrived.notify()
 
-    def _unplugged(self, error: Exception) -> DeviceError:
-        return DeviceError(
-            f"the DAQ on {self.port} was unplugged or switched off ({error}); plug it in and repeat the command"
-        )
+    def _unplugged(self) -> DeviceError:
+        return DeviceError(f"the DAQ on {self.port} was unplugged or switched off; plug it in and repeat the command")
 
 
 class _TcpPort:
@@ -147,4 +146,5 @@ def _explain(port: str, error: Exception) -> str:
         "refused": "nothing listens there: start the device or emulator first",
     }
     cure = next((hint for word, hint in hints.items() if word in text), "check the port's name and the cable")
-    return f"port {port} cannot be opened ({text}); {cure}"
+    reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else text
+    return f"port {port} cannot be opened ({reason}); {cure}"

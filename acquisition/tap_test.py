@@ -89,11 +89,12 @@ def average_good(hits: Sequence[Hit]) -> tuple[Frf, tuple[HitFlags, ...]]:
         reasons = "; ".join(
             f"hit {i}: {_reason(hit, flag)}" for i, (hit, flag) in enumerate(zip(hits, flags, strict=True), 1)
         )
-        raise DataError(f"none of {len(hits)} hits can be used ({reasons})")
+        raise DataError(f"no good hit of {len(hits)}: {reasons}")
     return estimate_frf(good), flags
 
 
 def _reason(hit: Hit, flags: HitFlags) -> str:
     """The verdict; an overload of a recording without converter codes is inferred, and says from what."""
     inferred = hit.codes is None and flags & (HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE)
-    return f"{flags}{' (inferred: its extreme value stands in a run of equal samples)' if inferred else ''}"
+    why = " (inferred: its extreme value stands in a run of equal samples)" if inferred else ""
+    return f"{flags.words}{why}. {flags.cure}"

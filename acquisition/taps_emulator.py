@@ -55,7 +55,7 @@ class TapsEmulator:
         self._wire: Wire = TcpWire() if tcp or os.name == "nt" else PtyWire()
         self.port = self._wire.port
         self._decoder = FrameDecoder()
-        self._seq = self._session = self._frames = self._scan = self._overruns = 0
+        self._seq = self._session = self._frames = self._scan = self._clock = self._overruns = 0
         self._streaming = self._lost = False
         self._n_scans, self._started, self._status_due = 0, 0.0, 0.0
         self._per_frame = 512
@@ -178,7 +178,8 @@ class TapsEmulator:
             time.sleep(0.5 * self._per_frame / self._rate)
 
     def _send_scans(self, overrun: bool) -> None:
-        codes = quantise(self._signal(self._scan, self._per_frame), self._channels)
+        codes = quantise(self._signal(self._clock, self._per_frame), self._channels)
+        self._clock += self._per_frame
         if overrun:
             self._lost = True
             self._overruns += 1

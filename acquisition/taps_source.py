@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
 from types import TracebackType
@@ -34,6 +35,7 @@ class TapsSource:
         """
         self._link = SerialLink(port)
         self._decoder = FrameDecoder()
+        self._frames: deque[Frame] = deque()
         self._seq = 0
         self._session: int | None = None
         self._next_scan = 0
@@ -88,10 +90,10 @@ class TapsSource:
         """Blocks with the scans lost before each; DeviceError where the device falls silent or is unplugged."""
         heard = time.monotonic()
         while self._streaming:
-            for frame in self._decoder.feed(self._link.read(0.1)):
-                if frame.type == MessageType.DATA and frame.session == self._session:
-                    heard = time.monotonic()
-                    yield self._block(frame)
+            frame = self._next_frame(0.1)
+            if frame is not None and frame.type == MessageType.DATA and frame.session == self._session:
+                heard = time.monotonic()
+                yield self._block(frame)
             if time.monotonic() - heard > SILENCE:
                 raise DeviceError(
                     f"the DAQ on {self._link.port} has sent no samples for {SILENCE:g} s; "
@@ -129,13 +131,19 @@ class TapsSource:
             self._link.write(self._encode(kind, body))
             deadline = time.monotonic() + ANSWER_TIME
             while (left := deadline - time.monotonic()) > 0:
-                for frame in self._decoder.feed(self._link.read(left)):
-                    if self._answers(frame, answer):
-                        return frame
+                frame = self._next_frame(left)
+                if frame is not None and self._answers(frame, answer):
+                    return frame
         raise DeviceError(
             f"no TAPS/1 device answers on {self._link.port} ({kind.name}, {TRIES} tries); "
             "check that this is the DAQ's port and that it is switched on"
         )
+
+    def _next_frame(self, timeout: float) -> Frame | None:
+        """The next frame in order of arrival; None where nothing came in time (s)."""
+        if not self._frames:
+            self._frames.extend(self._decoder.feed(self._link.read(timeout)))
+        return self._frames.popleft() if self._frames else None
 
     def _answers(self, frame: Frame, answer: MessageType) -> bool:
         about = int.from_bytes(frame.body[:4], "little")

@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 
 from lobewatch.commands.calibrate import calibrate
 from lobewatch.commands.demo import demo
@@ -58,7 +59,7 @@ def main() -> None:
     except (ValueError, OSError) as error:
         if "--debug" in sys.argv:
             raise
-        notes.print(f"[bold red]error:[/] {_sentence(error)}".replace("\\", "\\\\"))
+        notes.print("[bold red]error:[/]", escape(_sentence(error)))
         sys.exit(2)
 
 

@@ -9,7 +9,7 @@ from rich.table import Table
 
 from dsm import Calibration
 from lobes import StabilityLobes
-from lobewatch.machine import Machine
+from lobewatch.machine import REFERENCE_CUT, Machine
 from lobewatch.output import plus_minus, table
 from lobewatch.pipeline import Measurement
 from modal import Mode
@@ -32,7 +32,7 @@ def mode_json(mode: Mode) -> dict[str, Any]:
 
 def mode_table(modes: Sequence[Mode]) -> Table:
     """Modes, a line each, value ± standard error."""
-    made = table("f_n (Hz)", "zeta (%)", "K (N/um)", "<", "<found by")
+    made = table("f_n (Hz)", "zeta (%)", "K (N/um)", "<")
     for mode in modes:
         frequency, damping, stiffness = mode.standard_error
         made.add_row(
@@ -40,7 +40,6 @@ def mode_table(modes: Sequence[Mode]) -> Table:
             plus_minus(mode.damping_ratio, damping, 0.01),
             plus_minus(mode.stiffness, stiffness, 1e6),
             "" if mode.is_driving_point else "not a driving point",
-            mode.method,
         )
     return made
 
@@ -140,9 +139,9 @@ def measurement_texts(m: Measurement, machine: Machine) -> list[str | Table]:
         texts.append(f"followed: {m.dynamics.followed.frequency:.2f} Hz")
     if m.dynamics.calibration is not None:
         texts.append(calibration_lines(m.dynamics.calibration))
-    for name, lobes in m.lobes.items():
-        low = lobes.minimum
-        texts.append(f"{name}: lowest limit {low.depth * 1e3:.2f} mm at {low.speed_rpm:.0f} rpm ({lobes.method})")
+    if REFERENCE_CUT in m.lobes:
+        low = m.lobes[REFERENCE_CUT].minimum
+        texts.append(f"{REFERENCE_CUT}: lowest limit {low.depth * 1e3:.2f} mm at {low.speed_rpm:.0f} rpm")
     programs = program_json(m.lobes, machine)
     if programs:
         texts.append(program_table(programs))

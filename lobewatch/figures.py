@@ -116,6 +116,7 @@ def trend_figure(
     axes.xaxis.set_major_locator(locator)
     axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
     axes.set(ylabel=label)
+    axes.margins(y=0.12)
     return figure
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 from rich.console import Console
@@ -12,9 +12,9 @@ from rich.table import Table
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]
 
-notes = Console(stderr=True, highlight=False, soft_wrap=True)
+notes = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 """Progress and remarks."""
-results = Console(highlight=False, soft_wrap=True)
+results = Console(highlight=False, soft_wrap=True, emoji=False)
 """What was asked for."""
 
 
@@ -31,7 +31,8 @@ def table(*headings: str) -> Table:
     """An empty table; a heading that begins with "<" names a column of text."""
     made = Table(box=None, pad_edge=False, header_style="bold")
     for heading in headings:
-        made.add_column(heading.removeprefix("<"), justify="left" if heading.startswith("<") else "right")
+        justify: Literal["left", "right"] = "left" if heading.startswith("<") else "right"
+        made.add_column(heading.removeprefix("<"), justify=justify, no_wrap=True)
     return made
 
 

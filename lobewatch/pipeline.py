@@ -152,6 +152,5 @@ def _lobes(
     direction = tap.circumstances.direction
     if not other:
         notes.append(f"stability lobes in the {direction} direction alone: the other one was not tapped within a day")
-    rigid: list[Mode] = []
     x, y = (at_tip, other) if direction == "x" else (other, at_tip)
-    return {name: average_angle(x or rigid, y or None, cut, speed_grid(machine)) for name, cut in cuts.items()}
+    return {name: average_angle(x or None, y or None, cut, speed_grid(machine)) for name, cut in cuts.items()}

@@ -49,6 +49,7 @@ def taps(
             results.print(json.dumps({"port": device.port, **first}), markup=False)
         else:
             results.print(f"port {device.port}", markup=False)
+        results.file.flush()
         notes.print(f"the truth: f_1 {first['frequency_hz']:.2f} Hz, K {first['stiffness_n_per_m'] / 1e6:.3f} N/um")
         notes.print(f"tap with: lobewatch tap {machine} --port {device.port}   (Ctrl-C ends the emulator)")
         device.wait()

@@ -65,7 +65,7 @@ def tap(
 
 def _show(wanted: int) -> OnHit:
     def on_hit(hit: Hit, flags: HitFlags, good: int) -> None:
-        verdict = f"[bold red]✗ {flags.words.upper()}[/]  {flags}" if flags else "[bold green]✓ GOOD[/]"
+        verdict = f"[bold red]✗ {flags.words.upper()}[/]  {flags.cure}" if flags else "[bold green]✓ GOOD[/]"
         notes.print(f"{good:3d} / {wanted}  {verdict}  ({hit.force.max():.0f} N)")
 
     return on_hit

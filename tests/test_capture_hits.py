@@ -1,0 +1,111 @@
+"""The trigger: crossings, hysteresis, real pre-trigger samples, whatever the blocks are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from acquisition import Block, Channel, DataError, HammeredStructure, SimulatedSource, Trigger, capture_hits
+
+RATE = 1000.0
+UNIT = (Channel("force", 1.0, 32768.0), Channel("acceleration", 1.0, 32768.0))
+TRIGGER = Trigger(level=100.0, n_samples=50, pre_trigger=10)
+
+
+class Recorded:
+    """A source that plays back force samples, with gaps."""
+
+    sample_rate = RATE
+
+    def __init__(
+        self, force: NDArray[np.int32], block: int = 7, gaps: tuple[int, ...] = (), channels: tuple[Channel, ...] = UNIT
+    ) -> None:
+        self.channels = channels
+        self._codes = np.stack([force, np.arange(force.size, dtype=np.int32)])
+        self._block, self._gaps = block, gaps
+
+    def start(self) -> None: ...
+
+    def stop(self) -> None: ...
+
+    def blocks(self) -> Iterator[Block]:
+        for first in range(0, self._codes.shape[1], self._block):
+            lost = 5 if first in self._gaps else 0
+            yield Block(first, self._codes[:, first : first + self._block], lost_before=lost)
+
+
+def force(*hits: int, n: int = 400, shape: tuple[int, ...] = (30, 70, 150, 300, 150, 40)) -> NDArray[np.int32]:
+    signal = np.zeros(n, np.int32)
+    for at in hits:
+        signal[at : at + len(shape)] = shape
+    return signal
+
+
+@settings(max_examples=50)
+@given(st.integers(1, 60), st.integers(15, 100), st.integers(70, 200))
+def test_hits_are_cut_at_the_crossing_whatever_the_blocks(block: int, first: int, gap: int) -> None:
+    hits = list(capture_hits(Recorded(force(first, first + gap), block), TRIGGER))
+    assert [int(hit.acceleration[0]) for hit in hits] == [first + 2 - 10, first + gap + 2 - 10]
+    assert all(hit.force.size == 50 and hit.pre_trigger == 10 and hit.force[10] == 150 for hit in hits)
+
+
+def test_a_hit_without_enough_real_samples_before_it_is_passed_over() -> None:
+    assert [int(hit.acceleration[0]) for hit in capture_hits(Recorded(force(5, 200)), TRIGGER)] == [192]
+
+
+def test_a_signal_that_hangs_between_the_levels_does_not_arm_the_trigger() -> None:
+    signal = force(200)
+    signal[100:199] = 60
+    assert list(capture_hits(Recorded(signal), TRIGGER)) == []
+
+
+def test_below_the_level_nothing_happens_and_an_offset_is_no_hit() -> None:
+    assert list(capture_hits(Recorded(force(100, shape=(40, 99, 40))), TRIGGER)) == []
+    assert list(capture_hits(Recorded(np.full(4000, 60, np.int32)), TRIGGER)) == []
+
+
+@pytest.mark.parametrize(("gap_at", "lost"), [(98, 0), (105, 5), (147, 5), (154, 0)])
+def test_a_gap_counts_for_the_hit_that_it_touches_only(gap_at: int, lost: int) -> None:
+    (hit,) = capture_hits(Recorded(force(106), 7, (gap_at,)), TRIGGER)
+    assert hit.lost_scans == lost
+
+
+def test_simulated_hits_start_at_the_trigger(
+    tapper: Callable[..., HammeredStructure], channels: tuple[Channel, Channel]
+) -> None:
+    source = SimulatedSource(tapper(), channels, 25600.0, 80_000)
+    source.start()
+    hits = list(capture_hits(source, Trigger(20.0, 6400, 512)))
+    assert len(hits) >= 5
+    for hit in hits:
+        assert np.max(hit.force[:512]) < 20 <= hit.force[512]
+        assert hit.time[512] == 0
+
+
+@pytest.mark.parametrize("quantities", [("force", "force"), ("acceleration", "acceleration"), ("force",)])
+def test_one_force_and_one_acceleration_channel_are_needed(quantities: tuple[str, ...]) -> None:
+    channels = tuple(Channel(quantity, 1.0, 5.0) for quantity in quantities)  # type: ignore[arg-type]
+    with pytest.raises(DataError, match="one force and one acceleration channel are needed"):
+        list(capture_hits(Recorded(force(100), channels=channels), TRIGGER))
+
+
+def test_swapped_inputs_are_told_by_what_they_measure() -> None:
+    (hit,) = capture_hits(_Swapped(), TRIGGER)
+    assert np.max(hit.force) == 300
+
+
+class _Swapped(Recorded):
+    def __init__(self) -> None:
+        super().__init__(force(100), channels=(UNIT[1], UNIT[0]))
+        self._codes = self._codes[::-1]
+
+
+@pytest.mark.parametrize(("level", "n", "before"), [(0.0, 50, 10), (np.nan, 50, 10), (1.0, 50, 50), (1.0, 50, 0)])
+def test_a_trigger_that_cannot_work_is_refused(level: float, n: int, before: int) -> None:
+    with pytest.raises(ValueError, match="trigger level|pre_trigger"):
+        Trigger(level, n, before)

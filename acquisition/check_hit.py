@@ -19,7 +19,7 @@ DOUBLE_SHARE = 0.03
 DOUBLE_NOISE_RATIO = 6.0
 """... and above this many times the baseline's rms is a double hit."""
 DECAYED_SHARE = 0.02
-"""rms of the last tenth of the response against its largest rms over a tenth: above this it was cut off."""
+"""rms of the last tenth of the response against its largest rms over a tenth: above this and above twice the noise it was cut off."""
 
 
 def check_hit(hit: Hit) -> HitFlags:
@@ -40,7 +40,7 @@ def check_hit(hit: Hit) -> HitFlags:
         flags |= HitFlags.TOO_SOFT
     if _second_peak(pulse) > max(DOUBLE_SHARE * pulse.peak, DOUBLE_NOISE_RATIO * pulse.baseline_rms):
         flags |= HitFlags.DOUBLE_HIT
-    if _is_cut_off(hit.acceleration):
+    if _is_cut_off(hit):
         flags |= HitFlags.NOT_DECAYED
     return flags
 
@@ -90,7 +90,8 @@ def _duration(signal: NDArray[np.float64]) -> int:
     return int(high - low) + 1
 
 
-def _is_cut_off(response: NDArray[np.float64]) -> bool:
-    tenths = np.array_split(response - np.mean(response), 10)
-    levels = [float(np.std(tenth)) for tenth in tenths]
-    return levels[-1] > DECAYED_SHARE * max(levels)
+def _is_cut_off(hit: Hit) -> bool:
+    levels = [float(np.std(tenth)) for tenth in np.array_split(hit.acceleration, 10)]
+    quiet = hit.acceleration[: int(0.8 * hit.pre_trigger)]
+    noise = float(np.std(quiet)) if quiet.size >= 8 else 0.0
+    return levels[-1] > max(DECAYED_SHARE * max(levels), 2 * noise)

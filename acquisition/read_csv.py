@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from acquisition.errors import DataError
 from acquisition.frf import Frf
 from acquisition.hit import Hit
-from acquisition.units import FACTORS, STANDARD_GRAVITY, to_si
+from acquisition.units import FACTORS, STANDARD_GRAVITY, hit_from
 
 EVEN = 1e-3
 """Largest deviation of a time step from the mean step, as a share of it."""
@@ -41,7 +41,7 @@ def read_table(path: Path) -> Table:
     lines = [line for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines() if line.strip()]
     if len(lines) < 2:
         raise DataError(f"{path}: {len(lines)} lines; a heading and rows of numbers are needed")
-    separator, comma = _dialect(lines[1])
+    separator, comma = _dialect(lines[1:])
     heading = [word.strip().strip('"') for word in re.split(separator, lines[0].strip())]
     rows = [_row(path, i, line, separator, comma, len(heading)) for i, line in enumerate(lines[1:], 2)]
     names, units = zip(*(_name_and_unit(word) for word in heading), strict=True)
@@ -68,9 +68,11 @@ def hit_of(path: Path, table: Table) -> Hit:
     faults = _faults(table)
     if faults:
         raise DataError(f"{path}: not usable as a tap test: {'; '.join(faults)}")
-    columns = {unit: values for unit, values in zip(table.units[1:], table.values[1:], strict=True) if unit}
-    signals = to_si(path, columns)
-    return Hit(signals["force"], signals["acceleration"], 1 / float(np.mean(np.diff(table.values[0]))))
+    columns = [
+        (unit or name, values)
+        for name, unit, values in zip(table.names[1:], table.units[1:], table.values[1:], strict=True)
+    ]
+    return hit_from(path, columns, 1 / float(np.mean(np.diff(table.values[0]))))
 
 
 def _faults(table: Table) -> list[str]:
@@ -94,15 +96,13 @@ def _gravity_fault(name: str, unit: str, values: NDArray[np.float64]) -> str:
     return ""
 
 
-def _dialect(row: str) -> tuple[str, bool]:
+def _dialect(rows: list[str]) -> tuple[str, bool]:
     """Separator (a pattern) and whether the decimal sign is a comma."""
-    if "\t" in row:
-        return r"\t", "," in row
-    if ";" in row:
-        return ";", "," in row
-    if re.search(r",", row):
-        return ",", False
-    return r"\s+", False
+    has_comma = any("," in row for row in rows)
+    for separator in ("\t", ";"):
+        if separator in rows[0]:
+            return separator, has_comma
+    return ("," if has_comma else r"\s+"), False
 
 
 def _row(path: Path, number: int, line: str, separator: str, comma: bool, n: int) -> list[float]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from acquisition.errors import DataError
 from acquisition.hit import Hit
-from acquisition.units import to_si
+from acquisition.units import hit_from
 
 MAGIC = "LabVIEW Measurement"
 _END = "***End_of_Header***"
@@ -49,8 +49,7 @@ def _read_segment(path: Path, lines: list[str], places: tuple[int, int, int], co
             f"{path}: {min(len(rows), after - first)} of {n_samples} samples are there; the file is cut short"
         )
     columns = _numbers(path, rows, first + 1, len(units), comma)
-    signals = to_si(path, dict(zip(units, columns, strict=True)))
-    return Hit(signals["force"], signals["acceleration"], 1 / step)
+    return hit_from(path, list(zip(units, columns, strict=True)), 1 / step)
 
 
 def _numbers(path: Path, rows: list[str], first_line: int, n: int, comma: bool) -> NDArray[np.float64]:

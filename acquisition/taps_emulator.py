@@ -82,7 +82,7 @@ class TapsEmulator:
 
     def _serve(self) -> None:
         while not self._stopping:
-            for frame in self._decoder.feed(self._wire.exchange(0.0 if self._streaming else 0.05)):
+            for frame in self._decoder.feed(self._wire.exchange(0.0 if self._streaming and self._has_room() else 0.05)):
                 self._answer(frame)
             if self._streaming:
                 self._stream()
@@ -163,19 +163,22 @@ class TapsEmulator:
         """Send the frames that are due, drop them where the host has fallen behind, report now and then."""
         now = time.monotonic()
         due = self._scan + self._per_frame if not self._realtime else int((now - self._started) * self._rate)
-        backlog = int(BUFFER_SECONDS * self._rate) * 4 if self._realtime else 1 << 16
-        if not self._realtime and len(self._wire.pending) > backlog:
-            self._wire.exchange(0.05)
+        if not self._realtime and not self._has_room():
             return
         if self._faults.stall_after is not None and self._scan >= self._faults.stall_after:
             return
         while self._scan + self._per_frame <= due:
-            self._send_scans(len(self._wire.pending) > backlog)
+            self._send_scans(overrun=not self._has_room())
         if now >= self._status_due:
             self._status_due = now + STATUS_INTERVAL
             self._send(MessageType.STATUS, Status(self._scan, self._scan, 0, self._overruns, 31.5).encode())
         if self._realtime:
             time.sleep(0.5 * self._per_frame / self._rate)
+
+    def _has_room(self) -> bool:
+        """Whether the device's buffer takes another frame; when not in real time, little is sent ahead of the host."""
+        size = int(BUFFER_SECONDS * self._rate) * 4 if self._realtime else 1 << 16
+        return len(self._wire.pending) <= size
 
     def _send_scans(self, overrun: bool) -> None:
         codes = quantise(self._signal(self._clock, self._per_frame), self._channels)

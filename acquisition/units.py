@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.errors import DataError
+from acquisition.hit import Hit
 
 STANDARD_GRAVITY = 9.80665
 """m/s^2 per g."""
@@ -29,18 +30,21 @@ FACTORS: Mapping[str, tuple[str, float]] = {
 """Unit label in lower case -> quantity and factor to SI."""
 
 
-def to_si(path: Path, columns: Mapping[str, NDArray[np.float64]]) -> dict[str, NDArray[np.float64]]:
-    """Force (N) and acceleration (m/s^2) out of columns named by their unit; DataError unless there is one of each."""
+def hit_from(path: Path, columns: Sequence[tuple[str, NDArray[np.float64]]], sample_rate: float) -> Hit:
+    """The hit in columns of known unit; DataError unless there is one force and one acceleration, all finite."""
     signals: dict[str, NDArray[np.float64]] = {}
-    for unit, values in columns.items():
+    for unit, values in columns:
         quantity, factor = FACTORS.get(unit.strip().lower(), ("", 0.0))
         if not quantity:
-            known = ", ".join(FACTORS)
-            raise DataError(f"{path}: unit {unit!r} is not known; known are {known}")
+            raise DataError(f"{path}: unit {unit!r} is not known; known are {', '.join(FACTORS)}")
         if quantity in signals:
             raise DataError(f"{path}: two columns are {quantity}; one force and one acceleration are needed")
         signals[quantity] = values * factor
     missing = {"force", "acceleration"} - set(signals)
     if missing:
-        raise DataError(f"{path}: no {' and no '.join(sorted(missing))} channel (units {', '.join(columns)})")
-    return signals
+        units = ", ".join(unit for unit, _ in columns)
+        raise DataError(f"{path}: no {' and no '.join(sorted(missing))} channel (units {units})")
+    try:
+        return Hit(signals["force"], signals["acceleration"], sample_rate)
+    except ValueError as error:
+        raise DataError(f"{path}: {error}") from error

@@ -82,7 +82,8 @@ def test_lost_frames_are_counted_exactly_and_mark_the_hits(fault: Faults, tapper
         assert received[-1].first_scan + 512 == 30 * 512 + 4 * 512
         source.start()
         hits = list(islice(capture_hits(source, TRIGGER), 3))
-    assert [hit.lost_scans for hit in hits if hit.lost_scans not in (512, 1024)] == []
+    # 6400 scans have 12 or 13 joints between frames inside them, every sixth of which is a gap of 512
+    assert {hit.lost_scans for hit in hits} <= {1024, 1536}
 
 
 def test_unplugging_is_said_in_one_sentence(tapper: Tapper, channels: Pair) -> None:

@@ -1,0 +1,146 @@
+"""Files of other programs: LVM and text tables, real ones and every fault that people make in them."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition import DataError, HitFlags, check_hit, read_frf, read_hits, read_recording, recording_time
+
+N = 2000
+RATE = 5000.0
+TIME = np.arange(N) / RATE
+FORCE = np.where(np.abs(TIME - 0.05) < 1e-3, 100 * np.cos(np.pi * (TIME - 0.05) / 2e-3) ** 2, 0.0)
+ACCELERATION = np.where(TIME > 0.05, 50 * np.exp(-60 * (TIME - 0.05)) * np.sin(2 * np.pi * 300 * TIME), 0.0)
+
+
+def table(path: Path, heading: str, *columns: np.ndarray, separator: str = ",", comma: bool = False) -> Path:  # type: ignore[type-arg]
+    rows = [separator.join(f"{value:.8g}" for value in row) for row in zip(*columns, strict=True)]
+    text = "\n".join([heading, *(row.replace(".", ",") if comma else row for row in rows)])
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_real_lvm_with_decimal_comma_is_read_in_si(beam: Path) -> None:
+    (hit,) = read_hits(beam)
+    assert hit.force.size == 50030
+    assert hit.sample_rate == pytest.approx(50000.0)
+    assert np.max(hit.force) == pytest.approx(195.605522)
+    assert hit.acceleration[0] == pytest.approx(-0.007387 * 9.80665)
+    assert check_hit(hit) == HitFlags.OK
+    assert recording_time(beam).strftime("%Y-%m-%d %H:%M:%S") == "2018-12-17 10:18:21"
+
+
+def test_real_cnc_table_is_refused_with_all_its_faults(cnc_csv: Path) -> None:
+    with pytest.raises(DataError) as caught:
+        read_recording(cnc_csv)
+    message = str(caught.value)
+    assert "no force channel" in message
+    assert "uneven" in message
+    assert "unit of accel_y in doubt" in message
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    ("heading", "separator", "comma", "unit"),
+    [
+        ("time_s,force_N,acceleration_m_s2", ",", False, 1.0),
+        ("Time (s);Force [N];Acc [m/s^2]", ";", True, 1.0),
+        ("time [s]\tforce [N]\tacc [g]", "\t", True, 9.80665),
+        ("t_s force_N acc_g", " ", False, 9.80665),
+    ],
+)
+def test_tables_with_any_separator_and_decimal_sign(
+    tmp_path: Path, heading: str, separator: str, comma: bool, unit: float
+) -> None:
+    path = table(tmp_path / "hit.csv", heading, TIME, FORCE, ACCELERATION / unit, separator=separator, comma=comma)
+    (hit,) = read_hits(path)
+    assert hit.sample_rate == pytest.approx(RATE)
+    assert hit.force == pytest.approx(FORCE, abs=1e-6)
+    assert hit.acceleration == pytest.approx(ACCELERATION, abs=1e-5)
+
+
+def test_columns_are_told_apart_by_their_units_not_their_order(tmp_path: Path) -> None:
+    path = table(tmp_path / "hit.csv", "time_s,acc_g,force_N", TIME, ACCELERATION / 9.80665, FORCE)
+    assert np.max(read_hits(path)[0].force) == pytest.approx(np.max(FORCE))
+
+
+def test_swapped_columns_are_refused(tmp_path: Path) -> None:
+    path = table(tmp_path / "hit.csv", "time_s,force_N,acc_m_s2", TIME, ACCELERATION, FORCE)
+    with pytest.raises(DataError, match="swapped channels"):
+        read_frf(path)
+
+
+def test_an_frf_table_is_receptance(tmp_path: Path) -> None:
+    frequency = np.arange(1.0, 50.0)
+    path = table(tmp_path / "frf.txt", "Freq Real Imag", frequency, 1e-6 / frequency, -2e-6 / frequency, separator=" ")
+    frf = read_frf(path)
+    assert frf.receptance == pytest.approx((1e-6 - 2e-6j) / frequency)
+    with pytest.raises(DataError, match="holds an FRF"):
+        read_hits(path)
+
+
+def write(path: Path, text: str) -> Path:
+    path.write_text(text, encoding="latin-1")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "the file is empty"),
+        ("time_s,force_N,acc_g\n", "a heading and rows of numbers are needed"),
+        ("time_s,force_N,acc_g\n0,1,x\n", "line 2: '0,1,x' is no row of numbers"),
+        ("time_s,force_N,acc_g\n0,1,2\n0.1,3\n", "line 3: 2 numbers under 3 headings"),
+        ("time_s,force_N,acc_furlong\n0,1,2\n0.1,3,4\n", "acc_furlong"),
+        ("Freq Real Imag\n1 2 nan\n2 3 4\n", "not finite"),
+        ("\x00\x01\x02garbage", "neither HDF5 nor LVM nor a text table"),
+    ],
+)
+def test_broken_tables_are_refused_with_file_and_place(tmp_path: Path, text: str, message: str) -> None:
+    path = write(tmp_path / "broken.csv", text)
+    with pytest.raises(DataError, match=message) as caught:
+        read_recording(path)
+    assert "broken.csv" in str(caught.value)
+
+
+def test_nan_in_a_hit_is_refused_with_the_file(tmp_path: Path) -> None:
+    broken = FORCE.copy()
+    broken[77] = np.nan
+    path = table(tmp_path / "nan.csv", "time_s,force_N,acc_g", TIME, broken, ACCELERATION)
+    with pytest.raises(DataError, match=r"nan\.csv.*force is not finite at 1 samples, first at sample 77"):
+        read_hits(path)
+
+
+def test_a_truncated_lvm_is_refused(beam: Path, tmp_path: Path) -> None:
+    lines = beam.read_text(encoding="latin-1").splitlines()
+    with pytest.raises(DataError, match="9977 of 50030 samples are there; the file is cut short"):
+        read_hits(write(tmp_path / "cut.lvm", "\n".join(lines[:10000])))
+    with pytest.raises(DataError, match="is it cut short"):
+        read_hits(write(tmp_path / "head.lvm", "\n".join(lines[:15])))
+    with pytest.raises(DataError, match="line 13: the segment's header lacks"):
+        read_hits(write(tmp_path / "bad.lvm", "\n".join(line.replace("Delta_X", "Delta") for line in lines)))
+    garbled = [*lines[:5000], "\tabc\t1,0", *lines[5001:]]
+    with pytest.raises(DataError, match="line 5001: 'abc"):
+        read_hits(write(tmp_path / "garbled.lvm", "\n".join(garbled)))
+
+
+def test_an_lvm_in_an_unknown_unit_or_without_force_is_refused(beam: Path, tmp_path: Path) -> None:
+    text = beam.read_text(encoding="latin-1")
+    with pytest.raises(DataError, match="unit 'Volts' is not known"):
+        read_hits(write(tmp_path / "a.lvm", text.replace("Newtons", "Volts")))
+    with pytest.raises(DataError, match="two columns are acceleration"):
+        read_hits(write(tmp_path / "b.lvm", text.replace("Newtons", "g")))
+
+
+def test_time_of_a_file_that_does_not_tell_is_that_of_its_last_change(tmp_path: Path) -> None:
+    path = table(tmp_path / "hit.csv", "time_s,force_N,acc_g", TIME, FORCE, ACCELERATION)
+    assert recording_time(path) == datetime.fromtimestamp(path.stat().st_mtime).astimezone()
+
+
+def test_a_missing_file_is_an_os_error(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        read_frf(tmp_path / "nowhere.lvm")

@@ -1,0 +1,174 @@
+"""Tap files: what is written is read back to the bit, and damage is named."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from acquisition import (
+    Channel,
+    Circumstances,
+    DataError,
+    Frf,
+    HammeredStructure,
+    Hit,
+    HitFlags,
+    SimulatedSource,
+    SourceFile,
+    TapTest,
+    Trigger,
+    atomic_write,
+    average_good,
+    capture_hits,
+    new_tap_id,
+    read_frf,
+    read_hits,
+    read_tap,
+    read_tap_hits,
+    write_hit,
+    write_tap,
+)
+
+ABOUT = Circumstances("mill 3", datetime(2026, 1, 15, 9, 30, 0, 123456, UTC), "20 mm/ø", "y", "Kim", "[machine]\n")
+
+
+@pytest.fixture
+def tap(tapper: Callable[..., HammeredStructure], channels: tuple[Channel, Channel]) -> TapTest:
+    """Ten hits, some of them refused, with codes."""
+    source = SimulatedSource(tapper(double_hits=0.3, overloads=0.2), channels, 25600.0, 120_000)
+    hits = tuple(capture_hits(source, Trigger(20.0, 6400, 512)))
+    hits = (*hits[:-1], replace(hits[-1], lost_scans=7))
+    frf, flags = average_good(hits)
+    assert 2 < frf.n_averages < len(hits) - 1
+    return TapTest(new_tap_id(ABOUT), ABOUT, frf, hits, flags)
+
+
+def same_hit(a: Hit, b: Hit) -> bool:
+    return (
+        np.array_equal(a.force, b.force)
+        and np.array_equal(a.acceleration, b.acceleration)
+        and (a.sample_rate, a.pre_trigger, a.lost_scans, a.channels)
+        == (b.sample_rate, b.pre_trigger, b.lost_scans, b.channels)
+    )
+
+
+def same_frf(a: Frf, b: Frf) -> bool:
+    return (
+        np.array_equal(a.frequency, b.frequency)
+        and np.array_equal(a.receptance, b.receptance)
+        and np.array_equal(np.asarray(a.coherence), np.asarray(b.coherence))
+        and (a.n_averages, a.measured_as, a.usable_band) == (b.n_averages, b.measured_as, b.usable_band)
+    )
+
+
+def test_a_tap_test_is_read_back_to_the_bit(tap: TapTest, tmp_path: Path) -> None:
+    path = tmp_path / "tap.h5"
+    content = write_tap(path, tap)
+    assert path.read_bytes() == content
+    read = read_tap(path)
+    assert (read.id, read.circumstances, read.flags, read.source) == (tap.id, tap.circumstances, tap.flags, None)
+    assert all(map(same_hit, read.hits, tap.hits))
+    assert same_frf(read.frf, tap.frf)
+    assert same_frf(read_frf(path), tap.frf)
+    assert all(map(same_hit, read_hits(path), tap.hits))
+    assert HitFlags.LOST_SCANS in read.flags[-1]
+
+
+def test_the_frf_can_be_made_again_from_the_stored_codes(tap: TapTest, tmp_path: Path) -> None:
+    write_tap(tmp_path / "tap.h5", tap)
+    again, flags = average_good(read_tap(tmp_path / "tap.h5").hits)
+    assert flags == tap.flags
+    assert same_frf(again, tap.frf)
+
+
+def test_a_recording_without_codes_keeps_its_samples_and_its_source(tap: TapTest, tmp_path: Path) -> None:
+    bare = tuple(replace(hit, codes=None, channels=None) for hit in tap.hits)
+    source = SourceFile("hits.lvm", bytes(range(256)))
+    write_tap(tmp_path / "tap.h5", replace(tap, hits=bare, source=source))
+    read = read_tap(tmp_path / "tap.h5")
+    assert all(map(same_hit, read.hits, bare))
+    assert read.source == source
+
+
+def test_a_recorded_frf_has_no_hits(tmp_path: Path) -> None:
+    frf = Frf(np.array([1.0, 2.0]), np.array([1.0, 1j]))
+    write_tap(tmp_path / "tap.h5", TapTest("t", ABOUT, frf))
+    read = read_tap(tmp_path / "tap.h5")
+    assert (read.hits, read.flags) == ((), ())
+    assert same_frf(read.frf, frf)
+
+
+def test_the_file_is_plain_hdf5_with_units_and_scales(tap: TapTest, tmp_path: Path) -> None:
+    write_tap(tmp_path / "tap.h5", tap)
+    with h5py.File(tmp_path / "tap.h5") as file:
+        assert file["raw/codes"].dtype == np.int16
+        assert file["raw/codes"].attrs["units"] == "ADC code"
+        assert file["raw/channel_0"].attrs["sensitivity"] == 2.25e-3
+        assert file["frf/receptance"].attrs["units"] == "m/N"
+        assert file["frf/receptance"].dims[0][0].name == "/frf/frequency"
+        h1 = file["spectra/S_fx"][1:] / file["spectra/S_ff"][1:]
+        w = 2 * np.pi * file["spectra/frequency"][1:]
+        assert -h1 / w**2 == pytest.approx(file["frf/receptance"][()])
+        kinds: set[str] = set()
+        file.visititems(lambda _, node: kinds.add(node.dtype.kind) if isinstance(node, h5py.Dataset) else None)
+        assert "V" not in kinds
+
+
+def test_a_hit_in_progress_is_read_back_with_its_circumstances(tap: TapTest, tmp_path: Path) -> None:
+    write_hit(tmp_path / "0000.h5", tap.hits[0], ABOUT)
+    (hit,), about = read_tap_hits(tmp_path / "0000.h5")
+    assert same_hit(hit, tap.hits[0])
+    assert about == ABOUT
+
+
+def test_identities_are_unique_file_names_that_sort_by_time() -> None:
+    ids = {new_tap_id(ABOUT) for _ in range(50)}
+    assert len(ids) > 40
+    assert all(i.startswith("20260115T093000.123456Z_mill-3_20-mm_y_") for i in ids)
+
+
+@pytest.mark.parametrize("keep", [0, 4, 1000, -200])
+def test_a_truncated_file_is_refused_by_name(tap: TapTest, tmp_path: Path, keep: int) -> None:
+    path = tmp_path / "tap.h5"
+    path.write_bytes(write_tap(path, tap)[:keep])
+    with pytest.raises(DataError, match=r"tap\.h5"):
+        read_tap(path)
+
+
+def test_foreign_hdf5_is_refused(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["x"] = 1
+    with pytest.raises(DataError, match="no tap test of lobewatch"):
+        read_frf(tmp_path / "other.h5")
+
+
+@pytest.mark.parametrize("call", ["fsync", "replace"])
+def test_a_full_disk_leaves_the_old_file_and_no_litter(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str
+) -> None:
+    path = tmp_path / "file"
+    atomic_write(path, b"old")
+
+    def fail(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(*((os, "fsync") if call == "fsync" else (Path, "replace")), fail)
+    with pytest.raises(OSError, match="No space left"):
+        atomic_write(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_direction_that_is_none_and_a_time_without_zone_are_refused() -> None:
+    with pytest.raises(ValueError, match="direction='z'"):
+        replace(ABOUT, direction="z")
+    with pytest.raises(ValueError, match="no time zone"):
+        replace(ABOUT, created=datetime(2026, 1, 1))  # noqa: DTZ001

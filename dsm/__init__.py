@@ -1,0 +1,37 @@
+"""The spindle as a dynamic-stiffness model: modes, tip response, and bearing stiffness from a measured frequency.
+
+Planar Euler-Bernoulli beams on springs, exact at every frequency. Source: O. Gaber and S. M. Hashemi, Effects of
+Machine Tool Spindle Decay on the Stability Lobe Diagram, Shock and Vibration, 2015, in a form without its poles.
+"""
+
+from dsm.calibrate import calibrate
+from dsm.calibration import Calibration, UnreachableFrequencyError
+from dsm.critical_speed import critical_speed
+from dsm.modal_stiffness import modal_stiffness
+from dsm.mode_shapes import mode_shapes
+from dsm.modes import Modes
+from dsm.modes_at import modes_at
+from dsm.natural_frequencies import natural_frequencies
+from dsm.receptance import receptance
+from dsm.spindle import Bearing, Segment, Spindle, Theory
+from dsm.static_stiffness import static_stiffness
+from dsm.stiffness_curve import stiffness_curve
+
+__all__ = [
+    "Bearing",
+    "Calibration",
+    "Modes",
+    "Segment",
+    "Spindle",
+    "Theory",
+    "UnreachableFrequencyError",
+    "calibrate",
+    "critical_speed",
+    "modal_stiffness",
+    "mode_shapes",
+    "modes_at",
+    "natural_frequencies",
+    "receptance",
+    "static_stiffness",
+    "stiffness_curve",
+]

@@ -1,0 +1,146 @@
+"""What the spindle model refuses, and how it says so."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import FrozenInstanceError
+
+import numpy as np
+import pytest
+
+from dsm import (
+    Bearing,
+    Segment,
+    Spindle,
+    calibrate,
+    critical_speed,
+    modal_stiffness,
+    natural_frequencies,
+    receptance,
+    static_stiffness,
+    stiffness_curve,
+)
+from dsm.find_modes import find_modes
+
+PARTS = [Segment(0.2, 0.05), Segment(0.3, 0.08, 0.02)]
+BEARINGS = [Bearing(0.1, 1e8), Bearing(0.4, 2e8)]
+SPINDLE = Spindle(PARTS, BEARINGS)
+
+
+@pytest.mark.parametrize(
+    ("segment", "message"),
+    [
+        (Segment(0.0, 0.05), r"segment 3: length=0\.0 is not a finite number > 0 \(m\)"),
+        (Segment(math.nan, 0.05), "segment 3: length=nan"),
+        (Segment(0.1, -0.05), r"segment 3: outer_diameter=-0\.05"),
+        (Segment(0.1, math.inf), "segment 3: outer_diameter=inf"),
+        (Segment(0.1, 0.05, 0.05), r"segment 3: bore_diameter=0\.05 m is not .* outer_diameter=0\.05"),
+        (Segment(0.1, 0.05, -0.01), r"segment 3: bore_diameter=-0\.01"),
+        (Segment(0.1, 0.05, math.nan), "segment 3: bore_diameter=nan"),
+    ],
+)
+def test_segments_are_refused_by_number(segment: Segment, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Spindle([*PARTS, segment], BEARINGS)
+
+
+@pytest.mark.parametrize(
+    ("bearing", "message"),
+    [
+        (Bearing(0.6, 1e8), r"bearing 3: position=0\.6 m is off the shaft, 0 to 0\.5 m"),
+        (Bearing(-0.1, 1e8), r"bearing 3: position=-0\.1 m"),
+        (Bearing(math.nan, 1e8), "bearing 3: position=nan"),
+        (Bearing(0.4, 1e8), r"bearing 3: position=0\.4 m is that of bearing 2"),
+        (Bearing(0.2, 0.0), r"bearing 3: stiffness=0\.0 .* \(N/m\)"),
+        (Bearing(0.2, math.nan), "bearing 3: stiffness=nan"),
+        (Bearing(0.2, math.inf), "bearing 3: stiffness=inf .*rigid_bearings=True"),
+    ],
+)
+def test_bearings_are_refused_by_number(bearing: Bearing, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Spindle(PARTS, [*BEARINGS, bearing])
+
+
+def test_a_spindle_needs_segments_and_a_material() -> None:
+    with pytest.raises(ValueError, match="without segments"):
+        Spindle([], BEARINGS)
+    with pytest.raises(ValueError, match=r"youngs_modulus=-1\.0 .* \(Pa\)"):
+        Spindle(PARTS, BEARINGS, youngs_modulus=-1.0)
+    with pytest.raises(ValueError, match="density=nan"):
+        Spindle(PARTS, BEARINGS, density=math.nan)
+
+
+def test_an_unknown_theory_is_refused_by_name() -> None:
+    with pytest.raises(ValueError, match="theory='rayleigh' is none of euler-bernoulli"):
+        Spindle(PARTS, BEARINGS, theory="rayleigh")  # type: ignore[arg-type]
+
+
+def test_a_spindle_is_plain_frozen_data() -> None:
+    again = Spindle(list(PARTS), list(BEARINGS))
+    assert again == SPINDLE
+    assert hash(again) == hash(SPINDLE)
+    with pytest.raises(FrozenInstanceError):
+        SPINDLE.density = 1.0  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        static_stiffness,
+        critical_speed,
+        lambda s: calibrate(s, 100.0),
+        lambda s: receptance(s, [0.0, 1.0]),
+        lambda s: stiffness_curve(s, [1.0]),
+    ],
+)
+def test_a_shaft_that_can_move_freely_is_refused(ask: Callable[[Spindle], object]) -> None:
+    with pytest.raises(ValueError, match=r"held by 1 bearing\(s\).* at least two"):
+        ask(Spindle(PARTS, BEARINGS[:1]))
+
+
+def test_one_bearing_is_enough_for_natural_frequencies_and_receptance() -> None:
+    hinged = Spindle(PARTS, BEARINGS[:1])
+    assert natural_frequencies(hinged, 2)[0] == pytest.approx(0.0, abs=1e-2)
+    assert natural_frequencies(hinged, 2)[1] > 100
+    assert np.all(np.isfinite(receptance(hinged, [10.0, 100.0])))
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (lambda: natural_frequencies(SPINDLE, 0), "0 modes"),
+        (lambda: modal_stiffness(SPINDLE, 0), "mode=0"),
+        (lambda: modal_stiffness(SPINDLE, 1, 0.7), r"position=0\.7 m is off the shaft, which spans 0 to 0\.5 m"),
+        (lambda: static_stiffness(SPINDLE, math.nan), "position=nan"),
+        (lambda: receptance(SPINDLE, [10.0, -1.0]), r"frequency=-1\.0 Hz"),
+        (lambda: receptance(SPINDLE, [math.nan]), "frequency=nan"),
+        (lambda: receptance(SPINDLE, [[1.0, 2.0]]), r"shape \(1, 2\)"),
+        (lambda: receptance(SPINDLE, [1.0], loss_factor=-0.1), r"loss_factor=-0\.1"),
+        (lambda: receptance(SPINDLE, [1.0], loss_factor=math.nan), "loss_factor=nan"),
+        (lambda: calibrate(SPINDLE, 0.0), r"frequency=0\.0 Hz"),
+        (lambda: calibrate(SPINDLE, math.nan), "frequency=nan"),
+        (lambda: calibrate(SPINDLE, 500.0, -1.0), r"frequency_std=-1\.0"),
+        (lambda: calibrate(SPINDLE, 500.0, mode=0), "mode=0"),
+        (lambda: stiffness_curve(SPINDLE, [0.0]), "frequency=0 Hz"),
+    ],
+)
+def test_bad_arguments_are_refused(ask: Callable[[], object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        ask()
+
+
+def test_a_shaft_beyond_the_arithmetic_is_an_error_and_no_wrong_answer() -> None:
+    with pytest.raises(ArithmeticError, match="rounding"):
+        find_modes(Spindle([Segment(1e-7, 0.2), Segment(0.5, 0.001), Segment(1e-7, 0.2)], []), 3)
+
+
+def test_a_bearing_at_a_rounded_segment_end_makes_no_node_of_its_own() -> None:
+    thirds = [Segment(0.1, 0.05)] * 3
+    exact = Spindle(thirds, [Bearing(0.0, 1e8), Bearing(0.1 + 0.1 + 0.1, 1e8)])
+    rounded = Spindle(thirds, [Bearing(0.0, 1e8), Bearing(0.3, 1e8)])
+    assert natural_frequencies(rounded, 3) == pytest.approx(natural_frequencies(exact, 3), rel=1e-12)
+
+
+def test_no_frequencies_give_no_receptance() -> None:
+    assert receptance(SPINDLE, []).shape == (0,)

@@ -19,7 +19,7 @@ DOUBLE_SHARE = 0.03
 DOUBLE_NOISE_RATIO = 6.0
 """... and above this many times the baseline's rms is a double hit."""
 DECAYED_SHARE = 0.02
-"""rms of the last tenth of the response against its largest rms over a tenth: above this and above twice the noise it was cut off."""
+"""rms of the last tenth of the response against that of the loudest: above this and twice the noise it was cut off."""
 
 
 def check_hit(hit: Hit) -> HitFlags:

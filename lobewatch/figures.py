@@ -23,7 +23,7 @@ NOW = "#0072B2"
 THEN = "#777777"
 ALARM = "#D55E00"
 GOOD = "#009E73"
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.size": 10,
     "axes.grid": True,
     "grid.color": "#dddddd",

@@ -26,14 +26,14 @@ class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A table of machine.toml: unknown keys are refused."""
 
 
-class Identity(_Table):
+class Identity(_Table, frozen=True):
     """[machine]."""
 
     name: Annotated[str, Meta(min_length=1)]
     tap_interval_days: Positive = 30.0
 
 
-class TapSetup(_Table):
+class TapSetup(_Table, frozen=True):
     """[tap]: how the tap test is done."""
 
     tool: str = "reference"
@@ -44,14 +44,14 @@ class TapSetup(_Table):
     position_mm: NotNegative = 0.0
 
 
-class Daq(_Table):
+class Daq(_Table, frozen=True):
     """[daq]: the port is remembered here by hand, never written by the program."""
 
     port: str = ""
     sample_rate_hz: Positive | None = None
 
 
-class ModeChoice(_Table):
+class ModeChoice(_Table, frozen=True):
     """[mode]: which mode is followed."""
 
     band_hz: tuple[NotNegative, Positive] | None = None
@@ -62,14 +62,14 @@ class ModeChoice(_Table):
             raise ValueError(f"band_hz={list(self.band_hz)} does not rise; give [lowest, highest] in Hz")
 
 
-class Limits(_Table):
+class Limits(_Table, frozen=True):
     """[limits]: fall of the frequency that calls for attention; the defaults are the paper's."""
 
     frequency_warn_percent: Positive = 5.0
     frequency_alarm_percent: Positive = 10.0
 
 
-class SegmentTable(_Table):
+class SegmentTable(_Table, frozen=True):
     """One of [spindle] segments."""
 
     length_mm: Positive
@@ -82,13 +82,13 @@ class SegmentTable(_Table):
             raise ValueError(f"bore_mm={self.bore_mm:g} is not smaller than outer_mm={self.outer_mm:g}")
 
 
-class BearingTable(_Table):
+class BearingTable(_Table, frozen=True):
     """One of [spindle] bearings."""
 
     position_mm: NotNegative
 
 
-class SpindleTable(_Table):
+class SpindleTable(_Table, frozen=True):
     """[spindle]: the model; optional."""
 
     segments: Annotated[list[SegmentTable], Meta(min_length=1)]
@@ -110,7 +110,7 @@ class SpindleTable(_Table):
         )
 
 
-class CutTable(_Table):
+class CutTable(_Table, frozen=True):
     """[reference_cut], and what it shares with a program."""
 
     teeth: Annotated[int, Meta(ge=1)]
@@ -138,7 +138,7 @@ class CutTable(_Table):
         )
 
 
-class Program(CutTable, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class Program(CutTable, frozen=True, kw_only=True):
     """[[program]]: one cut that the shop runs."""
 
     name: Annotated[str, Meta(min_length=1)]
@@ -147,7 +147,7 @@ class Program(CutTable, frozen=True, forbid_unknown_fields=True, kw_only=True):
     depth_mm: Positive
 
 
-class SpeedRange(_Table):
+class SpeedRange(_Table, frozen=True):
     """[speed]: the range of the lobe diagrams."""
 
     low_rpm: Positive = 1000.0
@@ -160,7 +160,7 @@ class SpeedRange(_Table):
             raise ValueError(f"low_rpm={self.low_rpm:g} is not below high_rpm={self.high_rpm:g}")
 
 
-class Machine(_Table):
+class Machine(_Table, frozen=True):
     """All of machine.toml."""
 
     machine: Identity

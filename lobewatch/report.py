@@ -84,7 +84,7 @@ def _figures(
         ("frequency", "natural frequency (Hz)", machine.limits, "Bars: 95 % interval of each tap alone."),
         ("bearing_stiffness", "bearing stiffness (N/µm)", None, "Equivalent stiffness of each bearing in the model."),
     ):
-        values, stds = columns[name][rows], columns[f"{name}_std"][rows]
+        values, stds = (np.asarray(columns[key][rows], dtype=np.float64) for key in (name, f"{name}_std"))
         seen = np.isfinite(values)
         if seen.any():
             scale = 1.0 if limits else 1e6

@@ -107,5 +107,5 @@ class _Swapped(Recorded):
 
 @pytest.mark.parametrize(("level", "n", "before"), [(0.0, 50, 10), (np.nan, 50, 10), (1.0, 50, 50), (1.0, 50, 0)])
 def test_a_trigger_that_cannot_work_is_refused(level: float, n: int, before: int) -> None:
-    with pytest.raises(ValueError, match="trigger level|pre_trigger"):
+    with pytest.raises(ValueError, match=r"trigger level|pre_trigger"):
         Trigger(level, n, before)

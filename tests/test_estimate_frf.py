@@ -49,7 +49,7 @@ def test_ten_hits_give_the_true_receptance_in_size_and_phase(
 
 def test_noise_on_the_response_lowers_h2_not_h1(tapper: Tapper, channels: Pair, true_receptance: Receptance) -> None:
     noisy = hits(tapper, channels, response_noise=15.0)
-    frfs = {name: estimate_frf(noisy, name).in_band((1500.0, 1950.0)) for name in ("H1", "H2", "Hv")}  # type: ignore[arg-type]
+    frfs = {name: estimate_frf(noisy, name).in_band((1500.0, 1950.0)) for name in ("H1", "H2", "Hv")}
     truth = true_receptance(frfs["H1"].frequency)
     size = {name: float(np.mean(np.abs(frf.receptance) / np.abs(truth))) for name, frf in frfs.items()}
     assert size["H1"] < size["Hv"] < size["H2"]

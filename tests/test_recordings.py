@@ -17,7 +17,7 @@ FORCE = np.where(np.abs(TIME - 0.05) < 1e-3, 100 * np.cos(np.pi * (TIME - 0.05) 
 ACCELERATION = np.where(TIME > 0.05, 50 * np.exp(-60 * (TIME - 0.05)) * np.sin(2 * np.pi * 300 * TIME), 0.0)
 
 
-def table(path: Path, heading: str, *columns: np.ndarray, separator: str = ",", comma: bool = False) -> Path:  # type: ignore[type-arg]
+def table(path: Path, heading: str, *columns: np.ndarray, separator: str = ",", comma: bool = False) -> Path:
     rows = [separator.join(f"{value:.8g}" for value in row) for row in zip(*columns, strict=True)]
     text = "\n".join([heading, *(row.replace(".", ",") if comma else row for row in rows)])
     path.write_text(text, encoding="utf-8")

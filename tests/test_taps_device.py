@@ -6,7 +6,7 @@ import json
 import os
 import threading
 from collections.abc import Callable, Iterator
-from itertools import islice
+from itertools import islice, pairwise
 
 import numpy as np
 import pytest
@@ -119,7 +119,7 @@ def test_a_slow_host_loses_scans_and_is_told_how_many(
     assert sum(block.lost_before for block in blocks) > 0
     assert all(
         later.first_scan == earlier.first_scan + earlier.codes.shape[1] + later.lost_before
-        for earlier, later in zip(blocks, blocks[1:], strict=False)
+        for earlier, later in pairwise(blocks)
     )
 
 

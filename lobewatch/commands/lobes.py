@@ -57,8 +57,8 @@ def lobes(
     found: StabilityLobes = measurement.lobes[cut]
     if source is Dynamics.FRF:
         frf = folder.read(taps[-1]).frf.in_band(setup.mode.band_hz)
-        pair = (frf, None) if measurement.direction == "x" else (None, frf)
-        found = average_angle(*pair, cuts[cut], speed_grid(setup))
+        x, y = (frf, None) if measurement.direction == "x" else (None, frf)
+        found = average_angle(x, y, cuts[cut], speed_grid(setup))
     programs = program_json({cut: found}, setup)
     if figure is not None:
         title = f"{setup.machine.name}: {cut}, {measurement.time:%Y-%m-%d}, from {source}"

@@ -21,8 +21,8 @@ def assemble(
     """Dynamic stiffness matrix with nodes at segment ends, bearings, `places` (m) and `held` dofs.
 
     Elements longer than the series allows at `top_frequency` (Hz) are split into equal parts. A pinned end is
-    held = [(z, 0)], a clamped one [(z, 0), (z, 1)]. Rounding costs about 1e-16 (L/l)^3 of the result, l the shortest
-    distance between nodes and L the length of the shaft. Raises ValueError for a place off the shaft.
+    held = [(z, 0)], a clamped one [(z, 0), (z, 1)]. Rounding blurs the matrix by the order of 1e-14 EI/l^3
+    (N/m), l the shortest distance between nodes. Raises ValueError for a place off the shaft.
     """
     wanted = [bearing.position for bearing in spindle.bearings] + list(places) + [z for z, _ in held]
     position, of_segment = _nodes(spindle, wanted, top_frequency)

@@ -5,7 +5,7 @@
     python3 run.py test [...]    the tests (--long: the long ones too); the rest goes to pytest
     python3 run.py ARGS          lobewatch ARGS
 
-Needs nothing but Python's standard library; runs far enough under an old Python to say which one is needed.
+Needs nothing but Python's standard library; runs far enough under an old Python (2.7 too) to say which one is needed.
 """
 
 import hashlib
@@ -53,7 +53,7 @@ def make_environment(extras):
                  "install one of them (Debian: sudo apt install python3-pip) and start again.")
     import venv
 
-    print("Setting up %s (once; a minute or two) ..." % VENV, file=sys.stderr)
+    sys.stderr.write("Setting up %s (once; a minute or two) ...\n" % VENV)
     venv.create(VENV, with_pip=False, clear=True)
     for packages in (["--upgrade", "pip"], ["--editable", ROOT + extras]):
         status = subprocess.call(command + packages)

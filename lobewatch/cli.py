@@ -56,7 +56,7 @@ def main() -> None:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, ArithmeticError) as error:
         if "--debug" in sys.argv:
             raise
         notes.print("[bold red]error:[/]", escape(_sentence(error)))

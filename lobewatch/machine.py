@@ -99,6 +99,16 @@ class SpindleTable(_Table, frozen=True):
     damping_ratio: Annotated[float, Meta(gt=0, lt=1)] = 0.03
     label: str = ""
 
+    def __post_init__(self) -> None:
+        """Refuse bearings off the shaft, and whatever else is no spindle."""
+        length = sum(segment.length_mm for segment in self.segments)
+        for i, bearing in enumerate(self.bearings, 1):
+            if bearing.position_mm > length:
+                raise ValueError(
+                    f"bearing {i}: position_mm={bearing.position_mm:g} is off the shaft, 0 to {length:g} mm"
+                )
+        self.build()
+
     def build(self) -> Spindle:
         """The spindle in SI units."""
         stiffness = self.bearing_stiffness_n_per_um * 1e6

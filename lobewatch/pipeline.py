@@ -101,7 +101,7 @@ def _calibrate(followed: Mode | None, machine: Machine, notes: list[str]) -> Cal
     std = float(followed.standard_error[0])
     try:
         return calibrate(machine.spindle.build(), followed.frequency, std if np.isfinite(std) else None)
-    except ValueError as error:
+    except (ValueError, ArithmeticError) as error:
         notes.append(f"no bearing stiffness: {error}")
         return None
 

@@ -63,7 +63,13 @@ def modes_figure(frf: Frf, modes: Sequence[Mode], title: str) -> Figure:
     for mode in modes:
         axes.axvline(mode.frequency, color=NOW, lw=0.6)
         axes.annotate(
-            f"{mode.frequency:.0f}", (mode.frequency, 0.98), xycoords=("data", "axes fraction"), rotation=90, va="top"
+            f"{mode.frequency:.0f}",
+            (mode.frequency, 0.98),
+            xytext=(3, 0),
+            textcoords="offset points",
+            xycoords=("data", "axes fraction"),
+            rotation=90,
+            va="top",
         )
     axes.set(title=title, xlabel="frequency (Hz)", ylabel="|accelerance| (m/s²/N)")
     axes.legend(loc="lower right")
@@ -152,6 +158,7 @@ def _draw_program(axes: Axes, program: Mapping[str, Any]) -> None:
         xytext=(7, 5),
         textcoords="offset points",
         fontsize=9,
+        bbox={"color": "white", "alpha": 0.7, "pad": 1, "lw": 0},
     )
 
 

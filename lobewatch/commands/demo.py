@@ -78,6 +78,8 @@ def demo(
     emit(
         _payload(months, report),
         as_json,
+        "Emulated, and found beside it (f_1 natural frequency, zeta damping ratio, K stiffness at the tool tip,",
+        "k_b stiffness of each bearing):",
         _truth_table(months),
         "worst error: " + ", ".join(_worst(months)),
         f"K over the whole demo: {100 * fall[0]:+.2f} % found, {100 * fall[1]:+.2f} % true",
@@ -133,8 +135,8 @@ def _found(measurement: Measurement) -> dict[str, float]:
 
 
 def _truth_table(months: list[Month]) -> Table:
-    headings = ("f_1 (Hz)", "zeta (%)", "K (N/um)", "k_bearing (N/um)")
-    made = table("<month", *(word for heading in headings for word in (f"true {heading}", "found")))
+    headings = ("f_1 Hz", "zeta %", "K N/um", "k_b N/um")
+    made = table("<month", *(word for heading in headings for word in (heading, "found")))
     for month in months:
         cells = []
         for field, scale, digits in zip(FIELDS, (1.0, 0.01, 1e6, 1e6), (2, 3, 3, 1), strict=True):

@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Frf, from_accelerance
+from acquisition.frf import Quantity
 from modal import Mode, fit_modes, predominant, synthesize
 
 SPINDLE = [Mode(900.0, 0.03, 4e7), Mode(1722.0, 0.03, 3.5e7), Mode(2900.0, 0.03, 3e7)]
@@ -115,10 +116,19 @@ def test_one_mode_and_nothing_else_is_found_in_noise(n_lines: int, damping: floa
         assert np.all(np.abs(values(found) - values(mode)) < 5 * found.standard_error)
 
 
-def test_wide_mode_is_found_in_noise_as_high_as_a_fifth_of_it() -> None:
+@pytest.mark.parametrize("damping", [0.03, 0.1])
+def test_wide_mode_is_found_in_noise_as_high_as_a_fifth_of_it(damping: float) -> None:
     frequency = np.linspace(0.1, 5000.0, 50000)
-    (found,) = fit_modes(noisy([Mode(1722.0, 0.03, 3.5e7)], 0.2, 1, 0, frequency))
-    assert found.frequency == pytest.approx(1722.0, rel=2e-3)
+    for seed in range(4):
+        (found,) = fit_modes(noisy([Mode(1722.0, damping, 3.5e7)], 0.2, 1, seed, frequency))
+        assert found.frequency == pytest.approx(1722.0, rel=5e-3)
+
+
+def test_mode_narrower_than_a_line_in_noise_is_not_taken_for_a_conjugate() -> None:
+    frequency = np.linspace(25.0, 5000.0, 200)
+    for seed in range(200):
+        found = fit_modes(noisy([Mode(1722.0, 0.0005, 3.5e7)], 0.05, 1, seed, frequency))
+        assert len(found) <= 1
 
 
 @pytest.mark.parametrize("hits", [1, 10])
@@ -159,6 +169,25 @@ def test_lines_of_low_coherence_count_less() -> None:
     )
     assert weighted.standard_error[2] < equal.standard_error[2] / 3
     assert weighted.stiffness == pytest.approx(3.5e7, abs=3 * weighted.standard_error[2])
+
+
+@pytest.mark.parametrize(("measured_as", "power"), [("receptance", 0), ("mobility", 1), ("accelerance", 2)])
+def test_without_coherence_the_noise_is_equal_in_what_was_measured(measured_as: Quantity, power: int) -> None:
+    noise = np.random.default_rng(0).normal(size=(2, LINES.size)) * 1e-3
+    exact = synthesize([Mode(1722.0, 0.1, 3.5e7)], LINES).receptance * LINES**power
+    receptance = (exact + (noise[0] + 1j * noise[1]) * np.max(np.abs(exact))) / LINES**power
+    signal = np.abs(receptance) * LINES**power / np.max(np.abs(exact))
+    coherence = 1 / (1 + 10 * 2e-6 / signal**2)
+    (assumed,) = fit_modes(Frf(LINES, receptance, measured_as=measured_as))
+    (known,) = fit_modes(Frf(LINES, receptance, coherence, 10, measured_as))
+    assert values(assumed) == pytest.approx(values(known), rel=1e-9)
+    assert assumed.standard_error == pytest.approx(known.standard_error, rel=1e-9)
+
+
+def test_peak_of_low_coherence_is_no_mode() -> None:
+    coherence = np.where(np.abs(LINES - 2900.0) < 300.0, 0.2, 0.999)
+    found = fit_modes(from_accelerance(LINES, accelerance(SPINDLE, LINES), coherence, 10))
+    assert [round(mode.frequency) for mode in found] == [900, 1722]
 
 
 def test_standard_error_grows_with_the_noise_and_falls_with_the_hits() -> None:

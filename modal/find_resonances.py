@@ -1,0 +1,174 @@
+"""Where an FRF has resonances: peaks of its mobility that are too high for noise and turn like a mode."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter, uniform_filter1d
+from scipy.signal import find_peaks
+
+from acquisition import Frf
+from modal.line_weights import measuring_factor
+
+FEWEST_LINES = 8
+"""One mode and its residual terms have seven unknowns."""
+SCALES = 4 ** np.arange(10)
+"""Lengths of the running means (lines), up to a sixteenth of the FRF."""
+PROMINENCE_DB = 1.0
+"""A peak stands this far above its saddles (dB of mobility) ..."""
+NOISE_MULTIPLE = 8.0
+"""... and this many rms of the noise, which no ripple among a million lines reaches."""
+NOISE_LOSS = 4.0
+"""Height of a peak that may be the luck of its highest line (rms of the noise)."""
+LEAST_TURN = 0.5
+"""Angle between the chords of the mobility from the lower side to the peak and from there to the upper side (rad).
+
+On the circle of a mode, from half-power point to half-power point, it is -pi/2, whatever its neighbours add."""
+MOST_TURN = 2.6
+"""Of a mode narrower than the line spacing the chords lie side by side; which way it turns is not to be seen (rad)."""
+LEAST_COHERENCE = 0.5
+"""Mean coherence over a peak."""
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """One peak of the mobility."""
+
+    frequency: float
+    """Its highest line (Hz)."""
+    half_width: float
+    """From there to the nearer half-power point, roughly zeta f_n (Hz)."""
+    height: float
+    """Of the mobility (m/s/N)."""
+
+
+@dataclass(frozen=True)
+class _Peak:
+    resonance: Resonance
+    noise: float
+    turn: float
+    coherence: float
+
+
+def find_resonances(frf: Frf) -> list[Resonance]:
+    """Resonances by rising frequency, over all lines of the FRF (all above 0 Hz).
+
+    The mobility of a mode peaks at its natural frequency whatever its damping, and is 1/sqrt(2) of that where
+    r - 1/r = -+ 2 zeta. Peaks are looked for line by line and then in ever longer running means of the complex
+    mobility, so that a wide mode is found in noise that hides it from single lines. Two modes with no dip between
+    them are one peak, and a mode much narrower than the line spacing is none.
+
+    Raises ValueError for fewer than 8 lines, an FRF of zeros, and one whose phase rises through its resonances.
+    """
+    _check(frf)
+    peaks = [peak for peak in _peaks_at_all_scales(frf) if peak.coherence >= LEAST_COHERENCE]
+    _check_phase(frf, peaks)
+    return sorted((p.resonance for p in peaks if p.turn < -LEAST_TURN or p.turn > MOST_TURN), key=lambda r: r.frequency)
+
+
+def _check(frf: Frf) -> None:
+    n = frf.frequency.size
+    if n < FEWEST_LINES:
+        raise ValueError(f"{n} lines are too few to find a mode; at least {FEWEST_LINES} are needed: widen the band")
+    if not np.any(frf.receptance):
+        raise ValueError("the FRF is zero on every line: no response was measured; check the sensor and its cable")
+
+
+def _check_phase(frf: Frf, peaks: list[_Peak]) -> None:
+    """Refuse a conjugate: the peaks of its accelerance turn the wrong way, and so do all lines together.
+
+    Not of the mobility, where the drift near 0 Hz would have the last word.
+    """
+    falling = sum(p.resonance.frequency * p.resonance.height for p in peaks if p.turn < -LEAST_TURN)
+    rising = sum(p.resonance.frequency * p.resonance.height for p in peaks if LEAST_TURN < p.turn < MOST_TURN)
+    phase_step = np.imag(frf.accelerance[1:] * frf.accelerance[:-1].conj())
+    if rising > falling and np.sum(phase_step) > 0:
+        raise ValueError(
+            "the phase rises through the resonances, so that every damping ratio would be negative; this is the "
+            "complex conjugate of response over force: give Frf the conjugate of receptance"
+        )
+
+
+def _peaks_at_all_scales(frf: Frf) -> list[_Peak]:
+    """Every peak of any running mean, from the longest mean that costs it no more height than noise explains."""
+    noise = _noise(frf)
+    found: list[_Peak] = []
+    longest = max(1, frf.frequency.size // 16)
+    for length in SCALES[longest >= SCALES]:
+        mean = _running_mean(frf.mobility, length)
+        gain = (2 * length**2 + 1) / (3 * length**3)
+        rms = np.sqrt(gain * np.maximum(_running_mean(noise**2, length), 0.0))
+        for new in _peaks(frf, mean, rms):
+            same = [i for i, old in enumerate(found) if _is_same(new, old)]
+            if not same:
+                found.append(new)
+            elif len(same) == 1 and _is_as_high(new, found[same[0]]):
+                found[same[0]] = new
+    return found
+
+
+def _running_mean(values: NDArray[Any], length: int) -> NDArray[Any]:
+    """Box mean over this many lines, twice."""
+    return np.asarray(uniform_filter1d(uniform_filter1d(values, length), length))
+
+
+def _is_same(a: _Peak, b: _Peak) -> bool:
+    distance = abs(a.resonance.frequency - b.resonance.frequency)
+    return distance < max(a.resonance.half_width, b.resonance.half_width)
+
+
+def _is_as_high(new: _Peak, old: _Peak) -> bool:
+    return old.resonance.height - new.resonance.height < NOISE_LOSS * old.noise
+
+
+def _peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.float64]) -> list[_Peak]:
+    size = np.abs(mobility)
+    decibel = 20 * np.log10(np.maximum(size, 1e-12 * size.max()))
+    tops, found = find_peaks(decibel, prominence=PROMINENCE_DB)
+    rise = size[tops] * (1 - 10 ** (-found["prominences"] / 20))
+    high = tops[rise > NOISE_MULTIPLE * noise[tops]]
+    return [_peak(frf, mobility, int(top), float(noise[top])) for top in high]
+
+
+def _peak(frf: Frf, mobility: NDArray[np.complex128], top: int, noise: float) -> _Peak:
+    size, f = np.abs(mobility), frf.frequency
+    below, above = _lines_down(size[top::-1]), _lines_down(size[top:])
+    low, high = top - int(np.ceil(below)), top + int(np.ceil(above))
+    lower, upper = np.interp([top - below, top + above], np.arange(f.size), f)
+    turn = np.angle((mobility[high] - mobility[top]) / (mobility[top] - mobility[low]))
+    return _Peak(
+        resonance=Resonance(float(f[top]), float(min(f[top] - lower, upper - f[top])), float(size[top])),
+        noise=noise,
+        turn=float(turn),
+        coherence=_mean_coherence(frf, slice(low, high + 1)),
+    )
+
+
+def _mean_coherence(frf: Frf, lines: slice) -> float:
+    """1 where no coherence of meaning is known."""
+    if frf.coherence is None or frf.random_error is None:
+        return 1.0
+    return float(np.mean(frf.coherence[lines]))
+
+
+def _lines_down(size: NDArray[np.float64]) -> float:
+    """Lines from the peak size[0] to its half-power point, or to the saddle before a higher peak."""
+    level = size[0] / np.sqrt(2)
+    higher = np.flatnonzero(size > size[0])
+    side = size[: higher[0]] if higher.size else size
+    under = np.flatnonzero(side < level)
+    if not under.size:
+        return float(max(int(np.argmin(side)), 1))
+    end = int(under[0])
+    return float(end - (level - side[end]) / (side[end - 1] - side[end]))
+
+
+def _noise(frf: Frf) -> NDArray[np.float64]:
+    """rms of the noise on each line of the mobility, from third differences of what was measured, shape (n,)."""
+    factor = measuring_factor(frf)
+    rough = np.abs(np.diff(frf.receptance * factor, 3)) / np.sqrt(20)
+    rms = median_filter(rough, size=65) / np.sqrt(np.log(2))
+    return np.asarray(np.pad(rms, (1, 2), mode="edge") * 2 * np.pi * frf.frequency / factor)

@@ -1,0 +1,34 @@
+"""How much each line of an FRF counts in a fit."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
+
+from acquisition import Frf
+
+SMOOTHED_OVER = 9
+"""Lines over which the variance is averaged, so that a line that is small by chance does not count for more."""
+LEAST_VARIANCE = 1e-6
+"""Share of the mean variance below which no line is believed."""
+
+
+def line_weights(frf: Frf) -> NDArray[np.float64]:
+    """Weights of the receptance, 1/rms of its noise up to a factor, shape (n,).
+
+    The noise is that of the coherence where there are three averages or more (random error times |H|, squared and
+    averaged over neighbouring lines). Else it is taken as equal on all lines of the quantity that was measured.
+    """
+    factor = measuring_factor(frf)
+    if frf.random_error is None:
+        return factor
+    variance = uniform_filter1d((frf.random_error * np.abs(frf.receptance) * factor) ** 2, SMOOTHED_OVER)
+    mean = np.mean(variance)
+    return factor if mean == 0 else factor / np.sqrt(np.maximum(variance, LEAST_VARIANCE * mean) / mean)
+
+
+def measuring_factor(frf: Frf) -> NDArray[np.float64]:
+    """|measured quantity| over |receptance|: 1, omega or omega^2 by line, shape (n,)."""
+    power = {"receptance": 0, "mobility": 1, "accelerance": 2}[frf.measured_as]
+    return np.asarray((2 * np.pi * frf.frequency) ** power)

@@ -1,0 +1,19 @@
+"""The mode that is followed over the life of a machine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from modal.mode import Mode
+
+
+def predominant(modes: Sequence[Mode], band: tuple[float, float] | None = None) -> Mode | None:
+    """The driving-point mode inside band (Hz, ends included) with the largest peak of -Im of receptance, 1/(2 zeta K).
+
+    None where there is none. Source: Gaber & Hashemi (2015), "the most predominant mode".
+    """
+    low, high = band or (0.0, float("inf"))
+    if not low < high:
+        raise ValueError(f"band {low:g}..{high:g} Hz is empty; give the lower frequency first")
+    able = [mode for mode in modes if mode.is_driving_point and low <= mode.frequency <= high]
+    return min(able, key=lambda mode: mode.damping_ratio * mode.stiffness, default=None)

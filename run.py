@@ -49,8 +49,10 @@ def make_environment(extras):
             return
     command = installer()
     if command is None:
-        sys.exit("lobewatch needs pip or uv to install its packages: "
-                 "install one of them (Debian: sudo apt install python3-pip) and start again.")
+        sys.exit(
+            "lobewatch needs pip or uv to install its packages: "
+            "install one of them (Debian: sudo apt install python3-pip) and start again."
+        )
     import venv
 
     sys.stderr.write("Setting up %s (once; a minute or two) ...\n" % VENV)

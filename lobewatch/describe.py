@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from rich.markup import escape
 from rich.table import Table
 
 from dsm import Calibration
@@ -94,7 +95,7 @@ def program_table(programs: Sequence[dict[str, Any]]) -> Table:
     made = table("<program", "speed (rpm)", "depth (mm)", "limit (mm)", "<verdict")
     for entry in programs:
         made.add_row(
-            entry["name"],
+            escape(entry["name"]),
             f"{entry['speed_rpm']:g}",
             f"{entry['depth_mm']:g}",
             f"{entry['limit_mm']:.2f}",

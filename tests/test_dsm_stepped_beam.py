@@ -68,7 +68,7 @@ def test_modes_are_right_when_the_iteration_goes_astray(monkeypatch: pytest.Monk
     )
     expected = find_modes(spindle, 5)
 
-    def astray(model: object, w2: np.ndarray, shape: np.ndarray, width: object) -> tuple[np.ndarray, np.ndarray]:  # noqa: ARG001
+    def astray(model: object, w2: np.ndarray, shape: np.ndarray, width: object) -> tuple[np.ndarray, np.ndarray]:
         w2 = (2 * np.pi * expected.frequency) ** 2
         return w2[[1, 1, 2, 4, 4]], shape + 1e-3
 

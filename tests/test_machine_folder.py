@@ -19,7 +19,7 @@ START = datetime(2026, 1, 15, 9, tzinfo=UTC)
 
 def tap(days: float = 0.0, source: SourceFile | None = None, **about: str) -> TapTest:
     circumstances = replace(Circumstances("m", START + timedelta(days=days), "reference"), **about)  # type: ignore[arg-type]
-    frf = Frf(np.arange(1.0, 50.0), np.arange(1.0, 50.0) * (1 + 1j))
+    frf = Frf(np.arange(1.0, 50.0), np.linspace(1 + 1j, 49 + 49j, 49))
     return TapTest(new_tap_id(circumstances), circumstances, frf, source=source)
 
 
@@ -90,15 +90,15 @@ def test_an_altered_or_missing_file_is_named(folder: MachineFolder) -> None:
 
 
 def test_two_writers_are_told_apart(folder: MachineFolder) -> None:
-    with folder.locked():
-        with pytest.raises(DataError, match="another lobewatch is writing here"), MachineFolder(folder.path).locked():
-            pass
+    refusal = pytest.raises(DataError, match="another lobewatch is writing here")
+    with folder.locked(), refusal, MachineFolder(folder.path).locked():
+        pass
     with folder.locked():
         pass
 
 
 def test_a_folder_without_machine_toml_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="no machine.toml in it"):
+    with pytest.raises(DataError, match=r"no machine\.toml in it"):
         MachineFolder(tmp_path)
 
 

@@ -129,7 +129,7 @@ def test_an_unplugged_cable_costs_no_hit(folder: MachineFolder) -> None:
     structure = emulated_structure(table.build(), table.damping_ratio)
     signal = HammeredStructure(structure, SAMPLE_RATE, np.random.default_rng(1))
     seen = []
-    with TapsEmulator(signal, CHANNELS, SAMPLE_RATE, realtime=False, faults=Faults(unplug_after=60_000)) as device:
+    with TapsEmulator(signal, CHANNELS, SAMPLE_RATE, realtime=False, faults=Faults(unplug_after=100_000)) as device:
         source = TapsSource(device.port)
         running = begin_tap(folder, about(folder))
         with pytest.raises(DeviceError, match="unplugged"):
@@ -213,7 +213,7 @@ def test_a_tap_beside_the_tip_is_carried_to_it_by_the_model(folder: MachineFolde
     assert found.dynamics.followed.stiffness == pytest.approx(k, rel=1e-3)
 
 
-def test_a_machine_without_spindle_gives_all_but_the_models_part(tmp_path: Path, beam: Path) -> None:
+def test_a_machine_without_spindle_gives_all_but_the_models_part(tmp_path: Path) -> None:
     make_machine_folder(tmp_path / "plain", "new_machine.toml")
     folder = MachineFolder(tmp_path / "plain")
     folder.commit(recorded(about(folder), Mode(1700.0, 0.03, 3.5e7)))

@@ -66,11 +66,11 @@ def demo(
     path = out or next(p for p in _names() if not p.exists())
     make_machine_folder(path, "surrogate_machine.toml")
     folder = MachineFolder(path)
-    random = np.random.default_rng(seed)
-    wear = _wear(folder, taps)
+    randoms = np.random.default_rng(seed).spawn(taps)
+    wear = zip(_dates(), _wear(folder, taps), randoms, strict=False)
     months = []
     with Progress(console=notes, transient=True, disable=not notes.is_terminal) as progress:
-        for date, spindle in progress.track(zip(_dates(), wear, strict=False), total=taps, description="tap tests"):
+        for date, spindle, random in progress.track(wear, total=taps, description="tap tests"):
             months.append(_tap(folder, date, spindle, random))
     report = write_report(folder, path / "report.html")
     fall = [months[-1].found["stiffness_n_per_m"] / months[0].found["stiffness_n_per_m"] - 1]

@@ -19,7 +19,7 @@ START = datetime(2026, 1, 15, 9, tzinfo=UTC)
 
 def tap(days: float = 0.0, source: SourceFile | None = None, **about: str) -> TapTest:
     circumstances = replace(Circumstances("m", START + timedelta(days=days), "reference"), **about)  # type: ignore[arg-type]
-    frf = Frf(np.arange(1.0, 50.0), np.linspace(1 + 1j, 49 + 49j, 49))
+    frf = Frf(np.arange(1.0, 50.0), np.linspace(1 + 1j, 49 + 49j, 49).astype(np.complex128))
     return TapTest(new_tap_id(circumstances), circumstances, frf, source=source)
 
 

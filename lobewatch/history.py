@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import datetime, timedelta
 from importlib.metadata import version
 from typing import Any
@@ -51,22 +51,18 @@ NUMBERS = (
 MODE_COLUMNS = ("mode_frequency", "mode_damping_ratio", "mode_stiffness")
 
 
-def update_history(
-    folder: MachineFolder, progress: Callable[[int, int], None] = lambda _done, _of: None
-) -> tuple[SldHistory, list[Measurement]]:
+def update_history(folder: MachineFolder) -> tuple[SldHistory, list[Measurement]]:
     """The history with every committed tap in it, on the disk, and the measurements that were new to it.
 
-    What is there is kept as long as it was made by these settings and this version; else all is analysed again.
+    Rows stand in order of time. What is there is kept as long as it was made by these settings and this version from
+    the oldest taps on; else all is analysed again, so that a history kept up is equal to one made again.
     """
-    history = _read_current(folder)
-    known = set(history.columns["tap_id"])
-    new = [entry for entry in folder.taps() if entry.id not in known]
-    measurements: list[Measurement] = []
-    for i, entry in enumerate(new):
-        measurements.append(measure(folder, entry))
-        history = history.append(*_row(measurements[-1], folder.machine))
-        progress(i + 1, len(new))
-    if new or not folder.history.exists():
+    taps = folder.taps()
+    history = _read_current(folder, [entry.id for entry in taps])
+    measurements = [measure(folder, entry) for entry in taps[len(history) :]]
+    for measurement in measurements:
+        history = history.append(*_row(measurement, folder.machine))
+    if measurements or not folder.history.exists():
         write_history(folder.history, history)
     return history, measurements
 
@@ -79,19 +75,14 @@ def measure(folder: MachineFolder, entry: TapEntry) -> Measurement:
 def series(history: SldHistory, tool: str, direction: str) -> NDArray[np.int64]:
     """Rows of one tool and direction, oldest first."""
     columns = history.columns
-    rows = np.flatnonzero((columns["tool"] == tool) & (columns["direction"] == direction))
-    return rows[np.argsort([_time(text) for text in columns["time"][rows]], kind="stable")]
-
-
-def _time(text: str) -> float:
-    return datetime.fromisoformat(text).timestamp()
+    return np.flatnonzero((columns["tool"] == tool) & (columns["direction"] == direction))
 
 
 def _software() -> str:
     return f"lobewatch {version('lobewatch')}"
 
 
-def _read_current(folder: MachineFolder) -> SldHistory:
+def _read_current(folder: MachineFolder, tap_ids: list[str]) -> SldHistory:
     """The stored history where it still holds, else an empty one."""
     empty = _empty(folder.machine)
     if not folder.history.exists():
@@ -101,8 +92,7 @@ def _read_current(folder: MachineFolder) -> SldHistory:
     except ValueError:
         return empty
     same = stored.settings_hash == empty.settings_hash and stored.software == empty.software
-    ids = {entry.id for entry in folder.taps()}
-    return stored if same and ids.issuperset(stored.columns["tap_id"]) else empty
+    return stored if same and list(stored.columns["tap_id"]) == tap_ids[: len(stored)] else empty
 
 
 def _empty(machine: Machine) -> SldHistory:

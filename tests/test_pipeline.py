@@ -168,6 +168,19 @@ def test_x_and_y_within_a_day_make_one_two_directional_diagram(folder: MachineFo
     assert not both.notes
 
 
+def test_a_tap_recorded_earlier_and_stored_later_takes_its_place_in_time(folder: MachineFolder) -> None:
+    x, y = Mode(1700.0, 0.03, 3.5e7), Mode(1600.0, 0.04, 2.5e7)
+    folder.commit(recorded(about(folder, 1.0, "x"), x))
+    alone, _ = update_history(folder)
+    folder.commit(recorded(about(folder, 0.5, "y"), y))
+    kept_up, _ = update_history(folder)
+    folder.history.unlink()
+    made_again, _ = update_history(folder)
+    assert list(kept_up.columns["direction"]) == ["y", "x"]
+    assert np.array_equal(kept_up.depth[REFERENCE_CUT], made_again.depth[REFERENCE_CUT])
+    assert not np.array_equal(kept_up.depth[REFERENCE_CUT][1], alone.depth[REFERENCE_CUT][0])
+
+
 def test_a_negative_stiffness_is_stored_and_stops_the_lobes_with_a_reason(folder: MachineFolder) -> None:
     tap = recorded(about(folder), Mode(1700.0, 0.03, 3.5e7), Mode(1950.0, 0.01, -9e7))
     found = analyse(tap, folder.machine)

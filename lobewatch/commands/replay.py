@@ -56,8 +56,8 @@ def replay(
         for recorded in fresh.values():
             folder.commit(recorded)
         _, measurements = update_history(folder)
-    wanted = {recorded.id for recorded in fresh.values()}
-    shown = [m for m in measurements if m.tap_id in wanted]
+    new = {recorded.id for recorded in fresh.values()}
+    shown = [measurement for measurement in measurements if measurement.tap_id in new]
     texts = [text for m in shown for text in measurement_texts(m, setup)]
     payload = {"measurements": [measurement_json(m, setup) for m in shown]}
     emit(payload, as_json, *texts, f"{len(shown)} of {len(files)} file(s) stored in {folder.path}")

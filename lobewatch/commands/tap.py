@@ -63,7 +63,8 @@ def tap(
         folder.commit(running.finish())
         notes.print(f"saved {running.id}")
         _, measurements = update_history(folder)
-    emit(measurement_json(measurements[-1], setup), as_json, *measurement_texts(measurements[-1], setup))
+    found = next(measurement for measurement in measurements if measurement.tap_id == running.id)
+    emit(measurement_json(found, setup), as_json, *measurement_texts(found, setup))
 
 
 def _show(wanted: int) -> OnHit:

@@ -35,6 +35,7 @@ class PtyWire:
         import tty
 
         self._master, self._slave = pty.openpty()
+        self._open = [self._slave, self._master]
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self.port = os.ttyname(self._slave)
@@ -44,16 +45,17 @@ class PtyWire:
         """See Wire."""
         sending = [self._master] if self.pending else []
         readable, writable, _ = select.select([self._master], sending, [], timeout)
-        with contextlib.suppress(BlockingIOError):
+        with contextlib.suppress(BlockingIOError):  # the host may flush between select and here
             if writable:
                 del self.pending[: os.write(self._master, memoryview(self.pending)[:65536].tobytes())]
-        return os.read(self._master, 65536) if readable else b""
+            if readable:
+                return os.read(self._master, 65536)
+        return b""
 
     def close(self) -> None:
         """See Wire."""
-        for handle in (self._master, self._slave):
-            with contextlib.suppress(OSError):
-                os.close(handle)
+        while self._open:  # each once: the numbers of closed files are given to others
+            os.close(self._open.pop())
 
 
 class TcpWire:

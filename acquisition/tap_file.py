@@ -202,9 +202,9 @@ def _write_spectra(file: h5py.File, tap: TapTest) -> None:
 
 
 def _write_source(file: h5py.File, source: SourceFile) -> None:
-    file["source"] = np.frombuffer(source.content, np.uint8)
+    stored = file.create_dataset("source", data=np.frombuffer(source.content, np.uint8), compression="gzip")
     digest = hashlib.sha256(source.content).hexdigest()
-    file["source"].attrs.update(name=source.name, sha256=digest, units="byte")
+    stored.attrs.update(name=source.name, sha256=digest, units="byte")
 
 
 def _read_source(file: h5py.File) -> SourceFile | None:

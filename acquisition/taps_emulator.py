@@ -60,6 +60,7 @@ class TapsEmulator:
         self._n_scans, self._started, self._status_due = 0, 0.0, 0.0
         self._per_frame = 512
         self._stopping = False
+        self._ended = threading.Event()
         self._thread = threading.Thread(target=self._serve, name="TAPS emulator", daemon=True)
 
     def __enter__(self) -> Self:
@@ -77,10 +78,16 @@ class TapsEmulator:
 
     def wait(self) -> None:
         """Serve until interrupted or unplugged."""
-        while self._thread.is_alive():
-            self._thread.join(timeout=0.2)
+        while not self._ended.wait(timeout=0.2):  # an interrupted Thread.join takes the thread for ended
+            pass
 
     def _serve(self) -> None:
+        try:
+            self._answer_and_stream()
+        finally:
+            self._ended.set()
+
+    def _answer_and_stream(self) -> None:
         while not self._stopping:
             for frame in self._decoder.feed(self._wire.exchange(0.0 if self._streaming and self._has_room() else 0.05)):
                 self._answer(frame)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from importlib.metadata import version
@@ -51,6 +52,9 @@ def _options(
 
 def main() -> None:
     """Run; exit codes: 0 fine, 2 wrong use, bad file or no device, 130 Ctrl-C."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a console without these characters shows "?" instead
     try:
         app()
     except BrokenPipeError:

@@ -54,12 +54,16 @@ def tap(
         if running.hits:
             begun = f"{running.circumstances.created:%Y-%m-%d %H:%M} UTC"
             notes.print(f"going on with the test begun {begun}: {running.good} of {setup.tap.hits} good hits are there")
-        with TapsSource(port, setup.daq.sample_rate_hz) as source:
-            notes.print(
-                f"{source.info['model']} on {port}, {source.sample_rate:g} Hz. TAP the tool, again and again.",
-                markup=False,
-            )
-            take_hits(running, source, trigger_for(folder, source.sample_rate), setup.tap.hits, _show(setup.tap.hits))
+        try:
+            with TapsSource(port, setup.daq.sample_rate_hz) as source:
+                device = f"{source.info['model']} on {port}, {source.sample_rate:g} Hz"
+                notes.print(f"{device}. TAP the tool, again and again.", markup=False)
+                take_hits(
+                    running, source, trigger_for(folder, source.sample_rate), setup.tap.hits, _show(setup.tap.hits)
+                )
+        except KeyboardInterrupt:
+            notes.print(f"stopped with {running.good} good hits; the same command goes on with them")
+            raise
         folder.commit(running.finish())
         notes.print(f"saved {running.id}")
         _, measurements = update_history(folder)

@@ -14,8 +14,8 @@ Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout in
 
 notes = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 """Progress and remarks."""
-results = Console(highlight=False, soft_wrap=True, emoji=False)
-"""What was asked for."""
+results = Console(highlight=False, soft_wrap=True, emoji=False, width=max(Console().width, 120))
+"""What was asked for; wide enough for every table: a narrow terminal may break lines, but no number is cut off."""
 
 
 def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:

@@ -24,7 +24,7 @@ def render_report(folder: MachineFolder, history: SldHistory, tool: str, directi
     rows = series(history, tool, direction)
     if not rows.size:
         raise ValueError(f"{folder.path}: no tap test with tool {tool!r} in direction {direction!r} yet")
-    source = resources.files("lobewatch").joinpath("templates/report.html").read_text(encoding="utf-8")
+    source = resources.files("lobewatch").joinpath("report.html").read_text(encoding="utf-8")
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
     return environment.from_string(source).render(_content(folder, history, rows, tool, direction))
 

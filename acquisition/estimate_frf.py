@@ -59,15 +59,17 @@ def cross_spectra(hits: Sequence[Hit]) -> Spectra:
 
 
 def _windowed_force(hit: Hit) -> NDArray[np.float64]:
-    """The pulse kept whole for three of its widths, then tapered to zero over three more (raised cosine)."""
+    """The pulse with one of its widths on either side kept whole, then tapered to zero over one more (raised cosine).
+
+    A tight window matters: noise inside it is alike at neighbouring lines, and so passes for a shift of the mode.
+    """
     pulse = find_pulse(hit)
     if pulse is None:
         raise ValueError("a hit has no force pulse; check hits with check_hit before averaging")
     width = max(pulse.end - pulse.start, 8)
-    distance = np.arange(pulse.force.size) - (pulse.end + 3 * width)
-    before = (pulse.start - width) - np.arange(pulse.force.size)
-    outside = np.clip(np.maximum(distance, before) / (3 * width), 0.0, 1.0)
-    return np.asarray(pulse.force * 0.5 * (1 + np.cos(np.pi * outside)))
+    sample = np.arange(pulse.force.size)
+    beyond = np.maximum(sample - (pulse.end + width), (pulse.start - width) - sample)
+    return np.asarray(pulse.force * 0.5 * (1 + np.cos(np.pi * np.clip(beyond / width, 0.0, 1.0))))
 
 
 def _skew(hit: Hit) -> float:

@@ -75,7 +75,7 @@ class Hammering:
     """Share of hits with a second touch."""
     overloads: float = 0.05
     """Share of hits far too hard."""
-    force_noise: float = 0.2
+    force_noise: float = 0.1
     """rms (N)."""
     response_noise: float = 2.0
     """rms (m/s^2)."""

@@ -18,6 +18,7 @@ import pytest
 from acquisition import TapsEmulator
 from lobewatch.cli import main
 from lobewatch.emulation import emulated_structure, emulator
+from lobes import read_history
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.report import render_report
 
@@ -287,6 +288,11 @@ def test_the_demo_finds_the_truth_of_every_tap(run: Run) -> None:
     fall = {kind: last[kind]["stiffness_n_per_m"] / first[kind]["stiffness_n_per_m"] - 1 for kind in ("truth", "found")}
     assert fall["truth"] == pytest.approx(-0.0142, abs=1e-4)
     assert fall["found"] == pytest.approx(fall["truth"], abs=0.004)
+    columns = read_history("lobewatch-demo/history.h5").columns
+    for name, field in zip(("frequency", "damping_ratio", "stiffness", "bearing_stiffness"), bounds, strict=True):
+        truth = np.array([tap["truth"][field] for tap in said["taps"]])
+        score = (np.asarray(columns[name], float) - truth) / np.asarray(columns[f"{name}_std"], float)
+        assert 0.5 < np.sqrt(np.mean(score**2)) < 2, f"standard errors of {name} are not of the size of the errors"
     html = Path(said["report"]).read_text(encoding="utf-8")
     assert "2 of 3 cutting programs not stable" in html
     shown = run("demo", "--taps", 2, "--seed", 3)

@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 from acquisition import TapsEmulator
+from lobes import read_history
 from lobewatch.cli import main
 from lobewatch.emulation import emulated_structure, emulator
-from lobes import read_history
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.report import render_report
 

@@ -8,7 +8,10 @@ from pathlib import Path
 
 
 def atomic_write(path: Path, content: bytes) -> None:
-    """Write by temporary name, fsync, rename and fsync of the folder; on failure the old file stays as it was."""
+    """Write by temporary name, fsync, rename and fsync of the folder; on failure the old file stays as it was.
+
+    Raises OSError with the name of the file to be.
+    """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
         with temporary.open("xb") as file:
@@ -16,6 +19,8 @@ def atomic_write(path: Path, content: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
         temporary.unlink(missing_ok=True)
     sync_folder(path.parent)

@@ -49,9 +49,10 @@ def _overloads(hit: Hit) -> HitFlags:
     signals = hit.codes if hit.codes is not None else (hit.force, hit.acceleration)
     flags = HitFlags.OK
     for i, flag in enumerate((HitFlags.OVERLOAD_FORCE, HitFlags.OVERLOAD_RESPONSE)):
-        rails = (signals[i].min(), signals[i].max())
         if hit.codes is not None and hit.channels is not None:
-            rails = hit.channels[i].rails
+            rails = set(hit.channels[i].rails)
+        else:
+            rails = {signals[i].min(), signals[i].max()} - {np.median(signals[i])}  # a resting value is no rail
         if any(_longest_run(signals[i] == rail) >= RAIL_RUN for rail in rails):
             flags |= flag
     return flags

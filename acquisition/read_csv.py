@@ -2,7 +2,7 @@
 
 The separator (tab, semicolon, comma, white space) and the decimal comma are found from the first rows. A heading
 names each column and its unit: `time_s,force_N,acceleration_g`, `Time (s);Force [N];Acc [m/s^2]`,
-`Freq Real Imag` (receptance, m/N).
+`Freq Real Imag` (Hz; receptance, m/N).
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.units import FACTORS, STANDARD_GRAVITY, hit_from
 
+TIME = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6}
+"""Unit of the time column in lower case -> seconds."""
 EVEN = 1e-3
 """Largest deviation of a time step from the mean step, as a share of it."""
-_SUFFIX = re.compile(rf"(.+?)_({'|'.join(re.escape(unit) for unit in [*FACTORS, 's', 'hz'])})", re.IGNORECASE)
+_SUFFIX = re.compile(rf"(.+?)_({'|'.join(re.escape(unit) for unit in [*FACTORS, *TIME, 'hz'])})", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +58,8 @@ def is_frf(table: Table) -> bool:
 
 def frf_of(path: Path, table: Table) -> Frf:
     """Receptance (m/N) from frequency (Hz), real and imaginary part, and coherence where a fourth column has it."""
+    if table.units[0].lower() not in ("", "hz"):
+        raise DataError(f"{path}: frequency is in {table.units[0]!r}; give it in Hz")
     coherence = table.values[3] if len(table.names) > 3 and table.names[3].lower().startswith("coh") else None
     try:
         return Frf(table.values[0], table.values[1] + 1j * table.values[2], coherence)
@@ -72,14 +76,21 @@ def hit_of(path: Path, table: Table) -> Hit:
         (unit or name, values)
         for name, unit, values in zip(table.names[1:], table.units[1:], table.values[1:], strict=True)
     ]
-    return hit_from(path, columns, 1 / float(np.mean(np.diff(table.values[0]))))
+    step = float(np.mean(np.diff(table.values[0]))) * TIME[table.units[0].lower()]
+    return hit_from(path, columns, 1 / step)
 
 
 def _faults(table: Table) -> list[str]:
+    if table.values.shape[1] < 8:
+        return [f"{table.values.shape[1]} samples; at least 8 are needed"]
     quantities = [FACTORS.get(unit.lower(), ("unknown", 0.0))[0] for unit in table.units[1:]]
     faults = []
     if quantities.count("force") != 1:
         faults.append(f"{quantities.count('force') or 'no'} force channel (columns {', '.join(table.names)})")
+    if table.units[0].lower() not in TIME:
+        faults.append(
+            f"unit of the first column, time, not known (heading {table.names[0]!r}; known: {', '.join(TIME)})"
+        )
     step = np.diff(table.values[0])
     uneven = float(np.max(np.abs(step - step.mean())) / abs(step.mean())) if step.mean() else np.inf
     if uneven > EVEN:

@@ -68,6 +68,20 @@ def test_columns_are_told_apart_by_their_units_not_their_order(tmp_path: Path) -
     assert np.max(read_hits(path)[0].force) == pytest.approx(np.max(FORCE))
 
 
+def test_the_unit_of_time_is_read_and_never_guessed(tmp_path: Path) -> None:
+    in_ms = table(tmp_path / "ms.csv", "time_ms,force_N,acc_g", TIME * 1e3, FORCE, ACCELERATION)
+    assert read_hits(in_ms)[0].sample_rate == pytest.approx(RATE)
+    with pytest.raises(DataError, match="unit of the first column, time, not known"):
+        read_hits(table(tmp_path / "none.csv", "time,force_N,acc_g", TIME, FORCE, ACCELERATION))
+    with pytest.raises(DataError, match="frequency is in 'kHz'; give it in Hz"):
+        read_frf(table(tmp_path / "frf.csv", "Freq (kHz),Real,Imag", TIME + 1, FORCE, FORCE))
+
+
+def test_a_computed_hit_that_rests_at_exactly_zero_is_good(tmp_path: Path) -> None:
+    path = table(tmp_path / "hit.csv", "time_s,force_N,acc_m_s2", TIME, FORCE, ACCELERATION)
+    assert check_hit(read_hits(path)[0]) == HitFlags.OK
+
+
 def test_swapped_columns_are_refused(tmp_path: Path) -> None:
     path = table(tmp_path / "hit.csv", "time_s,force_N,acc_m_s2", TIME, ACCELERATION, FORCE)
     with pytest.raises(DataError, match="swapped channels"):
@@ -95,7 +109,8 @@ def write(path: Path, text: str) -> Path:
         ("time_s,force_N,acc_g\n", "a heading and rows of numbers are needed"),
         ("time_s,force_N,acc_g\n0,1,x\n", "line 2: '0,1,x' is no row of numbers"),
         ("time_s,force_N,acc_g\n0,1,2\n0.1,3\n", "line 3: 2 numbers under 3 headings"),
-        ("time_s,force_N,acc_furlong\n0,1,2\n0.1,3,4\n", "acc_furlong"),
+        ("time_s,force_N,acc_furlong\n" + "".join(f"{i},1,2\n" for i in range(9)), "acc_furlong"),
+        ("time_s,force_N,acc_g\n0,1,2\n1,2,3\n", "2 samples; at least 8 are needed"),
         ("Freq Real Imag\n1 2 nan\n2 3 4\n", "not finite"),
         ("\x00\x01\x02garbage", "neither HDF5 nor LVM nor a text table"),
     ],

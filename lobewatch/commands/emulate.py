@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 from typing import Annotated
 
@@ -51,5 +52,7 @@ def taps(
             results.print(f"port {device.port}", markup=False)
         results.file.flush()
         notes.print(f"the truth: f_1 {first['frequency_hz']:.2f} Hz, K {first['stiffness_n_per_m'] / 1e6:.3f} N/um")
-        notes.print(f"tap with: lobewatch tap {machine} --port {device.port}   (Ctrl-C ends the emulator)")
+        notes.print(
+            f"tap with: lobewatch tap {shlex.quote(str(machine))} --port {device.port}   (Ctrl-C ends the emulator)"
+        )
         device.wait()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from importlib import resources
 from pathlib import Path
 from typing import Annotated
@@ -30,7 +31,7 @@ def init(
         {"machine": str(machine), "machine_toml": str(toml)},
         as_json,
         f"made {toml}",
-        f"next: fill it in, then tap with: lobewatch tap {machine} --port PORT",
+        f"next: fill it in, then tap with: lobewatch tap {shlex.quote(str(machine))} --port PORT",
     )
 
 

@@ -1,0 +1,26 @@
+"""Numbers as people read them."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from lobewatch.output import plus_minus
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "scale", "text"),
+    [
+        (1722.0312, 0.0471, 1.0, "1722.031 ± 0.047"),
+        (1722.0312, 4.71, 1.0, "1722.0 ± 4.7"),
+        (1722.0312, 47.1, 1.0, "1722 ± 47"),
+        (3.2289e7, 1.2e4, 1e6, "32.289 ± 0.012"),
+        (-0.0029136, 0.00012, 0.01, "-0.291 ± 0.012"),
+        (1722.0312, math.nan, 1.0, "1722"),
+        (1722.0312, 1e-12, 1.0, "1722.0312"),
+        (math.nan, math.nan, 1.0, "-"),
+    ],
+)
+def test_two_digits_of_the_standard_error_decide(value: float, std: float, scale: float, text: str) -> None:
+    assert plus_minus(value, std, scale) == text

@@ -23,7 +23,10 @@ def read_lvm(path: Path) -> list[Hit]:
     ends = [i for i, line in enumerate(lines) if line.startswith(_END)]
     if len(ends) < 2:
         raise DataError(f"{path}: LVM file with {len(ends)} of at least 2 header ends; is it cut short?")
-    comma = any(line.split("\t")[:2] == ["Decimal_Separator", ","] for line in lines[: ends[0]])
+    head = [line.split("\t")[:2] for line in lines[: ends[0]]]
+    if ["X_Columns", "Multi"] in head:
+        raise DataError(f"{path}: each channel has its own time column (X_Columns Multi); export it with one or none")
+    comma = ["Decimal_Separator", ","] in head
     starts = [*ends[1:], len(lines)]
     return [
         _read_segment(path, lines, (before, end, after), comma)

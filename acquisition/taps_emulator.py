@@ -14,7 +14,16 @@ from typing import Any, Self
 from acquisition.channel import Channel
 from acquisition.emulator_wire import PtyWire, TcpWire, Wire
 from acquisition.simulated_source import Signal, quantise
-from acquisition.taps import LOST_BEFORE, Frame, FrameDecoder, MessageType, Status, encode_data, encode_frame
+from acquisition.taps import (
+    LOST_BEFORE,
+    SAMPLE_BITS,
+    Frame,
+    FrameDecoder,
+    MessageType,
+    Status,
+    encode_data,
+    encode_frame,
+)
 
 BUFFER_SECONDS = 1.0
 """What the device keeps for a slow host before it drops scans (s)."""
@@ -58,7 +67,7 @@ class TapsEmulator:
         self._seq = self._session = self._frames = self._scan = self._clock = self._overruns = 0
         self._streaming = self._lost = False
         self._n_scans, self._started, self._status_due = 0, 0.0, 0.0
-        self._per_frame = 512
+        self._per_frame, self._bits = 512, SAMPLE_BITS[0]
         self._stopping = False
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._serve, name="TAPS emulator", daemon=True)
@@ -122,7 +131,7 @@ class TapsEmulator:
                 self._streaming = False
             else:
                 raise ValueError(f"unknown command {frame.type:#04x}")
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, LookupError, TypeError) as error:
             self._send(MessageType.NACK, about + struct.pack("<H", 1) + str(error).encode())
         else:
             self._send(MessageType.ACK, about + struct.pack("<H", 0))
@@ -159,7 +168,7 @@ class TapsEmulator:
             raise ValueError("CONFIG while streaming; send STOP first")
         if wish["fs"] != self._rate or wish["channels"] != list(range(len(self._channels))):
             raise ValueError(f"CONFIG asks for what this device does not have: {wish}")
-        self._per_frame = int(wish["samples_per_frame"])
+        self._per_frame, self._bits = int(wish["samples_per_frame"]), SAMPLE_BITS[wish["format"]]
 
     def _start(self, n_scans: int) -> None:
         self._session = (self._session + 1) % 0x10000
@@ -194,7 +203,7 @@ class TapsEmulator:
             self._lost = True
             self._overruns += 1
         else:
-            body = encode_data(self._scan, codes, 16 if self._channels[0].adc_bits <= 16 else 32)
+            body = encode_data(self._scan, codes, self._bits)
             self._send(MessageType.DATA, body, LOST_BEFORE if self._lost else 0)
             self._lost = False
         self._scan += self._per_frame

@@ -42,8 +42,7 @@ class TapsSource:
         self._streaming = False
         try:
             self._command(MessageType.STOP)
-            self.info: dict[str, Any] = json.loads(self._command(MessageType.HELLO, answer=MessageType.INFO).body)
-            self.channels = _channels(self.info)
+            self.info, self.channels = self._identify()
             self.sample_rate = self._configure(sample_rate)
         except BaseException:
             self._link.close()
@@ -105,6 +104,19 @@ class TapsSource:
         lost = max(block.first_scan - self._next_scan, 0)
         self._next_scan = block.first_scan + block.codes.shape[1]
         return replace(block, lost_before=lost)
+
+    def _identify(self) -> tuple[dict[str, Any], tuple[Channel, ...]]:
+        body = self._command(MessageType.HELLO, answer=MessageType.INFO).body
+        try:
+            info = json.loads(body)
+            channels = _channels(info)
+            info["model"], info["fs_choices"] = str(info["model"]), [float(rate) for rate in info["fs_choices"]]
+        except (ValueError, KeyError, TypeError) as error:
+            raise DeviceError(
+                f"the DAQ on {self._link.port} describes itself wrongly ({type(error).__name__}: {error}); "
+                "its firmware must send the INFO of TAPS/1"
+            ) from error
+        return info, channels
 
     def _configure(self, sample_rate: float | None) -> float:
         choices = self.info["fs_choices"]

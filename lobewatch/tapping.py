@@ -72,9 +72,10 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
             f"{folder.path}: {free / 1e6:.0f} MB free on this disk; a tap test needs {RESERVE_BYTES / 1e6:.0f} MB"
         )
     spooled = sorted(folder.spool.iterdir(), reverse=True) if folder.spool.is_dir() else []
+    committed = {entry.id for entry in folder.taps()}
     for path in spooled if resume else []:
         files = sorted(path.glob("*.h5"))
-        if not files:
+        if not files or path.name in committed:
             continue
         about = read_tap_hits(files[0])[1]
         same = (about.tool, about.direction) == (circumstances.tool, circumstances.direction)
@@ -85,8 +86,16 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
 
 
 def take_hits(tap: TapInProgress, source: Source, trigger: Trigger, wanted: int, on_hit: OnHit) -> None:
-    """Add hits until `wanted` are good. The source is started and stopped here; DeviceError where it fails."""
+    """Add hits until `wanted` are good. The source is started and stopped here.
+
+    Raises DeviceError where the source fails, ValueError where earlier hits were recorded with another set-up.
+    """
     good = tap.good
+    setups = {(hit.force.size, hit.sample_rate) for hit in tap.hits}
+    if setups - {(trigger.n_samples, source.sample_rate)}:
+        raise ValueError(
+            f"the interrupted test {tap.id} was recorded with another length or sample rate; begin anew with --new"
+        )
     if good >= wanted:
         return
     source.start()

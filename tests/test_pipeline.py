@@ -17,12 +17,15 @@ from acquisition import (
     Faults,
     Frf,
     HammeredStructure,
+    Hit,
+    SimulatedSource,
     TapsEmulator,
     TapsSource,
     TapTest,
     average_good,
     from_accelerance,
     new_tap_id,
+    write_hit,
 )
 from dsm import modal_stiffness, modes_at, receptance, static_stiffness
 from lobes import average_angle, read_history
@@ -142,6 +145,18 @@ def test_an_unplugged_cable_costs_no_hit(folder: MachineFolder) -> None:
     assert begin_tap(folder, about(folder, days=0.1, direction="y")).hits == []
     assert begin_tap(folder, about(folder, days=2.0)).hits == []
     assert begin_tap(folder, about(folder), resume=False).hits == []
+    other = SimulatedSource(signal, CHANNELS, 2 * SAMPLE_RATE, 1)
+    with pytest.raises(ValueError, match="another length or sample rate; begin anew with --new"):
+        take_hits(resumed, other, trigger_for(folder, 2 * SAMPLE_RATE), 10, lambda *_: None)
+
+
+def test_a_committed_test_whose_spool_was_left_is_not_gone_on_with(folder: MachineFolder) -> None:
+    tap = recorded(about(folder), Mode(1700.0, 0.03, 3.5e7))
+    folder.commit(tap)
+    (folder.spool / tap.id).mkdir(parents=True)
+    hit = Hit(np.ones(100), np.ones(100), 1000.0)
+    write_hit(folder.spool / tap.id / "0000.h5", hit, about(folder))
+    assert begin_tap(folder, about(folder)).hits == []
 
 
 def test_a_full_disk_is_told_before_the_first_hit(folder: MachineFolder, monkeypatch: pytest.MonkeyPatch) -> None:

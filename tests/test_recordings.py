@@ -147,6 +147,8 @@ def test_an_lvm_in_an_unknown_unit_or_without_force_is_refused(beam: Path, tmp_p
     text = beam.read_text(encoding="latin-1")
     with pytest.raises(DataError, match="unit 'Volts' is not known"):
         read_hits(write(tmp_path / "a.lvm", text.replace("Newtons", "Volts")))
+    with pytest.raises(DataError, match="X_Columns Multi"):
+        read_hits(write(tmp_path / "m.lvm", text.replace("X_Columns\tNo", "X_Columns\tMulti")))
     with pytest.raises(DataError, match="two columns are acceleration"):
         read_hits(write(tmp_path / "b.lvm", text.replace("Newtons", "g")))
 

@@ -154,6 +154,26 @@ def test_something_that_is_no_daq_is_refused(monkeypatch: pytest.MonkeyPatch) ->
         os.close(slave)
 
 
+def test_a_device_that_describes_itself_wrongly_is_refused(tapper: Tapper) -> None:
+    impossible = Channel("force", 1.0, 5.0)
+    object.__setattr__(impossible, "quantity", "temperature")
+    with (
+        TapsEmulator(tapper(), (impossible,), RATE) as device,
+        pytest.raises(DeviceError, match=r"describes itself wrongly .*quantity='temperature'"),
+    ):
+        TapsSource(device.port)
+
+
+def test_a_24_bit_device_sends_long_words(tapper: Tapper) -> None:
+    fine = (Channel("force", 2.25e-3, 5.0, adc_bits=24), Channel("acceleration", 1.02e-3, 5.0, adc_bits=24))
+    with TapsEmulator(tapper(), fine, RATE, realtime=False) as device, TapsSource(device.port) as source:
+        source.start()
+        received = next(source.blocks())
+    expected = next(SimulatedSource(tapper(), fine, RATE, 512).blocks())
+    assert np.array_equal(received.codes, expected.codes)
+    assert np.max(np.abs(received.codes)) > 32767 or np.std(received.codes) > 100
+
+
 def test_a_rate_that_the_device_does_not_have_is_refused(device: TapsEmulator) -> None:
     with pytest.raises(ValueError, match="sample rate 1000 Hz is none of this device's: 25600 Hz"):
         TapsSource(device.port, sample_rate=1000.0)

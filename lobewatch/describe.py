@@ -135,7 +135,9 @@ def measurement_json(m: Measurement, machine: Machine) -> dict[str, Any]:
 
 def measurement_texts(m: Measurement, machine: Machine) -> list[str | Table]:
     """All of a measurement, for people."""
-    texts: list[str | Table] = [f"{m.tap_id}  (tool {m.tool}, direction {m.direction})", mode_table(m.dynamics.modes)]
+    texts: list[str | Table] = [f"{m.tap_id}  (tool {m.tool}, direction {m.direction})"]
+    if m.dynamics.modes:
+        texts.append(mode_table(m.dynamics.modes))
     if m.dynamics.followed is not None:
         texts.append(f"followed: {m.dynamics.followed.frequency:.2f} Hz")
     if m.dynamics.calibration is not None:

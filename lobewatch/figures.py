@@ -118,6 +118,8 @@ def trend_figure(
             axes.annotate(
                 f"-{percent:g} %", (1, level), xycoords=("axes fraction", "data"), ha="right", va="bottom", color=colour
             )
+    if len(days) == 1:
+        axes.set_xlim(days[0] - 15, days[0] + 15)
     locator = AutoDateLocator()
     axes.xaxis.set_major_locator(locator)
     axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))

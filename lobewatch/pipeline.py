@@ -74,17 +74,18 @@ def _in_band(modes: Sequence[Mode], machine: Machine) -> list[Mode]:
 
 
 def _no_mode(modes: Sequence[Mode], machine: Machine) -> str:
-    found = ", ".join(f"{mode.frequency:.0f}" for mode in modes) or "none"
-    if machine.mode.band_hz is None:
-        return f"no mode to follow: none with positive stiffness was found (modes at {found} Hz)"
-    low, high = machine.mode.band_hz
-    return (
-        f"no mode to follow: none with positive stiffness in [mode] band_hz {low:g}..{high:g} Hz (modes at {found} Hz)"
-    )
+    low, high = machine.mode.band_hz or (0.0, np.inf)
+    place = "" if machine.mode.band_hz is None else f" in [mode] band_hz {low:g}..{high:g} Hz"
+    found = f"found are {', '.join(f'{mode.frequency:.0f}' for mode in modes)} Hz" if modes else "none was found at all"
+    return f"no mode to follow: none with positive stiffness{place}; {found}"
 
 
 def _dynamics(tap: TapTest, machine: Machine, notes: list[str]) -> Dynamics:
-    modes = fit_modes(tap.frf)
+    try:
+        modes = fit_modes(tap.frf)
+    except ValueError as error:
+        notes.append(f"no modes: {error}")
+        return Dynamics([], None, None, [])
     followed = predominant(modes, machine.mode.band_hz)
     if followed is None:
         notes.append(_no_mode(modes, machine))

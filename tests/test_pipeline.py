@@ -219,12 +219,23 @@ def replace_band(folder: MachineFolder, band: str) -> MachineFolder:
 def test_nothing_in_the_band_and_out_of_reach_are_reasons_not_errors(folder: MachineFolder) -> None:
     outside = analyse(recorded(about(folder), Mode(900.0, 0.03, 3.5e7)), folder.machine)
     assert outside.dynamics.followed is None
-    assert "none with positive stiffness in [mode] band_hz 1200..2200 Hz (modes at 900 Hz)" in outside.notes[0]
+    assert "none with positive stiffness in [mode] band_hz 1200..2200 Hz; found are 900 Hz" in outside.notes[0]
     wide = replace_band(folder, "[1200, 3000]")
     beyond = analyse(recorded(about(folder), Mode(2500.0, 0.03, 3.5e7)), wide.machine)
     assert beyond.dynamics.calibration is None
     assert "2301.1 Hz (rigid bearings)" in beyond.notes[0]
     assert REFERENCE_CUT in beyond.lobes
+
+
+def test_an_frf_that_cannot_be_fitted_is_stored_with_the_reason_and_blocks_nothing(folder: MachineFolder) -> None:
+    good = recorded(about(folder, 30.0), Mode(1700.0, 0.03, 3.5e7))
+    first = recorded(about(folder), Mode(1700.0, 0.03, 3.5e7))
+    folder.commit(replace(first, frf=Frf(LINES, first.frf.receptance.conj())))
+    folder.commit(good)
+    history, (conjugated, fine) = update_history(folder)
+    assert conjugated.notes[0].startswith("no modes: the phase")
+    assert fine.lobes
+    assert "natural frequency" in render_report(folder, history, "reference", "x")
 
 
 def test_a_tap_beside_the_tip_is_carried_to_it_by_the_model(folder: MachineFolder) -> None:

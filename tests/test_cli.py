@@ -295,6 +295,11 @@ def test_the_demo_finds_the_truth_of_every_tap(run: Run) -> None:
         assert 0.5 < np.sqrt(np.mean(score**2)) < 2, f"standard errors of {name} are not of the size of the errors"
     html = Path(said["report"]).read_text(encoding="utf-8")
     assert "2 of 3 cutting programs not stable" in html
+    verdicts = {
+        row[1][0]: re.findall(r"(not stable|stable)</td>", row[0])
+        for row in re.finditer(r"<tr><td>([ABC]):.*?</tr>", html, re.DOTALL)
+    }
+    assert verdicts == {"A": ["stable", "not stable"], "B": ["stable", "stable"], "C": ["stable", "not stable"]}
     shown = run("demo", "--taps", 2, "--seed", 3)
     assert "report: lobewatch-demo-2" in shown.out
     assert "worst error: f_1" in shown.out

@@ -73,7 +73,7 @@ def _figures(
     columns = history.columns
     figures: list[tuple[str, str, str]] = []
     cut = machine.cut_names[0] if machine.cut_names else None
-    if cut is not None and np.all(np.isfinite(history.depth[cut][rows[-1], 0])):
+    if cut is not None and not np.isnan(history.depth[cut][rows[-1], 0]):
         then, now = history.depth[cut][rows[0]], history.depth[cut][rows[-1]]
         depths = {f"{times[0]:%Y-%m-%d}": then} if rows.size > 1 and not np.isnan(then[0]) else {}
         depths[f"{times[-1]:%Y-%m-%d}"] = now

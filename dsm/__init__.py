@@ -4,22 +4,29 @@ Planar Euler-Bernoulli beams on springs, exact at every frequency. Source: O. Ga
 Machine Tool Spindle Decay on the Stability Lobe Diagram, Shock and Vibration, 2015, in a form without its poles.
 """
 
+from dsm.attachments import Bearing, Joint, LumpedMass
 from dsm.calibrate import calibrate
 from dsm.calibration import Calibration, UnreachableFrequencyError
 from dsm.critical_speed import critical_speed
+from dsm.material import MATERIALS, Material
 from dsm.modal_stiffness import modal_stiffness
 from dsm.mode_shapes import mode_shapes
 from dsm.modes import Modes
 from dsm.modes_at import modes_at
 from dsm.natural_frequencies import natural_frequencies
 from dsm.receptance import receptance
-from dsm.spindle import Bearing, Segment, Spindle, Theory
+from dsm.segment import Segment
+from dsm.spindle import Spindle, Theory
 from dsm.static_stiffness import static_stiffness
 from dsm.stiffness_curve import stiffness_curve
 
 __all__ = [
+    "MATERIALS",
     "Bearing",
     "Calibration",
+    "Joint",
+    "LumpedMass",
+    "Material",
     "Modes",
     "Segment",
     "Spindle",

@@ -2,70 +2,125 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from dsm.attachments import Bearing, Joint, LumpedMass
 from dsm.dynamic_stiffness import DynamicStiffness
-from dsm.element_series import MAX_X, element_series
-from dsm.spindle import SAME_PLACE, Spindle
+from dsm.element_series import TERMS, element_series
+from dsm.place_nodes import place_nodes
+from dsm.sections import Sections, sections
+from dsm.spindle import Spindle
+from dsm.timoshenko_series import timoshenko_series
 
+_Float = NDArray[np.float64]
+_Indices = NDArray[np.int_]
 Held = tuple[float, int]
 """A dof that cannot move: position (m), and 0 for the deflection or 1 for the slope."""
 
 
 def assemble(
-    spindle: Spindle, top_frequency: float, places: Sequence[float] = (), held: Sequence[Held] = ()
+    spindle: Spindle,
+    top_frequency: float,
+    places: Sequence[float] = (),
+    held: Sequence[Held] = (),
+    left_out: Sequence[int] = (),
+    spin: float | None = None,
 ) -> DynamicStiffness:
-    """Dynamic stiffness matrix with nodes at segment ends, bearings, `places` (m) and `held` dofs.
+    """Dynamic stiffness matrix with nodes at segment ends, bearings, masses, joints, `places` (m) and `held` dofs.
 
     Elements longer than the series allows at `top_frequency` (Hz) are split into equal parts. A pinned end is
-    held = [(z, 0)], a clamped one [(z, 0), (z, 1)]. Rounding blurs the matrix by the order of 1e-14 EI/l^3
-    (N/m), l the shortest distance between nodes. Raises ValueError for a place off the shaft.
+    held = [(z, 0)], a clamped one [(z, 0), (z, 1)]. left_out: bearings (0 is the first) whose nodes are there without
+    their radial springs. spin (rad/s): a polynomial in w for circular whirl, see DynamicStiffness. Rounding blurs the
+    matrix by the order of 1e-14 EI/l^3 (N/m), l the shortest distance between nodes. The same one is not made twice.
+    Raises ValueError for a place off the shaft.
     """
-    wanted = [bearing.position for bearing in spindle.bearings] + list(places) + [z for z, _ in held]
-    position, of_segment = _nodes(spindle, wanted, top_frequency)
-    rigidity, mass = (values[of_segment] for values in section_properties(spindle))
-    series = element_series(rigidity, mass, np.diff(position))
+    return _assemble(spindle, float(top_frequency), tuple(map(float, places)), tuple(held), tuple(left_out), spin)
+
+
+@lru_cache(maxsize=32)
+def _assemble(
+    spindle: Spindle,
+    top_frequency: float,
+    places: tuple[float, ...],
+    held: tuple[Held, ...],
+    left_out: tuple[int, ...],
+    spin: float | None,
+) -> DynamicStiffness:
+    wanted = [*_places_of_parts(spindle), *places, *(z for z, _ in held)]
+    pieces = sections(spindle)
+    position, piece = place_nodes(pieces, wanted, spindle.theory, top_frequency, spin)
+    position, series = _with_joints(spindle, position, _beams(spindle, pieces, piece, np.diff(position), spin))
     diagonal = np.zeros((3, position.size, series.shape[2]))
     diagonal[:, :-1] = series[:3]
     diagonal[:, 1:] += series[:3] * np.array([1, -1, 1])[:, np.newaxis, np.newaxis]
     coupling = np.stack([series[3], series[4], -series[4], series[5]])
-    model = DynamicStiffness(position, diagonal, coupling, np.zeros((position.size, 2), dtype=bool), top_frequency)
-    for bearing in spindle.bearings:
-        diagonal[0, model.node(bearing.position), 0] += bearing.stiffness
-    for place, dof in held:
-        _hold(model, model.node(place), dof)
+    free = np.zeros((position.size, 2), dtype=bool)
+    model = DynamicStiffness(position, diagonal, coupling, free, top_frequency, spin)
+    _add_masses(model, spindle)
+    for z, dof in (*_add_springs(model, spindle, left_out), *held):
+        _hold(model, model.node(z), dof)
+    for values in (position, diagonal, coupling, free):
+        values.setflags(write=False)
     return model
 
 
-def section_properties(spindle: Spindle) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Bending stiffness EI (N m^2) and mass per length (kg/m) of the segments, shape (n_segments,) each."""
-    rigidity = [spindle.youngs_modulus * segment.second_moment for segment in spindle.segments]
-    return np.array(rigidity), np.array([spindle.density * segment.area for segment in spindle.segments])
+def _places_of_parts(spindle: Spindle) -> list[float]:
+    parts: tuple[Bearing | LumpedMass | Joint, ...] = (*spindle.bearings, *spindle.masses, *spindle.joints)
+    return [part.position for part in parts]
 
 
-def _nodes(
-    spindle: Spindle, wanted: Sequence[float], top_frequency: float
-) -> tuple[NDArray[np.float64], NDArray[np.int_]]:
-    """Node positions (m), shape (n,), and the segment of each element, shape (n - 1,)."""
-    ends = np.cumsum([0.0] + [segment.length for segment in spindle.segments])
-    slack = SAME_PLACE * ends[-1]
-    nodes = ends
-    for place in wanted:
-        if not -slack <= place <= ends[-1] + slack:
-            raise ValueError(f"position={place} m is off the shaft, which spans 0 to {ends[-1]:g} m")
-        if np.min(np.abs(nodes - place)) > slack:
-            nodes = np.sort(np.append(nodes, place))
-    of_segment = np.searchsorted(ends, (nodes[:-1] + nodes[1:]) / 2) - 1
-    rigidity, mass = section_properties(spindle)
-    x = np.diff(nodes) * ((mass / rigidity)[of_segment] * (2 * np.pi * top_frequency) ** 2) ** 0.25
-    parts = np.maximum(np.ceil(x / MAX_X), 1).astype(int)
-    if np.all(parts == 1):
-        return nodes, of_segment
-    pieces = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(nodes[:-1], nodes[1:], parts, strict=True)]
-    return np.append(np.concatenate(pieces), nodes[-1]), np.repeat(of_segment, parts)
+def _beams(spindle: Spindle, pieces: Sections, piece: _Indices, length: _Float, spin: float | None) -> _Float:
+    """Series of the beam elements, each part of a piece, shape (6, n_elements, n_terms)."""
+    rigidity, mass = pieces.rigidity[piece], pieces.mass[piece]
+    terms = TERMS if spin is None else 2 * TERMS - 1
+    if spindle.theory == "timoshenko":
+        rotary, shear = pieces.rotary[piece], pieces.shear[piece]
+        return timoshenko_series(rigidity, mass, rotary, shear, length, terms, spin)
+    series = np.zeros((6, length.size, terms))
+    series[..., :: 1 if spin is None else 2] = element_series(rigidity, mass, length)
+    return series
+
+
+def _with_joints(spindle: Spindle, position: _Float, series: _Float) -> tuple[_Float, _Float]:
+    """Nodes and element series with an element of no length at each joint."""
+    for joint in spindle.joints:
+        node = int(np.argmin(np.abs(position - joint.position)))
+        element = np.zeros((6, series.shape[2]))
+        k, tilt = joint.stiffness, joint.rotational_stiffness
+        element[:, 0] = k, 0.0, tilt, -k, 0.0, -tilt
+        position = np.insert(position, node, position[node])
+        series = np.insert(series, node, element, axis=1)
+    return position, series
+
+
+def _add_masses(model: DynamicStiffness, spindle: Spindle) -> None:
+    power = 1 if model.spin is None else 2
+    for body in spindle.masses:
+        node = model.node(body.position)
+        model.diagonal[0, node, power] -= body.mass
+        model.diagonal[2, node, power] -= body.diametral_inertia
+        if model.spin is not None:
+            model.diagonal[2, node, 1] += body.polar_inertia * model.spin
+
+
+def _add_springs(model: DynamicStiffness, spindle: Spindle, left_out: Sequence[int]) -> list[Held]:
+    """Add the bearings; what they hold rigidly is returned."""
+    rigid: list[Held] = []
+    for index, bearing in enumerate(spindle.bearings):
+        node = model.node(bearing.position)
+        model.diagonal[2, node, 0] += bearing.rotational_stiffness
+        if index in left_out:
+            continue
+        if math.isinf(bearing.support_stiffness):
+            rigid.append((bearing.position, 0))
+        else:
+            model.diagonal[0, node, 0] += bearing.support_stiffness
+    return rigid
 
 
 def _hold(model: DynamicStiffness, node: int, dof: int) -> None:

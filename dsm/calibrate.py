@@ -7,49 +7,49 @@ from dataclasses import replace
 
 import numpy as np
 
+from dsm.bearing_eigenproblem import BearingEigenproblem, bearing_eigenproblem, calibrated_bearings
 from dsm.calibration import Calibration, UnreachableFrequencyError
-from dsm.find_modes import find_modes
-from dsm.modal_stiffness import modal_stiffness
-from dsm.modes import Modes
 from dsm.natural_frequencies import natural_frequencies
 from dsm.spindle import Spindle
-from dsm.static_stiffness import static_stiffness
-from dsm.stiffness_factor import stiffness_factor
+from dsm.stiffness_curve import mean_stiffness
 
 
-def calibrate(spindle: Spindle, frequency: float, frequency_std: float | None = None, mode: int = 1) -> Calibration:
-    """Scale all bearing stiffnesses by one factor, so that a mode (1 is the lowest) has its measured frequency (Hz).
+def calibrate(
+    spindle: Spindle,
+    frequency: float,
+    frequency_std: float | None = None,
+    mode: int = 1,
+    group: str | None = None,
+) -> Calibration:
+    """Scale bearing stiffnesses by one factor, so that a mode (1 is the lowest) has its measured frequency (Hz).
 
     The given stiffnesses say only in which ratio the bearings share; equal ones make one unknown stiffness of them.
-    The factor is exact, from an eigenvalue problem of the order of the number of bearings; its standard error follows
-    from that of the frequency (`frequency_std`, Hz) by the chain rule.
+    group: the bearings that are scaled; None: all that have a group. The factor is exact, from an eigenvalue problem of
+    the order of the number of bearings, and a count of modes says which eigenvalue it is; its standard error follows
+    from that of the frequency (`frequency_std`, Hz) by the chain rule. Stiffness against tilting and of the housing
+    stays as it is.
 
-    Raises UnreachableFrequencyError where the frequency lies outside what free to rigid bearings allow, ValueError
-    for a frequency not > 0 and for fewer than two bearings.
+    Raises UnreachableFrequencyError where the frequency lies outside what the springs can do, ValueError for a
+    frequency not > 0, a shaft that is not held, and a group with no bearing or a rigid one.
     """
     _check(frequency, frequency_std, mode)
-    static_before = static_stiffness(spindle)
-    factor = float(stiffness_factor(spindle, frequency, mode)[0])
-    if math.isnan(factor):
-        raise _unreachable(spindle, frequency, mode)
-    bearings = [replace(bearing, stiffness=factor * bearing.stiffness) for bearing in spindle.bearings]
-    after = replace(spindle, bearings=bearings)
-    modes = find_modes(after, mode)
-    sensitivity = _sensitivity(after, modes)
-    stiffness = after.mean_bearing_stiffness
+    problem = bearing_eigenproblem(spindle, np.array([frequency]), group)
+    index = int(problem.pick(mode)[0])
+    if index < 0:
+        raise _unreachable(spindle, frequency, mode, group)
+    factor = float(-1 / problem.values[0, index])
+    sensitivity = _sensitivity(problem, index)
+    stiffness = factor * mean_stiffness(spindle, group)
     return Calibration(
         frequency=float(frequency),
+        frequency_std=frequency_std,
         mode=mode,
         bearing_stiffness=stiffness,
         bearing_stiffness_std=None if frequency_std is None else stiffness * frequency_std / frequency / sensitivity,
         factor=factor,
         sensitivity=sensitivity,
-        residual=float(modes.frequency[-1]) - frequency,
-        static_stiffness_before=static_before,
-        static_stiffness_after=static_stiffness(after),
-        modal_stiffness_before=modal_stiffness(spindle, mode),
-        modal_stiffness_after=float(modes.stiffness_at(0.0)[-1]),
-        spindle=after,
+        given=spindle,
+        spindle=_scaled(spindle, factor, group),
     )
 
 
@@ -62,17 +62,28 @@ def _check(frequency: float, frequency_std: float | None, mode: int) -> None:
         raise ValueError(f"mode={mode} is not at least 1, the lowest")
 
 
-def _sensitivity(spindle: Spindle, modes: Modes) -> float:
-    """d ln f / d ln k of the last mode: sum of k phi^2 over the bearings, over 2 w^2; phi of unit modal mass."""
-    energy = sum(b.stiffness * modes.deflection_at(b.position)[-1] ** 2 for b in spindle.bearings)
-    return float(energy / (2 * (2 * np.pi * modes.frequency[-1]) ** 2))
+def _sensitivity(problem: BearingEigenproblem, index: int) -> float:
+    """d ln f / d ln k: with -1/factor = v^T R v, d(v^T R v)/d(w^2) = -x^T (dK/d w^2) x, x = K^-1 B v."""
+    x = problem.response[0] @ problem.vectors[0, :, index]
+    slope = -x @ problem.model.dense(problem.w2, derivative=True)[0] @ x
+    return float(-problem.values[0, index] / (2 * problem.w2[0] * slope))
 
 
-def _unreachable(spindle: Spindle, frequency: float, mode: int) -> UnreachableFrequencyError:
-    low = float(natural_frequencies(replace(spindle, bearings=()), mode)[-1])
-    high = float(natural_frequencies(spindle, mode, rigid_bearings=True)[-1])
+def _scaled(spindle: Spindle, factor: float, group: str | None) -> Spindle:
+    bearings = list(spindle.bearings)
+    for index in calibrated_bearings(spindle, group):
+        bearings[index] = replace(bearings[index], stiffness=factor * bearings[index].stiffness)
+    return replace(spindle, bearings=bearings)
+
+
+def _unreachable(spindle: Spindle, frequency: float, mode: int, group: str | None) -> UnreachableFrequencyError:
+    chosen = calibrated_bearings(spindle, group)
+    soft = [bearing for index, bearing in enumerate(spindle.bearings) if index not in chosen]
+    hard = [replace(b, stiffness=math.inf) if i in chosen else b for i, b in enumerate(spindle.bearings)]
+    low = float(natural_frequencies(replace(spindle, bearings=soft), mode)[-1])
+    high = float(natural_frequencies(replace(spindle, bearings=hard), mode)[-1])
     return UnreachableFrequencyError(
-        f"no bearing stiffness puts mode {mode} at {frequency:g} Hz: it lies between {low:.1f} Hz (free shaft) and "
-        f"{high:.1f} Hz (rigid bearings); check the geometry, and which mode was measured",
+        f"no bearing stiffness puts mode {mode} at {frequency:g} Hz: it lies between {low:.1f} Hz (without these "
+        f"bearings) and {high:.1f} Hz (rigid bearings); check the geometry, and which mode was measured",
         (low, high),
     )

@@ -9,15 +9,16 @@ from scipy.linalg.lapack import dsytrf
 from dsm.dynamic_stiffness import DynamicStiffness
 
 
-def count_below(model: DynamicStiffness, w2: NDArray[np.float64]) -> NDArray[np.int_]:
-    """Number of natural frequencies below w, shape (n,), for w2 = w^2 in (rad/s)^2: the negative pivots of K(w).
+def count_below(model: DynamicStiffness, x: NDArray[np.float64]) -> NDArray[np.int_]:
+    """Number of natural frequencies below w, shape (n,), for x = w^2 (w where it spins): the negative pivots of K(w).
 
     None is missed and double ones count twice. Source: W. H. Wittrick and F. W. Williams, A general algorithm for
     computing natural frequencies of elastic structures, Q. J. Mech. Appl. Math. 24 (1971), with J0 = 0. The pivoting
-    of Bunch and Kaufman and rows scaled to one another keep it right where a part of the shaft is at resonance.
+    of Bunch and Kaufman and rows scaled to one another keep it right where a part of the shaft is at resonance. Where
+    the shaft spins, those of forward whirl are counted for w > 0: phi^T K(w) phi falls through 0 once, for any phi.
     """
-    scale = 1 / np.sqrt(np.diagonal(model.dense(np.zeros(1))[0]))
-    matrices = model.dense(w2) * np.outer(scale, scale)
+    scale = 1 / np.sqrt(np.diagonal(model.term(0)))
+    matrices = model.dense(x) * np.outer(scale, scale)
     return np.array([_negative_pivots(matrix) for matrix in matrices], dtype=int)
 
 

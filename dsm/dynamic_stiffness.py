@@ -15,6 +15,8 @@ Number = TypeVar("Number", np.float64, np.complex128)
 class DynamicStiffness:
     """Stiffness matrix K of a chain of beam elements, a polynomial in w^2 (w the angular frequency, rad/s).
 
+    For a shaft that spins it is a polynomial in w, for the circular whirl u exp(i w t) of both planes together. What
+    is called `x` below is w^2, or w where it spins. Lumped masses, bearings and joints of no length are in it.
     Node i has the deflection u_i and the slope t_i = du/dz, in this order. A dof that is held has its row and column
     replaced by those of the unit matrix: it stays at zero and adds a positive pivot. Exact for w up to that of
     `top_frequency`, where no element has a clamped natural frequency of its own (J0 = 0 of Wittrick and Williams).
@@ -23,38 +25,57 @@ class DynamicStiffness:
     position: NDArray[np.float64]
     """Nodes from the tool tip on (m), shape (n_nodes,)."""
     diagonal: NDArray[np.float64]
-    """Coefficients of K(u_i, u_i), K(u_i, t_i), K(t_i, t_i) in powers of w^2, shape (3, n_nodes, n_terms)."""
+    """Coefficients of K(u_i, u_i), K(u_i, t_i), K(t_i, t_i) in powers of x, shape (3, n_nodes, n_terms)."""
     coupling: NDArray[np.float64]
     """The same of K(u_i, u_j), K(u_i, t_j), K(t_i, u_j), K(t_i, t_j), j = i + 1, shape (4, n_nodes - 1, n_terms)."""
     held: NDArray[np.bool_]
     """Dofs that cannot move, shape (n_nodes, 2)."""
     top_frequency: float
     """Highest frequency of interest (Hz)."""
+    spin: float | None = None
+    """Speed of rotation (rad/s); forward whirl turns with it. None: the polynomial is one in w^2."""
+
+    def to_x(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The variable of the polynomial at frequencies (Hz), any shape."""
+        w = 2 * np.pi * frequency
+        return np.asarray(w if self.spin is not None else w * w)
+
+    def to_frequency(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Frequencies (Hz) at values of the variable, any shape."""
+        return np.asarray((x if self.spin is not None else np.sqrt(x)) / (2 * np.pi))
 
     def node(self, position: float) -> int:
         """Index of the node nearest to a position (m)."""
         return int(np.argmin(np.abs(self.position - position)))
 
-    def blocks(self, w2: NDArray[Number], derivative: bool = False) -> tuple[NDArray[Number], NDArray[Number]]:
-        """Values of diagonal (3, n_nodes, n) and coupling (4, n_nodes - 1, n) at w^2, shape (n,), (rad/s)^2.
+    def blocks(self, x: NDArray[Number], derivative: bool = False) -> tuple[NDArray[Number], NDArray[Number]]:
+        """Values of diagonal (3, n_nodes, n) and coupling (4, n_nodes - 1, n) at x, shape (n,), in SI units.
 
-        w^2 may be complex or negative. With `derivative`, those of dK/d(w^2).
+        x may be complex or negative. With `derivative`, those of dK/dx.
         """
-        powers = np.vander(w2, self.diagonal.shape[2], increasing=True).T
+        powers = np.vander(x, self.diagonal.shape[2], increasing=True).T
         if derivative:
             order = np.arange(1, powers.shape[0])
             powers = order[:, np.newaxis] * powers[:-1]
             return self.diagonal[..., 1:] @ powers, self.coupling[..., 1:] @ powers
         return self.diagonal @ powers, self.coupling @ powers
 
-    def dense(self, w2: NDArray[Number], derivative: bool = False) -> NDArray[Number]:
-        """K, or dK/d(w^2), as full matrices of shape (n, 2 n_nodes, 2 n_nodes)."""
-        (uu, ut, tt), coupling = self.blocks(w2, derivative)
-        u = 2 * np.arange(self.position.size)
-        matrix = np.zeros((w2.size, 2 * u.size, 2 * u.size), dtype=w2.dtype)
-        matrix[:, u, u] = uu.T
-        matrix[:, u, u + 1] = matrix[:, u + 1, u] = ut.T
-        matrix[:, u + 1, u + 1] = tt.T
-        for entry, (row, column) in zip(coupling, ((0, 2), (0, 3), (1, 2), (1, 3)), strict=True):
-            matrix[:, u[:-1] + row, u[:-1] + column] = matrix[:, u[:-1] + column, u[:-1] + row] = entry.T
-        return matrix
+    def dense(self, x: NDArray[Number], derivative: bool = False) -> NDArray[Number]:
+        """K, or dK/dx, as full matrices of shape (n, 2 n_nodes, 2 n_nodes)."""
+        return _full(*self.blocks(x, derivative))
+
+    def term(self, power: int) -> NDArray[np.float64]:
+        """Coefficient of one power of x in K, a full matrix of shape (2 n_nodes, 2 n_nodes)."""
+        return np.asarray(_full(self.diagonal[..., power : power + 1], self.coupling[..., power : power + 1])[0])
+
+
+def _full(diagonal: NDArray[Number], coupling: NDArray[Number]) -> NDArray[Number]:
+    uu, ut, tt = diagonal
+    u = 2 * np.arange(uu.shape[0])
+    matrix = np.zeros((uu.shape[1], 2 * u.size, 2 * u.size), dtype=uu.dtype)
+    matrix[:, u, u] = uu.T
+    matrix[:, u, u + 1] = matrix[:, u + 1, u] = ut.T
+    matrix[:, u + 1, u + 1] = tt.T
+    for entry, (row, column) in zip(coupling, ((0, 2), (0, 3), (1, 2), (1, 3)), strict=True):
+        matrix[:, u[:-1] + row, u[:-1] + column] = matrix[:, u[:-1] + column, u[:-1] + row] = entry.T
+    return matrix

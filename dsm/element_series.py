@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 TERMS = 12
 """Terms kept: the first pole is at z = 4.7300^4 = 500.56, so that the rest is below 1e-17 for z <= MAX_X^4."""
+POLE = 500.5639
+"""Lowest pole in z = x^4: where the element with clamped ends resonates, 4.7300^4."""
 MAX_X = 2.0
 """Largest x = L (m w^2/EI)^(1/4) of an element: longer ones are split, and no clamped frequency is left below w."""
 

@@ -1,38 +1,38 @@
-"""Driving-point receptance of a spindle."""
+"""Receptance of a spindle."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dsm.assemble import assemble
 from dsm.condense import condense
+from dsm.damped_blocks import damped_blocks
 from dsm.frequency_axis import frequency_axis
 from dsm.spindle import Spindle, require_support
 
 
 def receptance(
-    spindle: Spindle, frequency: ArrayLike, position: float = 0.0, loss_factor: float = 0.0
+    spindle: Spindle,
+    frequency: ArrayLike,
+    position: float = 0.0,
+    loss_factor: float = 0.0,
+    force_position: float | None = None,
 ) -> NDArray[np.complex128]:
-    """Deflection over force at one place (m/N), shape (n,), with all modes in it.
+    """Deflection over force (m/N), shape (n,), with all modes in it, of the shaft at rest.
 
-    frequency: (n,) Hz. position: distance from the tool tip (m). loss_factor eta: shaft and bearings get the complex
-    stiffness k (1 + i eta), so that every mode has the damping ratio eta/2 and H(w) = H0(w^2/(1 + i eta))/(1 + i eta)
-    with H0 the receptance of the undamped spindle.
+    frequency: (n,) Hz. position: where the deflection is, distance from the tool tip (m). loss_factor eta: all
+    stiffness k becomes k (1 + i eta), so that every mode has the damping ratio eta/2; the dampers of the bearings come
+    on top. force_position: where the force is (m); None: at the same place.
 
     Raises ValueError for frequencies that are negative or not finite, a loss factor below 0, a position off the
-    shaft, and 0 Hz with fewer than two bearings.
+    shaft, and 0 Hz for a shaft that is not held.
     """
     f = frequency_axis(frequency)
     if np.any(f == 0):
         require_support(spindle)
-    if not (math.isfinite(loss_factor) and loss_factor >= 0):
-        raise ValueError(f"loss_factor={loss_factor} is not a finite number >= 0")
-    model = assemble(spindle, float(np.max(f, initial=0.0)), [position])
-    complexity = 1 + 1j * loss_factor
-    uu, ut, tt = condense(
-        model, np.asarray((2 * np.pi * f) ** 2 / complexity, dtype=np.complex128), model.node(position)
-    )
-    return np.asarray(tt / (uu * tt - ut * ut) / complexity)
+    places = sorted([position, position if force_position is None else force_position])
+    model = assemble(spindle, float(np.max(f, initial=0.0)), places)
+    blocks = damped_blocks(model, spindle, np.asarray(2 * np.pi * f, dtype=np.complex128), loss_factor)
+    k = condense(*blocks, node=model.node(places[1]), start=model.node(places[0]))
+    return np.asarray((k.share_u * k.tt - k.share_t * k.ut) / (k.uu * k.tt - k.ut * k.ut))

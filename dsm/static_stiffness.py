@@ -18,5 +18,5 @@ def static_stiffness(spindle: Spindle, position: float = 0.0) -> float:
     model = assemble(spindle, 0.0, [position])
     force = np.zeros(model.held.size)
     force[2 * model.node(position)] = 1.0
-    deflection = np.linalg.solve(model.dense(np.zeros(1))[0], force)
+    deflection = np.linalg.solve(model.term(0), force)
     return float(1 / deflection[2 * model.node(position)])

@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsm.attachments import Bearing, Joint, LumpedMass
+from dsm.beam_series import beam_series
 from dsm.dynamic_stiffness import DynamicStiffness
-from dsm.element_series import TERMS, element_series
 from dsm.place_nodes import place_nodes
-from dsm.sections import Sections, sections
+from dsm.sections import sections
 from dsm.spindle import Spindle
-from dsm.timoshenko_series import timoshenko_series
 
 _Float = NDArray[np.float64]
-_Indices = NDArray[np.int_]
 Held = tuple[float, int]
 """A dof that cannot move: position (m), and 0 for the deflection or 1 for the slope."""
 
@@ -54,7 +52,7 @@ def _assemble(
     wanted = [*_places_of_parts(spindle), *places, *(z for z, _ in held)]
     pieces = sections(spindle)
     position, piece = place_nodes(pieces, wanted, spindle.theory, top_frequency, spin)
-    position, series = _with_joints(spindle, position, _beams(spindle, pieces, piece, np.diff(position), spin))
+    position, series = _with_joints(spindle, position, beam_series(spindle, pieces, piece, np.diff(position), spin))
     diagonal = np.zeros((3, position.size, series.shape[2]))
     diagonal[:, :-1] = series[:3]
     diagonal[:, 1:] += series[:3] * np.array([1, -1, 1])[:, np.newaxis, np.newaxis]
@@ -72,18 +70,6 @@ def _assemble(
 def _places_of_parts(spindle: Spindle) -> list[float]:
     parts: tuple[Bearing | LumpedMass | Joint, ...] = (*spindle.bearings, *spindle.masses, *spindle.joints)
     return [part.position for part in parts]
-
-
-def _beams(spindle: Spindle, pieces: Sections, piece: _Indices, length: _Float, spin: float | None) -> _Float:
-    """Series of the beam elements, each part of a piece, shape (6, n_elements, n_terms)."""
-    rigidity, mass = pieces.rigidity[piece], pieces.mass[piece]
-    terms = TERMS if spin is None else 2 * TERMS - 1
-    if spindle.theory == "timoshenko":
-        rotary, shear = pieces.rotary[piece], pieces.shear[piece]
-        return timoshenko_series(rigidity, mass, rotary, shear, length, terms, spin)
-    series = np.zeros((6, length.size, terms))
-    series[..., :: 1 if spin is None else 2] = element_series(rigidity, mass, length)
-    return series
 
 
 def _with_joints(spindle: Spindle, position: _Float, series: _Float) -> tuple[_Float, _Float]:

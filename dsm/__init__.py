@@ -1,13 +1,14 @@
 """The spindle as a dynamic-stiffness model: modes, tip response, and bearing stiffness from a measured frequency.
 
-Planar Euler-Bernoulli beams on springs, exact at every frequency. Source: O. Gaber and S. M. Hashemi, Effects of
-Machine Tool Spindle Decay on the Stability Lobe Diagram, Shock and Vibration, 2015, in a form without its poles.
+Beams on springs, Euler-Bernoulli or Timoshenko, exact at every frequency. Source: O. Gaber and S. M. Hashemi,
+Effects of Machine Tool Spindle Decay on the Stability Lobe Diagram, Shock and Vibration, 2015, without its poles.
 """
 
 from dsm.attachments import Bearing, Joint, LumpedMass
 from dsm.calibrate import calibrate
 from dsm.calibration import Calibration, UnreachableFrequencyError
 from dsm.critical_speed import critical_speed
+from dsm.linearized_stiffness import linearized_stiffness
 from dsm.material import MATERIALS, Material
 from dsm.modal_stiffness import modal_stiffness
 from dsm.mode_shapes import mode_shapes
@@ -17,6 +18,9 @@ from dsm.natural_frequencies import natural_frequencies
 from dsm.receptance import receptance
 from dsm.segment import Segment
 from dsm.spindle import Spindle, Theory
+from dsm.spinning_beam import SpinningBeam, SpinningSegment, SpinningSpring
+from dsm.spinning_element import spinning_element
+from dsm.spinning_frequencies import UnstableSpinError, spinning_frequencies
 from dsm.static_stiffness import static_stiffness
 from dsm.stiffness_curve import stiffness_curve
 
@@ -30,15 +34,22 @@ __all__ = [
     "Modes",
     "Segment",
     "Spindle",
+    "SpinningBeam",
+    "SpinningSegment",
+    "SpinningSpring",
     "Theory",
     "UnreachableFrequencyError",
+    "UnstableSpinError",
     "calibrate",
     "critical_speed",
+    "linearized_stiffness",
     "modal_stiffness",
     "mode_shapes",
     "modes_at",
     "natural_frequencies",
     "receptance",
+    "spinning_element",
+    "spinning_frequencies",
     "static_stiffness",
     "stiffness_curve",
 ]

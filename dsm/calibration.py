@@ -7,6 +7,7 @@ from functools import cached_property
 
 from dsm.modal_stiffness import modal_stiffness
 from dsm.natural_frequencies import natural_frequencies
+from dsm.plus_minus import plus_minus
 from dsm.spindle import Spindle
 from dsm.static_stiffness import static_stiffness
 
@@ -83,29 +84,21 @@ class Calibration:
 
     def __str__(self) -> str:
         """The report."""
-        frequency = plus_minus(self.frequency, self.frequency_std, "Hz")
-        stiffness = plus_minus(self.bearing_stiffness / 1e6, _scaled_down(self.bearing_stiffness_std), "N/um")
-        return "\n".join(
-            [
-                f"mode {self.mode} measured     {frequency}",
-                f"bearing stiffness   {stiffness} each on average ({self.spindle.theory})",
-                f"start               {self.bearing_stiffness / self.factor / 1e6:.5g} N/um, factor {self.factor:.5g}",
-                f"sensitivity         d ln f / d ln k = {self.sensitivity:.4f}",
-                f"energy share        {100 * self.energy_share:.1f} % of the mode's strain energy is in these bearings",
-                f"static tip stiffness {self.static_stiffness_before / 1e6:.4g} -> "
-                f"{self.static_stiffness_after / 1e6:.4g} N/um",
-                f"modal tip stiffness {self.modal_stiffness_before / 1e6:.4g} -> "
-                f"{self.modal_stiffness_after / 1e6:.4g} N/um",
-            ]
-        )
-
-
-def plus_minus(value: float, std: float | None, unit: str) -> str:
-    """A value with its standard error (and that in percent), where there is one."""
-    if std is None:
-        return f"{value:.6g} {unit}"
-    return f"{value:.6g} +/- {std:.2g} {unit} ({100 * std / abs(value):.2g} %)"
-
-
-def _scaled_down(std: float | None) -> float | None:
-    return None if std is None else std / 1e6
+        start = self.bearing_stiffness / self.factor / 1e6
+        static = self.static_stiffness_before / 1e6, self.static_stiffness_after / 1e6
+        modal = self.modal_stiffness_before / 1e6, self.modal_stiffness_after / 1e6
+        stiffness = plus_minus(self.bearing_stiffness, self.bearing_stiffness_std, "N/um", 1e6)
+        lines = [
+            ("bearing stiffness", f"{stiffness} each"),
+            (f"from mode {self.mode}", plus_minus(self.frequency, self.frequency_std, "Hz")),
+            ("start", f"{start:.5g} N/um each: factor {self.factor:.5f}"),
+            ("energy share", f"{100 * self.energy_share:.1f} % of the mode's strain energy is in these bearings"),
+            ("sensitivity", f"bearings 1 % softer lower the frequency by {self.sensitivity:.3f} %"),
+            ("static tip stiffness", f"{static[0]:.3f} -> {static[1]:.3f} N/um (model, start -> calibrated)"),
+            ("modal tip stiffness", f"{modal[0]:.3f} -> {modal[1]:.3f} N/um (model, start -> calibrated)"),
+            (
+                "equivalent number of",
+                f"this {self.spindle.theory} model: compare it with others of the same model only",
+            ),
+        ]
+        return "\n".join(f"{name:<22}{text}" for name, text in lines)

@@ -57,9 +57,7 @@ def _start(
     spindle: Spindle, count: int, places: Sequence[float], held: Sequence[Held], spin: float | None
 ) -> tuple[DynamicStiffness, _Float, _Float]:
     """A matrix exact up to the last mode, and the modes of its finite elements."""
-    pieces = sections(spindle)
-    wavelengths = float(np.sum(pieces.length * (pieces.mass / pieces.rigidity) ** 0.25))
-    top = (np.pi * (count + 2) / wavelengths) ** 2 / (2 * np.pi)
+    top = _first_guess(spindle, np.pi * (count + 2))
     for _ in range(8):
         model = assemble(spindle, top, places, held, spin=spin)
         x, shape = _finite_element_modes(model, count) if spin is None else _whirling_modes(model, count)
@@ -68,6 +66,17 @@ def _start(
             return model, x, shape
         top = highest
     raise ArithmeticError(SPOILT)
+
+
+def _first_guess(spindle: Spindle, phase: float) -> float:
+    """Frequency (Hz) at which a wave along the shaft turns by about `phase` (rad); 1/w^2 adds up as in Dunkerley's."""
+    pieces = sections(spindle)
+    bending = float(np.sum(pieces.length * (pieces.mass / pieces.rigidity) ** 0.25)) / phase
+    if spindle.theory == "euler-bernoulli":
+        return 1 / (2 * np.pi * bending**2)
+    shear = float(np.sum(pieces.length * np.sqrt(pieces.mass / pieces.shear))) / phase
+    rotary = float(np.sum(pieces.length * np.sqrt(pieces.rotary / pieces.rigidity))) / phase
+    return 1 / (2 * np.pi * float(np.sqrt(bending**4 + shear**2 + rotary**2)))
 
 
 def _finite_element_modes(model: DynamicStiffness, count: int) -> tuple[_Float, _Float]:

@@ -28,6 +28,6 @@ def damped_blocks(
     for bearing in spindle.bearings:
         if bearing.damping > 0 and math.isfinite(bearing.stiffness):
             spring = complexity * bearing.stiffness + 1j * w * bearing.damping
-            felt = spring / (1 + spring / (complexity * bearing.housing_stiffness))
+            felt = spring / (1 + spring / complexity * (1 / bearing.housing_stiffness))
             diagonal[0, model.node(bearing.position)] += felt - complexity * bearing.support_stiffness
     return diagonal, coupling

@@ -21,8 +21,13 @@ CERTAINTY = 2e-10
 """Relative half-width, in w^2 (w where it spins), of the interval in which each mode is proved to lie."""
 ROUNDING = 1024 * np.finfo(np.float64).eps
 """The same from rounding, relative to |phi|^T |K| |phi| of a mode of unit modal mass."""
+BLURRED = 0.01
+"""An interval wider than this part of its w^2 proves nothing worth having."""
 
-SPOILT = "rounding spoils the modes of this shaft; look for segments far too short, thick or thin beside the others"
+SPOILT = (
+    "rounding spoils the modes of this shaft; look for segments far too short, thick or thin beside the others, and for "
+    "bearings, masses or joints far too close to each other or to the end of a segment"
+)
 
 
 def find_modes(
@@ -47,6 +52,7 @@ def find_modes(
         model, x, shape = _start(spindle, count, places, held, spin)
         width = CERTAINTY * x + ROUNDING * _quadratic(np.abs(model.dense(x)), np.abs(shape))
         x, shape = _refine(model, x, shape, width)
+        _require_sharp(model, x, width)
         x, shape = _prove(model, x, shape, width)
     except np.linalg.LinAlgError as exc:
         raise ArithmeticError(SPOILT) from exc
@@ -142,6 +148,14 @@ def _iterate(model: DynamicStiffness, x: _Float, shape: _Float, width: _Float) -
 def _quadratic(matrix: _Float, shape: _Float) -> _Float:
     """phi^T A phi of each mode, shape (n_modes,)."""
     return np.asarray(np.einsum("mi,mij,mj->m", shape, matrix, shape))
+
+
+def _require_sharp(model: DynamicStiffness, x: _Float, width: _Float) -> None:
+    """Raise ArithmeticError where rounding leaves modes, or the difference from no bending at all, in doubt."""
+    moving = x > width
+    limit = np.where(moving, x, float(model.to_x(np.array(model.top_frequency))))
+    if np.any(width > BLURRED * limit):
+        raise ArithmeticError(SPOILT)
 
 
 def _prove(model: DynamicStiffness, x: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:

@@ -47,4 +47,4 @@ def _through_joint(side: SpindleSide, joint: tuple[float, float] | None) -> _Com
     # J (K + J)^-1 K with J = diag(k, tilt)
     both = uu * tt - ut * ut
     determinant = (uu + k) * (tt + tilt) - ut * ut
-    return np.stack([k * (uu * tilt + both), k * tilt * ut, tilt * (k * tt + both)]) / determinant
+    return np.asarray(np.array([k * (uu * tilt + both), k * tilt * ut, tilt * (k * tt + both)]) / determinant)

@@ -62,14 +62,17 @@ class DynamicStiffness:
 
     def dense(self, x: NDArray[Number], derivative: bool = False) -> NDArray[Number]:
         """K, or dK/dx, as full matrices of shape (n, 2 n_nodes, 2 n_nodes)."""
-        return _full(*self.blocks(x, derivative))
+        return full_matrices(*self.blocks(x, derivative))
 
     def term(self, power: int) -> NDArray[np.float64]:
         """Coefficient of one power of x in K, a full matrix of shape (2 n_nodes, 2 n_nodes)."""
-        return np.asarray(_full(self.diagonal[..., power : power + 1], self.coupling[..., power : power + 1])[0])
+        return np.asarray(
+            full_matrices(self.diagonal[..., power : power + 1], self.coupling[..., power : power + 1])[0]
+        )
 
 
-def _full(diagonal: NDArray[Number], coupling: NDArray[Number]) -> NDArray[Number]:
+def full_matrices(diagonal: NDArray[Number], coupling: NDArray[Number]) -> NDArray[Number]:
+    """Full matrices, shape (n, 2 n_nodes, 2 n_nodes), of blocks as in DynamicStiffness.blocks."""
     uu, ut, tt = diagonal
     u = 2 * np.arange(uu.shape[0])
     matrix = np.zeros((uu.shape[1], 2 * u.size, 2 * u.size), dtype=uu.dtype)

@@ -34,5 +34,8 @@ def receptance(
     places = sorted([position, position if force_position is None else force_position])
     model = assemble(spindle, float(np.max(f, initial=0.0)), places)
     blocks = damped_blocks(model, spindle, np.asarray(2 * np.pi * f, dtype=np.complex128), loss_factor)
-    k = condense(*blocks, node=model.node(places[1]), start=model.node(places[0]))
+    nodes = [model.node(place) for place in places]
+    if np.any(model.held[nodes, 0]):
+        return np.zeros(f.size, dtype=np.complex128)
+    k = condense(*blocks, node=nodes[1], start=nodes[0])
     return np.asarray((k.share_u * k.tt - k.share_t * k.ut) / (k.uu * k.tt - k.ut * k.ut))

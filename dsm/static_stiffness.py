@@ -22,9 +22,12 @@ def static_stiffness(spindle: Spindle, position: float = 0.0, linearized_at: flo
     if not (math.isfinite(linearized_at) and linearized_at >= 0):
         raise ValueError(f"linearized_at={linearized_at} Hz is not a finite number >= 0")
     model = assemble(spindle, linearized_at, [position])
+    node = model.node(position)
+    if model.held[node, 0]:
+        return math.inf
     terms = np.stack([model.term(power) for power in range(model.diagonal.shape[2])], axis=-1)
     stiffness, _ = linearized_stiffness(terms, 2 * np.pi * linearized_at)
     force = np.zeros(model.held.size)
-    force[2 * model.node(position)] = 1.0
+    force[2 * node] = 1.0
     deflection = np.linalg.solve(stiffness, force)
-    return float(1 / deflection[2 * model.node(position)])
+    return float(1 / deflection[2 * node])

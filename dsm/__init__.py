@@ -7,7 +7,10 @@ Effects of Machine Tool Spindle Decay on the Stability Lobe Diagram, Shock and V
 from dsm.attachments import Bearing, Joint, LumpedMass
 from dsm.calibrate import calibrate
 from dsm.calibration import Calibration, UnreachableFrequencyError
+from dsm.change_tool import change_tool
+from dsm.couple_tool import couple_tool
 from dsm.critical_speed import critical_speed
+from dsm.energy_shares import EnergyShares, energy_shares
 from dsm.linearized_stiffness import linearized_stiffness
 from dsm.material import MATERIALS, Material
 from dsm.modal_stiffness import modal_stiffness
@@ -16,40 +19,52 @@ from dsm.modes import Modes
 from dsm.modes_at import modes_at
 from dsm.natural_frequencies import natural_frequencies
 from dsm.receptance import receptance
+from dsm.receptance_map import receptance_map
 from dsm.segment import Segment
 from dsm.spindle import Spindle, Theory
+from dsm.spindle_side import SpindleSide, spindle_side
 from dsm.spinning_beam import SpinningBeam, SpinningSegment, SpinningSpring
 from dsm.spinning_element import spinning_element
 from dsm.spinning_frequencies import UnstableSpinError, spinning_frequencies
 from dsm.static_stiffness import static_stiffness
 from dsm.stiffness_curve import stiffness_curve
+from dsm.whirl_map import WhirlMap, whirl_map
 
 __all__ = [
     "MATERIALS",
     "Bearing",
     "Calibration",
+    "EnergyShares",
     "Joint",
     "LumpedMass",
     "Material",
     "Modes",
     "Segment",
     "Spindle",
+    "SpindleSide",
     "SpinningBeam",
     "SpinningSegment",
     "SpinningSpring",
     "Theory",
     "UnreachableFrequencyError",
     "UnstableSpinError",
+    "WhirlMap",
     "calibrate",
+    "change_tool",
+    "couple_tool",
     "critical_speed",
+    "energy_shares",
     "linearized_stiffness",
     "modal_stiffness",
     "mode_shapes",
     "modes_at",
     "natural_frequencies",
     "receptance",
+    "receptance_map",
+    "spindle_side",
     "spinning_element",
     "spinning_frequencies",
     "static_stiffness",
     "stiffness_curve",
+    "whirl_map",
 ]

@@ -94,11 +94,8 @@ class Calibration:
             ("start", f"{start:.5g} N/um each: factor {self.factor:.5f}"),
             ("energy share", f"{100 * self.energy_share:.1f} % of the mode's strain energy is in these bearings"),
             ("sensitivity", f"bearings 1 % softer lower the frequency by {self.sensitivity:.3f} %"),
-            ("static tip stiffness", f"{static[0]:.3f} -> {static[1]:.3f} N/um (model, start -> calibrated)"),
-            ("modal tip stiffness", f"{modal[0]:.3f} -> {modal[1]:.3f} N/um (model, start -> calibrated)"),
-            (
-                "equivalent number of",
-                f"this {self.spindle.theory} model: compare it with others of the same model only",
-            ),
+            ("static tip stiffness", f"{static[0]:.3f} -> {static[1]:.3f} N/um (start -> calibrated)"),
+            ("modal tip stiffness", f"{modal[0]:.3f} -> {modal[1]:.3f} N/um (start -> calibrated)"),
+            ("theory", f"{self.spindle.theory}; an equivalent stiffness: compare it within one model only"),
         ]
         return "\n".join(f"{name:<22}{text}" for name, text in lines)

@@ -16,6 +16,7 @@ from lobewatch.commands.demo import demo
 from lobewatch.commands.emulate import emulate
 from lobewatch.commands.init import init
 from lobewatch.commands.lobes import lobes
+from lobewatch.commands.model import model
 from lobewatch.commands.modes import modes
 from lobewatch.commands.replay import replay
 from lobewatch.commands.report import report
@@ -29,7 +30,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (demo, init, tap, replay, modes, calibrate, lobes, report):
+for command in (demo, init, tap, replay, modes, model, calibrate, lobes, report):
     app.command()(command)
 app.add_typer(emulate, name="emulate")
 

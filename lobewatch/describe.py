@@ -49,29 +49,19 @@ def calibration_json(calibration: Calibration) -> dict[str, Any]:
     """The recalibrated model."""
     return {
         "frequency_hz": calibration.frequency,
+        "mode": calibration.mode,
+        "theory": calibration.spindle.theory,
         "bearing_stiffness_n_per_m": calibration.bearing_stiffness,
         "bearing_stiffness_n_per_m_std": calibration.bearing_stiffness_std,
         "residual_hz": calibration.residual,
+        "factor": calibration.factor,
         "sensitivity": calibration.sensitivity,
+        "energy_share": calibration.energy_share,
         "static_tip_stiffness_n_per_m": calibration.static_stiffness_after,
         "static_tip_stiffness_before_n_per_m": calibration.static_stiffness_before,
         "modal_tip_stiffness_n_per_m": calibration.modal_stiffness_after,
         "modal_tip_stiffness_before_n_per_m": calibration.modal_stiffness_before,
     }
-
-
-def calibration_lines(calibration: Calibration) -> str:
-    """The recalibrated model, in words."""
-    std = calibration.bearing_stiffness_std
-    k = plus_minus(calibration.bearing_stiffness, float("nan") if std is None else std, 1e6)
-    static = (calibration.static_stiffness_before / 1e6, calibration.static_stiffness_after / 1e6)
-    modal = (calibration.modal_stiffness_before / 1e6, calibration.modal_stiffness_after / 1e6)
-    return (
-        f"bearing stiffness     {k} N/um each, for {calibration.frequency:.2f} Hz\n"
-        f"static tip stiffness  {static[0]:.3f} -> {static[1]:.3f} N/um (model: machine.toml -> recalibrated)\n"
-        f"modal tip stiffness   {modal[0]:.3f} -> {modal[1]:.3f} N/um (model: machine.toml -> recalibrated)\n"
-        f"bearings 1 % softer lower this frequency by {calibration.sensitivity:.3f} %"
-    )
 
 
 def program_json(lobes: Mapping[str, StabilityLobes], machine: Machine) -> list[dict[str, Any]]:
@@ -141,7 +131,7 @@ def measurement_texts(m: Measurement, machine: Machine) -> list[str | Table]:
     if m.dynamics.followed is not None:
         texts.append(f"followed: {m.dynamics.followed.frequency:.2f} Hz")
     if m.dynamics.calibration is not None:
-        texts.append(calibration_lines(m.dynamics.calibration))
+        texts.append(str(m.dynamics.calibration))
     if REFERENCE_CUT in m.lobes:
         low = m.lobes[REFERENCE_CUT].minimum
         texts.append(f"{REFERENCE_CUT}: lowest limit {low.depth * 1e3:.2f} mm at {low.speed_rpm:.0f} rpm")

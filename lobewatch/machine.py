@@ -10,30 +10,26 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import msgspec
-from msgspec import Meta, Struct
+from msgspec import Meta
 
 from acquisition import DataError
-from dsm import Bearing, Segment, Spindle
+from dsm import Spindle
 from lobes import Cut
+from lobewatch.spindle_tables import BearingTable, JointTable, MassTable, SegmentTable, SpindleTable, ToolTable
+from lobewatch.toml_table import NotNegative, Positive, Table
 
-Positive = Annotated[float, Meta(gt=0)]
-NotNegative = Annotated[float, Meta(ge=0)]
 Direction = Literal["up", "down"]
 REFERENCE_CUT = "reference cut"
 
 
-class _Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A table of machine.toml: unknown keys are refused."""
-
-
-class Identity(_Table, frozen=True):
+class Identity(Table, frozen=True):
     """[machine]."""
 
     name: Annotated[str, Meta(min_length=1)]
     tap_interval_days: Positive = 30.0
 
 
-class TapSetup(_Table, frozen=True):
+class TapSetup(Table, frozen=True):
     """[tap]: how the tap test is done."""
 
     tool: str = "reference"
@@ -44,17 +40,18 @@ class TapSetup(_Table, frozen=True):
     position_mm: NotNegative = 0.0
 
 
-class Daq(_Table, frozen=True):
+class Daq(Table, frozen=True):
     """[daq]: the port is remembered here by hand, never written by the program."""
 
     port: str = ""
     sample_rate_hz: Positive | None = None
 
 
-class ModeChoice(_Table, frozen=True):
+class ModeChoice(Table, frozen=True):
     """[mode]: which mode is followed."""
 
     band_hz: tuple[NotNegative, Positive] | None = None
+    model_mode: Annotated[int, Meta(ge=1)] = 1
 
     def __post_init__(self) -> None:
         """Refuse an empty band."""
@@ -62,65 +59,14 @@ class ModeChoice(_Table, frozen=True):
             raise ValueError(f"band_hz={list(self.band_hz)} does not rise; give [lowest, highest] in Hz")
 
 
-class Limits(_Table, frozen=True):
+class Limits(Table, frozen=True):
     """[limits]: fall of the frequency that calls for attention; the defaults are the paper's."""
 
     frequency_warn_percent: Positive = 5.0
     frequency_alarm_percent: Positive = 10.0
 
 
-class SegmentTable(_Table, frozen=True):
-    """One of [spindle] segments."""
-
-    length_mm: Positive
-    outer_mm: Positive
-    bore_mm: NotNegative = 0.0
-
-    def __post_init__(self) -> None:
-        """Refuse a bore that leaves no wall."""
-        if self.bore_mm >= self.outer_mm:
-            raise ValueError(f"bore_mm={self.bore_mm:g} is not smaller than outer_mm={self.outer_mm:g}")
-
-
-class BearingTable(_Table, frozen=True):
-    """One of [spindle] bearings."""
-
-    position_mm: NotNegative
-
-
-class SpindleTable(_Table, frozen=True):
-    """[spindle]: the model; optional."""
-
-    segments: Annotated[list[SegmentTable], Meta(min_length=1)]
-    bearings: Annotated[list[BearingTable], Meta(min_length=2)]
-    bearing_stiffness_n_per_um: Positive
-    youngs_modulus_gpa: Positive = 210.0
-    density_kg_per_m3: Positive = 7850.0
-    damping_ratio: Annotated[float, Meta(gt=0, lt=1)] = 0.03
-    label: str = ""
-
-    def __post_init__(self) -> None:
-        """Refuse bearings off the shaft, and whatever else is no spindle."""
-        length = sum(segment.length_mm for segment in self.segments)
-        for i, bearing in enumerate(self.bearings, 1):
-            if bearing.position_mm > length:
-                raise ValueError(
-                    f"bearing {i}: position_mm={bearing.position_mm:g} is off the shaft, 0 to {length:g} mm"
-                )
-        self.build()
-
-    def build(self) -> Spindle:
-        """The spindle in SI units."""
-        stiffness = self.bearing_stiffness_n_per_um * 1e6
-        return Spindle(
-            [Segment(s.length_mm / 1e3, s.outer_mm / 1e3, s.bore_mm / 1e3) for s in self.segments],
-            [Bearing(b.position_mm / 1e3, stiffness) for b in self.bearings],
-            youngs_modulus=self.youngs_modulus_gpa * 1e9,
-            density=self.density_kg_per_m3,
-        )
-
-
-class CutTable(_Table, frozen=True):
+class CutTable(Table, frozen=True):
     """[reference_cut], and what it shares with a program."""
 
     teeth: Annotated[int, Meta(ge=1)]
@@ -157,7 +103,7 @@ class Program(CutTable, frozen=True, kw_only=True):
     depth_mm: Positive
 
 
-class SpeedRange(_Table, frozen=True):
+class SpeedRange(Table, frozen=True):
     """[speed]: the range of the lobe diagrams."""
 
     low_rpm: Positive = 1000.0
@@ -170,7 +116,7 @@ class SpeedRange(_Table, frozen=True):
             raise ValueError(f"low_rpm={self.low_rpm:g} is not below high_rpm={self.high_rpm:g}")
 
 
-class Machine(_Table, frozen=True):
+class Machine(Table, frozen=True):
     """All of machine.toml."""
 
     machine: Identity
@@ -180,11 +126,13 @@ class Machine(_Table, frozen=True):
     limits: Limits = Limits()
     speed: SpeedRange = SpeedRange()
     reference_cut: CutTable | None = None
-    program: list[Program] = []
+    program: tuple[Program, ...] = ()
     spindle: SpindleTable | None = None
+    tool: tuple[ToolTable, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse programs that cannot be told apart or lie outside the speed range."""
+        """Refuse programs and tools that cannot be told apart, and what lies outside the speed range."""
+        self._check_tools()
         names = [program.name for program in self.program]
         for i, program in enumerate(self.program, 1):
             if program.name in (*names[: i - 1], REFERENCE_CUT):
@@ -194,6 +142,34 @@ class Machine(_Table, frozen=True):
                     f"program {i}: speed_rpm={program.speed_rpm:g} is outside [speed] "
                     f"{self.speed.low_rpm:g}..{self.speed.high_rpm:g} rpm"
                 )
+
+    def _check_tools(self) -> None:
+        taken = [self.tap.tool]
+        for i, tool in enumerate(self.tool, 1):
+            if tool.name in taken:
+                raise ValueError(f"tool {i}: name={tool.name!r} stands twice ([tap] tool counts); give each its own")
+            taken.append(tool.name)
+            if self.spindle is None or self.spindle.tool_length_mm is None:
+                raise ValueError(
+                    f"tool {i}: needs [spindle] tool_length_mm, the length of {self.tap.tool!r} from tip on"
+                )
+
+    def model(self, tool: str) -> Spindle:
+        """The spindle with a tool in it, in SI units; DataError where there is no model of it."""
+        if self.spindle is None:
+            raise DataError("no model: add a [spindle] table (lobewatch init FOLDER --example shows one)")
+        spindle = self.spindle.build()
+        if tool == self.tap.tool:
+            return spindle
+        return self.tool_named(tool).put_into(spindle, self.spindle.tool_length_mm or 0.0)
+
+    def tool_named(self, name: str) -> ToolTable:
+        """A [[tool]]; DataError where there is none of this name."""
+        for tool in self.tool:
+            if tool.name == name:
+                return tool
+        known = ", ".join(repr(known) for known in [self.tap.tool, *(tool.name for tool in self.tool)])
+        raise DataError(f"tool {name!r} has no model; modelled are {known}: add a [[tool]] table")
 
     def cuts(self, tool: str) -> dict[str, Cut]:
         """The reference cut and the programs that run with a tool, by name."""
@@ -208,7 +184,15 @@ class Machine(_Table, frozen=True):
     @property
     def settings_hash(self) -> str:
         """SHA-256 of all that decides what a history holds."""
-        settings = (self.mode, self.speed, self.reference_cut, self.program, self.spindle, self.tap.position_mm)
+        settings = (
+            self.mode,
+            self.speed,
+            self.reference_cut,
+            self.program,
+            self.spindle,
+            self.tool,
+            self.tap.position_mm,
+        )
         return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
 
 
@@ -247,7 +231,9 @@ def _readable(message: str) -> str:
 
 
 def _suggestion(key: str) -> str:
-    tables = [Machine, Identity, TapSetup, Daq, ModeChoice, Limits, SpeedRange, SpindleTable, SegmentTable]
-    known = {field for table in [*tables, BearingTable, Program] for field in table.__struct_fields__}
+    tables = [Machine, Identity, TapSetup, Daq, ModeChoice, Limits, SpeedRange, SpindleTable, SegmentTable, ToolTable]
+    known = {
+        field for table in [*tables, BearingTable, MassTable, JointTable, Program] for field in table.__struct_fields__
+    }
     near = difflib.get_close_matches(key, known, n=1)
     return f"; is {near[0]!r} meant?" if near else ""

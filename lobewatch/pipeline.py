@@ -89,19 +89,17 @@ def _dynamics(tap: TapTest, machine: Machine, notes: list[str]) -> Dynamics:
     followed = predominant(modes, machine.mode.band_hz)
     if followed is None:
         notes.append(_no_mode(modes, machine))
-    calibration = _calibrate(followed, machine, notes)
+    calibration = _calibrate(followed, machine, tap.circumstances.tool, notes)
     return Dynamics(modes, followed, calibration, _modes_at_tip(modes, followed, calibration, machine, notes))
 
 
-def _calibrate(followed: Mode | None, machine: Machine, notes: list[str]) -> Calibration | None:
-    if machine.spindle is None:
-        notes.append("no bearing stiffness: no model ([spindle] is missing in machine.toml)")
-        return None
+def _calibrate(followed: Mode | None, machine: Machine, tool: str, notes: list[str]) -> Calibration | None:
     if followed is None:
         return None
     std = float(followed.standard_error[0])
     try:
-        return calibrate(machine.spindle.build(), followed.frequency, std if np.isfinite(std) else None)
+        spindle = machine.model(tool)
+        return calibrate(spindle, followed.frequency, std if np.isfinite(std) else None, machine.mode.model_mode)
     except (ValueError, ArithmeticError) as error:
         notes.append(f"no bearing stiffness: {error}")
         return None
@@ -135,7 +133,8 @@ def _modes_at_tip(
 
 
 def _carried_to_tip(mode: Mode, calibration: Calibration, position: float) -> Mode:
-    ratio = modal_stiffness(calibration.spindle) / modal_stiffness(calibration.spindle, position=position)
+    number = calibration.mode
+    ratio = modal_stiffness(calibration.spindle, number) / modal_stiffness(calibration.spindle, number, position)
     scale = np.array([1.0, 1.0, ratio])
     covariance = None if mode.covariance is None else mode.covariance * np.outer(scale, scale)
     return replace(mode, stiffness=mode.stiffness * ratio, covariance=covariance, method=f"{mode.method}, model to tip")

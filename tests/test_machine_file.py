@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from importlib import resources
 from pathlib import Path
 
 import pytest
 
 from acquisition import DataError
+from dsm import MATERIALS
 from lobewatch.machine import REFERENCE_CUT, parse_machine, read_machine
 
 EXAMPLE = resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")
@@ -35,6 +37,31 @@ def test_a_fresh_machine_needs_no_spindle() -> None:
     assert machine.spindle is None
     assert machine.tap.hits == 10
     assert list(machine.cuts("anything")) == [REFERENCE_CUT]
+
+
+def test_what_the_fresh_machine_file_shows_in_comments_is_right() -> None:
+    start = FRESH.index("# [spindle]")
+    shown = "\n".join(line.removeprefix("#").removeprefix(" ") for line in FRESH[start:].splitlines())
+    text = shown.replace("A tool that is not tapped", "# A tool")
+    machine = parse_machine(FRESH[:start] + text)
+    spindle = machine.model("reference")
+    assert spindle.theory == "timoshenko"
+    assert spindle.segments[0].material == MATERIALS["carbide"]
+    assert spindle.segments[0].mass_diameter == pytest.approx(0.018)
+    assert spindle.segments[1].diameters_at(1.0) == pytest.approx((0.06, 0.02))
+    assert spindle.shear_modulus == pytest.approx(80.8e9)
+    front, damped, rear = spindle.bearings
+    assert (front.stiffness, front.group, front.housing_stiffness) == (500e6, "front", math.inf)
+    assert (damped.damping, damped.rotational_stiffness) == (500.0, 1e4)
+    assert (rear.stiffness, rear.housing_stiffness) == pytest.approx((200e6, 800e6))
+    (pulley,), (taper,) = spindle.masses, spindle.joints
+    assert (pulley.mass, pulley.diametral_inertia, pulley.polar_inertia) == pytest.approx((2.1, 3e-3, 5.5e-3))
+    assert (taper.stiffness, taper.rotational_stiffness, taper.group) == (2e9, 1e6, "taper")
+    short = machine.model("end mill 12")
+    assert short.length == pytest.approx(spindle.length - 0.010)
+    assert short.bearings[0].position == pytest.approx(0.150)
+    with pytest.raises(DataError, match="'end mill 13' has no model; modelled are 'reference', 'end mill 12'"):
+        machine.model("end mill 13")
 
 
 def test_programs_belong_to_their_tool() -> None:
@@ -65,6 +92,15 @@ def test_programs_belong_to_their_tool() -> None:
         ('name = "MACHINE_NAME"', 'name = ""', "machine name: "),
         ("[machine]", "[machin]", "unknown key 'machin'; is 'machine' meant?"),
         ("[machine]", "[machine", "at line 2"),
+        ('theory = "euler-bernoulli"', 'theory = "rayleigh"', "spindle theory: Invalid enum value 'rayleigh'"),
+        ("outer_mm = 31.5", 'material = "carbid", outer_mm = 31.5', "spindle segment 1: material='carbid' is none of"),
+        ("outer_mm = 31.5", "end_bore_mm = 40, outer_mm = 31.5", "segment 1: end_bore_mm=40 is not smaller than"),
+        ("outer_mm = 31.5", "mass_outer_mm = -1, outer_mm = 31.5", "spindle segment 1 mass_outer_mm: "),
+        ("position_mm = 203.5 ", "position_mm = 166 ", "bearing 2: position=0.166 m is that of bearing 1"),
+        ("tool_length_mm = 93.5", "tool_length_mm = 935", "spindle: tool_length_mm=935 is not shorter than the shaft"),
+        ("tool_length_mm = 93.5", "", "tool 1: needs [spindle] tool_length_mm"),
+        ('name = "long end mill"', 'name = "reference"', "tool 1: name='reference' stands twice"),
+        ("outer_mm = 17.0", "outer_mm = 0", "tool 1 segment 1 outer_mm: "),
     ],
 )
 def test_every_mistake_is_told_with_its_place(old: str, new: str, message: str) -> None:

@@ -11,13 +11,14 @@ from dsm.spindle import Spindle
 def change_tool(spindle: Spindle, position: float, tool: Spindle) -> Spindle:
     """The spindle beyond `position` from its tool tip (m) with `tool` in front of it.
 
-    tool: a free shaft, its first segment the new tool tip, its last one fast to the spindle. A bearing or a mass where
-    the spindle is cut stays with it; all that is nearer to the old tip falls away. Segments of the tool without a
-    material of their own keep that of the tool. Raises ValueError for a cut off the shaft or at a joint, a tool with
+    tool: a free shaft, its first segment the new tool tip, its last one fast to the spindle. A bearing, a mass or a
+    joint where the spindle is cut stays with it; all that is nearer to the old tip falls away. Segments of the tool
+    without a material of their own keep that of the tool. Raises ValueError for a cut off the shaft, a tool with
     bearings, and one of another beam theory.
     """
     check_tool(tool, spindle.theory)
-    rest = cut_spindle(spindle, position)
+    rest, joint = cut_spindle(spindle, position)
+    between = [] if joint is None else [replace(joint, position=tool.length)]
     segments = list(tool.segments)
     if tool.material != spindle.material:
         segments = [replace(segment, material=segment.material or tool.material) for segment in segments]
@@ -26,7 +27,7 @@ def change_tool(spindle: Spindle, position: float, tool: Spindle) -> Spindle:
         segments=[*segments, *rest.segments],
         bearings=moved(rest.bearings, tool.length),
         masses=[*tool.masses, *moved(rest.masses, tool.length)],
-        joints=[*tool.joints, *moved(rest.joints, tool.length)],
+        joints=[*tool.joints, *between, *moved(rest.joints, tool.length)],
     )
 
 

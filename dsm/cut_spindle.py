@@ -15,11 +15,11 @@ from dsm.spindle import SAME_PLACE, Spindle
 Part = TypeVar("Part", Bearing, LumpedMass, Joint)
 
 
-def cut_spindle(spindle: Spindle, position: float) -> Spindle:
-    """What lies beyond `position` from the tool tip (m); its own positions are counted from the cut.
+def cut_spindle(spindle: Spindle, position: float) -> tuple[Spindle, Joint | None]:
+    """What lies beyond `position` from the tool tip (m), its own positions counted from the cut; the joint at the cut.
 
     A segment there is cut in two. Bearings, masses and joints nearer to the tool tip fall away; a bearing or a mass at
-    the cut stays. Raises ValueError for a cut off the shaft or at its far end, and for a joint at the cut.
+    the cut stays. Raises ValueError for a cut off the shaft or at its far end.
     """
     slack = SAME_PLACE * spindle.length
     if not 0 <= position < spindle.length - slack:
@@ -27,12 +27,8 @@ def cut_spindle(spindle: Spindle, position: float) -> Spindle:
     ends = np.cumsum([0.0, *(segment.length for segment in spindle.segments)])
     nearest = float(ends[np.argmin(np.abs(ends - position))])
     cut = nearest if abs(nearest - position) <= slack else float(position)
-    for number, joint in enumerate(spindle.joints, 1):
-        if abs(joint.position - cut) <= slack:
-            raise ValueError(
-                f"joint {number}: position={joint.position} m is where the spindle is cut; cut it beside the joint"
-            )
-    return replace(
+    at_cut = [joint for joint in spindle.joints if abs(joint.position - cut) <= slack]
+    rest = replace(
         spindle,
         segments=[
             _tail(segment, max(cut - start, 0.0))
@@ -41,8 +37,9 @@ def cut_spindle(spindle: Spindle, position: float) -> Spindle:
         ],
         bearings=moved([part for part in spindle.bearings if part.position >= cut - slack], -cut),
         masses=moved([part for part in spindle.masses if part.position >= cut - slack], -cut),
-        joints=moved([part for part in spindle.joints if part.position >= cut - slack], -cut),
+        joints=moved([part for part in spindle.joints if part.position > cut + slack], -cut),
     )
+    return rest, at_cut[0] if at_cut else None
 
 
 def moved(parts: Iterable[Part], shift: float) -> list[Part]:

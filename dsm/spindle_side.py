@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dsm.assemble import assemble
+from dsm.attachments import Joint
 from dsm.condense import condense
 from dsm.cut_spindle import cut_spindle
 from dsm.damped_blocks import damped_blocks
@@ -38,16 +39,29 @@ class SpindleSide:
 def spindle_side(spindle: Spindle, frequency: ArrayLike, position: float, loss_factor: float = 0.0) -> SpindleSide:
     """All of a spindle beyond `position` from its tool tip (m), exactly condensed to the place of the cut.
 
-    frequency: (n,) Hz. loss_factor: as for receptance. A bearing or a mass where the spindle is cut counts as part of
-    it; all that is nearer to the tip falls away. Raises ValueError as receptance does, for a cut off the shaft or at a
-    joint, and where a rigid bearing holds the shaft at the cut.
+    frequency: (n,) Hz. loss_factor: as for receptance. A bearing, a mass or a joint where the spindle is cut counts as
+    part of it; all that is nearer to the tip falls away. Raises ValueError as receptance does, for a cut off the shaft,
+    and where a rigid bearing holds the shaft at the cut.
     """
     f = frequency_axis(frequency)
-    rest = cut_spindle(spindle, position)
+    rest, joint = cut_spindle(spindle, position)
     if np.any(f == 0):
         require_support(rest)
     model = assemble(rest, float(np.max(f, initial=0.0)))
     if np.any(model.held[0]):
         raise ValueError(f"position={position} m is held by a rigid bearing; cut the shaft elsewhere")
     k = condense(*damped_blocks(model, rest, np.asarray(2 * np.pi * f, dtype=np.complex128), loss_factor), node=0)
-    return SpindleSide(f, k.uu, k.ut, k.tt, loss_factor, spindle.theory)
+    stiffness = (k.uu, k.ut, k.tt)
+    if joint is not None:
+        stiffness = _through(joint, loss_factor, *stiffness)
+    return SpindleSide(f, *stiffness, loss_factor, spindle.theory)
+
+
+def _through(
+    joint: Joint, loss_factor: float, uu: _Complex, ut: _Complex, tt: _Complex
+) -> tuple[_Complex, _Complex, _Complex]:
+    """The stiffness K with the joint in series: J (K + J)^-1 K with J = diag(k, tilt)."""
+    k, tilt = (1 + 1j * loss_factor) * np.array([joint.stiffness, joint.rotational_stiffness])
+    both = uu * tt - ut * ut
+    determinant = (uu + k) * (tt + tilt) - ut * ut
+    return k * (uu * tilt + both) / determinant, k * tilt * ut / determinant, tilt * (k * tt + both) / determinant

@@ -21,12 +21,12 @@ CERTAINTY = 2e-10
 """Relative half-width, in w^2 (w where it spins), of the interval in which each mode is proved to lie."""
 ROUNDING = 1024 * np.finfo(np.float64).eps
 """The same from rounding, relative to |phi|^T |K| |phi| of a mode of unit modal mass."""
-BLURRED = 0.01
+BLURRED = 0.1
 """An interval wider than this part of its w^2 proves nothing worth having."""
 
 SPOILT = (
-    "rounding spoils the modes of this shaft; look for segments far too short, thick or thin beside the others, and for "
-    "bearings, masses or joints far too close to each other or to the end of a segment"
+    "rounding spoils the modes of this shaft; look for segments far too short, thick or thin beside the others, and "
+    "for bearings, masses or joints far too close to each other or to the end of a segment"
 )
 
 
@@ -52,7 +52,7 @@ def find_modes(
         model, x, shape = _start(spindle, count, places, held, spin)
         width = CERTAINTY * x + ROUNDING * _quadratic(np.abs(model.dense(x)), np.abs(shape))
         x, shape = _refine(model, x, shape, width)
-        _require_sharp(model, x, width)
+        _require_sharp(spindle, held, x, width)
         x, shape = _prove(model, x, shape, width)
     except np.linalg.LinAlgError as exc:
         raise ArithmeticError(SPOILT) from exc
@@ -150,12 +150,22 @@ def _quadratic(matrix: _Float, shape: _Float) -> _Float:
     return np.asarray(np.einsum("mi,mij,mj->m", shape, matrix, shape))
 
 
-def _require_sharp(model: DynamicStiffness, x: _Float, width: _Float) -> None:
-    """Raise ArithmeticError where rounding leaves modes, or the difference from no bending at all, in doubt."""
+def _require_sharp(spindle: Spindle, held: Sequence[Held], x: _Float, width: _Float) -> None:
+    """Raise ArithmeticError where rounding leaves modes in doubt, or takes them for motions without bending."""
     moving = x > width
-    limit = np.where(moving, x, float(model.to_x(np.array(model.top_frequency))))
-    if np.any(width > BLURRED * limit):
+    if np.any(width[moving] > BLURRED * x[moving]) or np.sum(~moving) > _motions(spindle, held, float(np.min(width))):
         raise ArithmeticError(SPOILT)
+
+
+def _motions(spindle: Spindle, held: Sequence[Held], width: float) -> int:
+    """Number of motions without bending, 0 to 2, that no spring worth the name and no held dof hinders."""
+    hindered = [[1.0, z] if dof == 0 else [0.0, 1.0] for z, dof in held]
+    for bearing in spindle.bearings:
+        if bearing.support_stiffness > width * spindle.mass:
+            hindered.append([1.0, bearing.position])
+        if bearing.rotational_stiffness > width * spindle.mass * spindle.length**2:
+            hindered.append([0.0, 1.0])
+    return 2 - int(np.linalg.matrix_rank(hindered) if hindered else 0)
 
 
 def _prove(model: DynamicStiffness, x: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:

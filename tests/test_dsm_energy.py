@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from dsm import MATERIALS, Bearing, Joint, LumpedMass, Material, Segment, Spindle, Theory, mode_shapes
 from dsm.energy_shares import EnergyShares, energy_shares
@@ -53,15 +54,15 @@ def rich_spindles(draw: st.DrawFn) -> Spindle:
     return Spindle(parts, bearings, theory=theory, masses=masses, joints=joints)
 
 
-def log_slope(scaled: Callable[[float], Spindle], count: int) -> np.ndarray:
+def log_slope(scaled: Callable[[float], Spindle], count: int) -> NDArray[np.float64]:
     """d ln f^2 / d ln k of each mode by a central difference."""
     low, high = (find_modes(scaled(math.exp(d)), count).frequency for d in (-STEP, STEP))
-    return np.asarray(2 * np.log(high / low) / (2 * STEP))
+    return np.asarray(np.log(high / low) / STEP)
 
 
-def total(shares: EnergyShares) -> np.ndarray:
+def total(shares: EnergyShares) -> NDArray[np.float64]:
     parts = (shares.segments, shares.bearings, shares.housings, shares.joints)
-    return np.sum([part.sum(axis=1) for part in parts], axis=0)
+    return np.asarray(np.hstack(parts).sum(axis=1))
 
 
 @RANDOM
@@ -79,28 +80,30 @@ def test_shares_lie_in_0_to_1_and_add_up_to_1(spindle: Spindle) -> None:
 def test_a_share_is_the_slope_of_the_frequency(spindle: Spindle, kind: str, index: int) -> None:
     frequency = find_modes(spindle, 4).frequency
     assume(np.min(np.diff(frequency) / frequency[:-1]) > 0.05)
-    shares = energy_shares(spindle, 3)
-
-    def scaled(factor: float) -> Spindle:
-        return stiffened(spindle, kind, index % len(getattr(spindle, f"{kind.replace('housing', 'bearing')}s")), factor)
-
-    share = getattr(shares, f"{kind}s")
-    assert log_slope(scaled, 3) == pytest.approx(share[:, index % share.shape[1]], rel=1e-4, abs=1e-5)
+    share = getattr(energy_shares(spindle, 3), f"{kind}s")
+    part = index % share.shape[1]
+    slope = log_slope(lambda factor: stiffened(spindle, kind, part, factor), 3)
+    assert slope == pytest.approx(share[:, part], rel=1e-4, abs=1e-5)
 
 
 def stiffened(spindle: Spindle, kind: str, index: int, factor: float) -> Spindle:
-    parts = list(getattr(spindle, "bearings" if kind == "housing" else f"{kind}s"))
-    part = parts[index]
+    """The spindle with one of its parts stiffer by a factor."""
+    segments, bearings, joints = list(spindle.segments), list(spindle.bearings), list(spindle.joints)
     if kind == "segment":
-        stuff: Material = part.material
+        stuff = segments[index].material or spindle.material
         stiff = Material(factor * stuff.youngs_modulus, stuff.density, factor * stuff.shear_modulus)
-        parts[index] = replace(part, material=stiff)
+        segments[index] = replace(segments[index], material=stiff)
     elif kind == "housing":
-        parts[index] = replace(part, housing_stiffness=factor * part.housing_stiffness)
+        bearings[index] = replace(bearings[index], housing_stiffness=factor * bearings[index].housing_stiffness)
+    elif kind == "bearing":
+        old = bearings[index]
+        tilting = factor * old.rotational_stiffness
+        bearings[index] = replace(old, stiffness=factor * old.stiffness, rotational_stiffness=tilting)
     else:
-        tilt = factor * part.rotational_stiffness
-        parts[index] = replace(part, stiffness=factor * part.stiffness, rotational_stiffness=tilt)
-    return replace(spindle, **{"bearings" if kind == "housing" else f"{kind}s": parts})
+        joint = joints[index]
+        tilting = factor * joint.rotational_stiffness
+        joints[index] = replace(joint, stiffness=factor * joint.stiffness, rotational_stiffness=tilting)
+    return replace(spindle, segments=segments, bearings=bearings, joints=joints)
 
 
 def test_two_springs_in_series_share_by_their_compliance() -> None:
@@ -140,7 +143,7 @@ def test_a_shaft_not_held_has_no_shares() -> None:
 def test_shapes_inside_elements_are_those_of_a_node_there(spindle: Spindle, share: float) -> None:
     place = share * spindle.length
     steps = np.abs(find_modes(spindle, 1).position - place)
-    assume(np.min(steps) > 1e-4)
+    assume(np.min(steps) > 1e-3)  # nearer, rounding spoils the model with a node there, not the shape
     inside = mode_shapes(spindle, 3, [place])
     noded = find_modes(spindle, 3, places=[place])
     frequency = find_modes(spindle, 4).frequency

@@ -1,4 +1,4 @@
-"""The two-disk rotor of M. I. Friswell, J. E. T. Penny, S. D. Garvey and A. W. Lees, Dynamics of Rotating Machines, 2010.
+"""The two-disk rotor of M. I. Friswell, J. E. T. Penny, S. D. Garvey, A. W. Lees, Dynamics of Rotating Machines, 2010.
 
 Steel shaft 1.5 m x 50 mm, disks 280 x 70 mm at 0.5 m and 350 x 70 mm at 1.0 m, springs of 1 MN/m at the ends,
 shear and gyroscopic moments included. The book gives six elements; "converged" is the limit of many.

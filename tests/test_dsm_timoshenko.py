@@ -7,6 +7,7 @@ A finite rotating shaft element using Timoshenko beam theory, J. Mech. Design 10
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -75,11 +76,16 @@ def test_a_slender_shaft_shows_neither_shear_nor_rotary_inertia() -> None:
 
 
 def exact_element(segment: Segment, w: float, spin: float) -> NDArray[np.float64]:
-    """Element matrix from exp(A L), 60 digits, of the state (u, t, M, Q): EI t' = M, S (u' - t) = Q and their forces."""
+    """Element matrix from exp(A L), 60 digits, of the state (u, t, M, Q) with EI t' = M, S (u' - t) = Q."""
     with mpmath.workdps(60):
         rigidity, mass, rotary, shear = (mpmath.mpf(value) for value in constants(segment))
         turning = rotary * mpmath.mpf(w) * (mpmath.mpf(w) - 2 * mpmath.mpf(spin))
-        rows = [[0, 1, 0, 1 / shear], [0, 0, 1 / rigidity, 0], [0, -turning, 0, -1], [-mass * mpmath.mpf(w) ** 2, 0, 0, 0]]
+        rows = [
+            [0, 1, 0, 1 / shear],
+            [0, 0, 1 / rigidity, 0],
+            [0, -turning, 0, -1],
+            [-mass * mpmath.mpf(w) ** 2, 0, 0, 0],
+        ]
         transfer = mpmath.expm(mpmath.matrix(rows) * mpmath.mpf(segment.length), method="taylor")
         a, b, c, d = (transfer[i : i + 2, j : j + 2] for i in (0, 2) for j in (0, 2))
         swap = mpmath.matrix([[0, 1], [1, 0]])
@@ -122,7 +128,11 @@ def test_response_between_two_points_is_the_same_both_ways() -> None:
 
 def stepped_shaft() -> Spindle:
     """Hollow, stepped, on springs, with a disk."""
-    segments = [Segment(0.12, 0.05), Segment(0.2, 0.09, 0.04), Segment(0.15, 0.07, 0.05, material=MATERIALS["titanium"])]
+    segments = [
+        Segment(0.12, 0.05),
+        Segment(0.2, 0.09, 0.04),
+        Segment(0.15, 0.07, 0.05, material=MATERIALS["titanium"]),
+    ]
     bearings = [Bearing(0.12, 2e8, rotational_stiffness=1e5), Bearing(0.32, 3e8)]
     return Spindle(segments, bearings, theory="timoshenko", masses=[LumpedMass(0.47, 3.0, 0.01, 0.018)])
 
@@ -130,7 +140,7 @@ def stepped_shaft() -> Spindle:
 def finite_elements(spindle: Spindle, parts: int, spin: float, count: int) -> NDArray[np.float64]:
     """Forward whirl (Hz) from two-node elements of cubic deflection and quadratic rotation, free of locking."""
     ends = np.cumsum([0.0, *(segment.length for segment in spindle.segments)])
-    nodes = np.concatenate([[0.0], *(np.linspace(a, b, parts + 1)[1:] for a, b in zip(ends[:-1], ends[1:], strict=True))])
+    nodes = np.concatenate([[0.0], *(np.linspace(a, b, parts + 1)[1:] for a, b in itertools.pairwise(ends))])
     stiffness, mass, gyroscopic = np.zeros((3, 2 * nodes.size, 2 * nodes.size))
     for index, length in enumerate(np.diff(nodes)):
         segment = spindle.segments[index // parts]
@@ -158,7 +168,7 @@ def finite_elements(spindle: Spindle, parts: int, spin: float, count: int) -> ND
 def two_node_element(
     segment: Segment, material: Material, length: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Stiffness, mass and gyroscopic matrix; both shape functions follow from static equilibrium, Phi = 12 EI/(S L^2)."""
+    """Stiffness, mass and gyroscopic matrix; the shapes follow from static equilibrium, Phi = 12 EI/(S L^2)."""
     area = ring_area(segment.outer_diameter, segment.bore_diameter)
     inertia = ring_second_moment(segment.outer_diameter, segment.bore_diameter)
     kappa = material.shear_coefficient(segment.bore_diameter / segment.outer_diameter)

@@ -152,7 +152,8 @@ def test_slender_and_stubby_shafts_get_right_modes(slenderness: float, theory: T
     """Rigid on springs that are soft beside it: bounce, and pitch about the middle."""
     length = 0.05 * slenderness
     shaft = Segment(length, 0.05)
-    soft = 1e-4 * 210e9 * min(shaft.second_moment / length**3, 0.1 * shaft.area / length)
+    bending, shear = 210e9 * shaft.second_moment / length**3, 0.1 * 210e9 * shaft.area / length
+    soft = 1e-4 * (min(bending, shear) if theory == "timoshenko" else bending)
     spindle = Spindle([shaft], [Bearing(0.0, soft), Bearing(length, soft)], theory=theory)
     gyration = math.sqrt((0.05**2 / 16 if theory == "timoshenko" else 0.0) + length**2 / 12)
     bounce, pitch = math.sqrt(2 * soft / spindle.mass), length / gyration * math.sqrt(soft / 2 / spindle.mass)

@@ -32,7 +32,7 @@ def critical_speed(spindle: Spindle, mode: int = 1) -> float:
         return 2 * math.pi * float(find_modes(spindle, mode, spin=spin).frequency[-1]) - spin
 
     at_rest = lead(0.0)
-    low, high = at_rest * (1 - 1e-9), 2 * at_rest
+    low, high = 0.0, 2 * at_rest
     while lead(high) > 0:
         low, high = high, 2 * high
         if high > FARTHEST * at_rest:

@@ -17,7 +17,7 @@ from dsm.energy_shares import EnergyShares, energy_shares
 from dsm.find_modes import find_modes
 
 RANDOM = settings(max_examples=25, deadline=None)
-STEP = 1e-3
+STEP = 3e-3
 
 
 @st.composite
@@ -83,7 +83,7 @@ def test_a_share_is_the_slope_of_the_frequency(spindle: Spindle, kind: str, inde
     share = getattr(energy_shares(spindle, 3), f"{kind}s")
     part = index % share.shape[1]
     slope = log_slope(lambda factor: stiffened(spindle, kind, part, factor), 3)
-    assert slope == pytest.approx(share[:, part], rel=1e-4, abs=1e-5)
+    assert slope == pytest.approx(share[:, part], rel=1e-3, abs=1e-4)
 
 
 def stiffened(spindle: Spindle, kind: str, index: int, factor: float) -> Spindle:
@@ -152,7 +152,20 @@ def test_shapes_inside_elements_are_those_of_a_node_there(spindle: Spindle, shar
     sign = np.sign(np.sum(noded.deflection[:, [0, -1]] * find_modes(spindle, 3).deflection[:, [0, -1]], axis=1))
     for found, expected in ((inside.deflection, noded.deflection), (inside.slope, noded.slope)):
         scale = np.max(np.abs(expected), axis=1)
-        assert (found[:, 0] - sign * expected[:, node]) / scale == pytest.approx(0, abs=1e-8)
+        assert (found[:, 0] - sign * expected[:, node]) / scale == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
+def test_shapes_inside_long_elements_to_nine_digits(theory: Theory) -> None:
+    spindle = Spindle(
+        [Segment(0.5, 0.05), Segment(0.4, 0.09, 0.03)], [Bearing(0.2, 1e8), Bearing(0.7, 2e8)], theory=theory
+    )
+    places = [0.07, 0.31, 0.44, 0.63, 0.83]
+    noded, inside = find_modes(spindle, 4, places=places), mode_shapes(spindle, 4, places)
+    nodes = np.searchsorted(noded.position, np.array(places) - 1e-9)
+    for expected, found in ((noded.deflection[:, nodes], inside.deflection), (noded.slope[:, nodes], inside.slope)):
+        sign = np.sign(np.sum(expected * found, axis=1, keepdims=True))
+        assert sign * found == pytest.approx(expected, abs=1e-9 * float(np.max(np.abs(expected))))
 
 
 def test_shape_of_a_pinned_beam_is_a_sine_everywhere() -> None:

@@ -24,6 +24,9 @@ ROUNDING = 1024 * np.finfo(np.float64).eps
 BLURRED = 0.1
 """An interval wider than this part of its w^2 proves nothing worth having."""
 
+SETTLED = 1e-8
+"""Relative change of x by a step that leaves less than rounding to the next: each step at least squares the error."""
+
 SPOILT = (
     "rounding spoils the modes of this shaft; look for segments far too short, thick or thin beside the others, and "
     "for bearings, masses or joints far too close to each other or to the end of a segment"
@@ -130,7 +133,7 @@ def _refine(model: DynamicStiffness, x: _Float, shape: _Float, width: _Float) ->
     for _ in range(8):
         previous = x
         x, shape = _iterate(model, x, shape, width)
-        if np.all(np.abs(x - previous) <= 1e-12 * x):
+        if np.all(np.abs(x - previous) <= SETTLED * x):
             break
     order = np.argsort(x)
     return x[order], shape[order]
@@ -147,13 +150,15 @@ def _iterate(model: DynamicStiffness, x: _Float, shape: _Float, width: _Float) -
 
 def _quadratic(matrix: _Float, shape: _Float) -> _Float:
     """phi^T A phi of each mode, shape (n_modes,)."""
-    return np.asarray(np.einsum("mi,mij,mj->m", shape, matrix, shape))
+    return np.asarray(np.sum(shape * (matrix @ shape[..., np.newaxis])[..., 0], axis=1))
 
 
 def _require_sharp(spindle: Spindle, held: Sequence[Held], x: _Float, width: _Float) -> None:
     """Raise ArithmeticError where rounding leaves modes in doubt, or takes them for motions without bending."""
     moving = x > width
-    if np.any(width[moving] > BLURRED * x[moving]) or np.sum(~moving) > _motions(spindle, held, float(np.min(width))):
+    still = int(np.sum(~moving))
+    doubtful = still > 0 and still > _motions(spindle, held, float(np.min(width)))
+    if doubtful or np.any(width[moving] > BLURRED * x[moving]):
         raise ArithmeticError(SPOILT)
 
 

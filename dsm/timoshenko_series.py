@@ -59,16 +59,15 @@ def timoshenko_series(
     return np.asarray(unit * scale)
 
 
-def _fundamental(p: _Float, q: _Float) -> list[_Float]:
+def _fundamental(p: _Float, q: _Float) -> _Float:
     """f, f', f'' and f''' at s = 1."""
-    earlier, now = np.zeros_like(p), np.zeros_like(p)
-    now[:, 0] = 1.0
-    sums = [np.zeros_like(p) for _ in range(4)]
-    for n in range(2 * p.shape[1]):
-        for k, total in enumerate(sums):
-            total += now / factorial(2 * n + 3 - k)
-        earlier, now = now, _times(q, earlier) - _times(p, now)
-    return sums
+    a = np.zeros((2 * p.shape[1], *p.shape))
+    a[0, :, 0] = 1.0
+    a[1] = -p
+    for n in range(2, a.shape[0]):
+        a[n] = _times(q, a[n - 2]) - _times(p, a[n - 1])
+    weights = [[1 / factorial(2 * n + 3 - k) for n in range(a.shape[0])] for k in range(4)]
+    return np.tensordot(weights, a, axes=1)
 
 
 def _times(a: _Float, b: _Float) -> _Float:

@@ -41,6 +41,8 @@ def installer():
 
 def make_environment(extras):
     """Make .venv and install lobewatch in it, unless it is there already; extras is "" or "[dev]"."""
+    if os.path.realpath(sys.prefix) == os.path.realpath(VENV):
+        return  # started by the environment itself, which cannot make itself anew
     marker = os.path.join(VENV, "lobewatch-stamp")
     if os.path.exists(marker):
         with open(marker) as file:

@@ -6,11 +6,14 @@ Effects of Machine Tool Spindle Decay on the Stability Lobe Diagram, Shock and V
 
 from dsm.attachments import Bearing, Joint, LumpedMass
 from dsm.calibrate import calibrate
+from dsm.calibrate_damping import DampingCalibration, UnreachableDampingError, calibrate_damping
 from dsm.calibration import Calibration, UnreachableFrequencyError
 from dsm.change_tool import change_tool
 from dsm.couple_tool import couple_tool
 from dsm.critical_speed import critical_speed
+from dsm.damped_modes import DampedModes, damped_modes
 from dsm.energy_shares import EnergyShares, energy_shares
+from dsm.fit_stiffness import fit_stiffness
 from dsm.linearized_stiffness import linearized_stiffness
 from dsm.material import MATERIALS, Material
 from dsm.modal_stiffness import modal_stiffness
@@ -28,12 +31,15 @@ from dsm.spinning_element import spinning_element
 from dsm.spinning_frequencies import UnstableSpinError, spinning_frequencies
 from dsm.static_stiffness import static_stiffness
 from dsm.stiffness_curve import stiffness_curve
+from dsm.stiffness_fit import StiffnessFit, StiffnessFitError
 from dsm.whirl_map import WhirlMap, whirl_map
 
 __all__ = [
     "MATERIALS",
     "Bearing",
     "Calibration",
+    "DampedModes",
+    "DampingCalibration",
     "EnergyShares",
     "Joint",
     "LumpedMass",
@@ -45,15 +51,21 @@ __all__ = [
     "SpinningBeam",
     "SpinningSegment",
     "SpinningSpring",
+    "StiffnessFit",
+    "StiffnessFitError",
     "Theory",
+    "UnreachableDampingError",
     "UnreachableFrequencyError",
     "UnstableSpinError",
     "WhirlMap",
     "calibrate",
+    "calibrate_damping",
     "change_tool",
     "couple_tool",
     "critical_speed",
+    "damped_modes",
     "energy_shares",
+    "fit_stiffness",
     "linearized_stiffness",
     "modal_stiffness",
     "mode_shapes",

@@ -8,7 +8,7 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
-from dsm import Calibration
+from dsm import Calibration, DampingCalibration, StiffnessFit
 from lobes import StabilityLobes
 from lobewatch.machine import REFERENCE_CUT, Machine
 from lobewatch.output import plus_minus, table
@@ -61,6 +61,33 @@ def calibration_json(calibration: Calibration) -> dict[str, Any]:
         "static_tip_stiffness_before_n_per_m": calibration.static_stiffness_before,
         "modal_tip_stiffness_n_per_m": calibration.modal_stiffness_after,
         "modal_tip_stiffness_before_n_per_m": calibration.modal_stiffness_before,
+    }
+
+
+def stiffness_fit_json(fit: StiffnessFit) -> dict[str, Any]:
+    """Several stiffnesses from several modes."""
+    return {
+        "groups": list(fit.groups),
+        "factor": fit.factor,
+        "factor_std": fit.factor_std,
+        "stiffness_n_per_m": fit.stiffness,
+        "stiffness_n_per_m_std": fit.stiffness_std,
+        "correlation": fit.correlation,
+        "mode": fit.mode,
+        "frequency_hz": fit.frequency,
+        "residual_hz": fit.residual,
+        "energy_share": fit.energy_share,
+        "condition": fit.condition,
+        "warnings": list(fit.warnings),
+    }
+
+
+def damping_json(found: DampingCalibration) -> dict[str, Any]:
+    """The bearings' dampers."""
+    return {
+        "damping_ratio": found.damping_ratio,
+        "bearing_damping_n_s_per_m": found.bearing_damping,
+        "bearing_damping_sensitivity": found.sensitivity,
     }
 
 

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 
 from acquisition import TapsEmulator
+from dsm import natural_frequencies
 from lobes import read_history
 from lobewatch.cli import main
 from lobewatch.emulation import emulated_structure, emulator
@@ -231,8 +233,29 @@ def test_calibrate(run: Run, trial: MachineFolder) -> None:
     assert "surrogate" in run("calibrate", "trial", "--frequency", 1550).out
     refused(run("calibrate", "trial", "--frequency", 2500), "2301.1 Hz (rigid bearings)")
     refused(run("calibrate", "trial", "--frequency", -1), "-1")
+    dampers = run("calibrate", "trial", "--frequency", 1713.05, "--damping-ratio", 0.03, "--json").json
+    assert dampers["bearing_damping_n_s_per_m"] > 0
+    assert "bearing damping" in run("calibrate", "trial", "--frequency", 1713.05, "--damping-ratio", 0.03).out
+    refused(run("calibrate", "trial", "--frequency", 1713.05, "--damping-ratio", 0.9), "0.9")
     run("init", "plain")
     refused(run("calibrate", "plain", "--frequency", 1550), "no model: add a [spindle] table")
+
+
+def test_calibrate_groups(run: Run, trial: MachineFolder) -> None:
+    toml = trial.toml.read_text("utf-8")
+    for position, group in ((166, "front"), (203.5, "front"), (241, "front")):
+        toml = toml.replace(f"position_mm = {position} ", f'position_mm = {position}, group = "{group}" ')
+    trial.toml.write_text(toml, "utf-8")
+    drawn = trial.machine.model("reference")
+    worn = replace(
+        drawn,
+        bearings=[replace(b, stiffness=b.stiffness * (0.5 if b.group == "front" else 0.8)) for b in drawn.bearings],
+    )
+    measured = [word for f in natural_frequencies(worn, 4) for word in ("--frequency", f)]
+    said = run("calibrate", "trial", *measured, "--group", "front", "--group", "bearings", "--json").json
+    assert said["factor"] == pytest.approx([0.5, 0.8], rel=1e-6)
+    assert "stiffness front" in run("calibrate", "trial", *measured).out
+    refused(run("calibrate", "trial", *measured, "--group", "tail"), "tail", "front")
 
 
 def test_init(run: Run, trial: MachineFolder) -> None:
@@ -254,7 +277,7 @@ def test_modes_of_bad_files_and_bands(run: Run, beam: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    "name", ["demo", "init", "tap", "replay", "modes", "calibrate", "lobes", "report", "emulate taps"]
+    "name", ["demo", "init", "tap", "replay", "modes", "model", "calibrate", "lobes", "report", "emulate taps"]
 )
 def test_every_command_has_help_with_examples_and_json(run: Run, name: str) -> None:
     said = run(*name.split(), "--help")

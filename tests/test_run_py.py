@@ -110,3 +110,13 @@ def test_what_is_run_and_that_its_status_is_passed_on(
         run_py.main()
     assert end.value.code == 7
     assert seen == [[run_py.PYTHON, "-m", *ran]]
+
+
+def test_an_environment_that_starts_it_is_never_cleared(run_py: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    keep = Path(run_py.VENV) / "keep"
+    keep.parent.mkdir()
+    keep.touch()
+    monkeypatch.setattr(run_py.sys, "prefix", run_py.VENV)
+    monkeypatch.setattr(run_py.subprocess, "call", lambda *_, **__: pytest.fail("nothing is to be installed"))
+    run_py.make_environment("[dev]")
+    assert keep.exists()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -74,11 +75,17 @@ class DynamicStiffness:
 def full_matrices(diagonal: NDArray[Number], coupling: NDArray[Number]) -> NDArray[Number]:
     """Full matrices, shape (n, 2 n_nodes, 2 n_nodes), of blocks as in DynamicStiffness.blocks."""
     uu, ut, tt = diagonal
-    u = 2 * np.arange(uu.shape[0])
-    matrix = np.zeros((uu.shape[1], 2 * u.size, 2 * u.size), dtype=uu.dtype)
-    matrix[:, u, u] = uu.T
-    matrix[:, u, u + 1] = matrix[:, u + 1, u] = ut.T
-    matrix[:, u + 1, u + 1] = tt.T
-    for entry, (row, column) in zip(coupling, ((0, 2), (0, 3), (1, 2), (1, 3)), strict=True):
-        matrix[:, u[:-1] + row, u[:-1] + column] = matrix[:, u[:-1] + column, u[:-1] + row] = entry.T
-    return matrix
+    size = 2 * uu.shape[0]
+    matrices = np.zeros((uu.shape[1], size * size), dtype=uu.dtype)
+    matrices[:, _entries(uu.shape[0])] = np.concatenate([uu, ut, ut, tt, *coupling, *coupling]).T
+    return matrices.reshape(-1, size, size)
+
+
+@lru_cache(maxsize=32)
+def _entries(n_nodes: int) -> NDArray[np.int_]:
+    """Where the blocks stand in a flattened matrix: diagonal ones, those above and those below them."""
+    u = 2 * np.arange(n_nodes)
+    left, right = u[:-1], u[1:]
+    above = [(left, right), (left, right + 1), (left + 1, right), (left + 1, right + 1)]
+    pairs = [(u, u), (u, u + 1), (u + 1, u), (u + 1, u + 1), *above, *((column, row) for row, column in above)]
+    return np.concatenate([2 * n_nodes * row + column for row, column in pairs])

@@ -1,0 +1,234 @@
+"""Speed and error of the spindle model beside finite elements and ROSS, all in one run and one BLAS thread.
+
+    python3 -m pip install --editable ".[bench]"    (for ROSS; without it the rest is measured)
+    python3 bench/bench_dsm.py                      (about a minute, most of it ROSS)
+    python3 bench/bench_dsm.py --quick              (few repetitions, without ROSS)
+
+Times are medians of repeated runs. "cold": a spindle that was never seen before, so that its matrix has to be made;
+"warm": the same one again; the matrices of the others are made beforehand too. The factors are times over that of the
+first row. An error is the largest relative difference from the exact solution, which the model is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import numpy as np
+import scipy
+from dsm_peers import FiniteElements, Float, RossRotor, import_ross, refine
+from threadpoolctl import threadpool_limits
+
+from dsm import (
+    Spindle,
+    Theory,
+    calibrate,
+    change_tool,
+    couple_tool,
+    natural_frequencies,
+    receptance,
+    receptance_map,
+    spindle_side,
+)
+from lobewatch.machine import read_machine
+
+MACHINE = Path(__file__).parent.parent / "sim_data" / "surrogate_machine.toml"
+MEASURED = 1722.0
+"""First natural frequency that is calibrated to (Hz)."""
+STIFFNESS = 1.28e9
+"""Of each bearing otherwise (N/m)."""
+LOSS_FACTOR = 0.05
+MODES = 6
+REFINED = 2e-6
+"""Relative error in k that the refined elements are allowed."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """How much is measured."""
+
+    repeats: int
+    frequencies: int
+    factors: int
+
+    def seconds(self, work: Callable[[], Any], repeats: int | None = None) -> float:
+        """Median time of a run."""
+        work()
+        times = []
+        for _ in range(repeats or self.repeats):
+            start = time.perf_counter()
+            work()
+            times.append(time.perf_counter() - start)
+        return median(times)
+
+
+class Table:
+    """Rows of one question; the first row is what the others are compared with."""
+
+    def __init__(self, title: str) -> None:
+        print(f"\n{title}")
+        self.first: float | None = None
+
+    def row(self, name: str, seconds: float, error: str = "") -> None:
+        """Print one."""
+        self.first = self.first or seconds
+        digits = f"{1e3 * seconds:.2f}" if seconds < 1 else f"{1e3 * seconds:.0f}"
+        print(f"  {name:<52}{digits:>10} ms{seconds / self.first:>10.1f} x   {error}".rstrip())
+
+
+def spindle(theory: Theory) -> Spindle:
+    """The surrogate spindle."""
+    drawn = read_machine(MACHINE).spindle
+    if drawn is None:
+        raise SystemExit(f"{MACHINE}: no [spindle]")
+    built = drawn.build()
+    return replace(built, bearings=[replace(b, stiffness=STIFFNESS) for b in built.bearings], theory=theory)
+
+
+def never_seen(given: Spindle, bench: Bench) -> Callable[[], Spindle]:
+    """Hands out spindles made beforehand that differ in the last digits."""
+    factors = 1 + 1e-12 * np.arange(1, bench.repeats + 2)
+    spindles = iter([scaled(given, factor) for factor in factors])
+    return lambda: next(spindles)
+
+
+def scaled(given: Spindle, factor: float) -> Spindle:
+    """With other bearings."""
+    return replace(given, bearings=[replace(b, stiffness=float(factor) * b.stiffness) for b in given.bearings])
+
+
+def difference(found: Any, exact: Any) -> str:
+    """Largest relative difference."""
+    return f"error {np.max(np.abs(np.asarray(found) / np.asarray(exact) - 1)):.1e}"
+
+
+def nearest(found: Float, wanted: Float) -> Float:
+    """Of the frequencies found, the one nearest to each that is wanted."""
+    return np.asarray(found[np.argmin(np.abs(found[:, np.newaxis] - wanted), axis=0)])
+
+
+def bench_calibration(bench: Bench, given: Spindle) -> None:
+    """Bearing stiffness from one frequency."""
+    exact = calibrate(given, MEASURED)
+    table, fresh = Table(f"Calibration to {MEASURED:g} Hz, {given.theory}"), never_seen(given, bench)
+    table.row("this model, warm", bench.seconds(lambda: calibrate(given, MEASURED)), "exact")
+    table.row("this model, cold", bench.seconds(lambda: calibrate(fresh(), MEASURED)), "exact")
+    print(f"  {'':<52}solved anew, the frequency is off by {abs(exact.residual) / MEASURED:.0e}")
+    if given.theory != "euler-bernoulli":
+        return
+    k = exact.bearing_stiffness
+    coarse, (fine, parts) = FiniteElements(given), refine(given, MEASURED, k, REFINED)
+    for elements, name in ((coarse, "1 element"), (fine, f"{parts} elements")):
+        size = f"{name} a segment, {elements.mass.shape[0]} dof"
+        rivals = {"root search": elements.calibrate, "no root search": elements.calibrate_by_eigenproblem}
+        if elements is fine:
+            rivals["sparse root search"] = elements.calibrate_sparse
+        for how, rival in rivals.items():
+            seconds = bench.seconds(lambda rival=rival: rival(MEASURED), max(3, bench.repeats // 10))  # type: ignore[misc]
+            table.row(f"{size}, {how}", seconds, difference(rival(MEASURED), k))
+
+
+def bench_modes(bench: Bench, given: Spindle, ross: RossRotor | None) -> None:
+    """The lowest natural frequencies."""
+    exact = natural_frequencies(given, MODES)
+    table, fresh = Table(f"{MODES} natural frequencies, {given.theory}"), never_seen(given, bench)
+    table.row("this model, each certified, warm", bench.seconds(lambda: natural_frequencies(given, MODES)), "exact")
+    table.row("this model, each certified, cold", bench.seconds(lambda: natural_frequencies(fresh(), MODES)), "exact")
+    if given.theory == "euler-bernoulli":
+        elements = FiniteElements(given)
+        seconds = bench.seconds(lambda: elements.frequencies(STIFFNESS, MODES))
+        table.row("1 element a segment, 54 dof", seconds, difference(elements.frequencies(STIFFNESS, MODES), exact))
+    if ross is not None:
+        found = nearest(ross.frequencies(), exact)
+        table.row("ROSS, 1 element a segment", bench.seconds(ross.frequencies, 3), difference(found, exact))
+
+
+def bench_receptance(bench: Bench, given: Spindle, ross: RossRotor | None) -> None:
+    """Tip receptance over frequency."""
+    f = np.linspace(100.0, 4000.0, bench.frequencies)
+    exact = receptance(given, f, loss_factor=LOSS_FACTOR)
+    table, fresh = Table(f"Tip receptance at {f.size} frequencies, {given.theory}"), never_seen(given, bench)
+    cold = bench.seconds(lambda: receptance(fresh(), f, loss_factor=LOSS_FACTOR))
+    table.row("this model, warm", bench.seconds(lambda: receptance(given, f, loss_factor=LOSS_FACTOR)), "exact")
+    table.row("this model, cold", cold, "exact")
+    if given.theory == "euler-bernoulli":
+        elements = FiniteElements(given)
+        seconds = bench.seconds(lambda: elements.tip_receptance(STIFFNESS, f, LOSS_FACTOR), 3)
+        found = elements.tip_receptance(STIFFNESS, f, LOSS_FACTOR)
+        table.row("1 element a segment, 54 dof, one solve a frequency", seconds, difference(found, exact))
+    if ross is not None:
+        undamped = receptance(given, f[:5])
+        error = difference(ross.tip_receptance(f[:5]), undamped)
+        table.row("ROSS, 1 element a segment, all points (1 run)", once(lambda: ross.tip_receptance(f)), error)
+
+
+def bench_tools(bench: Bench, given: Spindle) -> None:
+    """Tip receptance with another tool."""
+    f = np.linspace(100.0, 4000.0, bench.frequencies)
+    machine = read_machine(MACHINE)
+    tool, cut = machine.tool[0].build(given), sum(segment.length for segment in given.segments[:4])
+    table = Table(f"Tip receptance with another tool at {f.size} frequencies, {given.theory}")
+    side, whole = spindle_side(given, f, cut, LOSS_FACTOR), change_tool(given, cut, tool)
+    found, exact = couple_tool(side, tool), receptance(whole, f, loss_factor=LOSS_FACTOR)
+    table.row(
+        "tool coupled to the condensed spindle",
+        bench.seconds(lambda: couple_tool(side, tool)),
+        difference(found, exact),
+    )
+    table.row("whole shaft", bench.seconds(lambda: receptance(whole, f, loss_factor=LOSS_FACTOR)), "exact")
+    table.row("condensing the spindle, once", bench.seconds(lambda: spindle_side(given, f, cut, LOSS_FACTOR)))
+
+
+def bench_map(bench: Bench, given: Spindle) -> None:
+    """Tip receptance for many bearing stiffnesses."""
+    f, factors = np.linspace(100.0, 4000.0, max(2, bench.frequencies // 5)), np.geomspace(0.1, 10.0, bench.factors)
+    table = Table(f"Tip receptance, {factors.size} bearing stiffnesses x {f.size} frequencies, {given.theory}")
+
+    def one_by_one() -> Any:
+        spindles = [scaled(given, factor) for factor in factors]
+        return np.array([receptance(changed, f, loss_factor=LOSS_FACTOR) for changed in spindles])
+
+    seconds = bench.seconds(lambda: receptance_map(given, f, factors, loss_factor=LOSS_FACTOR), 5)
+    error = difference(receptance_map(given, f, factors, loss_factor=LOSS_FACTOR), one_by_one())
+    table.row("one eigenproblem a frequency", seconds, error)
+    table.row("receptance of each (1 run)", once(one_by_one), "exact")
+
+
+def once(work: Callable[[], Any]) -> float:
+    """Time of a single run (s)."""
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def main() -> None:
+    """Print all tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--quick", action="store_true", help="few repetitions, without ROSS")
+    quick = parser.parse_args().quick
+    bench = Bench(3, 50, 10) if quick else Bench(100, 1000, 1000)
+    ross = None if quick else import_ross()
+    with threadpool_limits(1):
+        cpu = platform.processor() or platform.machine()
+        print(f"Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}, ", end="")
+        print(f"{cpu}, {os.cpu_count()} cores, one BLAS thread")
+        print("ROSS " + (str(ross.__version__) if ross else "is left out" if quick else 'is not installed: ".[bench]"'))
+        for theory in ("euler-bernoulli", "timoshenko"):
+            given = spindle(theory)
+            rotor = None if ross is None else RossRotor(ross, given)
+            bench_calibration(bench, given)
+            bench_modes(bench, given, rotor)
+            bench_receptance(bench, given, rotor)
+            bench_map(bench, given)
+            bench_tools(bench, given)
+
+
+if __name__ == "__main__":
+    main()

@@ -45,15 +45,20 @@ def tip_response(tip: Tip, direction: str, tooth_frequency: float) -> TipRespons
     """
     if isinstance(tip, Frf):
         return _from_frf(tip.in_band(tip.usable_band))
-    if not tip:
-        raise ValueError(f"{direction} has no modes; give at least one mode, or the FRF itself")
-    for mode in tip:
+    check_modes(tip, direction)
+    return _from_modes(tip, tooth_frequency)
+
+
+def check_modes(modes: Sequence[Mode], direction: str) -> None:
+    """Refuse an empty list of modes, and modes that are not of a driving point."""
+    if not modes:
+        raise ValueError(f"{direction} has no modes; give at least one mode, or None where it is rigid")
+    for mode in modes:
         if not mode.is_driving_point:
             raise ValueError(
                 f"the mode at {mode.frequency:g} Hz of {direction} has stiffness {mode.stiffness:g} N/m, which is not "
                 "of a driving point; leave it out, or tap where the sensor sits"
             )
-    return _from_modes(tip, tooth_frequency)
 
 
 def weighted_sum(parts: Sequence[tuple[float, TipResponse]]) -> TipResponse:

@@ -16,7 +16,9 @@ from modal import Mode
 PER_CYCLE = 60
 """Intervals in one cycle of the fastest mode: multipliers within 0.2 % of the exact ones."""
 FEWEST = 40
-"""Intervals of a tooth period at least: they follow the cutting force."""
+"""Intervals of a tooth period at least ..."""
+IN_CUT = 30
+"""... and of the part of it that a tooth spends in the cut, where that is less."""
 GROWTH = 1.1
 """Numbers are rounded up to powers of this times the fewest, so that neighbouring speeds share theirs."""
 
@@ -29,14 +31,25 @@ def intervals_needed(
     The modes count as stiffened by a cut of this depth (m): f^2 + depth max|H| / (4 pi^2 mass). Modes of less than 1 %
     of the largest flexibility 1 / (2 K zeta) do not count.
     """
-    return needed(milling_system(x, y), cut, check_speeds(speed_rpm), depth)
+    return chosen_intervals(None, milling_system(x, y), cut, check_speeds(speed_rpm), depth)
 
 
-def needed(system: MillingSystem, cut: Cut, speed_rpm: NDArray[np.float64], depth: float) -> NDArray[np.int64]:
-    """The same for a system of modes."""
+def chosen_intervals(
+    asked: int | None, system: MillingSystem, cut: Cut, speed_rpm: NDArray[np.float64], depth: float
+) -> NDArray[np.int64]:
+    """The number asked for, or those needed; ValueError for what is no number of intervals."""
+    if asked is None:
+        return _needed(system, cut, speed_rpm, depth)
+    if not (asked >= 1 and asked == int(asked)):
+        raise ValueError(f"intervals={asked} is not a whole number >= 1; None chooses it from the fastest mode")
+    return np.full(speed_rpm.shape, int(asked))
+
+
+def _needed(system: MillingSystem, cut: Cut, speed_rpm: NDArray[np.float64], depth: float) -> NDArray[np.int64]:
     force = np.max(np.abs(interval_forces(cut, FEWEST, np.zeros(1))))
     stiffened = system.frequency**2 + depth * force * system.shape**2
     fastest = float(np.sqrt(np.max(stiffened[system.deciding]))) / (2 * np.pi)
     wanted = PER_CYCLE * fastest * 60 / (cut.teeth * speed_rpm)
-    power = np.ceil(np.log(np.maximum(wanted / FEWEST, 1)) / np.log(GROWTH))
+    fewest = max(FEWEST, IN_CUT / min(cut.teeth_in_cut, 1))
+    power = np.ceil(np.log(np.maximum(wanted, fewest) / FEWEST) / np.log(GROWTH) - 1e-9)
     return np.ceil(FEWEST * GROWTH**power - 1e-9).astype(np.int64)

@@ -21,7 +21,7 @@ from numba import njit
 REACH = 1.0
 """Largest angle (rad) of one Taylor series; beyond, the interval is halved and its map squared."""
 ROUNDING = 1e-17
-"""Taylor series end with the first term below this."""
+"""A Taylor series ends with two terms below this."""
 
 
 @njit(cache=True, nogil=True)
@@ -34,15 +34,15 @@ def hessenberg(damping, stiffness, shape, direction, force, which, gain, start, 
     n, (_, m, p, _) = shape.size, force.shape
     steps = np.empty((m, 2 * n + 2 * p, 2 * n))
     basis = np.empty((out.shape[2], start.size))
-    work = np.empty((4, max(2 * n, p), 2 * n + 2 * p))
+    work = np.empty((8, n, n))
     for i in range(gain.shape[0]):
         for j in range(gain.shape[1]):
             one = force[which[i, j]]
             for k in range(m):
-                if k > 0 and _same(one[k], one[k - 1]):
+                if _same(one, k):
                     steps[k] = steps[k - 1]
                 else:
-                    _interval(damping[i], stiffness[i], shape, direction, one[k], gain[i, j], work, steps[k])
+                    _interval(damping[i], stiffness[i], shape, direction, one, gain[i, j], work, k, steps)
             basis[0] = start
             for _ in range(warm_up):
                 _over_period(steps, shape, direction, basis[0], basis[1])
@@ -59,88 +59,107 @@ def _norm(vector):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _same(one, other):  # type: ignore[no-untyped-def]
-    for a in range(one.shape[0]):
-        for b in range(one.shape[1]):
-            if one[a, b] != other[a, b]:
+def _same(forces, k):  # type: ignore[no-untyped-def]
+    """Whether interval k has the forces of the one before."""
+    if k == 0:
+        return False
+    for a in range(forces.shape[1]):
+        for b in range(forces.shape[2]):
+            if forces[k, a, b] != forces[k - 1, a, b]:
                 return False
     return True
 
 
 @njit(cache=True, nogil=True)
-def _interval(damping, stiffness, shape, direction, force, scale, work, out):  # type: ignore[no-untyped-def]
-    """Fill out (2n + 2p, 2n) with the map over one interval."""
-    n, p = shape.size, force.shape[0]
-    largest, sum_of_squares = 0.0, 0.0
+def _interval(damping, stiffness, shape, direction, forces, gain, work, k, steps):  # type: ignore[no-untyped-def]
+    """Fill steps[k] from the response of the modes to an impulse on each: its value g, g', and its integrals.
+
+    Work (8, n, n) holds, from the third on, the stiffness with the cut, g, g', the integral of g and that of it. The
+    response to an initial q is g' + g damping, to a force that begins and stays the integral of g, to one that rises
+    evenly the integral of that.
+    """
+    n, p = shape.size, forces.shape[1]
+    h, halvings = _stiffen(damping, stiffness, shape, direction, forces, gain, k, work)
+    _impulse(damping, work, h)
     for a in range(n):
-        largest = max(largest, stiffness[a] + damping[a] ** 2)
-        sum_of_squares += shape[a] ** 2
-    strongest = 0.0
-    for a in range(p):
-        for b in range(p):
-            strongest += abs(force[a, b]) * scale
-    angle = np.sqrt(largest + strongest * sum_of_squares)
-    h, halvings = 1.0, 0
-    while angle * h > REACH:
-        h, halvings = h / 2, halvings + 1
-    terms, size = 2, angle * h
-    while size > ROUNDING:
-        terms, size = terms + 1, size * angle * h / terms
-    total = work[3]
-    _taylor(damping, stiffness, shape, direction, force, scale, h, terms, work, total)
-    for c in range(2 * n + 2 * p):
-        to = h if n <= c < 2 * n or c >= 2 * n + p else 1.0
-        for a in range(n):
-            out[c, a] = total[a, c] * to
-            out[c, n + a] = total[n + a, c] * to / h
+        for b in range(n):
+            pull = 0.0
+            for c in range(n):
+                pull += work[2, a, c] * work[3, c, b]
+            steps[k, b, a] = work[4, a, b] + work[3, a, b] * damping[b]
+            steps[k, b, n + a] = -pull - damping[a] * work[4, a, b] + work[4, a, b] * damping[b]
+            steps[k, n + b, a] = work[3, a, b]
+            steps[k, n + b, n + a] = work[4, a, b]
+        for r in range(p):
+            value, integral, twice = 0.0, 0.0, 0.0
+            for b in range(n):
+                push = gain * shape[b] * forces[k, direction[b], r]
+                value, integral = value + work[3, a, b] * push, integral + work[5, a, b] * push
+                twice += work[6, a, b] * push
+            steps[k, 2 * n + r, a], steps[k, 2 * n + r, n + a] = integral, value
+            steps[k, 2 * n + p + r, a], steps[k, 2 * n + p + r, n + a] = twice, integral
     for _ in range(halvings):
-        _double(out, n, p, h)
+        _double(steps[k], n, p, h)
         h *= 2
-    for c in range(p):
+    for r in range(p):
         for a in range(2 * n):
-            out[2 * n + c, a] -= out[2 * n + p + c, a]
+            steps[k, 2 * n + r, a] -= steps[k, 2 * n + p + r, a]
 
 
 @njit(cache=True, nogil=True)
-def _taylor(damping, stiffness, shape, direction, force, scale, h, terms, work, out):  # type: ignore[no-untyped-def]
-    """q and h q' after time h from q, h q', w at the begin and h times the slope of w: out (2n, 2n + 2p)."""
-    n, p = shape.size, force.shape[0]
-    columns = 2 * n + 2 * p
-    term, pull, thrust = work[0], work[1], work[2]
-    for a in range(2 * n):
-        for c in range(columns):
-            term[a, c] = out[a, c] = 1.0 if a == c else 0.0
+def _stiffen(damping, stiffness, shape, direction, forces, gain, k, work):  # type: ignore[no-untyped-def]
+    """Fill work[2] with the stiffness of modes and cut; return the time of one series and how often to double it."""
+    n = shape.size
+    largest = 0.0
     for a in range(n):
-        out[a, n + a] = 1.0
-    for k in range(terms):
-        for r in range(p):
-            for c in range(columns):
-                pull[r, c] = -1.0 if k < 2 and c == 2 * n + k * p + r else 0.0
-        for a in range(n):
-            for c in range(columns):
-                pull[direction[a], c] += shape[a] * term[a, c]
-        share = 1.0 / ((k + 1) * (k + 2))
-        for r in range(p):
-            for c in range(columns):
-                thrust[r, c] = 0.0
-            for s in range(p):
-                weight = force[r, s] * scale * h * h * share
-                for c in range(columns):
-                    thrust[r, c] += weight * pull[s, c]
-        for a in range(n):
-            slow, pull_back, r = damping[a] * h / (k + 2), stiffness[a] * h * h * share, direction[a]
-            for c in range(columns):
-                new = -slow * term[n + a, c] - pull_back * term[a, c] - shape[a] * thrust[r, c]
-                term[a, c] = term[n + a, c]
-                term[n + a, c] = new
-                out[a, c] += new
-                out[n + a, c] += (k + 2) * new
+        row = damping[a] ** 2
+        for b in range(n):
+            work[2, a, b] = gain * shape[a] * forces[k, direction[a], direction[b]] * shape[b]
+            if a == b:
+                work[2, a, b] += stiffness[a]
+            row += abs(work[2, a, b])
+        largest = max(largest, row)
+    h, halvings = 1.0, 0
+    while largest * h * h > REACH * REACH:
+        h, halvings = h / 2, halvings + 1
+    return h, halvings
 
 
 @njit(cache=True, nogil=True)
-def _double(steps, n, p, h):  # type: ignore[no-untyped-def]
+def _impulse(damping, work, h):  # type: ignore[no-untyped-def]
+    """Fill work[3:7] with g, g', the integral of g and the integral of that at time h, by the Taylor series of g."""
+    n = damping.size
+    for a in range(n):
+        for b in range(n):
+            one = h if a == b else 0.0
+            work[0, a, b], work[1, a, b] = 0.0, one
+            work[3, a, b], work[4, a, b], work[5, a, b], work[6, a, b] = one, one / h, one * h / 2, one * h * h / 6
+    k, largest = 0, 1.0
+    while largest > ROUNDING:
+        largest = 0.0
+        share = 1.0 / ((k + 1) * (k + 2))
+        for b in range(n):
+            for a in range(n):
+                pull = 0.0
+                for c in range(n):
+                    pull += work[2, a, c] * work[0, c, b]
+                work[7, a, b] = -(damping[a] * h * (k + 1) * work[1, a, b] + h * h * pull) * share
+        for a in range(n):
+            for b in range(n):
+                new = work[7, a, b]
+                work[0, a, b], work[1, a, b] = work[1, a, b], new
+                work[3, a, b] += new
+                work[4, a, b] += (k + 2) * new / h
+                work[5, a, b] += h * new / (k + 3)
+                work[6, a, b] += h * h * new / ((k + 3) * (k + 4))
+                largest = max(largest, abs(new), abs(work[0, a, b]))
+        k += 1
+
+
+@njit(cache=True, nogil=True)
+def _double(step, n, p, h):  # type: ignore[no-untyped-def]
     """Turn the transposed map over time h (from z, w and the slope of w) into the one over 2h."""
-    first = steps.copy()
+    first = step.copy()
     for c in range(2 * n + 2 * p):
         for r in range(2 * n):
             total = 0.0
@@ -150,7 +169,7 @@ def _double(steps, n, p, h):  # type: ignore[no-untyped-def]
                 total += first[c, r]
             if c >= 2 * n + p:
                 total += h * first[c - p, r]
-            steps[c, r] = total
+            step[c, r] = total
 
 
 @njit(cache=True, nogil=True)

@@ -15,10 +15,10 @@ from lobes.cut import Cut
 from lobes.milling_system import MillingSystem
 from lobes.tooth_force import interval_forces
 
-EFFORTS = ((10, 12), (20, 20), (40, 40), (80, 80))
+EFFORTS = ((6, 9), (12, 14), (20, 24), (40, 40), (80, 80))
 """Power steps and Arnoldi vectors of each attempt; what an attempt leaves in doubt goes on to the next."""
 TOLERANCE = 1e-9
-"""Largest residual of a multiplier that counts as found, relative to it."""
+"""Largest residual of a multiplier that counts as found, relative to it, unless another is asked for."""
 SMALL = 200
 """Cases that are not worth a second thread."""
 
@@ -28,24 +28,24 @@ _log = logging.getLogger(__name__)
 
 
 def largest_multipliers(
-    system: MillingSystem, cut: Cut, speed_rpm: Floats, depth: Floats, intervals: NDArray[np.int64]
+    system: MillingSystem, cut: Cut, speed_rpm: Floats, depth: Floats, intervals: NDArray[np.int64],
+    tolerance: float = TOLERANCE,
 ) -> Complexes:
     """Multiplier of largest magnitude over one tooth period, shape (s, d).
 
     speed_rpm (s,), depth (s, d) in m, intervals (s,) of the tooth period at each speed. Within each interval the cutting
     coefficients are averaged and the displacement of the period before is linear. The period map is applied, never
-    built: power steps, then Arnoldi, until the residual is below 1e-9 of the multiplier; the last resort of a small
-    system are all its vectors. Raises ArithmeticError for a multiplier that stays in doubt.
+    built: power steps, then Arnoldi, until the residual is below `tolerance` times the multiplier. Raises ArithmeticError for a multiplier that stays in doubt.
     Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, ch. 3 and 5.
     """
     found = np.empty(depth.shape, dtype=np.complex128)
     for number in np.unique(intervals):
         rows = np.flatnonzero(intervals == number)
-        found[rows] = _equally_divided(system, cut, speed_rpm[rows], depth[rows], int(number))
+        found[rows] = _equally_divided(system, cut, speed_rpm[rows], depth[rows], int(number), tolerance)
     return found
 
 
-def _equally_divided(system: MillingSystem, cut: Cut, speed_rpm: Floats, depth: Floats, intervals: int) -> Complexes:
+def _equally_divided(system: MillingSystem, cut: Cut, speed_rpm: Floats, depth: Floats, intervals: int, tolerance: float) -> Complexes:
     """Multipliers where all tooth periods have this many intervals."""
     states = 2 * system.shape.size + system.axes.size * intervals
     solve = _solver(system, cut, intervals)
@@ -53,15 +53,15 @@ def _equally_divided(system: MillingSystem, cut: Cut, speed_rpm: Floats, depth: 
     value, doubt = _in_threads(solve, speed_rpm[:, np.newaxis], depth, EFFORTS[0])
     value, doubt, cases = value.ravel(), doubt.ravel(), depth.reshape(-1, 1)
     for effort in EFFORTS[1:]:
-        open_cases = np.flatnonzero(doubt > TOLERANCE)
+        open_cases = np.flatnonzero(doubt > tolerance)
         if not open_cases.size:
             break
         again = _in_threads(solve, speed[open_cases], cases[open_cases], (effort[0], min(effort[1], states)))
         value[open_cases], doubt[open_cases] = again[0][:, 0], again[1][:, 0]
-    if np.any(doubt > TOLERANCE):
+    if np.any(doubt > tolerance):
         worst = int(np.argmax(doubt))
         raise ArithmeticError(
-            f"the multiplier at {speed[worst, 0]:g} rpm and {cases[worst, 0] * 1e3:g} mm is not found to 1e-9 "
+            f"the multiplier at {speed[worst, 0]:g} rpm and {cases[worst, 0] * 1e3:g} mm is not found to {tolerance:g} "
             f"(residual {doubt[worst]:.1e}); leave this speed or depth out"
         )
     return value.reshape(depth.shape)
@@ -137,5 +137,5 @@ def _compiled() -> Callable[..., None]:
 
     cache = Path(hessenberg.stats.cache_path)
     if not hessenberg.signatures and not any(cache.glob("kernel.hessenberg-*.nbc")):
-        _log.warning("lobes: compiling the kernel of the semi-discretisation, once (about 15 s)")
+        _log.warning("compiling the kernel of the semi-discretisation, once (about 15 s)")
     return hessenberg  # type: ignore[no-any-return]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from lobes.cut import Cut
 from lobes.depths import check_depths
-from lobes.intervals import needed
+from lobes.intervals import chosen_intervals
 from lobes.milling_system import milling_system
 from lobes.multipliers import largest_multipliers
 from lobes.speeds import check_speeds
@@ -34,8 +34,6 @@ def spectral_radius(
     Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, first order.
     """
     system, speed, deep = milling_system(x, y), check_speeds(speed_rpm), check_depths(depth)
-    if intervals is not None and not (intervals >= 1 and intervals == int(intervals)):
-        raise ValueError(f"intervals={intervals} is not a whole number >= 1; None chooses it from the fastest mode")
-    number = needed(system, cut, speed, float(np.max(deep))) if intervals is None else np.full(speed.shape, intervals)
+    number = chosen_intervals(intervals, system, cut, speed, float(np.max(deep)))
     grid = np.broadcast_to(deep, (speed.size, deep.size))
     return np.abs(largest_multipliers(system, cut, speed, grid, number))

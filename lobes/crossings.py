@@ -34,11 +34,9 @@ def find_crossings(growth: Growth, n_rows: int, deepest: float) -> Floats:
     rows = np.arange(n_rows)
     depth = np.broadcast_to(deepest * (np.arange(1, SCAN + 1) / SCAN) ** SPREAD, (n_rows, SCAN))
     value = growth(rows, depth, SURE)
-    row, low, high, at_low, at_high = _brackets(depth, value)
-    extra = _islands(growth, depth, value)
-    row, low, high, at_low, at_high = (np.concatenate(pair) for pair in zip((row, low, high, at_low, at_high), extra))
-    crossing = _refine(growth, row, low, high, at_low, at_high)
-    return _table(row, crossing, n_rows)
+    found = zip(_brackets(depth, value), _islands(growth, depth, value), strict=True)
+    row, low, high, at_low, at_high = (np.concatenate(pair) for pair in found)
+    return _table(row, _refine(growth, row, low, high, at_low, at_high), n_rows)
 
 
 def _table(row: Rows, crossing: Floats, n_rows: int) -> Floats:
@@ -51,7 +49,7 @@ def _table(row: Rows, crossing: Floats, n_rows: int) -> Floats:
 
 
 def _brackets(depth: Floats, value: Floats) -> tuple[Rows, Floats, Floats, Floats, Floats]:
-    """Row, depths and values on both sides of each change of sign; depth 0 takes the value at the first one, mirrored."""
+    """Row, depths and values on both sides of each change of sign; depth 0 has the value at the first, made stable."""
     at = np.hstack((np.zeros((len(depth), 1)), depth))
     values = np.hstack((-np.abs(value[:, :1]), value))
     row, step = np.nonzero((values[:, 1:] < 0) != (values[:, :-1] < 0))

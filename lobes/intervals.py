@@ -52,4 +52,4 @@ def _needed(system: MillingSystem, cut: Cut, speed_rpm: NDArray[np.float64], dep
     wanted = PER_CYCLE * fastest * 60 / (cut.teeth * speed_rpm)
     fewest = max(FEWEST, IN_CUT / min(cut.teeth_in_cut, 1))
     power = np.ceil(np.log(np.maximum(wanted, fewest) / FEWEST) / np.log(GROWTH) - 1e-9)
-    return np.ceil(FEWEST * GROWTH**power - 1e-9).astype(np.int64)
+    return np.asarray(np.ceil(FEWEST * GROWTH**power - 1e-9), dtype=np.int64)

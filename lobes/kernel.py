@@ -12,7 +12,6 @@ of their mode shapes at the tool tip, so that all numbers are near 1. Symbols, f
                shape (m, 2n + 2p, 2n)
 """
 
-# ruff: noqa: ANN001
 from __future__ import annotations
 
 import numpy as np
@@ -25,7 +24,7 @@ ROUNDING = 1e-17
 
 
 @njit(cache=True, nogil=True)
-def hessenberg(damping, stiffness, shape, direction, force, which, gain, start, warm_up, out):  # type: ignore[no-untyped-def]
+def hessenberg(damping, stiffness, shape, direction, force, which, gain, start, warm_up, out):
     """Fill out (s, d, k + 1, k) with the Hessenberg matrices of k Arnoldi steps after `warm_up` power steps.
 
     damping, stiffness (s, n); shape, direction (n,); case (s, d) has the forces gain[s, d] force[which[s, d]] of
@@ -51,7 +50,7 @@ def hessenberg(damping, stiffness, shape, direction, force, which, gain, start, 
 
 
 @njit(cache=True, nogil=True)
-def _norm(vector):  # type: ignore[no-untyped-def]
+def _norm(vector):
     total = 0.0
     for value in vector:
         total += value * value
@@ -59,7 +58,7 @@ def _norm(vector):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _same(forces, k):  # type: ignore[no-untyped-def]
+def _same(forces, k):
     """Whether interval k has the forces of the one before."""
     if k == 0:
         return False
@@ -71,7 +70,7 @@ def _same(forces, k):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _interval(damping, stiffness, shape, direction, forces, gain, work, k, steps):  # type: ignore[no-untyped-def]
+def _interval(damping, stiffness, shape, direction, forces, gain, work, k, steps):
     """Fill steps[k] from the response of the modes to an impulse on each: its value g, g', and its integrals.
 
     Work (8, n, n) holds, from the third on, the stiffness with the cut, g, g', the integral of g and that of it. The
@@ -81,13 +80,11 @@ def _interval(damping, stiffness, shape, direction, forces, gain, work, k, steps
     n, p = shape.size, forces.shape[1]
     h, halvings = _stiffen(damping, stiffness, shape, direction, forces, gain, k, work)
     _impulse(damping, work, h)
+    _multiply(work, 2, 3, 7)
     for a in range(n):
         for b in range(n):
-            pull = 0.0
-            for c in range(n):
-                pull += work[2, a, c] * work[3, c, b]
             steps[k, b, a] = work[4, a, b] + work[3, a, b] * damping[b]
-            steps[k, b, n + a] = -pull - damping[a] * work[4, a, b] + work[4, a, b] * damping[b]
+            steps[k, b, n + a] = -work[7, a, b] - damping[a] * work[4, a, b] + work[4, a, b] * damping[b]
             steps[k, n + b, a] = work[3, a, b]
             steps[k, n + b, n + a] = work[4, a, b]
         for r in range(p):
@@ -107,7 +104,7 @@ def _interval(damping, stiffness, shape, direction, forces, gain, work, k, steps
 
 
 @njit(cache=True, nogil=True)
-def _stiffen(damping, stiffness, shape, direction, forces, gain, k, work):  # type: ignore[no-untyped-def]
+def _stiffen(damping, stiffness, shape, direction, forces, gain, k, work):
     """Fill work[2] with the stiffness of modes and cut; return the time of one series and how often to double it."""
     n = shape.size
     largest = 0.0
@@ -126,7 +123,7 @@ def _stiffen(damping, stiffness, shape, direction, forces, gain, k, work):  # ty
 
 
 @njit(cache=True, nogil=True)
-def _impulse(damping, work, h):  # type: ignore[no-untyped-def]
+def _impulse(damping, work, h):
     """Fill work[3:7] with g, g', the integral of g and the integral of that at time h, by the Taylor series of g."""
     n = damping.size
     for a in range(n):
@@ -136,28 +133,45 @@ def _impulse(damping, work, h):  # type: ignore[no-untyped-def]
             work[3, a, b], work[4, a, b], work[5, a, b], work[6, a, b] = one, one / h, one * h / 2, one * h * h / 6
     k, largest = 0, 1.0
     while largest > ROUNDING:
-        largest = 0.0
         share = 1.0 / ((k + 1) * (k + 2))
-        for b in range(n):
-            for a in range(n):
-                pull = 0.0
-                for c in range(n):
-                    pull += work[2, a, c] * work[0, c, b]
-                work[7, a, b] = -(damping[a] * h * (k + 1) * work[1, a, b] + h * h * pull) * share
+        _multiply(work, 2, 0, 7)
         for a in range(n):
             for b in range(n):
-                new = work[7, a, b]
-                work[0, a, b], work[1, a, b] = work[1, a, b], new
-                work[3, a, b] += new
-                work[4, a, b] += (k + 2) * new / h
-                work[5, a, b] += h * new / (k + 3)
-                work[6, a, b] += h * h * new / ((k + 3) * (k + 4))
-                largest = max(largest, abs(new), abs(work[0, a, b]))
+                work[7, a, b] = -(damping[a] * h * (k + 1) * work[1, a, b] + h * h * work[7, a, b]) * share
+        largest = _add_term(work, k, h)
         k += 1
 
 
 @njit(cache=True, nogil=True)
-def _double(step, n, p, h):  # type: ignore[no-untyped-def]
+def _multiply(work, one, other, to):
+    """work[to] = work[one] @ work[other]."""
+    n = work.shape[1]
+    for a in range(n):
+        for b in range(n):
+            total = 0.0
+            for c in range(n):
+                total += work[one, a, c] * work[other, c, b]
+            work[to, a, b] = total
+
+
+@njit(cache=True, nogil=True)
+def _add_term(work, k, h):
+    """Add the term h^(k + 2) in work[7] to g and its kin; return the largest of the last two terms."""
+    largest, n = 0.0, work.shape[1]
+    for a in range(n):
+        for b in range(n):
+            new = work[7, a, b]
+            work[0, a, b], work[1, a, b] = work[1, a, b], new
+            work[3, a, b] += new
+            work[4, a, b] += (k + 2) * new / h
+            work[5, a, b] += h * new / (k + 3)
+            work[6, a, b] += h * h * new / ((k + 3) * (k + 4))
+            largest = max(largest, abs(new), abs(work[0, a, b]))
+    return largest
+
+
+@njit(cache=True, nogil=True)
+def _double(step, n, p, h):
     """Turn the transposed map over time h (from z, w and the slope of w) into the one over 2h."""
     first = step.copy()
     for c in range(2 * n + 2 * p):
@@ -173,7 +187,7 @@ def _double(step, n, p, h):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _over_period(steps, shape, direction, state, out):  # type: ignore[no-untyped-def]
+def _over_period(steps, shape, direction, state, out):
     """Fill out with the state one tooth period on."""
     m, columns, rows = steps.shape
     n, p = rows // 2, (columns - rows) // 2
@@ -185,17 +199,12 @@ def _over_period(steps, shape, direction, state, out):  # type: ignore[no-untype
         begin = rows + i * p
         for r in range(rows):
             after[r] = 0.0
-        for c in range(rows):
-            for r in range(rows):
-                after[r] += steps[i, c, r] * z[c]
-        for c in range(p):
-            was = state[begin + c]
-            for r in range(rows):
-                after[r] += steps[i, rows + c, r] * was
-        for c in range(p):
-            was = state[begin + p + c] if i < m - 1 else out[rows + c]
-            for r in range(rows):
-                after[r] += steps[i, rows + p + c, r] * was
+        _add_columns(steps, i, 0, z, 0, rows, after)
+        _add_columns(steps, i, rows, state, begin, p, after)
+        if i < m - 1:
+            _add_columns(steps, i, rows + p, state, begin + p, p, after)
+        else:
+            _add_columns(steps, i, rows + p, out, rows, p, after)
         z, after = after, z
         if i < m - 1:
             for a in range(n):
@@ -204,7 +213,16 @@ def _over_period(steps, shape, direction, state, out):  # type: ignore[no-untype
 
 
 @njit(cache=True, nogil=True)
-def _arnoldi(steps, shape, direction, basis, out):  # type: ignore[no-untyped-def]
+def _add_columns(steps, i, first, vector, begin, count, total):
+    """Add the share of vector[begin : begin + count] in what comes out of interval i to total."""
+    for c in range(count):
+        value = vector[begin + c]
+        for r in range(total.size):
+            total[r] += steps[i, first + c, r] * value
+
+
+@njit(cache=True, nogil=True)
+def _arnoldi(steps, shape, direction, basis, out):
     """Fill out (k + 1, k) with the Hessenberg matrix from the first row of basis (k + 1, states)."""
     out[:] = 0.0
     basis[0] /= _norm(basis[0])

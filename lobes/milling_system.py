@@ -31,6 +31,14 @@ class MillingSystem:
     axes: NDArray[np.int64]
     """Directions that give way, 0 for x (feed) and 1 for y (normal), shape (p,)."""
 
+    def receptance(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Receptance of each direction (m/N) at frequencies (Hz) of any shape, shape (..., p)."""
+        omega = 2 * np.pi * frequency
+        total = np.zeros((*omega.shape, self.axes.size), dtype=np.complex128)
+        for w, zeta, shape, row in zip(self.frequency, self.damping_ratio, self.shape, self.direction, strict=True):
+            total[..., row] += shape**2 / (w**2 - omega**2 + 2j * zeta * w * omega)
+        return total
+
     @property
     def deciding(self) -> NDArray[np.bool_]:
         """Which modes are not rigid beside the others, shape (n,)."""

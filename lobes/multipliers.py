@@ -28,14 +28,19 @@ _log = logging.getLogger(__name__)
 
 
 def largest_multipliers(
-    system: MillingSystem, cut: Cut, speed_rpm: Floats, depth: Floats, intervals: NDArray[np.int64],
+    system: MillingSystem,
+    cut: Cut,
+    speed_rpm: Floats,
+    depth: Floats,
+    intervals: NDArray[np.int64],
     tolerance: float = TOLERANCE,
 ) -> Complexes:
     """Multiplier of largest magnitude over one tooth period, shape (s, d).
 
-    speed_rpm (s,), depth (s, d) in m, intervals (s,) of the tooth period at each speed. Within each interval the cutting
-    coefficients are averaged and the displacement of the period before is linear. The period map is applied, never
-    built: power steps, then Arnoldi, until the residual is below `tolerance` times the multiplier. Raises ArithmeticError for a multiplier that stays in doubt.
+    speed_rpm (s,), depth (s, d) in m, intervals (s,) of the tooth period at each speed. Within each interval the
+    cutting coefficients are averaged and the displacement of the period before is linear. The period map is applied,
+    never built: power steps, then Arnoldi, until the residual is below `tolerance` times the multiplier. Raises
+    ArithmeticError for a multiplier that stays in doubt.
     Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, ch. 3 and 5.
     """
     found = np.empty(depth.shape, dtype=np.complex128)
@@ -45,7 +50,9 @@ def largest_multipliers(
     return found
 
 
-def _equally_divided(system: MillingSystem, cut: Cut, speed_rpm: Floats, depth: Floats, intervals: int, tolerance: float) -> Complexes:
+def _equally_divided(
+    system: MillingSystem, cut: Cut, speed_rpm: Floats, depth: Floats, intervals: int, tolerance: float
+) -> Complexes:
     """Multipliers where all tooth periods have this many intervals."""
     states = 2 * system.shape.size + system.axes.size * intervals
     solve = _solver(system, cut, intervals)
@@ -76,8 +83,11 @@ def _solver(system: MillingSystem, cut: Cut, intervals: int) -> Solver:
     unit = float(np.max(system.shape))
     states = 2 * system.shape.size + system.axes.size * intervals
     start = np.random.default_rng(0).normal(size=states)
-    entries = np.ix_(range(1), range(intervals), system.axes, system.axes)
-    straight = interval_forces(cut, intervals, np.zeros(1))[entries]
+
+    def forces_at(depth: Floats) -> Floats:
+        return interval_forces(cut, intervals, depth)[..., system.axes[:, np.newaxis], system.axes]
+
+    straight = forces_at(np.zeros(1))
 
     def solve(speed_rpm: Floats, depth: Floats, effort: tuple[int, int]) -> tuple[Complexes, Floats]:
         interval = 60 / (cut.teeth * speed_rpm * intervals)
@@ -86,7 +96,7 @@ def _solver(system: MillingSystem, cut: Cut, intervals: int) -> Solver:
         forces = straight
         if cut.helix_lag > 0:
             depths, which = np.unique(depth, return_inverse=True)
-            forces = np.concatenate([interval_forces(cut, intervals, one)[entries] for one in depths.reshape(-1, 1)])
+            forces = forces_at(depths)
         matrices = np.empty((*depth.shape, effort[1] + 1, effort[1]))
         hessenberg(
             2 * system.damping_ratio * angle,

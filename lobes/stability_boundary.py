@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lobes.chatter_frequency import chatter_frequency
 from lobes.crossings import Growth, find_crossings
 from lobes.cut import Cut
 from lobes.intervals import chosen_intervals
@@ -16,8 +17,6 @@ from lobes.speeds import check_speeds
 from lobes.stability_lobes import StabilityLobes
 from modal import Mode
 
-HARMONICS = 2.0
-"""Chatter is looked for up to this many times the highest natural frequency and the tooth frequency."""
 REAL = 1e-4
 """A multiplier whose angle is this near to pi (rad) is real."""
 
@@ -36,9 +35,8 @@ def stability_boundary(
 
     x is the feed, y the normal to it; None stands for a direction that is rigid or not known. `depth` is the lowest
     crossing, inf where there is none; `crossings` are all, islands too. `kind` is "flip" where the multiplier is -1
-    (period two), else "hopf". A multiplier mu leaves chatter at |+-arg(mu) / (2 pi) + j| tooth frequencies, j whole:
-    given is the one that the modes answer most. `intervals` divide the tooth period; None takes `lobes.intervals_needed`,
-    speed by speed; `method` states them.
+    (period two), else "hopf"; the chatter frequency is the loudest of those that the multiplier leaves. `intervals`
+    divide the tooth period; None takes `lobes.intervals_needed`, speed by speed; `method` states them.
 
     Raises ValueError for bad speeds, depths or modes.
     Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, first order.
@@ -54,7 +52,7 @@ def stability_boundary(
     if found.size:
         at = depth[found, np.newaxis]
         multiplier = largest_multipliers(system, cut, speed[found], at, number[found])[:, 0]
-        chatter[found] = _chatter_frequency(system, multiplier, cut.teeth * speed[found] / 60)
+        chatter[found] = chatter_frequency(system, cut, multiplier, depth[found], cut.teeth * speed[found] / 60)
         flip = np.abs(np.abs(np.angle(multiplier)) - np.pi) < REAL
         kind[found] = np.where(flip, "flip", "hopf")
     low, high = int(np.min(number)), int(np.max(number))
@@ -69,9 +67,7 @@ def stability_boundary(
     )
 
 
-def _growth(
-    system: MillingSystem, cut: Cut, speed: Floats, intervals: NDArray[np.int64]
-) -> Growth:
+def _growth(system: MillingSystem, cut: Cut, speed: Floats, intervals: NDArray[np.int64]) -> Growth:
     """Logarithm of the largest multiplier's magnitude at the speeds of some rows (s,) and depths (s, d)."""
 
     def growth(row: NDArray[np.intp], depth: Floats, tolerance: float) -> Floats:
@@ -79,19 +75,3 @@ def _growth(
         return np.asarray(np.log(np.maximum(np.abs(multiplier), np.finfo(np.float64).tiny)))
 
     return growth
-
-
-def _chatter_frequency(system: MillingSystem, multiplier: NDArray[np.complex128], tooth_frequency: Floats) -> Floats:
-    """The frequency (Hz) of each multiplier's family that the modes answer most."""
-    base = np.abs(np.angle(multiplier)) / (2 * np.pi)
-    highest = HARMONICS * float(np.max(system.frequency)) / (2 * np.pi)
-    harmonics = np.arange(int(highest / np.min(tooth_frequency)) + 3)
-    waves = np.concatenate((harmonics + base[:, np.newaxis], harmonics + 1 - base[:, np.newaxis]), axis=1)
-    omega = 2 * np.pi * waves * tooth_frequency[:, np.newaxis]
-    answer = np.zeros((system.axes.size, *omega.shape), dtype=np.complex128)
-    for w, zeta, shape, row in zip(
-        system.frequency, system.damping_ratio, system.shape, system.direction, strict=True
-    ):
-        answer[row] += shape**2 / (w**2 - omega**2 + 2j * zeta * w * omega)
-    best = np.argmax(np.max(np.abs(answer), axis=0), axis=1)[:, np.newaxis]
-    return np.asarray(np.take_along_axis(omega, best, axis=1)[:, 0] / (2 * np.pi))

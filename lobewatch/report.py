@@ -153,7 +153,7 @@ def _programs(machine: Machine, history: SldHistory, first: int, last: int) -> l
             "limit_mm": limits[last, i] * 1e3,
             "was_stable": bool(program.depth_mm < limits[first, i] * 1e3),
             "stable": bool(program.depth_mm < limits[last, i] * 1e3),
-            "same_as_reference": reference is not None and program.build() == reference.build(),
+            "same_as_reference": reference is not None and machine.build_cut(program) == machine.build_cut(reference),
         }
         for i, program in enumerate(machine.program)
         if not np.isnan(limits[last, i])

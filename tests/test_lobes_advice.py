@@ -56,7 +56,8 @@ def test_the_paper_s_spindle_in_an_aluminium_slot() -> None:
     around = np.linspace(5000, 5500, 5001)
     new_lobes, old_lobes = (average_angle([mode], None, SLOT, around) for mode in (SPINDLE, old))
     deepest = pockets(new_lobes, 1.0)[0]
-    assert (deepest.speed_rpm, deepest.depth * 1e3) == (pytest.approx(5262, abs=1), pytest.approx(8.7, abs=0.05))
+    assert deepest.speed_rpm == pytest.approx(5262, abs=1)
+    assert deepest.depth * 1e3 == pytest.approx(8.7, abs=0.05)
     assert new_lobes.depth_at(5200) * 1e3 == pytest.approx(7.97, abs=0.005)
     assert old_lobes.depth_at(5200) * 1e3 == pytest.approx(3.48, abs=0.005)
     charts = [average_angle([m], None, SLOT, np.linspace(3000, 20000, 20001)).minimum.depth for m in (SPINDLE, old)]
@@ -110,7 +111,7 @@ def test_a_stable_program() -> None:
     states = spectral_radius([MODE], [MODE], SLOT, SPEEDS, program.depth)[:, 0] < 1
     nearer = np.abs(SPEEDS - 18000) < abs(found.nearest_speed - 18000) - 1
     assert np.all(states[nearer])
-    assert not states[SPEEDS == found.nearest_speed][0]
+    assert not states[found.nearest_speed == SPEEDS][0]
 
 
 def test_an_unstable_program_and_the_nearest_stable_speed() -> None:
@@ -151,7 +152,7 @@ def test_tolerable_decay_ends_where_the_limit_crosses_the_depth() -> None:
 
 def test_a_softer_mode_tolerates_less() -> None:
     program = pocket_program()
-    constant = tolerable_decay(program, lambda r: ([aged_mode(MODE, r, "model")],) * 2)
+    constant = tolerable_decay(program, lambda r: ([aged_mode(MODE, r, "model")], [aged_mode(MODE, r, "model")]))
     assert tolerable_decay(program, aged) < constant
 
 
@@ -235,6 +236,10 @@ def measured(covariance: NDArray[np.float64]) -> Mode:
     return replace(MODE, covariance=covariance)
 
 
+def drawn(values: NDArray[np.float64]) -> Mode:
+    return Mode(float(values[0]), float(values[1]), float(values[2]))
+
+
 def limits(x: Modes, y: Modes) -> StabilityLobes:
     return zero_order(x, y, SLOT, SPEEDS)
 
@@ -256,7 +261,7 @@ def test_the_band_holds_95_percent_of_what_modes_drawn_from_the_covariance_give(
     mean = np.array([MODE.frequency, MODE.damping_ratio, MODE.stiffness])
     inside = []
     for _ in range(150):
-        x, y = ([Mode(*map(float, mean + root @ random.normal(size=3)))] for _ in range(2))
+        x, y = ([drawn(mean + root @ random.normal(size=3))] for _ in range(2))
         depth = limits(x, y).depth
         inside.append((depth > band.low) & (depth < band.high))
     assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
@@ -282,7 +287,8 @@ def test_published_coefficients_in_si_with_source_and_edge() -> None:
     known = {one.material: one for one in cutting_coefficients()}
     assert len(known) == 10
     first = known["Al 7075-T6 (carbide; dry; ref. 190)"]
-    assert (first.alloy, first.tangential, first.radial) == ("Al 7075", pytest.approx(767.01e6), 168.8e6)
+    assert first.alloy == "Al 7075"
+    assert (first.tangential, first.radial) == pytest.approx((767.01e6, 168.8e6))
     assert (first.tangential_edge, first.radial_edge) == (27700.0, 26600.0)
     assert all(
         "10.1186" in one.source or "p." in one.source or "Ex." in one.source or "Stepan" in one.source

@@ -1,7 +1,7 @@
 """Zero-order limits.
 
 Y. Altintas, E. Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362, half
-immersion up-milling with the modes of Weck, Altintas & Budak: tests/data/milling_stability/frequency_domain_reference.csv.
+immersion up-milling with the modes of Weck, Altintas & Budak: frequency_domain_reference.csv in tests/data/.
 """
 
 from __future__ import annotations

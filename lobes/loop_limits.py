@@ -64,7 +64,7 @@ def _warning(method: str, cut: Cut) -> str:
         return ""
     return (
         f"{method} knows no flip lobes: at immersion {cut.immersion:g} (below {LOW_IMMERSION}) the true limit can be "
-        "lower; use stability_boundary (semi-discretisation)"
+        "lower; use semi-discretisation (stability_boundary)"
     )
 
 

@@ -71,8 +71,9 @@ def pocket_shifts(then: StabilityLobes, now: StabilityLobes, deepest: float) -> 
     """The pockets of two diagrams of one cut that belong together: a pair is nearest to each other.
 
     Pocket k stands at about 60 f / (N k): all move by one ratio, which the median of the chatter frequencies tells.
+    Those at an end of the range of speeds are left out: their tops lie outside.
     """
-    before, after = pockets(then, deepest), pockets(now, deepest)
+    before, after = _inside(then, deepest), _inside(now, deepest)
     if not before or not after:
         return []
     ratio = _median_chatter(now) / _median_chatter(then)
@@ -85,6 +86,11 @@ def pocket_shifts(then: StabilityLobes, now: StabilityLobes, deepest: float) -> 
         if before[back] == pocket:
             shifts.append(PocketShift(pocket, after[nearest]))
     return shifts
+
+
+def _inside(lobes: StabilityLobes, deepest: float) -> list[Pocket]:
+    ends = (np.min(lobes.speed_rpm), np.max(lobes.speed_rpm))
+    return [pocket for pocket in pockets(lobes, deepest) if pocket.speed_rpm not in ends]
 
 
 def _median_chatter(lobes: StabilityLobes) -> float:

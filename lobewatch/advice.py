@@ -15,14 +15,14 @@ from lobes import (
     StabilityLobes,
     aged_mode,
     check_program,
-    deepest_for_drive,
     measurement_band,
     stability_boundary,
     tolerable_decay,
 )
+from lobewatch.cut_tables import Program as ProgramTable
+from lobewatch.drive import drive_limit
 from lobewatch.history import measure
 from lobewatch.machine import Machine
-from lobewatch.machine import Program as ProgramTable
 from lobewatch.machine_folder import MachineFolder, TapEntry
 from lobewatch.pipeline import Measurement, speed_grid
 from modal import Mode
@@ -95,10 +95,11 @@ def aging(measurement: Measurement) -> tuple[ModesAt, str]:
         )
         return x, y
 
-    said = "K constant: no model"
+    said = "K does not (no model)"
     if ratios.size > 1:
-        said = f"K by the model, {100 * (ratios[-1] - 1):+.1f} % at {-100 * FALLS[ratios.size - 1]:.0f} % of f_n"
-    return modes_at, f"tolerable decay: all modes fall alike, zeta constant, {said}"
+        fall, change = 100 * FALLS[ratios.size - 1], 100 * (ratios[-1] - 1)
+        said = f"K changes as in the model ({change:+.1f} % when f_n has fallen by {fall:.0f} %)"
+    return modes_at, f"decay left: all modes fall alike, zeta does not change, {said}"
 
 
 def _stiffness_ratios(spindle: Spindle, frequency: float) -> NDArray[np.float64]:
@@ -110,22 +111,6 @@ def _stiffness_ratios(spindle: Spindle, frequency: float) -> NDArray[np.float64]
         except (ValueError, ArithmeticError):
             break
     return np.array(stiffness or [1.0]) / (stiffness or [1.0])[0]
-
-
-def drive_limit(machine: Machine, table: ProgramTable, speed_rpm: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Deepest cut (m) of a program that [drive] allows at each speed (rpm); inf where nothing is known."""
-    if table.feed_per_tooth_mm is None:
-        return np.full(speed_rpm.shape, np.inf)
-    edge = machine.coefficients(table).tangential_edge
-    return deepest_for_drive(
-        machine.build_cut(table),
-        speed_rpm,
-        table.tool_diameter_mm / 1e3,
-        table.feed_per_tooth_mm / 1e3,
-        edge if np.isfinite(edge) else 0.0,
-        machine.drive.power_kw * 1e3,
-        machine.drive.torque_nm,
-    )
 
 
 def _first(taps: Sequence[TapEntry]) -> TapEntry:

@@ -195,7 +195,7 @@ class Machine(_Table, frozen=True):
     def settings_hash(self) -> str:
         """SHA-256 of all that decides what a history holds."""
         cutting = (self.material, self.reference_cut, self.program)
-        settings = (self.mode, self.speed, cutting, self.spindle, self.tap.position_mm)
+        settings = ("zero order", self.mode, self.speed, cutting, self.spindle, self.tap.position_mm)
         return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
 
 

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from acquisition import TapTest
 from dsm import Calibration, calibrate, modal_stiffness
-from lobes import StabilityLobes, average_angle
+from lobes import StabilityLobes, zero_order
 from lobewatch.machine import Machine
 from modal import Mode, fit_modes, predominant
 
@@ -159,4 +159,6 @@ def _lobes(
     if not other:
         notes.append(f"stability lobes in the {direction} direction alone: the other one was not tapped within a day")
     x, y = (at_tip, other) if direction == "x" else (other, at_tip)
-    return {name: average_angle(x or None, y or None, cut, speed_grid(machine)) for name, cut in cuts.items()}
+    lobes = {name: zero_order(x or None, y or None, cut, speed_grid(machine)) for name, cut in cuts.items()}
+    notes.extend(f"{name}: {found.warning}" for name, found in lobes.items() if found.warning)
+    return lobes

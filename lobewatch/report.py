@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from acquisition import Frf, TapTest
 from lobes import SldHistory
-from lobewatch.figures import frf_figure, lobes_figure, svg, trend_figure
+from lobewatch.figures import frf_figure, svg, trend_figure
+from lobewatch.figures_lobes import lobes_figure
 from lobewatch.history import series
 from lobewatch.machine import Machine
 from lobewatch.machine_folder import MachineFolder

@@ -111,7 +111,7 @@ def test_many_teeth_make_it_exact() -> None:
 
 def test_low_immersion_is_warned_of() -> None:
     low = Cut(2, 0.1, "down", 6e8, 2e8)
-    assert "use stability_boundary" in zero_order(BENCHMARK, None, low, 18000).warning
-    assert "use stability_boundary" in average_angle(BENCHMARK, None, low, 18000).warning
+    assert "use semi-discretisation" in zero_order(BENCHMARK, None, low, 18000).warning
+    assert "use semi-discretisation" in average_angle(BENCHMARK, None, low, 18000).warning
     assert zero_order(BENCHMARK, None, Cut(2, 0.25, "down", 6e8, 2e8), 18000).warning == ""
     assert stability_boundary(BENCHMARK, None, low, 18000, 2e-3).warning == ""

@@ -17,7 +17,7 @@ from lobes.tooth_force import interval_forces
 
 EFFORTS = ((6, 9), (12, 14), (20, 24), (40, 40), (80, 80))
 """Power steps and Arnoldi vectors of each attempt; what an attempt leaves in doubt goes on to the next."""
-TOLERANCE = 1e-9
+TOLERANCE = 3e-10
 """Largest residual of a multiplier that counts as found, relative to it, unless another is asked for."""
 SMALL = 200
 """Cases that are not worth a second thread."""

@@ -43,12 +43,12 @@ def lobes_figure(
     finite = now[1][np.isfinite(now[1])] * 1e3
     top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * p["depth_mm"] for p in programs)])
     if spread is not None:
-        _fill(axes, speed_rpm, spread, top, color=SPREAD, label="published coefficients, lowest to highest", zorder=0.5)
+        _fill(axes, speed_rpm, spread, top, color=SPREAD, label="range of published coefficients", zorder=0.5)
     for label, depth in earlier:
         axes.plot(speed_rpm, depth * 1e3, color=THEN, ls="--", lw=1.2, label=label)
     axes.plot(speed_rpm, now[1] * 1e3, color=NOW, lw=1.6, label=now[0])
     if band is not None:
-        _fill(axes, speed_rpm, band, top, color=NOW, alpha=0.35, label="95 % band of the measurement")
+        _fill(axes, speed_rpm, band, top, color=NOW, alpha=0.35, label="95 % band of the tap")
     axes.fill_between(speed_rpm, np.minimum(now[1] * 1e3, top), top, color=NOW, alpha=0.10, lw=0)
     for pocket in pockets:
         _draw_pocket(axes, pocket)

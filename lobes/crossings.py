@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-SCAN = 28
+SCAN = 24
 """Depths looked at before anything is refined ..."""
 SPREAD = 1.5
 """... the j-th of them at (j / SCAN) ^ SPREAD of the deepest: limits lie low."""
@@ -97,9 +97,9 @@ def _refine(growth: Growth, row: Rows, low: Floats, high: Floats, at_low: Floats
         guess = np.clip(b - fb * (b - a) / (fb - fa), a + 0.01 * (b - a), b - 0.01 * (b - a))
         value = growth(row[busy], guess[:, np.newaxis], ACCURACY)[:, 0]
         lower = (value < 0) == (fa < 0)
+        left = value * np.where(lower, guess - b, a - guess) / np.where(lower, fb - value, value - fa)
+        zero[busy] = guess + left
         low[busy], at_low[busy] = np.where(lower, guess, a), np.where(lower, value, fa / 2)
         high[busy], at_high[busy] = np.where(lower, b, guess), np.where(lower, fb / 2, value)
-        moved = np.abs(guess - zero[busy])
-        zero[busy] = guess
-        busy = busy[(moved > ACCURACY * guess) & (high[busy] - low[busy] > ACCURACY * guess)]
+        busy = busy[np.abs(left) > ACCURACY * guess]
     return zero

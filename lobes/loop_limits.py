@@ -55,11 +55,24 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
             for i, branch in enumerate(branches)
             for lobe in _lobes(branch.grid, responses[i], cut, np.unique(waves[found & (setting == i)]), speed_rpm)
         ),
-        warning=_warning(method, cut),
+        warning=_out_of_band(branches, responses) or _out_of_range(method, cut),
     )
 
 
-def _warning(method: str, cut: Cut) -> str:
+def _out_of_band(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> str:
+    """Whether measured lines end before the loop is at its weakest, in words."""
+    branch, response = min(zip(branches, responses, strict=True), key=lambda pair: float(np.min(pair[1].real)))
+    weakest = int(np.argmin(response.real))
+    if branch.grid[0] == 0 or (response.real[weakest] < 0 and 0 < weakest < branch.grid.size - 1):
+        return ""
+    return (
+        f"the FRF does not reach the chatter band: between {branch.grid[0]:g} and {branch.grid[-1]:g} Hz the real part "
+        "has no lowest point; use a wider band, or record one"
+    )
+
+
+def _out_of_range(method: str, cut: Cut) -> str:
+    """Whether the cut is too slender for a mean force, in words."""
     if cut.immersion >= LOW_IMMERSION:
         return ""
     return (

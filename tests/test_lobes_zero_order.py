@@ -115,3 +115,12 @@ def test_low_immersion_is_warned_of() -> None:
     assert "use semi-discretisation" in average_angle(BENCHMARK, None, low, 18000).warning
     assert zero_order(BENCHMARK, None, Cut(2, 0.25, "down", 6e8, 2e8), 18000).warning == ""
     assert stability_boundary(BENCHMARK, None, low, 18000, 2e-3).warning == ""
+
+
+@pytest.mark.parametrize("band", [(10.0, 590.0), (700.0, 3000.0)])
+def test_an_frf_that_does_not_reach_the_chatter_band_says_so(band: tuple[float, float]) -> None:
+    for method in (zero_order, average_angle):
+        short = method(frf(X).in_band(band), frf(Y).in_band(band), CUT, SPEEDS)
+        assert "does not reach the chatter band" in short.warning
+        assert f"between {band[0]:g} and {band[1]:g} Hz" in short.warning
+        assert method(frf(X), frf(Y), CUT, SPEEDS).warning == ""

@@ -240,8 +240,6 @@ def test_own_and_published_materials() -> None:
     assert (cut.tangential, cut.radial, cut.immersion) == (800e6, 200e6, 0.5)
     assert cut.helix_lag == pytest.approx(2 * np.tan(np.radians(30)) / 0.01)
     steel = parse_machine(EXAMPLE.replace('material = "ours"', 'material = "Steel (textbook)"'))
-        EXAMPLE.replace('"ours"\n"""', '"ours"').replace('material = "ours"', 'material = "Steel (textbook)"')
-    )
     assert steel.reference_cut is not None
     assert steel.build_cut(steel.reference_cut).tangential == pytest.approx(2173.3e6)
     assert steel.settings_hash != machine.settings_hash

@@ -36,7 +36,7 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
     tooth_frequency = cut.teeth * speed_rpm / 60
     depth, chatter = np.full(speed_rpm.shape, np.inf), np.full(speed_rpm.shape, np.nan)
     setting = np.zeros(speed_rpm.shape, dtype=np.intp)
-    responses = [branch.receptance(branch.grid) for branch in branches]
+    responses = [branch.on_grid for branch in branches]
     for i, branch in enumerate(branches):
         frequency, limit = _limits(branch, responses[i], tooth_frequency)
         lower = limit < depth

@@ -33,6 +33,13 @@ class TipResponse:
     """Frequencies that show every turn of the receptance, rising (Hz), shape (p,); known nowhere outside."""
     receptance: Callable[[NDArray[np.float64]], NDArray[np.complex128]]
     """Receptance (m/N) at any frequencies (Hz) between the ends of the grid, same shape."""
+    known: NDArray[np.complex128] | None = None
+    """Receptance on the grid (m/N), shape (p,), where it has been computed already."""
+
+    @property
+    def on_grid(self) -> NDArray[np.complex128]:
+        """Receptance on the grid (m/N), shape (p,)."""
+        return self.receptance(self.grid) if self.known is None else self.known
 
 
 def tip_response(tip: Tip, direction: str, tooth_frequency: float) -> TipResponse:

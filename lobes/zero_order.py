@@ -51,7 +51,7 @@ def _eigenvalues(force: NDArray[np.float64], tips: Sequence[TipResponse]) -> lis
         product = (force[0, 0] * force[1, 1] - force[0, 1] * force[1, 0]) * gx * gy
         return half, np.sqrt(half**2 - product)
 
-    root = half_trace_and_root(grid)[1]
+    half_trace, root = half_trace_and_root(grid)
     jumps = np.real(root[1:] * np.conj(root[:-1])) < 0
     root *= np.concatenate(([1.0], np.cumprod(np.where(jumps, -1.0, 1.0))))
 
@@ -61,6 +61,6 @@ def _eigenvalues(force: NDArray[np.float64], tips: Sequence[TipResponse]) -> lis
             near = root[np.clip(np.searchsorted(grid, frequency), 0, grid.size - 1)]
             return np.asarray(half + side * np.where(np.real(found * np.conj(near)) < 0, -found, found))
 
-        return TipResponse(grid, value)
+        return TipResponse(grid, value, half_trace + side * root)
 
     return [branch(1.0), branch(-1.0)]

@@ -281,7 +281,6 @@ def test_maps_stand_where_the_numbers_say(folder: MachineFolder) -> None:
     shown = np.asarray(mesh.get_array()).reshape(depth.shape)
     low = shown < 0.99 * shown.max()
     np.testing.assert_allclose(shown[low], depth[low] * 1e3)
-    from lobes import Cut, radial_lobes
 
     modes = [Mode(1713.0, 0.03, 3.5e7)]
     found = radial_lobes(

@@ -45,16 +45,20 @@ def hessenberg(damping, stiffness, shape, direction, force, which, gain, start, 
             basis[0] = start
             for _ in range(warm_up):
                 _over_period(steps, shape, direction, basis[0], basis[1])
-                basis[0] = basis[1] / _norm(basis[1])
+                _normalise(basis[1], basis[0])
             _arnoldi(steps, shape, direction, basis, out[i, j])
 
 
 @njit(cache=True, nogil=True)
-def _norm(vector):
+def _normalise(vector, out):
+    """Fill out with the vector at length 1 and return its length; out stays where that is 0."""
     total = 0.0
     for value in vector:
         total += value * value
-    return np.sqrt(total)
+    length = np.sqrt(total)
+    if length > 0.0:
+        out[:] = vector / length
+    return length
 
 
 @njit(cache=True, nogil=True)
@@ -270,7 +274,7 @@ def _one_mode_over_period(steps, shape, state, out):
 def _arnoldi(steps, shape, direction, basis, out):
     """Fill out (k + 1, k) with the Hessenberg matrix from the first row of basis (k + 1, states)."""
     out[:] = 0.0
-    basis[0] /= _norm(basis[0])
+    _normalise(basis[0], basis[0])
     for k in range(out.shape[1]):
         new = basis[k + 1]
         _over_period(steps, shape, direction, basis[k], new)
@@ -282,8 +286,6 @@ def _arnoldi(steps, shape, direction, basis, out):
                 out[j, k] += overlap
                 for i in range(new.size):
                     new[i] -= overlap * basis[j, i]
-        norm = _norm(new)
-        out[k + 1, k] = norm
-        if norm == 0.0:
+        out[k + 1, k] = _normalise(new, new)
+        if out[k + 1, k] == 0.0:
             break
-        new /= norm

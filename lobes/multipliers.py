@@ -15,12 +15,16 @@ from lobes.cut import Cut
 from lobes.milling_system import MillingSystem
 from lobes.tooth_force import interval_forces
 
-EFFORTS = ((6, 9), (12, 14), (20, 24), (40, 40), (80, 80))
+EFFORTS = ((6, 9), (12, 14), (20, 24), (40, 40), (80, 80), (80, 600))
 """Power steps and Arnoldi vectors of each attempt; what an attempt leaves in doubt goes on to the next."""
 TOLERANCE = 3e-10
 """Largest residual of a multiplier that counts as found, relative to it, unless another is asked for."""
+HUGE = 1e6
+"""Of larger multipliers only the order of magnitude is found."""
 SMALL = 200
 """Cases that are not worth a second thread."""
+MEMORY = 2_000_000
+"""Numbers in the Hessenberg matrices of the cases that are solved at once."""
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -60,18 +64,23 @@ def _equally_divided(
     value, doubt = _in_threads(solve, speed_rpm[:, np.newaxis], depth, EFFORTS[0])
     value, doubt, cases = value.ravel(), doubt.ravel(), depth.reshape(-1, 1)
     for effort in EFFORTS[1:]:
-        open_cases = np.flatnonzero(doubt > tolerance)
+        open_cases = np.flatnonzero(_in_doubt(value, doubt, tolerance))
         if not open_cases.size:
             break
         again = _in_threads(solve, speed[open_cases], cases[open_cases], (effort[0], min(effort[1], states)))
         value[open_cases], doubt[open_cases] = again[0][:, 0], again[1][:, 0]
-    if np.any(doubt > tolerance):
-        worst = int(np.argmax(doubt))
+    left = np.flatnonzero(_in_doubt(value, doubt, tolerance))
+    if left.size:
+        worst = left[np.argmax(doubt[left])]
         raise ArithmeticError(
             f"the multiplier at {speed[worst, 0]:g} rpm and {cases[worst, 0] * 1e3:g} mm is not found to {tolerance:g} "
             f"(residual {doubt[worst]:.1e}); leave this speed or depth out"
         )
     return value.reshape(depth.shape)
+
+
+def _in_doubt(value: Complexes, doubt: Floats, tolerance: float) -> NDArray[np.bool_]:
+    return (doubt > tolerance) & ((np.abs(value) < HUGE) | (doubt > 0.5))
 
 
 Solver = Callable[[Floats, Floats, tuple[int, int]], tuple[Complexes, Floats]]
@@ -116,17 +125,23 @@ def _solver(system: MillingSystem, cut: Cut, intervals: int) -> Solver:
 
 
 def _in_threads(solve: Solver, speed: Floats, depth: Floats, effort: tuple[int, int]) -> tuple[Complexes, Floats]:
-    workers = 1 if depth.size < SMALL else min(os.cpu_count() or 1, len(depth))
-    if workers == 1:
+    workers = 1 if depth.size < SMALL else os.cpu_count() or 1
+    pieces = max(4 * workers if workers > 1 else 1, depth.size * effort[1] ** 2 // MEMORY)
+    if pieces == 1:
         return solve(speed, depth, effort)
-    parts = np.array_split(np.arange(len(depth)), 4 * workers)
+    parts = np.array_split(np.arange(len(depth)), min(pieces, len(depth)))
     with ThreadPoolExecutor(workers) as pool:
         done = list(pool.map(lambda part: solve(speed[part], depth[part], effort), parts))
     return np.concatenate([value for value, _ in done]), np.concatenate([doubt for _, doubt in done])
 
 
 def _largest(matrices: Floats) -> tuple[Complexes, Floats]:
-    """Largest Ritz value of each Hessenberg matrix (..., k + 1, k), and its residual relative to it."""
+    """Largest Ritz value of each Hessenberg matrix (..., k + 1, k), and its residual relative to it.
+
+    A period that grows beyond what a number can hold has the multiplier inf.
+    """
+    finite = np.all(np.isfinite(matrices), axis=(-1, -2))
+    matrices = np.where(finite[..., np.newaxis, np.newaxis], matrices, 0.0)
     square = matrices[..., :-1, :]
     values = np.linalg.eigvals(square).astype(np.complex128)
     largest = np.take_along_axis(values, np.argmax(np.abs(values), axis=-1)[..., np.newaxis], axis=-1)
@@ -138,7 +153,8 @@ def _largest(matrices: Floats) -> tuple[Complexes, Floats]:
         vector[..., j - 1] = -row / np.maximum(square[..., j, j - 1], tiny)
         vector /= np.max(np.abs(vector), axis=-1, keepdims=True)
     residual = matrices[..., -1, -1] * np.abs(vector[..., -1]) / np.linalg.norm(vector, axis=-1)
-    return largest[..., 0], residual / np.maximum(np.abs(largest[..., 0]), tiny)
+    found = np.where(finite, largest[..., 0], np.inf)
+    return found, residual / np.maximum(np.abs(largest[..., 0]), tiny)
 
 
 def _compiled() -> Callable[..., None]:

@@ -20,6 +20,9 @@ from modal import Mode
 REAL = 1e-4
 """A multiplier whose angle is this near to pi (rad) is real."""
 
+LIMITS = (1e-300, 1e300)
+"""Magnitudes of multipliers that are told apart."""
+
 Floats = NDArray[np.float64]
 
 
@@ -72,6 +75,6 @@ def _growth(system: MillingSystem, cut: Cut, speed: Floats, intervals: NDArray[n
 
     def growth(row: NDArray[np.intp], depth: Floats, tolerance: float) -> Floats:
         multiplier = largest_multipliers(system, cut, speed[row], depth, intervals[row], tolerance)
-        return np.asarray(np.log(np.maximum(np.abs(multiplier), np.finfo(np.float64).tiny)))
+        return np.asarray(np.log(np.clip(np.abs(multiplier), *LIMITS)))
 
     return growth

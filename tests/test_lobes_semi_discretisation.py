@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition import Frf
 from lobes import Cut, intervals_needed, radial_lobes, spectral_radius, stability_boundary, zero_order
+from lobes.tooth_force import interval_forces
 from modal import Mode
 
 X = [Mode(603.0, 0.039, 5.59e6), Mode(1450.0, 0.02, 2.1e7)]
@@ -101,6 +102,23 @@ def test_damped_and_fast_modes_without_a_cut(mode: Mode) -> None:
     rate = zeta * w - math.sqrt(max(zeta**2 - 1, 0)) * w
     radius = spectral_radius([mode], None, CUT, 9000.0, 0.0, intervals=3)
     assert radius[0, 0] == pytest.approx(math.exp(-rate * period), rel=1e-8)
+
+
+def test_growth_and_decay_beyond_what_a_number_holds() -> None:
+    """A metre of depth at 60 rpm pulls the tool in without bounds; without a cut all is forgotten within a turn."""
+    mode, cut = [Mode(900.0, 0.02, 1e6)], Cut(1, 0.5, "up", 600e6, 200e6)
+    radius = spectral_radius(None, mode, cut, 60.0, [0.0, 1.0], intervals=3000)[0]
+    assert radius[0] == pytest.approx(math.exp(-0.02 * 2 * math.pi * 900), rel=1e-6)
+    assert radius[1] == np.inf
+    assert 1e-5 < stability_boundary(None, mode, cut, 60.0, 1.0, intervals=3000).depth[0] < 1.0
+
+
+def test_a_creeping_mode_copies_its_wave() -> None:
+    """Without inertia q = b H/(k + b H) q(t - tau) at each angle by itself: all multipliers crowd, none leads."""
+    cut = Cut(3, 1.0, "up", 100e6, 600e6)
+    largest = 1e-2 * np.max(interval_forces(cut, 400, np.zeros(1))[0, :, 0, 0])
+    radius = spectral_radius([Mode(5000.0, 5.0, 1e7)], None, cut, 20.0, 1e-2, intervals=100)
+    assert radius[0, 0] == pytest.approx(largest / (1e7 + largest), rel=0.03)
 
 
 def test_depth_goes_with_stiffness_and_against_cutting_force() -> None:

@@ -19,7 +19,7 @@ from lobewatch.output import Json, emit, table
 
 
 def check(
-    machine: Annotated[Path, typer.Argument(help="Machine folder with tap tests and [[program]] tables.")],
+    machine: Annotated[Path, typer.Argument(help="Machine folder with tap tests and cutting programs.")],
     as_json: Json = False,
 ) -> None:
     """Every cutting program against the newest tap test with its tool; exit code 1 when one is not stable.

@@ -1,18 +1,55 @@
-"""From modes or FRFs to stability lobes, and the history of the lobes of one machine."""
+"""From modes or FRFs to stability lobes, advice for cutting programs, and the history of the lobes of one machine."""
 
+from lobes.aged_mode import aged_mode
 from lobes.average_angle import average_angle
+from lobes.check_program import ProgramCheck, check_program
+from lobes.coefficients import Coefficients, cutting_coefficients, tangential_and_radial
 from lobes.cut import Cut
+from lobes.cutting_power import deepest_for_drive, mean_torque
+from lobes.depth_band import DepthBand, coefficient_range, measurement_band
 from lobes.history import SldHistory
 from lobes.history_file import read_history, write_history
+from lobes.intervals import intervals_needed
+from lobes.pockets import Pocket, PocketShift, best_pockets, pocket_shifts, pockets
+from lobes.program import Program
+from lobes.radial_lobes import RadialLobes, radial_lobes
+from lobes.spectral_radius import spectral_radius
+from lobes.stability_boundary import stability_boundary
 from lobes.stability_lobes import Lobe, Minimum, StabilityLobes
+from lobes.tolerable_decay import tolerable_decay
+from lobes.zero_order import zero_order
 
 __all__ = [
+    "Coefficients",
     "Cut",
+    "DepthBand",
     "Lobe",
     "Minimum",
+    "Pocket",
+    "PocketShift",
+    "Program",
+    "ProgramCheck",
+    "RadialLobes",
     "SldHistory",
     "StabilityLobes",
+    "aged_mode",
     "average_angle",
+    "best_pockets",
+    "check_program",
+    "coefficient_range",
+    "cutting_coefficients",
+    "deepest_for_drive",
+    "intervals_needed",
+    "mean_torque",
+    "measurement_band",
+    "pocket_shifts",
+    "pockets",
+    "radial_lobes",
     "read_history",
+    "spectral_radius",
+    "stability_boundary",
+    "tangential_and_radial",
+    "tolerable_decay",
     "write_history",
+    "zero_order",
 ]

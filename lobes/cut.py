@@ -12,7 +12,7 @@ Direction = Literal["up", "down"]
 
 @dataclass(frozen=True)
 class Cut:
-    """A milling cut with straight, evenly spaced teeth. Conventions, kept everywhere in this package:
+    """A milling cut with evenly spaced teeth. Conventions, kept everywhere in this package:
 
     x is the feed, y the normal to it; the tooth angle phi runs clockwise from +y (rad). A tooth at phi in a cut
     of depth b answers the displacement q = (x, y) with the force F = -b H(phi) (q(t) - q(t - tau)),
@@ -30,6 +30,8 @@ class Cut:
     """Tangential cutting coefficient Kt (Pa)."""
     radial: float
     """Radial cutting coefficient Kr (Pa)."""
+    helix_lag: float = 0.0
+    """Lag of a helical tooth along the axis, 2 tan(helix angle) / diameter (rad/m); 0 for straight teeth."""
 
     def __post_init__(self) -> None:
         """Refuse what is no cut."""
@@ -45,6 +47,10 @@ class Cut:
             raise ValueError(f"tangential={self.tangential} Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
         if not (np.isfinite(self.radial) and self.radial >= 0):
             raise ValueError(f"radial={self.radial} Pa is not a finite number >= 0; 1 MPa (N/mm^2) is 1e6 Pa")
+        if not (np.isfinite(self.helix_lag) and self.helix_lag >= 0):
+            raise ValueError(
+                f"helix_lag={self.helix_lag} rad/m is not a finite number >= 0; give 2 tan(helix angle) / diameter"
+            )
 
     @property
     def entry_angle(self) -> float:

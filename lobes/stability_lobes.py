@@ -57,6 +57,8 @@ class StabilityLobes:
     """How the limits were found."""
     lobes: tuple[Lobe, ...] = ()
     """Lobes that set the limit at one speed at least, as far as the speeds reach; empty where a method has none."""
+    warning: str = ""
+    """Why the method or the FRF is out of its range for this cut, and what to do; "" where it is not."""
 
     def __post_init__(self) -> None:
         """Check shapes and values."""

@@ -33,6 +33,13 @@ class TipResponse:
     """Frequencies that show every turn of the receptance, rising (Hz), shape (p,); known nowhere outside."""
     receptance: Callable[[NDArray[np.float64]], NDArray[np.complex128]]
     """Receptance (m/N) at any frequencies (Hz) between the ends of the grid, same shape."""
+    known: NDArray[np.complex128] | None = None
+    """Receptance on the grid (m/N), shape (p,), where it has been computed already."""
+
+    @property
+    def on_grid(self) -> NDArray[np.complex128]:
+        """Receptance on the grid (m/N), shape (p,)."""
+        return self.receptance(self.grid) if self.known is None else self.known
 
 
 def tip_response(tip: Tip, direction: str, tooth_frequency: float) -> TipResponse:
@@ -45,27 +52,49 @@ def tip_response(tip: Tip, direction: str, tooth_frequency: float) -> TipRespons
     """
     if isinstance(tip, Frf):
         return _from_frf(tip.in_band(tip.usable_band))
-    if not tip:
-        raise ValueError(f"{direction} has no modes; give at least one mode, or the FRF itself")
-    for mode in tip:
+    check_modes(tip, direction)
+    return _from_modes(tip, tooth_frequency)
+
+
+def check_modes(modes: Sequence[Mode], direction: str) -> None:
+    """Refuse an empty list of modes, and modes that are not of a driving point."""
+    if not modes:
+        raise ValueError(f"{direction} has no modes; give at least one mode, or None where it is rigid")
+    for mode in modes:
         if not mode.is_driving_point:
             raise ValueError(
                 f"the mode at {mode.frequency:g} Hz of {direction} has stiffness {mode.stiffness:g} N/m, which is not "
                 "of a driving point; leave it out, or tap where the sensor sits"
             )
-    return _from_modes(tip, tooth_frequency)
 
 
-def weighted_sum(parts: Sequence[tuple[float, TipResponse]]) -> TipResponse:
-    """Sum of weight times receptance, known where all parts are; ValueError where their bands do not overlap."""
-    low = max(part.grid[0] for _, part in parts)
-    high = min(part.grid[-1] for _, part in parts)
+def tip_responses(x: Tip | None, y: Tip | None, tooth_frequency: float) -> list[tuple[int, TipResponse]]:
+    """Axis (0 for x, 1 for y) and receptance of each direction that is not None; ValueError where both are."""
+    given = [
+        (axis, tip_response(tip, name, tooth_frequency))
+        for axis, name, tip in ((0, "x", x), (1, "y", y))
+        if tip is not None
+    ]
+    if not given:
+        raise ValueError("x and y are both None; give the modes or the FRF of one direction at least")
+    return given
+
+
+def common_grid(tips: Sequence[TipResponse]) -> NDArray[np.float64]:
+    """Frequencies (Hz) that show every turn of all, where all are known; ValueError where bands do not overlap."""
+    low = max(tip.grid[0] for tip in tips)
+    high = min(tip.grid[-1] for tip in tips)
     if not low < high:
         raise ValueError(
             f"x and y have no band in common: one ends at {high:g} Hz, the other begins at {low:g} Hz; "
             "give FRFs that overlap"
         )
-    grid = np.unique(np.concatenate([part.grid for _, part in parts]))
+    grid = np.unique(np.concatenate([tip.grid for tip in tips]))
+    return np.asarray(grid[(grid >= low) & (grid <= high)])
+
+
+def weighted_sum(parts: Sequence[tuple[float, TipResponse]]) -> TipResponse:
+    """Sum of weight times receptance, known where all parts are; ValueError where their bands do not overlap."""
 
     def receptance(frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
         total = np.zeros(np.shape(frequency), dtype=np.complex128)
@@ -73,7 +102,7 @@ def weighted_sum(parts: Sequence[tuple[float, TipResponse]]) -> TipResponse:
             total += weight * part.receptance(frequency)
         return total
 
-    return TipResponse(grid[(grid >= low) & (grid <= high)], receptance)
+    return TipResponse(common_grid([part for _, part in parts]), receptance)
 
 
 def _from_frf(frf: Frf) -> TipResponse:

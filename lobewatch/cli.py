@@ -12,6 +12,7 @@ import typer
 from rich.markup import escape
 
 from lobewatch.commands.calibrate import calibrate
+from lobewatch.commands.check import check
 from lobewatch.commands.demo import demo
 from lobewatch.commands.emulate import emulate
 from lobewatch.commands.init import init
@@ -30,7 +31,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (demo, init, tap, replay, modes, model, calibrate, lobes, report):
+for command in (demo, init, tap, replay, modes, model, calibrate, lobes, check, report):
     app.command()(command)
 app.add_typer(emulate, name="emulate")
 
@@ -52,7 +53,7 @@ def _options(
 
 
 def main() -> None:
-    """Run; exit codes: 0 fine, 2 wrong use, bad file or no device, 130 Ctrl-C."""
+    """Run; exit codes: 0 fine, 1 a program is not stable (check), 2 wrong use, bad file or no device, 130 Ctrl-C."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a console without these characters shows "?" instead

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -54,7 +54,7 @@ def svg(figure: Figure) -> str:
 
 def modes_figure(frf: Frf, modes: Sequence[Mode], title: str) -> Figure:
     """Magnitude of accelerance, measured and synthesised from the modes alone."""
-    figure, (axes,) = _axes(1, (8.0, 4.0))
+    figure, (axes,) = new_axes(1, (8.0, 4.0))
     shown = frf.in_band(frf.usable_band)
     axes.semilogy(shown.frequency, np.abs(shown.accelerance), color=THEN, lw=0.8, label="measured")
     if modes:
@@ -79,7 +79,7 @@ def modes_figure(frf: Frf, modes: Sequence[Mode], title: str) -> Figure:
 def frf_figure(then: Frf | None, now: Frf, band: tuple[float, float]) -> Figure:
     """Real and imaginary part of receptance and coherence, the newest and the first test."""
     rows = 2 if now.coherence is None else 3
-    figure, axes = _axes(rows, (8.0, 2.1 * rows))
+    figure, axes = new_axes(rows, (8.0, 2.1 * rows))
     tests = [(now, "now", NOW, "-"), *([(then, "first", THEN, "--")] if then is not None else [])]
     for frf, label, colour, dashes in tests:
         inside = frf.in_band(band)
@@ -105,7 +105,7 @@ def trend_figure(
     limits: Limits | None = None,
 ) -> Figure:
     """A value over time with its 95 % interval; with limits, where its fall calls for attention."""
-    figure, (axes,) = _axes(1, (8.0, 2.8))
+    figure, (axes,) = new_axes(1, (8.0, 2.8))
     days = date2num(times)
     axes.errorbar(days, values, yerr=1.96 * np.nan_to_num(stds), fmt="o", ms=4, color=NOW, capsize=2)
     if limits is not None:
@@ -128,43 +128,8 @@ def trend_figure(
     return figure
 
 
-def lobes_figure(
-    speed_rpm: NDArray[np.float64],
-    depths: Mapping[str, NDArray[np.float64]],
-    programs: Sequence[Mapping[str, Any]] = (),
-    title: str = "",
-) -> Figure:
-    """Stability lobe diagram: the last of `depths` (m, by label) is now, those before it are earlier ones."""
-    figure, (axes,) = _axes(1, (8.0, 4.2))
-    *earlier, now = depths.items()
-    for label, depth in earlier:
-        axes.plot(speed_rpm, depth * 1e3, color=THEN, ls="--", lw=1.2, label=label)
-    axes.plot(speed_rpm, now[1] * 1e3, color=NOW, lw=1.6, label=now[0])
-    finite = now[1][np.isfinite(now[1])] * 1e3
-    top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * p["depth_mm"] for p in programs)])
-    axes.fill_between(speed_rpm, np.minimum(now[1] * 1e3, top), top, color=NOW, alpha=0.10, lw=0)
-    for program in programs:
-        _draw_program(axes, program)
-    axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
-    axes.set(xlabel="spindle speed (rpm)", ylabel="limiting depth (mm)")
-    axes.legend(loc="upper left", ncols=2)
-    return figure
-
-
-def _draw_program(axes: Axes, program: Mapping[str, Any]) -> None:
-    colour, mark = (GOOD, "o") if program["stable"] else (ALARM, "X")
-    axes.plot(program["speed_rpm"], program["depth_mm"], mark, color=colour, ms=9, mec="white")
-    axes.annotate(
-        program["name"],
-        (program["speed_rpm"], program["depth_mm"]),
-        xytext=(7, 5),
-        textcoords="offset points",
-        fontsize=9,
-        bbox={"color": "white", "alpha": 0.7, "pad": 1, "lw": 0},
-    )
-
-
-def _axes(rows: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
+def new_axes(rows: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
+    """A figure of this size (inches) with rows of axes, one above the other."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots(rows, 1, sharex=True, squeeze=False)

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import difflib
 import hashlib
+import math
 import re
 import tomllib
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 from msgspec import Meta
 
 from acquisition import DataError
 from dsm import Spindle
-from lobes import Cut
+from lobes import Coefficients, Cut, cutting_coefficients
+from lobewatch.cut_tables import CutTable, Drive, MaterialTable, Program
 from lobewatch.spindle_tables import BearingTable, JointTable, MassTable, SegmentTable, SpindleTable, ToolTable
 from lobewatch.toml_table import NotNegative, Positive, Table
 
-Direction = Literal["up", "down"]
 REFERENCE_CUT = "reference cut"
 
 
@@ -66,43 +67,6 @@ class Limits(Table, frozen=True):
     frequency_alarm_percent: Positive = 10.0
 
 
-class CutTable(Table, frozen=True):
-    """[reference_cut], and what it shares with a program."""
-
-    teeth: Annotated[int, Meta(ge=1)]
-    radial_depth_mm: Positive
-    tool_diameter_mm: Positive
-    direction: Direction
-    tangential_n_per_mm2: Positive
-    radial_n_per_mm2: NotNegative
-
-    def __post_init__(self) -> None:
-        """Refuse a cut wider than the tool."""
-        if self.radial_depth_mm > self.tool_diameter_mm:
-            raise ValueError(
-                f"radial_depth_mm={self.radial_depth_mm:g} is larger than tool_diameter_mm={self.tool_diameter_mm:g}"
-            )
-
-    def build(self) -> Cut:
-        """The cut in SI units."""
-        return Cut(
-            teeth=self.teeth,
-            immersion=self.radial_depth_mm / self.tool_diameter_mm,
-            direction=self.direction,
-            tangential=self.tangential_n_per_mm2 * 1e6,
-            radial=self.radial_n_per_mm2 * 1e6,
-        )
-
-
-class Program(CutTable, frozen=True, kw_only=True):
-    """[[program]]: one cut that the shop runs."""
-
-    name: Annotated[str, Meta(min_length=1)]
-    tool: str = "reference"
-    speed_rpm: Positive
-    depth_mm: Positive
-
-
 class SpeedRange(Table, frozen=True):
     """[speed]: the range of the lobe diagrams."""
 
@@ -125,6 +89,8 @@ class Machine(Table, frozen=True):
     mode: ModeChoice = ModeChoice()
     limits: Limits = Limits()
     speed: SpeedRange = SpeedRange()
+    drive: Drive = Drive()
+    material: tuple[MaterialTable, ...] = ()
     reference_cut: CutTable | None = None
     program: tuple[Program, ...] = ()
     spindle: SpindleTable | None = None
@@ -142,6 +108,31 @@ class Machine(Table, frozen=True):
                     f"program {i}: speed_rpm={program.speed_rpm:g} is outside [speed] "
                     f"{self.speed.low_rpm:g}..{self.speed.high_rpm:g} rpm"
                 )
+        for table in (*([self.reference_cut] if self.reference_cut else []), *self.program):
+            self.coefficients(table)
+
+    def coefficients(self, table: CutTable) -> Coefficients:
+        """Cutting coefficients of a cut: its own, or those of its material; ValueError for one that is not known."""
+        if table.material is None:
+            tangential, radial = (1e6 * (k or 0) for k in (table.tangential_n_per_mm2, table.radial_n_per_mm2))
+            return Coefficients("", tangential, radial, source="machine.toml")
+        known = {one.material: one for one in cutting_coefficients()} | {one.name: one.build() for one in self.material}
+        if table.material not in known:
+            near = difflib.get_close_matches(table.material, known, n=1, cutoff=0.0)[0]
+            raise ValueError(f"material={table.material!r} is not known; is {near!r} meant? Or add a [[material]]")
+        return known[table.material]
+
+    def build_cut(self, table: CutTable) -> Cut:
+        """A cut in SI units."""
+        coefficients, diameter = self.coefficients(table), table.tool_diameter_mm / 1e3
+        return Cut(
+            teeth=table.teeth,
+            immersion=table.radial_depth_mm / table.tool_diameter_mm,
+            direction=table.direction,
+            tangential=coefficients.tangential,
+            radial=coefficients.radial,
+            helix_lag=2 * math.tan(math.radians(table.helix_deg)) / diameter,
+        )
 
     def _check_tools(self) -> None:
         taken = [self.tap.tool]
@@ -173,8 +164,8 @@ class Machine(Table, frozen=True):
 
     def cuts(self, tool: str) -> dict[str, Cut]:
         """The reference cut and the programs that run with a tool, by name."""
-        reference = {REFERENCE_CUT: self.reference_cut.build()} if self.reference_cut else {}
-        return reference | {program.name: program.build() for program in self.program if program.tool == tool}
+        reference = {REFERENCE_CUT: self.build_cut(self.reference_cut)} if self.reference_cut else {}
+        return reference | {program.name: self.build_cut(program) for program in self.program if program.tool == tool}
 
     @property
     def cut_names(self) -> list[str]:
@@ -184,15 +175,9 @@ class Machine(Table, frozen=True):
     @property
     def settings_hash(self) -> str:
         """SHA-256 of all that decides what a history holds."""
-        settings = (
-            self.mode,
-            self.speed,
-            self.reference_cut,
-            self.program,
-            self.spindle,
-            self.tool,
-            self.tap.position_mm,
-        )
+        cutting = (self.material, self.reference_cut, self.program)
+        model = (self.spindle, self.tool, self.tap.tool, self.tap.position_mm)
+        settings = ("zero order", self.mode, self.speed, cutting, model)
         return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
 
 
@@ -231,9 +216,8 @@ def _readable(message: str) -> str:
 
 
 def _suggestion(key: str) -> str:
-    tables = [Machine, Identity, TapSetup, Daq, ModeChoice, Limits, SpeedRange, SpindleTable, SegmentTable, ToolTable]
-    known = {
-        field for table in [*tables, BearingTable, MassTable, JointTable, Program] for field in table.__struct_fields__
-    }
+    tables = [Machine, Identity, TapSetup, Daq, ModeChoice, Limits, SpeedRange, Drive, MaterialTable, Program]
+    tables += [SpindleTable, SegmentTable, BearingTable, MassTable, JointTable, ToolTable]
+    known = {field for table in tables for field in table.__struct_fields__}
     near = difflib.get_close_matches(key, known, n=1)
     return f"; is {near[0]!r} meant?" if near else ""

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from acquisition import TapTest
 from dsm import Calibration, calibrate, modal_stiffness
-from lobes import StabilityLobes, average_angle
+from lobes import StabilityLobes, zero_order
 from lobewatch.machine import Machine
 from modal import Mode, fit_modes, predominant
 
@@ -50,6 +50,10 @@ class Measurement:
     """Stability lobes by name of the cut."""
     notes: Sequence[str]
     """What could not be done, and why."""
+    x: Sequence[Mode] | None = None
+    """Modes at the tool tip in the feed direction that lobes are computed from; None where there are none."""
+    y: Sequence[Mode] | None = None
+    """The same normal to the feed."""
 
 
 def analyse(tap: TapTest, machine: Machine, partner: TapTest | None = None) -> Measurement:
@@ -60,7 +64,8 @@ def analyse(tap: TapTest, machine: Machine, partner: TapTest | None = None) -> M
         seen = _dynamics(tap, machine, notes)
         other = _dynamics(partner, machine, []).at_tip if partner is not None else []
         lobes = _lobes(seen.at_tip, other, tap, machine, notes)
-    return Measurement(tap.id, about.created, about.tool, about.direction, seen, lobes, notes)
+    x, y = (seen.at_tip, other) if about.direction == "x" else (other, seen.at_tip)
+    return Measurement(tap.id, about.created, about.tool, about.direction, seen, lobes, notes, x or None, y or None)
 
 
 def speed_grid(machine: Machine) -> NDArray[np.float64]:
@@ -153,4 +158,6 @@ def _lobes(
     if not other:
         notes.append(f"stability lobes in the {direction} direction alone: the other one was not tapped within a day")
     x, y = (at_tip, other) if direction == "x" else (other, at_tip)
-    return {name: average_angle(x or None, y or None, cut, speed_grid(machine)) for name, cut in cuts.items()}
+    lobes = {name: zero_order(x or None, y or None, cut, speed_grid(machine)) for name, cut in cuts.items()}
+    notes.extend(f"{name}: {found.warning}" for name, found in lobes.items() if found.warning)
+    return lobes

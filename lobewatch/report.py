@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from acquisition import Frf, TapTest
 from lobes import SldHistory
-from lobewatch.figures import frf_figure, lobes_figure, svg, trend_figure
+from lobewatch.figures import frf_figure, svg, trend_figure
+from lobewatch.figures_lobes import lobes_figure
 from lobewatch.history import series
 from lobewatch.machine import Machine
 from lobewatch.machine_folder import MachineFolder
@@ -153,7 +154,7 @@ def _programs(machine: Machine, history: SldHistory, first: int, last: int) -> l
             "limit_mm": limits[last, i] * 1e3,
             "was_stable": bool(program.depth_mm < limits[first, i] * 1e3),
             "stable": bool(program.depth_mm < limits[last, i] * 1e3),
-            "same_as_reference": reference is not None and program.build() == reference.build(),
+            "same_as_reference": reference is not None and machine.build_cut(program) == machine.build_cut(reference),
         }
         for i, program in enumerate(machine.program)
         if not np.isnan(limits[last, i])

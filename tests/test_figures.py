@@ -9,7 +9,8 @@ import pytest
 from matplotlib.collections import LineCollection
 
 from acquisition import Frf
-from lobewatch.figures import frf_figure, lobes_figure, svg, trend_figure
+from lobewatch.figures import frf_figure, svg, trend_figure
+from lobewatch.figures_lobes import lobes_figure
 from lobewatch.machine import Limits
 
 TIMES = [datetime(2026, month, 1, tzinfo=UTC) for month in (1, 2, 3)]

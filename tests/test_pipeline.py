@@ -28,7 +28,7 @@ from acquisition import (
     write_hit,
 )
 from dsm import modal_stiffness, modes_at, receptance, static_stiffness
-from lobes import average_angle, read_history
+from lobes import read_history, zero_order
 from lobewatch.commands.init import make_machine_folder
 from lobewatch.emulation import CHANNELS, SAMPLE_RATE, emulated_structure, emulator, with_bearing_stiffness
 from lobewatch.history import series, update_history
@@ -106,7 +106,7 @@ def test_live_taps_find_what_was_emulated_and_the_history_grows(folder: MachineF
     again = read_history(folder.history)
     assert np.array_equal(again.depth[REFERENCE_CUT], history.depth[REFERENCE_CUT])
     followed = found.dynamics.at_tip
-    expected = average_angle(followed, None, folder.machine.cuts("reference")[REFERENCE_CUT], again.speed_rpm)
+    expected = zero_order(followed, None, folder.machine.cuts("reference")[REFERENCE_CUT], again.speed_rpm)
     assert np.array_equal(again.depth[REFERENCE_CUT][1], expected.depth)
     assert not list(folder.spool.iterdir())
 
@@ -176,9 +176,9 @@ def test_x_and_y_within_a_day_make_one_two_directional_diagram(folder: MachineFo
     _, (alone, both, late) = update_history(folder)
     cut = folder.machine.cuts("reference")[REFERENCE_CUT]
     speeds = alone.lobes[REFERENCE_CUT].speed_rpm
-    assert alone.lobes[REFERENCE_CUT].depth == pytest.approx(average_angle([x], None, cut, speeds).depth, rel=1e-3)
-    assert both.lobes[REFERENCE_CUT].depth == pytest.approx(average_angle([x], [y], cut, speeds).depth, rel=1e-3)
-    assert late.lobes[REFERENCE_CUT].depth == pytest.approx(average_angle(None, [y], cut, speeds).depth, rel=1e-3)
+    assert alone.lobes[REFERENCE_CUT].depth == pytest.approx(zero_order([x], None, cut, speeds).depth, rel=1e-3)
+    assert both.lobes[REFERENCE_CUT].depth == pytest.approx(zero_order([x], [y], cut, speeds).depth, rel=1e-3)
+    assert late.lobes[REFERENCE_CUT].depth == pytest.approx(zero_order(None, [y], cut, speeds).depth, rel=1e-3)
     assert any("the y direction alone" in note for note in late.notes)
     assert not both.notes
 

@@ -1,0 +1,72 @@
+"""Published cutting coefficients, with their sources (cutting_coefficients.csv beside this module)."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """Cutting coefficients of one material: cutting force per chip area, edge force per length of edge."""
+
+    material: str
+    """Material, tool and coolant, e.g. "Al 7075-T6 (carbide; dry)"."""
+    tangential: float
+    """Tangential coefficient Ktc (Pa)."""
+    radial: float
+    """Radial coefficient Krc (Pa)."""
+    tangential_edge: float = float("nan")
+    """Tangential edge coefficient Kte (N/m): no part in stability, but in torque; nan where not published."""
+    radial_edge: float = float("nan")
+    """Radial edge coefficient Kre (N/m); nan where not published."""
+    note: str = ""
+    """What to know before use."""
+    source: str = ""
+    """Where it was published."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no coefficient."""
+        if not (np.isfinite(self.tangential) and self.tangential > 0):
+            raise ValueError(f"tangential={self.tangential} Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
+        if not (np.isfinite(self.radial) and self.radial >= 0):
+            raise ValueError(f"radial={self.radial} Pa is not a finite number >= 0; 1 MPa (N/mm^2) is 1e6 Pa")
+
+    @property
+    def alloy(self) -> str:
+        """The material without temper, tool and coolant, e.g. "Al 7075"."""
+        return self.material.split(" (")[0].split("-")[0]
+
+
+@cache
+def cutting_coefficients() -> tuple[Coefficients, ...]:
+    """All published coefficients that come with this package; their spread for one alloy is large."""
+    text = (files("lobes") / "cutting_coefficients.csv").read_text(encoding="utf-8")
+    return tuple(
+        Coefficients(
+            material=row["material"],
+            tangential=float(row["Ktc_MPa"]) * 1e6,
+            radial=float(row["Krc_MPa"]) * 1e6,
+            tangential_edge=float(row["Kte_N_per_mm"] or "nan") * 1e3,
+            radial_edge=float(row["Kre_N_per_mm"] or "nan") * 1e3,
+            note=row["note"],
+            source=row["source"],
+        )
+        for row in csv.DictReader(text.splitlines())
+    )
+
+
+def tangential_and_radial(specific_force: float, force_angle: float) -> tuple[float, float]:
+    """Ktc and Krc (Pa) from Ks (Pa) and the angle beta (rad): Ktc = Ks sin(beta), Krc = Ks cos(beta).
+
+    The way back is `Cut.specific_force` and `Cut.force_angle`. Raises ValueError for Ks <= 0 or beta outside (0, pi/2].
+    """
+    if not (np.isfinite(specific_force) and specific_force > 0):
+        raise ValueError(f"specific_force={specific_force} Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
+    if not 0 < force_angle <= np.pi / 2:
+        raise ValueError(f"force_angle={force_angle} rad is not in (0, pi/2]; 68 degrees are 1.187 rad")
+    return specific_force * float(np.sin(force_angle)), max(specific_force * float(np.cos(force_angle)), 0.0)

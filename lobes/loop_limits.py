@@ -1,0 +1,190 @@
+"""Limits and lobes of a chatter loop that is known over frequency: what average angle and zero order share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobes.cut import Cut
+from lobes.stability_lobes import Lobe, StabilityLobes
+from lobes.tip_response import TipResponse
+
+FIRST_BLOCK = 128
+"""Grid steps searched first; every further block is twice as long ..."""
+BLOCK = 2_000_000
+"""... up to this many grid values (speeds times steps): it bounds the memory."""
+MOST_STEPS = 60
+"""Of the search for a crossing inside one grid step; a handful do."""
+ROUNDING = 1e-11
+"""Turns that no longer count."""
+LOW_IMMERSION = 0.25
+"""Radial depth over diameter below which a mean force is no picture of a cut."""
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Rows = NDArray[np.intp]
+
+
+def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, method: str) -> StabilityLobes:
+    """Limiting depth b at each speed (rpm) of loops b L (1 - exp(-2 pi i f_c / f_t)) = -1.
+
+    The branches give L over frequency (1/m); the lowest limit of all branches counts: b = -1 / (2 Re L) where Re L < 0,
+    and f_c / f_t = j + eps / (2 pi), j = 0, 1, 2 ..., eps / 2 = atan2(-Re L, Im L).
+    """
+    tooth_frequency = cut.teeth * speed_rpm / 60
+    depth, chatter = np.full(speed_rpm.shape, np.inf), np.full(speed_rpm.shape, np.nan)
+    setting = np.zeros(speed_rpm.shape, dtype=np.intp)
+    responses = [branch.on_grid for branch in branches]
+    for i, branch in enumerate(branches):
+        frequency, limit = _limits(branch, responses[i], tooth_frequency)
+        lower = limit < depth
+        depth[lower], chatter[lower], setting[lower] = limit[lower], frequency[lower], i
+    found = np.isfinite(depth)
+    waves = np.where(found, np.floor(np.where(found, chatter, 0) / tooth_frequency), -1).astype(np.int64)
+    return StabilityLobes(
+        speed_rpm=speed_rpm,
+        depth=depth,
+        chatter_frequency=chatter,
+        kind=np.where(found, "hopf", ""),
+        crossings=depth[:, np.newaxis],
+        method=method,
+        lobes=tuple(
+            lobe
+            for i, branch in enumerate(branches)
+            for lobe in _lobes(branch.grid, responses[i], cut, np.unique(waves[found & (setting == i)]), speed_rpm)
+        ),
+        warning=_out_of_band(branches, responses) or _out_of_range(method, cut),
+    )
+
+
+def _out_of_band(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> str:
+    """Whether measured lines end before the loop is at its weakest, in words."""
+    branch, response = min(zip(branches, responses, strict=True), key=lambda pair: float(np.min(pair[1].real)))
+    weakest = int(np.argmin(response.real))
+    if branch.grid[0] == 0 or (response.real[weakest] < 0 and 0 < weakest < branch.grid.size - 1):
+        return ""
+    return (
+        f"the FRF does not reach the chatter band: between {branch.grid[0]:g} and {branch.grid[-1]:g} Hz the real part "
+        "has no lowest point; use a wider band, or record one"
+    )
+
+
+def _out_of_range(method: str, cut: Cut) -> str:
+    """Whether the cut is too slender for a mean force, in words."""
+    if cut.immersion >= LOW_IMMERSION:
+        return ""
+    return (
+        f"{method} knows no flip lobes: at immersion {cut.immersion:g} (below {LOW_IMMERSION}) the true limit can be "
+        "lower; use semi-discretisation (stability_boundary)"
+    )
+
+
+def _limits(branch: TipResponse, response: Complexes, tooth_frequency: Floats) -> tuple[Floats, Floats]:
+    """Frequency of the lowest crossing at each tooth frequency (Hz) and its depth (m); nan and inf where none."""
+    chatter = _chatter_frequency(branch, response, tooth_frequency)
+    found = np.flatnonzero(np.isfinite(chatter))
+    real = branch.receptance(chatter[found]).real
+    chatter[found[real >= 0]] = np.nan
+    depth = np.full(chatter.shape, np.inf)
+    depth[found[real < 0]] = -1 / (2 * real[real < 0])
+    return chatter, depth
+
+
+def _chatter_frequency(branch: TipResponse, response: Complexes, tooth_frequency: Floats) -> Floats:
+    """Frequency of the lowest crossing at each tooth frequency (Hz), shape (n,); nan where there is none.
+
+    f/f_t - arg(L)/pi + 1/2 is a whole number at every crossing, with arg(L) followed continuously along f. The steps
+    of the grid are searched in the order of their limits, until each tooth frequency has one below all that is left.
+    """
+    turn = 0.5 - np.unwrap(np.angle(response)) / np.pi
+    lowest = np.minimum(response.real[1:], response.real[:-1])
+    order = np.argsort(lowest)
+    order = order[: np.searchsorted(lowest[order], 0.0)]
+    best, step, whole = np.zeros(tooth_frequency.shape), np.zeros(tooth_frequency.shape, np.intp), 0 * tooth_frequency
+    begin, size = 0, FIRST_BLOCK
+    while begin < order.size:
+        rows = np.flatnonzero(best > lowest[order[begin]])
+        if not rows.size:
+            break
+        block = order[begin : begin + max(1, min(size, BLOCK // rows.size))]
+        real, where, number = _lowest_step(branch.grid, turn, response.real, block, tooth_frequency[rows])
+        lower = real < best[rows]
+        best[rows[lower]], step[rows[lower]], whole[rows[lower]] = real[lower], where[lower], number[lower]
+        begin, size = begin + block.size, 2 * size
+    chatter = np.full(tooth_frequency.shape, np.nan)
+    found = np.flatnonzero(best < 0)
+    missing = whole[found] - branch.grid[step[found]] / tooth_frequency[found] - turn[step[found]]
+    chatter[found] = _refine(branch, step[found], missing, tooth_frequency[found])
+    return chatter
+
+
+def _lowest_step(
+    grid: Floats, turn: Floats, real: Floats, block: Rows, tooth_frequency: Floats
+) -> tuple[Floats, Rows, Floats]:
+    """For each tooth frequency the real part, the grid step and the whole number of the lowest crossing in a block.
+
+    Where several whole numbers lie in one step, the one nearest its end of lower real part is the lowest limit. The
+    real part is 0 where there is no crossing.
+    """
+    lower = block + (real[block + 1] < real[block])
+    upper = 2 * block + 1 - lower
+    at_lower = grid[lower] / tooth_frequency[:, np.newaxis] + turn[lower]
+    at_upper = grid[upper] / tooth_frequency[:, np.newaxis] + turn[upper]
+    floor = np.floor(at_lower)
+    row, column = np.nonzero(floor != np.floor(at_upper))
+    start, end = at_lower[row, column], at_upper[row, column]
+    number = floor[row, column] + (end > start)
+    share = (number - start) / (end - start)
+    at_crossing = real[lower[column]] + share * (real[upper[column]] - real[lower[column]])
+    order = np.lexsort((at_crossing, row))
+    first = order[np.flatnonzero(np.diff(row[order], prepend=-1))]
+    best, step, whole = np.zeros(tooth_frequency.shape), np.zeros(tooth_frequency.shape, np.intp), 0 * tooth_frequency
+    best[row[first]] = at_crossing[first]
+    step[row[first]] = block[column[first]]
+    whole[row[first]] = number[first]
+    return best, step, whole
+
+
+def _refine(branch: TipResponse, step: Rows, missing: Floats, tooth_frequency: Floats) -> Floats:
+    """Frequency (Hz) inside each grid step at which `missing` turns, counted from its lower end, have been made.
+
+    By the false position, with the weight of an end that stays put halved (Illinois).
+    """
+    start, low, high = branch.grid[step], branch.grid[step], branch.grid[step + 1]
+    origin = branch.receptance(start)
+
+    def excess(frequency: Floats) -> Floats:
+        turned = np.angle(branch.receptance(frequency) * np.conj(origin)) / np.pi
+        return np.asarray((frequency - start) / tooth_frequency - turned - missing)
+
+    at_low, at_high = -missing, excess(high)
+    middle = low
+    for _ in range(MOST_STEPS):
+        middle = np.clip(high - at_high * (high - low) / (at_high - at_low), low, high)
+        value = excess(middle)
+        if np.all(np.abs(value) < ROUNDING):
+            break
+        before = value * at_high < 0
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+        at_low, at_high = np.where(before, value, at_low / 2), np.where(before, at_high / 2, value)
+    return middle
+
+
+def _lobes(
+    grid: Floats, response: Complexes, cut: Cut, numbers: NDArray[np.int64], speed_rpm: Floats
+) -> Iterator[Lobe]:
+    slowest, fastest = np.min(speed_rpm), np.max(speed_rpm)
+    index = np.flatnonzero(response.real < 0)
+    frequency, response = grid[index], response[index]
+    depth = -1 / (2 * response.real)
+    fraction = np.arctan2(-response.real, response.imag) / np.pi
+    for number in numbers:
+        speed = 60 * frequency / (cut.teeth * (number + fraction))
+        reaching = (np.minimum(speed[1:], speed[:-1]) <= fastest) & (np.maximum(speed[1:], speed[:-1]) >= slowest)
+        steps = np.flatnonzero(reaching & (np.diff(index) == 1))
+        for run in np.split(steps, np.flatnonzero(np.diff(steps) > 1) + 1):
+            if run.size:
+                piece = slice(run[0], run[-1] + 2)
+                yield Lobe(int(number), speed[piece], depth[piece], frequency[piece])

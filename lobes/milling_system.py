@@ -1,0 +1,69 @@
+"""The modes of tool tip and cut as one system."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Frf
+from lobes.tip_response import check_modes
+from modal import Mode
+
+RIGID = 0.01
+"""A mode whose flexibility 1 / (2 K zeta) is below this share of the largest does not decide the intervals."""
+
+
+@dataclass(frozen=True, eq=False)
+class MillingSystem:
+    """n modes, each in one of the p directions that give way: q'' + 2 zeta w q' + w^2 q = shape F, d = sum shape q."""
+
+    frequency: NDArray[np.float64]
+    """Natural frequencies w (rad/s), shape (n,)."""
+    damping_ratio: NDArray[np.float64]
+    """Damping ratios zeta, shape (n,)."""
+    shape: NDArray[np.float64]
+    """Mass-normalised mode shapes at the tool tip, w / sqrt(K) (kg^-1/2), shape (n,)."""
+    direction: NDArray[np.int64]
+    """Row of `axes` in which each mode moves, shape (n,)."""
+    axes: NDArray[np.int64]
+    """Directions that give way, 0 for x (feed) and 1 for y (normal), shape (p,)."""
+
+    def receptance(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Receptance of each direction (m/N) at frequencies (Hz) of any shape, shape (..., p)."""
+        omega = 2 * np.pi * frequency
+        total = np.zeros((*omega.shape, self.axes.size), dtype=np.complex128)
+        for w, zeta, shape, row in zip(self.frequency, self.damping_ratio, self.shape, self.direction, strict=True):
+            total[..., row] += shape**2 / (w**2 - omega**2 + 2j * zeta * w * omega)
+        return total
+
+    @property
+    def deciding(self) -> NDArray[np.bool_]:
+        """Which modes are not rigid beside the others, shape (n,)."""
+        flexibility = self.shape**2 / (self.frequency**2 * self.damping_ratio)
+        return np.asarray(flexibility >= RIGID * np.max(flexibility))
+
+
+def milling_system(x: Sequence[Mode] | None, y: Sequence[Mode] | None) -> MillingSystem:
+    """The system of the modes in the feed (x) and normal (y) direction; None for one that is rigid or not known.
+
+    Raises ValueError for FRFs, for two rigid directions, an empty list, and modes of negative stiffness.
+    """
+    given = [(axis, name, modes) for axis, name, modes in ((0, "x", x), (1, "y", y)) if modes is not None]
+    if not given:
+        raise ValueError("x and y are both None; give the modes of one direction at least")
+    for _, name, modes in given:
+        if isinstance(modes, Frf):
+            raise ValueError(f"{name} is an FRF; semi-discretisation works on modes: find them with modal.fit_modes")
+        check_modes(modes, name)
+    modes = [mode for _, _, group in given for mode in group]
+    frequency = 2 * np.pi * np.array([mode.frequency for mode in modes])
+    return MillingSystem(
+        frequency=frequency,
+        damping_ratio=np.array([mode.damping_ratio for mode in modes]),
+        shape=frequency / np.sqrt([mode.stiffness for mode in modes]),
+        direction=np.repeat(np.arange(len(given)), [len(group) for _, _, group in given]),
+        axes=np.array([axis for axis, _, _ in given]),
+    )

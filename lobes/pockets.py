@@ -1,0 +1,98 @@
+"""The pockets between the lobes: where to cut deep, and how they move."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.signal import find_peaks
+
+from lobes.stability_lobes import StabilityLobes
+
+
+class Pocket(NamedTuple):
+    """One pocket of a diagram."""
+
+    speed_rpm: float
+    """Speed of its deepest point (rpm), the middle of a flat one."""
+    depth: float
+    """Its limit (m), or the deepest cut of interest where that is less."""
+
+
+class PocketShift(NamedTuple):
+    """A pocket then and now."""
+
+    then: Pocket
+    """Where it was."""
+    now: Pocket
+    """Where it is."""
+
+    @property
+    def speed_change(self) -> float:
+        """Relative change of its speed."""
+        return self.now.speed_rpm / self.then.speed_rpm - 1
+
+    @property
+    def depth_change(self) -> float:
+        """Relative change of its depth."""
+        return self.now.depth / self.then.depth - 1
+
+
+def pockets(lobes: StabilityLobes, deepest: ArrayLike) -> list[Pocket]:
+    """All pockets of a diagram in the order of speed, cut off at the deepest cut of interest (m), a number or (n,).
+
+    `deepest` is what the flutes or the drive (`lobes.deepest_for_drive`) allow. A pocket that the range of speeds cuts
+    through counts with what is inside. Raises ValueError for a `deepest` that is not > 0.
+    """
+    order = np.argsort(lobes.speed_rpm)
+    most = np.broadcast_to(np.asarray(deepest, dtype=np.float64), lobes.speed_rpm.shape)[order]
+    if not np.all(np.isfinite(most) & (most > 0)):
+        raise ValueError(f"deepest={deepest!r} m is not finite and > 0; give the deepest cut of interest")
+    speed, depth = lobes.speed_rpm[order], np.minimum(lobes.depth[order], most)
+    padded = np.concatenate(([0.0], depth, [0.0]))
+    peaks = find_peaks(padded, plateau_size=1, prominence=0.05 * depth.min())[0] - 1
+    return [Pocket(float(speed[i]), float(depth[i])) for i in peaks]
+
+
+def best_pockets(found: Sequence[Pocket], count: int = 3, by: str = "depth") -> list[Pocket]:
+    """The best pockets first, by "depth" or by "removal" (depth times speed: chip volume at one feed per tooth)."""
+    if by not in ("depth", "removal"):
+        raise ValueError(f'by={by!r} is neither "depth" nor "removal"; choose what is best')
+
+    def worth(pocket: Pocket) -> float:
+        return pocket.depth * (pocket.speed_rpm if by == "removal" else 1.0)
+
+    return sorted(found, key=worth, reverse=True)[:count]
+
+
+def pocket_shifts(then: StabilityLobes, now: StabilityLobes, deepest: float) -> list[PocketShift]:
+    """The pockets of two diagrams of one cut that belong together: a pair is nearest to each other.
+
+    Pocket k stands at about 60 f / (N k): all move by one ratio, which the median of the chatter frequencies tells.
+    Those at an end of the range of speeds are left out: their tops lie outside.
+    """
+    before, after = _inside(then, deepest), _inside(now, deepest)
+    if not before or not after:
+        return []
+    ratio = _median_chatter(now) / _median_chatter(then)
+    speeds: NDArray[np.float64] = np.log([pocket.speed_rpm for pocket in after])
+    shifts = []
+    for pocket in before:
+        expected = np.log(pocket.speed_rpm * ratio)
+        nearest = int(np.argmin(np.abs(speeds - expected)))
+        back = int(np.argmin([abs(np.log(p.speed_rpm * ratio) - speeds[nearest]) for p in before]))
+        if before[back] == pocket:
+            shifts.append(PocketShift(pocket, after[nearest]))
+    return shifts
+
+
+def _inside(lobes: StabilityLobes, deepest: float) -> list[Pocket]:
+    ends = (np.min(lobes.speed_rpm), np.max(lobes.speed_rpm))
+    return [pocket for pocket in pockets(lobes, deepest) if pocket.speed_rpm not in ends]
+
+
+def _median_chatter(lobes: StabilityLobes) -> float:
+    known = lobes.chatter_frequency[np.isfinite(lobes.chatter_frequency)]
+    return float(np.median(known)) if known.size else 1.0

@@ -1,0 +1,48 @@
+"""Stability limits with the radial depth as third axis."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lobes.cut import Cut
+from lobes.stability_lobes import StabilityLobes
+
+
+@dataclass(frozen=True, eq=False)
+class RadialLobes:
+    """Limiting axial depth over spindle speed and radial depth."""
+
+    speed_rpm: NDArray[np.float64]
+    """Spindle speeds (rpm), shape (n,)."""
+    immersion: NDArray[np.float64]
+    """Radial depths over cutter diameter, shape (r,)."""
+    depth: NDArray[np.float64]
+    """Limiting depths (m), shape (r, n); inf where there is no limit."""
+    method: str
+    """How the limits were found."""
+    warning: str
+    """What is wrong with the method at the smallest immersion; "" where nothing is."""
+
+
+def radial_lobes(limits: Callable[[Cut], StabilityLobes], cut: Cut, immersion: ArrayLike) -> RadialLobes:
+    """The limits of a cut at other immersions (r,), each in (0, 1], by any method with its other arguments set:
+
+        radial_lobes(lambda cut: stability_boundary(x, y, cut, speeds, 0.02), cut, np.linspace(0.05, 1, 20))
+
+    Raises ValueError for immersions that are none.
+    """
+    shares = np.atleast_1d(np.asarray(immersion, dtype=np.float64))
+    if shares.ndim != 1 or shares.size == 0:
+        raise ValueError(f"immersion has shape {shares.shape}; a 1-D array of at least one value in (0, 1] is needed")
+    charts = [limits(replace(cut, immersion=float(share))) for share in shares]
+    return RadialLobes(
+        speed_rpm=charts[0].speed_rpm,
+        immersion=shares,
+        depth=np.stack([chart.depth for chart in charts]),
+        method=charts[0].method,
+        warning=charts[int(np.argmin(shares))].warning,
+    )

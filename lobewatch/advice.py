@@ -1,0 +1,154 @@
+"""Advice for cutting programs: lobes joined with the machine file and, for what is hypothetical, with the model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsm import Spindle, calibrate
+from lobes import (
+    Program,
+    ProgramCheck,
+    StabilityLobes,
+    aged_mode,
+    check_program,
+    measurement_band,
+    stability_boundary,
+    tolerable_decay,
+)
+from lobewatch.cut_tables import Program as ProgramTable
+from lobewatch.drive import drive_limit
+from lobewatch.history import measure
+from lobewatch.machine import Machine
+from lobewatch.machine_folder import MachineFolder, TapEntry
+from lobewatch.pipeline import Measurement, speed_grid
+from modal import Mode
+
+FALLS = np.array([0.0, 0.05, 0.10, 0.15, 0.20])
+"""Falls of the frequency for which the model is recalibrated; between them its stiffness is interpolated."""
+
+Modes = Sequence[Mode] | None
+ModesAt = Callable[[float], tuple[Modes, Modes]]
+
+
+@dataclass(frozen=True)
+class ProgramAdvice:
+    """What a programmer should know of one program."""
+
+    table: ProgramTable
+    """The program as it stands in machine.toml."""
+    tap_id: str
+    """The tap test that it was checked with; "" where there is none with its tool."""
+    check: ProgramCheck | None
+    """State, margins, nearest speed; None where it could not be checked."""
+    limit_band: tuple[float, float]
+    """95 % band of the limit from the covariance of the modes (m)."""
+    decay: float
+    """Tolerable fall of the frequency, relative; inf where nothing happens down to 80 %."""
+    was_stable: bool
+    """Whether it was stable on the first spindle tapped with this tool and direction."""
+    drive_limit: float
+    """Deepest cut that power and torque allow at its speed (m); inf where no limit is known."""
+    notes: tuple[str, ...]
+    """Assumptions, and why something is missing."""
+
+
+def advise(folder: MachineFolder) -> list[ProgramAdvice]:
+    """Advice for every program of a machine, from the newest tap test with its tool."""
+    taps = folder.taps()
+    measured: dict[str, Measurement] = {}
+    found = []
+    for table in folder.machine.program:
+        of_tool = [tap for tap in taps if tap.tool == table.tool]
+        if not of_tool:
+            found.append(_unknown(table, "", f"no tap test with tool {table.tool!r}"))
+            continue
+        for tap in (of_tool[-1], _first(of_tool)):
+            measured.setdefault(tap.id, measure(folder, tap))
+        now, then = measured[of_tool[-1].id], measured[_first(of_tool).id]
+        if now.dynamics.at_tip:
+            found.append(_advise(table, folder.machine, now, then))
+        else:
+            found.append(_unknown(table, now.tap_id, "; ".join(now.notes)))
+    return found
+
+
+def aging(measurement: Measurement) -> tuple[ModesAt, str]:
+    """The modes of a measurement as functions of a frequency ratio, all falling alike, and the assumption in words.
+
+    K follows the model (bearings softer until its frequency has fallen as far); without a model it stays.
+    """
+    followed = measurement.dynamics.followed
+    calibration = measurement.dynamics.calibration
+    ratios = np.ones(1)
+    if calibration is not None and followed is not None:
+        ratios = _stiffness_ratios(calibration.spindle, followed.frequency)
+
+    def modes_at(ratio: float) -> tuple[Modes, Modes]:
+        softer = float(np.interp(1 - ratio, FALLS[: ratios.size], ratios)) if ratios.size > 1 else None
+        x, y = (
+            [aged_mode(mode, ratio, "model", softer) for mode in modes] if modes else None
+            for modes in (measurement.x, measurement.y)
+        )
+        return x, y
+
+    said = "K does not (no model)"
+    if ratios.size > 1:
+        fall, change = 100 * FALLS[ratios.size - 1], 100 * (ratios[-1] - 1)
+        said = f"K changes as in the model ({change:+.1f} % when f_n has fallen by {fall:.0f} %)"
+    return modes_at, f"decay left: all modes fall alike, zeta does not change, {said}"
+
+
+def _stiffness_ratios(spindle: Spindle, frequency: float) -> NDArray[np.float64]:
+    """Modal stiffness at the tip for each of FALLS over that for none, as far as softer bearings can bring about."""
+    stiffness: list[float] = []
+    for fall in FALLS:
+        try:
+            stiffness.append(calibrate(spindle, frequency * (1 - fall)).modal_stiffness_after)
+        except (ValueError, ArithmeticError):
+            break
+    return np.array(stiffness or [1.0]) / (stiffness or [1.0])[0]
+
+
+def _first(taps: Sequence[TapEntry]) -> TapEntry:
+    """The first tap in the direction of the newest."""
+    return next(tap for tap in taps if tap.direction == taps[-1].direction)
+
+
+def _unknown(table: ProgramTable, tap_id: str, reason: str) -> ProgramAdvice:
+    nan = float("nan")
+    return ProgramAdvice(table, tap_id, None, (nan, nan), nan, False, float("inf"), (f"not checked: {reason}",))
+
+
+def _advise(table: ProgramTable, machine: Machine, now: Measurement, then: Measurement) -> ProgramAdvice:
+    program = Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
+    check = check_program(program, now.x, now.y, speed_grid(machine))
+    modes_at, assumption = aging(now)
+    allowed = float(drive_limit(machine, table, np.array([table.speed_rpm]))[0])
+    notes = [assumption] if check.stable else []
+    if not (now.x and now.y):
+        notes.append(f"modes in the {now.direction} direction alone")
+    return ProgramAdvice(
+        table=table,
+        tap_id=now.tap_id,
+        check=check,
+        limit_band=_band(program, now, check),
+        decay=tolerable_decay(program, modes_at) if check.stable else 0.0,
+        was_stable=bool(_limits(program, then.x, then.y).depth[0] > program.depth) if then.dynamics.at_tip else False,
+        drive_limit=allowed,
+        notes=tuple(notes),
+    )
+
+
+def _limits(program: Program, x: Modes, y: Modes) -> StabilityLobes:
+    return stability_boundary(x, y, program.cut, program.speed_rpm, 20 * program.depth)
+
+
+def _band(program: Program, measurement: Measurement, check: ProgramCheck) -> tuple[float, float]:
+    if not np.isfinite(check.limit):
+        return check.limit, check.limit
+    band = measurement_band(lambda x, y: _limits(program, x, y), measurement.x, measurement.y)
+    return float(band.low[0]), float(band.high[0])

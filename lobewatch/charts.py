@@ -1,0 +1,39 @@
+"""Stability lobes by the method that is asked for."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Frf
+from lobes import Cut, StabilityLobes, average_angle, stability_boundary, zero_order
+from lobes.tip_response import Tip
+
+MOST_SPEEDS = 400
+"""Speeds of a chart by semi-discretisation."""
+DEEPEST = 12.0
+"""Depth up to which it looks, as a multiple of the lowest limit by zero order."""
+
+
+class Method(StrEnum):
+    """How limits are found."""
+
+    ZERO_ORDER = "zero-order"
+    AVERAGE_ANGLE = "average-angle"
+    SEMI_DISCRETISATION = "semi-discretisation"
+
+
+def chart(method: Method, x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: NDArray[np.float64]) -> StabilityLobes:
+    """The lobes of a cut over speeds (rpm), fewer of them by semi-discretisation, which needs modes."""
+    if method is Method.AVERAGE_ANGLE:
+        return average_angle(x, y, cut, speed_rpm)
+    mean = zero_order(x, y, cut, speed_rpm)
+    if method is Method.ZERO_ORDER:
+        return mean
+    if isinstance(x, Frf) or isinstance(y, Frf):
+        raise ValueError("--method semi-discretisation works from the modes; leave --source frf out")
+    speeds = np.linspace(speed_rpm[0], speed_rpm[-1], min(MOST_SPEEDS, speed_rpm.size))
+    lowest = mean.minimum.depth
+    return stability_boundary(x, y, cut, speeds, DEEPEST * lowest if np.isfinite(lowest) else 0.1)

@@ -1,0 +1,141 @@
+"""Pictures of stability lobes, in the colours of figures.py."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from lobes import DepthBand, Pocket, RadialLobes
+from lobewatch.figures import ALARM, GOOD, NOW, THEN, new_axes
+
+Floats = NDArray[np.float64]
+
+MAP = "cividis"
+"""Colours of depth: dark is shallow, bright is deep, in grey too."""
+SPREAD = "#E6E6E6"
+LEVELS = 12
+"""Steps of colour in a map."""
+
+
+def lobes_figure(
+    speed_rpm: Floats,
+    depths: Mapping[str, Floats],
+    programs: Sequence[Mapping[str, Any]] = (),
+    title: str = "",
+    band: DepthBand | None = None,
+    spread: DepthBand | None = None,
+    pockets: Sequence[Pocket] = (),
+) -> Figure:
+    """Stability lobe diagram: the last of `depths` (m, by label) is now, those before it are earlier ones.
+
+    band is the 95 % band of the measurement, spread the range of the published cutting coefficients.
+    """
+    figure, (axes,) = new_axes(1, (8.0, 4.2))
+    *earlier, now = depths.items()
+    finite = now[1][np.isfinite(now[1])] * 1e3
+    top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * p["depth_mm"] for p in programs)])
+    if spread is not None:
+        _fill(axes, speed_rpm, spread, top, color=SPREAD, label="range of published coefficients", zorder=0.5)
+    for label, depth in earlier:
+        axes.plot(speed_rpm, depth * 1e3, color=THEN, ls="--", lw=1.2, label=label)
+    axes.plot(speed_rpm, now[1] * 1e3, color=NOW, lw=1.6, label=now[0])
+    if band is not None:
+        _fill(axes, speed_rpm, band, top, color=NOW, alpha=0.35, label="95 % band of the tap")
+    axes.fill_between(speed_rpm, np.minimum(now[1] * 1e3, top), top, color=NOW, alpha=0.10, lw=0)
+    for pocket in pockets:
+        _draw_pocket(axes, pocket)
+    for program in programs:
+        _draw_program(axes, program)
+    axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
+    axes.set(xlabel="spindle speed (rpm)", ylabel="limiting depth (mm)")
+    figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+    return figure
+
+
+def waterfall_figure(speed_rpm: Floats, times: Sequence[datetime], depth: Floats, title: str = "") -> Figure:
+    """Limiting depth over speed and time: depth (n, m) in m at n times, the oldest below."""
+    figure, (axes,) = new_axes(1, (8.0, 4.2))
+    top = _top(depth)
+    rows, columns = _edges(date2num(times), 30.0), _edges(speed_rpm, 1.0)
+    mesh = axes.pcolormesh(columns, rows, np.minimum(depth * 1e3, top), cmap=MAP, vmin=0, vmax=top, rasterized=True)
+    _colour_bar(figure, axes, mesh)
+    locator = AutoDateLocator()
+    axes.yaxis.set_major_locator(locator)
+    axes.yaxis.set_major_formatter(ConciseDateFormatter(locator))
+    axes.set(title=title, xlabel="spindle speed (rpm)", xlim=(speed_rpm[0], speed_rpm[-1]))
+    axes.grid(visible=False)
+    return figure
+
+
+def radial_figure(lobes: RadialLobes, diameter: float, title: str = "") -> Figure:
+    """Limiting depth over speed and radial depth for a cutter of this diameter (m), as a map with lines."""
+    figure, (axes,) = new_axes(1, (8.0, 4.2))
+    top = _top(lobes.depth)
+    shown = np.minimum(lobes.depth * 1e3, top)
+    radial = lobes.immersion * diameter * 1e3
+    levels = MaxNLocator(LEVELS).tick_values(0, top)
+    mesh = axes.contourf(lobes.speed_rpm, radial, shown, levels=levels, cmap=MAP)
+    lines = axes.contour(lobes.speed_rpm, radial, shown, levels=levels[1:-1:2], colors="black", linewidths=0.5)
+    axes.clabel(lines, fmt="%g", fontsize=8)
+    _colour_bar(figure, axes, mesh)
+    axes.set(title=title, xlabel="spindle speed (rpm)", ylabel="radial depth (mm)")
+    axes.grid(visible=False)
+    return figure
+
+
+def _edges(middles: Floats, alone: float) -> Floats:
+    """Edges of cells around their middles; a cell that stands alone has this width."""
+    halves = np.diff(middles) / 2 if middles.size > 1 else np.array([alone / 2])
+    inner = middles[:-1] + halves[: middles.size - 1]
+    return np.concatenate((middles[:1] - halves[0], inner, middles[-1:] + halves[-1]))
+
+
+def _top(depth: Floats) -> float:
+    """Depth (mm) at which a map of depths (m) ends."""
+    finite = depth[np.isfinite(depth)] * 1e3
+    return min(6 * float(finite.min()), float(finite.max())) if finite.size else 1.0
+
+
+def _colour_bar(figure: Figure, axes: Axes, mesh: Any) -> None:
+    figure.colorbar(mesh, ax=axes).set_label("limiting depth (mm); brightest: this or more")
+
+
+def _fill(axes: Axes, speed_rpm: Floats, band: DepthBand, top: float, **style: Any) -> None:
+    """A band between its edges, cut off above the picture."""
+    low, high = (np.minimum(edge * 1e3, 2 * top) for edge in band)
+    axes.fill_between(speed_rpm, low, high, lw=0, **style)
+
+
+def _draw_pocket(axes: Axes, pocket: Pocket) -> None:
+    """A line at the speed of a pocket, with the speed at its foot."""
+    axes.axvline(pocket.speed_rpm, color=NOW, ls=":", lw=1)
+    axes.annotate(
+        f"{pocket.speed_rpm:.0f} rpm",
+        (pocket.speed_rpm, 0.02),
+        xycoords=("data", "axes fraction"),
+        fontsize=8,
+        ha="center",
+        color=NOW,
+        bbox={"color": "white", "alpha": 0.8, "pad": 1, "lw": 0},
+    )
+
+
+def _draw_program(axes: Axes, program: Mapping[str, Any]) -> None:
+    colour, mark = (GOOD, "o") if program["stable"] else (ALARM, "X")
+    axes.plot(program["speed_rpm"], program["depth_mm"], mark, color=colour, ms=9, mec="white")
+    axes.annotate(
+        program["name"],
+        (program["speed_rpm"], program["depth_mm"]),
+        xytext=(7, 5),
+        textcoords="offset points",
+        fontsize=9,
+        bbox={"color": "white", "alpha": 0.7, "pad": 1, "lw": 0},
+    )

@@ -1,0 +1,317 @@
+"""From lobes to advice: programs, tolerable decay, aged modes, pockets, drive limits, bands, coefficients.
+
+T. L. Schmitz, K. S. Smith, Machining Dynamics, 2nd ed., Springer 2019, Ex. 4.3 (slot in aluminium).
+O. Gaber, S. M. Hashemi, Shock and Vibration 2015: 1722 -> 1550 Hz, K x 0.9.
+Y. Altintas, Manufacturing Automation, 2nd ed., Cambridge 2012, ch. 2 (mean torque).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lobes import (
+    Coefficients,
+    Cut,
+    Program,
+    StabilityLobes,
+    aged_mode,
+    average_angle,
+    best_pockets,
+    check_program,
+    coefficient_range,
+    cutting_coefficients,
+    deepest_for_drive,
+    mean_torque,
+    measurement_band,
+    pocket_shifts,
+    pockets,
+    spectral_radius,
+    stability_boundary,
+    tangential_and_radial,
+    tolerable_decay,
+    zero_order,
+)
+from lobes.program import Modes
+from modal import Mode
+
+SLOT = Cut(4, 1.0, "up", *tangential_and_radial(750e6, math.radians(68)))
+SPINDLE = Mode(1722.0, 0.029136, 3.2289e7)
+MODE = Mode(1200.0, 0.03, 2e7)
+SPEEDS = np.linspace(6000.0, 24000.0, 361)
+
+
+def aged(ratio: float) -> tuple[Modes, Modes]:
+    return [aged_mode(MODE, ratio, "paper")], [aged_mode(MODE, ratio, "paper")]
+
+
+def test_the_paper_s_spindle_in_an_aluminium_slot() -> None:
+    """The lowest limit falls by 10 %, but at 5200 rpm, inside the 8.7 mm pocket at 5262 rpm, from 7.97 to 3.48 mm."""
+    old = aged_mode(SPINDLE, 0.9, "paper")
+    around = np.linspace(5000, 5500, 5001)
+    new_lobes, old_lobes = (average_angle([mode], None, SLOT, around) for mode in (SPINDLE, old))
+    deepest = pockets(new_lobes, 1.0)[0]
+    assert deepest.speed_rpm == pytest.approx(5262, abs=1)
+    assert deepest.depth * 1e3 == pytest.approx(8.7, abs=0.05)
+    assert new_lobes.depth_at(5200) * 1e3 == pytest.approx(7.97, abs=0.005)
+    assert old_lobes.depth_at(5200) * 1e3 == pytest.approx(3.48, abs=0.005)
+    charts = [average_angle([m], None, SLOT, np.linspace(3000, 20000, 20001)).minimum.depth for m in (SPINDLE, old)]
+    assert charts[1] / charts[0] == pytest.approx(0.9, abs=1e-4)
+
+
+def test_rules_for_k() -> None:
+    covariance = np.diag([1.0, 1e-8, 1e10])
+    base = replace(SPINDLE, covariance=covariance, method="tap")
+    paper = aged_mode(base, 0.9, "paper")
+    assert paper.frequency == pytest.approx(1549.8)
+    assert paper.damping_ratio == 0.029136
+    assert paper.stiffness == pytest.approx(0.9 * 3.2289e7)
+    np.testing.assert_allclose(paper.standard_error, [0.9, 1e-4, 0.9e5])
+    assert aged_mode(base, 0.9, "model", 0.985).stiffness == pytest.approx(0.985 * 3.2289e7)
+    assert aged_mode(base, 0.9, "measured", 1.02).stiffness == pytest.approx(1.02 * 3.2289e7)
+    constant = aged_mode(base, 0.9, "model")
+    assert constant.stiffness == 3.2289e7
+    assert constant.method == "tap, aged, K constant, no model"
+    assert paper.method == "tap, aged, K by rule paper"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((0.9, "guess", None), "rule='guess'"),
+        ((0.0, "paper", None), "ratio=0.0"),
+        ((0.9, "measured", None), "needs stiffness_ratio"),
+        ((0.9, "paper", 0.9), "leave stiffness_ratio=0.9 out"),
+        ((0.9, "model", -1.0), "stiffness_ratio=-1.0"),
+        ((math.nan, "model", None), "ratio=nan"),
+    ],
+)
+def test_bad_aging_is_refused(arguments: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        aged_mode(SPINDLE, *arguments)
+
+
+def pocket_program(speed: float = 18000.0, share: float = 0.7) -> Program:
+    limit = stability_boundary([MODE], [MODE], SLOT, speed, 50e-3).depth[0]
+    return Program(SLOT, speed, float(share * limit))
+
+
+def test_a_stable_program() -> None:
+    program = pocket_program()
+    found = check_program(program, [MODE], [MODE], SPEEDS)
+    assert found.stable
+    assert found.depth_margin == pytest.approx(1 / 0.7 - 1, rel=1e-3)
+    assert found.limit == pytest.approx(program.depth / 0.7, rel=1e-3)
+    assert found.nearest_speed is not None
+    assert found.speed_margin == pytest.approx(abs(found.nearest_speed / 18000 - 1))
+    states = spectral_radius([MODE], [MODE], SLOT, SPEEDS, program.depth)[:, 0] < 1
+    nearer = np.abs(SPEEDS - 18000) < abs(found.nearest_speed - 18000) - 1
+    assert np.all(states[nearer])
+    assert not states[found.nearest_speed == SPEEDS][0]
+
+
+def test_an_unstable_program_and_the_nearest_stable_speed() -> None:
+    program = pocket_program(14500.0, 1.6)
+    found = check_program(program, [MODE], [MODE], SPEEDS)
+    assert not found.stable
+    assert found.depth_margin == pytest.approx(1 / 1.6 - 1, rel=1e-3)
+    assert found.nearest_speed is not None
+    moved = replace(program, speed_rpm=found.nearest_speed)
+    assert check_program(moved, [MODE], [MODE], SPEEDS).stable
+    assert 500 < found.chatter_frequency < 2500
+
+
+def test_no_stable_speed() -> None:
+    found = check_program(Program(SLOT, 14000.0, 0.2), [MODE], [MODE], np.linspace(13000, 15000, 21))
+    assert (found.stable, found.nearest_speed, found.speed_margin) == (False, None, math.inf)
+
+
+def test_an_island_above_the_limit_is_no_place_to_work() -> None:
+    """a/D 0.1 at 18 000 rpm: stable below 0.816 mm, and again between 3.118 and 3.831 mm."""
+    benchmark = [Mode(922.0, 0.011, 0.03993 * (2 * math.pi * 922) ** 2)]
+    program = Program(Cut(2, 0.1, "down", 6e8, 2e8), 18000.0, 3.5e-3)
+    assert spectral_radius(benchmark, None, program.cut, 18000.0, 3.5e-3)[0, 0] < 1
+    found = check_program(program, benchmark, None, np.array([17990.0, 18000.0, 18010.0]))
+    assert (found.stable, found.nearest_speed) == (False, None)
+    assert found.limit * 1e3 == pytest.approx(0.816, rel=0.01)
+
+
+def test_tolerable_decay_ends_where_the_limit_crosses_the_depth() -> None:
+    program = pocket_program()
+    fall = tolerable_decay(program, aged)
+    assert 0.005 < fall < 0.2
+    for side, stable in ((-0.001, True), (0.001, False)):
+        x, y = aged(1 - fall - side)
+        limit = stability_boundary(x, y, SLOT, program.speed_rpm, 50e-3).depth[0]
+        assert (limit > program.depth) == stable
+
+
+def test_a_softer_mode_tolerates_less() -> None:
+    program = pocket_program()
+    constant = tolerable_decay(program, lambda r: ([aged_mode(MODE, r, "model")], [aged_mode(MODE, r, "model")]))
+    assert tolerable_decay(program, aged) < constant
+
+
+def test_decay_of_programs_that_are_unstable_or_never_so() -> None:
+    assert tolerable_decay(pocket_program(14500.0, 1.6), aged) == 0.0
+    assert tolerable_decay(pocket_program(14500.0, 0.05), aged, largest=0.05) == math.inf
+    with pytest.raises(ValueError, match=r"largest=1\.5"):
+        tolerable_decay(pocket_program(), aged, largest=1.5)
+
+
+@pytest.mark.parametrize(("speed", "depth"), [(0.0, 1e-3), (math.nan, 1e-3), (1e4, 0.0), (1e4, math.inf)])
+def test_bad_programs_are_refused(speed: float, depth: float) -> None:
+    with pytest.raises(ValueError, match=r"speed_rpm=|depth="):
+        Program(SLOT, speed, depth)
+
+
+def chart(depth: list[float], speed: NDArray[np.float64] | None = None) -> StabilityLobes:
+    values = np.array(depth)
+    speeds = np.arange(1.0, values.size + 1) * 1000 if speed is None else speed
+    return StabilityLobes(
+        speeds, values, np.full(values.shape, 800.0), np.full(values.shape, "hopf"), values[:, None], "made up"
+    )
+
+
+def test_pockets_are_the_tops_of_the_diagram() -> None:
+    found = pockets(chart([4.0, 1.0, 3.0, 1.0, math.inf, math.inf, math.inf, 2.0]), 5.0)
+    assert found == [(1000.0, 4.0), (3000.0, 3.0), (6000.0, 5.0)]
+    assert best_pockets(found, 2) == [(6000.0, 5.0), (1000.0, 4.0)]
+    assert best_pockets(found, 2, by="removal") == [(6000.0, 5.0), (3000.0, 3.0)]
+    with pytest.raises(ValueError, match="by='speed'"):
+        best_pockets(found, by="speed")
+    with pytest.raises(ValueError, match="deepest"):
+        pockets(chart([1.0, 2.0]), 0.0)
+
+
+def test_the_drive_cuts_pockets_off() -> None:
+    lobes = chart([1.0, 8.0, 1.0, 1.0, 9.0, 1.0])
+    assert pockets(lobes, np.array([9.0, 9, 9, 2, 2, 2]))[1] == (5000.0, 2.0)
+
+
+def test_pockets_move_with_the_frequency() -> None:
+    speeds = np.linspace(6000, 30000, 2401)
+    then, now = (average_angle([aged_mode(MODE, ratio, "paper")], None, SLOT, speeds) for ratio in (1.0, 0.95))
+    shifts = pocket_shifts(then, now, 50e-3)
+    assert len(shifts) >= 2
+    inside = [shift for shift in shifts if 7000 < shift.then.speed_rpm < 28000]
+    for shift in inside:
+        assert shift.speed_change == pytest.approx(-0.05, abs=2e-3)
+        assert shift.depth_change == pytest.approx(-0.05, abs=0.03)
+
+
+def test_mean_torque_of_a_slot() -> None:
+    """N D / (4 pi) b (2 Kt f + pi Kte)."""
+    torque = mean_torque(SLOT, [1e-3, 2e-3], diameter=0.02, feed_per_tooth=1e-4, edge=2e4)
+    one = 4 * 0.02 / (4 * math.pi) * 1e-3 * (2 * SLOT.tangential * 1e-4 + math.pi * 2e4)
+    assert torque == pytest.approx([one, 2 * one])
+
+
+def test_power_is_the_tangential_force_times_the_removal_rate() -> None:
+    """Kt a_e b f N n: the chip volume of a half-immersed cut times Kt."""
+    half = replace(SLOT, immersion=0.5)
+    power = 2 * math.pi * 200 * mean_torque(half, 3e-3, 0.02, 1e-4)
+    assert power == pytest.approx(half.tangential * 0.01 * 3e-3 * 1e-4 * 4 * 200)
+
+
+def test_depth_for_power_and_torque() -> None:
+    depth = deepest_for_drive(SLOT, [3000.0, 12000.0], 0.02, 1e-4, power=2000.0, torque=4.0)
+    at_torque = 4.0 / mean_torque(SLOT, 1.0, 0.02, 1e-4)
+    at_power = 2000 / (2 * math.pi * 200) / mean_torque(SLOT, 1.0, 0.02, 1e-4)
+    assert depth == pytest.approx([at_torque, at_power])
+
+
+@pytest.mark.parametrize("change", [{"diameter": 0.0}, {"feed_per_tooth": -1.0}, {"edge": math.nan}, {"power": 0.0}])
+def test_bad_drive_limits_are_refused(change: dict[str, float]) -> None:
+    good = {"diameter": 0.02, "feed_per_tooth": 1e-4}
+    with pytest.raises(ValueError, match=next(iter(change))):
+        deepest_for_drive(SLOT, 3000.0, **{**good, **change})
+
+
+def measured(covariance: NDArray[np.float64]) -> Mode:
+    return replace(MODE, covariance=covariance)
+
+
+def drawn(values: NDArray[np.float64]) -> Mode:
+    return Mode(float(values[0]), float(values[1]), float(values[2]))
+
+
+def limits(x: Modes, y: Modes) -> StabilityLobes:
+    return zero_order(x, y, SLOT, SPEEDS)
+
+
+def test_the_band_of_a_stiffness_is_its_interval() -> None:
+    """The depth goes with K, so that 1 % of K is 1 % of depth: 95 % are exp(+-0.0196)."""
+    band = measurement_band(limits, [measured(np.diag([0.0, 0.0, (0.01 * 2e7) ** 2]))], None)
+    base = limits([MODE], None).depth
+    np.testing.assert_allclose(band.high / base, math.exp(0.0195996), rtol=1e-6)
+    np.testing.assert_allclose(band.low / base, math.exp(-0.0195996), rtol=1e-6)
+
+
+def test_the_band_holds_95_percent_of_what_modes_drawn_from_the_covariance_give() -> None:
+    sigma = np.array([2.0, 0.0006, 2e5])
+    correlation = np.array([[1.0, 0.2, 0.1], [0.2, 1.0, -0.7], [0.1, -0.7, 1.0]])
+    covariance = correlation * np.outer(sigma, sigma)
+    band = measurement_band(limits, [measured(covariance)], [measured(covariance)])
+    random, root = np.random.default_rng(7), np.linalg.cholesky(correlation) * sigma[:, np.newaxis]
+    mean = np.array([MODE.frequency, MODE.damping_ratio, MODE.stiffness])
+    inside = []
+    for _ in range(150):
+        x, y = ([drawn(mean + root @ random.normal(size=3))] for _ in range(2))
+        depth = limits(x, y).depth
+        inside.append((depth > band.low) & (depth < band.high))
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
+
+
+def test_modes_without_covariance_have_no_band() -> None:
+    band = measurement_band(limits, [MODE], [MODE])
+    np.testing.assert_array_equal(band.low, band.high)
+
+
+def test_range_of_published_coefficients() -> None:
+    alloy = [one for one in cutting_coefficients() if one.alloy == "Al 7075"]
+    assert len(alloy) == 4
+    found = coefficient_range(lambda cut: zero_order([MODE], [MODE], cut, SPEEDS), SLOT, alloy)
+    hardest = replace(SLOT, tangential=1319.41e6, radial=788.83e6)
+    np.testing.assert_allclose(found.low.min(), zero_order([MODE], [MODE], hardest, SPEEDS).depth.min())
+    assert np.all(found.high > found.low)
+    with pytest.raises(ValueError, match="published is empty"):
+        coefficient_range(lambda cut: zero_order([MODE], None, cut, SPEEDS), SLOT, [])
+
+
+def test_published_coefficients_in_si_with_source_and_edge() -> None:
+    known = {one.material: one for one in cutting_coefficients()}
+    assert len(known) == 10
+    first = known["Al 7075-T6 (carbide; dry; ref. 190)"]
+    assert first.alloy == "Al 7075"
+    assert (first.tangential, first.radial) == pytest.approx((767.01e6, 168.8e6))
+    assert (first.tangential_edge, first.radial_edge) == (27700.0, 26600.0)
+    assert all(
+        "10.1186" in one.source or "p." in one.source or "Ex." in one.source or "Stepan" in one.source
+        for one in known.values()
+    )
+    assert math.isnan(known["Al (textbook; Altintas)"].tangential_edge)
+
+
+def test_specific_force_and_angle_there_and_back() -> None:
+    assert SLOT.specific_force == pytest.approx(750e6)
+    assert math.degrees(SLOT.force_angle) == pytest.approx(68)
+    assert tangential_and_radial(750e6, math.radians(68)) == pytest.approx((695.4e6, 281.0e6), abs=0.05e6)
+    assert tangential_and_radial(1e9, math.pi / 2) == pytest.approx((1e9, 0.0), abs=1e-3)
+
+
+@pytest.mark.parametrize(("force", "angle"), [(0.0, 1.0), (math.nan, 1.0), (1e9, 0.0), (1e9, 2.0), (1e9, math.nan)])
+def test_bad_specific_forces_are_refused(force: float, angle: float) -> None:
+    with pytest.raises(ValueError, match=r"specific_force=|force_angle="):
+        tangential_and_radial(force, angle)
+
+
+@pytest.mark.parametrize(("tangential", "radial"), [(0.0, 1.0), (1e9, -1.0), (math.inf, 1.0), (1e9, math.nan)])
+def test_bad_coefficients_are_refused(tangential: float, radial: float) -> None:
+    with pytest.raises(ValueError, match=r"tangential=|radial="):
+        Coefficients("unobtainium", tangential, radial)

@@ -1,0 +1,126 @@
+"""Zero-order limits.
+
+Y. Altintas, E. Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362, half
+immersion up-milling with the modes of Weck, Altintas & Budak: frequency_domain_reference.csv in tests/data/.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from acquisition import Frf
+from lobes import Cut, average_angle, stability_boundary, zero_order
+from lobes.tooth_force import mean_force
+from modal import Mode
+
+X, Y = [Mode(603.0, 0.039, 5.59e6)], [Mode(666.0, 0.035, 5.715e6)]
+CUT = Cut(3, 0.5, "up", 600e6, 42e6)
+BENCHMARK = [Mode(922.0, 0.011, 0.03993 * (2 * math.pi * 922) ** 2)]
+SPEEDS = np.linspace(3000.0, 20000.0, 50)
+
+
+def frf(modes: list[Mode]) -> Frf:
+    frequency = np.arange(1.0, 5000.0)
+    return Frf(frequency, np.sum([mode.receptance(frequency) for mode in modes], axis=0))
+
+
+def test_directional_coefficients() -> None:
+    """alpha = -4 pi H0 / (N Kt)."""
+    alpha = -4 * math.pi / (3 * 600e6) * mean_force(CUT)
+    assert alpha.ravel() == pytest.approx([-1.109956, -1.640796, 1.500796, 0.890044], abs=5e-7)
+
+
+@pytest.mark.parametrize(("speed", "depth_mm"), [(4000, 1.4193), (7000, 1.4614), (10000, 1.3396), (13000, 5.1905)])
+def test_limits_of_half_immersion(speed: float, depth_mm: float) -> None:
+    assert zero_order(X, Y, CUT, speed).depth[0] * 1e3 == pytest.approx(depth_mm, abs=5e-5)
+    assert zero_order(frf(X), frf(Y), CUT, speed).depth[0] * 1e3 == pytest.approx(depth_mm, abs=5e-5)
+
+
+def test_lowest_limit_of_half_immersion() -> None:
+    low = zero_order(X, Y, CUT, np.linspace(5000, 5050, 5001)).minimum
+    assert low.depth * 1e3 == pytest.approx(1.08683, abs=5e-6)
+    assert low.chatter_frequency == pytest.approx(632.978, abs=0.01)
+    assert low.speed_rpm == pytest.approx(5022.36, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("immersion", "speeds", "depth_mm", "chatter"),
+    [(0.05, (12100, 12200), 1.791579, 911.802), (1.0, (15900, 16000), 0.298054, 932.087)],
+)
+def test_lowest_limit_of_the_milling_benchmark(
+    immersion: float, speeds: tuple[float, float], depth_mm: float, chatter: float
+) -> None:
+    low = zero_order(BENCHMARK, None, Cut(2, immersion, "down", 6e8, 2e8), np.linspace(*speeds, 10001)).minimum
+    assert low.depth * 1e3 == pytest.approx(depth_mm, abs=5e-7)
+    assert low.chatter_frequency == pytest.approx(chatter, abs=0.01)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    immersion=st.floats(0.05, 1.0),
+    direction=st.sampled_from(["up", "down"]),
+    speed=st.floats(2000, 30000),
+    radial=st.floats(0, 6e8),
+)
+def test_the_loop_closes_at_the_limit(immersion: float, direction: str, speed: float, radial: float) -> None:
+    """det(I + b (1 - exp(-2 pi i f/f_t)) H0 G(f)) = 0."""
+    cut = Cut(3, immersion, "up" if direction == "up" else "down", 6e8, radial)
+    found = zero_order(X, Y, cut, speed)
+    f = found.chatter_frequency
+    receptance = np.diag([X[0].receptance(f)[0], Y[0].receptance(f)[0]])
+    loop = found.depth[0] * (1 - np.exp(-120j * np.pi * f[0] / (3 * speed))) * mean_force(cut) @ receptance
+    assert abs(np.linalg.det(np.eye(2) + loop)) < 1e-6
+
+
+def test_a_slot_is_unchanged_when_x_and_y_are_exchanged() -> None:
+    slot = Cut(3, 1.0, "up", 6e8, 2e8)
+    np.testing.assert_allclose(zero_order(X, Y, slot, SPEEDS).depth, zero_order(Y, X, slot, SPEEDS).depth, rtol=1e-9)
+
+
+def test_depth_goes_with_stiffness_and_speeds_with_frequency() -> None:
+    base = zero_order(X, Y, CUT, SPEEDS)
+    x, y = ([Mode(m.frequency, m.damping_ratio, 3 * m.stiffness) for m in modes] for modes in (X, Y))
+    np.testing.assert_allclose(zero_order(x, y, CUT, SPEEDS).depth, 3 * base.depth, rtol=1e-6)
+    x, y = ([Mode(1.7 * m.frequency, m.damping_ratio, m.stiffness) for m in modes] for modes in (X, Y))
+    again = zero_order(x, y, CUT, 1.7 * SPEEDS)
+    np.testing.assert_allclose(again.depth, base.depth, rtol=1e-6)
+    np.testing.assert_allclose(again.chatter_frequency, 1.7 * base.chatter_frequency, rtol=1e-6)
+
+
+def test_one_direction_of_a_slot_is_the_average_angle_with_its_mean_share() -> None:
+    """H0_xx = N Kr / 4 in a slot, mu_x Ks Nt* = N Kr / 2: the mean of sin^2 is half its largest value."""
+    slot = Cut(3, 1.0, "up", 6e8, 2e8)
+    one, other = zero_order(X, None, slot, SPEEDS), average_angle(X, None, slot, SPEEDS)
+    np.testing.assert_allclose(one.depth, 2 * other.depth, rtol=1e-9)
+
+
+def test_many_teeth_make_it_exact() -> None:
+    """With many teeth the force hardly varies: semi-discretisation gives the same limits."""
+    cut = Cut(24, 1.0, "up", 6e8, 2e8)
+    speeds = np.array([500.0, 700.0, 1100.0, 1600.0])
+    exact = stability_boundary(X, Y, cut, speeds, 2e-3)
+    mean = zero_order(X, Y, cut, speeds)
+    np.testing.assert_allclose(mean.depth, exact.depth, rtol=2e-3)
+    np.testing.assert_allclose(mean.chatter_frequency, exact.chatter_frequency, rtol=1e-3)
+
+
+def test_low_immersion_is_warned_of() -> None:
+    low = Cut(2, 0.1, "down", 6e8, 2e8)
+    assert "use semi-discretisation" in zero_order(BENCHMARK, None, low, 18000).warning
+    assert "use semi-discretisation" in average_angle(BENCHMARK, None, low, 18000).warning
+    assert zero_order(BENCHMARK, None, Cut(2, 0.25, "down", 6e8, 2e8), 18000).warning == ""
+    assert stability_boundary(BENCHMARK, None, low, 18000, 2e-3).warning == ""
+
+
+@pytest.mark.parametrize("band", [(10.0, 590.0), (700.0, 3000.0)])
+def test_an_frf_that_does_not_reach_the_chatter_band_says_so(band: tuple[float, float]) -> None:
+    for method in (zero_order, average_angle):
+        short = method(frf(X).in_band(band), frf(Y).in_band(band), CUT, SPEEDS)
+        assert "does not reach the chatter band" in short.warning
+        assert f"between {band[0]:g} and {band[1]:g} Hz" in short.warning
+        assert method(frf(X), frf(Y), CUT, SPEEDS).warning == ""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquisition import Frf
 from modal.find_resonances import find_resonances
-from modal.fit_local import LocalFit, fit_local
+from modal.fit_band import BandFit, fit_band
 from modal.line_weights import line_weights
 from modal.local_bands import LocalBand, local_bands
 from modal.mode import Mode
@@ -68,7 +68,7 @@ class _Guess:
 @dataclass(frozen=True, eq=False)
 class _Fitted:
     where: slice
-    fit: LocalFit
+    fit: BandFit
     height: NDArray[np.float64]
 
     @property
@@ -81,13 +81,13 @@ def _first(local: LocalBand) -> _Guess:
     return _Guess(local.lines, frequency, half_width / frequency, height)
 
 
-def _fit(lines: Frf, weight: NDArray[np.float64], guess: _Guess, others: list[LocalFit]) -> _Fitted | None:
+def _fit(lines: Frf, weight: NDArray[np.float64], guess: _Guess, others: list[BandFit]) -> _Fitted | None:
     """Fit of what is left after the weakest of those that turn out to be no modes are taken out, one by one."""
     f = lines.frequency[guess.where]
-    tails = sum((other.receptance(f) for other in others), np.zeros(f.size, complex))
+    tails = sum((other.receptance(f)[0] for other in others), np.zeros(f.size, complex))
     own = lines.receptance[guess.where] - tails
     while guess.height.size:
-        fit = fit_local(f, own, weight[guess.where], np.stack([guess.frequency, guess.damping_ratio]))
+        fit = fit_band(f, own[None], weight[None, guess.where], np.stack([guess.frequency, guess.damping_ratio]))
         sure = np.zeros(guess.height.size, bool) if fit is None else _are_modes(fit, f, guess.height)
         if fit is not None and np.all(sure):
             return _Fitted(guess.where, fit, guess.height)
@@ -96,7 +96,7 @@ def _fit(lines: Frf, weight: NDArray[np.float64], guess: _Guess, others: list[Lo
     return None
 
 
-def _are_modes(fit: LocalFit, frequency: NDArray[np.float64], height: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _are_modes(fit: BandFit, frequency: NDArray[np.float64], height: NDArray[np.float64]) -> NDArray[np.bool_]:
     _, damping_error, flexibility_error = fit.standard_error
     return np.asarray(
         (fit.frequency > frequency[0])
@@ -105,15 +105,15 @@ def _are_modes(fit: LocalFit, frequency: NDArray[np.float64], height: NDArray[np
         & (fit.damping_ratio < 1)
         & (fit.mobility_peak > LEAST_SHARE * height)
         & (damping_error < LARGEST_ERROR * fit.damping_ratio)
-        & (flexibility_error < LARGEST_ERROR * np.abs(fit.flexibility))
+        & (flexibility_error < LARGEST_ERROR * np.abs(fit.flexibility[0]))
     )
 
 
-def _modes(fit: LocalFit, frequency: NDArray[np.float64]) -> Iterator[Mode]:
+def _modes(fit: BandFit, frequency: NDArray[np.float64]) -> Iterator[Mode]:
     n = fit.frequency.size
     method = f"least squares, {frequency[0]:.0f}..{frequency[-1]:.0f} Hz" + (f", {n} modes together" if n > 1 else "")
     for i in range(n):
-        stiffness = float(1 / fit.flexibility[i])
+        stiffness = float(1 / fit.flexibility[0, i])
         chain = np.array([1.0, 1.0, -(stiffness**2)])
         mine = np.ix_([i, n + i, 2 * n + i], [i, n + i, 2 * n + i])
         covariance = fit.covariance[mine] * np.outer(chain, chain)

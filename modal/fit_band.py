@@ -1,0 +1,222 @@
+"""Least squares of a few neighbouring modes at once, in one FRF or in several with the same poles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag, solve_triangular
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+MOST_TRIALS = 60
+"""Evaluations of the model; a mode in its own band takes some ten."""
+CONVERGED = 1e-13
+"""Step (share of the half-power half-width) after which there is nothing left to gain."""
+LEAST_SINGULAR = 1e-10
+"""Share of the largest singular value below which an unknown cannot be told from the others."""
+
+
+@dataclass(frozen=True, eq=False)
+class BandFit:
+    """Values of m modes that were fitted together in p FRFs."""
+
+    frequency: Array
+    """Natural frequencies (Hz), shape (m,)."""
+    damping_ratio: Array
+    """Damping ratios (-), shape (m,)."""
+    flexibility: Array
+    """1/K, signed (m/N), shape (p, m)."""
+    covariance: Array
+    """Of all frequencies, all damping ratios, then all flexibilities FRF by FRF, shape (2 m + p m, 2 m + p m)."""
+    influence: Array
+    """Change of those values by a change of the weighted FRFs, one Gauss-Newton step, shape (2 m + p m, 2 n p)."""
+    residual: Array
+    """Of the weighted FRFs, each its real and then its imaginary part, shape (2 n p,)."""
+
+    @property
+    def standard_error(self) -> Array:
+        """Standard errors of frequencies, damping ratios and flexibilities of the first FRF, shape (3, m)."""
+        return np.sqrt(np.diag(self.covariance))[: 3 * self.frequency.size].reshape(3, -1)
+
+    @property
+    def mobility_peak(self) -> Array:
+        """|mobility| of each mode alone at its natural frequency, largest of all FRFs (m/s/N), shape (m,)."""
+        return np.asarray(np.pi * self.frequency * np.abs(self.flexibility / self.damping_ratio).max(axis=0))
+
+    @property
+    def sum_of_squares(self) -> float:
+        """Of the weighted residuals."""
+        return float(self.residual @ self.residual)
+
+    def receptance(self, frequency: Array) -> ComplexArray:
+        """Sum of these modes alone (m/N) at these frequencies (Hz), shape (p, n)."""
+        return np.asarray(self.flexibility @ mode_curves(frequency, self.frequency, self.damping_ratio))
+
+
+def fit_band(frequency: Array, receptance: ComplexArray, weight: Array, starts: Array) -> BandFit | None:
+    """Fit H = sum of a_k / (1 - r_k^2 + 2i zeta_k r_k) + L/f^2 + U, r_k = f/f_k; None where nothing can be fitted.
+
+    a_k = 1/K_k is real. L (modes far below, and the free body) and U (modes far above) are complex: the tail of a
+    damped neighbour is not real, and a real L or U would push its imaginary part into zeta and K, by percents.
+    In accelerance, -(2 pi f)^2 H, L is a constant and U grows with f^2: the weight says what was measured.
+    The linear unknowns are eliminated (variable projection), f_k and zeta_k found by Levenberg-Marquardt.
+    frequency (Hz) has shape (n,), receptance (m/N) and weight (p, n), starts (Hz; damping ratios) (2, m).
+
+    Source: Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, 413; Kaufman (1975), BIT 15, 49 (Jacobian).
+    """
+    p, m = receptance.shape[0], starts.shape[1]
+    if 2 * m + p * (m + 4) >= 2 * receptance.size or m == 0:
+        return None
+    problem = _Problem(frequency, _split(weight * receptance), weight)
+    with np.errstate(all="ignore"):
+        try:
+            return _result(_solve(problem, starts))
+        except np.linalg.LinAlgError:
+            return None
+
+
+def mode_curves(frequency: Array, natural_frequency: Array, damping_ratio: Array) -> ComplexArray:
+    """1/(1 - r^2 + 2i zeta r) of m modes (rows) at n frequencies, shape (m, n)."""
+    r = frequency / natural_frequency[:, None]
+    return np.asarray(1 / (1 - r**2 + 2j * damping_ratio[:, None] * r))
+
+
+@dataclass(frozen=True, eq=False)
+class _Projected:
+    """One FRF at given poles with its linear unknowns eliminated."""
+
+    q: Array
+    """Orthonormal basis of the linear unknowns, (2 n, m + 4)."""
+    r: Array
+    """Its triangle, (m + 4, m + 4)."""
+    linear: Array
+    """Best linear unknowns, (m + 4,)."""
+    residual: Array
+    """Weighted data that is left, (2 n,)."""
+    slope: Array
+    """By frequencies (in shares of zeta f) and damping ratios (in shares of zeta) of the model, (2 n, 2 m)."""
+
+    @property
+    def jacobian(self) -> Array:
+        """Slope of the residual with the linear unknowns following (Kaufman), (2 n, 2 m)."""
+        return np.asarray(self.q @ (self.q.T @ self.slope) - self.slope)
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    poles: Array
+    """(2, m)."""
+    frfs: list[_Projected]
+
+    @property
+    def cost(self) -> float:
+        cost = float(sum(frf.residual @ frf.residual for frf in self.frfs))
+        return cost if np.all(np.isfinite(self.poles)) and np.all(self.poles > 0) and np.isfinite(cost) else np.inf
+
+    @property
+    def scale(self) -> Array:
+        """What a step of one means: zeta f and zeta, (2 m,)."""
+        return np.concatenate([self.poles[0] * self.poles[1], self.poles[1]])
+
+    @property
+    def jacobian(self) -> Array:
+        return np.concatenate([frf.jacobian for frf in self.frfs])
+
+    @property
+    def residual(self) -> Array:
+        return np.concatenate([frf.residual for frf in self.frfs])
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    frequency: Array
+    data: Array
+    """Weighted, (p, 2 n)."""
+    weight: Array
+    """(p, n)."""
+
+    def at(self, poles: Array) -> _State:
+        return _State(poles, list(self._projected(poles)))
+
+    def _projected(self, poles: Array) -> Iterator[_Projected]:
+        fn, zeta = poles
+        curves = mode_curves(self.frequency, fn, zeta)
+        r = self.frequency / fn[:, None]
+        slopes = np.concatenate([(2j * zeta[:, None] * r - 2 * r**2) * zeta[:, None], -2j * r * zeta[:, None]])
+        low = (np.mean(self.frequency) / self.frequency) ** 2
+        high = np.ones_like(low)
+        columns = np.concatenate([curves, [low, 1j * low, high, 1j * high]])
+        for data, weight in zip(self.data, self.weight, strict=True):
+            q, triangle = np.linalg.qr(_split(weight * columns).T)
+            part = q.T @ data
+            linear = solve_triangular(triangle, part)
+            a = np.tile(linear[: fn.size], 2)[:, None]
+            slope = _split(weight * a * slopes * np.tile(curves**2, (2, 1))).T
+            yield _Projected(q, triangle, linear, data - q @ part, slope)
+
+
+def _split(values: ComplexArray) -> Array:
+    """Real, then imaginary parts along the last axis."""
+    return np.concatenate([values.real, values.imag], axis=-1)
+
+
+def _solve(problem: _Problem, starts: Array) -> _State | None:
+    """Levenberg-Marquardt; None where it does not converge."""
+    state, damping = problem.at(starts), 1e-3
+    for _ in range(MOST_TRIALS):
+        if not np.isfinite(state.cost):
+            return None
+        step = _step(state, damping)
+        trial = problem.at(state.poles + (step * state.scale).reshape(2, -1))
+        small = np.max(np.abs(step)) < CONVERGED
+        if trial.cost < state.cost:
+            gained = 1 - trial.cost / state.cost
+            state, damping = trial, damping / 10
+            if small or gained < 1e-15:
+                return state
+        elif small or damping > 1e8 or (np.max(np.abs(step)) < 1e-6 and damping < 1e-3):
+            return state
+        else:
+            damping = max(damping, 1e-6) * 10
+    return None
+
+
+def _step(state: _State, damping: float) -> Array:
+    """Damped Gauss-Newton step in units of the scale, shape (2 m,)."""
+    jacobian = state.jacobian
+    norm = np.linalg.norm(jacobian, axis=0)
+    rows = np.vstack([jacobian / norm, np.sqrt(damping) * np.eye(norm.size)])
+    right = np.concatenate([-state.residual, np.zeros(norm.size)])
+    return np.asarray(np.linalg.lstsq(rows, right, rcond=None)[0] / norm)
+
+
+def _result(state: _State | None) -> BandFit | None:
+    if state is None:
+        return None
+    m, p = state.poles.shape[1], len(state.frfs)
+    jacobian = state.jacobian
+    norm = np.linalg.norm(jacobian, axis=0)
+    left, singular, right = np.linalg.svd(jacobian / norm, full_matrices=False)
+    if not singular[-1] > LEAST_SINGULAR * singular[0]:
+        return None
+    influence = _influence(state, -(right.T / singular) @ left.T / norm[:, None])
+    freedom = jacobian.shape[0] - 2 * m - p * (m + 4)
+    return BandFit(
+        *state.poles,
+        np.array([frf.linear[:m] for frf in state.frfs]),
+        influence @ influence.T * (state.cost / freedom),
+        influence,
+        state.residual,
+    )
+
+
+def _influence(state: _State, on_poles: Array) -> Array:
+    """On poles in Hz and damping ratio, then on the flexibilities; on_poles: on scaled poles, shape (2 m, 2 n p)."""
+    m = state.poles.shape[1]
+    own = block_diag(*(solve_triangular(frf.r, frf.q.T)[:m] for frf in state.frfs))
+    by_poles = np.concatenate([solve_triangular(frf.r, frf.q.T @ frf.slope)[:m] for frf in state.frfs])
+    return np.concatenate([on_poles * state.scale[:, None], own - by_poles @ on_poles])

@@ -1,0 +1,169 @@
+"""Modes band by band: LSCF poles to start from, least squares to refine them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Frf
+from modal.find_resonances import Resonance, find_resonances
+from modal.fit_band import BandFit, fit_band
+from modal.line_weights import line_weights
+from modal.local_bands import LocalBand, local_bands
+from modal.physical_poles import physical_poles
+from modal.stabilise import StabilisationChart, stabilise
+from modal.usable_lines import usable_lines
+
+Array = NDArray[np.float64]
+
+ORDERS = 14
+"""Highest order of the LSCF models of a band, several times the modes that one holds."""
+SWEEPS = 3
+"""Rounds over the local bands after the first, each with the tails of the other bands' modes taken off."""
+LARGEST_ERROR = 1 / 3
+"""Relative standard error of damping ratio and stiffness above which a peak is not a mode."""
+LEAST_SHARE = 0.05
+"""Share of its peak of the mobility that a mode has; 1 dB of prominence needs twice this."""
+HIDDEN_F = 40.0
+"""A mode without a peak of its own lowers the sum of squares by this many times what three unknowns do by chance."""
+HIDDEN_ERROR = 1 / 6
+"""Relative standard error that its damping ratio and stiffness have at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedBand:
+    """Some neighbouring modes that were fitted together."""
+
+    lines: slice
+    """Where on the frequency axis."""
+    resonances: tuple[Resonance, ...]
+    """The peaks that the band was laid around."""
+    height: Array
+    """What the mobility of each mode is measured against, its own peak or the highest of the band (m/s/N), (m,)."""
+    fit: BandFit
+    """Their values."""
+    chart: StabilisationChart
+    """LSCF poles of these lines, the tails of other bands' modes taken off."""
+
+
+@dataclass(frozen=True, eq=False)
+class Extraction:
+    """All that was found in one FRF."""
+
+    frf: Frf
+    """The lines that were used."""
+    weight: Array
+    """Their weights, shape (n,)."""
+    bands: tuple[FittedBand, ...]
+    """By rising frequency."""
+
+    def receptance(self, frequency: Array, without: FittedBand | None = None) -> NDArray[np.complex128]:
+        """Of all modes found but those of one band (m/N) at these frequencies (Hz), shape (n,)."""
+        parts = [band.fit.receptance(frequency)[0] for band in self.bands if band is not without]
+        return np.asarray(sum(parts, np.zeros(frequency.size, complex)))
+
+    def own(self, band: FittedBand) -> NDArray[np.complex128]:
+        """Measured receptance on the lines of a band without the modes of all others (m/N)."""
+        part = band.lines
+        return np.asarray(self.frf.receptance[part] - self.receptance(self.frf.frequency[part], without=band))
+
+
+def extract(frf: Frf, band: tuple[float, float] | None = None) -> Extraction:
+    """Find and fit all modes between band[0] and band[1] (Hz). Raises ValueError as `fit_modes`."""
+    lines = usable_lines(frf, band)
+    weight = line_weights(lines)
+    found = (_first(lines, weight, local) for local in local_bands(find_resonances(lines), lines.frequency))
+    state = Extraction(lines, weight, tuple(band for band in found if band is not None))
+    for sweep in range(1 + (SWEEPS if len(state.bands) > 1 else 0)):
+        for i in range(len(state.bands)):
+            state = _again(state, i, look_closer=sweep == 0)
+        state = replace(state, bands=tuple(band for band in state.bands if band.height.size))
+    return state
+
+
+def _first(frf: Frf, weight: Array, local: LocalBand) -> FittedBand | None:
+    """The resonances of a band, each from the LSCF pole nearest to it, else from its own width."""
+    part = local.lines
+    f, own, w = frf.frequency[part], frf.receptance[part], weight[part]
+    chart = stabilise(f, own[None], w[None], ORDERS)
+    poles = physical_poles(chart)
+    starts = np.array([(r.frequency, r.half_width / r.frequency) for r in local.resonances]).T
+    for i, resonance in enumerate(local.resonances):
+        near = np.abs(poles.frequency - resonance.frequency) < resonance.half_width
+        if np.any(near):
+            best = np.argmax(np.where(near, np.abs(poles.flexibility[:, 0]) / poles.damping_ratio, 0))
+            starts[:, i] = poles.frequency[best], poles.damping_ratio[best]
+    height = np.array([r.height for r in local.resonances])
+    fitted = _fit(f, own, w, starts, height)
+    return None if fitted is None else FittedBand(part, local.resonances, fitted[1], fitted[0], chart)
+
+
+def _again(state: Extraction, i: int, look_closer: bool) -> Extraction:
+    """Fit band i to what the modes of all others leave; closer: also look for modes that have no peak."""
+    band = state.bands[i]
+    f, own, weight = state.frf.frequency[band.lines], state.own(band), state.weight[band.lines]
+    fitted = _fit(f, own, weight, np.stack([band.fit.frequency, band.fit.damping_ratio]), band.height)
+    if fitted is None:
+        new = replace(band, height=np.empty(0))
+    else:
+        new = replace(band, fit=fitted[0], height=fitted[1])
+        new = _with_hidden(new, f, own, weight) if look_closer else new
+    return replace(state, bands=(*state.bands[:i], new, *state.bands[i + 1 :]))
+
+
+def _with_hidden(band: FittedBand, f: Array, own: NDArray[np.complex128], weight: Array) -> FittedBand:
+    """The band with those LSCF poles added that are modes although they have no peak of their own, highest first."""
+    chart = stabilise(f, own[None], weight[None], ORDERS)
+    poles = physical_poles(chart)
+    band, peak = replace(band, chart=chart), np.max(band.height)
+    size = np.pi * poles.frequency * np.abs(poles.flexibility[:, 0]) / poles.damping_ratio
+    high = size > LEAST_SHARE * peak
+    starts = np.stack([poles.frequency, poles.damping_ratio])[:, high]
+    alone = [k for k in range(band.height.size) if not np.any(_is_near(band.fit, k, starts[0]))]
+    starts = np.hstack([starts, np.stack([band.fit.frequency, band.fit.damping_ratio])[:, alone]])
+    size = np.concatenate([size[high], band.fit.mobility_peak[alone]])
+    for keep in (np.argsort(-size)[:n] for n in range(size.size, band.height.size, -1)):
+        fit = fit_band(f, own[None], weight[None], starts[:, keep])
+        height = np.full(keep.size, peak)
+        if fit is not None and np.all(_are_modes(fit, f, height, HIDDEN_ERROR)) and _is_better(fit, band.fit):
+            return replace(band, fit=fit, height=height)
+    return band
+
+
+def _is_near(fit: BandFit, k: int, frequency: Array) -> NDArray[np.bool_]:
+    return np.abs(frequency - fit.frequency[k]) < fit.damping_ratio[k] * fit.frequency[k]
+
+
+def _is_better(more: BandFit, fewer: BandFit) -> bool:
+    """Whether the modes that one fit has more than the other are worth their unknowns."""
+    unknowns = 3 * (more.frequency.size - fewer.frequency.size)
+    mean_square = more.sum_of_squares / (more.residual.size - 3 * more.frequency.size - 4)
+    return fewer.sum_of_squares - more.sum_of_squares > HIDDEN_F * unknowns * mean_square
+
+
+def _fit(
+    f: Array, own: NDArray[np.complex128], weight: Array, starts: Array, height: Array
+) -> tuple[BandFit, Array] | None:
+    """Fit after the weakest of those that turn out to be no modes are taken out, one by one."""
+    while height.size:
+        fit = fit_band(f, own[None], weight[None], starts)
+        sure = np.zeros(height.size, bool) if fit is None else _are_modes(fit, f, height)
+        if fit is not None and np.all(sure):
+            return fit, height
+        keep = np.arange(sure.size) != np.argmin(np.where(sure, np.inf, height))
+        starts, height = starts[:, keep], height[keep]
+    return None
+
+
+def _are_modes(fit: BandFit, frequency: Array, height: Array, largest_error: float = LARGEST_ERROR) -> NDArray[np.bool_]:
+    _, damping_error, flexibility_error = fit.standard_error
+    return np.asarray(
+        (fit.frequency > frequency[0])
+        & (fit.frequency < frequency[-1])
+        & (fit.damping_ratio < 1)
+        & (fit.mobility_peak > LEAST_SHARE * height)
+        & (damping_error < largest_error * fit.damping_ratio)
+        & (flexibility_error < largest_error * np.abs(fit.flexibility[0]))
+    )

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from acquisition import Frf
 from modal.find_resonances import Resonance, find_resonances
-from modal.fit_band import BandFit, fit_band
+from modal.fit_band import RESIDUAL_POWERS, BandFit, fit_band
 from modal.line_weights import line_weights
 from modal.local_bands import LocalBand, local_bands
 from modal.physical_poles import physical_poles
@@ -28,6 +28,8 @@ LEAST_SHARE = 0.05
 """Share of its peak of the mobility that a mode has; 1 dB of prominence needs twice this."""
 HIDDEN_F = 40.0
 """A mode without a peak of its own lowers the sum of squares by this many times what three unknowns do by chance."""
+TERM_F = 8.0
+"""A further residual term lowers it by this many times what two unknowns do by chance."""
 HIDDEN_ERROR = 1 / 6
 """Relative standard error that its damping ratio and stiffness have at most."""
 
@@ -44,6 +46,8 @@ class FittedBand:
     """What the mobility of each mode is measured against, its own peak or the highest of the band (m/s/N), (m,)."""
     fit: BandFit
     """Their values."""
+    terms: int
+    """Complex residual terms."""
     chart: StabilisationChart
     """LSCF poles of these lines, the tails of other bands' modes taken off."""
 
@@ -97,14 +101,15 @@ def _first(frf: Frf, weight: Array, local: LocalBand) -> FittedBand | None:
             starts[:, i] = poles.frequency[best], poles.damping_ratio[best]
     height = np.array([r.height for r in local.resonances])
     fitted = _fit(f, own, w, starts, height)
-    return None if fitted is None else FittedBand(part, local.resonances, fitted[1], fitted[0], chart)
+    return None if fitted is None else FittedBand(part, local.resonances, fitted[1], fitted[0], 2, chart)
 
 
 def _again(state: Extraction, i: int, look_closer: bool) -> Extraction:
     """Fit band i to what the modes of all others leave; closer: also look for modes that have no peak."""
     band = state.bands[i]
     f, own, weight = state.frf.frequency[band.lines], state.own(band), state.weight[band.lines]
-    fitted = _fit(f, own, weight, np.stack([band.fit.frequency, band.fit.damping_ratio]), band.height)
+    starts = np.stack([band.fit.frequency, band.fit.damping_ratio])
+    fitted = _fit(f, own, weight, starts, band.height, band.terms)
     if fitted is None:
         new = replace(band, height=np.empty(0))
     else:
@@ -117,7 +122,7 @@ def _with_hidden(band: FittedBand, f: Array, own: NDArray[np.complex128], weight
     """The band with those LSCF poles added that are modes although they have no peak of their own, highest first."""
     chart = stabilise(f, own[None], weight[None], ORDERS)
     poles = physical_poles(chart)
-    band, peak = replace(band, chart=chart), np.max(band.height)
+    band, peak = _with_terms(replace(band, chart=chart), f, own, weight), np.max(band.height)
     size = np.pi * poles.frequency * np.abs(poles.flexibility[:, 0]) / poles.damping_ratio
     high = size > LEAST_SHARE * peak
     starts = np.stack([poles.frequency, poles.damping_ratio])[:, high]
@@ -125,10 +130,22 @@ def _with_hidden(band: FittedBand, f: Array, own: NDArray[np.complex128], weight
     starts = np.hstack([starts, np.stack([band.fit.frequency, band.fit.damping_ratio])[:, alone]])
     size = np.concatenate([size[high], band.fit.mobility_peak[alone]])
     for keep in (np.argsort(-size)[:n] for n in range(size.size, band.height.size, -1)):
-        fit = fit_band(f, own[None], weight[None], starts[:, keep])
-        height = np.full(keep.size, peak)
-        if fit is not None and np.all(_are_modes(fit, f, height, HIDDEN_ERROR)) and _is_better(fit, band.fit):
-            return replace(band, fit=fit, height=height)
+        fit, height = fit_band(f, own[None], weight[None], starts[:, keep]), np.full(keep.size, peak)
+        if fit is None:
+            continue
+        more = _with_terms(replace(band, fit=fit, height=height, terms=2), f, own, weight)
+        if np.all(_are_modes(more.fit, f, height, HIDDEN_ERROR)) and _is_better(more.fit, band.fit, HIDDEN_F):
+            return more
+    return band
+
+
+def _with_terms(band: FittedBand, f: Array, own: NDArray[np.complex128], weight: Array) -> FittedBand:
+    """The band with as many residual terms as lower the sum of squares for more than by chance."""
+    for terms in range(band.terms + 1, len(RESIDUAL_POWERS) + 1):
+        fit = fit_band(f, own[None], weight[None], np.stack([band.fit.frequency, band.fit.damping_ratio]), terms)
+        if fit is None or not _is_better(fit, band.fit, TERM_F) or not np.all(_are_modes(fit, f, band.height)):
+            break
+        band = replace(band, fit=fit, terms=terms)
     return band
 
 
@@ -136,19 +153,18 @@ def _is_near(fit: BandFit, k: int, frequency: Array) -> NDArray[np.bool_]:
     return np.abs(frequency - fit.frequency[k]) < fit.damping_ratio[k] * fit.frequency[k]
 
 
-def _is_better(more: BandFit, fewer: BandFit) -> bool:
-    """Whether the modes that one fit has more than the other are worth their unknowns."""
-    unknowns = 3 * (more.frequency.size - fewer.frequency.size)
-    mean_square = more.sum_of_squares / (more.residual.size - 3 * more.frequency.size - 4)
-    return fewer.sum_of_squares - more.sum_of_squares > HIDDEN_F * unknowns * mean_square
+def _is_better(more: BandFit, fewer: BandFit, least: float) -> bool:
+    """Whether the sum of squares falls by more than `least` times what the further unknowns take off by chance."""
+    gain = (fewer.sum_of_squares - more.sum_of_squares) / max(fewer.freedom - more.freedom, 1)
+    return gain > least * more.sum_of_squares / more.freedom
 
 
 def _fit(
-    f: Array, own: NDArray[np.complex128], weight: Array, starts: Array, height: Array
+    f: Array, own: NDArray[np.complex128], weight: Array, starts: Array, height: Array, terms: int = 2
 ) -> tuple[BandFit, Array] | None:
     """Fit after the weakest of those that turn out to be no modes are taken out, one by one."""
     while height.size:
-        fit = fit_band(f, own[None], weight[None], starts)
+        fit = fit_band(f, own[None], weight[None], starts, terms)
         sure = np.zeros(height.size, bool) if fit is None else _are_modes(fit, f, height)
         if fit is not None and np.all(sure):
             return fit, height

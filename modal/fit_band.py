@@ -12,6 +12,8 @@ from scipy.linalg import block_diag, solve_triangular
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
+RESIDUAL_POWERS = (-2, 0, 2, 4)
+"""Of the frequency, in the order in which residual terms are taken."""
 MOST_TRIALS = 60
 """Evaluations of the model; a mode in its own band takes some ten."""
 CONVERGED = 1e-13
@@ -32,6 +34,8 @@ class BandFit:
     """1/K, signed (m/N), shape (p, m)."""
     covariance: Array
     """Of all frequencies, all damping ratios, then all flexibilities FRF by FRF, shape (2 m + p m, 2 m + p m)."""
+    freedom: int
+    """Real values that were fitted less unknowns."""
     influence: Array
     """Change of those values by a change of the weighted FRFs, one Gauss-Newton step, shape (2 m + p m, 2 n p)."""
     residual: Array
@@ -57,21 +61,24 @@ class BandFit:
         return np.asarray(self.flexibility @ mode_curves(frequency, self.frequency, self.damping_ratio))
 
 
-def fit_band(frequency: Array, receptance: ComplexArray, weight: Array, starts: Array) -> BandFit | None:
-    """Fit H = sum of a_k / (1 - r_k^2 + 2i zeta_k r_k) + L/f^2 + U, r_k = f/f_k; None where nothing can be fitted.
+def fit_band(
+    frequency: Array, receptance: ComplexArray, weight: Array, starts: Array, terms: int = 2
+) -> BandFit | None:
+    """Fit H = sum of a_k / (1 - r_k^2 + 2i zeta_k r_k) + L/f^2 + U + ..., r_k = f/f_k; None where nothing fits.
 
     a_k = 1/K_k is real. L (modes far below, and the free body) and U (modes far above) are complex: the tail of a
     damped neighbour is not real, and a real L or U would push its imaginary part into zeta and K, by percents.
-    In accelerance, -(2 pi f)^2 H, L is a constant and U grows with f^2: the weight says what was measured.
+    In accelerance, -(2 pi f)^2 H, L is a constant and U grows with f^2: the weight says what was measured. A third
+    and a fourth term, f^2 and f^4, are for a strong mode just outside the band.
     The linear unknowns are eliminated (variable projection), f_k and zeta_k found by Levenberg-Marquardt.
     frequency (Hz) has shape (n,), receptance (m/N) and weight (p, n), starts (Hz; damping ratios) (2, m).
 
     Source: Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, 413; Kaufman (1975), BIT 15, 49 (Jacobian).
     """
     p, m = receptance.shape[0], starts.shape[1]
-    if 2 * m + p * (m + 4) >= 2 * receptance.size or m == 0:
+    if 2 * m + p * (m + 2 * terms) >= 2 * receptance.size or m == 0:
         return None
-    problem = _Problem(frequency, _split(weight * receptance), weight)
+    problem = _Problem(frequency, _split(weight * receptance), weight, terms)
     with np.errstate(all="ignore"):
         try:
             return _result(_solve(problem, starts))
@@ -90,11 +97,11 @@ class _Projected:
     """One FRF at given poles with its linear unknowns eliminated."""
 
     q: Array
-    """Orthonormal basis of the linear unknowns, (2 n, m + 4)."""
+    """Orthonormal basis of the linear unknowns, (2 n, m + 2 terms)."""
     r: Array
-    """Its triangle, (m + 4, m + 4)."""
+    """Its triangle, square."""
     linear: Array
-    """Best linear unknowns, (m + 4,)."""
+    """Best linear unknowns, (m + 2 terms,)."""
     residual: Array
     """Weighted data that is left, (2 n,)."""
     slope: Array
@@ -138,6 +145,7 @@ class _Problem:
     """Weighted, (p, 2 n)."""
     weight: Array
     """(p, n)."""
+    terms: int
 
     def at(self, poles: Array) -> _State:
         return _State(poles, list(self._projected(poles)))
@@ -147,9 +155,8 @@ class _Problem:
         curves = mode_curves(self.frequency, fn, zeta)
         r = self.frequency / fn[:, None]
         slopes = np.concatenate([(2j * zeta[:, None] * r - 2 * r**2) * zeta[:, None], -2j * r * zeta[:, None]])
-        low = (np.mean(self.frequency) / self.frequency) ** 2
-        high = np.ones_like(low)
-        columns = np.concatenate([curves, [low, 1j * low, high, 1j * high]])
+        residual = (self.frequency / np.mean(self.frequency)) ** np.array([RESIDUAL_POWERS[: self.terms]], dtype=float).T
+        columns = np.concatenate([curves, residual, 1j * residual])
         for data, weight in zip(self.data, self.weight, strict=True):
             q, triangle = np.linalg.qr(_split(weight * columns).T)
             part = q.T @ data
@@ -197,18 +204,19 @@ def _step(state: _State, damping: float) -> Array:
 def _result(state: _State | None) -> BandFit | None:
     if state is None:
         return None
-    m, p = state.poles.shape[1], len(state.frfs)
+    m = state.poles.shape[1]
     jacobian = state.jacobian
     norm = np.linalg.norm(jacobian, axis=0)
     left, singular, right = np.linalg.svd(jacobian / norm, full_matrices=False)
     if not singular[-1] > LEAST_SINGULAR * singular[0]:
         return None
     influence = _influence(state, -(right.T / singular) @ left.T / norm[:, None])
-    freedom = jacobian.shape[0] - 2 * m - p * (m + 4)
+    freedom = jacobian.shape[0] - 2 * m - sum(frf.linear.size for frf in state.frfs)
     return BandFit(
         *state.poles,
         np.array([frf.linear[:m] for frf in state.frfs]),
         influence @ influence.T * (state.cost / freedom),
+        freedom,
         influence,
         state.residual,
     )

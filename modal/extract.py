@@ -28,6 +28,8 @@ LEAST_SHARE = 0.05
 """Share of its peak of the mobility that a mode has; 1 dB of prominence needs twice this."""
 HIDDEN_F = 40.0
 """A mode without a peak of its own lowers the sum of squares by this many times what three unknowns do by chance."""
+LEAST_TERMS = 3
+"""Complex residual terms that every band has."""
 TERM_F = 8.0
 """A further residual term lowers it by this many times what two unknowns do by chance."""
 HIDDEN_ERROR = 1 / 6
@@ -101,7 +103,7 @@ def _first(frf: Frf, weight: Array, local: LocalBand) -> FittedBand | None:
             starts[:, i] = poles.frequency[best], poles.damping_ratio[best]
     height = np.array([r.height for r in local.resonances])
     fitted = _fit(f, own, w, starts, height)
-    return None if fitted is None else FittedBand(part, local.resonances, fitted[1], fitted[0], 2, chart)
+    return None if fitted is None else FittedBand(part, local.resonances, fitted[1], fitted[0], LEAST_TERMS, chart)
 
 
 def _again(state: Extraction, i: int, look_closer: bool) -> Extraction:
@@ -133,7 +135,7 @@ def _with_hidden(band: FittedBand, f: Array, own: NDArray[np.complex128], weight
         fit, height = fit_band(f, own[None], weight[None], starts[:, keep]), np.full(keep.size, peak)
         if fit is None:
             continue
-        more = _with_terms(replace(band, fit=fit, height=height, terms=2), f, own, weight)
+        more = _with_terms(replace(band, fit=fit, height=height, terms=LEAST_TERMS), f, own, weight)
         if np.all(_are_modes(more.fit, f, height, HIDDEN_ERROR)) and _is_better(more.fit, band.fit, HIDDEN_F):
             return more
     return band
@@ -160,7 +162,7 @@ def _is_better(more: BandFit, fewer: BandFit, least: float) -> bool:
 
 
 def _fit(
-    f: Array, own: NDArray[np.complex128], weight: Array, starts: Array, height: Array, terms: int = 2
+    f: Array, own: NDArray[np.complex128], weight: Array, starts: Array, height: Array, terms: int = LEAST_TERMS
 ) -> tuple[BandFit, Array] | None:
     """Fit after the weakest of those that turn out to be no modes are taken out, one by one."""
     while height.size:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, solve_triangular
+from scipy.linalg import block_diag
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -98,8 +98,8 @@ class _Projected:
 
     q: Array
     """Orthonormal basis of the linear unknowns, (2 n, m + 2 terms)."""
-    r: Array
-    """Its triangle, square."""
+    inverse: Array
+    """Inverse of its triangle, square."""
     linear: Array
     """Best linear unknowns, (m + 2 terms,)."""
     residual: Array
@@ -160,10 +160,11 @@ class _Problem:
         for data, weight in zip(self.data, self.weight, strict=True):
             q, triangle = np.linalg.qr(_split(weight * columns).T)
             part = q.T @ data
-            linear = solve_triangular(triangle, part)
+            inverse = np.linalg.inv(triangle)
+            linear = inverse @ part
             a = np.tile(linear[: fn.size], 2)[:, None]
             slope = _split(weight * a * slopes * np.tile(curves**2, (2, 1))).T
-            yield _Projected(q, triangle, linear, data - q @ part, slope)
+            yield _Projected(q, inverse, linear, data - q @ part, slope)
 
 
 def _split(values: ComplexArray) -> Array:
@@ -225,6 +226,6 @@ def _result(state: _State | None) -> BandFit | None:
 def _influence(state: _State, on_poles: Array) -> Array:
     """On poles in Hz and damping ratio, then on the flexibilities; on_poles: on scaled poles, shape (2 m, 2 n p)."""
     m = state.poles.shape[1]
-    own = block_diag(*(solve_triangular(frf.r, frf.q.T)[:m] for frf in state.frfs))
-    by_poles = np.concatenate([solve_triangular(frf.r, frf.q.T @ frf.slope)[:m] for frf in state.frfs])
+    own = block_diag(*(frf.inverse[:m] @ frf.q.T for frf in state.frfs))
+    by_poles = np.concatenate([frf.inverse[:m] @ (frf.q.T @ frf.slope) for frf in state.frfs])
     return np.concatenate([on_poles * state.scale[:, None], own - by_poles @ on_poles])

@@ -1,26 +1,70 @@
-"""Modes by LSCF and least squares: the default."""
+"""Modes by LSCF and weighted least squares: the default."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
-from acquisition import Frf
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Frf, Hit
+from modal.assess import assess
 from modal.extract import Extraction, FittedBand, extract
+from modal.jackknife import jackknife, left_out
 from modal.mode import Mode
 
 
-def fit_modes(frf: Frf, band: tuple[float, float] | None = None) -> list[Mode]:
-    """x."""
+def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[Hit] = ()) -> list[Mode]:
+    """Modes from the lines between band[0] and band[1] (Hz), by rising frequency, each with its covariance; maybe none.
+
+    Every resonance is fitted in a local band of some half-power widths, close ones together, from LSCF poles that
+    stay where they are as the order grows; those without a peak of their own are taken where the sum of squares asks
+    for them. Complex residual terms stand for what lies outside, and the tails of all other fitted modes are taken
+    off. A line counts by its random error (from a smoothed coherence), or equally in the measured quantity where
+    none is known; the covariance is scaled by the reduced chi-square. A peak is left out where least squares does
+    not converge to a mode inside its local band, or leaves its damping ratio or stiffness uncertain by more than a
+    third; `pick_peaks` may still list it. What else speaks against a mode stands in its `doubts`.
+
+    hits: those that the FRF was averaged from (H1), three or more; then the modes also have a jackknife over hits,
+    which holds for errors that are alike at neighbouring lines (noise of the hammer), too.
+
+    Source: Peeters et al. (2004), Shock and Vibration 11, 395 (LSCF); Ewins, Modal Testing, ch. 4 (curve fitting
+    with residuals); Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, 413.
+
+    Raises ValueError for fewer than 8 usable lines, an FRF of zeros, one with its phase conjugated, one without
+    phase, and hits that have other lines than the FRF.
+    """
     state = extract(frf, band)
-    modes = [_mode(state, band, i) for band in state.bands for i in range(band.height.size)]
-    return sorted(modes, key=lambda mode: mode.frequency)
+    without = left_out(hits, state.frf)
+    return modes_of(state, without)
 
 
-def _mode(state: Extraction, band: FittedBand, i: int) -> Mode:
+def modes_of(state: Extraction, without: Sequence[Frf] = ()) -> list[Mode]:
+    """Modes of an extraction, by rising frequency; without: FRFs that lack one hit each."""
+    found = [mode for band in state.bands for mode in _modes(state, band, without)]
+    return assess(state, sorted(found, key=lambda mode: mode.frequency))
+
+
+def _modes(state: Extraction, band: FittedBand, without: Sequence[Frf]) -> list[Mode]:
     f, n, fit = state.frf.frequency[band.lines], band.height.size, band.fit
     method = f"least squares, {f[0]:.0f}..{f[-1]:.0f} Hz" + (f", {n} modes together" if n > 1 else "")
-    stiffness = float(1 / fit.flexibility[0, i])
-    chain = np.array([1.0, 1.0, -(stiffness**2)])
-    mine = [i, n + i, 2 * n + i]
-    covariance = fit.covariance[np.ix_(mine, mine)] * np.outer(chain, chain)
-    return Mode(float(fit.frequency[i]), float(fit.damping_ratio[i]), stiffness, covariance, method)
+    scatter = jackknife(state, band, without) if without else None
+    return [
+        Mode(
+            float(fit.frequency[i]),
+            float(fit.damping_ratio[i]),
+            float(1 / fit.flexibility[0, i]),
+            _of_one(fit.covariance, i, fit.flexibility[0]),
+            method,
+            None if scatter is None else _of_one(scatter, i, fit.flexibility[0]),
+            len(without),
+        )
+        for i in range(n)
+    ]
+
+
+def _of_one(covariance: NDArray[np.float64], i: int, flexibility: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Covariance of frequency, damping ratio and stiffness of mode i from that of all modes of a band."""
+    mine = np.ix_(*2 * [[i, flexibility.size + i, 2 * flexibility.size + i]])
+    chain = np.array([1.0, 1.0, -1 / flexibility[i] ** 2])
+    return np.asarray(covariance[mine] * np.outer(chain, chain))

@@ -8,7 +8,7 @@ from scipy.ndimage import uniform_filter1d
 
 from acquisition import Frf
 
-SMOOTHED_OVER = 9
+SMOOTHED_OVER = 25
 """Lines over which the variance is averaged, so that a line that is small by chance does not count for more."""
 LEAST_VARIANCE = 1e-6
 """Share of the mean variance below which no line is believed."""

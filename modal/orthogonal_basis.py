@@ -33,15 +33,15 @@ class OrthogonalBasis:
 
 def orthogonal_basis(x: NDArray[np.float64], weight: ComplexArray, order: int) -> OrthogonalBasis:
     """Basis up to this order at x, shape (lines,), with these weights, shape (lines,)."""
-    values = np.empty((x.size, order + 1), dtype=np.complex128)
+    rows = np.empty((order + 1, x.size), dtype=np.complex128)
     recurrence = np.zeros((order + 1, order), dtype=np.complex128)
-    values[:, 0] = weight / np.linalg.norm(weight)
+    rows[0] = weight / np.linalg.norm(weight)
     for k in range(order):
-        new = x * values[:, k]
+        new = x * rows[k]
         for _ in range(2):
-            part = values[:, : k + 1].conj().T @ new
-            new -= values[:, : k + 1] @ part
+            part = (rows[: k + 1] @ new.conj()).conj()
+            new -= part @ rows[: k + 1]
             recurrence[: k + 1, k] += part
         recurrence[k + 1, k] = np.linalg.norm(new)
-        values[:, k + 1] = new / recurrence[k + 1, k]
-    return OrthogonalBasis(values, recurrence)
+        rows[k + 1] = new / recurrence[k + 1, k]
+    return OrthogonalBasis(rows.T, recurrence)

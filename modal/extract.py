@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from acquisition import Frf
 from modal.find_resonances import Resonance, find_resonances
@@ -30,7 +31,7 @@ HIDDEN_F = 40.0
 """A mode without a peak of its own lowers the sum of squares by this many times what three unknowns do by chance."""
 LEAST_TERMS = 3
 """Complex residual terms that every band has."""
-TERM_F = 8.0
+TERM_F = 12.0
 """A further residual term lowers it by this many times what two unknowns do by chance."""
 HIDDEN_ERROR = 1 / 6
 """Relative standard error that its damping ratio and stiffness have at most."""
@@ -50,6 +51,8 @@ class FittedBand:
     """Their values."""
     terms: int
     """Complex residual terms."""
+    suspects: tuple[float, ...]
+    """Frequencies of modes that may stand here instead of those fitted, but are too uncertain (Hz)."""
     chart: StabilisationChart
     """LSCF poles of these lines, the tails of other bands' modes taken off."""
 
@@ -78,7 +81,11 @@ class Extraction:
 
 def extract(frf: Frf, band: tuple[float, float] | None = None) -> Extraction:
     """Find and fit all modes between band[0] and band[1] (Hz). Raises ValueError as `fit_modes`."""
-    lines = usable_lines(frf, band)
+    with threadpool_limits(limits=1):
+        return _extract(usable_lines(frf, band))
+
+
+def _extract(lines: Frf) -> Extraction:
     weight = line_weights(lines)
     found = (_first(lines, weight, local) for local in local_bands(find_resonances(lines), lines.frequency))
     state = Extraction(lines, weight, tuple(band for band in found if band is not None))
@@ -103,7 +110,7 @@ def _first(frf: Frf, weight: Array, local: LocalBand) -> FittedBand | None:
             starts[:, i] = poles.frequency[best], poles.damping_ratio[best]
     height = np.array([r.height for r in local.resonances])
     fitted = _fit(f, own, w, starts, height)
-    return None if fitted is None else FittedBand(part, local.resonances, fitted[1], fitted[0], LEAST_TERMS, chart)
+    return None if fitted is None else FittedBand(part, local.resonances, fitted[1], fitted[0], LEAST_TERMS, (), chart)
 
 
 def _again(state: Extraction, i: int, look_closer: bool) -> Extraction:
@@ -138,6 +145,8 @@ def _with_hidden(band: FittedBand, f: Array, own: NDArray[np.complex128], weight
         more = _with_terms(replace(band, fit=fit, height=height, terms=LEAST_TERMS), f, own, weight)
         if np.all(_are_modes(more.fit, f, height, HIDDEN_ERROR)) and _is_better(more.fit, band.fit, HIDDEN_F):
             return more
+        if np.all(_are_modes(more.fit, f, height, np.inf)) and _is_better(more.fit, band.fit, TERM_F):
+            band = replace(band, suspects=tuple(more.fit.frequency.tolist()))
     return band
 
 

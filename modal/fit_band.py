@@ -92,6 +92,11 @@ def mode_curves(frequency: Array, natural_frequency: Array, damping_ratio: Array
     return np.asarray(1 / (1 - r**2 + 2j * damping_ratio[:, None] * r))
 
 
+def residual_terms(frequency: Array, terms: int) -> Array:
+    """The first powers of the frequency that stand for what lies outside the band, shape (terms, n)."""
+    return np.asarray((frequency / np.mean(frequency)) ** np.array([RESIDUAL_POWERS[:terms]], dtype=float).T)
+
+
 @dataclass(frozen=True, eq=False)
 class _Projected:
     """One FRF at given poles with its linear unknowns eliminated."""
@@ -155,7 +160,7 @@ class _Problem:
         curves = mode_curves(self.frequency, fn, zeta)
         r = self.frequency / fn[:, None]
         slopes = np.concatenate([(2j * zeta[:, None] * r - 2 * r**2) * zeta[:, None], -2j * r * zeta[:, None]])
-        residual = (self.frequency / np.mean(self.frequency)) ** np.array([RESIDUAL_POWERS[: self.terms]], dtype=float).T
+        residual = residual_terms(self.frequency, self.terms)
         columns = np.concatenate([curves, residual, 1j * residual])
         for data, weight in zip(self.data, self.weight, strict=True):
             q, triangle = np.linalg.qr(_split(weight * columns).T)

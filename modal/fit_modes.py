@@ -35,21 +35,20 @@ def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[
     phase, and hits that have other lines than the FRF.
     """
     state = extract(frf, band)
-    without = left_out(hits, state.frf)
-    return modes_of(state, without)
+    return modes_of(state, left_out(hits, state.frf))
 
 
 def modes_of(state: Extraction, without: Sequence[Frf] = ()) -> list[Mode]:
     """Modes of an extraction, by rising frequency; without: FRFs that lack one hit each."""
     found = [mode for band in state.bands for mode in _modes(state, band, without)]
-    return assess(state, sorted(found, key=lambda mode: mode.frequency))
+    return sorted(found, key=lambda mode: mode.frequency)
 
 
 def _modes(state: Extraction, band: FittedBand, without: Sequence[Frf]) -> list[Mode]:
     f, n, fit = state.frf.frequency[band.lines], band.height.size, band.fit
     method = f"least squares, {f[0]:.0f}..{f[-1]:.0f} Hz" + (f", {n} modes together" if n > 1 else "")
     scatter = jackknife(state, band, without) if without else None
-    return [
+    modes = [
         Mode(
             float(fit.frequency[i]),
             float(fit.damping_ratio[i]),
@@ -61,6 +60,7 @@ def _modes(state: Extraction, band: FittedBand, without: Sequence[Frf]) -> list[
         )
         for i in range(n)
     ]
+    return [assess(state, band, i, mode) for i, mode in enumerate(modes)]
 
 
 def _of_one(covariance: NDArray[np.float64], i: int, flexibility: NDArray[np.float64]) -> NDArray[np.float64]:

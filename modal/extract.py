@@ -161,7 +161,7 @@ def _with_terms(band: FittedBand, f: Array, own: NDArray[np.complex128], weight:
 
 
 def _is_near(fit: BandFit, k: int, frequency: Array) -> NDArray[np.bool_]:
-    return np.abs(frequency - fit.frequency[k]) < fit.damping_ratio[k] * fit.frequency[k]
+    return np.asarray(np.abs(frequency - fit.frequency[k]) < fit.damping_ratio[k] * fit.frequency[k])
 
 
 def _is_better(more: BandFit, fewer: BandFit, least: float) -> bool:
@@ -184,7 +184,9 @@ def _fit(
     return None
 
 
-def _are_modes(fit: BandFit, frequency: Array, height: Array, largest_error: float = LARGEST_ERROR) -> NDArray[np.bool_]:
+def _are_modes(
+    fit: BandFit, frequency: Array, height: Array, largest_error: float = LARGEST_ERROR
+) -> NDArray[np.bool_]:
     _, damping_error, flexibility_error = fit.standard_error
     return np.asarray(
         (fit.frequency > frequency[0])

@@ -219,7 +219,8 @@ def _result(state: _State | None) -> BandFit | None:
     influence = _influence(state, -(right.T / singular) @ left.T / norm[:, None])
     freedom = jacobian.shape[0] - 2 * m - sum(frf.linear.size for frf in state.frfs)
     return BandFit(
-        *state.poles,
+        state.poles[0],
+        state.poles[1],
         np.array([frf.linear[:m] for frf in state.frfs]),
         influence @ influence.T * (state.cost / freedom),
         freedom,

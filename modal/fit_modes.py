@@ -53,9 +53,9 @@ def _modes(state: Extraction, band: FittedBand, without: Sequence[Frf]) -> list[
             float(fit.frequency[i]),
             float(fit.damping_ratio[i]),
             float(1 / fit.flexibility[0, i]),
-            _of_one(fit.covariance, i, fit.flexibility[0]),
+            of_one(fit.covariance, i, fit.flexibility[0]),
             method,
-            None if scatter is None else _of_one(scatter, i, fit.flexibility[0]),
+            None if scatter is None else of_one(scatter, i, fit.flexibility[0]),
             len(without),
         )
         for i in range(n)
@@ -63,7 +63,7 @@ def _modes(state: Extraction, band: FittedBand, without: Sequence[Frf]) -> list[
     return [assess(state, band, i, mode) for i, mode in enumerate(modes)]
 
 
-def _of_one(covariance: NDArray[np.float64], i: int, flexibility: NDArray[np.float64]) -> NDArray[np.float64]:
+def of_one(covariance: NDArray[np.float64], i: int, flexibility: NDArray[np.float64]) -> NDArray[np.float64]:
     """Covariance of frequency, damping ratio and stiffness of mode i from that of all modes of a band."""
     mine = np.ix_(*2 * [[i, flexibility.size + i, 2 * flexibility.size + i]])
     chain = np.array([1.0, 1.0, -1 / flexibility[i] ** 2])

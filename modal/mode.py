@@ -41,6 +41,8 @@ class Mode:
     """rms of what the fit leaves in its band over rms of the noise there: 1 for a fit that leaves nothing."""
     half_power_damping: float | None = None
     """Damping ratio from the width of the peak at half power, for comparison; None where it has no such width."""
+    shape: NDArray[np.float64] | None = None
+    """Mode shape over the FRFs of `fit_points`, the largest 1 or -1 and the first > 0, shape (p,); None of one FRF."""
     doubts: tuple[str, ...] = ()
     """Why it may not be trusted; empty where nothing speaks against it."""
 

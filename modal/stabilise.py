@@ -91,8 +91,7 @@ def _orders(model: _Model, orders: int) -> Iterator[_Order]:
     below = orthogonal_basis(np.tile(model.x, p), (model.weight * model.receptance).ravel(), orders)
     above = [orthogonal_basis(model.x, w.astype(complex), orders + EXTRA) for w in model.weight]
     overlap = [
-        basis.values.conj().T @ part
-        for basis, part in zip(above, below.values.reshape(p, n, orders + 1), strict=True)
+        basis.values.conj().T @ part for basis, part in zip(above, below.values.reshape(p, n, orders + 1), strict=True)
     ]
     for order in range(1, orders + 1):
         left = np.eye(order + 1) - sum(
@@ -117,7 +116,7 @@ def _flexibilities(model: _Model, above: list[OrthogonalBasis], poles: ComplexAr
         columns = np.hstack([model.weight[i][:, None] * fractions, basis.values[:, : EXTRA + 1]])
         fit = np.linalg.lstsq(columns, model.weight[i] * model.receptance[i], rcond=None)[0]
         residues[:, i] = fit[: poles.size]
-    return residues * (-2 * poles.real / np.abs(poles) ** 2)[:, None]
+    return np.asarray(residues * (-2 * poles.real / np.abs(poles) ** 2)[:, None])
 
 
 def _same(below: _Order, here: _Order) -> NDArray[np.int64]:

@@ -78,6 +78,11 @@ class Extraction:
         part = band.lines
         return np.asarray(self.frf.receptance[part] - self.receptance(self.frf.frequency[part], without=band))
 
+    def left(self, band: FittedBand) -> NDArray[np.complex128]:
+        """Measured receptance on the lines of a band less the fit with its residual terms (m/N)."""
+        real, imaginary = np.split(band.fit.residual, 2)
+        return np.asarray((real + 1j * imaginary) / self.weight[band.lines])
+
 
 def extract(frf: Frf, band: tuple[float, float] | None = None) -> Extraction:
     """Find and fit all modes between band[0] and band[1] (Hz). Raises ValueError as `fit_modes`."""

@@ -14,10 +14,10 @@ def remove_window(mode: Mode, time_constant: float) -> Mode:
 
     The window adds 1/time_constant to the decay rate zeta w_n and leaves the damped frequency and the strength of
     the free decay as they are: zeta falls by 1/(w_n time_constant), to first order, and K follows w_n^2. Standard
-    errors are carried over. (Of a windowed acceleration K comes out too large by a further 2 zeta/(w_n time_constant)
-    of itself, a few parts in ten thousand.) Raises ValueError for a time constant that is not > 0, and for a mode that decays no
-    faster than the window.
+    errors are carried over. Of a windowed acceleration K comes out too large by a further 2 zeta/(w_n time_constant)
+    of itself, a few parts in ten thousand.
 
+    Raises ValueError for a time constant that is not > 0, and for a mode that decays no faster than the window.
     Source: Fladung & Rost (1997), Application and correction of the exponential window for FRFs, Mechanical Systems
     and Signal Processing 11, 23.
     """

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from modal.extract import Extraction, FittedBand
+from modal.extract import LEAST_TERMS, Extraction, FittedBand
 from modal.fit_band import mode_curves, residual_terms
 from modal.mode import Mode
 
@@ -88,6 +88,8 @@ def _about_the_place(state: Extraction, band: FittedBand, mode: Mode) -> Iterato
     for other in np.delete(band.fit.frequency, np.argmin(np.abs(band.fit.frequency - mode.frequency))):
         if abs(other - mode.frequency) < 2 * half_width:
             yield f"overlaps with the mode at {other:.1f} Hz"
+    if band.terms > LEAST_TERMS:
+        yield "a far stronger mode beside the band bends the fit: zeta and K may be off by more than their errors"
     if any(abs(suspect - mode.frequency) < half_width for suspect in band.suspects):
         yield f"may be several modes, near {' and '.join(f'{s:.0f}' for s in band.suspects)} Hz: too noisy to tell"
 

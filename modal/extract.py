@@ -29,9 +29,9 @@ LEAST_SHARE = 0.05
 """Share of its peak of the mobility that a mode has; 1 dB of prominence needs twice this."""
 HIDDEN_F = 40.0
 """A mode without a peak of its own lowers the sum of squares by this many times what three unknowns do by chance."""
-LEAST_TERMS = 3
+LEAST_TERMS = 4
 """Complex residual terms that every band has."""
-TERM_F = 12.0
+TERM_F = 6.0
 """A further residual term lowers it by this many times what two unknowns do by chance."""
 HIDDEN_ERROR = 1 / 6
 """Relative standard error that its damping ratio and stiffness have at most."""

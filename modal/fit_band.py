@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
-RESIDUAL_POWERS = (-2, 0, 2, 4)
+RESIDUAL_POWERS = (-2, 0, 2, 4, 6, 8)
 """Of the frequency, in the order in which residual terms are taken."""
 MOST_TRIALS = 60
 """Evaluations of the model; a mode in its own band takes some ten."""
@@ -62,14 +62,14 @@ class BandFit:
 
 
 def fit_band(
-    frequency: Array, receptance: ComplexArray, weight: Array, starts: Array, terms: int = 2
+    frequency: Array, receptance: ComplexArray, weight: Array, starts: Array, terms: int = 4
 ) -> BandFit | None:
     """Fit H = sum of a_k / (1 - r_k^2 + 2i zeta_k r_k) + L/f^2 + U + ..., r_k = f/f_k; None where nothing fits.
 
     a_k = 1/K_k is real. L (modes far below, and the free body) and U (modes far above) are complex: the tail of a
     damped neighbour is not real, and a real L or U would push its imaginary part into zeta and K, by percents.
-    In accelerance, -(2 pi f)^2 H, L is a constant and U grows with f^2: the weight says what was measured. A third
-    and a fourth term, f^2 and f^4, are for a strong mode just outside the band.
+    In accelerance, -(2 pi f)^2 H, L is a constant and U grows with f^2: the weight says what was measured. Further
+    terms, f^2, f^4, ..., follow the tails of strong modes just outside the band.
     The linear unknowns are eliminated (variable projection), f_k and zeta_k found by Levenberg-Marquardt.
     frequency (Hz) has shape (n,), receptance (m/N) and weight (p, n), starts (Hz; damping ratios) (2, m).
 

@@ -13,7 +13,7 @@ from modal.find_resonances import Resonance
 
 CLOSE = 4.0
 """Neighbours nearer than this many times the sum of their half-widths are fitted together."""
-REACH = 6.0
+REACH = 8.0
 """A local band ends this many half-widths beyond its outer resonances."""
 LEAST_LINES = 6
 """Lines that a local band has at least on either side, where there are as many."""

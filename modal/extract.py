@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter
 from threadpoolctl import threadpool_limits
 
 from acquisition import Frf
@@ -33,6 +34,8 @@ LEAST_TERMS = 4
 """Complex residual terms that every band has."""
 TERM_F = 6.0
 """A further residual term lowers it by this many times what two unknowns do by chance."""
+STRAY = 8.0
+"""A single line counts for nothing where it is this many times as far off as the median of the lines about it."""
 HIDDEN_ERROR = 1 / 6
 """Relative standard error that its damping ratio and stiffness have at most."""
 
@@ -79,9 +82,10 @@ class Extraction:
         return np.asarray(self.frf.receptance[part] - self.receptance(self.frf.frequency[part], without=band))
 
     def left(self, band: FittedBand) -> NDArray[np.complex128]:
-        """Measured receptance on the lines of a band less the fit with its residual terms (m/N)."""
+        """Measured receptance on the lines of a band less the fit with its residual terms (m/N); 0 at stray lines."""
         real, imaginary = np.split(band.fit.residual, 2)
-        return np.asarray((real + 1j * imaginary) / self.weight[band.lines])
+        weight = self.weight[band.lines]
+        return np.asarray((real + 1j * imaginary) / np.where(weight > 0, weight, np.inf))
 
 
 def extract(frf: Frf, band: tuple[float, float] | None = None) -> Extraction:
@@ -94,11 +98,27 @@ def _extract(lines: Frf) -> Extraction:
     weight = line_weights(lines)
     found = (_first(lines, weight, local) for local in local_bands(find_resonances(lines), lines.frequency))
     state = Extraction(lines, weight, tuple(band for band in found if band is not None))
-    for sweep in range(1 + (SWEEPS if len(state.bands) > 1 else 0)):
+    state = _swept(state, SWEEPS if len(state.bands) > 1 else 0)
+    stray = _stray_lines(state)
+    return _swept(replace(state, weight=np.where(stray, 0.0, weight)), 0) if np.any(stray) else state
+
+
+def _swept(state: Extraction, times: int) -> Extraction:
+    """All bands fitted again, the first time with a closer look, then so many times more."""
+    for sweep in range(1 + times):
         for i in range(len(state.bands)):
             state = _again(state, i, look_closer=sweep == 0)
         state = replace(state, bands=tuple(band for band in state.bands if band.height.size))
     return state
+
+
+def _stray_lines(state: Extraction) -> NDArray[np.bool_]:
+    """Lines that stand far out of the residual on both sides of them: hum, or a carrier."""
+    stray = np.zeros(state.weight.size, bool)
+    for band in state.bands:
+        size = np.abs(state.left(band)) * state.weight[band.lines]
+        stray[band.lines] |= size > STRAY * np.maximum(median_filter(size, size=11), np.median(size))
+    return stray
 
 
 def _first(frf: Frf, weight: Array, local: LocalBand) -> FittedBand | None:

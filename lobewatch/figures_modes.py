@@ -76,8 +76,8 @@ def _draw_chart(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
             axes.plot(chart.frequency[which], chart.order[which], mark, **style)
     for mode in modes:
         axes.axvline(mode.frequency, color=NOW, lw=0.6)
-    axes.set(xlabel="frequency (Hz); grey: the bands fitted, with the tails of other bands taken off", ylabel="order")
-    axes.set_ylim(0, 18)
+    axes.set(xlabel="frequency (Hz); grey: the bands fitted", ylabel="order")
+    axes.set_ylim(0, 16)
     if state.bands:
         axes.legend(loc="upper right", ncols=2)
 

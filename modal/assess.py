@@ -65,9 +65,8 @@ def _misfit(state: Extraction, band: FittedBand, i: int) -> tuple[float, float]:
     real, imaginary = np.split(band.fit.residual, 2)
     rms = np.sqrt(band.fit.sum_of_squares / band.fit.freedom * 2)
     noise = np.median(np.abs(np.diff(real + 1j * imaginary, 3))) / np.sqrt(20 * np.log(2))
-    peak = np.interp(band.fit.frequency[i], state.frf.frequency, state.weight) * np.abs(
-        band.fit.flexibility[0, i] / (2 * band.fit.damping_ratio[i])
-    )
+    nearest = np.argmin(np.abs(state.frf.frequency - band.fit.frequency[i]) + 1e9 * (state.weight == 0))
+    peak = state.weight[nearest] * np.abs(band.fit.flexibility[0, i] / (2 * band.fit.damping_ratio[i]))
     return float(rms / peak), float(rms / noise) if noise > 0 else 1.0
 
 

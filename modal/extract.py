@@ -20,10 +20,12 @@ from modal.usable_lines import usable_lines
 
 Array = NDArray[np.float64]
 
-ORDERS = 14
+ORDERS = 12
 """Highest order of the LSCF models of a band, several times the modes that one holds."""
 SWEEPS = 3
-"""Rounds over the local bands after the first, each with the tails of the other bands' modes taken off."""
+"""Rounds over the bands after the second, each with the tails of the other bands' modes as they are then."""
+SETTLED = 0.01
+"""Change of those tails, as a share of what the fit leaves, that is not worth another fit."""
 LARGEST_ERROR = 1 / 3
 """Relative standard error of damping ratio and stiffness above which a peak is not a mode."""
 LEAST_SHARE = 0.05
@@ -36,6 +38,8 @@ TERM_F = 6.0
 """A further residual term lowers it by this many times what two unknowns do by chance."""
 STRAY = 8.0
 """A single line counts for nothing where it is this many times as far off as the median of the lines about it."""
+ROUNDING = 1e-8
+"""Share of the largest value below which no residual means anything."""
 HIDDEN_ERROR = 1 / 6
 """Relative standard error that its damping ratio and stiffness have at most."""
 
@@ -52,12 +56,14 @@ class FittedBand:
     """What the mobility of each mode is measured against, its own peak or the highest of the band (m/s/N), (m,)."""
     fit: BandFit
     """Their values."""
+    own: NDArray[np.complex128]
+    """What they were fitted to: the receptance without the modes of all other bands (m/N)."""
     terms: int
     """Complex residual terms."""
     suspects: tuple[float, ...]
     """Frequencies of modes that may stand here instead of those fitted, but are too uncertain (Hz)."""
     chart: StabilisationChart
-    """LSCF poles of these lines, the tails of other bands' modes taken off."""
+    """LSCF poles of these lines."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +123,8 @@ def _stray_lines(state: Extraction) -> NDArray[np.bool_]:
     stray = np.zeros(state.weight.size, bool)
     for band in state.bands:
         size = np.abs(state.left(band)) * state.weight[band.lines]
-        stray[band.lines] |= size > STRAY * np.maximum(median_filter(size, size=11), np.median(size))
+        far = size > STRAY * np.maximum(median_filter(size, size=11), np.median(size))
+        stray[band.lines] |= far & (size > ROUNDING * np.max(np.abs(band.own) * state.weight[band.lines]))
     return stray
 
 
@@ -135,28 +142,30 @@ def _first(frf: Frf, weight: Array, local: LocalBand) -> FittedBand | None:
             starts[:, i] = poles.frequency[best], poles.damping_ratio[best]
     height = np.array([r.height for r in local.resonances])
     fitted = _fit(f, own, w, starts, height)
-    return None if fitted is None else FittedBand(part, local.resonances, fitted[1], fitted[0], LEAST_TERMS, (), chart)
+    return None if fitted is None else FittedBand(part, local.resonances, fitted[1], fitted[0], own, LEAST_TERMS, (), chart)
 
 
 def _again(state: Extraction, i: int, look_closer: bool) -> Extraction:
     """Fit band i to what the modes of all others leave; closer: also look for modes that have no peak."""
     band = state.bands[i]
     f, own, weight = state.frf.frequency[band.lines], state.own(band), state.weight[band.lines]
+    change = np.linalg.norm((own - band.own) * weight)
+    if not look_closer and change**2 < SETTLED**2 * band.fit.sum_of_squares:
+        return state
     starts = np.stack([band.fit.frequency, band.fit.damping_ratio])
     fitted = _fit(f, own, weight, starts, band.height, band.terms)
     if fitted is None:
         new = replace(band, height=np.empty(0))
     else:
-        new = replace(band, fit=fitted[0], height=fitted[1])
+        new = replace(band, fit=fitted[0], height=fitted[1], own=own)
         new = _with_hidden(new, f, own, weight) if look_closer else new
     return replace(state, bands=(*state.bands[:i], new, *state.bands[i + 1 :]))
 
 
 def _with_hidden(band: FittedBand, f: Array, own: NDArray[np.complex128], weight: Array) -> FittedBand:
     """The band with those LSCF poles added that are modes although they have no peak of their own, highest first."""
-    chart = stabilise(f, own[None], weight[None], ORDERS)
-    poles = physical_poles(chart)
-    band, peak = _with_terms(replace(band, chart=chart), f, own, weight), np.max(band.height)
+    poles = physical_poles(band.chart)
+    band, peak = _with_terms(band, f, own, weight), np.max(band.height)
     size = np.pi * poles.frequency * np.abs(poles.flexibility[:, 0]) / poles.damping_ratio
     high = size > LEAST_SHARE * peak
     starts = np.stack([poles.frequency, poles.damping_ratio])[:, high]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ MOST_TRIALS = 60
 """Evaluations of the model; a mode in its own band takes some ten."""
 CONVERGED = 1e-13
 """Step (share of the half-power half-width) after which there is nothing left to gain."""
+GAINED = 1e-10
+"""Relative fall of the sum of squares that is not worth another step: a thousandth of a standard error."""
 LEAST_SINGULAR = 1e-10
 """Share of the largest singular value below which an unknown cannot be told from the others."""
 
@@ -124,7 +127,7 @@ class _State:
     """(2, m)."""
     frfs: list[_Projected]
 
-    @property
+    @cached_property
     def cost(self) -> float:
         cost = float(sum(frf.residual @ frf.residual for frf in self.frfs))
         return cost if np.all(np.isfinite(self.poles)) and np.all(self.poles > 0) and np.isfinite(cost) else np.inf
@@ -179,32 +182,31 @@ def _split(values: ComplexArray) -> Array:
 
 def _solve(problem: _Problem, starts: Array) -> _State | None:
     """Levenberg-Marquardt; None where it does not converge."""
-    state, damping = problem.at(starts), 1e-3
+    state, damping = problem.at(starts), 1e-4
     for _ in range(MOST_TRIALS):
         if not np.isfinite(state.cost):
             return None
-        step = _step(state, damping)
+        step, gain = _step(state, damping)
+        if gain < GAINED * state.cost or np.max(np.abs(step)) < CONVERGED:
+            return state
         trial = problem.at(state.poles + (step * state.scale).reshape(2, -1))
-        small = np.max(np.abs(step)) < CONVERGED
         if trial.cost < state.cost:
-            gained = 1 - trial.cost / state.cost
             state, damping = trial, damping / 10
-            if small or gained < 1e-15:
-                return state
-        elif small or damping > 1e8 or (np.max(np.abs(step)) < 1e-6 and damping < 1e-3):
+        elif damping > 1e8 or np.max(np.abs(step)) < 1e-6:
             return state
         else:
             damping = max(damping, 1e-6) * 10
     return None
 
 
-def _step(state: _State, damping: float) -> Array:
-    """Damped Gauss-Newton step in units of the scale, shape (2 m,)."""
+def _step(state: _State, damping: float) -> tuple[Array, float]:
+    """Damped Gauss-Newton step in units of the scale, shape (2 m,), and the fall of the cost that it promises."""
     jacobian = state.jacobian
     norm = np.linalg.norm(jacobian, axis=0)
-    rows = np.vstack([jacobian / norm, np.sqrt(damping) * np.eye(norm.size)])
-    right = np.concatenate([-state.residual, np.zeros(norm.size)])
-    return np.asarray(np.linalg.lstsq(rows, right, rcond=None)[0] / norm)
+    gram = (jacobian.T @ jacobian) / np.outer(norm, norm) + damping * np.eye(norm.size)
+    step = np.linalg.solve(gram, -(jacobian.T @ state.residual) / norm) / norm
+    change = jacobian @ step
+    return step, float(change @ change)
 
 
 def _result(state: _State | None) -> BandFit | None:

@@ -17,8 +17,10 @@ _Order = tuple[ComplexArray, ComplexArray]
 
 EXTRA = 2
 """Degree of the polynomial that stands for all poles outside the band, negative frequencies among them."""
-MOST_LINES = 3000
+MOST_LINES = 1500
 """Lines that poles are computed from; of more, every so many."""
+RIDGE = 1e-12
+"""Added to the unit diagonal of the normal equations for the residues, so that coinciding poles can be solved for."""
 POLE_TOLERANCE = 0.25
 """A pole is stable where one of the order below lies within this many half-power half-widths ..."""
 RESIDUE_TOLERANCE = 0.35
@@ -114,8 +116,10 @@ def _flexibilities(model: _Model, above: list[OrthogonalBasis], poles: ComplexAr
     residues = np.empty((poles.size, len(above)), dtype=np.complex128)
     for i, basis in enumerate(above):
         columns = np.hstack([model.weight[i][:, None] * fractions, basis.values[:, : EXTRA + 1]])
-        fit = np.linalg.lstsq(columns, model.weight[i] * model.receptance[i], rcond=None)[0]
-        residues[:, i] = fit[: poles.size]
+        columns /= np.linalg.norm(columns, axis=0)
+        gram = columns.conj().T @ columns + RIDGE * np.eye(columns.shape[1])
+        fit = np.linalg.solve(gram, columns.conj().T @ (model.weight[i] * model.receptance[i]))[: poles.size]
+        residues[:, i] = fit / np.linalg.norm(model.weight[i][:, None] * fractions, axis=0)
     return np.asarray(residues * (-2 * poles.real / np.abs(poles) ** 2)[:, None])
 
 

@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from acquisition import Frf
 from modal.find_resonances import Resonance, find_resonances
-from modal.fit_band import RESIDUAL_POWERS, BandFit, fit_band
+from modal.fit_band import RESIDUAL_POWERS, BandFit, fit_band, gain_of_a_term
 from modal.line_weights import line_weights
 from modal.local_bands import LocalBand, local_bands
 from modal.physical_poles import physical_poles
@@ -20,7 +20,7 @@ from modal.usable_lines import usable_lines
 
 Array = NDArray[np.float64]
 
-ORDERS = 12
+ORDERS = 10
 """Highest order of the LSCF models of a band, several times the modes that one holds."""
 SWEEPS = 3
 """Rounds over the bands after the second, each with the tails of the other bands' modes as they are then."""
@@ -142,7 +142,11 @@ def _first(frf: Frf, weight: Array, local: LocalBand) -> FittedBand | None:
             starts[:, i] = poles.frequency[best], poles.damping_ratio[best]
     height = np.array([r.height for r in local.resonances])
     fitted = _fit(f, own, w, starts, height)
-    return None if fitted is None else FittedBand(part, local.resonances, fitted[1], fitted[0], own, LEAST_TERMS, (), chart)
+    return (
+        None
+        if fitted is None
+        else FittedBand(part, local.resonances, fitted[1], fitted[0], own, LEAST_TERMS, (), chart)
+    )
 
 
 def _again(state: Extraction, i: int, look_closer: bool) -> Extraction:
@@ -187,6 +191,8 @@ def _with_hidden(band: FittedBand, f: Array, own: NDArray[np.complex128], weight
 def _with_terms(band: FittedBand, f: Array, own: NDArray[np.complex128], weight: Array) -> FittedBand:
     """The band with as many residual terms as lower the sum of squares for more than by chance."""
     for terms in range(band.terms + 1, len(RESIDUAL_POWERS) + 1):
+        if gain_of_a_term(band.fit, f, weight, terms - 1) < TERM_F * band.fit.sum_of_squares / band.fit.freedom:
+            break
         fit = fit_band(f, own[None], weight[None], np.stack([band.fit.frequency, band.fit.damping_ratio]), terms)
         if fit is None or not _is_better(fit, band.fit, TERM_F) or not np.all(_are_modes(fit, f, band.height)):
             break

@@ -81,10 +81,10 @@ def fit_band(
     p, m = receptance.shape[0], starts.shape[1]
     if 2 * m + p * (m + 2 * terms) >= 2 * receptance.size or m == 0:
         return None
-    problem = _Problem(frequency, _split(weight * receptance), weight, terms)
+    problem = _problem(frequency, receptance, weight, terms)
     with np.errstate(all="ignore"):
         try:
-            return _result(_solve(problem, starts))
+            return _result(_solve(problem, starts), 2 * terms)
         except np.linalg.LinAlgError:
             return None
 
@@ -100,16 +100,25 @@ def residual_terms(frequency: Array, terms: int) -> Array:
     return np.asarray((frequency / np.mean(frequency)) ** np.array([RESIDUAL_POWERS[:terms]], dtype=float).T)
 
 
+def gain_of_a_term(fit: BandFit, frequency: Array, weight: Array, terms: int) -> float:
+    """Fall of the sum of squares, to first order, that one residual term more than these would bring to one FRF."""
+    powers = residual_terms(frequency, terms + 1)
+    old, new = (_split(weight * np.concatenate([part, 1j * part])).T for part in (powers[:-1], powers[-1:]))
+    q = np.linalg.qr(np.hstack([old, fit.influence.T, new]))[0]
+    part = q[:, -2:].T @ fit.residual
+    return float(part @ part)
+
+
 @dataclass(frozen=True, eq=False)
 class _Projected:
-    """One FRF at given poles with its linear unknowns eliminated."""
+    """One FRF at given poles with its linear unknowns eliminated, the residual terms first."""
 
     q: Array
-    """Orthonormal basis of the linear unknowns, (2 n, m + 2 terms)."""
+    """Orthonormal basis of what the residual terms leave of the modes, (2 n, m)."""
     inverse: Array
-    """Inverse of its triangle, square."""
+    """Inverse of its triangle, (m, m)."""
     linear: Array
-    """Best linear unknowns, (m + 2 terms,)."""
+    """Best flexibilities, (m,)."""
     residual: Array
     """Weighted data that is left, (2 n,)."""
     slope: Array
@@ -149,11 +158,12 @@ class _State:
 @dataclass(frozen=True, eq=False)
 class _Problem:
     frequency: Array
-    data: Array
-    """Weighted, (p, 2 n)."""
     weight: Array
     """(p, n)."""
-    terms: int
+    bases: list[Array]
+    """Orthonormal basis of the residual terms of each FRF, (2 n, 2 terms)."""
+    data: list[Array]
+    """What they leave of each weighted FRF, (2 n,)."""
 
     def at(self, poles: Array) -> _State:
         return _State(poles, list(self._projected(poles)))
@@ -163,16 +173,26 @@ class _Problem:
         curves = mode_curves(self.frequency, fn, zeta)
         r = self.frequency / fn[:, None]
         slopes = np.concatenate([(2j * zeta[:, None] * r - 2 * r**2) * zeta[:, None], -2j * r * zeta[:, None]])
-        residual = residual_terms(self.frequency, self.terms)
-        columns = np.concatenate([curves, residual, 1j * residual])
-        for data, weight in zip(self.data, self.weight, strict=True):
-            q, triangle = np.linalg.qr(_split(weight * columns).T)
+        for data, weight, base in zip(self.data, self.weight, self.bases, strict=True):
+            q, triangle = np.linalg.qr(_without(base, _split(weight * curves).T))
             part = q.T @ data
             inverse = np.linalg.inv(triangle)
             linear = inverse @ part
-            a = np.tile(linear[: fn.size], 2)[:, None]
-            slope = _split(weight * a * slopes * np.tile(curves**2, (2, 1))).T
-            yield _Projected(q, inverse, linear, data - q @ part, slope)
+            slope = _split(weight * np.tile(linear, 2)[:, None] * slopes * np.tile(curves**2, (2, 1))).T
+            yield _Projected(q, inverse, linear, data - q @ part, _without(base, slope))
+
+
+def _problem(frequency: Array, receptance: ComplexArray, weight: Array, terms: int) -> _Problem:
+    powers = residual_terms(frequency, terms)
+    columns = np.concatenate([powers, 1j * powers])
+    bases = [np.linalg.qr(_split(w * columns).T)[0] for w in weight]
+    data = [_without(base, values) for base, values in zip(bases, _split(weight * receptance), strict=True)]
+    return _Problem(frequency, weight, bases, data)
+
+
+def _without(base: Array, values: Array) -> Array:
+    """Values less their part in an orthonormal basis."""
+    return np.asarray(values - base @ (base.T @ values))
 
 
 def _split(values: ComplexArray) -> Array:
@@ -209,7 +229,7 @@ def _step(state: _State, damping: float) -> tuple[Array, float]:
     return step, float(change @ change)
 
 
-def _result(state: _State | None) -> BandFit | None:
+def _result(state: _State | None, n_residual: int) -> BandFit | None:
     if state is None:
         return None
     m = state.poles.shape[1]
@@ -219,11 +239,11 @@ def _result(state: _State | None) -> BandFit | None:
     if not singular[-1] > LEAST_SINGULAR * singular[0]:
         return None
     influence = _influence(state, -(right.T / singular) @ left.T / norm[:, None])
-    freedom = jacobian.shape[0] - 2 * m - sum(frf.linear.size for frf in state.frfs)
+    freedom = jacobian.shape[0] - 2 * m - (m + n_residual) * len(state.frfs)
     return BandFit(
         state.poles[0],
         state.poles[1],
-        np.array([frf.linear[:m] for frf in state.frfs]),
+        np.array([frf.linear for frf in state.frfs]),
         influence @ influence.T * (state.cost / freedom),
         freedom,
         influence,
@@ -233,7 +253,6 @@ def _result(state: _State | None) -> BandFit | None:
 
 def _influence(state: _State, on_poles: Array) -> Array:
     """On poles in Hz and damping ratio, then on the flexibilities; on_poles: on scaled poles, shape (2 m, 2 n p)."""
-    m = state.poles.shape[1]
-    own = block_diag(*(frf.inverse[:m] @ frf.q.T for frf in state.frfs))
-    by_poles = np.concatenate([frf.inverse[:m] @ (frf.q.T @ frf.slope) for frf in state.frfs])
+    own = block_diag(*(frf.inverse @ frf.q.T for frf in state.frfs))
+    by_poles = np.concatenate([frf.inverse @ (frf.q.T @ frf.slope) for frf in state.frfs])
     return np.concatenate([on_poles * state.scale[:, None], own - by_poles @ on_poles])

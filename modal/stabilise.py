@@ -17,7 +17,7 @@ _Order = tuple[ComplexArray, ComplexArray]
 
 EXTRA = 2
 """Degree of the polynomial that stands for all poles outside the band, negative frequencies among them."""
-MOST_LINES = 1500
+MOST_LINES = 600
 """Lines that poles are computed from; of more, every so many."""
 RIDGE = 1e-12
 """Added to the unit diagonal of the normal equations for the residues, so that coinciding poles can be solved for."""

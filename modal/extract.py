@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,6 +41,8 @@ STRAY = 8.0
 """A single line counts for nothing where it is this many times as far off as the median of the lines about it."""
 ROUNDING = 1e-8
 """Share of the largest value below which no residual means anything."""
+SPLIT = 0.35
+"""Half the distance at which two modes in place of one are tried (half-power half-widths)."""
 HIDDEN_ERROR = 1 / 6
 """Relative standard error that its damping ratio and stiffness have at most."""
 
@@ -167,25 +170,38 @@ def _again(state: Extraction, i: int, look_closer: bool) -> Extraction:
 
 
 def _with_hidden(band: FittedBand, f: Array, own: NDArray[np.complex128], weight: Array) -> FittedBand:
-    """The band with those LSCF poles added that are modes although they have no peak of their own, highest first."""
-    poles = physical_poles(band.chart)
-    band, peak = _with_terms(band, f, own, weight), np.max(band.height)
-    size = np.pi * poles.frequency * np.abs(poles.flexibility[:, 0]) / poles.damping_ratio
-    high = size > LEAST_SHARE * peak
-    starts = np.stack([poles.frequency, poles.damping_ratio])[:, high]
-    alone = [k for k in range(band.height.size) if not np.any(_is_near(band.fit, k, starts[0]))]
-    starts = np.hstack([starts, np.stack([band.fit.frequency, band.fit.damping_ratio])[:, alone]])
-    size = np.concatenate([size[high], band.fit.mobility_peak[alone]])
-    for keep in (np.argsort(-size)[:n] for n in range(size.size, band.height.size, -1)):
-        fit, height = fit_band(f, own[None], weight[None], starts[:, keep]), np.full(keep.size, peak)
-        if fit is None:
+    """The band with those modes added that have no peak of their own, where the sum of squares asks for them."""
+    bent = _with_terms(band, f, own, weight)
+    for starts in _more_modes(band, split=bent.terms > band.terms):
+        fit, height = (
+            fit_band(f, own[None], weight[None], starts, band.terms),
+            np.full(starts.shape[1], band.height.max()),
+        )
+        if fit is None or not _is_better(fit, band.fit, TERM_F) or not _is_likelier(fit, bent.fit):
             continue
-        more = _with_terms(replace(band, fit=fit, height=height, terms=LEAST_TERMS), f, own, weight)
-        if np.all(_are_modes(more.fit, f, height, HIDDEN_ERROR)) and _is_better(more.fit, band.fit, HIDDEN_F):
-            return more
-        if np.all(_are_modes(more.fit, f, height, np.inf)) and _is_better(more.fit, band.fit, TERM_F):
-            band = replace(band, suspects=tuple(more.fit.frequency.tolist()))
-    return band
+        if _is_better(fit, band.fit, HIDDEN_F) and np.all(_are_modes(fit, f, height, HIDDEN_ERROR)):
+            return _with_terms(replace(band, fit=fit, height=height), f, own, weight)
+        if np.all(_are_modes(fit, f, height, np.inf)):
+            bent = replace(bent, suspects=tuple(sorted(fit.frequency.tolist())))
+    return bent
+
+
+def _more_modes(band: FittedBand, split: bool) -> Iterator[Array]:
+    """Starts (2, m) for more modes than are fitted, from all high LSCF poles down; then two for the highest mode."""
+    fit, poles = band.fit, physical_poles(band.chart)
+    known = np.stack([fit.frequency, fit.damping_ratio])
+    size = np.pi * poles.frequency * np.abs(poles.flexibility[:, 0]) / poles.damping_ratio
+    high = size > LEAST_SHARE * np.max(band.height)
+    starts = np.stack([poles.frequency, poles.damping_ratio])[:, high]
+    alone = [k for k in range(band.height.size) if not np.any(np.abs(starts[0] - known[0, k]) < np.prod(known[:, k]))]
+    starts, size = np.hstack([starts, known[:, alone]]), np.concatenate([size[high], fit.mobility_peak[alone]])
+    for n in range(size.size, band.height.size, -1):
+        yield starts[:, np.argsort(-size)[:n]]
+    if split:
+        i = int(np.argmax(fit.mobility_peak))
+        apart = SPLIT * known[1, i] * known[0, i]
+        halves = [[known[0, i] - apart, known[0, i] + apart], 2 * [known[1, i]]]
+        yield np.hstack([np.delete(known, i, axis=1), halves])
 
 
 def _with_terms(band: FittedBand, f: Array, own: NDArray[np.complex128], weight: Array) -> FittedBand:
@@ -200,14 +216,16 @@ def _with_terms(band: FittedBand, f: Array, own: NDArray[np.complex128], weight:
     return band
 
 
-def _is_near(fit: BandFit, k: int, frequency: Array) -> NDArray[np.bool_]:
-    return np.asarray(np.abs(frequency - fit.frequency[k]) < fit.damping_ratio[k] * fit.frequency[k])
-
-
 def _is_better(more: BandFit, fewer: BandFit, least: float) -> bool:
     """Whether the sum of squares falls by more than `least` times what the further unknowns take off by chance."""
     gain = (fewer.sum_of_squares - more.sum_of_squares) / max(fewer.freedom - more.freedom, 1)
     return gain > least * more.sum_of_squares / more.freedom
+
+
+def _is_likelier(fit: BandFit, other: BandFit) -> bool:
+    """By the information criterion of Akaike (sum of squares and number of unknowns)."""
+    variance = min(one.sum_of_squares / one.freedom for one in (fit, other))
+    return fit.sum_of_squares - 2 * variance * fit.freedom < other.sum_of_squares - 2 * variance * other.freedom
 
 
 def _fit(

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modal.extract import LEAST_TERMS, Extraction, FittedBand
-from modal.fit_band import mode_curves, residual_terms
 from modal.mode import Mode
+from modal.physical_poles import physical_poles
 
 LEAST_COHERENCE = 0.9
 """Mean coherence between the half-power points; below it the averaged hits disagree."""
@@ -20,6 +20,8 @@ LARGEST_MISFIT = 2.0
 """rms of the residual over rms of the noise ..."""
 MISFIT_SHARE = 0.01
 """... that matters where it is more than this share of the mode's own peak."""
+BENT = 0.005
+"""Relative standard error of K above which a strong mode beside the band may have bent the fit by more than that."""
 MOST_LEFT = 0.02
 """Share of a mode's decay that may be left when the record ends."""
 LARGEST_SCATTER = 3.0
@@ -33,7 +35,7 @@ def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
     share, misfit = _misfit(state, band, i)
     judged = replace(
         mode,
-        residue_phase=_phase(state, band, i),
+        residue_phase=_phase(band, mode),
         coherence=_coherence(state, mode),
         misfit=misfit,
         half_power_damping=_half_power_damping(band, mode),
@@ -42,13 +44,13 @@ def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
     return replace(judged, doubts=tuple(doubts))
 
 
-def _phase(state: Extraction, band: FittedBand, i: int) -> float:
-    """Of the modal constant against its real value, all constants of the band taken as complex (rad)."""
-    f, weight = state.frf.frequency[band.lines], state.weight[band.lines]
-    curves = mode_curves(f, band.fit.frequency, band.fit.damping_ratio)
-    columns = (weight * np.concatenate([curves, residual_terms(f, band.terms)])).T
-    constants = np.linalg.lstsq(columns, weight * state.own(band), rcond=None)[0]
-    return float(np.angle(constants[i] / band.fit.flexibility[0, i]))
+def _phase(band: FittedBand, mode: Mode) -> float | None:
+    """Of the complex modal constant of the LSCF pole of this mode against its real value (rad); None without a pole."""
+    poles = physical_poles(band.chart)
+    distance = np.abs(poles.frequency - mode.frequency)
+    if not np.any(distance < mode.damping_ratio * mode.frequency):
+        return None
+    return float(np.angle(poles.flexibility[np.argmin(distance), 0] * np.sign(mode.stiffness)))
 
 
 def _coherence(state: Extraction, mode: Mode) -> float | None:
@@ -87,7 +89,7 @@ def _about_the_place(state: Extraction, band: FittedBand, mode: Mode) -> Iterato
     for other in np.delete(band.fit.frequency, np.argmin(np.abs(band.fit.frequency - mode.frequency))):
         if abs(other - mode.frequency) < 2 * half_width:
             yield f"overlaps with the mode at {other:.1f} Hz"
-    if band.terms > LEAST_TERMS:
+    if band.terms > LEAST_TERMS and mode.standard_error[2] > BENT * abs(mode.stiffness):
         yield "a far stronger mode beside the band bends the fit: zeta and K may be off by more than their errors"
     if any(abs(suspect - mode.frequency) < half_width for suspect in band.suspects):
         yield f"may be several modes, near {' and '.join(f'{s:.0f}' for s in band.suspects)} Hz: too noisy to tell"
@@ -107,7 +109,7 @@ def _about_the_values(mode: Mode, share: float, n_modes: int) -> Iterator[str]:
         yield f"coherence {mode.coherence:.2f} at its peak, below {LEAST_COHERENCE:g}: the hits disagree"
     phase, known = mode.residue_phase or 0.0, mode.standard_error[2] / abs(mode.stiffness)
     if abs(phase) > max(LARGEST_PHASE, 3 * known):
-        yield f"modal constant {np.degrees(phase):+.0f}° off real: K is that of its real part"
+        yield f"modal constant {np.degrees(phase):+.0f}° off real: K is that of the real mode nearest to it"
     if mode.misfit is not None and mode.misfit > LARGEST_MISFIT and share > MISFIT_SHARE:
         yield f"the fit leaves {mode.misfit:.1f} times the noise, {100 * share:.0f} % of its peak"
     if mode.jackknife is not None and np.max(mode.standard_error / mode.fit_error) > LARGEST_SCATTER:

@@ -34,7 +34,7 @@ class Mode:
     n_hits: int = 0
     """Hits that the jackknife left out in turn."""
     residue_phase: float | None = None
-    """Phase of the modal constant when it is fitted as a complex number (rad): 0 for a real mode."""
+    """Phase of its modal constant as a complex number (LSCF), against the sign of K (rad): 0 for a real mode."""
     coherence: float | None = None
     """Mean coherence between the half-power points; None where it is not known."""
     misfit: float | None = None

@@ -145,11 +145,9 @@ def _first(frf: Frf, weight: Array, local: LocalBand) -> FittedBand | None:
             starts[:, i] = poles.frequency[best], poles.damping_ratio[best]
     height = np.array([r.height for r in local.resonances])
     fitted = _fit(f, own, w, starts, height)
-    return (
-        None
-        if fitted is None
-        else FittedBand(part, local.resonances, fitted[1], fitted[0], own, LEAST_TERMS, (), chart)
-    )
+    if fitted is None:
+        return None
+    return FittedBand(part, local.resonances, fitted[1], fitted[0], own, LEAST_TERMS, (), chart)
 
 
 def _again(state: Extraction, i: int, look_closer: bool) -> Extraction:
@@ -173,10 +171,8 @@ def _with_hidden(band: FittedBand, f: Array, own: NDArray[np.complex128], weight
     """The band with those modes added that have no peak of their own, where the sum of squares asks for them."""
     bent = _with_terms(band, f, own, weight)
     for starts in _more_modes(band, split=bent.terms > band.terms):
-        fit, height = (
-            fit_band(f, own[None], weight[None], starts, band.terms),
-            np.full(starts.shape[1], band.height.max()),
-        )
+        height = np.full(starts.shape[1], np.max(band.height))
+        fit = fit_band(f, own[None], weight[None], starts, band.terms)
         if fit is None or not _is_better(fit, band.fit, TERM_F) or not _is_likelier(fit, bent.fit):
             continue
         if _is_better(fit, band.fit, HIDDEN_F) and np.all(_are_modes(fit, f, height, HIDDEN_ERROR)):

@@ -6,6 +6,7 @@ from modal.fit_points import fit_points
 from modal.follow import Followed, follow
 from modal.mac import mac
 from modal.mode import Mode
+from modal.mode_indicator import mode_indicator
 from modal.physical_poles import PhysicalPoles, physical_poles
 from modal.pick_peaks import pick_peaks
 from modal.predominant import predominant
@@ -25,6 +26,7 @@ __all__ = [
     "fit_points",
     "follow",
     "mac",
+    "mode_indicator",
     "modes_of",
     "physical_poles",
     "pick_peaks",

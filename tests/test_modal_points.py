@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from acquisition import Frf
-from modal import Mode, fit_points, follow, mac
+from modal import Mode, fit_points, follow, mac, mode_indicator, synthesize
 
 LINES = np.arange(5.0, 4000.0, 5.0)
 SHAPES = np.array([[1.0, 0.5, -0.7], [1.0, -0.8, 0.3], [0.6, 1.0, 0.9]])
@@ -66,6 +66,23 @@ def test_mac_of_textbook_shapes() -> None:
         mac([1, 2], [1, 2, 3])
     with pytest.raises(ValueError, match="zero"):
         mac([0, 0], [1, 2])
+
+
+def test_mode_indicator_is_one_at_a_real_mode_alone_and_what_it_is_elsewhere() -> None:
+    mode = Mode(1000.0, 0.02, 3e7)
+    frf = synthesize([mode], [500.0, 1000.0, 1010.0, 2000.0])
+    phase = np.angle(frf.receptance)
+    assert mode_indicator([frf]) == pytest.approx(1 - np.abs(np.cos(phase)))
+    assert mode_indicator([frf, frf])[1] == pytest.approx(1.0)
+    assert mode_indicator([frf])[3] < 0.01
+    assert mode_indicator([Frf(LINES, np.zeros(LINES.size, complex))]) == pytest.approx(np.zeros(LINES.size))
+    peaks = [float(mode_indicator(points())[np.argmin(np.abs(LINES - f))]) for f in (900.0, 1300.0)]
+    assert peaks[0] > 0.9
+    assert peaks[1] < 0.3
+    with pytest.raises(ValueError, match="no FRF"):
+        mode_indicator([])
+    with pytest.raises(ValueError, match="differ in their frequency lines"):
+        mode_indicator([frf, *points()])
 
 
 LAST = Mode(1700.0, 0.03, 3.5e7)

@@ -96,5 +96,10 @@ def test_command_corrects_an_exponential_window_and_draws(
     added = 1 / (2 * np.pi * 1722 * 0.1)
     assert plain["damping_ratio"] - corrected["damping_ratio"] == pytest.approx(added, rel=0.01)
     assert picture.stat().st_size > 10_000
-    assert command(monkeypatch, str(file), "--window", "-1") == 2
+    np.savetxt(file, table * [1, 1, -1], header="Freq Real Imag", comments="")
+    assert command(monkeypatch, str(file)) == 2
+    assert "--conjugate" in capsys.readouterr().err
+    assert command(monkeypatch, str(file), "--conjugate", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["modes"][1]["damping_ratio"] == pytest.approx(plain["damping_ratio"])
+    assert command(monkeypatch, str(file), "--conjugate", "--window", "-1") == 2
     assert "time_constant=-1.0 s" in capsys.readouterr().err

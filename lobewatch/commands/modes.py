@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -24,6 +25,9 @@ def modes(
     window: Annotated[
         float | None, typer.Option(help="Time constant (s) of an exponential window on the response, to be corrected.")
     ] = None,
+    conjugate: Annotated[
+        bool, typer.Option("--conjugate", help="The file holds the complex conjugate of response over force.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Natural frequency, damping ratio and stiffness from one recorded file.
@@ -38,7 +42,9 @@ def modes(
       lobewatch modes tap.h5 --band 1200 2200 --figure modes.png
     """
     frf = read_frf(file)
-    found, picked = fit_modes(frf, band, _good_hits(file)), pick_peaks(frf, band)
+    frf = replace(frf, receptance=frf.receptance.conj()) if conjugate else frf
+    hits = [] if conjugate else _good_hits(file)
+    found, picked = fit_modes(frf, band, hits), pick_peaks(frf, band)
     if figure is not None:
         save_figure(modes_figure(extract(frf, band), found, file.name), figure)
     fitted = [_without(window, mode) for mode in found]

@@ -94,7 +94,8 @@ def _check_phase(frf: Frf, peaks: list[_Peak]) -> None:
     if rising > falling and np.sum(phase_step) > 0:
         raise ValueError(
             "the phase rises through the resonances, so that every damping ratio would be negative; this is the "
-            "complex conjugate of response over force: give Frf the conjugate of receptance (lobewatch modes --conjugate)"
+            "complex conjugate of response over force: give Frf the conjugate of receptance (on the command line: "
+            "--conjugate)"
         )
 
 

@@ -76,8 +76,8 @@ def _draw_chart(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
             axes.plot(chart.frequency[which], chart.order[which], mark, **style)
     for mode in modes:
         axes.axvline(mode.frequency, color=NOW, lw=0.6)
-    axes.set(xlabel="frequency (Hz); grey: the bands fitted", ylabel="order")
-    axes.set_ylim(0, 16)
+    axes.set(xlabel="frequency (Hz); grey: the bands fitted; ?: the report has a doubt", ylabel="order")
+    axes.set_ylim(0, 13)
     if state.bands:
         axes.legend(loc="upper right", ncols=2)
 

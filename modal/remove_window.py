@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modal.mode import Mode
 
@@ -31,16 +32,32 @@ def remove_window(mode: Mode, time_constant: float) -> Mode:
             f"window, {1 / time_constant:.3g}/s: the time constant is not that of its window; look it up"
         )
     w = float(np.hypot(decay, size * np.sqrt(1 - mode.damping_ratio**2)))
-    frequency, ratio = w / (2 * np.pi), w / size
-    slope = np.diag([1 / ratio, size / w, ratio**2])
-    slope[1, 0] = 2 * np.pi * (mode.damping_ratio - decay / w / ratio) / w
+    slope = _slope(mode, time_constant, size, decay, w)
     covariances = [c if c is None else slope @ c @ slope.T for c in (mode.covariance, mode.jackknife)]
     return replace(
         mode,
-        frequency=frequency,
+        frequency=w / (2 * np.pi),
         damping_ratio=decay / w,
-        stiffness=mode.stiffness * ratio**2,
+        stiffness=mode.stiffness * (w / size) ** 2,
         covariance=covariances[0],
         jackknife=covariances[1],
         method=f"{mode.method}, without the window of {time_constant:g} s",
     )
+
+
+def _slope(mode: Mode, tau: float, size: float, decay: float, w: float) -> NDArray[np.float64]:
+    """Of frequency, damping ratio and stiffness without the window by those with it, shape (3, 3).
+
+    w^2 = size^2 - 2 zeta size/tau + 1/tau^2.
+    """
+    by_size, by_zeta = (size - mode.damping_ratio / tau) / w, -size / tau / w
+    k = 2 * mode.stiffness * w / size**2
+    slope = np.array(
+        [
+            [by_size, by_zeta, 0],
+            [mode.damping_ratio / w - decay / w**2 * by_size, size / w - decay / w**2 * by_zeta, 0],
+            [k * (by_size - w / size), k * by_zeta, (w / size) ** 2],
+        ]
+    )
+    hertz = np.diag([2 * np.pi, 1, 1])
+    return np.asarray(np.linalg.inv(hertz) @ slope @ hertz)

@@ -42,6 +42,14 @@ def test_errors_in_noise_are_those_that_are_stated() -> None:
         assert np.sqrt(np.mean(error**2)) == pytest.approx(stated, rel=0.5)
 
 
+def test_the_first_point_of_a_shape_is_positive_whatever_the_sign_of_the_response() -> None:
+    turned = [Frf(LINES, -frf.receptance) for frf in points()]
+    for mode, shape in zip(fit_points(turned), SHAPES, strict=True):
+        assert not mode.is_driving_point
+        assert mode.shape is not None
+        assert mode.shape == pytest.approx(shape, abs=1e-3)
+
+
 def test_one_frf_is_allowed_and_different_lines_and_none_are_not() -> None:
     (one, *_) = points()
     assert [round(mode.frequency) for mode in fit_points([one])] == [900, 1722, 1790]

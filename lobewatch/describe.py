@@ -19,30 +19,91 @@ from modal import Mode
 def mode_json(mode: Mode) -> dict[str, Any]:
     """One mode."""
     frequency, damping, stiffness = mode.standard_error
+    by_fit = mode.fit_error
     return {
         "frequency_hz": mode.frequency,
         "frequency_hz_std": frequency,
+        "frequency_hz_std_of_fit": by_fit[0],
         "damping_ratio": mode.damping_ratio,
         "damping_ratio_std": damping,
+        "damping_ratio_std_of_fit": by_fit[1],
         "stiffness_n_per_m": mode.stiffness,
         "stiffness_n_per_m_std": stiffness,
+        "stiffness_n_per_m_std_of_fit": by_fit[2],
+        "interval_95": mode.interval(),
+        "correlation": mode.correlation,
+        "hits": mode.n_hits,
         "driving_point": mode.is_driving_point,
+        "residue_phase_rad": mode.residue_phase,
+        "coherence": mode.coherence,
+        "misfit": mode.misfit,
+        "half_power_damping_ratio": mode.half_power_damping,
+        "doubts": list(mode.doubts),
         "method": mode.method,
     }
 
 
 def mode_table(modes: Sequence[Mode]) -> Table:
-    """Modes, a line each, value ± standard error."""
+    """Modes, a line each, value ± standard error (in percent)."""
     made = table("f_n (Hz)", "zeta (%)", "K (N/um)", "<")
     for mode in modes:
-        frequency, damping, stiffness = mode.standard_error
+        values = (mode.frequency, mode.damping_ratio, mode.stiffness)
         made.add_row(
-            plus_minus(mode.frequency, frequency),
-            plus_minus(mode.damping_ratio, damping, 0.01),
-            plus_minus(mode.stiffness, stiffness, 1e6),
+            *(
+                plus_minus(value, std, scale) + _percent(std / abs(value))
+                for value, std, scale in zip(values, mode.standard_error, (1.0, 0.01, 1e6), strict=True)
+            ),
             "" if mode.is_driving_point else "not a driving point",
         )
     return made
+
+
+def _percent(share: float) -> str:
+    """A standard error as a share; empty where there is none or no error worth the name."""
+    return f" ({100 * share:.2g} %)" if share > 1e-7 else ""
+
+
+def mode_lines(modes: Sequence[Mode]) -> list[str]:
+    """What stands below a table of modes: where ± comes from, and correlated errors."""
+    hits = max((mode.n_hits for mode in modes), default=0)
+    lines = [f"± is the standard error over the {hits} hits (jackknife, {hits - 1} degrees of freedom)"] if hits else []
+    for (i, j), names in (((0, 1), "f_n and zeta"), ((0, 2), "f_n and K"), ((1, 2), "zeta and K")):
+        high = [f"{m.correlation[i, j]:+.2f} ({m.frequency:.0f} Hz)" for m in modes if abs(m.correlation[i, j]) > 0.5]
+        if high:
+            lines.append(f"correlation of the errors of {names}: {', '.join(high)}")
+    return lines
+
+
+def doubt_lines(modes: Sequence[Mode]) -> list[str]:
+    """What speaks against modes, a line each."""
+    where: dict[str, list[str]] = {}
+    for mode in modes:
+        for doubt in mode.doubts:
+            where.setdefault(doubt, []).append(f"{mode.frequency:.0f}")
+    lines = [f"doubt at {', '.join(at)} Hz: {doubt}" for doubt, at in where.items()]
+    if len(modes) > 1 and not any(mode.is_driving_point for mode in modes):
+        lines.append("every K is negative: hammer or sensor is mounted or wired the other way round (sign swapped)")
+    return lines
+
+
+def picked_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
+    """Modes by peak picking, and how far each is from the fitted mode nearest to it."""
+    made = table("f_n (Hz)", "zeta (%)", "K (N/um)", "<against the fit")
+    for mode in picked:
+        near = min(fitted, key=lambda other: abs(other.frequency - mode.frequency), default=None)
+        same = near is not None and abs(near.frequency - mode.frequency) < mode.damping_ratio * mode.frequency
+        made.add_row(
+            f"{mode.frequency:.5g}",
+            f"{100 * mode.damping_ratio:.5g}",
+            f"{mode.stiffness / 1e6:.5g}",
+            _difference(mode, near) if same and near is not None else "not fitted",
+        )
+    return made
+
+
+def _difference(mode: Mode, fit: Mode) -> str:
+    zeta, k = mode.damping_ratio / fit.damping_ratio - 1, mode.stiffness / fit.stiffness - 1
+    return f"f_n {mode.frequency - fit.frequency:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
 
 
 def calibration_json(calibration: Calibration) -> dict[str, Any]:
@@ -154,7 +215,7 @@ def measurement_texts(m: Measurement, machine: Machine) -> list[str | Table]:
     """All of a measurement, for people."""
     texts: list[str | Table] = [f"{m.tap_id}  (tool {m.tool}, direction {m.direction})"]
     if m.dynamics.modes:
-        texts.append(mode_table(m.dynamics.modes))
+        texts += [mode_table(m.dynamics.modes), *doubt_lines(m.dynamics.modes)]
     if m.dynamics.followed is not None:
         texts.append(f"followed: {m.dynamics.followed.frequency:.2f} Hz")
     if m.dynamics.calibration is not None:

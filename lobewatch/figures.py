@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from acquisition import Frf
 from lobewatch.machine import Limits
-from modal import Mode, synthesize
 
 NOW = "#0072B2"
 THEN = "#777777"
@@ -50,30 +49,6 @@ def svg(figure: Figure) -> str:
     with mpl.rc_context(STYLE):
         figure.savefig(text, format="svg", metadata={"Date": None})
     return text.getvalue()[text.getvalue().index("<svg") :]
-
-
-def modes_figure(frf: Frf, modes: Sequence[Mode], title: str) -> Figure:
-    """Magnitude of accelerance, measured and synthesised from the modes alone."""
-    figure, (axes,) = new_axes(1, (8.0, 4.0))
-    shown = frf.in_band(frf.usable_band)
-    axes.semilogy(shown.frequency, np.abs(shown.accelerance), color=THEN, lw=0.8, label="measured")
-    if modes:
-        fitted = synthesize(modes, shown.frequency)
-        axes.semilogy(shown.frequency, np.abs(fitted.accelerance), color=NOW, ls="--", label="modes found, alone")
-    for mode in modes:
-        axes.axvline(mode.frequency, color=NOW, lw=0.6)
-        axes.annotate(
-            f"{mode.frequency:.0f}",
-            (mode.frequency, 0.98),
-            xytext=(3, 0),
-            textcoords="offset points",
-            xycoords=("data", "axes fraction"),
-            rotation=90,
-            va="top",
-        )
-    axes.set(title=title, xlabel="frequency (Hz)", ylabel="|accelerance| (m/s²/N)")
-    axes.legend(loc="lower right")
-    return figure
 
 
 def frf_figure(then: Frf | None, now: Frf, band: tuple[float, float]) -> Figure:

@@ -59,23 +59,34 @@ def update_history(folder: MachineFolder) -> tuple[SldHistory, list[Measurement]
     """
     taps = folder.taps()
     history = _read_current(folder, [entry.id for entry in taps])
-    measurements = [measure(folder, entry) for entry in taps[len(history) :]]
-    for measurement in measurements:
-        history = history.append(*_row(measurement, folder.machine))
+    measurements = []
+    for entry in taps[len(history) :]:
+        measurements.append(measure(folder, entry, _last_followed(history, entry)))
+        history = history.append(*_row(measurements[-1], folder.machine))
     if measurements or not folder.history.exists():
         write_history(folder.history, history)
     return history, measurements
 
 
-def measure(folder: MachineFolder, entry: TapEntry) -> Measurement:
-    """The measurement of one committed tap, together with its partner in the other direction."""
-    return analyse(folder.read(entry), folder.machine, _partner(folder, entry))
+def measure(folder: MachineFolder, entry: TapEntry, last: Mode | None = None) -> Measurement:
+    """The measurement of one committed tap, together with its partner in the other direction; last: as in `analyse`."""
+    return analyse(folder.read(entry), folder.machine, _partner(folder, entry), last)
 
 
 def series(history: SldHistory, tool: str, direction: str) -> NDArray[np.int64]:
     """Rows of one tool and direction, oldest first."""
     columns = history.columns
     return np.flatnonzero((columns["tool"] == tool) & (columns["direction"] == direction))
+
+
+def _last_followed(history: SldHistory, entry: TapEntry) -> Mode | None:
+    """The mode that was followed last in the series of this tap."""
+    columns = history.columns
+    rows = [row for row in series(history, entry.tool, entry.direction) if np.isfinite(columns["frequency"][row])]
+    if not rows:
+        return None
+    frequency, damping, stiffness = (float(columns[name][rows[-1]]) for name in NUMBERS[:6:2])
+    return Mode(frequency, damping, stiffness)
 
 
 def _software() -> str:

@@ -15,7 +15,7 @@ from acquisition import TapTest
 from dsm import Calibration, calibrate, modal_stiffness
 from lobes import StabilityLobes, zero_order
 from lobewatch.machine import Machine
-from modal import Mode, fit_modes, predominant
+from modal import Mode, fit_modes, follow, predominant
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,12 +56,13 @@ class Measurement:
     """The same normal to the feed."""
 
 
-def analyse(tap: TapTest, machine: Machine, partner: TapTest | None = None) -> Measurement:
-    """All that follows from a tap test; partner: the one in the other direction with the same tool, within a day."""
+def analyse(tap: TapTest, machine: Machine, partner: TapTest | None = None, last: Mode | None = None) -> Measurement:
+    """All that follows from a tap test; partner: the one in the other direction with the same tool, within a day;
+    last: the mode that was followed in the test before."""
     notes: list[str] = []
     about = tap.circumstances
     with threadpool_limits(limits=1):
-        seen = _dynamics(tap, machine, notes)
+        seen = _dynamics(tap, machine, notes, last)
         other = _dynamics(partner, machine, []).at_tip if partner is not None else []
         lobes = _lobes(seen.at_tip, other, tap, machine, notes)
     x, y = (seen.at_tip, other) if about.direction == "x" else (other, seen.at_tip)
@@ -85,17 +86,31 @@ def _no_mode(modes: Sequence[Mode], machine: Machine) -> str:
     return f"no mode to follow: none with positive stiffness{place}; {found}"
 
 
-def _dynamics(tap: TapTest, machine: Machine, notes: list[str]) -> Dynamics:
+def _dynamics(tap: TapTest, machine: Machine, notes: list[str], last: Mode | None = None) -> Dynamics:
     try:
-        modes = fit_modes(tap.frf)
+        modes = fit_modes(tap.frf, hits=tap.accepted)
     except ValueError as error:
         notes.append(f"no modes: {error}")
         return Dynamics([], None, None, [])
-    followed = predominant(modes, machine.mode.band_hz)
-    if followed is None:
-        notes.append(_no_mode(modes, machine))
+    followed = _follow(modes, machine, notes, last)
     calibration = _calibrate(followed, machine, tap.circumstances.tool, notes)
     return Dynamics(modes, followed, calibration, _modes_at_tip(modes, followed, calibration, machine, notes))
+
+
+def _follow(modes: Sequence[Mode], machine: Machine, notes: list[str], last: Mode | None) -> Mode | None:
+    """The mode that continues the last one, the predominant one where there is none yet."""
+    first = predominant(modes, machine.mode.band_hz)
+    if first is None:
+        notes.append(_no_mode(modes, machine))
+        return None
+    if last is None:
+        return first
+    found = follow(last, _in_band(modes, machine))
+    if found.mode is None:
+        notes.append(f"no mode to follow: {found.doubt}; for a rebuilt spindle lay [mode] band_hz around its new mode")
+    elif found.doubt:
+        notes.append(found.doubt)
+    return found.mode
 
 
 def _calibrate(followed: Mode | None, machine: Machine, tool: str, notes: list[str]) -> Calibration | None:
@@ -120,7 +135,7 @@ def _modes_at_tip(
     """Modes in the band, carried to the tip by the model where the tap was elsewhere; none where K < 0."""
     candidates = _in_band(modes, machine)
     against = [mode for mode in candidates if not mode.is_driving_point]
-    if followed is None:
+    if not any(mode.is_driving_point for mode in candidates):
         return []
     if against:
         where = ", ".join(f"{mode.frequency:.0f}" for mode in against)
@@ -131,8 +146,10 @@ def _modes_at_tip(
         return []
     if machine.tap.position_mm == 0:
         return candidates
-    if calibration is None:
-        notes.append("no stability lobes: the tap was not at the tool tip ([tap] position_mm), and there is no model")
+    if calibration is None or followed is None:
+        notes.append(
+            "no stability lobes: the tap was not at the tool tip ([tap] position_mm), and there is no calibrated model"
+        )
         return []
     return [_carried_to_tip(followed, calibration, machine.tap.position_mm / 1e3)]
 
@@ -141,8 +158,16 @@ def _carried_to_tip(mode: Mode, calibration: Calibration, position: float) -> Mo
     number = calibration.mode
     ratio = modal_stiffness(calibration.spindle, number) / modal_stiffness(calibration.spindle, number, position)
     scale = np.array([1.0, 1.0, ratio])
-    covariance = None if mode.covariance is None else mode.covariance * np.outer(scale, scale)
-    return replace(mode, stiffness=mode.stiffness * ratio, covariance=covariance, method=f"{mode.method}, model to tip")
+    covariance, jackknife = (
+        None if c is None else c * np.outer(scale, scale) for c in (mode.covariance, mode.jackknife)
+    )
+    return replace(
+        mode,
+        stiffness=mode.stiffness * ratio,
+        covariance=covariance,
+        jackknife=jackknife,
+        method=f"{mode.method}, model to tip",
+    )
 
 
 def _lobes(

@@ -1,9 +1,37 @@
 """From an FRF to natural frequencies, damping ratios and stiffnesses."""
 
-from modal.fit_modes import fit_modes
+from modal.extract import Extraction, FittedBand, extract
+from modal.fit_modes import fit_modes, modes_of
+from modal.fit_points import fit_points
+from modal.follow import Followed, follow
+from modal.mac import mac
 from modal.mode import Mode
+from modal.mode_indicator import mode_indicator
+from modal.physical_poles import PhysicalPoles, physical_poles
 from modal.pick_peaks import pick_peaks
 from modal.predominant import predominant
+from modal.remove_window import remove_window
+from modal.stabilise import StabilisationChart, stabilise
 from modal.synthesize import synthesize
 
-__all__ = ["Mode", "fit_modes", "pick_peaks", "predominant", "synthesize"]
+__all__ = [
+    "Extraction",
+    "FittedBand",
+    "Followed",
+    "Mode",
+    "PhysicalPoles",
+    "StabilisationChart",
+    "extract",
+    "fit_modes",
+    "fit_points",
+    "follow",
+    "mac",
+    "mode_indicator",
+    "modes_of",
+    "physical_poles",
+    "pick_peaks",
+    "predominant",
+    "remove_window",
+    "stabilise",
+    "synthesize",
+]

@@ -61,10 +61,16 @@ def find_resonances(frf: Frf) -> list[Resonance]:
     mobility, so that a wide mode is found in noise that hides it from single lines. Two modes with no dip between
     them are one peak, and a mode much narrower than the line spacing is none.
 
-    Raises ValueError for fewer than 8 lines, an FRF of zeros, and one whose phase rises through its resonances.
+    Raises ValueError for fewer than 8 lines, an FRF of zeros, one without phase, and one whose phase rises through its
+    resonances.
     """
     _check(frf)
     peaks = [peak for peak in _peaks_at_all_scales(frf) if peak.coherence >= LEAST_COHERENCE]
+    if peaks and not np.any(frf.receptance.imag):
+        raise ValueError(
+            "the FRF is real on every line: its phase is missing, and without it damping and stiffness cannot be told "
+            "from neighbouring modes; export real and imaginary part, or magnitude and phase"
+        )
     _check_phase(frf, peaks)
     return sorted((p.resonance for p in peaks if p.turn < -LEAST_TURN or p.turn > MOST_TURN), key=lambda r: r.frequency)
 
@@ -88,7 +94,8 @@ def _check_phase(frf: Frf, peaks: list[_Peak]) -> None:
     if rising > falling and np.sum(phase_step) > 0:
         raise ValueError(
             "the phase rises through the resonances, so that every damping ratio would be negative; this is the "
-            "complex conjugate of response over force: give Frf the conjugate of receptance"
+            "complex conjugate of response over force: give Frf the conjugate of receptance (on the command line: "
+            "--conjugate)"
         )
 
 

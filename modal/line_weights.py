@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import median_filter, uniform_filter1d
 
 from acquisition import Frf
 
-SMOOTHED_OVER = 9
+SMOOTHED_OVER = 25
 """Lines over which the variance is averaged, so that a line that is small by chance does not count for more."""
+OUTSTANDING = 8.0
+"""Times the median about it that the variance of an undisturbed line never reaches."""
 LEAST_VARIANCE = 1e-6
 """Share of the mean variance below which no line is believed."""
 
@@ -23,9 +25,15 @@ def line_weights(frf: Frf) -> NDArray[np.float64]:
     factor = measuring_factor(frf)
     if frf.random_error is None:
         return factor
-    variance = uniform_filter1d((frf.random_error * np.abs(frf.receptance) * factor) ** 2, SMOOTHED_OVER)
+    variance = _smoothed((frf.random_error * np.abs(frf.receptance) * factor) ** 2)
     mean = np.mean(variance)
     return factor if mean == 0 else factor / np.sqrt(np.maximum(variance, LEAST_VARIANCE * mean) / mean)
+
+
+def _smoothed(variance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Running mean that a disturbed line (hum) does not spread over; such a line keeps its own variance."""
+    most = OUTSTANDING * median_filter(variance, SMOOTHED_OVER)
+    return np.where(variance > most, variance, uniform_filter1d(np.minimum(variance, most), SMOOTHED_OVER))
 
 
 def measuring_factor(frf: Frf) -> NDArray[np.float64]:

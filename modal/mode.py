@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri, stdtrit
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,9 +24,27 @@ class Mode:
     stiffness: float
     """Modal stiffness K between hammer and sensor (N/m), signed."""
     covariance: NDArray[np.float64] | None = None
-    """Covariance of (frequency, damping_ratio, stiffness), SI units, shape (3, 3); None where not estimated."""
+    """Covariance of (frequency, damping_ratio, stiffness) from the residual of the fit, SI units, shape (3, 3).
+
+    It takes the errors of neighbouring lines as independent. None where not estimated."""
     method: str = ""
     """How it was found."""
+    jackknife: NDArray[np.float64] | None = None
+    """The same covariance from the scatter of the hits, whatever their errors, shape (3, 3); None without hits."""
+    n_hits: int = 0
+    """Hits that the jackknife left out in turn."""
+    residue_phase: float | None = None
+    """Phase of its modal constant as a complex number (LSCF), against the sign of K (rad): 0 for a real mode."""
+    coherence: float | None = None
+    """Mean coherence between the half-power points; None where it is not known."""
+    misfit: float | None = None
+    """rms of what the fit leaves in its band over rms of the noise there: 1 for a fit that leaves nothing."""
+    half_power_damping: float | None = None
+    """Damping ratio from the width of the peak at half power, for comparison; None where it has no such width."""
+    shape: NDArray[np.float64] | None = None
+    """Mode shape over the FRFs of `fit_points`, the largest 1 or -1 and the first > 0, shape (p,); None of one FRF."""
+    doubts: tuple[str, ...] = ()
+    """Why it may not be trusted; empty where nothing speaks against it."""
 
     def __post_init__(self) -> None:
         """Refuse what is no mode."""
@@ -34,8 +53,11 @@ class Mode:
                 raise ValueError(f"{name}={value} is not a finite number > 0")
         if not np.isfinite(self.stiffness) or self.stiffness == 0:
             raise ValueError(f"stiffness={self.stiffness} is not a finite number other than 0 (N/m)")
-        if self.covariance is not None and np.shape(self.covariance) != (3, 3):
-            raise ValueError(f"covariance has shape {np.shape(self.covariance)}, not (3, 3)")
+        for name, matrix in (("covariance", self.covariance), ("jackknife", self.jackknife)):
+            if matrix is not None and np.shape(matrix) != (3, 3):
+                raise ValueError(f"{name} has shape {np.shape(matrix)}, not (3, 3)")
+        if self.jackknife is not None and self.n_hits < 2:
+            raise ValueError(f"n_hits={self.n_hits}: a jackknife has at least 2 hits")
 
     @property
     def is_driving_point(self) -> bool:
@@ -43,13 +65,45 @@ class Mode:
         return self.stiffness > 0
 
     @property
+    def best_covariance(self) -> NDArray[np.float64] | None:
+        """The covariance to go on with: over the hits where there are any, else that of the fit; None without both."""
+        return self.covariance if self.jackknife is None else self.jackknife
+
+    @property
     def standard_error(self) -> NDArray[np.float64]:
-        """Standard errors of (frequency Hz, damping_ratio, stiffness N/m), shape (3,); NaN where not estimated."""
-        if self.covariance is None:
-            return np.full(3, np.nan)
-        return np.sqrt(np.diag(self.covariance))
+        """Standard errors of (frequency Hz, damping_ratio, stiffness N/m), shape (3,); NaN where not estimated.
+
+        Over the hits where there are any, else those of the fit."""
+        return _root_of_diagonal(self.best_covariance)
+
+    @property
+    def fit_error(self) -> NDArray[np.float64]:
+        """Standard errors from the residual of the fit alone, shape (3,); NaN where not estimated."""
+        return _root_of_diagonal(self.covariance)
+
+    @property
+    def correlation(self) -> NDArray[np.float64]:
+        """Correlations of the errors, shape (3, 3); NaN where not estimated."""
+        if self.best_covariance is None:
+            return np.full((3, 3), np.nan)
+        return np.asarray(self.best_covariance / np.outer(self.standard_error, self.standard_error))
+
+    def interval(self, level: float = 0.95) -> NDArray[np.float64]:
+        """Limits that hold the truth with this probability, (low, high) of frequency, damping and stiffness, (3, 2).
+
+        Student's t with n_hits - 1 degrees of freedom over hits, else the normal distribution."""
+        if not 0 < level < 1:
+            raise ValueError(f"level={level} is not between 0 and 1")
+        p = (1 + level) / 2
+        reach = (ndtri(p) if self.jackknife is None else stdtrit(self.n_hits - 1, p)) * self.standard_error
+        value = np.array([self.frequency, self.damping_ratio, self.stiffness])
+        return np.stack([value - reach, value + reach], axis=1)
 
     def receptance(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Receptance of this mode alone (m/N), same shape as frequency (Hz)."""
         r = np.asarray(frequency) / self.frequency
         return np.asarray(1 / (self.stiffness * (1 - r**2 + 2j * self.damping_ratio * r)))
+
+
+def _root_of_diagonal(covariance: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    return np.full(3, np.nan) if covariance is None else np.sqrt(np.diag(covariance))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,6 +53,20 @@ def test_conjugated_frf_is_refused(extract: Extraction, modes: list[Mode]) -> No
 @pytest.mark.parametrize("receptance", [np.full(LINES.size, 1e-8), 1 / LINES**2, 1e-8 * np.exp(-1e-3j * LINES)])
 def test_frf_without_resonance_gives_an_empty_list(extract: Extraction, receptance: NDArray[np.complex128]) -> None:
     assert extract(Frf(LINES, receptance)) == []
+
+
+@both
+@pytest.mark.parametrize("lost", [np.abs, np.real])
+def test_magnitude_or_real_part_alone_is_refused(extract: Extraction, lost: Callable[..., Any]) -> None:
+    with pytest.raises(ValueError, match="phase is missing"):
+        extract(Frf(LINES, lost(GOOD.receptance)))
+
+
+def test_values_that_are_none_are_refused_by_the_frf() -> None:
+    with pytest.raises(ValueError, match=f"not finite at {LINES.size} lines"):
+        Frf(LINES, np.full(LINES.size, np.nan))
+    with pytest.raises(ValueError, match="coherence must lie between 0 and 1"):
+        Frf(LINES, GOOD.receptance, np.full(LINES.size, 1.1))
 
 
 @both

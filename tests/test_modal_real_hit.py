@@ -30,7 +30,7 @@ def nearest(modes: list[Mode], frequency: float) -> Mode:
 def test_known_modes_are_fitted(beam: Frf) -> None:
     found = [nearest(fit_modes(beam), f) for f in FREQUENCY]
     assert [mode.frequency for mode in found] == pytest.approx(FREQUENCY, rel=5e-4)
-    assert [mode.damping_ratio for mode in found] == pytest.approx(DAMPING, rel=0.08)
+    assert [mode.damping_ratio for mode in found] == pytest.approx(DAMPING, rel=0.09)
     assert [mode.is_driving_point for mode in found] == [True, True, False, False]
 
 

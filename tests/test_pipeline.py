@@ -295,3 +295,36 @@ def test_modes_of_many_hits_agree_with_the_frf_they_come_from(
     again, flags = average_good(tap.hits)
     assert np.array_equal(again.receptance, tap.frf.receptance)
     assert replace(tap, flags=flags).accepted == tap.accepted
+
+
+def test_standard_errors_are_those_over_the_hits(folder: MachineFolder) -> None:
+    live_tap(folder, 1.28e9)
+    history, (found,) = update_history(folder)
+    followed = found.dynamics.followed
+    assert followed is not None
+    assert followed.n_hits == folder.machine.tap.hits
+    assert followed.jackknife is not None
+    assert history.columns["stiffness_std"][0] == pytest.approx(np.sqrt(followed.jackknife[2, 2]))
+
+
+def test_a_mode_is_followed_past_a_neighbour_that_becomes_the_highest(folder: MachineFolder) -> None:
+    for month in range(4):
+        own = Mode(1700.0 - 20 * month, 0.03, 3.5e7)
+        neighbour = Mode(1900.0, 0.03, 3.9e7 - 0.4e7 * month)
+        folder.commit(recorded(about(folder, 30.0 * month), own, neighbour))
+    history, measurements = update_history(folder)
+    assert history.columns["frequency"] == pytest.approx([1700, 1680, 1660, 1640], abs=0.5)
+    assert not any("in doubt" in note for found in measurements for note in found.notes)
+    folder.history.unlink()
+    again, _ = update_history(folder)
+    assert np.array_equal(again.columns["frequency"], history.columns["frequency"])
+
+
+def test_a_jump_of_the_frequency_is_said_and_a_far_one_is_not_followed(folder: MachineFolder) -> None:
+    for days, f in ((0.0, 1500.0), (30.0, 1640.0), (60.0, 2100.0)):
+        folder.commit(recorded(about(folder, days), Mode(f, 0.03, 3.5e7)))
+    history, (_, jumped, far) = update_history(folder)
+    assert any("followed mode in doubt, now 1640.0 Hz" in note for note in jumped.notes)
+    assert "no mode is like the one followed so far, 1640.0 Hz; nearest is 2100.0 Hz" in far.notes[0]
+    assert np.isnan(history.columns["frequency"][2])
+    assert far.lobes

@@ -2,27 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from acquisition import read_frf
-from lobewatch.describe import mode_json, mode_table
-from lobewatch.figures import modes_figure, save_figure
+from acquisition import Frf, Hit, check_hit, read_frf, read_recording
+from lobewatch.describe import doubt_lines, mode_json, mode_lines, mode_table, picked_table
+from lobewatch.figures import save_figure
+from lobewatch.figures_modes import modes_figure
 from lobewatch.output import Json, emit
-from modal import fit_modes, pick_peaks
+from modal import Mode, extract, fit_modes, pick_peaks, remove_window
 
 
 def modes(
     file: Annotated[Path, typer.Argument(help="Tap file (HDF5), LVM or CSV with hits, or CSV with an FRF.")],
     band: Annotated[tuple[float, float] | None, typer.Option(help="Only between these frequencies (Hz).")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Draw FRF and fit to this file (.svg, .png, .pdf).")] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Draw FRF, fit and poles to this file (.svg, .png, .pdf).")
+    ] = None,
+    window: Annotated[
+        float | None, typer.Option(help="Time constant (s) of an exponential window on the response, to be corrected.")
+    ] = None,
+    conjugate: Annotated[
+        bool, typer.Option("--conjugate", help="The file holds the complex conjugate of response over force.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Natural frequency, damping ratio and stiffness from one recorded file.
 
-    Each by a least-squares fit with standard errors, and beside it by the peak picking of Gaber & Hashemi (2015).
+    Each by a least-squares fit with standard errors, over the hits where the file holds three or more, and beside it
+    by the peak picking of Gaber & Hashemi (2015). What speaks against a mode is said below the table.
 
     Examples:
 
@@ -31,9 +42,12 @@ def modes(
       lobewatch modes tap.h5 --band 1200 2200 --figure modes.png
     """
     frf = read_frf(file)
-    fitted, picked = fit_modes(frf, band), pick_peaks(frf, band)
+    frf = replace(frf, receptance=frf.receptance.conj()) if conjugate else frf
+    hits = [] if conjugate else _good_hits(file)
+    found, picked = fit_modes(frf, band, hits), pick_peaks(frf, band)
     if figure is not None:
-        save_figure(modes_figure(frf, fitted, file.name), figure)
+        save_figure(modes_figure(extract(frf, band), found, file.name), figure)
+    fitted = [_without(window, mode) for mode in found]
     payload = {
         "file": str(file),
         "n_averages": frf.n_averages,
@@ -48,7 +62,19 @@ def modes(
         as_json,
         f"{file.name}: {frf.n_averages} hit(s) averaged, {lines}{usable}",
         mode_table(fitted),
+        *mode_lines(fitted),
+        *doubt_lines(fitted),
         "peak picking (eqs. 28, 29), for comparison:",
-        mode_table(picked),
+        picked_table(picked, found),
         *([] if fitted else ["no mode found: is the band right, was the hit hard enough?"]),
     )
+
+
+def _good_hits(file: Path) -> list[Hit]:
+    """The hits that the FRF of this file was averaged from; none where it holds only an FRF."""
+    recording = read_recording(file)
+    return [] if isinstance(recording, Frf) else [hit for hit in recording if not check_hit(hit)]
+
+
+def _without(window: float | None, mode: Mode) -> Mode:
+    return mode if window is None else remove_window(mode, window)

@@ -1,0 +1,99 @@
+"""Speed and errors of modal extraction beside sdypy-EMA, in one process with one BLAS thread each.
+
+    python -m pip install -e .[bench]      (in an environment of its own)
+    python bench/bench_modal.py
+
+One accelerance of 8193 lines (that at 0 Hz is left out) with five modes and noise. Ours: `fit_modes`, which finds,
+selects and fits the modes and gives their standard errors. Theirs: get_poles at order 60, select_closest_poles at the
+true frequencies, get_constants.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import time
+import warnings
+from collections.abc import Callable
+from importlib.metadata import version
+
+import numpy as np
+from numpy.typing import NDArray
+from sdypy import EMA
+from threadpoolctl import threadpool_limits
+
+from acquisition import Frf, from_accelerance
+from modal import Mode, fit_modes, synthesize
+
+TRUE = [
+    Mode(420.0, 0.020, 6.0e7),
+    Mode(900.0, 0.010, 4.0e7),
+    Mode(1722.0, 0.029136, 3.2289e7),
+    Mode(2600.0, 0.015, 9.0e7),
+    Mode(3400.0, 0.020, 1.2e8),
+]
+LINES = np.linspace(0.0, 4096.0, 8193)[1:]
+NOISE = 1e-5
+"""rms over the largest accelerance."""
+ROUNDS = 7
+Values = NDArray[np.float64]
+
+
+def measured(seed: int) -> Frf:
+    exact = synthesize(TRUE, LINES).accelerance
+    noise = np.random.default_rng(seed).normal(size=(2, LINES.size)) / np.sqrt(2)
+    return from_accelerance(LINES, exact + NOISE * np.max(np.abs(exact)) * (noise[0] + 1j * noise[1]))
+
+
+def ours(frf: Frf) -> Values:
+    return np.array([(m.frequency, m.damping_ratio, m.stiffness) for m in fit_modes(frf)])
+
+
+def theirs(frf: Frf) -> Values:
+    model = EMA.Model(
+        frf.accelerance[None],
+        frf.frequency,
+        lower=50,
+        upper=4096,
+        pol_order_high=60,
+        frf_form="accelerance",
+    )
+    with contextlib.redirect_stderr(io.StringIO()), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        model.get_poles(show_progress=False)
+        model.select_closest_poles([mode.frequency for mode in TRUE])
+        model.get_constants()
+    w, zeta = 2 * np.pi * np.array(model.nat_freq), np.array(model.nat_xi)
+    stiffness = w / (2 * np.abs(model.A[0]) * np.sqrt(1 - zeta**2))
+    return np.stack([w / (2 * np.pi), zeta, stiffness], axis=1)
+
+
+def cpu(extract: Callable[[Frf], Values], frf: Frf) -> tuple[float, Values]:
+    start = time.process_time()
+    found = extract(frf)
+    return time.process_time() - start, found
+
+
+def main() -> None:
+    true = np.array([(m.frequency, m.damping_ratio, m.stiffness) for m in TRUE])
+    methods = {"lobewatch fit_modes": ours, f"sdypy-EMA {version('sdypy-EMA')}, order 60": theirs}
+    times: dict[str, list[float]] = {name: [] for name in methods}
+    errors: dict[str, list[Values]] = {name: [] for name in methods}
+    for round_ in range(ROUNDS):
+        frf = measured(round_)
+        for name, extract in methods.items():
+            seconds, found = cpu(extract, frf)
+            times[name].append(seconds)
+            errors[name].append(np.abs(found / true - 1).max(axis=0))
+    print(f"{LINES.size} lines, {len(TRUE)} modes, noise {NOISE:g} of the largest accelerance, {ROUNDS} rounds")
+    print(f"{'':32}{'CPU (s)':>10}{'f':>10}{'zeta':>10}{'K':>10}   largest relative error, median of the rounds")
+    for name in methods:
+        f, zeta, k = np.median(errors[name], axis=0)
+        print(f"{name:32}{np.median(times[name]):10.3f}{f:10.1e}{zeta:10.1e}{k:10.1e}")
+    mine, other = (np.median(times[name]) for name in methods)
+    print(f"sdypy-EMA takes {other / mine:.1f} times the CPU time of lobewatch")
+
+
+if __name__ == "__main__":
+    with threadpool_limits(limits=1):
+        main()

@@ -1,0 +1,119 @@
+"""What speaks for and against a fitted mode."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modal.extract import LEAST_TERMS, Extraction, FittedBand
+from modal.mode import Mode
+from modal.physical_poles import physical_poles
+
+LEAST_COHERENCE = 0.9
+"""Mean coherence between the half-power points; below it the averaged hits disagree."""
+LARGEST_PHASE = np.radians(15)
+"""Phase of the complex modal constant."""
+LARGEST_MISFIT = 2.0
+"""rms of the residual over rms of the noise ..."""
+MISFIT_SHARE = 0.01
+"""... that matters where it is more than this share of the mode's own peak."""
+BENT = 0.005
+"""Relative standard error of K above which a strong mode beside the band may have bent the fit by more than that."""
+MOST_LEFT = 0.02
+"""Share of a mode's decay that may be left when the record ends."""
+LARGEST_SCATTER = 3.0
+"""Standard error over hits over that of the fit."""
+LARGEST_DIFFERENCE = 0.25
+"""Share that the damping ratio from the half-power width may differ by."""
+
+
+def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
+    """Mode i of a band with its figures of quality and the doubts that follow from them."""
+    share, misfit = _misfit(state, band, i)
+    judged = replace(
+        mode,
+        residue_phase=_phase(band, mode),
+        coherence=_coherence(state, mode),
+        misfit=misfit,
+        half_power_damping=_half_power_damping(band, mode),
+    )
+    doubts = [*_about_the_place(state, band, judged), *_about_the_values(judged, share, band.height.size)]
+    return replace(judged, doubts=tuple(doubts))
+
+
+def _phase(band: FittedBand, mode: Mode) -> float | None:
+    """Of the complex modal constant of the LSCF pole of this mode against its real value (rad); None without a pole."""
+    poles = physical_poles(band.chart)
+    distance = np.abs(poles.frequency - mode.frequency)
+    if not np.any(distance < mode.damping_ratio * mode.frequency):
+        return None
+    return float(np.angle(poles.flexibility[np.argmin(distance), 0] * np.sign(mode.stiffness)))
+
+
+def _coherence(state: Extraction, mode: Mode) -> float | None:
+    frf = state.frf
+    if frf.coherence is None or frf.random_error is None:
+        return None
+    distance = np.abs(frf.frequency - mode.frequency)
+    near = distance <= max(mode.damping_ratio * mode.frequency, distance.min())
+    return float(np.mean(frf.coherence[near]))
+
+
+def _misfit(state: Extraction, band: FittedBand, i: int) -> tuple[float, float]:
+    """rms of the residual as a share of the peak of the mode, and over that of the noise (from third differences)."""
+    real, imaginary = np.split(band.fit.residual, 2)
+    rms = np.sqrt(band.fit.sum_of_squares / band.fit.freedom * 2)
+    noise = np.median(np.abs(np.diff(real + 1j * imaginary, 3))) / np.sqrt(20 * np.log(2))
+    nearest = np.argmin(np.abs(state.frf.frequency - band.fit.frequency[i]) + 1e9 * (state.weight == 0))
+    peak = state.weight[nearest] * np.abs(band.fit.flexibility[0, i] / (2 * band.fit.damping_ratio[i]))
+    return float(rms / peak), float(rms / noise) if noise > 0 else 1.0
+
+
+def _half_power_damping(band: FittedBand, mode: Mode) -> float | None:
+    reach = mode.damping_ratio * mode.frequency
+    near = [r for r in band.resonances if abs(r.frequency - mode.frequency) < max(reach, r.half_width)]
+    widths = [r.half_width / r.frequency for r in near]
+    return min(widths, key=lambda width: abs(width - mode.damping_ratio), default=None)
+
+
+def _about_the_place(state: Extraction, band: FittedBand, mode: Mode) -> Iterator[str]:
+    f, half_width = state.frf.frequency, mode.damping_ratio * mode.frequency
+    if min(mode.frequency - f[0], f[-1] - mode.frequency) < half_width:
+        yield f"its peak is cut by the edge of the lines, {f[0]:.0f}..{f[-1]:.0f} Hz"
+    left = _left_at_the_end(f, half_width)
+    if left > MOST_LEFT:
+        yield f"{100 * left:.0f} % of it still rings when the record ends: record longer"
+    for other in np.delete(band.fit.frequency, np.argmin(np.abs(band.fit.frequency - mode.frequency))):
+        if abs(other - mode.frequency) < 2 * half_width:
+            yield f"overlaps with the mode at {other:.1f} Hz"
+    if band.terms > LEAST_TERMS and mode.standard_error[2] > BENT * abs(mode.stiffness):
+        yield "a far stronger mode beside the band bends the fit: zeta and K may be off by more than their errors"
+    if any(abs(suspect - mode.frequency) < half_width for suspect in band.suspects):
+        yield f"may be several modes, near {' and '.join(f'{s:.0f}' for s in band.suspects)} Hz: too noisy to tell"
+
+
+def _left_at_the_end(frequency: NDArray[np.float64], half_width: float) -> float:
+    """Share of the decay after the record, whose length is one over the line spacing; 0 for an uneven axis."""
+    steps = np.diff(frequency)
+    even = np.ptp(steps) < 1e-3 * steps[0]
+    return float(np.exp(-2 * np.pi * half_width / np.mean(steps))) if even else 0.0
+
+
+def _about_the_values(mode: Mode, share: float, n_modes: int) -> Iterator[str]:
+    if not mode.is_driving_point:
+        yield "K is negative: not a driving point here, or hammer or sensor has its sign swapped"
+    if mode.coherence is not None and mode.coherence < LEAST_COHERENCE:
+        yield f"coherence {mode.coherence:.2f} at its peak, below {LEAST_COHERENCE:g}: the hits disagree"
+    phase, known = mode.residue_phase or 0.0, mode.standard_error[2] / abs(mode.stiffness)
+    if abs(phase) > max(LARGEST_PHASE, 3 * known):
+        yield f"modal constant {np.degrees(phase):+.0f}° off real: K is that of the real mode nearest to it"
+    if mode.misfit is not None and mode.misfit > LARGEST_MISFIT and share > MISFIT_SHARE:
+        yield f"the fit leaves {mode.misfit:.1f} times the noise, {100 * share:.0f} % of its peak"
+    if mode.jackknife is not None and np.max(mode.standard_error / mode.fit_error) > LARGEST_SCATTER:
+        yield f"scatters {np.max(mode.standard_error / mode.fit_error):.1f} times more from hit to hit than in the fit"
+    width = mode.half_power_damping
+    if width is not None and n_modes == 1 and abs(width / mode.damping_ratio - 1) > LARGEST_DIFFERENCE:
+        yield f"zeta from its half-power width is {100 * width:.2g} %"

@@ -1,0 +1,64 @@
+"""The same mode in the next measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from modal.mac import mac
+from modal.mode import Mode
+
+LIKELY_CHANGE = (0.03, 0.5, 0.3)
+"""Relative change of frequency, damping ratio and stiffness from one measurement to the next that counts as one."""
+LIKELY_MAC_LOSS = 0.1
+"""1 - MAC that counts as one."""
+FARTHEST = 4.0
+"""Distance above which a mode is no longer the same."""
+DOUBTFUL = 2.5
+"""Distance above which it may be another one."""
+RIVAL = 2.0
+"""A second mode that is less than this many times as far may be the one, too."""
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """The mode that continues an earlier one."""
+
+    mode: Mode | None
+    """None where no mode is near enough."""
+    doubt: str
+    """Why it may be another mode; empty where there is none."""
+
+
+def follow(last: Mode, modes: Sequence[Mode]) -> Followed:
+    """Of modes (driving points) the one that is most like the last one followed, with a doubt where that is not clear.
+
+    The distance is the root of the sum of squares of the changes of frequency, damping ratio and stiffness, each
+    in units of a likely change, and of 1 - MAC where both modes have shapes over the same points.
+    """
+    near = sorted((m for m in modes if m.is_driving_point), key=lambda mode: _distance(last, mode))
+    if not near or _distance(last, near[0]) > FARTHEST:
+        found = f"; nearest is {near[0].frequency:.1f} Hz" if near else ""
+        return Followed(None, f"no mode is like the one followed so far, {last.frequency:.1f} Hz{found}")
+    first = _distance(last, near[0])
+    if len(near) > 1 and _distance(last, near[1]) < RIVAL * max(first, 0.5):
+        return Followed(near[0], f"{_it_is(near[0])}: {near[1].frequency:.1f} Hz is nearly as like it")
+    if first > DOUBTFUL:
+        return Followed(near[0], f"{_it_is(near[0])}: it was {last.frequency:.1f} Hz, {last.stiffness / 1e6:.3g} N/um")
+    return Followed(near[0], "")
+
+
+def _it_is(mode: Mode) -> str:
+    return f"followed mode in doubt, now {mode.frequency:.1f} Hz, {mode.stiffness / 1e6:.3g} N/um"
+
+
+def _distance(a: Mode, b: Mode) -> float:
+    ratios = (b.frequency / a.frequency, b.damping_ratio / a.damping_ratio, b.stiffness / a.stiffness)
+    changes = [
+        np.log(ratio) / likely if ratio > 0 else np.inf for ratio, likely in zip(ratios, LIKELY_CHANGE, strict=True)
+    ]
+    if a.shape is not None and b.shape is not None and a.shape.shape == b.shape.shape:
+        changes.append((1 - mac(a.shape, b.shape)) / LIKELY_MAC_LOSS)
+    return float(np.linalg.norm(changes))

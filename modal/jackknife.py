@@ -1,0 +1,44 @@
+"""How far modes scatter from hit to hit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Frf, Hit, estimate_frf
+from modal.extract import Extraction, FittedBand
+
+FEWEST_HITS = 3
+"""With two the interval would be 6 times wider than the error is likely to be."""
+
+
+def left_out(hits: Sequence[Hit], frf: Frf) -> list[Frf]:
+    """FRFs of all hits but one, for each hit, on the lines of frf; none for fewer than three hits.
+
+    Raises ValueError where the hits have other lines than the FRF.
+    """
+    if len(hits) < FEWEST_HITS:
+        return []
+    found = [estimate_frf([*hits[:i], *hits[i + 1 :]]) for i in range(len(hits))]
+    first = int(np.searchsorted(found[0].frequency, frf.frequency[0]))
+    part = slice(first, first + frf.frequency.size)
+    if not np.array_equal(found[0].frequency[part], frf.frequency):
+        raise ValueError("hits and FRF differ in their frequency lines; give the hits that this FRF was averaged from")
+    return [Frf(one.frequency[part], one.receptance[part]) for one in found]
+
+
+def jackknife(state: Extraction, band: FittedBand, without: Sequence[Frf]) -> NDArray[np.float64]:
+    """Covariance of the values of one band, (n - 1)/n times the sum of squares over the FRFs without one hit each.
+
+    Each is refitted by one Gauss-Newton step from the fit to all hits, which is exact to first order in the change;
+    shape (3 m, 3 m), frequencies, damping ratios and flexibilities. Source: Efron & Stein (1981), The jackknife
+    estimate of variance, Annals of Statistics 9, 586.
+    """
+    part = band.lines
+    change = np.array([one.receptance[part] for one in without]) * state.weight[part]
+    change -= change.mean(axis=0)
+    steps = np.concatenate([change.real, change.imag], axis=1) @ band.fit.influence.T
+    n = len(without)
+    return np.asarray((n - 1) / n * steps.T @ steps)

@@ -1,0 +1,80 @@
+"""Modes closer than a half-power width: no dip between them, and one peak."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from acquisition import Frf, from_accelerance
+from modal import Mode, fit_modes, pick_peaks, synthesize
+
+LINES = np.arange(5.0, 6000.0, 5.0)
+NEIGHBOURS = [Mode(900.0, 0.03, 4e7), Mode(2900.0, 0.03, 3e7)]
+
+
+def pair(ratio: float, damping: float = 0.03) -> list[Mode]:
+    return [Mode(1722.0, damping, 3.5e7), Mode(1722.0 * ratio, damping, 5e7)]
+
+
+def noisy(modes: list[Mode], level: float, seed: int) -> Frf:
+    """Noise of level times the largest accelerance on each line."""
+    exact = synthesize([*modes, *NEIGHBOURS], LINES).accelerance
+    noise = np.random.default_rng(seed).normal(size=(2, LINES.size)) / np.sqrt(2) * level * np.max(np.abs(exact))
+    return from_accelerance(LINES, exact + noise[0] + 1j * noise[1])
+
+
+def between(modes: list[Mode]) -> list[Mode]:
+    return [mode for mode in modes if 1600 < mode.frequency < 2100]
+
+
+def values(modes: list[Mode]) -> NDArray[np.float64]:
+    return np.array([(m.frequency, m.damping_ratio, m.stiffness) for m in modes])
+
+
+@pytest.mark.parametrize("damping", [0.005, 0.03, 0.1])
+@pytest.mark.parametrize("ratio", [1.02, 1.03, 1.05])
+def test_without_noise_both_are_found_to_many_digits(ratio: float, damping: float) -> None:
+    true = pair(ratio, damping)
+    found = fit_modes(synthesize(true, LINES))
+    assert values(found) == pytest.approx(values(true), rel=1e-6)
+
+
+@pytest.mark.parametrize("ratio", [1.02, 1.03, 1.05])
+def test_in_noise_both_are_found_within_their_errors(ratio: float) -> None:
+    for seed in range(5):
+        frf = noisy(pair(ratio), 1e-3, seed)
+        assert len(between(pick_peaks(frf))) == 1
+        found = between(fit_modes(frf))
+        assert len(found) == 2
+        errors = np.array([mode.standard_error for mode in found])
+        assert np.all(np.abs(values(found) - values(pair(ratio))) < 4 * errors)
+        assert all("overlaps with the mode at" in doubt for mode in found for doubt in mode.doubts)
+
+
+def test_what_is_too_noisy_to_tell_is_said() -> None:
+    said = 0
+    for seed in range(12):
+        found = between(fit_modes(noisy(pair(1.02), 4e-3, seed)))
+        if len(found) == 1:
+            said += any("may be several modes" in doubt for doubt in found[0].doubts)
+        else:
+            errors = np.array([mode.standard_error for mode in found])
+            assert np.all(np.abs(values(found) - values(pair(1.02))) < 5 * errors)
+            said += 1
+    assert said >= 11
+
+
+def test_opposite_constants_are_told_apart_too() -> None:
+    true = [Mode(1722.0, 0.03, 3.5e7), Mode(1790.0, 0.03, -5e7)]
+    assert values(fit_modes(synthesize(true, LINES))) == pytest.approx(values(true), rel=1e-6)
+
+
+def test_one_mode_is_not_taken_for_two() -> None:
+    for seed in range(20):
+        assert len(between(fit_modes(noisy([Mode(1722.0, 0.03, 2e7)], 1e-3, seed)))) == 1
+
+
+def test_three_modes_in_one_peak() -> None:
+    true = [Mode(1700.0, 0.02, 4e7), Mode(1740.0, 0.02, 5e7), Mode(1790.0, 0.02, 4e7)]
+    assert values(fit_modes(synthesize(true, LINES))) == pytest.approx(values(true), rel=1e-5)

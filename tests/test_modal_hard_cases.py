@@ -1,0 +1,130 @@
+"""FRFs as they come: hum, drift, light and heavy damping, odd frequency axes, few and many lines."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from acquisition import Frf, from_accelerance
+from acquisition.frf import Quantity
+from modal import Mode, fit_modes, synthesize
+
+LINES = np.arange(5.0, 4000.0, 5.0)
+SPINDLE = [Mode(900.0, 0.03, 4e7), Mode(1722.0, 0.03, 3.5e7), Mode(2900.0, 0.03, 3e7)]
+
+
+def damped(zeta: float) -> list[Mode]:
+    return [Mode(mode.frequency, zeta, mode.stiffness) for mode in SPINDLE]
+
+
+def measured(
+    modes: list[Mode],
+    lines: NDArray[np.float64],
+    hits: int = 10,
+    seed: int = 0,
+    extra: NDArray[np.complex128] | NDArray[np.float64] | float = 0.0,
+) -> Frf:
+    """Mean of hits with noise of 0.002 times the largest accelerance, and extra (hits, n) times that accelerance."""
+    exact = synthesize(modes, lines).accelerance
+    noise = np.random.default_rng(seed).normal(size=(2, hits, lines.size)) / np.sqrt(2)
+    each = exact + np.max(np.abs(exact)) * (0.002 * (noise[0] + 1j * noise[1]) + extra)
+    mean = each.mean(axis=0)
+    coherence = np.abs(mean) ** 2 / np.mean(np.abs(each) ** 2, axis=0)
+    return from_accelerance(lines, mean, coherence if hits > 1 else None, hits)
+
+
+def assert_found(found: list[Mode], true: list[Mode]) -> None:
+    """All of them and no other, within 4.5 standard errors that are no excuse (a tenth of the value at most)."""
+    assert len(found) == len(true)
+    for a, b in zip(found, true, strict=True):
+        values = np.array([b.frequency, b.damping_ratio, b.stiffness])
+        error = np.array([a.frequency, a.damping_ratio, a.stiffness]) - values
+        assert np.all(np.abs(error) < 4.5 * a.standard_error)
+        assert np.all(a.standard_error < 0.1 * np.abs(values))
+
+
+@pytest.mark.parametrize("zeta", [0.0005, 0.005, 0.05, 0.1])
+@pytest.mark.parametrize("hits", [1, 10])
+def test_light_and_heavy_damping(zeta: float, hits: int) -> None:
+    assert_found(fit_modes(measured(damped(zeta), np.arange(1.0, 4000.0), hits)), damped(zeta))
+
+
+@pytest.mark.parametrize("n_lines", [200, 2000, 20000])
+def test_few_and_many_lines(n_lines: int) -> None:
+    assert_found(fit_modes(measured(SPINDLE, np.linspace(4000 / n_lines, 4000, n_lines))), SPINDLE)
+
+
+@pytest.mark.long
+def test_two_hundred_thousand_lines() -> None:
+    assert_found(fit_modes(measured(SPINDLE, np.linspace(0.02, 4000, 200_000), 3)), SPINDLE)
+
+
+@pytest.mark.parametrize(
+    "lines",
+    [
+        np.sort(np.random.default_rng(3).uniform(300, 4000, 1500)),
+        np.geomspace(200.0, 4000.0, 1200),
+        np.arange(603.7, 3800.0, 5.3),
+    ],
+    ids=["uneven", "logarithmic", "begins at 604 Hz"],
+)
+def test_axes_of_other_programs(lines: NDArray[np.float64]) -> None:
+    assert_found(fit_modes(measured(SPINDLE, lines)), SPINDLE)
+
+
+def test_drift_of_the_integrated_acceleration() -> None:
+    lines = np.arange(0.5, 4000.0, 0.5)
+    random = np.random.default_rng(1)
+    slow = (random.normal(size=(10, 1)) + 1j * random.normal(size=(10, 1))) * 2000 / lines**2
+    assert_found([m for m in fit_modes(measured(SPINDLE, lines, extra=slow)) if m.frequency > 50], SPINDLE)
+
+
+def test_hum_of_the_mains_on_the_peak() -> None:
+    random = np.random.default_rng(2)
+    hum = np.where(LINES % 250 == 0, 0.3, 0.0) * np.exp(2j * np.pi * random.uniform(size=(10, LINES.size)))
+    with_hum, without = fit_modes(measured(SPINDLE, LINES, extra=hum)), fit_modes(measured(SPINDLE, LINES))
+    assert_found(with_hum, SPINDLE)
+    assert np.all(with_hum[1].standard_error < 4 * without[1].standard_error)
+
+
+def test_one_stray_line_of_a_single_hit_is_left_out() -> None:
+    stray = np.where(LINES == 1700.0, 0.1, 0.0) * np.ones((1, 1))
+    found, without = fit_modes(measured(SPINDLE, LINES, 1, extra=stray)), fit_modes(measured(SPINDLE, LINES, 1))
+    assert_found(found, SPINDLE)
+    assert found[1].standard_error == pytest.approx(without[1].standard_error, rel=0.3)
+
+
+@pytest.mark.parametrize("high", [1760.0, 1800.0, 1900.0])
+def test_a_mode_near_the_edge_of_the_band(high: float) -> None:
+    assert_found(fit_modes(measured(SPINDLE, LINES), (500.0, high)), SPINDLE[:2])
+
+
+def test_a_strong_mode_beside_the_band_does_not_bend_a_weak_one_in_it_unsaid() -> None:
+    weak = Mode(3300.0, 0.03, 1.4e9)
+    strong = [SPINDLE[1], Mode(3900.0, 0.03, 2.6e8)]
+    for seed in range(5):
+        for mode in fit_modes(measured([weak, *strong], LINES, seed=seed), (100.0, 3500.0)):
+            if mode.frequency > 3000:
+                off = abs(mode.stiffness - weak.stiffness) > 4 * mode.standard_error[2]
+                assert not off or mode.doubts
+
+
+def test_accelerance_mobility_and_receptance_of_one_structure_have_the_same_modes() -> None:
+    receptance = synthesize(SPINDLE, LINES).receptance
+    for kind in get_args(Quantity):
+        for a, b in zip(fit_modes(Frf(LINES, receptance, measured_as=kind)), SPINDLE, strict=True):
+            assert a.frequency == pytest.approx(b.frequency, rel=1e-9)
+            assert a.damping_ratio == pytest.approx(b.damping_ratio, rel=1e-7)
+            assert a.stiffness == pytest.approx(b.stiffness, rel=1e-7)
+
+
+def test_residual_terms_of_accelerance_are_a_constant_and_a_parabola() -> None:
+    w = 2 * np.pi * LINES
+    accelerance = synthesize([SPINDLE[1]], LINES).accelerance + 4.0 - 2j + (3e-9 + 1e-9j) * w**2
+    inside = (LINES > 1200) & (LINES < 2400)
+    (found,) = fit_modes(from_accelerance(LINES[inside], accelerance[inside]))
+    assert found.stiffness == pytest.approx(3.5e7, rel=1e-9)
+    assert found.damping_ratio == pytest.approx(0.03, rel=1e-9)

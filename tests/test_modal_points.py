@@ -1,0 +1,131 @@
+"""Several FRFs with common poles, mode shapes, and the same mode in the next measurement."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquisition import Frf
+from modal import Mode, fit_points, follow, mac, mode_indicator, synthesize
+
+LINES = np.arange(5.0, 4000.0, 5.0)
+SHAPES = np.array([[1.0, 0.5, -0.7], [1.0, -0.8, 0.3], [0.6, 1.0, 0.9]])
+MODES = [Mode(900.0, 0.02, 4e7), Mode(1722.0, 0.03, 3.5e7), Mode(1790.0, 0.03, 5e7)]
+
+
+def points(noise: float = 0.0, seed: int = 0) -> list[Frf]:
+    """Driving point first: the constants of a mode are shape_i shape_0 / K, K that of a shape of 1."""
+    exact = sum(np.outer(shape * shape[0], mode.receptance(LINES)) for shape, mode in zip(SHAPES, MODES, strict=True))
+    random = np.random.default_rng(seed).normal(size=(2, *np.shape(exact)))
+    return [Frf(LINES, row) for row in exact + noise * np.max(np.abs(exact)) * (random[0] + 1j * random[1])]
+
+
+def test_poles_are_common_and_shapes_those_of_the_structure() -> None:
+    found = fit_points(points())
+    assert len(found) == 3
+    for mode, true, shape in zip(found, MODES, SHAPES, strict=True):
+        assert mode.frequency == pytest.approx(true.frequency, rel=1e-6)
+        assert mode.damping_ratio == pytest.approx(true.damping_ratio, rel=2e-4)
+        assert mode.stiffness == pytest.approx(true.stiffness / shape[0] ** 2, rel=1e-3)
+        assert mode.shape is not None
+        assert mode.shape == pytest.approx(shape, abs=1e-3)
+        assert mac(mode.shape, shape) > 0.99999
+
+
+def test_errors_in_noise_are_those_that_are_stated() -> None:
+    fits = [fit_points(points(1e-3, seed)) for seed in range(20)]
+    for i, (true, shape) in enumerate(zip(MODES, SHAPES, strict=True)):
+        error = np.array([fit[i].stiffness for fit in fits]) - true.stiffness / shape[0] ** 2
+        stated = np.sqrt(np.mean([fit[i].standard_error[2] ** 2 for fit in fits]))
+        assert np.sqrt(np.mean(error**2)) == pytest.approx(stated, rel=0.5)
+
+
+def test_the_first_point_of_a_shape_is_positive_whatever_the_sign_of_the_response() -> None:
+    turned = [Frf(LINES, -frf.receptance) for frf in points()]
+    for mode, shape in zip(fit_points(turned), SHAPES, strict=True):
+        assert not mode.is_driving_point
+        assert mode.shape is not None
+        assert mode.shape == pytest.approx(shape, abs=1e-3)
+
+
+def test_one_frf_is_allowed_and_different_lines_and_none_are_not() -> None:
+    (one, *_) = points()
+    assert [round(mode.frequency) for mode in fit_points([one])] == [900, 1722, 1790]
+    with pytest.raises(ValueError, match="no FRF"):
+        fit_points([])
+    with pytest.raises(ValueError, match="differ in their frequency lines"):
+        fit_points([one, Frf(LINES[1:], one.receptance[1:])])
+
+
+def test_usable_band_is_the_narrowest() -> None:
+    frfs = points()
+    frfs[1] = replace(frfs[1], usable_band=(5.0, 1300.0))
+    assert [round(mode.frequency) for mode in fit_points(frfs)] == [900]
+
+
+def test_mac_of_textbook_shapes() -> None:
+    assert mac([1, 2, 3], [2, 4, 6]) == pytest.approx(1.0)
+    assert mac([1, 0], [0, 1]) == 0
+    assert mac([1, 1], [1, 0]) == pytest.approx(0.5)
+    assert mac([1, 1j], [1j, -1]) == pytest.approx(1.0)
+    with pytest.raises(ValueError, match="over the same points"):
+        mac([1, 2], [1, 2, 3])
+    with pytest.raises(ValueError, match="zero"):
+        mac([0, 0], [1, 2])
+
+
+def test_mode_indicator_is_one_at_a_real_mode_alone_and_what_it_is_elsewhere() -> None:
+    mode = Mode(1000.0, 0.02, 3e7)
+    frf = synthesize([mode], [500.0, 1000.0, 1010.0, 2000.0])
+    phase = np.angle(frf.receptance)
+    assert mode_indicator([frf]) == pytest.approx(1 - np.abs(np.cos(phase)))
+    assert mode_indicator([frf, frf])[1] == pytest.approx(1.0)
+    assert mode_indicator([frf])[3] < 0.01
+    assert mode_indicator([Frf(LINES, np.zeros(LINES.size, complex))]) == pytest.approx(np.zeros(LINES.size))
+    peaks = [float(mode_indicator(points())[np.argmin(np.abs(LINES - f))]) for f in (900.0, 1300.0)]
+    assert peaks[0] > 0.9
+    assert peaks[1] < 0.3
+    with pytest.raises(ValueError, match="no FRF"):
+        mode_indicator([])
+    with pytest.raises(ValueError, match="differ in their frequency lines"):
+        mode_indicator([frf, *points()])
+
+
+LAST = Mode(1700.0, 0.03, 3.5e7)
+NEIGHBOUR = Mode(1850.0, 0.03, 3.3e7)
+
+
+def test_a_slow_change_is_followed_past_a_stronger_neighbour() -> None:
+    for month in range(24):
+        aged = Mode(1700.0 * 0.996 ** (month + 1), 0.03, 3.5e7)
+        found = follow(Mode(1700.0 * 0.996**month, 0.03, 3.5e7), [aged, NEIGHBOUR])
+        assert found.mode is aged
+        assert not found.doubt
+
+
+def test_the_neighbour_in_place_of_a_mode_that_was_not_found_is_said() -> None:
+    found = follow(LAST, [NEIGHBOUR])
+    assert found.mode is NEIGHBOUR
+    assert "in doubt, now 1850.0 Hz" in found.doubt
+
+
+def test_two_that_are_equally_like_it_are_said() -> None:
+    found = follow(LAST, [Mode(1660.0, 0.03, 3.5e7), Mode(1745.0, 0.03, 3.5e7)])
+    assert found.mode is not None
+    assert "1660.0 Hz is nearly as like it" in found.doubt or "1745.0 Hz is nearly as like it" in found.doubt
+
+
+def test_the_shape_decides_between_two() -> None:
+    first, second = (
+        replace(LAST, frequency=f, shape=np.array(shape)) for f, shape in ((1690, [1, 0.9]), (1712, [1, -0.9]))
+    )
+    found = follow(replace(LAST, shape=np.array([1.0, -1.0])), [first, second])
+    assert found.mode is second
+
+
+def test_nothing_near_is_no_mode() -> None:
+    assert follow(LAST, []).mode is None
+    assert follow(LAST, [Mode(2600.0, 0.03, 3.5e7)]).doubt.endswith("nearest is 2600.0 Hz")
+    assert follow(LAST, [replace(LAST, stiffness=-3.5e7)]).mode is None

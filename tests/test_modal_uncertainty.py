@@ -1,0 +1,149 @@
+"""Standard errors: over the hits (jackknife) and from the residual of the fit."""
+
+from __future__ import annotations
+
+from importlib import resources
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.stats import norm, t
+
+from acquisition import Hit, Structure, estimate_frf
+from lobewatch.emulation import SAMPLE_RATE, emulated_structure
+from lobewatch.machine import parse_machine
+from modal import Mode, fit_modes
+
+RECORD, PRE_TRIGGER = 6400, 512
+"""0.25 s and 0.02 s, the demo's."""
+
+
+def demo_structure() -> Structure:
+    table = parse_machine(resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")).spindle
+    assert table is not None
+    return emulated_structure(table.build(), table.damping_ratio)
+
+
+STRUCTURE = demo_structure()
+TRUTH = np.array([STRUCTURE.frequency[0], STRUCTURE.damping_ratio[0], STRUCTURE.stiffness[0]])
+
+
+def tap(seed: int, hits: int = 10, hammer_noise: float = 0.1, sensor_noise: float = 2.0) -> list[Hit]:
+    """Good hits as the demo's hammerer gives them: 150..350 N, 0.55..0.75 ms, white noise on both channels."""
+    random = np.random.default_rng(seed)
+    made = []
+    for _ in range(hits):
+        peak, width = random.uniform(150, 350), random.uniform(0.55e-3, 0.75e-3)
+        time = (np.arange(RECORD) - PRE_TRIGGER + random.uniform()) / SAMPLE_RATE
+        after = time >= 0
+        force = np.where(after & (time <= width), np.sin(np.pi * time / width) ** 4, 0.0)
+        response = np.zeros(RECORD)
+        response[after] = STRUCTURE.response(time[after], width)
+        force = peak * force + random.normal(scale=hammer_noise, size=RECORD)
+        response = peak * response + random.normal(scale=sensor_noise, size=RECORD)
+        made.append(Hit(force, response, SAMPLE_RATE, PRE_TRIGGER))
+    return made
+
+
+def first_mode(hits: list[Hit]) -> Mode:
+    return fit_modes(estimate_frf(hits), hits=hits)[0]
+
+
+def values(mode: Mode) -> NDArray[np.float64]:
+    return np.array([mode.frequency, mode.damping_ratio, mode.stiffness])
+
+
+def test_both_errors_are_in_the_result_and_the_hits_decide() -> None:
+    mode = first_mode(tap(0))
+    assert mode.n_hits == 10
+    assert mode.covariance is not None
+    assert mode.jackknife is not None
+    assert mode.standard_error == pytest.approx(np.sqrt(np.diag(mode.jackknife)))
+    assert mode.fit_error == pytest.approx(np.sqrt(np.diag(mode.covariance)))
+    assert np.all(np.abs(values(mode) - TRUTH) < 4 * mode.standard_error)
+
+
+def test_jackknife_is_that_of_refitted_frfs() -> None:
+    hits = tap(1)
+    mode = first_mode(hits)
+    without = [values(fit_modes(estimate_frf(hits[:i] + hits[i + 1 :]))[0]) for i in range(10)]
+    spread = np.array(without) - np.mean(without, axis=0)
+    assert mode.standard_error == pytest.approx(np.sqrt(0.9 * np.sum(spread**2, axis=0)), rel=0.1)
+
+
+@pytest.mark.parametrize("n_hits", [0, 1, 2])
+def test_two_hits_have_no_jackknife(n_hits: int) -> None:
+    hits = tap(0, 2)
+    (mode, *_) = fit_modes(estimate_frf(hits), hits=hits[:n_hits])
+    assert mode.jackknife is None
+    assert mode.n_hits == 0
+    assert mode.standard_error == pytest.approx(mode.fit_error)
+
+
+def test_hits_of_another_record_are_refused() -> None:
+    hits = tap(0, 3)
+    short = [Hit(hit.force[:4096], hit.acceleration[:4096], SAMPLE_RATE, PRE_TRIGGER) for hit in hits]
+    with pytest.raises(ValueError, match="differ in their frequency lines"):
+        fit_modes(estimate_frf(hits), hits=short)
+
+
+def test_noise_of_the_hammer_is_seen_by_the_hits_and_not_by_the_fit() -> None:
+    modes = [first_mode(tap(seed, hammer_noise=0.5, sensor_noise=0.2)) for seed in range(25)]
+    scatter = np.std([values(mode) for mode in modes], axis=0)
+    over_hits = np.sqrt(np.mean([mode.standard_error**2 for mode in modes], axis=0))
+    of_fits = np.sqrt(np.mean([mode.fit_error**2 for mode in modes], axis=0))
+    assert over_hits == pytest.approx(scatter, rel=0.35)
+    assert of_fits[0] < scatter[0] / 2
+
+
+def test_interval_is_students_over_hits_and_normal_without() -> None:
+    cov = np.diag([4.0, 1e-8, 9e8])
+    alone = Mode(1722.0, 0.03, 3.5e7, cov)
+    over_hits = Mode(1722.0, 0.03, 3.5e7, cov, jackknife=4 * cov, n_hits=10)
+    assert alone.interval()[0] == pytest.approx(1722 + norm.ppf([0.025, 0.975]) * 2)
+    assert over_hits.interval(0.9)[2] == pytest.approx(3.5e7 + t.ppf([0.05, 0.95], 9) * 6e4)
+    assert np.all(np.isnan(Mode(1722.0, 0.03, 3.5e7).interval()))
+    with pytest.raises(ValueError, match="not between 0 and 1"):
+        alone.interval(1.0)
+
+
+def test_correlation_of_damping_and_stiffness_of_a_driving_point_is_negative() -> None:
+    correlation = first_mode(tap(0)).correlation
+    assert np.diag(correlation) == pytest.approx(1.0)
+    assert correlation[1, 2] < -0.7
+    assert np.all(np.isnan(Mode(1722.0, 0.03, 3.5e7).correlation))
+
+
+def test_shape_of_a_covariance_and_hits_of_a_jackknife_are_checked() -> None:
+    with pytest.raises(ValueError, match="jackknife has shape"):
+        Mode(1722.0, 0.03, 3.5e7, jackknife=np.eye(2), n_hits=10)
+    with pytest.raises(ValueError, match="at least 2 hits"):
+        Mode(1722.0, 0.03, 3.5e7, jackknife=np.eye(3))
+
+
+TESTS = 500
+
+
+def coverage(hammer_noise: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Share of tests whose 95 % interval holds the truth: over hits, and of the fit; each (3,)."""
+    modes = [first_mode(tap(1000 + seed, hammer_noise=hammer_noise)) for seed in range(TESTS)]
+    error = np.abs([values(mode) - TRUTH for mode in modes])
+    over_hits = error < t.ppf(0.975, 9) * np.array([mode.standard_error for mode in modes])
+    of_fit = error < norm.ppf(0.975) * np.array([mode.fit_error for mode in modes])
+    print(f"hammer noise {hammer_noise} N: over hits {over_hits.mean(axis=0)}, of the fit {of_fit.mean(axis=0)}")  # noqa: T201
+    return over_hits.mean(axis=0), of_fit.mean(axis=0)
+
+
+@pytest.mark.long
+@pytest.mark.timeout(1200)
+def test_both_95_percent_intervals_hold_the_truth_where_the_sensor_makes_the_noise() -> None:
+    for share in coverage(hammer_noise=0.02):
+        assert np.all((share >= 0.92) & (share <= 0.98))
+
+
+@pytest.mark.long
+@pytest.mark.timeout(1200)
+def test_95_percent_interval_over_hits_holds_the_truth_in_the_chain_of_the_demo() -> None:
+    over_hits, of_fit = coverage(hammer_noise=0.1)
+    assert np.all((over_hits >= 0.92) & (over_hits <= 0.98))
+    assert np.all(of_fit > 0.8)

@@ -90,10 +90,10 @@ MASS = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, 
 
 
 def refine(spindle: Spindle, frequency: float, exact: float, within: float) -> tuple[FiniteElements, int]:
-    """The coarsest elements, 2^n a segment, that calibrate k within a relative error; with their number a segment."""
+    """The coarsest elements that calibrate k within a relative error; with their number a segment."""
     parts = 1
     while abs(FiniteElements(spindle, parts).calibrate_by_eigenproblem(frequency) / exact - 1) > within:
-        parts *= 2
+        parts += 1
     return FiniteElements(spindle, parts), parts
 
 
@@ -148,13 +148,15 @@ class RossRotor:
             for b in spindle.bearings
         ]
         self.rotor = ross.Rotor(shaft, bearing_elements=bearings)
+        self.runs = 0
 
     def frequencies(self) -> Float:
-        """Natural frequencies (Hz) of bending, stretching and twisting, by its dense solver, which is the faster one."""
-        found = self.rotor.run_modal(0.0, num_modes=48, sparse=False).wn
+        """Natural frequencies (Hz) of bending, stretching and twisting, by its dense solver, the faster one here."""
+        self.runs += 1  # another speed (rad/s), as good as zero: the result of the same one would be remembered
+        found = self.rotor.run_modal(1e-9 * self.runs, num_modes=48, sparse=False).wn
         return np.asarray(np.sort(found) / (2 * np.pi))
 
     def tip_receptance(self, frequency: Float) -> Complex:
-        """Undamped deflection over force at the tip (m/N)."""
+        """Undamped deflection over force at the tip (m/N); ROSS works out that between all degrees of freedom."""
         response = self.rotor.run_freq_response(speed_range=2 * np.pi * frequency)
         return np.asarray(response.freq_resp[0, 0])

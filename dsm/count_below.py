@@ -17,7 +17,7 @@ def count_below(model: DynamicStiffness, x: NDArray[np.float64]) -> NDArray[np.i
     of Bunch and Kaufman and rows scaled to one another keep it right where a part of the shaft is at resonance. Where
     the shaft spins, those of forward whirl are counted for w > 0: phi^T K(w) phi falls through 0 once, for any phi.
     """
-    scale = 1 / np.sqrt(np.diagonal(model.term(0)))
+    scale = 1 / np.sqrt(model.diagonal[[0, 2], :, 0].T.ravel())
     matrices = model.dense(x) * np.outer(scale, scale)
     return np.array([_negative_pivots(matrix) for matrix in matrices], dtype=int)
 

@@ -93,11 +93,12 @@ class Spindle:
         return density * segment.length * (areas[0] + 4 * areas[1] + areas[2]) / 6
 
     def _check_parts(self, kind: str, parts: Sequence[Bearing | LumpedMass | Joint]) -> None:
-        slack = SAME_PLACE * self.length
+        length = self.length
+        slack = SAME_PLACE * length
         for number, part in enumerate(parts, 1):
             where = f"{kind} {number}: "
-            if not -slack <= part.position <= self.length + slack:
-                raise ValueError(f"{where}position={part.position} m is off the shaft, 0 to {self.length:g} m")
+            if not -slack <= part.position <= length + slack:
+                raise ValueError(f"{where}position={part.position} m is off the shaft, 0 to {length:g} m")
             part.check(where)
             for earlier, other in enumerate(parts[: number - 1], 1):
                 if abs(other.position - part.position) <= slack:

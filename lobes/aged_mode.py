@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -31,11 +30,4 @@ def aged_mode(baseline: Mode, ratio: float, rule: Rule, stiffness_ratio: float |
         raise ValueError(f'rule="paper" sets K itself; leave stiffness_ratio={stiffness_ratio} out')
     softer = ratio if rule == "paper" else 1.0 if stiffness_ratio is None else stiffness_ratio
     said = "K constant, no model" if rule == "model" and stiffness_ratio is None else f"K by rule {rule}"
-    scale = np.array([ratio, 1.0, softer])
-    return replace(
-        baseline,
-        frequency=baseline.frequency * ratio,
-        stiffness=baseline.stiffness * softer,
-        covariance=None if baseline.covariance is None else baseline.covariance * np.outer(scale, scale),
-        method=f"{baseline.method}, aged, {said}".removeprefix(", "),
-    )
+    return baseline.scaled(ratio, softer, f"aged, {said}")

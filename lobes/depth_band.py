@@ -15,8 +15,6 @@ from lobes.program import Modes
 from lobes.stability_lobes import StabilityLobes
 from modal import Mode
 
-NORMAL_95 = 1.959963984540054
-
 
 class DepthBand(NamedTuple):
     """A band of limiting depths over speed."""
@@ -31,7 +29,8 @@ def measurement_band(limits: Callable[[Modes, Modes], StabilityLobes], x: Modes,
     """95 % band of the limiting depth from the covariances of the modes; modes without one count as exact.
 
     Sigma points: each root of each covariance is added and taken away, and the changes of the depth make its variance:
-    the linear propagation with slopes taken over one standard error. `limits` is any method with cut and speeds set.
+    the linear propagation with slopes taken over one standard error. For covariances over hits Student's t of the mode
+    with the fewest hits replaces the normal distribution. `limits` is any method with cut and speeds set.
     """
     base = limits(x, y).depth
     variance = np.zeros(base.shape)
@@ -44,7 +43,8 @@ def measurement_band(limits: Callable[[Modes, Modes], StabilityLobes], x: Modes,
                     changed[i] = _moved(mode, sign * root)
                     sides.append(limits(*((changed, y) if axis == 0 else (x, changed))).depth)
                 variance += _half_difference(*sides) ** 2
-    spread = np.exp(NORMAL_95 * np.sqrt(variance))
+    reach = max((mode.quantile() for modes in (x, y) for mode in modes or ()), default=0.0)
+    spread = np.exp(reach * np.sqrt(variance))
     return DepthBand(base / spread, base * spread)
 
 
@@ -60,10 +60,11 @@ def coefficient_range(
 
 def _roots(mode: Mode) -> NDArray[np.float64]:
     """Vectors (r, 3) whose outer products make up the covariance."""
-    if mode.covariance is None or not np.all(np.isfinite(mode.covariance)):
+    covariance = mode.best_covariance
+    if covariance is None or not np.all(np.isfinite(covariance)):
         return np.empty((0, 3))
     scale = np.array([mode.frequency, mode.damping_ratio, mode.stiffness])
-    values, vectors = np.linalg.eigh(mode.covariance / np.outer(scale, scale))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
     return np.asarray((vectors * np.sqrt(np.maximum(values, 0))).T)
 
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm import Spindle, calibrate
+from acquisition import DataError
+from dsm import Calibration, calibrate
 from lobes import (
     Program,
     ProgramCheck,
@@ -25,6 +26,7 @@ from lobewatch.history import measure
 from lobewatch.machine import Machine
 from lobewatch.machine_folder import MachineFolder, TapEntry
 from lobewatch.pipeline import Measurement, speed_grid
+from lobewatch.prediction import predict
 from modal import Mode
 
 FALLS = np.array([0.0, 0.05, 0.10, 0.15, 0.20])
@@ -64,7 +66,7 @@ def advise(folder: MachineFolder) -> list[ProgramAdvice]:
     for table in folder.machine.program:
         of_tool = [tap for tap in taps if tap.tool == table.tool]
         if not of_tool:
-            found.append(_unknown(table, "", f"no tap test with tool {table.tool!r}"))
+            found.append(_predicted(table, folder))
             continue
         for tap in (of_tool[-1], _first(of_tool)):
             measured.setdefault(tap.id, measure(folder, tap))
@@ -76,16 +78,24 @@ def advise(folder: MachineFolder) -> list[ProgramAdvice]:
     return found
 
 
+def _predicted(table: ProgramTable, folder: MachineFolder) -> ProgramAdvice:
+    """Advice for a program whose tool was never tapped, from the model where there is one."""
+    try:
+        prediction = predict(folder, table.tool)
+    except DataError as error:
+        return _unknown(table, "", f"no tap test with tool {table.tool!r}, and no prediction: {error}")
+    return _advise(table, folder.machine, prediction, prediction)
+
+
 def aging(measurement: Measurement) -> tuple[ModesAt, str]:
     """The modes of a measurement as functions of a frequency ratio, all falling alike, and the assumption in words.
 
     K follows the model (bearings softer until its frequency has fallen as far); without a model it stays.
     """
-    followed = measurement.dynamics.followed
     calibration = measurement.dynamics.calibration
     ratios = np.ones(1)
-    if calibration is not None and followed is not None:
-        ratios = _stiffness_ratios(calibration.spindle, followed.frequency)
+    if calibration is not None:
+        ratios = _stiffness_ratios(calibration)
 
     def modes_at(ratio: float) -> tuple[Modes, Modes]:
         softer = float(np.interp(1 - ratio, FALLS[: ratios.size], ratios)) if ratios.size > 1 else None
@@ -102,12 +112,13 @@ def aging(measurement: Measurement) -> tuple[ModesAt, str]:
     return modes_at, f"decay left: all modes fall alike, zeta does not change, {said}"
 
 
-def _stiffness_ratios(spindle: Spindle, frequency: float) -> NDArray[np.float64]:
+def _stiffness_ratios(calibration: Calibration) -> NDArray[np.float64]:
     """Modal stiffness at the tip for each of FALLS over that for none, as far as softer bearings can bring about."""
     stiffness: list[float] = []
     for fall in FALLS:
         try:
-            stiffness.append(calibrate(spindle, frequency * (1 - fall)).modal_stiffness_after)
+            softer = calibrate(calibration.spindle, calibration.frequency * (1 - fall), mode=calibration.mode)
+            stiffness.append(softer.modal_stiffness_after)
         except (ValueError, ArithmeticError):
             break
     return np.array(stiffness or [1.0]) / (stiffness or [1.0])[0]
@@ -129,6 +140,7 @@ def _advise(table: ProgramTable, machine: Machine, now: Measurement, then: Measu
     modes_at, assumption = aging(now)
     allowed = float(drive_limit(machine, table, np.array([table.speed_rpm]))[0])
     notes = [assumption] if check.stable else []
+    notes += [note for note in now.notes if "is predicted" in note]
     if not (now.x and now.y):
         notes.append(f"modes in the {now.direction} direction alone")
     return ProgramAdvice(

@@ -61,16 +61,22 @@ def update_history(folder: MachineFolder) -> tuple[SldHistory, list[Measurement]
     history = _read_current(folder, [entry.id for entry in taps])
     measurements = []
     for entry in taps[len(history) :]:
-        measurements.append(measure(folder, entry, _last_followed(history, entry)))
+        measurements.append(_measure(folder, entry, history))
         history = history.append(*_row(measurements[-1], folder.machine))
     if measurements or not folder.history.exists():
         write_history(folder.history, history)
     return history, measurements
 
 
-def measure(folder: MachineFolder, entry: TapEntry, last: Mode | None = None) -> Measurement:
-    """The measurement of one committed tap, together with its partner in the other direction; last: as in `analyse`."""
-    return analyse(folder.read(entry), folder.machine, _partner(folder, entry), last)
+def measure(folder: MachineFolder, entry: TapEntry) -> Measurement:
+    """The measurement of one committed tap as the history holds it."""
+    history, _ = update_history(folder)
+    return _measure(folder, entry, history)
+
+
+def _measure(folder: MachineFolder, entry: TapEntry, history: SldHistory) -> Measurement:
+    """One tap, its partner in the other direction, and the mode that was followed before it."""
+    return analyse(folder.read(entry), folder.machine, _partner(folder, entry), _last_followed(history, entry))
 
 
 def series(history: SldHistory, tool: str, direction: str) -> NDArray[np.int64]:
@@ -80,9 +86,12 @@ def series(history: SldHistory, tool: str, direction: str) -> NDArray[np.int64]:
 
 
 def _last_followed(history: SldHistory, entry: TapEntry) -> Mode | None:
-    """The mode that was followed last in the series of this tap."""
+    """The mode that was followed last before a tap, in its series."""
     columns = history.columns
-    rows = [row for row in series(history, entry.tool, entry.direction) if np.isfinite(columns["frequency"][row])]
+    itself = np.flatnonzero(columns["tap_id"] == entry.id)
+    before = itself[0] if itself.size else len(history)
+    known = [row for row in series(history, entry.tool, entry.direction) if np.isfinite(columns["frequency"][row])]
+    rows = [row for row in known if row < before]
     if not rows:
         return None
     frequency, damping, stiffness = (float(columns[name][rows[-1]]) for name in NUMBERS[:6:2])

@@ -42,10 +42,12 @@ class ModelState:
     """The shaft with this tool and the newest bearings."""
     reference: Spindle
     """The same bearings with the tool that is tapped."""
+    tap: TapEntry | None
+    """The tap test that the bearings were found from; None: they are those of machine.toml."""
     followed: Mode | None
-    """The mode that the bearings were found from."""
+    """The mode that they were found from."""
     origin: str
-    """Where the bearing stiffness comes from."""
+    """Where the bearing stiffness comes from, in words."""
 
     @property
     def title(self) -> str:
@@ -62,11 +64,11 @@ def model_state(folder: MachineFolder, tool: str | None = None) -> ModelState:
     drawn, reference = machine.model(wanted), machine.model(machine.tap.tool)
     newest = _newest_calibration(folder)
     if newest is None:
-        return ModelState(folder, wanted, drawn, reference, None, "machine.toml, not calibrated yet")
+        return ModelState(folder, wanted, drawn, reference, None, None, "machine.toml, not calibrated yet")
     tap, calibration, followed = newest
     origin = f"tap test {tap.id}: {calibration.bearing_stiffness / 1e6:.1f} N/um on average"
     drawn, reference = (_with_bearings_of(calibration.spindle, shaft) for shaft in (drawn, reference))
-    return ModelState(folder, wanted, drawn, reference, followed, origin)
+    return ModelState(folder, wanted, drawn, reference, tap, followed, origin)
 
 
 def _with_bearings_of(calibrated: Spindle, shaft: Spindle) -> Spindle:
@@ -100,7 +102,7 @@ def model_picture(state: ModelState, modes: int) -> ModelPicture:
         whirl=whirl_map(spindle, speeds, min(modes, 2)),
         highest_speed=machine.speed.high_rpm,
         frf_place="at the tool tip" if _tap_position(state) == 0 else f"{_tap_position(state) * 1e3:g} mm from the tip",
-        model_frf=_model_frf(state),
+        model_frf=model_frf(state),
         measured_frf=_measured_frf(state),
     )
 
@@ -121,8 +123,8 @@ def _points(state: ModelState) -> tuple[_Float, _Float]:
     return columns["bearing_stiffness"][mine], columns["frequency"][mine]
 
 
-def _model_frf(state: ModelState) -> Frf:
-    """Where it is tapped; of another tool at its tip, coupled to the spindle side of the calibrated model."""
+def model_frf(state: ModelState) -> Frf:
+    """Around the first modes, where it is tapped; of another tool at its tip, by coupling to the calibrated spindle."""
     machine = state.folder.machine
     table = machine.spindle
     if table is None:

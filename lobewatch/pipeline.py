@@ -4,7 +4,7 @@ recorded with its reason, and the pipeline goes on."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 
 import numpy as np
@@ -157,17 +157,7 @@ def _modes_at_tip(
 def _carried_to_tip(mode: Mode, calibration: Calibration, position: float) -> Mode:
     number = calibration.mode
     ratio = modal_stiffness(calibration.spindle, number) / modal_stiffness(calibration.spindle, number, position)
-    scale = np.array([1.0, 1.0, ratio])
-    covariance, jackknife = (
-        None if c is None else c * np.outer(scale, scale) for c in (mode.covariance, mode.jackknife)
-    )
-    return replace(
-        mode,
-        stiffness=mode.stiffness * ratio,
-        covariance=covariance,
-        jackknife=jackknife,
-        method=f"{mode.method}, model to tip",
-    )
+    return mode.scaled(1.0, ratio, "model to tip")
 
 
 def _lobes(
@@ -175,14 +165,20 @@ def _lobes(
 ) -> dict[str, StabilityLobes]:
     if not at_tip:
         return {}
-    cuts = machine.cuts(tap.circumstances.tool)
-    if not cuts:
-        notes.append("no stability lobes: no [reference_cut] and no [[program]] in machine.toml")
-        return {}
     direction = tap.circumstances.direction
     if not other:
         notes.append(f"stability lobes in the {direction} direction alone: the other one was not tapped within a day")
     x, y = (at_tip, other) if direction == "x" else (other, at_tip)
-    lobes = {name: zero_order(x or None, y or None, cut, speed_grid(machine)) for name, cut in cuts.items()}
+    return lobes_of(x or None, y or None, tap.circumstances.tool, machine, notes)
+
+
+def lobes_of(
+    x: Sequence[Mode] | None, y: Sequence[Mode] | None, tool: str, machine: Machine, notes: list[str]
+) -> dict[str, StabilityLobes]:
+    """Stability lobes by zero order for the reference cut and every program of a tool; warnings go to the notes."""
+    cuts = machine.cuts(tool)
+    if not cuts:
+        notes.append("no stability lobes: no [reference_cut] and no [[program]] in machine.toml")
+    lobes = {name: zero_order(x, y, cut, speed_grid(machine)) for name, cut in cuts.items()}
     notes.extend(f"{name}: {found.warning}" for name, found in lobes.items() if found.warning)
     return lobes

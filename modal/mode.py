@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,16 +88,33 @@ class Mode:
             return np.full((3, 3), np.nan)
         return np.asarray(self.best_covariance / np.outer(self.standard_error, self.standard_error))
 
+    def quantile(self, level: float = 0.95) -> float:
+        """Standard errors to either side of a value that hold the truth with this probability (-); see interval."""
+        if not 0 < level < 1:
+            raise ValueError(f"level={level} is not between 0 and 1")
+        p = (1 + level) / 2
+        return float(ndtri(p) if self.jackknife is None else stdtrit(self.n_hits - 1, p))
+
     def interval(self, level: float = 0.95) -> NDArray[np.float64]:
         """Limits that hold the truth with this probability, (low, high) of frequency, damping and stiffness, (3, 2).
 
         Student's t with n_hits - 1 degrees of freedom over hits, else the normal distribution."""
-        if not 0 < level < 1:
-            raise ValueError(f"level={level} is not between 0 and 1")
-        p = (1 + level) / 2
-        reach = (ndtri(p) if self.jackknife is None else stdtrit(self.n_hits - 1, p)) * self.standard_error
+        reach = self.quantile(level) * self.standard_error
         value = np.array([self.frequency, self.damping_ratio, self.stiffness])
         return np.stack([value - reach, value + reach], axis=1)
+
+    def scaled(self, frequency: float, stiffness: float, method: str) -> Mode:
+        """The mode with its frequency and stiffness times these factors (-), its covariances along with them."""
+        scale = np.outer(*2 * [np.array([frequency, 1.0, stiffness])])
+        covariance, jackknife = (None if c is None else c * scale for c in (self.covariance, self.jackknife))
+        return replace(
+            self,
+            frequency=self.frequency * frequency,
+            stiffness=self.stiffness * stiffness,
+            covariance=covariance,
+            jackknife=jackknife,
+            method=f"{self.method}, {method}".removeprefix(", "),
+        )
 
     def receptance(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Receptance of this mode alone (m/N), same shape as frequency (Hz)."""

@@ -29,7 +29,9 @@ def rotor() -> Spindle:
 
 
 def test_natural_frequencies() -> None:
-    assert 60 * natural_frequencies(rotor(), 3) == pytest.approx([16830.752292166, 48527.654970233, 87742.730607908], rel=1e-9)
+    assert 60 * natural_frequencies(rotor(), 3) == pytest.approx(
+        [16830.752292166, 48527.654970233, 87742.730607908], rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("mode", [1, 2, 3])

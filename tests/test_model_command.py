@@ -13,14 +13,34 @@ import pytest
 from typer.testing import CliRunner
 
 from acquisition import Circumstances, Frf, TapTest, new_tap_id
-from dsm import natural_frequencies, receptance
+from dsm import modes_at, natural_frequencies, receptance
+from lobes import zero_order
+from lobewatch.advice import advise
 from lobewatch.cli import app
 from lobewatch.commands.init import make_machine_folder
 from lobewatch.figures_model import model_figure
+from lobewatch.machine import REFERENCE_CUT
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.model_state import model_picture, model_state
+from lobewatch.pipeline import speed_grid
+from lobewatch.prediction import predict
+from modal import Mode
 
 TOOL = "long end mill"
+EXAMPLE_PROGRAM = """
+[[program]]
+name = "long slot"
+tool = "{tool}"
+teeth = 4
+tool_diameter_mm = 20
+radial_depth_mm = 20
+direction = "down"
+tangential_n_per_mm2 = 1400
+radial_n_per_mm2 = 500
+speed_rpm = 9000
+depth_mm = 0.3
+
+"""
 LINES = np.arange(2.0, 6000.0, 2.0)
 
 
@@ -39,7 +59,10 @@ def bearing_stiffness(found: dict[str, Any]) -> float:
 
 
 def tapped(folder: MachineFolder, factor: float, tool: str = "reference", day: int = 1) -> TapTest:
-    """A noiseless tap test of the model with its bearings softened by `factor`."""
+    """A noiseless tap test of the model with its bearings softened by `factor`.
+
+    Its damping is structural, and is fitted as viscous: the stiffness found is a few parts in a thousand off.
+    """
     drawn = folder.machine.model(tool)
     worn = replace(drawn, bearings=[replace(b, stiffness=factor * b.stiffness) for b in drawn.bearings])
     time = datetime(2026, 3, day, tzinfo=UTC)
@@ -76,14 +99,14 @@ def test_the_newest_tap_sets_the_bearings_of_every_tool(folder: MachineFolder) -
     drawn = folder.machine.model(TOOL)
     worn = replace(drawn, bearings=[replace(b, stiffness=0.6 * b.stiffness) for b in drawn.bearings])
     predicted = [mode["frequency_hz"] for mode in found["modes"]]
-    assert predicted == pytest.approx(natural_frequencies(worn, 4), rel=3e-4)
-    assert bearing_stiffness(found) == pytest.approx(768, rel=2e-3)
+    assert predicted == pytest.approx(natural_frequencies(worn, 4), rel=1e-3)
+    assert bearing_stiffness(found) == pytest.approx(768, rel=5e-3)
 
 
 def test_a_tap_with_another_tool_is_calibrated_with_that_tools_model(folder: MachineFolder) -> None:
     folder.commit(tapped(folder, 0.7, TOOL))
     found = said("model", folder.path)
-    assert bearing_stiffness(found) == pytest.approx(896, rel=2e-3)
+    assert bearing_stiffness(found) == pytest.approx(896, rel=5e-3)
 
 
 @pytest.mark.parametrize("tool", [None, TOOL])
@@ -108,6 +131,60 @@ def test_the_picture_shows_the_shaft_the_curve_and_what_was_measured(folder: Mac
 
 def damping(mode: Any) -> float:
     return float(mode.damping_ratio)
+
+
+def with_program(folder: MachineFolder) -> None:
+    """A program of the long tool, tapped nowhere."""
+    program = EXAMPLE_PROGRAM.format(tool=TOOL)
+    toml = folder.toml.read_text("utf-8")
+    folder.toml.write_text(
+        toml.replace("# A tool that is not tapped", program + "# A tool that is not tapped"), "utf-8"
+    )
+
+
+def test_one_tap_predicts_the_lobes_of_every_tool(folder: MachineFolder) -> None:
+    with_program(folder)
+    folder = MachineFolder(folder.path)
+    folder.commit(tapped(folder, 0.6))
+    found = said("lobes", folder.path, "--tool", TOOL)
+    drawn = folder.machine.model(TOOL)
+    worn = replace(drawn, bearings=[replace(b, stiffness=0.6 * b.stiffness) for b in drawn.bearings])
+    frequency, stiffness = modes_at(worn, 12)
+    modes = [Mode(f, 0.029, k) for f, k in zip(frequency, stiffness, strict=True)]
+    expected = zero_order(modes, modes, folder.machine.cuts(TOOL)[REFERENCE_CUT], speed_grid(folder.machine))
+    assert found["minimum_depth_mm"] == pytest.approx(expected.minimum.depth * 1e3, rel=2e-3)
+    assert "predicted, not measured" in found["notes"][0]
+    coupled = said("lobes", folder.path, "--tool", TOOL, "--source", "frf")
+    assert coupled["minimum_depth_mm"] == pytest.approx(found["minimum_depth_mm"], rel=0.02)
+    measured = said("lobes", folder.path)
+    assert measured["minimum_depth_mm"] > 2 * found["minimum_depth_mm"]
+    assert not any("predicted" in note for note in measured["notes"])
+
+
+def test_check_predicts_where_a_tool_was_never_tapped(folder: MachineFolder) -> None:
+    with_program(folder)
+    folder = MachineFolder(folder.path)
+    folder.commit(tapped(folder, 1.0))
+    (long,) = [one for one in advise(folder) if one.table.tool == TOOL]
+    assert long.check is not None
+    assert long.tap_id.startswith("prediction from ")
+    assert any("predicted, not measured" in note for note in long.notes)
+    assert long.check.limit == pytest.approx(0.4e-3, rel=0.5)
+
+
+def test_predictions_need_a_model_and_a_tap(folder: MachineFolder) -> None:
+    folder.commit(tapped(folder, 1.0))
+    for arguments, message in (
+        (("--tool", "drill"), "'drill' has no model"),
+        (("--tool", TOOL, "--waterfall", "w.png"), "--waterfall shows measured lobes"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            CliRunner().invoke(app, ["lobes", str(folder.path), *arguments], catch_exceptions=False)
+
+
+def test_a_prediction_is_refused_before_the_first_tap(folder: MachineFolder) -> None:
+    with pytest.raises(ValueError, match="no tap test has set the bearings of the model yet"):
+        predict(folder, TOOL)
 
 
 def test_an_unknown_tool_and_a_machine_without_a_model_are_refused(folder: MachineFolder, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from acquisition import DataError
+from acquisition import DataError, Frf
 from lobes import (
     Cut,
     DepthBand,
@@ -37,8 +37,10 @@ from lobewatch.figures_lobes import lobes_figure, radial_figure, waterfall_figur
 from lobewatch.history import measure, series, update_history
 from lobewatch.machine import REFERENCE_CUT, Machine
 from lobewatch.machine_folder import MachineFolder, TapEntry
+from lobewatch.model_state import model_frf, model_state
 from lobewatch.output import Json, emit
 from lobewatch.pipeline import Measurement, speed_grid
+from lobewatch.prediction import predict
 
 USEFUL = 5.0
 """Pockets are cut off at this many times the lowest limit, where the diagram ends."""
@@ -66,6 +68,7 @@ class _Chart:
 def lobes(
     machine: Annotated[Path, typer.Argument(help="Machine folder with at least one tap test.")],
     cut: Annotated[str, typer.Option(help="Name of a [[program]], or the reference cut.")] = REFERENCE_CUT,
+    tool: Annotated[str | None, typer.Option(help="Of the newest tap test if not given; else predicted.")] = None,
     source: Annotated[Dynamics, typer.Option(help="From the modes found, or straight from the FRF.")] = Dynamics.MODES,
     method: Annotated[Method, typer.Option(help="How the limits are found.")] = Method.ZERO_ORDER,
     figure: Annotated[Path | None, typer.Option(help="Draw the diagram to this file (.svg, .png, .pdf).")] = None,
@@ -75,6 +78,8 @@ def lobes(
     as_json: Json = False,
 ) -> None:
     """Stability lobes of the newest tap test, drawn beside those of the first test, and the best pockets.
+
+    A --tool that was never tapped is predicted by the model with the bearings of the newest tap test.
 
     Examples:
 
@@ -86,19 +91,17 @@ def lobes(
     if materials:
         emit({"materials": _materials(folder.machine)}, as_json, *_material_lines(folder.machine))
         return
-    taps = folder.taps()
-    if not taps:
-        raise DataError(f"{folder.path}: no tap test yet; take one with lobewatch tap, or replay a recorded file")
-    now = _found(folder, taps[-1], cut, source, method)
-    of_series = [tap for tap in taps if (tap.tool, tap.direction) == (taps[-1].tool, taps[-1].direction)]
-    then = _found(folder, of_series[0], cut, source, method) if len(of_series) > 1 else None
+    of_series = _series(folder, tool)
+    newest = measure(folder, of_series[-1]) if of_series else predict(folder, tool or "")
+    now = _found(folder, newest, cut, source, method)
+    then = _found(folder, measure(folder, of_series[0]), cut, source, method) if len(of_series) > 1 else None
     best = _pockets(folder.machine, now.lobes, cut)
     if figure is not None:
         save_figure(_diagram(folder, now, then, cut, source, best), figure)
     if radial is not None:
         _draw_radial(folder.machine, now, cut, method, radial)
     if waterfall is not None:
-        _draw_waterfall(folder, taps[-1], cut, waterfall)
+        _draw_waterfall(folder, newest, cut, waterfall)
     shifts = pocket_shifts(then.lobes, now.lobes, DEEPEST * now.lobes.minimum.depth) if then is not None else []
     _say(folder.machine, now, cut, source, best, shifts, as_json)
 
@@ -141,22 +144,39 @@ def _say(
     )
 
 
-def _found(folder: MachineFolder, tap: TapEntry, cut: str, source: Dynamics, method: Method) -> _Chart:
-    """The lobes of a tap for one cut; DataError with the reason where there are none."""
-    measurement = measure(folder, tap)
+def _series(folder: MachineFolder, tool: str | None) -> list[TapEntry]:
+    """Taps with a tool in the direction of the newest of them; None: the tool that was tapped last."""
+    taps = folder.taps()
+    if not taps:
+        raise DataError(f"{folder.path}: no tap test yet; take one with lobewatch tap, or replay a recorded file")
+    of_tool = [tap for tap in taps if tap.tool == (taps[-1].tool if tool is None else tool)]
+    return [tap for tap in of_tool if tap.direction == of_tool[-1].direction]
+
+
+def _found(folder: MachineFolder, measurement: Measurement, cut: str, source: Dynamics, method: Method) -> _Chart:
+    """The lobes of a measurement for one cut; DataError with the reason where there are none."""
     cuts = folder.machine.cuts(measurement.tool)
     if cut not in cuts:
         raise DataError(
             f"--cut {cut!r} is none of the cuts with tool {measurement.tool!r}: {', '.join(cuts) or 'none'}"
         )
     if cut not in measurement.lobes:
-        raise DataError(f"{tap.id}: {'; '.join(measurement.notes)}")
+        raise DataError(f"{measurement.tap_id}: {'; '.join(measurement.notes)}")
     x: Tip | None = measurement.x
     y: Tip | None = measurement.y
     if source is Dynamics.FRF:
-        frf = folder.read(tap).frf.in_band(folder.machine.mode.band_hz)
-        x, y = (frf, None) if measurement.direction == "x" else (None, frf)
+        x, y = _frfs(folder, measurement)
     return _Chart(measurement, x, y, cuts[cut], chart(method, x, y, cuts[cut], speed_grid(folder.machine)))
+
+
+def _frfs(folder: MachineFolder, measurement: Measurement) -> tuple[Frf | None, Frf | None]:
+    """Measured in one direction; predicted by receptance coupling, both alike."""
+    taps = [tap for tap in folder.taps() if tap.id == measurement.tap_id]
+    if not taps:
+        coupled = model_frf(model_state(folder, measurement.tool))
+        return coupled, coupled
+    frf = folder.read(taps[0]).frf.in_band(folder.machine.mode.band_hz)
+    return (frf, None) if measurement.direction == "x" else (None, frf)
 
 
 def _table_of(machine: Machine, cut: str) -> CutTable | None:
@@ -215,11 +235,13 @@ def _draw_radial(machine: Machine, now: _Chart, cut: str, method: Method, path: 
     save_figure(radial_figure(found, of_cut.tool_diameter_mm / 1e3, title=title), path)
 
 
-def _draw_waterfall(folder: MachineFolder, newest: TapEntry, cut: str, path: Path) -> None:
+def _draw_waterfall(folder: MachineFolder, newest: Measurement, cut: str, path: Path) -> None:
     with folder.locked():
         history, _ = update_history(folder)
     rows = series(history, newest.tool, newest.direction)
     rows = rows[~np.isnan(history.depth[cut][rows, 0])]
+    if not rows.size:
+        raise DataError(f"--waterfall shows measured lobes; no tap test with tool {newest.tool!r} has any of {cut!r}")
     times = [datetime.fromisoformat(text) for text in history.columns["time"][rows]]
     title = f"{folder.machine.machine.name}: {cut}, zero order"
     save_figure(waterfall_figure(history.speed_rpm, times, history.depth[cut][rows], title), path)

@@ -152,7 +152,7 @@ def test_one_tap_predicts_the_lobes_of_every_tool(folder: MachineFolder) -> None
     frequency, stiffness = modes_at(worn, 12)
     modes = [Mode(f, 0.029, k) for f, k in zip(frequency, stiffness, strict=True)]
     expected = zero_order(modes, modes, folder.machine.cuts(TOOL)[REFERENCE_CUT], speed_grid(folder.machine))
-    assert found["minimum_depth_mm"] == pytest.approx(expected.minimum.depth * 1e3, rel=2e-3)
+    assert found["minimum_depth_mm"] == pytest.approx(expected.minimum.depth * 1e3, rel=0.02)
     assert "predicted, not measured" in found["notes"][0]
     coupled = said("lobes", folder.path, "--tool", TOOL, "--source", "frf")
     assert coupled["minimum_depth_mm"] == pytest.approx(found["minimum_depth_mm"], rel=0.02)

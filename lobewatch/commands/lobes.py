@@ -203,7 +203,10 @@ def _diagram(
 
 
 def _bands(machine: Machine, now: _Chart, cut: str, source: Dynamics) -> tuple[DepthBand | None, DepthBand | None]:
-    """Band of the measurement and range of the coefficients, each from zero order and carried over as ratios."""
+    """Band of the measurement and range of the coefficients, each from zero order and carried over as ratios.
+
+    None where modes have no standard errors, and where there are not two publications of one alloy.
+    """
     if source is Dynamics.FRF:
         return None, None
     speeds = now.lobes.speed_rpm
@@ -215,14 +218,15 @@ def _bands(machine: Machine, now: _Chart, cut: str, source: Dynamics) -> tuple[D
         low, high = (np.where(known, edge / np.where(known, base, 1.0), 1.0) for edge in band)
         return DepthBand(now.lobes.depth * low, now.lobes.depth * high)
 
-    measured = measurement_band(lambda x, y: chart(Method.ZERO_ORDER, x, y, now.cut, speeds), x, y)
+    measured = spread = None
+    if any(mode.best_covariance is not None for mode in (*(x or ()), *(y or ()))):
+        measured = carried(measurement_band(lambda x, y: chart(Method.ZERO_ORDER, x, y, now.cut, speeds), x, y))
     of_cut = _table_of(machine, cut)
     alloy = machine.coefficients(of_cut).alloy if of_cut is not None else ""
     published = [one for one in cutting_coefficients() if alloy and one.alloy == alloy]
-    if len(published) < 2:
-        return carried(measured), None
-    spread = coefficient_range(lambda cut: chart(Method.ZERO_ORDER, x, y, cut, speeds), now.cut, published)
-    return carried(measured), carried(spread)
+    if len(published) >= 2:
+        spread = carried(coefficient_range(lambda cut: chart(Method.ZERO_ORDER, x, y, cut, speeds), now.cut, published))
+    return measured, spread
 
 
 def _draw_radial(machine: Machine, now: _Chart, cut: str, method: Method, path: Path) -> None:

@@ -47,7 +47,9 @@ class ProgramAdvice:
     check: ProgramCheck | None
     """State, margins, nearest speed; None where it could not be checked."""
     limit_band: tuple[float, float]
-    """95 % band of the limit from the covariance of the modes (m)."""
+    """95 % band of the limit from the covariance of the modes (m); NaN where they have none."""
+    measured: bool
+    """Whether its tool was tapped; else all is predicted by the model."""
     decay: float
     """Tolerable fall of the frequency, relative; inf where nothing happens down to 80 %."""
     was_stable: bool
@@ -131,7 +133,7 @@ def _first(taps: Sequence[TapEntry]) -> TapEntry:
 
 def _unknown(table: ProgramTable, tap_id: str, reason: str) -> ProgramAdvice:
     nan = float("nan")
-    return ProgramAdvice(table, tap_id, None, (nan, nan), nan, False, float("inf"), (f"not checked: {reason}",))
+    return ProgramAdvice(table, tap_id, None, (nan, nan), False, nan, False, float("inf"), (f"not checked: {reason}",))
 
 
 def _advise(table: ProgramTable, machine: Machine, now: Measurement, then: Measurement) -> ProgramAdvice:
@@ -140,7 +142,8 @@ def _advise(table: ProgramTable, machine: Machine, now: Measurement, then: Measu
     modes_at, assumption = aging(now)
     allowed = float(drive_limit(machine, table, np.array([table.speed_rpm]))[0])
     notes = [assumption] if check.stable else []
-    notes += [note for note in now.notes if "is predicted" in note]
+    if now.predicted:
+        notes += now.notes[:1]
     if not (now.x and now.y):
         notes.append(f"modes in the {now.direction} direction alone")
     return ProgramAdvice(
@@ -148,6 +151,7 @@ def _advise(table: ProgramTable, machine: Machine, now: Measurement, then: Measu
         tap_id=now.tap_id,
         check=check,
         limit_band=_band(program, now, check),
+        measured=not now.predicted,
         decay=tolerable_decay(program, modes_at) if check.stable else 0.0,
         was_stable=bool(_limits(program, then.x, then.y).depth[0] > program.depth) if then.dynamics.at_tip else False,
         drive_limit=allowed,
@@ -162,5 +166,7 @@ def _limits(program: Program, x: Modes, y: Modes) -> StabilityLobes:
 def _band(program: Program, measurement: Measurement, check: ProgramCheck) -> tuple[float, float]:
     if not np.isfinite(check.limit):
         return check.limit, check.limit
+    if all(mode.best_covariance is None for mode in (*(measurement.x or ()), *(measurement.y or ()))):
+        return float("nan"), float("nan")
     band = measurement_band(lambda x, y: _limits(program, x, y), measurement.x, measurement.y)
     return float(band.low[0]), float(band.high[0])

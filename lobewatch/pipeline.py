@@ -54,6 +54,8 @@ class Measurement:
     """Modes at the tool tip in the feed direction that lobes are computed from; None where there are none."""
     y: Sequence[Mode] | None = None
     """The same normal to the feed."""
+    predicted: bool = False
+    """Whether all of it comes from the model, for a tool that was never tapped."""
 
 
 def analyse(tap: TapTest, machine: Machine, partner: TapTest | None = None, last: Mode | None = None) -> Measurement:

@@ -50,4 +50,5 @@ def predict(folder: MachineFolder, tool: str) -> Measurement:
         notes=notes,
         x=modes,
         y=modes,
+        predicted=True,
     )

@@ -168,6 +168,11 @@ def test_check_predicts_where_a_tool_was_never_tapped(folder: MachineFolder) -> 
     (long,) = [one for one in advise(folder) if one.table.tool == TOOL]
     assert long.check is not None
     assert long.tap_id.startswith("prediction from ")
+    assert not long.measured
+    assert np.isnan(long.limit_band).all()
+    shown = CliRunner().invoke(app, ["check", str(folder.path)], catch_exceptions=False)
+    assert "stable (predicted)" in shown.stdout
+    assert shown.exit_code == 0
     assert any("predicted, not measured" in note for note in long.notes)
     assert long.check.limit == pytest.approx(0.4e-3, rel=0.5)
 

@@ -58,6 +58,7 @@ def _json(one: ProgramAdvice) -> dict[str, Any]:
     if found is not None:
         known = {
             "stable": found.stable,
+            "measured": one.measured,
             "was_stable_at_first": one.was_stable,
             "limit_mm": found.limit * 1e3,
             "limit_low_mm": one.limit_band[0] * 1e3,
@@ -88,16 +89,15 @@ def _verdict(one: ProgramAdvice) -> tuple[str, str, str, str]:
     if found is None:
         return "-", "-", "-", "not checked"
     low, high = (edge * 1e3 for edge in one.limit_band)
-    limit = (
-        f"> {20 * one.table.depth_mm:g}"
-        if math.isinf(found.limit)
-        else f"{found.limit * 1e3:.2f} ({low:.2f}..{high:.2f})"
-    )
+    limit = f"{found.limit * 1e3:.2f}" + (f" ({low:.2f}..{high:.2f})" if one.measured else "")
+    if math.isinf(found.limit):
+        limit = f"> {20 * one.table.depth_mm:g}"
     margin = "-" if math.isinf(found.depth_margin) else f"{100 * found.depth_margin:+.0f} %"
+    predicted = "" if one.measured else " (predicted)"
     if not found.stable:
-        return limit, margin, "none", "NOT STABLE any more" if one.was_stable else "NOT STABLE"
+        return limit, margin, "none", f"NOT STABLE{' any more' if one.was_stable else ''}{predicted}"
     left = "> 20 %" if math.isinf(one.decay) else f"{100 * one.decay:.1f} %"
-    return limit, margin, left, "stable" if low > one.table.depth_mm else "stable, within the error"
+    return limit, margin, left, f"stable{', within the error' if low <= one.table.depth_mm else ''}{predicted}"
 
 
 def _sentences(one: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:

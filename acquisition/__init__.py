@@ -9,7 +9,7 @@ from acquisition.estimate_frf import cross_spectra, estimate_frf
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hammered_structure import HammeredStructure, Hammering, Structure
 from acquisition.hit import Hit, HitFlags
-from acquisition.read_recording import read_frf, read_hits, read_recording, recording_time
+from acquisition.read_recording import read_frf, read_hits, read_recording, recorded_as
 from acquisition.simulated_source import SimulatedSource
 from acquisition.source import Source
 from acquisition.tap_file import read_tap, read_tap_hits, write_hit, write_tap
@@ -50,7 +50,7 @@ __all__ = [
     "read_recording",
     "read_tap",
     "read_tap_hits",
-    "recording_time",
+    "recorded_as",
     "write_hit",
     "write_tap",
 ]

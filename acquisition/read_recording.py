@@ -11,7 +11,7 @@ from acquisition.hit import Hit
 from acquisition.read_csv import frf_of, hit_of, is_frf, read_table
 from acquisition.read_lvm import MAGIC, lvm_time, read_lvm
 from acquisition.tap_file import read_tap, read_tap_hits
-from acquisition.tap_test import average_good
+from acquisition.tap_test import Circumstances, average_good
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
@@ -58,11 +58,14 @@ def read_recording(path: Path | str) -> list[Hit] | Frf:
     return frf_of(path, table) if is_frf(table) else [hit_of(path, table)]
 
 
-def recording_time(path: Path | str) -> datetime:
-    """When it was recorded: from the file itself where it says so, else its time of modification."""
+def recorded_as(path: Path | str) -> Circumstances:
+    """What a recording says of itself: all of it in our own files, else only when it was made.
+
+    The time is that in the file, or that of its modification where there is none.
+    """
     path = Path(path)
     magic = _magic(path)
     if magic == _HDF5:
-        return read_tap_hits(path)[1].created
+        return read_tap_hits(path)[1]
     written = lvm_time(path) if magic and MAGIC.encode().startswith(magic) else None
-    return written or datetime.fromtimestamp(path.stat().st_mtime).astimezone()
+    return Circumstances("", written or datetime.fromtimestamp(path.stat().st_mtime).astimezone())

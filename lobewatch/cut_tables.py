@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from lobes import Coefficients, tangential_and_radial
-from lobewatch.toml_table import NotNegative, Positive, Table
+from lobewatch.toml_table import NotNegative, Positive, PositiveOrInfinite, Table
 
 Direction = Literal["up", "down"]
 
@@ -90,5 +90,5 @@ class MaterialTable(Table, frozen=True):
 class Drive(Table, frozen=True):
     """[drive]: what the spindle motor can do; optional."""
 
-    power_kw: Positive = math.inf
-    torque_nm: Positive = math.inf
+    power_kw: PositiveOrInfinite = math.inf
+    torque_nm: PositiveOrInfinite = math.inf

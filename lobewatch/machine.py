@@ -108,6 +108,10 @@ class Machine(Table, frozen=True):
                     f"program {i}: speed_rpm={program.speed_rpm:g} is outside [speed] "
                     f"{self.speed.low_rpm:g}..{self.speed.high_rpm:g} rpm"
                 )
+        names = [material.name for material in self.material]
+        for i, name in enumerate(names, 1):
+            if name in names[: i - 1]:
+                raise ValueError(f"material {i}: name={name!r} stands twice; give each its own")
         for table in (*([self.reference_cut] if self.reference_cut else []), *self.program):
             self.coefficients(table)
 

@@ -10,7 +10,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory, change_tool
-from lobewatch.toml_table import NotNegative, Positive, Table
+from lobewatch.toml_table import NotNegative, Positive, PositiveOrInfinite, Table
 
 
 class SegmentTable(Table, frozen=True):
@@ -55,10 +55,10 @@ class BearingTable(Table, frozen=True):
     """One of bearings."""
 
     position_mm: NotNegative
-    stiffness_n_per_um: Positive | None = None
+    stiffness_n_per_um: PositiveOrInfinite | None = None
     damping_n_s_per_m: NotNegative = 0.0
     rotational_stiffness_n_m_per_rad: NotNegative = 0.0
-    housing_stiffness_n_per_um: Positive = math.inf
+    housing_stiffness_n_per_um: PositiveOrInfinite = math.inf
     group: str = "bearings"
 
     def build(self, stiffness_n_per_um: float) -> Bearing:

@@ -191,6 +191,20 @@ def test_replay_of_a_tap_file_with_a_date(run: Run, trial: MachineFolder, device
     assert measurement["calibration"]["bearing_stiffness_n_per_m"] == pytest.approx(1.28e9, rel=0.01)
 
 
+def test_replay_believes_what_a_tap_file_says_of_itself(run: Run, trial: MachineFolder, device: TapsEmulator) -> None:
+    run("tap", "trial", "--port", device.port, "--direction", "y", "--tool", "drill", "--operator", "Ada")
+    (entry,) = trial.taps()
+    file = f"trial/taps/{entry.id}.h5"
+    assert "0 of 1 file(s) stored" in run("replay", "trial", file).out
+    run("init", "other", "--example")
+    (measurement,) = run("replay", "other", file, "--json").json["measurements"]
+    assert (measurement["direction"], measurement["tool"]) == ("y", "drill")
+    assert measurement["time"] == entry.time
+    (copy,) = MachineFolder("other").taps()
+    assert MachineFolder("other").read(copy).circumstances.operator == "Ada"
+    assert "0 of 1 file(s) stored" in run("replay", "other", file).out
+
+
 def test_lobes_and_report(run: Run, trial: MachineFolder, device: TapsEmulator) -> None:
     refused(run("lobes", "trial"), "no tap test yet")
     refused(run("report", "trial"), "no tap test yet")

@@ -101,6 +101,8 @@ def test_programs_belong_to_their_tool() -> None:
         ("tool_length_mm = 93.5", "", "tool 1: needs [spindle] tool_length_mm"),
         ('name = "long end mill"', 'name = "reference"', "tool 1: name='reference' stands twice"),
         ("outer_mm = 17.0", "outer_mm = 0", "tool 1 segment 1 outer_mm: "),
+        ("high_rpm = 24000", "high_rpm = inf", "speed high_rpm: Expected `float` <= 1"),
+        ("depth_mm = 6.0", "depth_mm = inf", "program 1 depth_mm: Expected `float` <= 1"),
     ],
 )
 def test_every_mistake_is_told_with_its_place(old: str, new: str, message: str) -> None:
@@ -110,6 +112,13 @@ def test_every_mistake_is_told_with_its_place(old: str, new: str, message: str) 
     assert str(caught.value).startswith("machine.toml: ")
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_materials_have_names_of_their_own() -> None:
+    material = '[[material]]\nname = "my steel"\ntangential_n_per_mm2 = 1500\nradial_n_per_mm2 = 500\n'
+    assert len(parse_machine(f"{EXAMPLE}\n{material}").material) == 1
+    with pytest.raises(DataError, match="material 2: name='my steel' stands twice"):
+        parse_machine(f"{EXAMPLE}\n{material}{material}")
 
 
 def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import DataError, HitFlags, check_hit, read_frf, read_hits, read_recording, recording_time
+from acquisition import DataError, HitFlags, check_hit, read_frf, read_hits, read_recording, recorded_as
 
 N = 2000
 RATE = 5000.0
@@ -31,7 +31,7 @@ def test_real_lvm_with_decimal_comma_is_read_in_si(beam: Path) -> None:
     assert np.max(hit.force) == pytest.approx(195.605522)
     assert hit.acceleration[0] == pytest.approx(-0.007387 * 9.80665)
     assert check_hit(hit) == HitFlags.OK
-    assert recording_time(beam).strftime("%Y-%m-%d %H:%M:%S") == "2018-12-17 10:18:21"
+    assert recorded_as(beam).created.strftime("%Y-%m-%d %H:%M:%S") == "2018-12-17 10:18:21"
 
 
 def test_real_cnc_table_is_refused_with_all_its_faults(cnc_csv: Path) -> None:
@@ -155,7 +155,7 @@ def test_an_lvm_in_an_unknown_unit_or_without_force_is_refused(beam: Path, tmp_p
 
 def test_time_of_a_file_that_does_not_tell_is_that_of_its_last_change(tmp_path: Path) -> None:
     path = table(tmp_path / "hit.csv", "time_s,force_N,acc_g", TIME, FORCE, ACCELERATION)
-    assert recording_time(path) == datetime.fromtimestamp(path.stat().st_mtime).astimezone()
+    assert recorded_as(path).created == datetime.fromtimestamp(path.stat().st_mtime).astimezone()
 
 
 def test_a_missing_file_is_an_os_error(tmp_path: Path) -> None:

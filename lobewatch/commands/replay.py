@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from acquisition import Circumstances, DataError, Frf, SourceFile, TapTest, average_good, new_tap_id, read_recording
-from acquisition import recording_time as time_of
+from acquisition import (
+    Circumstances,
+    DataError,
+    Frf,
+    SourceFile,
+    TapTest,
+    average_good,
+    new_tap_id,
+    read_recording,
+    recorded_as,
+)
 from lobewatch.describe import measurement_json, measurement_texts
 from lobewatch.history import update_history
 from lobewatch.machine_folder import MachineFolder
@@ -20,8 +30,12 @@ from lobewatch.output import Json, emit, notes
 def replay(
     machine: Annotated[Path, typer.Argument(help="Machine folder.")],
     files: Annotated[list[Path], typer.Argument(help="Recorded hits or FRFs: tap file (HDF5), LVM, CSV.")],
-    tool: Annotated[str, typer.Option(help="What was in the spindle; [tap] tool where not given.")] = "",
-    direction: Annotated[str, typer.Option(help="Direction at the tool tip, x or y.")] = "x",
+    tool: Annotated[
+        str, typer.Option(help="What was in the spindle; from a tap file, or [tap] tool, where not given.")
+    ] = "",
+    direction: Annotated[
+        str, typer.Option(help="Direction at the tool tip, x or y; from a tap file, or x, where not given.")
+    ] = "",
     date: Annotated[
         datetime | None, typer.Option(help="When it was recorded, local time; from the file where not given.")
     ] = None,
@@ -40,7 +54,7 @@ def replay(
     folder = MachineFolder(machine)
     setup = folder.machine
     with folder.locked():
-        stored = {entry.source_sha256: entry.id for entry in folder.taps()}
+        stored = {digest: entry.id for entry in folder.taps() for digest in (entry.source_sha256, entry.sha256)}
         fresh: dict[str, TapTest] = {}
         for file in files:
             content = file.read_bytes()
@@ -48,9 +62,14 @@ def replay(
             if digest in stored or digest in fresh:
                 notes.print(f"{file.name}: stored already as {stored.get(digest) or fresh[digest].id}", markup=False)
                 continue
-            created = date.astimezone() if date else time_of(file)
-            about = Circumstances(
-                setup.machine.name, created, tool or setup.tap.tool, direction, "", folder.toml.read_text("utf-8")
+            own = recorded_as(file)
+            about = replace(
+                own,
+                machine=setup.machine.name,
+                created=date.astimezone() if date else own.created,
+                tool=tool or own.tool or setup.tap.tool,
+                direction=direction or own.direction,
+                machine_toml=folder.toml.read_text("utf-8"),
             )
             fresh[digest] = _tap_test(file, about, SourceFile(file.name, content))
         for recorded in fresh.values():

@@ -1,7 +1,8 @@
-"""Stability lobes by the method that is asked for."""
+"""Stability lobes by the method and from the dynamics that are asked for."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from acquisition import Frf
 from lobes import Cut, StabilityLobes, average_angle, stability_boundary, zero_order
 from lobes.tip_response import Tip
+from lobewatch.cut_tables import CutTable
+from lobewatch.pipeline import Measurement
 
 MOST_SPEEDS = 400
 """Speeds of a chart by semi-discretisation."""
@@ -23,6 +26,46 @@ class Method(StrEnum):
     ZERO_ORDER = "zero-order"
     AVERAGE_ANGLE = "average-angle"
     SEMI_DISCRETISATION = "semi-discretisation"
+
+
+class Dynamics(StrEnum):
+    """What the lobes are computed from."""
+
+    MODES = "modes"
+    FRF = "frf"
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """The lobes of one tap test, and what they came from."""
+
+    name: str
+    """Of the cut."""
+    table: CutTable
+    """The cut as it stands in machine.toml."""
+    measurement: Measurement
+    """The tap test, or the prediction."""
+    source: Dynamics
+    """What of it was used."""
+    x: Tip | None
+    """Dynamics at the tool tip in the feed direction; None where they are not known."""
+    y: Tip | None
+    """The same normal to the feed."""
+    cut: Cut
+    """The cut in SI units."""
+    lobes: StabilityLobes
+    """Its limits."""
+
+    @property
+    def directions(self) -> str:
+        """Those that the lobes know."""
+        return " and ".join(name for name, tip in (("x", self.x), ("y", self.y)) if tip is not None)
+
+    @property
+    def label(self) -> str:
+        """What a legend says."""
+        day = f"{self.measurement.time:%Y-%m-%d}"
+        return f"predicted, bearings of {day}" if self.measurement.predicted else day
 
 
 def chart(method: Method, x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: NDArray[np.float64]) -> StabilityLobes:

@@ -36,11 +36,12 @@ STYLE: dict[Any, Any] = {
 
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a picture in the format that the ending names; ValueError for one that is not known."""
+    if path.suffix.lower() not in (".svg", ".png", ".pdf"):
+        raise ValueError(
+            f"{path}: a picture cannot end in {path.suffix!r}; name a file that ends in .svg, .png or .pdf"
+        )
     with mpl.rc_context(STYLE):
-        try:
-            figure.savefig(path, dpi=150)
-        except ValueError as error:
-            raise ValueError(f"{path}: {error}; name a file that ends in .svg, .png or .pdf") from error
+        figure.savefig(path, dpi=150)
 
 
 def svg(figure: Figure) -> str:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
+from textwrap import fill
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
+from matplotlib.dates import AutoDateLocator, DateFormatter, date2num
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
@@ -23,6 +25,9 @@ MAP = "cividis"
 SPREAD = "#E6E6E6"
 LEVELS = 12
 """Steps of colour in a map."""
+BAR = "limiting depth (mm); brightest: this or more"
+SHORT = 10.0
+"""Days below which dates are told with their time."""
 
 
 def lobes_figure(
@@ -50,11 +55,11 @@ def lobes_figure(
     if band is not None:
         _fill(axes, speed_rpm, band, top, color=NOW, alpha=0.35, label="95 % band of the tap")
     axes.fill_between(speed_rpm, np.minimum(now[1] * 1e3, top), top, color=NOW, alpha=0.10, lw=0)
+    axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
     for pocket in pockets:
         _draw_pocket(axes, pocket)
     for program in programs:
         _draw_program(axes, program)
-    axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
     axes.set(xlabel="spindle speed (rpm)", ylabel="limiting depth (mm)")
     figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=9)
     return figure
@@ -66,27 +71,34 @@ def waterfall_figure(speed_rpm: Floats, times: Sequence[datetime], depth: Floats
     top = _top(depth)
     rows, columns = _edges(date2num(times), 30.0), _edges(speed_rpm, 1.0)
     mesh = axes.pcolormesh(columns, rows, np.minimum(depth * 1e3, top), cmap=MAP, vmin=0, vmax=top, rasterized=True)
-    _colour_bar(figure, axes, mesh)
-    locator = AutoDateLocator()
-    axes.yaxis.set_major_locator(locator)
-    axes.yaxis.set_major_formatter(ConciseDateFormatter(locator))
-    axes.set(title=title, xlabel="spindle speed (rpm)", xlim=(speed_rpm[0], speed_rpm[-1]))
+    figure.colorbar(mesh, ax=axes, label=BAR)
+    axes.yaxis.set_major_locator(AutoDateLocator())
+    axes.yaxis.set_major_formatter(DateFormatter("%Y-%m-%d" if np.ptp(rows) > SHORT else "%Y-%m-%d %H:%M"))
+    axes.set(title=title, xlabel="spindle speed (rpm)", ylabel="date", xlim=(speed_rpm[0], speed_rpm[-1]))
     axes.grid(visible=False)
     return figure
 
 
-def radial_figure(lobes: RadialLobes, diameter: float, title: str = "") -> Figure:
-    """Limiting depth over speed and radial depth for a cutter of this diameter (m), as a map with lines."""
+def radial_figure(lobes: RadialLobes, diameter: float, present: float, title: str = "") -> Figure:
+    """Limiting depth over speed and radial depth for a cutter of this diameter (m), as a map with lines.
+
+    present is the immersion (radial depth over diameter) of the cut itself, a dashed line. The contours are those of
+    one over depth, which is smooth where a pocket has no limit.
+    """
     figure, (axes,) = new_axes(1, (8.0, 4.2))
-    top = _top(lobes.depth)
-    shown = np.minimum(lobes.depth * 1e3, top)
-    radial = lobes.immersion * diameter * 1e3
-    levels = MaxNLocator(LEVELS).tick_values(0, top)
-    mesh = axes.contourf(lobes.speed_rpm, radial, shown, levels=levels, cmap=MAP)
-    lines = axes.contour(lobes.speed_rpm, radial, shown, levels=levels[1:-1:2], colors="black", linewidths=0.5)
-    axes.clabel(lines, fmt="%g", fontsize=8)
-    _colour_bar(figure, axes, mesh)
-    axes.set(title=title, xlabel="spindle speed (rpm)", ylabel="radial depth (mm)")
+    depths = np.asarray(MaxNLocator(LEVELS).tick_values(0, _top(lobes.depth)))[1:]
+    radial, softness = lobes.immersion * diameter * 1e3, 1e-3 / lobes.depth
+    levels = 1 / depths[::-1]
+    colours = colormaps[MAP](np.linspace(1, 0, levels.size + 1))
+    mesh = axes.contourf(lobes.speed_rpm, radial, softness, levels=levels, colors=colours, extend="both")
+    axes.contour(lobes.speed_rpm, radial, softness, levels=levels, colors="black", linewidths=0.3)
+    axes.axhline(present * diameter * 1e3, color=ALARM, ls="--", lw=2, clip_on=False)
+    bar = figure.colorbar(mesh, ax=axes, spacing="uniform", label=BAR)
+    bar.ax.invert_yaxis()
+    bar.set_ticks(levels.tolist(), labels=[f"{depth:g}" for depth in depths[::-1]])
+    if lobes.warning:
+        figure.supxlabel(fill(lobes.warning, 120), fontsize=8)
+    axes.set(title=title, xlabel="spindle speed (rpm)", ylabel="radial depth (mm); dashed: now")
     axes.grid(visible=False)
     return figure
 
@@ -102,10 +114,6 @@ def _top(depth: Floats) -> float:
     """Depth (mm) at which a map of depths (m) ends."""
     finite = depth[np.isfinite(depth)] * 1e3
     return min(6 * float(finite.min()), float(finite.max())) if finite.size else 1.0
-
-
-def _colour_bar(figure: Figure, axes: Axes, mesh: Any) -> None:
-    figure.colorbar(mesh, ax=axes).set_label("limiting depth (mm); brightest: this or more")
 
 
 def _fill(axes: Axes, speed_rpm: Floats, band: DepthBand, top: float, **style: Any) -> None:
@@ -130,12 +138,15 @@ def _draw_pocket(axes: Axes, pocket: Pocket) -> None:
 
 def _draw_program(axes: Axes, program: Mapping[str, Any]) -> None:
     colour, mark = (GOOD, "o") if program["stable"] else (ALARM, "X")
+    low, high = axes.get_xlim()
+    is_left = program["speed_rpm"] > low + 0.8 * (high - low)
     axes.plot(program["speed_rpm"], program["depth_mm"], mark, color=colour, ms=9, mec="white")
     axes.annotate(
         program["name"],
         (program["speed_rpm"], program["depth_mm"]),
-        xytext=(7, 5),
+        xytext=(-7 if is_left else 7, 5),
         textcoords="offset points",
+        ha="right" if is_left else "left",
         fontsize=9,
         bbox={"color": "white", "alpha": 0.7, "pad": 1, "lw": 0},
     )

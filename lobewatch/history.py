@@ -76,7 +76,17 @@ def measure(folder: MachineFolder, entry: TapEntry) -> Measurement:
 
 def _measure(folder: MachineFolder, entry: TapEntry, history: SldHistory) -> Measurement:
     """One tap, its partner in the other direction, and the mode that was followed before it."""
-    return analyse(folder.read(entry), folder.machine, _partner(folder, entry), _last_followed(history, entry))
+    return analyse(folder.read(entry), folder.machine, partner(folder, entry), _last_followed(history, entry))
+
+
+def partner(folder: MachineFolder, entry: TapEntry) -> TapTest | None:
+    """The newest tap of the other direction and the same tool, at most a day before."""
+    time = datetime.fromisoformat(entry.time)
+    for other in reversed(folder.taps()):
+        age = time - datetime.fromisoformat(other.time)
+        if other.tool == entry.tool and other.direction != entry.direction and timedelta(0) <= age <= PAIRING:
+            return folder.read(other)
+    return None
 
 
 def series(history: SldHistory, tool: str, direction: str) -> NDArray[np.int64]:
@@ -170,13 +180,3 @@ def _mode_table(modes: Sequence[Mode]) -> dict[str, NDArray[np.float64]]:
     for i, mode in enumerate(modes[:MAX_MODES]):
         table[:, i] = mode.frequency, mode.damping_ratio, mode.stiffness
     return dict(zip(MODE_COLUMNS, table, strict=True))
-
-
-def _partner(folder: MachineFolder, entry: TapEntry) -> TapTest | None:
-    """The newest tap of the other direction and the same tool, at most a day before."""
-    time = datetime.fromisoformat(entry.time)
-    for other in reversed(folder.taps()):
-        age = time - datetime.fromisoformat(other.time)
-        if other.tool == entry.tool and other.direction != entry.direction and timedelta(0) <= age <= PAIRING:
-            return folder.read(other)
-    return None

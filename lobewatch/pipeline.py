@@ -57,6 +57,11 @@ class Measurement:
     predicted: bool = False
     """Whether all of it comes from the model, for a tool that was never tapped."""
 
+    @property
+    def reasons(self) -> list[str]:
+        """The notes but for those on the lobes of single cuts."""
+        return [note for note in self.notes if note not in _warnings(self.lobes)]
+
 
 def analyse(tap: TapTest, machine: Machine, partner: TapTest | None = None, last: Mode | None = None) -> Measurement:
     """All that follows from a tap test; partner: the one in the other direction with the same tool, within a day;
@@ -182,5 +187,13 @@ def lobes_of(
     if not cuts:
         notes.append("no stability lobes: no [reference_cut] and no [[program]] in machine.toml")
     lobes = {name: zero_order(x, y, cut, speed_grid(machine)) for name, cut in cuts.items()}
-    notes.extend(f"{name}: {found.warning}" for name, found in lobes.items() if found.warning)
+    notes.extend(_warnings(lobes))
     return lobes
+
+
+def _warnings(lobes: Mapping[str, StabilityLobes]) -> list[str]:
+    """What speaks against the method, with the cuts that it concerns."""
+    cuts: dict[str, list[str]] = {}
+    for name, found in lobes.items():
+        cuts.setdefault(found.warning, []).append(name)
+    return [f"{', '.join(names)}: {warning}" for warning, names in cuts.items() if warning]

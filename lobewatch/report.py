@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime
 from importlib import resources
 from typing import Any
@@ -11,13 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Frf, TapTest
-from lobes import SldHistory
+from lobes import ProgramCheck, SldHistory
+from lobewatch.advice import ProgramAdvice, advise
 from lobewatch.figures import frf_figure, svg, trend_figure
 from lobewatch.figures_lobes import lobes_figure
-from lobewatch.history import series
+from lobewatch.history import measure, series
 from lobewatch.machine import Machine
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.output import plus_minus
+from lobewatch.pipeline import Measurement
 
 
 def render_report(folder: MachineFolder, history: SldHistory, tool: str, direction: str) -> str:
@@ -38,7 +41,8 @@ def _content(
     times = [datetime.fromisoformat(text) for text in columns["time"][rows]]
     taps = {entry.id: entry for entry in folder.taps()}
     now, then = (folder.read(taps[columns["tap_id"][row]]) for row in (last, first))
-    programs = _programs(machine, history, first, last)
+    measured = [measure(folder, taps[columns["tap_id"][row]]) for row in (first, last)]
+    advice = advise(folder)
     return {
         "name": machine.machine.name,
         "tool": tool,
@@ -49,7 +53,8 @@ def _content(
         "software": history.software,
         "label": machine.spindle.label if machine.spindle else "",
         "changes": _changes(history, first, last),
-        "programs": programs,
+        "programs": [_program(one) for one in advice],
+        "program_method": next((one.check.method.partition(",")[0] for one in advice if one.check is not None), ""),
         "notes": [note for note in str(columns["notes"][last]).splitlines() if note],
         "modes": _modes(history, last),
         "operator": now.circumstances.operator,
@@ -57,9 +62,41 @@ def _content(
         "good": len(now.accepted),
         "hits": len(now.hits),
         "averages": now.frf.n_averages,
-        "figures": _figures(machine, history, rows, times, (then, now), programs),
+        "figures": [
+            *_lobes(machine, measured[0], measured[1], advice),
+            *_figures(machine, history, rows, times, (then, now)),
+        ],
         "limits": machine.limits,
     }
+
+
+def _lobes(
+    machine: Machine, first: Measurement, last: Measurement, advice: Sequence[ProgramAdvice]
+) -> list[tuple[str, str, str]]:
+    """The diagram of the reference cut, or else of the first program of the tool, now and then."""
+    if not last.lobes:
+        return []
+    cut, now = next(iter(last.lobes.items()))
+    known = (bool(last.x), bool(last.y))
+    then = first.lobes.get(cut) if first.tap_id != last.tap_id else None
+    text = (
+        f"Limit of the {cut} by {now.method}; cuts in the shaded region chatter. "
+        "Marks: programs with this same cut, as in the table above."
+    )
+    if np.isinf(now.minimum.depth):
+        text = f"The {cut} has no limit in this speed range ({now.method})."
+    if then is not None and (bool(first.x), bool(first.y)) != known:
+        then, text = None, f"{text} The first test knows other directions than the newest: no comparison."
+    depths = {f"{first.time:%Y-%m-%d}": then.depth} if then is not None else {}
+    depths[f"{last.time:%Y-%m-%d}"] = now.depth
+    cuts = machine.cuts(last.tool)
+    marks = [
+        _program(one)
+        for one in advice
+        if one.check is not None and one.table.name in cuts and cuts[one.table.name] == cuts[cut]
+    ]
+    picture = lobes_figure(now.speed_rpm, depths, marks)
+    return [("Stability lobes, then and now" if then is not None else "Stability lobes", text, svg(picture))]
 
 
 def _figures(
@@ -68,19 +105,10 @@ def _figures(
     rows: NDArray[np.int64],
     times: list[datetime],
     taps: tuple[TapTest, TapTest],
-    programs: list[dict[str, Any]],
 ) -> list[tuple[str, str, str]]:
     """Heading, sentence and picture of each figure that there is something to show in."""
     columns = history.columns
     figures: list[tuple[str, str, str]] = []
-    cut = machine.cut_names[0] if machine.cut_names else None
-    if cut is not None and not np.isnan(history.depth[cut][rows[-1], 0]):
-        then, now = history.depth[cut][rows[0]], history.depth[cut][rows[-1]]
-        depths = {f"{times[0]:%Y-%m-%d}": then} if rows.size > 1 and not np.isnan(then[0]) else {}
-        depths[f"{times[-1]:%Y-%m-%d}"] = now
-        picture = lobes_figure(history.speed_rpm, depths, [p for p in programs if p["same_as_reference"]])
-        text = f"Limit of the {cut}; cuts in the shaded region chatter. Marks: programs with this same cut."
-        figures.append(("Stability lobes, then and now", text, svg(picture)))
     for name, label, limits, text in (
         ("frequency", "natural frequency (Hz)", machine.limits, "Bars: 95 % interval of each tap alone."),
         ("bearing_stiffness", "bearing stiffness (N/µm)", None, "Equivalent stiffness of each bearing in the model."),
@@ -139,23 +167,35 @@ def _modes(history: SldHistory, row: int) -> list[dict[str, str]]:
     ]
 
 
-def _programs(machine: Machine, history: SldHistory, first: int, last: int) -> list[dict[str, Any]]:
-    """Programs that have a limit now, with their verdict then and now."""
-    if not machine.program:
-        return []
-    limits = history.columns["program_limit"]
-    reference = machine.reference_cut
-    return [
-        {
-            "name": program.name,
-            "speed_rpm": program.speed_rpm,
-            "depth_mm": program.depth_mm,
-            "then_mm": limits[first, i] * 1e3,
-            "limit_mm": limits[last, i] * 1e3,
-            "was_stable": bool(program.depth_mm < limits[first, i] * 1e3),
-            "stable": bool(program.depth_mm < limits[last, i] * 1e3),
-            "same_as_reference": reference is not None and machine.build_cut(program) == machine.build_cut(reference),
+def _program(one: ProgramAdvice) -> dict[str, Any]:
+    """A row of the table of programs: what `lobewatch check` says."""
+    row = {"name": one.table.name, "speed_rpm": one.table.speed_rpm, "depth_mm": one.table.depth_mm}
+    found = one.check
+    if found is None:
+        return row | {
+            "stable": None,
+            "was_stable": None,
+            "limit": "-",
+            "band": "",
+            "margin": "-",
+            "remark": "; ".join(one.notes),
         }
-        for i, program in enumerate(machine.program)
-        if not np.isnan(limits[last, i])
-    ]
+    low, high = (edge * 1e3 for edge in one.limit_band)
+    limit = f"{found.limit * 1e3:.2f}"
+    return row | {
+        "stable": found.stable,
+        "was_stable": one.was_stable if one.measured else None,
+        "limit": limit if np.isfinite(found.limit) else f"> {20 * one.table.depth_mm:g}",
+        "band": f"{low:.2f} to {high:.2f}" if np.isfinite(high) else "",
+        "margin": f"{100 * found.depth_margin:+.0f} %" if np.isfinite(found.depth_margin) else "-",
+        "remark": _remark(one, found, low),
+    }
+
+
+def _remark(one: ProgramAdvice, found: ProgramCheck, low: float) -> str:
+    remarks = [] if one.measured else ["predicted"]
+    if found.stable and low <= one.table.depth_mm:
+        remarks.append("within the error of the limit")
+    if one.table.depth_mm > one.drive_limit * 1e3:
+        remarks.append(f"[drive] allows {one.drive_limit * 1e3:.2f} mm")
+    return "; ".join(remarks)

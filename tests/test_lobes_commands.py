@@ -68,10 +68,12 @@ def folder(tmp_path: Path) -> MachineFolder:
     return MachineFolder(tmp_path / "m")
 
 
-def tap(folder: MachineFolder, frequency: float, days: float = 0.0, direction: str = "x") -> None:
+def tap(
+    folder: MachineFolder, frequency: float, days: float = 0.0, direction: str = "x", stiffness: float = 3.5e7
+) -> None:
     when = START + timedelta(days=days)
     about = Circumstances("m", when, "reference", direction, "", folder.toml.read_text("utf-8"))
-    frf = synthesize([Mode(frequency, 0.029136, 3.5e7)], LINES)
+    frf = synthesize([Mode(frequency, 0.029136, stiffness)], LINES)
     folder.commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
 
 
@@ -216,6 +218,134 @@ def test_materials_are_listed_with_their_sources(run: Run, folder: MachineFolder
     assert "Al 6061-T6 (carbide; dry)                  Kt   244  Kr  114 N/mm²  low outlier: not a default" in said
 
 
+def test_an_frf_beside_the_tip_is_refused(run: Run, folder: MachineFolder) -> None:
+    folder = edit(folder, "position_mm = 0 ", "position_mm = 60 ")
+    tap(folder, 1713.0)
+    assert run("lobes", "m").code == 0
+    said = run("lobes", "m", "--source", "frf")
+    assert (said.code, "needs an FRF at the tool tip, but [tap] position_mm = 60" in said.err) == (2, True)
+    assert "use --source modes" in said.err
+
+
+def test_both_directions_count_from_the_frf_too(run: Run, folder: MachineFolder) -> None:
+    tap(folder, 1713.0, stiffness=9e7)
+    tap(folder, 1600.0, days=0.2, direction="y", stiffness=2e7)
+    for days in (0.0, 400.0):
+        if days:
+            tap(folder, 1700.0, days, stiffness=9e7)
+            tap(folder, 1590.0, days + 0.2, direction="y", stiffness=2e7)
+        frf, modes = (json.loads(run("lobes", "m", "--source", name, "--json").out) for name in ("frf", "modes"))
+        assert frf["minimum_depth_mm"] == pytest.approx(modes["minimum_depth_mm"], rel=0.01)
+    assert frf["pocket_shifts"][-1]["speed_change"] == pytest.approx(
+        modes["pocket_shifts"][-1]["speed_change"], abs=2e-3
+    )
+
+
+def test_tests_of_other_directions_are_not_compared(run: Run, folder: MachineFolder) -> None:
+    tap(folder, 1713.0)
+    tap(folder, 1600.0, days=99.8, direction="y")
+    tap(folder, 1690.0, days=100)
+    said = json.loads(run("lobes", "m", "--figure", "l.svg", "--json").out)
+    assert said["pocket_shifts"] == []
+    assert any("its lobes know direction x, those of" in note and "x and y" in note for note in said["notes"])
+    drawn = Path("l.svg").read_text("utf-8")
+    assert (">2026-01-15</text>" in drawn, ">2026-04-25</text>" in drawn) == (False, True)
+    run("report", "m")
+    html = Path("m/report.html").read_text("utf-8")
+    assert "The first test knows other directions than the newest" in html
+    assert "<h2>Stability lobes</h2>" in html
+
+
+def test_pockets_are_compared_where_both_tops_are_known(run: Run, folder: MachineFolder) -> None:
+    tap(folder, 1713.0)
+    tap(folder, 1700.0, days=300, stiffness=1.2e7)
+    said = json.loads(run("lobes", "m", "--json").out)
+    first = measure(folder, folder.taps()[0]).lobes["reference cut"]
+    shifts = said["pocket_shifts"]
+    assert len(shifts) >= 3
+    for shift in shifts:
+        top = float(first.depth_at(shift["then"]["speed_rpm"]))
+        assert shift["then"]["depth_mm"] == pytest.approx(top * 1e3)
+        assert shift["depth_change"] == pytest.approx(1.2 / 3.5 - 1, abs=0.05)
+
+
+def test_the_report_says_what_check_says(run: Run, folder: MachineFolder) -> None:
+    text = folder.toml.read_text("utf-8")
+    cut = text.partition('name = "A: slot at 12 900 rpm"')[2]
+    cut = cut[: cut.index("[[program]]")].replace("radial_depth_mm = 20", "radial_depth_mm = 10")
+    added = ""
+    for name, tool, speed, depth in (
+        ("H", "reference", 23500, 50),
+        ("P", "long end mill", 12900, 0.2),
+        ("U", "T9", 9e3, 1),
+    ):
+        own = cut.replace('"reference"', f'"{tool}"').replace("speed_rpm = 12900", f"speed_rpm = {speed}")
+        added += f'[[program]]\nname = "{name}"' + own.replace("depth_mm = 6.0", f"depth_mm = {depth}")
+    folder.toml.write_text(f"{text}\n{added}", "utf-8")
+    folder = MachineFolder(folder.path)
+    tap(folder, 1541.7)
+    said = {entry["name"]: entry for entry in json.loads(run("check", "m", "--json").out)["programs"]}
+    zero = measure(folder, folder.taps()[-1]).lobes["H"].depth_at(23500) * 1e3
+    assert said["H"]["limit_mm"] < 50 < zero
+    run("report", "m")
+    html = Path("m/report.html").read_text("utf-8")
+    rows = {row.partition("<")[0]: row.partition("</tr>")[0] for row in html.split("<tr><td>")}
+    for name in "HP":
+        assert f"<td>{said[name]['limit_mm']:.2f}" in rows[name]
+        assert ("✗ not stable" in rows[name]) == (not said[name]["stable"])
+    assert "predicted" in rows["P"]
+    assert "predicted" not in rows["H"]
+    assert "not checked: no tap test with tool &#39;T9&#39;" in rows["U"]
+    assert "not stable" in html[: html.index("<table>")]
+    assert "1 not checked" in html
+    assert "average tooth angle" not in html
+    assert "by semi-discretisation" in html
+    assert "Limit of the reference cut by zero order" in html
+
+
+def test_a_predicted_diagram_says_so_and_is_no_waterfall(run: Run, folder: MachineFolder) -> None:
+    tap(folder, 1713.0)
+    assert run("lobes", "m", "--tool", "long end mill", "--figure", "p.svg").code == 0
+    drawn = Path("p.svg").read_text("utf-8")
+    assert drawn.count("predicted, bearings of 2026-01-15</text>") == 1
+    assert "zero order, predicted, bearings of 2026-01-15, from the modes" in drawn
+    assert "95 % band" not in drawn
+    said = run("lobes", "m", "--tool", "long end mill", "--figure", "q.svg", "--waterfall", "w.svg")
+    assert (said.code, "--waterfall shows measured lobes" in said.err) == (2, True)
+    assert not Path("q.svg").exists()
+
+
+def test_low_immersions_are_noted_once_and_where_they_concern(run: Run, folder: MachineFolder) -> None:
+    folder = edit(folder, "radial_depth_mm = 20 ", "radial_depth_mm = 2 ")
+    tap(folder, 1713.0)
+    note = "zero order knows no flip lobes"
+    assert run("lobes", "m").out.count(note) == 1
+    assert note not in run("lobes", "m", "--cut", "A: slot at 12 900 rpm").out
+    assert note not in run("lobes", "m", "--method", "semi-discretisation").out
+    said = run("lobes", "m", "--cut", "A: slot at 12 900 rpm", "--radial", "r.svg").out
+    assert said.count(f"--radial: {note}") == 1
+    assert note in Path("r.svg").read_text("utf-8")
+
+
+def test_a_cut_without_limit_is_said_to_have_none(run: Run, folder: MachineFolder) -> None:
+    folder = edit(folder, "radial_n_per_mm2 = 500", "radial_n_per_mm2 = 0")
+    for days in (0.0, 300.0):
+        tap(folder, 1713.0 - days / 10, days)
+        said = run("lobes", "m", "--figure", "l.png", "--radial", "r.png", "--waterfall", "w.png")
+        assert said.code == 0, said.err
+        assert "no limit in this speed range (zero order)" in said.out
+        assert not any(word in said.out for word in ("nan", "inf ", "pocket"))
+        assert run("report", "m").code == 0
+        assert "has no limit in this speed range (zero order)" in Path("m/report.html").read_text("utf-8")
+
+
+def test_an_unknown_ending_names_those_that_are_known(run: Run, folder: MachineFolder) -> None:
+    tap(folder, 1713.0)
+    said = run("lobes", "m", "--figure", "l.xyz")
+    assert (said.code, "name a file that ends in .svg, .png or .pdf" in said.err) == (2, True)
+    assert "webp" not in said.err
+
+
 EXAMPLE = """
 [machine]
 name = "m"
@@ -288,8 +418,9 @@ def test_maps_stand_where_the_numbers_say(folder: MachineFolder) -> None:
         Cut(4, 1, "up", 1e9, 3e8),
         [0.5, 1],
     )
-    axes = radial_figure(found, 0.02).axes[0]
+    axes = radial_figure(found, 0.02, 0.75).axes[0]
     assert axes.get_ylim() == pytest.approx((10.0, 20.0))
+    assert np.asarray(axes.lines[0].get_ydata()) == pytest.approx(15.0)
 
 
 def test_bands_and_pockets_are_drawn() -> None:

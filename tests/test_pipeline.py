@@ -265,15 +265,6 @@ def test_a_machine_without_spindle_gives_all_but_the_models_part(tmp_path: Path)
     assert "Bearing stiffness" not in html
 
 
-def test_a_speed_without_limit_does_not_hide_the_lobes(folder: MachineFolder) -> None:
-    folder.commit(recorded(about(folder), Mode(1700.0, 0.03, 3.5e7)))
-    history, _ = update_history(folder)
-    depth = history.depth[REFERENCE_CUT].copy()
-    depth[:, 0] = np.inf
-    unlimited = replace(history, depth=dict(history.depth) | {REFERENCE_CUT: depth})
-    assert "Stability lobes, then and now" in render_report(folder, unlimited, "reference", "x")
-
-
 def test_series_are_sorted_by_time_and_told_apart(folder: MachineFolder) -> None:
     for days, direction in ((60, "x"), (0, "x"), (30, "x"), (45, "y")):
         folder.commit(recorded(about(folder, days, direction), Mode(1700.0 - days, 0.03, 3.5e7)))

@@ -78,7 +78,8 @@ def calibrated_bearings(spindle: Spindle, group: str | None = None) -> list[int]
     ]
     if not chosen:
         known = ", ".join(sorted({repr(bearing.group) for bearing in spindle.bearings if bearing.group})) or "none"
-        raise ValueError(f"group={group!r} has no bearing to calibrate; groups of this spindle: {known}")
+        wanted = "with a group" if group is None else f"of group {group!r}"
+        raise ValueError(f"there is no bearing {wanted} to calibrate; groups of this spindle: {known}")
     for index in chosen:
         if math.isinf(spindle.bearings[index].stiffness):
             raise ValueError(

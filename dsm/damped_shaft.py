@@ -21,6 +21,8 @@ OFFSET = 1e-10
 """Relative distance from the frequency at which K is inverted: it is singular at the frequency itself."""
 NEWTON_ROUNDS = 8
 """More are not spent on one step of damping."""
+OSCILLATES = 1e-4
+"""A mode whose damped frequency is a smaller part of |w| counts as one that has ceased to oscillate."""
 SETTLED = 1e-8
 """Last relative change of w; Rayleigh's quotient has cubed the error once more by then."""
 FORESEEN = 0.2
@@ -140,7 +142,7 @@ class DampedShaft:
             last, w = w, trial - complex(shape @ stiffness @ shape)
             if abs(w - last) <= SETTLED * abs(w):
                 close = abs(w - foreseen) <= FORESEEN * abs(foreseen - mode.w) + SETTLED * abs(w)
-                return DampedMode(w, shape) if close and w.real > 0 else None
+                return DampedMode(w, shape) if close and w.real > OSCILLATES * abs(w) else None
         return None
 
     def _movable(self) -> list[int]:

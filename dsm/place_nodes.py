@@ -11,6 +11,9 @@ from dsm.element_series import MAX_X, POLE
 from dsm.sections import Sections
 from dsm.spindle import SAME_PLACE, Theory
 
+MAX_ELEMENTS = 2000
+"""More are refused: the work grows with their third power."""
+
 _Float = NDArray[np.float64]
 _Indices = NDArray[np.int_]
 
@@ -33,6 +36,11 @@ def place_nodes(
             nodes = np.sort(np.append(nodes, place))
     piece = np.searchsorted(ends, (nodes[:-1] + nodes[1:]) / 2) - 1
     parts = _parts(pieces, piece, np.diff(nodes), theory, top_frequency, spin)
+    if np.sum(parts) > MAX_ELEMENTS:
+        raise ArithmeticError(
+            f"{top_frequency:.4g} Hz needs more than {MAX_ELEMENTS} elements: ask for lower frequencies and modes, and "
+            "look for segments far too thin or soft, and for wrong units"
+        )
     if np.all(parts == 1):
         return nodes, piece
     split = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(nodes[:-1], nodes[1:], parts, strict=True)]
@@ -55,4 +63,4 @@ def _parts(
         rest = rest * (length / np.pi) ** 2
     allowed = MAX_X**4 / POLE
     squared = (rest + np.sqrt(rest**2 + 4 * allowed * bending)) / (2 * allowed)
-    return np.maximum(np.ceil(np.sqrt(squared) * (1 - 1e-12)), 1).astype(int)
+    return np.clip(np.ceil(np.sqrt(squared) * (1 - 1e-12)), 1, MAX_ELEMENTS + 1).astype(int)

@@ -20,6 +20,9 @@ SAME_DIAMETER = 1e-6
 STIFF = [1, 4]
 """Columns of rigidity and shear stiffness in a row of Sections."""
 
+STEEPEST = 0.9
+"""No half of a step differs more than by this part from the mean of both: a wall may thin out to nothing."""
+
 _Float = NDArray[np.float64]
 
 
@@ -69,7 +72,7 @@ def steps_of_cone(segment: Segment, shaft_length: float) -> int:
     inertia, area = ([section(*diameters) for diameters in ends] for section in (ring_second_moment, ring_area))
     outer = [diameters[0] for diameters in ends]
     change = max(p * abs(math.log(b / a)) for p, (a, b) in zip((1, 2, 4), (inertia, area, outer), strict=True))
-    waves = max(4.0, 12 * math.sqrt(segment.length / shaft_length))
+    waves = max(6.0, 18 * math.sqrt(segment.length / shaft_length))
     return max(1, math.ceil(max(waves * math.pow(change, 0.25), change / 0.6)))
 
 
@@ -90,6 +93,7 @@ def _cone(spindle: Spindle, segment: Segment) -> list[tuple[float, ...]]:
         values = np.array([_piece(spindle, segment, float(z), (end - start) / 2 * segment.length) for z in shares])
         values[:, STIFF] **= -1
         mean, moment = weight @ values / 2, (weight * place) @ values
+        moment = np.clip(moment, -STEEPEST * mean, STEEPEST * mean)
         for half in (mean - moment, mean + moment):
             half[STIFF] **= -1
             halves.append(tuple(half))

@@ -52,7 +52,7 @@ class ModeChoice(Table, frozen=True):
     """[mode]: which mode is followed."""
 
     band_hz: tuple[NotNegative, Positive] | None = None
-    model_mode: Annotated[int, Meta(ge=1)] = 1
+    model_mode: Annotated[int, Meta(ge=1, le=50)] = 1
 
     def __post_init__(self) -> None:
         """Refuse an empty band."""
@@ -146,8 +146,15 @@ class Machine(Table, frozen=True):
             taken.append(tool.name)
             if self.spindle is None or self.spindle.tool_length_mm is None:
                 raise ValueError(
-                    f"tool {i}: needs [spindle] tool_length_mm, the length of {self.tap.tool!r} from tip on"
+                    f"tool {i}: needs [spindle] tool_length_mm, the part of the shaft that is {self.tap.tool!r}"
                 )
+            try:
+                self.model(tool.name)
+            except ValueError as error:
+                raise ValueError(f"tool {i}: {error} (here in SI units)") from error
+        length = self.spindle.build().length * 1e3 if self.spindle else math.inf
+        if self.tap.position_mm > length:
+            raise ValueError(f"tap: position_mm={self.tap.position_mm:g} is off the shaft, 0 to {length:g} mm")
 
     def model(self, tool: str) -> Spindle:
         """The spindle with a tool in it, in SI units; DataError where there is no model of it."""

@@ -89,10 +89,18 @@ def _newest_calibration(folder: MachineFolder) -> tuple[TapEntry, Calibration, M
     return tap, dynamics.calibration, dynamics.followed
 
 
+def first_critical_speed(spindle: Spindle) -> float | None:
+    """The lowest critical speed (rpm); None where gyroscopic moments leave none."""
+    try:
+        return critical_speed(spindle)
+    except ArithmeticError:
+        return None
+
+
 def model_picture(state: ModelState, modes: int) -> ModelPicture:
     """What `lobewatch model --figure` draws."""
     spindle, machine = state.spindle, state.folder.machine
-    speeds = np.linspace(0.0, 1.15 * critical_speed(spindle), 24)
+    speeds = np.linspace(0.0, 1.15 * (first_critical_speed(spindle) or machine.speed.high_rpm), 24)
     return ModelPicture(
         title=state.title,
         spindle=spindle,
@@ -109,6 +117,8 @@ def model_picture(state: ModelState, modes: int) -> ModelPicture:
 
 def _curve(spindle: Spindle, mode: int) -> tuple[_Float, _Float]:
     """Bearing stiffness over the followed frequency, from a thirtieth to thirty times the present one."""
+    if not any(bearing.group and np.isfinite(bearing.stiffness) for bearing in spindle.bearings):
+        return np.empty(0), np.empty(0)
     ends = []
     for factor in (1 / 30, 30.0):
         scaled = [replace(bearing, stiffness=factor * bearing.stiffness) for bearing in spindle.bearings]
@@ -132,10 +142,18 @@ def model_frf(state: ModelState) -> Frf:
     first = float(natural_frequencies(state.spindle, 1)[0])
     frequency = np.linspace(0.3 * first, 3.0 * first, 2 * POINTS)
     loss_factor = 2 * (table.damping_ratio if state.followed is None else state.followed.damping_ratio)
+    spindle, reference = state.spindle, state.reference
+    if state.followed is not None:
+        spindle, reference = _undamped(spindle), _undamped(reference)
     if state.tool == machine.tap.tool or table.tool_length_mm is None:
-        return Frf(frequency, receptance(state.spindle, frequency, _tap_position(state), loss_factor))
-    side = spindle_side(state.reference, frequency, table.tool_length_mm / 1e3, loss_factor)
+        return Frf(frequency, receptance(spindle, frequency, _tap_position(state), loss_factor))
+    side = spindle_side(reference, frequency, table.tool_length_mm / 1e3, loss_factor)
     return Frf(frequency, couple_tool(side, machine.tool_named(state.tool).build(state.reference)))
+
+
+def _undamped(spindle: Spindle) -> Spindle:
+    """Without dampers: a measured damping ratio holds what they do already."""
+    return replace(spindle, bearings=[replace(bearing, damping=0.0) for bearing in spindle.bearings])
 
 
 def _tap_position(state: ModelState) -> float:

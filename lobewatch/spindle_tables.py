@@ -132,8 +132,12 @@ class SpindleTable(Table, frozen=True):
                     raise ValueError(
                         f"{kind} {i}: position_mm={part.position_mm:g} is off the shaft, 0 to {length:g} mm"
                     )
-        if self.tool_length_mm is not None and self.tool_length_mm >= length:
-            raise ValueError(f"tool_length_mm={self.tool_length_mm:g} is not shorter than the shaft, {length:g} mm")
+        first = min(bearing.position_mm for bearing in self.bearings)
+        if self.tool_length_mm is not None and self.tool_length_mm > first:
+            raise ValueError(
+                f"tool_length_mm={self.tool_length_mm:g} reaches beyond the first bearing, at {first:g} mm; "
+                "give the length of the tool alone"
+            )
         _in_mm(self.build)
 
     def build(self) -> Spindle:

@@ -251,6 +251,11 @@ def test_calibrate(run: Run, trial: MachineFolder) -> None:
     assert dampers["bearing_damping_n_s_per_m"] > 0
     assert "bearing damping" in run("calibrate", "trial", "--frequency", 1713.05, "--damping-ratio", 0.03).out
     refused(run("calibrate", "trial", "--frequency", 1713.05, "--damping-ratio", 0.9), "0.9")
+    twice = ("--frequency-std", 1, "--frequency-std", 2)
+    refused(run("calibrate", "trial", "--frequency", 1550, *twice), "2 --frequency-std for 1 --frequency")
+    refused(run("calibrate", "trial", "--frequency", 1550, "--mode", 1, "--mode", 2), "2 --mode for 1 --frequency")
+    refused(run("calibrate", "trial", "--frequency", 1550, "--frequency", 1e9), "puts mode 2 at 1e+09 Hz")
+    refused(run("calibrate", "trial", "--frequency", 1e11), "needs more than 2000 elements")
     run("init", "plain")
     refused(run("calibrate", "plain", "--frequency", 1550), "no model: add a [spindle] table")
 
@@ -297,6 +302,7 @@ def test_every_command_has_help_with_examples_and_json(run: Run, name: str) -> N
     said = run(*name.split(), "--help")
     assert said.code == 0
     assert "Examples:" in said.out
+    assert "a  in" not in said.out  # a key in brackets taken for markup
     assert "--json" in said.out
 
 

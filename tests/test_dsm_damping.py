@@ -161,6 +161,18 @@ def test_a_mode_that_stops_oscillating_is_no_mode() -> None:
         damped_modes(two_bodies(1.1 * W0 * MASS), 2)
 
 
+@pytest.mark.parametrize("damping", [1e6, 1e7, 1e9])
+def test_a_damper_that_holds_its_bearing_gives_no_mode_that_only_creeps(damping: float) -> None:
+    """A stiff damper leaves a motion that dies out at k/c without a swing; it is none of the modes."""
+    shaft = Spindle([Segment(0.3, 0.05)], [Bearing(0.05, 1e8, damping=damping), Bearing(0.25, 2e8)])
+    try:
+        found = damped_modes(shaft, 4)
+    except ArithmeticError:
+        return
+    assert np.all(found.damping_ratio < 0.9999)
+    assert np.all(np.diff(found.frequency) > 1e-6 * found.frequency[1:])
+
+
 @pytest.mark.parametrize("eta", [-0.1, math.nan, math.inf])
 def test_bad_loss_factors_are_refused(eta: float) -> None:
     with pytest.raises(ValueError, match="loss_factor="):
@@ -267,7 +279,7 @@ def test_other_damping_above_the_measured_one_is_refused() -> None:
         ((0, 0, 0), {"damping_ratio": 1.0}, r"damping_ratio=1\.0"),
         ((0, 0, 0), {"damping_ratio": 0.1, "damping_ratio_std": -1.0}, r"damping_ratio_std=-1\.0"),
         ((0, 0, 0), {"damping_ratio": 0.1, "mode": 0}, "mode=0 is not at least 1"),
-        ((0, 0, 0), {"damping_ratio": 0.1, "group": "tool"}, "group='tool' has no bearing .* 'front', 'rear'"),
+        ((0, 0, 0), {"damping_ratio": 0.1, "group": "tool"}, "no bearing of group 'tool' .* 'front', 'rear'"),
         ((0, 0, 0), {"damping_ratio": 0.1, "loss_factor": -1.0}, r"loss_factor=-1\.0"),
         ((1, 0, 1), {"damping_ratio": 0.1}, "2 of the 3 bearings to calibrate have damping; give it to all"),
     ],

@@ -6,6 +6,7 @@ for Natural Frequency and Mode Shape, table 8-8 and chapter 6.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -242,7 +243,7 @@ def test_calibration_moves_its_group_alone() -> None:
     ratios = [a.stiffness / b.stiffness for a, b in zip(everything.spindle.bearings[:3], bearings[:3], strict=True)]
     assert ratios == pytest.approx([everything.factor] * 3, rel=1e-12)
     assert 1 > everything.factor > front.factor
-    with pytest.raises(ValueError, match=r"group='tail' has no bearing .* 'front', 'rear'"):
+    with pytest.raises(ValueError, match=r"no bearing of group 'tail' .* 'front', 'rear'"):
         calibrate(spindle, target, group="tail")
 
 
@@ -305,3 +306,22 @@ def test_response_between_any_two_points_is_the_same_both_ways(spindle: Spindle,
     back = receptance(spindle, frequency, two, 0.05, force_position=one)
     own = np.abs(receptance(spindle, frequency, one, 0.05) * receptance(spindle, frequency, two, 0.05)) ** 0.5
     assert np.abs(there - back) / own == pytest.approx(0, abs=1e-6)
+
+
+def test_a_wall_may_thin_out_to_nothing() -> None:
+    shaft = Spindle([Segment(0.3, 0.05, end_bore_diameter=0.049999)], [Bearing(0.02, 1e8), Bearing(0.2, 1e8)])
+    thick = Spindle([Segment(0.3, 0.05, end_bore_diameter=0.049)], [Bearing(0.02, 1e8), Bearing(0.2, 1e8)])
+    assert natural_frequencies(shaft, 2) == pytest.approx(natural_frequencies(thick, 2), rel=0.1)
+
+
+def test_cone_between_bearings_of_its_own_keeps_the_bound_of_its_steps() -> None:
+    """Modes with bearings inside the cone, against three times the steps."""
+    cone = Segment(0.430926, 0.037288, end_outer_diameter=0.064384)
+    bearings = [Bearing(0.008087, 2.90e9), Bearing(0.403962, 7.08e9)]
+    ends = np.linspace(0.0, 1.0, 13)
+    parts = [
+        Segment(cone.length / 12, cone.diameters_at(a)[0], end_outer_diameter=cone.diameters_at(b)[0])
+        for a, b in itertools.pairwise(ends)
+    ]
+    one, fine = (Spindle(shaft, bearings, theory="timoshenko") for shaft in ([cone], parts))
+    assert natural_frequencies(one, 6) == pytest.approx(natural_frequencies(fine, 6), rel=1e-4)

@@ -25,7 +25,7 @@ def _group() -> None:
 
 @emulate.command()
 def taps(
-    machine: Annotated[Path, typer.Argument(help="Machine folder with a [spindle]: what the hammer hits.")],
+    machine: Annotated[Path, typer.Argument(help=r"Machine folder with a \[spindle]: what the hammer hits.")],
     tcp: Annotated[bool, typer.Option("--tcp", help="On a TCP port of this computer instead.")] = False,
     fast: Annotated[bool, typer.Option("--fast", help="As fast as the host reads, not in real time.")] = False,
     seed: Annotated[int, typer.Option(help="Of the random numbers.")] = 1,

@@ -39,7 +39,7 @@ USEFUL = 5.0
 
 def lobes(
     machine: Annotated[Path, typer.Argument(help="Machine folder with at least one tap test.")],
-    cut: Annotated[str, typer.Option(help="Name of a [[program]], or the reference cut.")] = REFERENCE_CUT,
+    cut: Annotated[str, typer.Option(help=r"Name of a \[\[program]], or the reference cut.")] = REFERENCE_CUT,
     tool: Annotated[str | None, typer.Option(help="Of the newest tap test if not given; else predicted.")] = None,
     source: Annotated[Dynamics, typer.Option(help="From the modes found, or straight from the FRF.")] = Dynamics.MODES,
     method: Annotated[Method, typer.Option(help="How the limits are found.")] = Method.ZERO_ORDER,

@@ -11,7 +11,6 @@ from rich.table import Table
 
 from dsm import (
     Spindle,
-    critical_speed,
     energy_shares,
     modes_at,
     natural_frequencies,
@@ -20,13 +19,15 @@ from dsm import (
 from lobewatch.figures import save_figure
 from lobewatch.figures_model import model_figure
 from lobewatch.machine_folder import MachineFolder
-from lobewatch.model_state import model_picture, model_state
+from lobewatch.model_state import first_critical_speed, model_picture, model_state
 from lobewatch.output import Json, emit, table
 
 
 def model(
-    machine: Annotated[Path, typer.Argument(help="Machine folder with a [spindle] in its machine.toml.")],
-    tool: Annotated[str | None, typer.Option(help="Name of a [[tool]]; the one that is tapped if not given.")] = None,
+    machine: Annotated[Path, typer.Argument(help=r"Machine folder with a \[spindle] in its machine.toml.")],
+    tool: Annotated[
+        str | None, typer.Option(help=r"Name of a \[\[tool]]; else the one that is tapped.")
+    ] = None,
     modes: Annotated[int, typer.Option(min=1, max=20, help="How many modes.")] = 4,
     figure: Annotated[Path | None, typer.Option(help="Draw the model to this file (.svg, .png, .pdf).")] = None,
     as_json: Json = False,
@@ -43,7 +44,7 @@ def model(
     """
     state = model_state(MachineFolder(machine), tool)
     found = _modes(state.spindle, modes)
-    critical = critical_speed(state.spindle)
+    critical = first_critical_speed(state.spindle)
     static = static_stiffness(state.spindle)
     rigid = float(natural_frequencies(state.spindle, 1, rigid_bearings=True)[0])
     if figure is not None:
@@ -66,7 +67,7 @@ def model(
         f"bearings of {state.origin}",
         _table(found),
         f"static stiffness at the tip  {static / 1e6:.3f} N/um",
-        f"critical speed               {critical:.0f} rpm",
+        f"critical speed               {'none' if critical is None else f'{critical:.0f} rpm'}",
         f"with rigid bearings          {rigid:.1f} Hz in mode 1",
     )
 

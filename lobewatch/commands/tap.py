@@ -19,7 +19,7 @@ from lobewatch.tapping import OnHit, begin_tap, take_hits, trigger_for
 def tap(
     machine: Annotated[Path, typer.Argument(help="Machine folder.")],
     port: Annotated[str, typer.Option(help="Serial port of the DAQ, or socket://HOST:PORT.")] = "",
-    tool: Annotated[str, typer.Option(help="What is in the spindle; [tap] tool where not given.")] = "",
+    tool: Annotated[str, typer.Option(help=r"What is in the spindle; \[tap] tool where not given.")] = "",
     direction: Annotated[str, typer.Option(help="Direction at the tool tip, x or y.")] = "x",
     operator: Annotated[str, typer.Option(help="Who holds the hammer.")] = "",
     new: Annotated[bool, typer.Option("--new", help="Begin anew, do not go on with an interrupted test.")] = False,

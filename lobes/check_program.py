@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from lobes.nearest_speed import nearest_speed
 from lobes.program import Modes, Program, stable_at
+from lobes.speeds import check_speeds
 from lobes.stability_boundary import stability_boundary
 
 DEEPEST = 20.0
 """Limits are looked for up to this many times the depth of the program."""
-BLOCK = 48
-"""Speeds looked at together, the nearest first."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class ProgramCheck:
     """What can be said of one program on one spindle."""
 
     stable: bool
-    """Whether its depth lies below the limit at its speed."""
+    """Whether its depth lies below the limit at its speed, and the multipliers at its depth below 1."""
     limit: float
     """Deepest stable depth at its speed (m); inf where there is none up to 20 times its own depth."""
     chatter_frequency: float
@@ -30,7 +30,7 @@ class ProgramCheck:
     """"hopf", "flip" or ""."""
     nearest_speed: float | None
     """Nearest speed at which the same depth is of the other state (rpm): where an unstable program becomes stable, or
-    a stable one unstable. None where no speed of the range is."""
+    a stable one unstable. None where no speed of the range is, or none that the drive allows."""
     depth_margin: float
     """Limit over depth, less 1; negative where unstable."""
     speed_margin: float
@@ -39,15 +39,23 @@ class ProgramCheck:
     """How it was found."""
 
 
-def check_program(program: Program, x: Modes, y: Modes, speeds_rpm: NDArray[np.float64]) -> ProgramCheck:
+def check_program(
+    program: Program, x: Modes, y: Modes, speeds_rpm: NDArray[np.float64], deepest: ArrayLike = np.inf
+) -> ProgramCheck:
     """Check a program by semi-discretisation; speeds_rpm are those that the machine can run (rpm), shape (n,).
 
-    Raises ValueError for bad speeds and modes.
+    `deepest` is the cut that the drive allows there (m), a number or (n,): an unstable program is sent nowhere where
+    its depth is beyond it. Raises ValueError for bad speeds and modes.
     """
     lobes = stability_boundary(x, y, program.cut, program.speed_rpm, DEEPEST * program.depth)
-    limit = float(lobes.depth[0])
+    stable = bool(stable_at(program, x, y, np.array([program.speed_rpm]))[0])
+    if not stable and lobes.depth[0] > program.depth:
+        lobes = stability_boundary(x, y, program.cut, program.speed_rpm, program.depth)
+    limit = float(lobes.depth[0]) if stable else min(float(lobes.depth[0]), program.depth)
     stable = program.depth < limit
-    nearest = _nearest(program, x, y, np.asarray(speeds_rpm, dtype=np.float64), not stable)
+    speeds = check_speeds(speeds_rpm)
+    within = speeds if stable else speeds[np.broadcast_to(deepest, speeds.shape) >= program.depth]
+    nearest = nearest_speed(program, x, y, within, not stable) if within.size else None
     return ProgramCheck(
         stable=stable,
         limit=limit,
@@ -58,13 +66,3 @@ def check_program(program: Program, x: Modes, y: Modes, speeds_rpm: NDArray[np.f
         speed_margin=float("inf") if nearest is None else abs(nearest / program.speed_rpm - 1),
         method=lobes.method,
     )
-
-
-def _nearest(program: Program, x: Modes, y: Modes, speeds: NDArray[np.float64], wanted: bool) -> float | None:
-    """The speed nearest to the program's at which its state is as wanted."""
-    near = speeds[np.argsort(np.abs(speeds - program.speed_rpm), kind="stable")]
-    for block in np.array_split(near, -(-near.size // BLOCK)):
-        hits = np.flatnonzero(stable_at(program, x, y, block) == wanted)
-        if hits.size:
-            return float(block[hits[0]])
-    return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,10 @@ SCAN = 24
 """Depths looked at before anything is refined ..."""
 SPREAD = 1.5
 """... the j-th of them at (j / SCAN) ^ SPREAD of the deepest: limits lie low."""
-ROUNDS = 5
-"""Halvings of the surroundings of a turning point that may hide an island."""
+ROUNDS = 6
+"""Halvings of a step that may hide a pair of crossings."""
+DOUBT = 0.5
+"""It may where growth, as steep as in a step beside it, goes this share of the way to zero and back."""
 SURE = 1e-3
 """Accuracy of growth that is enough for its sign, unless it is smaller than that."""
 ACCURACY = 1e-6
@@ -28,15 +31,15 @@ Growth = Callable[[Rows, Floats, float], Floats]
 def find_crossings(growth: Growth, n_rows: int, deepest: float) -> Floats:
     """Depths up to `deepest` where growth changes its sign, rising in each row, filled up with inf, shape (n_rows, k).
 
-    A scan finds the changes between its depths; where growth turns around near zero, its extremum is followed, so that
-    an island between two depths is seen. Growth is negative at depth 0. k is at least 1.
+    A scan finds the changes between its depths. A step of it is halved as long as growth, were it as steep in it as in
+    the steps beside it, could reach zero and come back: so short excursions and islands inside a step are seen. Growth
+    is negative at depth 0. k is at least 1.
     """
     rows = np.arange(n_rows)
     depth = np.broadcast_to(deepest * (np.arange(1, SCAN + 1) / SCAN) ** SPREAD, (n_rows, SCAN))
     value = growth(rows, depth, SURE)
-    found = zip(_brackets(depth, value), _islands(growth, depth, value), strict=True)
-    row, low, high, at_low, at_high = (np.concatenate(pair) for pair in found)
-    return _table(row, _refine(growth, row, low, high, at_low, at_high), n_rows)
+    found = _brackets(growth, _steps(depth, value))
+    return _table(found.row, _refine(growth, found), n_rows)
 
 
 def _table(row: Rows, crossing: Floats, n_rows: int) -> Floats:
@@ -48,46 +51,75 @@ def _table(row: Rows, crossing: Floats, n_rows: int) -> Floats:
     return table
 
 
-def _brackets(depth: Floats, value: Floats) -> tuple[Rows, Floats, Floats, Floats, Floats]:
-    """Row, depths and values on both sides of each change of sign; depth 0 has the value at the first, made stable."""
+@dataclass(frozen=True, eq=False)
+class _Steps:
+    """Steps between two depths, arrays of one shape (n,)."""
+
+    row: Rows
+    low: Floats
+    high: Floats
+    at_low: Floats
+    at_high: Floats
+    before: Floats
+    """Steepness of growth in the step before ..."""
+    after: Floats
+    """... and in the one after."""
+
+    def __getitem__(self, which: NDArray[np.bool_]) -> _Steps:
+        return _Steps(*(getattr(self, field.name)[which] for field in fields(self)))
+
+    @property
+    def crosses(self) -> NDArray[np.bool_]:
+        return np.asarray((self.at_low < 0) != (self.at_high < 0))
+
+    @property
+    def may_hide(self) -> NDArray[np.bool_]:
+        """Whether growth could change its sign twice more: from one end to zero and back takes |low| + |high|."""
+        reach = np.maximum(self.before, self.after) * (self.high - self.low)
+        return np.asarray(reach > DOUBT * (np.abs(self.at_low) + np.abs(self.at_high)))
+
+    def halves(self, middle: Floats) -> _Steps:
+        """Both halves, given growth at the middles."""
+        half = (self.low + self.high) / 2
+        left, right = (np.abs(middle - end) / (half - self.low) for end in (self.at_low, self.at_high))
+        return _joined(
+            _Steps(self.row, self.low, half, self.at_low, middle, self.before, right),
+            _Steps(self.row, half, self.high, middle, self.at_high, left, self.after),
+        )
+
+
+def _joined(*parts: _Steps) -> _Steps:
+    return _Steps(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(_Steps)))
+
+
+def _steps(depth: Floats, value: Floats) -> _Steps:
+    """The steps of a scan; depth 0 has the value at the first depth, made stable."""
     at = np.hstack((np.zeros((len(depth), 1)), depth))
     values = np.hstack((-np.abs(value[:, :1]), value))
-    row, step = np.nonzero((values[:, 1:] < 0) != (values[:, :-1] < 0))
-    return row, at[row, step], at[row, step + 1], values[row, step], values[row, step + 1]
+    steep = np.pad(np.abs(np.diff(values) / np.diff(at)), ((0, 0), (1, 1)))
+    row = np.repeat(np.arange(len(depth)), depth.shape[1])
+    parts = (at[:, :-1], at[:, 1:], values[:, :-1], values[:, 1:], steep[:, :-2], steep[:, 2:])
+    return _Steps(row, *(part.ravel() for part in parts))
 
 
-def _islands(growth: Growth, depth: Floats, value: Floats) -> tuple[Rows, Floats, Floats, Floats, Floats]:
-    """Brackets of the changes of sign that lie, in pairs, between the depths of the scan."""
-    side = np.sign(value[:, 1:-1])
-    left, middle, right = side * value[:, :-2], side * value[:, 1:-1], side * value[:, 2:]
-    turning = (middle < left) & (middle <= right) & (middle < np.maximum(left, right) - middle)
-    row, step = np.nonzero(turning)
-    three = np.stack([depth[row, step + i] for i in range(3)], axis=1)
-    values = side[row, step, np.newaxis] * np.stack([value[row, step + i] for i in range(3)], axis=1)
-    outer_depth, outer_value, sign = three[:, ::2].copy(), values[:, ::2].copy(), side[row, step]
-    for _ in range(ROUNDS if row.size else 0):
-        between = (three[:, 1:] + three[:, :-1]) / 2
-        fresh = sign[:, np.newaxis] * growth(row, between, SURE)
-        five = np.stack([three[:, 0], between[:, 0], three[:, 1], between[:, 1], three[:, 2]], axis=1)
-        fives = np.stack([values[:, 0], fresh[:, 0], values[:, 1], fresh[:, 1], values[:, 2]], axis=1)
-        best = 1 + np.argmin(fives[:, 1:4], axis=1)
-        pick = best[:, np.newaxis] + np.array([-1, 0, 1])
-        three, values = np.take_along_axis(five, pick, axis=1), np.take_along_axis(fives, pick, axis=1)
-    hit = np.flatnonzero((values[:, 1] < 0) & np.all(outer_value >= 0, axis=1))
-    bottom, at_bottom = three[hit, 1], (sign * values[:, 1])[hit]
-    ends = sign[hit, np.newaxis] * outer_value[hit]
-    return (
-        np.concatenate((row[hit], row[hit])),
-        np.concatenate((outer_depth[hit, 0], bottom)),
-        np.concatenate((bottom, outer_depth[hit, 1])),
-        np.concatenate((ends[:, 0], at_bottom)),
-        np.concatenate((at_bottom, ends[:, 1])),
-    )
+def _brackets(growth: Growth, steps: _Steps) -> _Steps:
+    """The steps that hold a crossing, halved where there may be more."""
+    done = []
+    for _ in range(ROUNDS):
+        doubtful = steps.may_hide
+        done.append(steps[~doubtful & steps.crosses])
+        steps = steps[doubtful]
+        if not steps.row.size:
+            break
+        middle = (steps.low + steps.high)[:, np.newaxis] / 2
+        steps = steps.halves(growth(steps.row, middle, SURE)[:, 0])
+    return _joined(*done, steps[steps.crosses])
 
 
-def _refine(growth: Growth, row: Rows, low: Floats, high: Floats, at_low: Floats, at_high: Floats) -> Floats:
-    """The zero in each bracket by the false position, with the weight of an end that stays put halved (Illinois)."""
-    low, high, at_low, at_high = low.copy(), high.copy(), at_low.copy(), at_high.copy()
+def _refine(growth: Growth, found: _Steps) -> Floats:
+    """The zero in each step by the false position, with the weight of an end that stays put halved (Illinois)."""
+    row, low, high = found.row, found.low.copy(), found.high.copy()
+    at_low, at_high = found.at_low.copy(), found.at_high.copy()
     zero = (low + high) / 2
     busy = np.arange(row.size)
     for _ in range(MOST_STEPS):

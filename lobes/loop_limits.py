@@ -20,7 +20,11 @@ MOST_STEPS = 60
 ROUNDING = 1e-11
 """Turns that no longer count."""
 LOW_IMMERSION = 0.25
-"""Radial depth over diameter below which a mean force is no picture of a cut."""
+"""Radial depth over diameter below which a mean force is no picture of a cut ..."""
+NEAR_SLOT = 0.95
+"""... and below which it is none at fast teeth: flip lobes lie around tooth frequency = 2 f_n / (2 k + 1)."""
+FAST = 0.5
+"""Tooth frequency over chatter frequency from which on the wide ones, k = 0 and 1, are met."""
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -55,13 +59,24 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
             for i, branch in enumerate(branches)
             for lobe in _lobes(branch.grid, responses[i], cut, np.unique(waves[found & (setting == i)]), speed_rpm)
         ),
-        warning=_out_of_band(branches, responses) or _out_of_range(method, cut),
+        warning=_out_of_band(branches, responses)
+        or _out_of_range(method, cut, _weakest(branches, responses), speed_rpm),
     )
+
+
+def _weakest_branch(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> tuple[TipResponse, Complexes]:
+    return min(zip(branches, responses, strict=True), key=lambda pair: float(np.min(pair[1].real)))
+
+
+def _weakest(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> float:
+    """Frequency at which the lowest limit of all speeds chatters (Hz)."""
+    branch, response = _weakest_branch(branches, responses)
+    return float(branch.grid[np.argmin(response.real)])
 
 
 def _out_of_band(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> str:
     """Whether measured lines end before the loop is at its weakest, in words."""
-    branch, response = min(zip(branches, responses, strict=True), key=lambda pair: float(np.min(pair[1].real)))
+    branch, response = _weakest_branch(branches, responses)
     weakest = int(np.argmin(response.real))
     if branch.grid[0] == 0 or (response.real[weakest] < 0 and 0 < weakest < branch.grid.size - 1):
         return ""
@@ -71,13 +86,20 @@ def _out_of_band(branches: Sequence[TipResponse], responses: Sequence[Complexes]
     )
 
 
-def _out_of_range(method: str, cut: Cut) -> str:
-    """Whether the cut is too slender for a mean force, in words."""
-    if cut.immersion >= LOW_IMMERSION:
+def _out_of_range(method: str, cut: Cut, chatter: float, speed_rpm: Floats) -> str:
+    """Whether the cut is too slender, or the teeth too fast, for a mean force, in words."""
+    instead = "use semi-discretisation (stability_boundary)"
+    if cut.immersion < LOW_IMMERSION:
+        return (
+            f"{method} knows no flip lobes: at immersion {cut.immersion:g} (below {LOW_IMMERSION}) the true limit can "
+            f"be lower; {instead}"
+        )
+    fast = FAST * 60 * chatter / cut.teeth
+    if cut.immersion >= NEAR_SLOT or np.max(speed_rpm) < fast:
         return ""
     return (
-        f"{method} knows no flip lobes: at immersion {cut.immersion:g} (below {LOW_IMMERSION}) the true limit can be "
-        "lower; use semi-discretisation (stability_boundary)"
+        f"{method} knows no flip lobes: above {fast:.0f} rpm, where the tooth frequency is half the chatter frequency, "
+        f"the true limit at immersion {cut.immersion:g} can be far lower; {instead}"
     )
 
 

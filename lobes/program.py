@@ -18,6 +18,9 @@ Modes = Sequence[Mode] | None
 SHARES = (0.25, 0.5, 0.75, 1.0)
 """A program is stable where it is so at all these shares of its depth: an island above a limit is none to work in."""
 
+LIMITS = (1e-300, 1e300)
+"""Radii that are told apart."""
+
 
 @dataclass(frozen=True)
 class Program:
@@ -40,5 +43,16 @@ class Program:
 
 def stable_at(program: Program, x: Modes, y: Modes, speed_rpm: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Whether the program would be stable at other speeds (rpm), shape (n,), by semi-discretisation."""
+    return log_radius(program, x, y, speed_rpm) < 0
+
+
+def log_radius(program: Program, x: Modes, y: Modes, speed_rpm: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Logarithm of the largest spectral radius over SHARES at speeds (rpm), shape (n,); negative where stable."""
     depths = program.depth * np.array(SHARES)
-    return np.asarray(np.all(spectral_radius(x, y, program.cut, speed_rpm, depths) < 1, axis=1))
+    radius = spectral_radius(x, y, program.cut, speed_rpm, depths[-1])[:, 0]
+    still = np.flatnonzero(radius < 1)
+    if still.size:
+        radius[still] = np.maximum(
+            radius[still], np.max(spectral_radius(x, y, program.cut, speed_rpm[still], depths[:-1]), axis=1)
+        )
+    return np.log(np.clip(radius, *LIMITS))

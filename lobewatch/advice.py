@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from time import monotonic
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +26,13 @@ from lobewatch.drive import drive_limit
 from lobewatch.history import measure
 from lobewatch.machine import Machine
 from lobewatch.machine_folder import MachineFolder, TapEntry
+from lobewatch.output import notes
 from lobewatch.pipeline import Measurement, speed_grid
 from lobewatch.prediction import predict
 from modal import Mode
 
+PATIENCE = 5.0
+"""Time after which a person is told how far it is (s)."""
 FALLS = np.array([0.0, 0.05, 0.10, 0.15, 0.20])
 """Falls of the frequency for which the model is recalibrated; between them its stiffness is interpolated."""
 
@@ -52,8 +56,9 @@ class ProgramAdvice:
     """Whether its tool was tapped; else all is predicted by the model."""
     decay: float
     """Tolerable fall of the frequency, relative; inf where nothing happens down to 80 %."""
-    was_stable: bool
-    """Whether it was stable on the first spindle tapped with this tool and direction."""
+    was_stable: bool | None
+    """Whether it was stable on the first spindle tapped with this tool and direction; None where the modes of then and
+    now are not of the same directions."""
     drive_limit: float
     """Deepest cut that power and torque allow at its speed (m); inf where no limit is known."""
     notes: tuple[str, ...]
@@ -62,10 +67,14 @@ class ProgramAdvice:
 
 def advise(folder: MachineFolder) -> list[ProgramAdvice]:
     """Advice for every program of a machine, from the newest tap test with its tool."""
-    taps = folder.taps()
+    taps, programs = folder.taps(), folder.machine.program
     measured: dict[str, Measurement] = {}
-    found = []
-    for table in folder.machine.program:
+    found: list[ProgramAdvice] = []
+    begin, told = monotonic(), False
+    for table in programs:
+        if not told and monotonic() - begin > PATIENCE:
+            notes.print(f"{len(found)} of {len(programs)} programs are checked; the others take a while too")
+            told = True
         of_tool = [tap for tap in taps if tap.tool == table.tool]
         if not of_tool:
             found.append(_predicted(table, folder))
@@ -138,14 +147,10 @@ def _unknown(table: ProgramTable, tap_id: str, reason: str) -> ProgramAdvice:
 
 def _advise(table: ProgramTable, machine: Machine, now: Measurement, then: Measurement) -> ProgramAdvice:
     program = Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
-    check = check_program(program, now.x, now.y, speed_grid(machine))
+    speeds = speed_grid(machine)
+    check = check_program(program, now.x, now.y, speeds, drive_limit(machine, table, speeds))
     modes_at, assumption = aging(now)
     allowed = float(drive_limit(machine, table, np.array([table.speed_rpm]))[0])
-    notes = [assumption] if check.stable else []
-    if now.predicted:
-        notes += now.notes[:1]
-    if not (now.x and now.y):
-        notes.append(f"modes in the {now.direction} direction alone")
     return ProgramAdvice(
         table=table,
         tap_id=now.tap_id,
@@ -153,10 +158,25 @@ def _advise(table: ProgramTable, machine: Machine, now: Measurement, then: Measu
         limit_band=_band(program, now, check),
         measured=not now.predicted,
         decay=tolerable_decay(program, modes_at) if check.stable else 0.0,
-        was_stable=bool(_limits(program, then.x, then.y).depth[0] > program.depth) if then.dynamics.at_tip else False,
+        was_stable=_was_stable(program, now, then),
         drive_limit=allowed,
-        notes=tuple(notes),
+        notes=(*([assumption] if check.stable else []), *_remarks(table, machine, now)),
     )
+
+
+def _remarks(table: ProgramTable, machine: Machine, now: Measurement) -> Iterator[str]:
+    if now.predicted:
+        yield from now.notes[:1]
+    if not (now.x and now.y):
+        yield f"modes in the {now.direction} direction alone"
+    if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and table.feed_per_tooth_mm is None:
+        yield "[drive] does not count: feed_per_tooth_mm is missing"
+
+
+def _was_stable(program: Program, now: Measurement, then: Measurement) -> bool | None:
+    if (bool(now.x), bool(now.y)) != (bool(then.x), bool(then.y)):
+        return None
+    return bool(_limits(program, then.x, then.y).depth[0] > program.depth)
 
 
 def _limits(program: Program, x: Modes, y: Modes) -> StabilityLobes:

@@ -7,6 +7,7 @@ immersion up-milling with the modes of Weck, Altintas & Budak: frequency_domain_
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -113,7 +114,7 @@ def test_low_immersion_is_warned_of() -> None:
     low = Cut(2, 0.1, "down", 6e8, 2e8)
     assert "use semi-discretisation" in zero_order(BENCHMARK, None, low, 18000).warning
     assert "use semi-discretisation" in average_angle(BENCHMARK, None, low, 18000).warning
-    assert zero_order(BENCHMARK, None, Cut(2, 0.25, "down", 6e8, 2e8), 18000).warning == ""
+    assert zero_order(BENCHMARK, None, Cut(2, 0.25, "down", 6e8, 2e8), 13000).warning == ""
     assert stability_boundary(BENCHMARK, None, low, 18000, 2e-3).warning == ""
 
 
@@ -123,4 +124,18 @@ def test_an_frf_that_does_not_reach_the_chatter_band_says_so(band: tuple[float, 
         short = method(frf(X).in_band(band), frf(Y).in_band(band), CUT, SPEEDS)
         assert "does not reach the chatter band" in short.warning
         assert f"between {band[0]:g} and {band[1]:g} Hz" in short.warning
-        assert method(frf(X), frf(Y), CUT, SPEEDS).warning == ""
+        assert method(frf(X), frf(Y), CUT, SPEEDS / 4).warning == ""
+
+
+@pytest.mark.parametrize("direction", ["up", "down"])
+def test_fast_teeth_are_warned_of_where_flip_lobes_make_the_limit_lower(direction: Literal["up", "down"]) -> None:
+    """At fast teeth zero order is more than a tenth too deep somewhere, but for a slot."""
+    mode, speeds = [Mode(1713.0, 0.029, 3.5e7)], np.linspace(24000.0, 64000.0, 40)
+    for immersion, far_off in ((0.35, True), (0.5, True), (0.7, True), (1.0, False)):
+        cut = Cut(4, immersion, direction, 1400e6, 500e6)
+        mean = zero_order(mode, None, cut, speeds)
+        deepest = 6 * mean.minimum.depth
+        true = stability_boundary(mode, None, cut, speeds, deepest).depth
+        assert bool(np.any(np.minimum(mean.depth, deepest) > 1.1 * true)) == far_off
+        assert ("above 1" in mean.warning, "no flip lobes" in mean.warning) == (far_off, far_off)
+        assert zero_order(mode, None, cut, speeds / 6).warning == ""

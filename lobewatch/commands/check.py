@@ -22,9 +22,10 @@ def check(
     machine: Annotated[Path, typer.Argument(help="Machine folder with tap tests and cutting programs.")],
     as_json: Json = False,
 ) -> None:
-    """Every cutting program against the newest tap test with its tool; exit code 1 when one is not stable.
+    """Every cutting program against the newest tap test with its tool; exit code 1 unless all are stable.
 
-    By semi-discretisation. The decay column says how far f_n may fall before the program chatters.
+    By semi-discretisation. A program that could not be checked does not count as stable. The decay column says how far
+    f_n may fall before the program chatters.
 
     Examples:
 
@@ -40,16 +41,28 @@ def check(
     advice = advise(folder)
     unstable = sum(one.check is not None and not one.check.stable for one in advice)
     checked = sum(one.check is not None for one in advice)
+    missing = len(advice) - checked
     emit(
-        {"programs": [_json(one) for one in advice], "unstable": unstable},
+        {"programs": [_json(one) for one in advice], "unstable": unstable, "not_checked": missing},
         as_json,
         _table(advice),
         *(line for one in advice for line in _sentences(one, folder.machine.speed)),
-        *(f"note: {note}" for note in dict.fromkeys(note for one in advice for note in one.notes)),
-        f"{unstable} of {checked} programs not stable",
+        *_notes(advice),
+        f"{unstable} of {checked} programs not stable"
+        + (f", {missing} of {len(advice)} not checked" if missing else ""),
     )
-    if unstable:
+    if unstable or missing:
         raise typer.Exit(1)
+
+
+def _notes(advice: Sequence[ProgramAdvice]) -> Iterator[str]:
+    """Each note once, with the programs that it is about where it is not about all."""
+    about: dict[str, list[str]] = {}
+    for one in advice:
+        for note in one.notes:
+            about.setdefault(note, []).append(one.table.name)
+    for note, names in about.items():
+        yield f"note: {note}" if len(names) == len(advice) else f"note: {', '.join(names)}: {note}"
 
 
 def _json(one: ProgramAdvice) -> dict[str, Any]:
@@ -93,11 +106,14 @@ def _verdict(one: ProgramAdvice) -> tuple[str, str, str, str]:
     if math.isinf(found.limit):
         limit = f"> {20 * one.table.depth_mm:g}"
     margin = "-" if math.isinf(found.depth_margin) else f"{100 * found.depth_margin:+.0f} %"
+    beyond = one.table.depth_mm > one.drive_limit * 1e3
     predicted = "" if one.measured else " (predicted)"
     if not found.stable:
-        return limit, margin, "none", f"NOT STABLE{' any more' if one.was_stable else ''}{predicted}"
+        verdict = f"NOT STABLE{' any more' if one.was_stable else ''}{', beyond the drive' if beyond else ''}"
+        return limit, margin, "none", verdict + predicted
     left = "> 20 %" if math.isinf(one.decay) else f"{100 * one.decay:.1f} %"
-    return limit, margin, left, f"stable{', within the error' if low <= one.table.depth_mm else ''}{predicted}"
+    verdict = "beyond the drive" if beyond else f"stable{', within the error' if low <= one.table.depth_mm else ''}"
+    return limit, margin, left, verdict + predicted
 
 
 def _sentences(one: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:
@@ -123,5 +139,8 @@ def _sentences(one: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:
 def _elsewhere(one: ProgramAdvice, speeds: SpeedRange) -> str:
     found = one.check
     if found is None or found.nearest_speed is None:
-        return f"choose another tool: no stable speed at this depth in {speeds.low_rpm:g}..{speeds.high_rpm:g} rpm"
+        drive = " that [drive] allows" if math.isfinite(one.drive_limit) else ""
+        return (
+            f"choose another tool: no stable speed{drive} at this depth in {speeds.low_rpm:g}..{speeds.high_rpm:g} rpm"
+        )
     return f"run this depth at {found.nearest_speed:.0f} rpm, the nearest stable speed"

@@ -1,0 +1,127 @@
+"""The lowest crossing beside flip lobes, and checks that rest on it: against dense scans of the spectral radius."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lobes import (
+    Cut,
+    Program,
+    check_program,
+    intervals_needed,
+    spectral_radius,
+    stability_boundary,
+    zero_order,
+)
+from lobes.program import Modes
+from modal import Mode
+
+SPINDLE = [Mode(1713.0636, 0.029120, 3.53170e7)]
+AGED = [Mode(1541.7569, 0.029123, 3.48023e7)]
+FINISHING = Cut(4, 0.1, "down", 1400e6, 500e6)
+LOOKS = 200
+"""Depths of a dense scan."""
+
+
+class Case(NamedTuple):
+    x: list[Mode]
+    y: Modes
+    cut: Cut
+    speed_rpm: NDArray[np.float64]
+    deepest: float
+
+
+def cases(number: int, seed: int) -> Iterator[Case]:
+    """Cuts of low immersion, at speeds around flip lobes: tooth frequency 2 f_n / (2 k + 1)."""
+    random = np.random.default_rng(seed)
+    for _ in range(number):
+        frequency, k, teeth = random.uniform(500, 2500), random.integers(0, 3), int(random.integers(1, 6))
+        x = [Mode(frequency, random.uniform(0.008, 0.05), 2e7)]
+        if random.random() < 0.4:
+            x.append(Mode(frequency * random.uniform(1.2, 2.5), random.uniform(0.01, 0.04), random.uniform(4e7, 4e8)))
+        y = [Mode(frequency * random.uniform(0.8, 1.2), 0.02, 3e7)] if random.random() < 0.3 else None
+        tangential, share = random.uniform(5e8, 2e9), random.uniform(0, 0.6)
+        direction: Literal["up", "down"] = "up" if random.random() < 0.5 else "down"
+        cut = Cut(teeth, float(np.exp(random.uniform(-3.5, -1.2))), direction, tangential, tangential * share)
+        speed = 60 / teeth * 2 * frequency / (2 * k + 1) * random.uniform(0.88, 1.2, 12)
+        lowest = zero_order(x, y, cut, np.linspace(30, 120, 50) * frequency / teeth).minimum.depth
+        yield Case(x, y, cut, speed, float(lowest * np.exp(random.uniform(1.6, 3.7))))
+
+
+def missed(case: Case) -> int:
+    """Speeds at which the cut is unstable somewhere below its limit."""
+    x, y, cut, speed, deepest = case
+    limit = np.minimum(stability_boundary(x, y, cut, speed, deepest).depth, deepest)
+    found = 0
+    for rpm, deep, number in zip(speed, limit, intervals_needed(x, y, cut, speed), strict=True):
+        depths = deep * np.arange(1, LOOKS) / LOOKS
+        found += bool(np.any(spectral_radius(x, y, cut, rpm, depths, int(number)) > 1 + 1e-5))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("modes", "speed", "lowest"),
+    [
+        (SPINDLE, 15410.0, 23.418e-3),
+        (SPINDLE, 15430.0, 23.718e-3),
+        (AGED, 7900.0, 29.862e-3),
+    ],
+)
+def test_a_short_excursion_below_the_limit_is_seen(modes: list[Mode], speed: float, lowest: float) -> None:
+    """A flip lobe that ends between two depths of the scan, below a limit that is a third deeper."""
+    lobes = stability_boundary(modes, None, FINISHING, speed, 0.17)
+    assert (lobes.depth[0], lobes.kind[0]) == (pytest.approx(lowest, rel=0.002), "flip")
+    number = int(lobes.method.split()[1])
+    below, above = spectral_radius(modes, None, FINISHING, speed, lobes.depth[0] * np.array([0.995, 1.005]), number)[0]
+    assert below < 1 < above
+
+
+def test_limits_around_flip_lobes_hold_against_a_dense_scan() -> None:
+    assert sum(missed(case) for case in cases(8, 3)) == 0
+
+
+@pytest.mark.long
+@pytest.mark.timeout(900)
+def test_two_hundred_cuts_around_flip_lobes() -> None:
+    assert sum(missed(case) for case in cases(200, 11)) == 0
+
+
+@pytest.mark.parametrize("speed", [15390.0, 15410.0, 15420.0, 15430.0])
+def test_a_check_agrees_with_the_multipliers(speed: float) -> None:
+    program = Program(FINISHING, speed, 24e-3)
+    radius = spectral_radius(SPINDLE, None, FINISHING, speed, program.depth)[0, 0]
+    found = check_program(program, SPINDLE, None, np.linspace(3000, 24000, 1151))
+    assert radius > 1
+    assert not found.stable
+    assert found.depth_margin <= 0
+    assert found.nearest_speed is not None
+    moved = replace(program, speed_rpm=found.nearest_speed)
+    assert check_program(moved, SPINDLE, None, np.array([speed])).stable
+
+
+def test_a_program_is_sent_where_the_drive_allows_its_depth() -> None:
+    program, speeds = Program(FINISHING, 15410.0, 24e-3), np.linspace(3000, 24000, 1151)
+    freely = check_program(program, SPINDLE, None, speeds).nearest_speed
+    slow = np.where(speeds < 15000, 30e-3, 20e-3)
+    driven = check_program(program, SPINDLE, None, speeds, slow).nearest_speed
+    assert freely is not None
+    assert driven is not None
+    assert driven < 15000 < freely
+    assert check_program(program, SPINDLE, None, speeds, 20e-3).nearest_speed is None
+
+
+def test_the_nearest_speed_is_that_of_looking_at_all() -> None:
+    speeds = np.linspace(3000, 24000, 401)
+    for speed, depth in ((6500.0, 20e-3), (12900.0, 40e-3), (12900.0, 10e-3), (20000.0, 15e-3)):
+        program = Program(replace(FINISHING, immersion=0.5), speed, depth)
+        found = check_program(program, SPINDLE, None, speeds)
+        states = stability_boundary(SPINDLE, None, program.cut, speeds, depth).depth == np.inf
+        others = speeds[states != found.stable]
+        expected = others[np.argmin(np.abs(others - speed))] if others.size else None
+        assert found.nearest_speed == expected

@@ -149,9 +149,46 @@ def test_the_drive_and_missing_taps_are_told(run: Run, folder: MachineFolder) ->
     said = run("check", "m")
     assert "A: slot at 12 900 rpm: [drive] allows no more than" in said.out
     assert "not checked: no tap test with tool 'T7'" in said.out
-    assert said.out.splitlines()[-1] == "0 of 2 programs not stable"
+    assert said.code == 1
+    assert said.out.splitlines()[-1] == "0 of 2 programs not stable, 1 of 3 not checked"
+    assert "note: C: slot at 6 500 rpm: [drive] does not count: feed_per_tooth_mm is missing" in said.out
     power = 4 * 0.02 / (4 * np.pi) * 2 * 1400e6 * 1e-4 * 2 * np.pi * 12900 / 60
     assert f"{5000 / power * 1e3:.2f} mm" in said.out
+
+
+def test_programs_that_cannot_be_checked_are_no_success(run: Run, folder: MachineFolder) -> None:
+    edit(folder, 'tool = "reference"\nteeth', 'tool = "T7"\nteeth')
+    tap(folder, 1713.0)
+    said = run("check", "m", "--json")
+    assert (said.code, json.loads(said.out)["not_checked"], json.loads(said.out)["unstable"]) == (1, 3, 0)
+
+
+def test_any_more_is_said_of_the_same_directions_only(run: Run, folder: MachineFolder) -> None:
+    tap(folder, 1713.0)
+    tap(folder, 1713.0 * 0.9, days=700)
+    assert run("check", "m").out.count("NOT STABLE any more") == 2
+    tap(folder, 1713.0 * 0.9, days=700.1, direction="y")
+    tap(folder, 1713.0 * 0.9, days=700.2)
+    said = run("check", "m").out
+    assert ("NOT STABLE" in said, "any more" in said) == (True, False)
+
+
+def test_beyond_the_drive_and_notes_of_single_programs(run: Run, folder: MachineFolder) -> None:
+    edit(folder, "speed_rpm = 12900", "feed_per_tooth_mm = 0.1\nspeed_rpm = 12900")
+    edit(folder, "[speed]", "[drive]\npower_kw = 0.5\n\n[speed]")
+    edit(folder, "depth_mm = 8.0", "depth_mm = 80.0")
+    tap(folder, 1713.0)
+    said = run("check", "m")
+    (row,) = (line for line in said.out.splitlines() if line.startswith("A: slot at 12 900 rpm  "))
+    assert row.endswith("beyond the drive")
+    assert "note: A: slot at 12 900 rpm, B: slot at 8 700 rpm: decay left" in said.out
+    assert "note: modes in the x direction alone" in said.out
+
+
+def test_a_long_check_says_how_far_it_is(run: Run, folder: MachineFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lobewatch.advice.PATIENCE", -1.0)
+    tap(folder, 1713.0)
+    assert run("check", "m").err.count("0 of 3 programs are checked") == 1
 
 
 def test_no_stable_speed_is_said(run: Run, folder: MachineFolder) -> None:

@@ -25,9 +25,7 @@ from lobewatch.output import Json, emit, table
 
 def model(
     machine: Annotated[Path, typer.Argument(help=r"Machine folder with a \[spindle] in its machine.toml.")],
-    tool: Annotated[
-        str | None, typer.Option(help=r"Name of a \[\[tool]]; else the one that is tapped.")
-    ] = None,
+    tool: Annotated[str | None, typer.Option(help=r"Name of a \[\[tool]]; else the one that is tapped.")] = None,
     modes: Annotated[int, typer.Option(min=1, max=20, help="How many modes.")] = 4,
     figure: Annotated[Path | None, typer.Option(help="Draw the model to this file (.svg, .png, .pdf).")] = None,
     as_json: Json = False,

@@ -8,8 +8,9 @@ from typing import Annotated
 
 import typer
 
-from acquisition import Circumstances, Hit, HitFlags, TapsSource
+from acquisition import Circumstances, Hit, HitFlags
 from lobewatch.describe import measurement_json, measurement_texts
+from lobewatch.devices import open_source
 from lobewatch.history import update_history
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.output import Json, emit, notes
@@ -55,7 +56,7 @@ def tap(
             begun = f"{running.circumstances.created:%Y-%m-%d %H:%M} UTC"
             notes.print(f"going on with the test begun {begun}: {running.good} of {setup.tap.hits} good hits are there")
         try:
-            with TapsSource(port, setup.daq.sample_rate_hz) as source:
+            with open_source(setup.daq, port) as source:
                 device = f"{source.info['model']} on {port}, {source.sample_rate:g} Hz"
                 notes.print(f"{device}. TAP the tool, again and again.", markup=False)
                 take_hits(

@@ -77,20 +77,22 @@ def find_resonances(frf: Frf) -> list[Resonance]:
             "from neighbouring modes; export real and imaginary part, or magnitude and phase"
         )
     _check_phase(frf, peaks)
-    return _that_turn(peaks)
+    turning = [peak.resonance for peak in peaks if peak.turn < -LEAST_TURN or peak.turn > MOST_TURN]
+    return sorted(turning, key=lambda r: r.frequency)
 
 
 def resonances_beside(known: Sequence[Resonance], left: Frf) -> list[Resonance]:
     """Known resonances with those that stand out of what the fit of these leaves, by rising frequency.
 
-    left: the measured FRF less all that was fitted. Where a known resonance stands its residual does not count.
+    left: the measured FRF less all that was fitted. Where a known resonance stands its residual does not count, and
+    neither do single lines (hum).
     """
     if not known:
         return []
     least = LEAST_BESIDE * min(r.height for r in known)
     peaks = [peak for peak in _peaks_at_all_scales(left, least) if peak.coherence >= LEAST_COHERENCE]
-    beside = [new for new in _that_turn(peaks) if _is_beside(known, new)]
-    return sorted([*known, *beside], key=lambda r: r.frequency)
+    turning = [peak.resonance for peak in peaks if -MOST_TURN < peak.turn < -LEAST_TURN]
+    return sorted([*known, *(new for new in turning if _is_beside(known, new))], key=lambda r: r.frequency)
 
 
 def _is_beside(known: Sequence[Resonance], new: Resonance) -> bool:
@@ -101,11 +103,6 @@ def _is_beside(known: Sequence[Resonance], new: Resonance) -> bool:
         return False
     tail = np.array([old.height * old.half_width for old in known]) / distance
     return new.height > LEAST_BESIDE * known[int(np.argmax(tail))].height
-
-
-def _that_turn(peaks: list[_Peak]) -> list[Resonance]:
-    """Those that turn like a mode, by rising frequency."""
-    return sorted((p.resonance for p in peaks if p.turn < -LEAST_TURN or p.turn > MOST_TURN), key=lambda r: r.frequency)
 
 
 def _check(frf: Frf) -> None:

@@ -115,6 +115,17 @@ def test_a_ripple_of_a_percent_beside_a_mode_is_no_mode() -> None:
         assert len(fit_modes(measured(pair, LINES, 1, seed))) == 1
 
 
+def test_lines_of_hum_beside_a_mode_are_no_modes() -> None:
+    """Taken for modes they would narrow its band, and K be less certain."""
+    lines, true = np.arange(1.0, 4000.0), SPINDLE[2:]
+    for seed in range(3):
+        turns = np.random.default_rng(seed).uniform(size=(1, lines.size))
+        hum = np.where(lines % 50 == 0, 0.02, 0.0) * np.exp(2j * np.pi * turns)
+        found, without = fit_modes(measured(true, lines, 1, seed, hum)), fit_modes(measured(true, lines, 1, seed))
+        assert_found(found, true)
+        assert found[0].standard_error[2] < 1.5 * without[0].standard_error[2]
+
+
 @pytest.mark.parametrize("ends", [(1480.0, 4000.0), (4.0, 1520.0)])
 def test_a_peak_a_few_lines_from_the_edge_is_found_and_flagged(ends: tuple[float, float]) -> None:
     true = [Mode(1500.0, 0.03, 3e7)]

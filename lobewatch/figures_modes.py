@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from lobewatch.figures import ALARM, NOW, STYLE, THEN
 from modal import Extraction, FittedBand, Mode
@@ -19,6 +19,10 @@ COLUMNS = 4
 """Circles in a row."""
 MOST_CIRCLES = 8
 """Of more modes those with the highest peaks of accelerance are drawn."""
+LEAST_APART = 0.014
+"""Between labels of modes that are close (share of the axis)."""
+LEGEND = 0.08
+"""Room for it below all lines (share of the axis)."""
 REACH = 3.0
 """A circle is drawn over this many half-power half-widths on either side."""
 
@@ -35,7 +39,7 @@ def modes_figure(state: Extraction, modes: Sequence[Mode], title: str) -> Figure
         _draw_frf(top, state, modes)
         _draw_chart(chart, state, modes)
         _draw_circles(figure, grid, state, sorted(circles, key=lambda mode: mode.frequency))
-    top.set_title(title, pad=38)
+    top.set_title(title, pad=10 + 6 * max((len(_name(mode)) for mode in modes), default=0))
     return figure
 
 
@@ -49,10 +53,11 @@ def _draw_frf(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
         fitted = state.frf.receptance[band.lines] - left
         axes.semilogy(part, np.abs(fitted) * size, color=NOW, ls="--", label="fit in its bands" if i == 0 else None)
         axes.semilogy(part, np.abs(left) * size, color=ALARM, lw=0.6, label="measured - fit" if i == 0 else None)
-    for mode in modes:
+    places = _apart([mode.frequency for mode in modes], LEAST_APART * (f[-1] - f[0]))
+    for mode, place in zip(modes, places, strict=True):
         axes.annotate(
-            f"{mode.frequency:.0f}" + (" ?" if mode.doubts else ""),
-            (mode.frequency, 1.0),
+            _name(mode),
+            (place, 1.0),
             xytext=(0, 2),
             textcoords="offset points",
             xycoords=("data", "axes fraction"),
@@ -61,9 +66,22 @@ def _draw_frf(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
             va="bottom",
             fontsize=8,
         )
-    axes.set(ylabel="|accelerance| (m/s²/N)", xlim=(f[0], f[-1]))
+    low, high = axes.get_ylim()
+    axes.set(ylabel="|accelerance| (m/s²/N)", xlim=(f[0], f[-1]), ylim=(low * (low / high) ** LEGEND, high))
     axes.tick_params(labelbottom=False)
     axes.legend(loc="lower right", ncols=3)
+
+
+def _name(mode: Mode) -> str:
+    return f"{mode.frequency:.0f}" + (" ?" if mode.doubts else "")
+
+
+def _apart(places: Sequence[float], least: float) -> list[float]:
+    """Rising places, each moved up as far as it must be to stand this far from the one before."""
+    moved: list[float] = []
+    for place in places:
+        moved.append(max(place, moved[-1] + least) if moved else place)
+    return moved
 
 
 def _draw_chart(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
@@ -78,6 +96,7 @@ def _draw_chart(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
         axes.axvline(mode.frequency, color=NOW, lw=0.6)
     axes.set(xlabel="frequency (Hz); grey: the bands fitted; ?: the report has a doubt", ylabel="order")
     axes.set_ylim(0, 13)
+    axes.yaxis.set_major_locator(MultipleLocator(2))
     if state.bands:
         axes.legend(loc="upper right", ncols=2)
 

@@ -1,5 +1,6 @@
 """From an FRF to natural frequencies, damping ratios and stiffnesses."""
 
+from modal.cut_edges import cut_edges
 from modal.extract import Extraction, FittedBand, extract
 from modal.fit_modes import fit_modes, modes_of
 from modal.fit_points import fit_points
@@ -21,6 +22,7 @@ __all__ = [
     "Mode",
     "PhysicalPoles",
     "StabilisationChart",
+    "cut_edges",
     "extract",
     "fit_modes",
     "fit_points",

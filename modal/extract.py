@@ -11,7 +11,7 @@ from scipy.ndimage import median_filter
 from threadpoolctl import threadpool_limits
 
 from acquisition import Frf
-from modal.find_resonances import Resonance, find_resonances
+from modal.find_resonances import Resonance, find_resonances, resonances_beside
 from modal.fit_band import RESIDUAL_POWERS, BandFit, fit_band, gain_of_a_term
 from modal.line_weights import line_weights
 from modal.local_bands import LocalBand, local_bands
@@ -104,12 +104,20 @@ def extract(frf: Frf, band: tuple[float, float] | None = None) -> Extraction:
 
 
 def _extract(lines: Frf) -> Extraction:
-    weight = line_weights(lines)
-    found = (_first(lines, weight, local) for local in local_bands(find_resonances(lines), lines.frequency))
-    state = Extraction(lines, weight, tuple(band for band in found if band is not None))
+    weight, resonances = line_weights(lines), find_resonances(lines)
+    state = _started(lines, weight, resonances)
+    left = replace(lines, receptance=lines.receptance - state.receptance(lines.frequency))
+    more = resonances_beside(resonances, left)
+    state = _started(lines, weight, more) if len(more) > len(resonances) else state
     state = _swept(state, SWEEPS if len(state.bands) > 1 else 0)
     stray = _stray_lines(state)
     return _swept(replace(state, weight=np.where(stray, 0.0, weight)), 0) if np.any(stray) else state
+
+
+def _started(lines: Frf, weight: Array, resonances: list[Resonance]) -> Extraction:
+    """A first fit of every band around these."""
+    found = (_first(lines, weight, local) for local in local_bands(resonances, lines.frequency))
+    return Extraction(lines, weight, tuple(band for band in found if band is not None))
 
 
 def _swept(state: Extraction, times: int) -> Extraction:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +32,10 @@ MOST_TURN = 2.6
 """Of a mode narrower than the line spacing the chords lie side by side; which way it turns is not to be seen (rad)."""
 LEAST_COHERENCE = 0.5
 """Mean coherence over a peak."""
+BESIDE = 2.0
+"""A peak of the residual counts this many times the sum of the half-widths away from all known ones ..."""
+LEAST_BESIDE = 0.02
+"""... and from this share of the height of its neighbour; a real peak is a linear mode to a percent or so."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +77,32 @@ def find_resonances(frf: Frf) -> list[Resonance]:
             "from neighbouring modes; export real and imaginary part, or magnitude and phase"
         )
     _check_phase(frf, peaks)
-    return sorted((p.resonance for p in peaks if p.turn < -LEAST_TURN or p.turn > MOST_TURN), key=lambda r: r.frequency)
+    turning = [peak.resonance for peak in peaks if peak.turn < -LEAST_TURN or peak.turn > MOST_TURN]
+    return sorted(turning, key=lambda r: r.frequency)
+
+
+def resonances_beside(known: Sequence[Resonance], left: Frf) -> list[Resonance]:
+    """Known resonances with those that stand out of what the fit of these leaves, by rising frequency.
+
+    left: the measured FRF less all that was fitted. Where a known resonance stands its residual does not count, and
+    neither do single lines (hum).
+    """
+    if not known:
+        return []
+    least = LEAST_BESIDE * min(r.height for r in known)
+    peaks = [peak for peak in _peaks_at_all_scales(left, least) if peak.coherence >= LEAST_COHERENCE]
+    turning = [peak.resonance for peak in peaks if -MOST_TURN < peak.turn < -LEAST_TURN]
+    return sorted([*known, *(new for new in turning if _is_beside(known, new))], key=lambda r: r.frequency)
+
+
+def _is_beside(known: Sequence[Resonance], new: Resonance) -> bool:
+    """Whether it is apart from all known ones, and high enough against the one with the highest tail there."""
+    distance = np.array([abs(new.frequency - old.frequency) for old in known])
+    apart = BESIDE * np.array([new.half_width + old.half_width for old in known])
+    if np.any(distance <= apart):
+        return False
+    tail = np.array([old.height * old.half_width for old in known]) / distance
+    return new.height > LEAST_BESIDE * known[int(np.argmax(tail))].height
 
 
 def _check(frf: Frf) -> None:
@@ -99,16 +129,19 @@ def _check_phase(frf: Frf, peaks: list[_Peak]) -> None:
         )
 
 
-def _peaks_at_all_scales(frf: Frf) -> list[_Peak]:
-    """Every peak of any running mean, from the longest mean that costs it no more height than noise explains."""
-    noise = _noise(frf)
+def _peaks_at_all_scales(frf: Frf, least: float = 0.0) -> list[_Peak]:
+    """Every peak of any running mean, from the longest mean that costs it no more height than noise explains.
+
+    least: height of the mobility below which none is looked at (m/s/N).
+    """
+    noise = mobility_noise(frf)
     found: list[_Peak] = []
     longest = max(1, frf.frequency.size // 16)
     for length in SCALES[longest >= SCALES]:
         mean = _running_mean(frf.mobility, length)
         gain = (2 * length**2 + 1) / (3 * length**3)
         rms = np.sqrt(gain * np.maximum(_running_mean(noise**2, length), 0.0))
-        for new in _peaks(frf, mean, rms):
+        for new in _peaks(frf, mean, rms, least):
             same = [i for i, old in enumerate(found) if _is_same(new, old)]
             if not same:
                 found.append(new)
@@ -131,12 +164,15 @@ def _is_as_high(new: _Peak, old: _Peak) -> bool:
     return old.resonance.height - new.resonance.height < NOISE_LOSS * old.noise
 
 
-def _peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.float64]) -> list[_Peak]:
+def _peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.float64], least: float) -> list[_Peak]:
     size = np.abs(mobility)
     decibel = 20 * np.log10(np.maximum(size, 1e-12 * size.max()))
-    tops, found = find_peaks(decibel, prominence=PROMINENCE_DB)
+    between_valleys = np.pad(decibel, 1, constant_values=np.min(decibel))
+    floor = 20 * np.log10(np.maximum(NOISE_MULTIPLE * noise, max(least, 1e-12 * size.max())))
+    tops, found = find_peaks(between_valleys, height=np.pad(floor, 1), prominence=PROMINENCE_DB)
+    tops -= 1
     rise = size[tops] * (1 - 10 ** (-found["prominences"] / 20))
-    high = tops[rise > NOISE_MULTIPLE * noise[tops]]
+    high = tops[(rise > NOISE_MULTIPLE * noise[tops]) & (tops > 0) & (tops < size.size - 1)]
     return [_peak(frf, mobility, int(top), float(noise[top])) for top in high]
 
 
@@ -173,7 +209,7 @@ def _lines_down(size: NDArray[np.float64]) -> float:
     return float(end - (level - side[end]) / (side[end - 1] - side[end]))
 
 
-def _noise(frf: Frf) -> NDArray[np.float64]:
+def mobility_noise(frf: Frf) -> NDArray[np.float64]:
     """rms of the noise on each line of the mobility, from third differences of what was measured, shape (n,)."""
     factor = measuring_factor(frf)
     rough = np.abs(np.diff(frf.receptance * factor, 3)) / np.sqrt(20)

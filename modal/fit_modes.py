@@ -54,6 +54,7 @@ def _modes(state: Extraction, band: FittedBand, without: Sequence[Frf]) -> list[
             float(fit.damping_ratio[i]),
             float(1 / fit.flexibility[0, i]),
             of_one(fit.covariance, i, fit.flexibility[0]),
+            fit.freedom,
             method,
             None if scatter is None else of_one(scatter, i, fit.flexibility[0]),
             len(without),

@@ -127,6 +127,7 @@ def _mode(fit: BandFit, i: int) -> Mode:
         float(fit.damping_ratio[i]),
         float(1 / constants[0]),
         of_one(fit.covariance, i, fit.flexibility[0]),
+        fit.freedom,
         f"least squares of {constants.size} FRFs",
         shape=shape,
     )

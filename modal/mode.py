@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri, stdtrit
+from scipy.special import stdtrit
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +27,8 @@ class Mode:
     """Covariance of (frequency, damping_ratio, stiffness) from the residual of the fit, SI units, shape (3, 3).
 
     It takes the errors of neighbouring lines as independent. None where not estimated."""
+    freedom: float = np.inf
+    """Degrees of freedom of that covariance: real values fitted less unknowns, all of its band."""
     method: str = ""
     """How it was found."""
     jackknife: NDArray[np.float64] | None = None
@@ -56,6 +58,8 @@ class Mode:
         for name, matrix in (("covariance", self.covariance), ("jackknife", self.jackknife)):
             if matrix is not None and np.shape(matrix) != (3, 3):
                 raise ValueError(f"{name} has shape {np.shape(matrix)}, not (3, 3)")
+        if not self.freedom > 0:
+            raise ValueError(f"freedom={self.freedom} is not a number > 0")
         if self.jackknife is not None and self.n_hits < 2:
             raise ValueError(f"n_hits={self.n_hits}: a jackknife has at least 2 hits")
 
@@ -93,12 +97,12 @@ class Mode:
         if not 0 < level < 1:
             raise ValueError(f"level={level} is not between 0 and 1")
         p = (1 + level) / 2
-        return float(ndtri(p) if self.jackknife is None else stdtrit(self.n_hits - 1, p))
+        return float(stdtrit(self.freedom if self.jackknife is None else self.n_hits - 1, p))
 
     def interval(self, level: float = 0.95) -> NDArray[np.float64]:
         """Limits that hold the truth with this probability, (low, high) of frequency, damping and stiffness, (3, 2).
 
-        Student's t with n_hits - 1 degrees of freedom over hits, else the normal distribution."""
+        Student's t: with n_hits - 1 degrees of freedom over hits, else with those of the fit."""
         reach = self.quantile(level) * self.standard_error
         value = np.array([self.frequency, self.damping_ratio, self.stiffness])
         return np.stack([value - reach, value + reach], axis=1)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquisition import Frf, from_accelerance
 from acquisition.frf import Quantity
-from modal import Mode, fit_modes, synthesize
+from modal import Mode, cut_edges, fit_modes, synthesize
 
 LINES = np.arange(5.0, 4000.0, 5.0)
 SPINDLE = [Mode(900.0, 0.03, 4e7), Mode(1722.0, 0.03, 3.5e7), Mode(2900.0, 0.03, 3e7)]
@@ -100,6 +100,66 @@ def test_one_stray_line_of_a_single_hit_is_left_out() -> None:
 @pytest.mark.parametrize("high", [1760.0, 1800.0, 1900.0])
 def test_a_mode_near_the_edge_of_the_band(high: float) -> None:
     assert_found(fit_modes(measured(SPINDLE, LINES), (500.0, high)), SPINDLE[:2])
+
+
+def test_a_weak_mode_on_the_flank_of_a_strong_one_is_found() -> None:
+    """It has no peak of its own; left out, it shifts zeta and K of the strong one by one standard error."""
+    pair = [Mode(1500.0, 0.03, 3e7), Mode(1900.0, 0.03, 1.5e9)]
+    for seed in range(5):
+        assert_found(fit_modes(measured(pair, LINES, 1, seed)), pair)
+
+
+def test_a_ripple_of_a_percent_beside_a_mode_is_no_mode() -> None:
+    pair = [Mode(1500.0, 0.03, 3e7), Mode(1900.0, 0.03, 3e9)]
+    for seed in range(5):
+        assert len(fit_modes(measured(pair, LINES, 1, seed))) == 1
+
+
+def test_lines_of_hum_beside_a_mode_are_no_modes() -> None:
+    """Taken for modes they would narrow its band, and K be less certain."""
+    lines, true = np.arange(1.0, 4000.0), SPINDLE[2:]
+    for seed in range(3):
+        turns = np.random.default_rng(seed).uniform(size=(1, lines.size))
+        hum = np.where(lines % 50 == 0, 0.02, 0.0) * np.exp(2j * np.pi * turns)
+        found, without = fit_modes(measured(true, lines, 1, seed, hum)), fit_modes(measured(true, lines, 1, seed))
+        assert_found(found, true)
+        assert found[0].standard_error[2] < 1.5 * without[0].standard_error[2]
+
+
+@pytest.mark.parametrize("ends", [(1480.0, 4000.0), (4.0, 1520.0)])
+def test_a_peak_a_few_lines_from_the_edge_is_found_and_flagged(ends: tuple[float, float]) -> None:
+    true = [Mode(1500.0, 0.03, 3e7)]
+    for seed in range(5):
+        found = fit_modes(measured(true, np.arange(*ends, 4.0), 1, seed))
+        assert_found(found, true)
+        assert "its peak is cut by the edge" in found[0].doubts[0]
+
+
+@pytest.mark.parametrize("ends", [(1496.0, 4000.0), (1520.0, 4000.0), (4.0, 1506.0), (4.0, 1482.0)])
+def test_a_peak_on_the_edge_or_just_beyond_is_said(ends: tuple[float, float]) -> None:
+    lines = np.arange(*ends, 4.0)
+    frf = measured([Mode(1500.0, 0.03, 3e7), Mode(700.0, 0.02, 3e8), Mode(2900.0, 0.02, 3e8)], lines, 1)
+    found = fit_modes(frf)
+    assert len(found) == 1
+    assert cut_edges(frf, found) == [lines[0] if ends[0] > 1000 else lines[-1]]
+
+
+def test_an_edge_on_a_flank_or_on_a_fitted_peak_is_no_cut() -> None:
+    frf = measured(SPINDLE, LINES, 1)
+    for band in ((1200.0, 2400.0), (5.0, 2500.0), (1500.0, 3995.0), (500.0, 1750.0)):
+        assert cut_edges(frf, fit_modes(frf, band), band) == []
+    assert cut_edges(frf, [], (500.0, 1730.0)) == [1730.0]
+
+
+@pytest.mark.parametrize("low", [975.0, 1000.0, 2025.0])
+def test_a_fall_to_an_antiresonance_is_no_cut(low: float) -> None:
+    """Several half-widths above a mode the others turn its mobility real for some lines."""
+    assert cut_edges(measured(SPINDLE, LINES, 10), [], (low, 3995.0)) == []
+
+
+def test_the_line_of_a_mass_is_no_peak() -> None:
+    w = 2 * np.pi * LINES
+    assert cut_edges(from_accelerance(LINES, synthesize(SPINDLE, LINES).accelerance + 0.5 + 0j * w), []) == []
 
 
 def test_a_strong_mode_beside_the_band_does_not_bend_a_weak_one_in_it_unsaid() -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.text import Annotation
 
 from acquisition import Frf, from_accelerance
 from lobewatch.cli import main
@@ -77,6 +78,27 @@ def test_figure_draws_fit_residual_poles_and_circles() -> None:
     radius = np.pi * 900 / (2 * 0.02 * 4e7) * 1e3
     assert np.hypot(circle[:, 0] - radius, circle[:, 1]) == pytest.approx(radius, rel=0.02)
     assert np.hypot(points[:, 0] - radius, points[:, 1]) == pytest.approx(radius, rel=0.1)
+
+
+def test_figure_keeps_labels_of_close_modes_apart() -> None:
+    close = [Mode(1700.0, 0.01, 4e7), Mode(1704.0, 0.01, 4e7), Mode(1706.0, 0.01, 4e7)]
+    top = modes_figure(extract(noisy()), close, "x").axes[0]
+    places = [label.xy[0] for label in top.texts if isinstance(label, Annotation)]
+    assert places[0] == 1700.0
+    assert np.all(np.diff(places) >= 0.01 * (LINES[-1] - LINES[0]))
+
+
+def test_command_says_where_a_peak_may_be_cut(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    frf = noisy().in_band((1722.0, 4000.0))
+    file = tmp_path / "frf.csv"
+    table = np.stack([frf.frequency, frf.receptance.real, frf.receptance.imag], axis=1)
+    np.savetxt(file, table, header="Freq Real Imag", comments="")
+    assert command(monkeypatch, str(file)) == 0
+    assert "a peak may be cut by the edge of the lines at 1725 Hz" in capsys.readouterr().out
+    assert command(monkeypatch, str(file), "--json") == 0
+    assert "1725 Hz" in json.loads(capsys.readouterr().out)["notes"][0]
 
 
 def test_command_corrects_an_exponential_window_and_draws(

@@ -9,11 +9,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import norm, t
 
-from acquisition import Hit, Structure, estimate_frf
+from acquisition import Frf, Hit, Structure, estimate_frf, from_accelerance
 from lobewatch.emulation import SAMPLE_RATE, emulated_structure
 from lobewatch.machine import parse_machine
-from modal import Mode, fit_modes
+from modal import Mode, extract, fit_modes, synthesize
 
+STRONG, WEAK = Mode(1500.0, 0.03, 3e7), Mode(1900.0, 0.03, 1.5e9)
 RECORD, PRE_TRIGGER = 6400, 512
 """0.25 s and 0.02 s, the demo's."""
 
@@ -47,6 +48,13 @@ def tap(seed: int, hits: int = 10, hammer_noise: float = 0.1, sensor_noise: floa
 
 def first_mode(hits: list[Hit]) -> Mode:
     return fit_modes(estimate_frf(hits), hits=hits)[0]
+
+
+def one_average(modes: list[Mode], lines: NDArray[np.float64], level: float, seed: int) -> Frf:
+    """FRF without hits; white noise of level times the largest accelerance on it."""
+    exact = synthesize(modes, lines).accelerance
+    noise = np.random.default_rng(seed).normal(size=(2, lines.size)) / np.sqrt(2) * level * np.max(np.abs(exact))
+    return from_accelerance(lines, exact + noise[0] + 1j * noise[1])
 
 
 def values(mode: Mode) -> NDArray[np.float64]:
@@ -96,15 +104,28 @@ def test_noise_of_the_hammer_is_seen_by_the_hits_and_not_by_the_fit() -> None:
     assert of_fits[0] < scatter[0] / 2
 
 
-def test_interval_is_students_over_hits_and_normal_without() -> None:
+def test_interval_is_students_over_hits_and_with_the_freedom_of_the_fit_without() -> None:
     cov = np.diag([4.0, 1e-8, 9e8])
     alone = Mode(1722.0, 0.03, 3.5e7, cov)
+    of_few_lines = Mode(1722.0, 0.03, 3.5e7, cov, freedom=13)
     over_hits = Mode(1722.0, 0.03, 3.5e7, cov, jackknife=4 * cov, n_hits=10)
     assert alone.interval()[0] == pytest.approx(1722 + norm.ppf([0.025, 0.975]) * 2)
+    assert of_few_lines.interval()[0] == pytest.approx(1722 + t.ppf([0.025, 0.975], 13) * 2)
     assert over_hits.interval(0.9)[2] == pytest.approx(3.5e7 + t.ppf([0.05, 0.95], 9) * 6e4)
     assert np.all(np.isnan(Mode(1722.0, 0.03, 3.5e7).interval()))
     with pytest.raises(ValueError, match="not between 0 and 1"):
         alone.interval(1.0)
+
+
+def test_freedom_of_a_fit_is_twice_its_lines_less_unknowns() -> None:
+    """One mode has three, four complex residual terms eight."""
+    (mode,) = fit_modes(one_average([STRONG], np.linspace(1300.0, 1700.0, 12), 0.001, 0))
+    assert mode.freedom == 2 * 12 - 3 - 8
+
+
+def test_freedom_is_positive() -> None:
+    with pytest.raises(ValueError, match="freedom=0 is not"):
+        Mode(1722.0, 0.03, 3.5e7, freedom=0)
 
 
 def test_correlation_of_damping_and_stiffness_of_a_driving_point_is_negative() -> None:
@@ -129,7 +150,7 @@ def coverage(hammer_noise: float) -> tuple[NDArray[np.float64], NDArray[np.float
     modes = [first_mode(tap(1000 + seed, hammer_noise=hammer_noise)) for seed in range(TESTS)]
     error = np.abs([values(mode) - TRUTH for mode in modes])
     over_hits = error < t.ppf(0.975, 9) * np.array([mode.standard_error for mode in modes])
-    of_fit = error < norm.ppf(0.975) * np.array([mode.fit_error for mode in modes])
+    of_fit = error < np.array([t.ppf(0.975, mode.freedom) * mode.fit_error for mode in modes])
     print(f"hammer noise {hammer_noise} N: over hits {over_hits.mean(axis=0)}, of the fit {of_fit.mean(axis=0)}")  # noqa: T201
     return over_hits.mean(axis=0), of_fit.mean(axis=0)
 
@@ -147,3 +168,43 @@ def test_95_percent_interval_over_hits_holds_the_truth_in_the_chain_of_the_demo(
     over_hits, of_fit = coverage(hammer_noise=0.1)
     assert np.all((over_hits >= 0.92) & (over_hits <= 0.98))
     assert np.all(of_fit > 0.8)
+
+
+def correlation_of_neighbouring_lines(hits: list[Hit]) -> float:
+    """Of what the fit of the first mode leaves, weighted."""
+    state = extract(estimate_frf(hits))
+    left = state.left(state.bands[0]) * state.weight[state.bands[0].lines]
+    return float(np.real(np.vdot(left[:-1], left[1:])) / np.linalg.norm(left) ** 2)
+
+
+@pytest.mark.long
+@pytest.mark.timeout(600)
+def test_what_a_fit_leaves_does_not_show_noise_of_the_hammer() -> None:
+    """It is as white with the noise that makes the interval of the fit too narrow: no covariance can be made of it."""
+    noises = (0.02, 0.1)
+    each = [[correlation_of_neighbouring_lines(tap(s, hammer_noise=noise)) for s in range(200)] for noise in noises]
+    without, with_noise = np.mean(each, axis=1)
+    print(f"neighbouring lines: {without:.3f}, with noise of the hammer {with_noise:.3f}")  # noqa: T201
+    assert abs(with_noise - without) < 0.01
+    assert abs(with_noise) < 0.05
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("modes", "lines", "level"),
+    [
+        ([STRONG], np.arange(5.0, 4000.0, 5.0), 0.002),
+        ([STRONG, WEAK], np.arange(5.0, 4000.0, 5.0), 0.002),
+        ([STRONG], np.linspace(1300.0, 1700.0, 12), 0.005),
+        ([Mode(1500.0, 0.0005, 3e7)], np.arange(4.0, 4000.0, 4.0), 0.001),
+    ],
+    ids=["alone", "weak neighbour", "12 lines", "0.05 % at 4 Hz"],
+)
+def test_95_percent_interval_of_one_average_holds_the_truth(
+    modes: list[Mode], lines: NDArray[np.float64], level: float
+) -> None:
+    truth = values(modes[0])[:, None]
+    limits = np.array([fit_modes(one_average(modes, lines, level, seed))[0].interval() for seed in range(400)])
+    share = np.mean((limits[:, :, :1] < truth) & (truth < limits[:, :, 1:]), axis=0)[:, 0]
+    print(f"{len(modes)} modes, {lines.size} lines: {share}")  # noqa: T201
+    assert np.all((share >= 0.92) & (share <= 0.98))

@@ -13,7 +13,7 @@ from lobewatch.describe import doubt_lines, mode_json, mode_lines, mode_table, p
 from lobewatch.figures import save_figure
 from lobewatch.figures_modes import modes_figure
 from lobewatch.output import Json, emit
-from modal import Mode, extract, fit_modes, pick_peaks, remove_window
+from modal import Mode, cut_edges, extract, fit_modes, pick_peaks, remove_window
 
 
 def modes(
@@ -45,6 +45,11 @@ def modes(
     frf = replace(frf, receptance=frf.receptance.conj()) if conjugate else frf
     hits = [] if conjugate else _good_hits(file)
     found, picked = fit_modes(frf, band, hits), pick_peaks(frf, band)
+    cut = [
+        f"a peak may be cut by the edge of the lines at {edge:.0f} Hz, its mode missing: widen the band (a harder "
+        "hammer tip reaches higher)"
+        for edge in cut_edges(frf, found, band)
+    ]
     if figure is not None:
         save_figure(modes_figure(extract(frf, band), found, file.name), figure)
     fitted = [_without(window, mode) for mode in found]
@@ -54,6 +59,7 @@ def modes(
         "usable_band_hz": frf.usable_band,
         "modes": [mode_json(mode) for mode in fitted],
         "peak_picking": [mode_json(mode) for mode in picked],
+        "notes": cut,
     }
     usable = "" if frf.usable_band is None else f", usable {frf.usable_band[0]:.0f} to {frf.usable_band[1]:.0f} Hz"
     lines = f"{frf.frequency.size} lines {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
@@ -64,6 +70,7 @@ def modes(
         mode_table(fitted),
         *mode_lines(fitted),
         *doubt_lines(fitted),
+        *cut,
         "peak picking (eqs. 28, 29), for comparison:",
         picked_table(picked, found),
         *([] if fitted else ["no mode found: is the band right, was the hit hard enough?"]),

@@ -11,7 +11,7 @@ from lobes.cut import Cut
 from lobes.stability_lobes import Lobe, StabilityLobes
 from lobes.tip_response import TipResponse
 
-FIRST_BLOCK = 128
+FIRST_BLOCK = 64
 """Grid steps searched first; every further block is twice as long ..."""
 BLOCK = 2_000_000
 """... up to this many grid values (speeds times steps): it bounds the memory."""

@@ -88,7 +88,7 @@ def _out_of_band(branches: Sequence[TipResponse], responses: Sequence[Complexes]
 
 def _out_of_range(method: str, cut: Cut, chatter: float, speed_rpm: Floats) -> str:
     """Whether the cut is too slender, or the teeth too fast, for a mean force, in words."""
-    instead = "use semi-discretisation (stability_boundary)"
+    instead = "use semi-discretisation"
     if cut.immersion < LOW_IMMERSION:
         return (
             f"{method} knows no flip lobes: at immersion {cut.immersion:g} (below {LOW_IMMERSION}) the true limit can "

@@ -16,6 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from lobes import DepthBand, Pocket, RadialLobes
+from lobes.pockets import SHARE
 from lobewatch.figures import ALARM, GOOD, NOW, THEN, new_axes
 
 Floats = NDArray[np.float64]
@@ -123,8 +124,9 @@ def _fill(axes: Axes, speed_rpm: Floats, band: DepthBand, top: float, **style: A
 
 
 def _draw_pocket(axes: Axes, pocket: Pocket) -> None:
-    """A line at the speed of a pocket, with the speed at its foot."""
+    """A line at the speed of a pocket, with the speed at its foot, and a bar as wide as the pocket."""
     axes.axvline(pocket.speed_rpm, color=NOW, ls=":", lw=1)
+    axes.plot((pocket.from_rpm, pocket.to_rpm), (SHARE * pocket.depth * 1e3,) * 2, color=NOW, lw=1, marker="|", ms=7)
     axes.annotate(
         f"{pocket.speed_rpm:.0f} rpm",
         (pocket.speed_rpm, 0.02),

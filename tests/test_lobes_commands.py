@@ -65,7 +65,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
 @pytest.fixture
 def folder(tmp_path: Path) -> MachineFolder:
     make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
-    return MachineFolder(tmp_path / "m")
+    return edit(MachineFolder(tmp_path / "m"), "high_rpm = 24000", "high_rpm = 24000\nsteps = 300")
 
 
 def tap(
@@ -206,8 +206,6 @@ def test_check_without_anything_to_check_is_refused(run: Run, folder: MachineFol
 
 
 def test_methods_pockets_and_shifts(run: Run, folder: MachineFolder) -> None:
-    edit(folder, "high_rpm = 24000", "high_rpm = 24000\nsteps = 300")
-    folder = MachineFolder(folder.path)
     tap(folder, 1713.0)
     tap(folder, 1713.0 * 0.95, days=300)
     zero, angle, semi = (
@@ -233,7 +231,7 @@ def test_methods_pockets_and_shifts(run: Run, folder: MachineFolder) -> None:
 
 
 def test_pictures(run: Run, folder: MachineFolder) -> None:
-    edit(folder, "high_rpm = 24000", "high_rpm = 24000\nsteps = 60")
+    edit(folder, "steps = 300", "steps = 60")
     edit(folder, "tangential_n_per_mm2 = 1400\nradial_n_per_mm2 = 500", 'material = "Al 7075 (HSS; dry)"')
     folder = MachineFolder(folder.path)
     tap(folder, 1713.0)
@@ -246,7 +244,6 @@ def test_pictures(run: Run, folder: MachineFolder) -> None:
 
 def test_an_own_material_has_no_published_spread(run: Run, folder: MachineFolder) -> None:
     edit(folder, "tangential_n_per_mm2 = 1400\nradial_n_per_mm2 = 500", 'material = "Al 7075 (HSS; dry)"')
-    folder = edit(folder, "high_rpm = 24000", "high_rpm = 24000\nsteps = 60")
     tap(folder, 1713.0)
     run("lobes", "m", "--figure", "published.svg")
     own = '[[material]]\nname = "Al 7075 (HSS; dry)"\ntangential_n_per_mm2 = 800\nradial_n_per_mm2 = 200\n\n[speed]'
@@ -257,7 +254,6 @@ def test_an_own_material_has_no_published_spread(run: Run, folder: MachineFolder
 
 
 def test_a_verdict_by_zero_order_sends_to_check(run: Run, folder: MachineFolder) -> None:
-    folder = edit(folder, "high_rpm = 24000", "high_rpm = 24000\nsteps = 60")
     tap(folder, 1713.0)
     program = ("lobes", "m", "--cut", "A: slot at 12 900 rpm")
     said = [run(*program, "--method", method).out for method in ("zero-order", "semi-discretisation")]

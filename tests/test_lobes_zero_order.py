@@ -138,7 +138,7 @@ def test_fast_teeth_are_warned_of_where_flip_lobes_make_the_limit_lower(directio
         true = stability_boundary(mode, None, cut, speeds, deepest).depth
         assert bool(np.any(np.minimum(mean.depth, deepest) > 1.1 * true)) == far_off
         assert ("above 1" in mean.warning, "no flip lobes" in mean.warning) == (far_off, far_off)
-        assert zero_order(mode, None, cut, speeds / 6).warning == ""
+        assert "no flip lobes" not in zero_order(mode, None, cut, speeds / 6).warning
 
 
 @pytest.mark.parametrize(

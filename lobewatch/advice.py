@@ -176,7 +176,7 @@ def _remarks(table: ProgramTable, machine: Machine, now: Measurement) -> Iterato
 def _was_stable(program: Program, now: Measurement, then: Measurement) -> bool | None:
     if (bool(now.x), bool(now.y)) != (bool(then.x), bool(then.y)):
         return None
-    return bool(_limits(program, then.x, then.y).depth[0] > program.depth)
+    return bool(stability_boundary(then.x, then.y, program.cut, program.speed_rpm, program.depth).depth[0] == np.inf)
 
 
 def _limits(program: Program, x: Modes, y: Modes) -> StabilityLobes:

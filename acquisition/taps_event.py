@@ -25,8 +25,8 @@ class EventKind(enum.IntEnum):
 
 
 _FAULTS = {
-    EventKind.CABLE: "the cable of the {} sensor is broken or not plugged in; check it at both ends",
-    EventKind.SENSOR_BIAS: "the {} sensor has no proper supply (bias voltage out of range); check the sensor, "
+    EventKind.CABLE: "the cable of the {} sensor is broken or not plugged in: check it at both ends",
+    EventKind.SENSOR_BIAS: "the {} sensor has no proper supply (bias voltage out of range): check the sensor, "
     "its cable and the IEPE switch",
 }
 

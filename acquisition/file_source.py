@@ -6,6 +6,8 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import TracebackType
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +47,16 @@ class FileSource:
         self.info = {"model": f"replay of {Path(path).name}"}
         self._hits, self._realtime = hits, realtime
         self._stopped = threading.Event()
+
+    def __enter__(self) -> Self:
+        """The source."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End it."""
+        self.stop()
 
     def start(self) -> None:
         """Begin at the first hit."""

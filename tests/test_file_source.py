@@ -97,12 +97,13 @@ def test_in_real_time_scans_come_when_they_are_due(
     tmp_path: Path, tapper: Callable[..., HammeredStructure], channels: Pair
 ) -> None:
     tap_file(tmp_path / "a.h5", tapper, channels)
-    source = FileSource(tmp_path / "a.h5")
-    source.start()
-    threading.Timer(0.5, source.stop).start()
-    began = time.monotonic()
-    blocks = list(source.blocks())
-    came, due = time.monotonic() - began, (blocks[-1].first_scan + 512) / 25600.0
-    assert 0 < due <= came
-    source.start()
-    assert next(source.blocks()).first_scan == 0
+    with FileSource(tmp_path / "a.h5") as source:
+        source.start()
+        threading.Timer(0.5, source.stop).start()
+        began = time.monotonic()
+        blocks = list(source.blocks())
+        came, due = time.monotonic() - began, (blocks[-1].first_scan + 512) / 25600.0
+        assert 0 < due <= came
+        source.start()
+        assert next(source.blocks()).first_scan == 0
+    assert list(source.blocks()) == []

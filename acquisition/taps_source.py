@@ -42,6 +42,7 @@ class TapsSource:
         self._seq = 0
         self._events = EventLog()
         self._stream: ScanStream | None = None
+        self._streaming = False
         self.status: Status | None = None
         """What the device has last reported of itself (every 0.5 s of a stream)."""
         try:
@@ -74,7 +75,7 @@ class TapsSource:
 
     @property
     def lost_scans(self) -> int:
-        """Scans of this stream that never came."""
+        """Scans of this or the last stream that never came."""
         return self._stream.lost_scans if self._stream else 0
 
     @property
@@ -92,10 +93,11 @@ class TapsSource:
         self.status = None
         answer = self._command(MessageType.START, (0).to_bytes(8, "little"))
         self._stream = ScanStream(answer.session, len(self.channels))
+        self._streaming = True
 
     def stop(self) -> None:
         """End the stream; in the thread that reads the blocks."""
-        self._stream = None
+        self._streaming = False
         self._command(MessageType.STOP)
 
     def close(self) -> None:
@@ -110,7 +112,7 @@ class TapsSource:
     def blocks(self) -> Iterator[Block]:
         """Blocks with the scans lost before each; DeviceError where the device falls silent or is unplugged."""
         heard = time.monotonic()
-        while self._stream is not None:
+        while self._stream is not None and self._streaming:
             frame = self._next_frame(0.1)
             if frame is not None and frame.type == MessageType.DATA:
                 block = self._stream.accept(frame)

@@ -113,6 +113,8 @@ def test_lost_frames_are_counted_exactly_and_mark_the_hits(
             assert np.array_equal(block.codes, expected[:, block.first_scan : block.first_scan + 512])
         assert all(b.first_scan == a.first_scan + 512 + b.lost_before for a, b in pairwise(received))
         source.stop()
+        assert list(source.blocks()) == []
+        assert source.lost_scans == lost
         source.start()
         hits = list(islice(capture_hits(source, TRIGGER), 3))
     # 6400 scans have 12 or 13 joints between frames inside them, every sixth (fifth) of which is a gap

@@ -6,6 +6,8 @@ from acquisition.channel import Block, Channel
 from acquisition.check_hit import check_hit
 from acquisition.errors import DataError, DeviceError
 from acquisition.estimate_frf import cross_spectra, estimate_frf
+from acquisition.file_source import FileSource
+from acquisition.find_port import find_port, usb_identity
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hammered_structure import HammeredStructure, Hammering, Structure
 from acquisition.hit import Hit, HitFlags
@@ -14,7 +16,9 @@ from acquisition.simulated_source import SimulatedSource
 from acquisition.source import Source
 from acquisition.tap_file import read_tap, read_tap_hits, write_hit, write_tap
 from acquisition.tap_test import Circumstances, SourceFile, TapTest, average_good, new_tap_id
-from acquisition.taps_emulator import Faults, TapsEmulator
+from acquisition.taps_emulator import TapsEmulator
+from acquisition.taps_event import Event, EventKind
+from acquisition.taps_faults import Faults
 from acquisition.taps_source import TapsSource
 
 __all__ = [
@@ -23,7 +27,10 @@ __all__ = [
     "Circumstances",
     "DataError",
     "DeviceError",
+    "Event",
+    "EventKind",
     "Faults",
+    "FileSource",
     "Frf",
     "HammeredStructure",
     "Hammering",
@@ -43,6 +50,7 @@ __all__ = [
     "check_hit",
     "cross_spectra",
     "estimate_frf",
+    "find_port",
     "from_accelerance",
     "new_tap_id",
     "read_frf",
@@ -51,6 +59,7 @@ __all__ = [
     "read_tap",
     "read_tap_hits",
     "recorded_as",
+    "usb_identity",
     "write_hit",
     "write_tap",
 ]

@@ -23,11 +23,16 @@ class Recorded:
     sample_rate = RATE
 
     def __init__(
-        self, force: NDArray[np.int32], block: int = 7, gaps: tuple[int, ...] = (), channels: tuple[Channel, ...] = UNIT
+        self,
+        force: NDArray[np.int32],
+        block: int = 7,
+        gaps: tuple[int, ...] = (),
+        channels: tuple[Channel, ...] = UNIT,
+        overloads: dict[int, int] | None = None,
     ) -> None:
         self.channels = channels
         self._codes = np.stack([force, np.arange(force.size, dtype=np.int32)])
-        self._block, self._gaps = block, gaps
+        self._block, self._gaps, self._overloads = block, gaps, overloads or {}
 
     def start(self) -> None: ...
 
@@ -36,7 +41,8 @@ class Recorded:
     def blocks(self) -> Iterator[Block]:
         for first in range(0, self._codes.shape[1], self._block):
             lost = 5 if first in self._gaps else 0
-            yield Block(first, self._codes[:, first : first + self._block], lost_before=lost)
+            overload = self._overloads.get(first, 0)
+            yield Block(first, self._codes[:, first : first + self._block], overload, lost)
 
 
 def force(*hits: int, n: int = 400, shape: tuple[int, ...] = (30, 70, 150, 300, 150, 40)) -> NDArray[np.int32]:
@@ -73,6 +79,22 @@ def test_below_the_level_nothing_happens_and_an_offset_is_no_hit() -> None:
 def test_a_gap_counts_for_the_hit_that_it_touches_only(gap_at: int, lost: int) -> None:
     (hit,) = capture_hits(Recorded(force(106), 7, (gap_at,)), TRIGGER)
     assert hit.lost_scans == lost
+
+
+@pytest.mark.parametrize(
+    ("reported", "overload"),
+    [({91: 1}, 0), ({98: 1}, 1), ({105: 1, 140: 2}, 3), ({147: 4}, 0), ({147: 2}, 2), ({154: 3}, 0)],
+)
+def test_an_overload_counts_for_the_hit_that_it_touches_only(reported: dict[int, int], overload: int) -> None:
+    (hit,) = capture_hits(Recorded(force(110), 7, overloads=reported), TRIGGER)  # the record is 102 to 151
+    assert hit.overload == overload
+
+
+def test_a_hammer_of_negative_sensitivity_triggers_too() -> None:
+    wired = (Channel("force", -1.0, 32768.0), UNIT[1])
+    (hit,) = capture_hits(Recorded(-force(100), channels=wired), TRIGGER)
+    assert hit.force[10] == 150
+    assert np.max(hit.force) == 300
 
 
 def test_simulated_hits_start_at_the_trigger(

@@ -82,6 +82,15 @@ def test_a_tap_test_is_read_back_to_the_bit(tap: TapTest, tmp_path: Path) -> Non
     assert HitFlags.LOST_SCANS in read.flags[-1]
 
 
+def test_a_file_from_before_overloads_were_reported_is_read(tap: TapTest, tmp_path: Path) -> None:
+    reported = (replace(tap.hits[0], overload=2), *tap.hits[1:])
+    write_tap(tmp_path / "tap.h5", replace(tap, hits=reported))
+    assert [hit.overload for hit in read_tap(tmp_path / "tap.h5").hits] == [2] + [0] * (len(tap.hits) - 1)
+    with h5py.File(tmp_path / "tap.h5", "a") as file:
+        del file["raw/overload"]
+    assert not any(hit.overload for hit in read_tap(tmp_path / "tap.h5").hits)
+
+
 def test_the_frf_can_be_made_again_from_the_stored_codes(tap: TapTest, tmp_path: Path) -> None:
     write_tap(tmp_path / "tap.h5", tap)
     again, flags = average_good(read_tap(tmp_path / "tap.h5").hits)

@@ -4,6 +4,9 @@ from acquisition.atomic_write import atomic_write
 from acquisition.capture_hits import Trigger, capture_hits
 from acquisition.channel import Block, Channel
 from acquisition.check_hit import check_hit
+from acquisition.dataq import DataqInput
+from acquisition.dataq_emulator import DataqEmulator, DataqFaults, DataqTraits
+from acquisition.dataq_source import DataqSource
 from acquisition.errors import DataError, DeviceError
 from acquisition.estimate_frf import cross_spectra, estimate_frf
 from acquisition.frf import Frf, from_accelerance
@@ -22,6 +25,11 @@ __all__ = [
     "Channel",
     "Circumstances",
     "DataError",
+    "DataqEmulator",
+    "DataqFaults",
+    "DataqInput",
+    "DataqSource",
+    "DataqTraits",
     "DeviceError",
     "Faults",
     "Frf",

@@ -74,7 +74,9 @@ def choose_rate(wanted: float, dividend: int) -> RateSetting:
     """The setting that comes nearest to a rate (Hz), with as little decimation as can be; ValueError out of reach."""
     fastest, slowest = dividend / SRATE[0], dividend / (SRATE[1] * DEC[1] * DECA[1])
     if not slowest <= wanted <= fastest:
-        raise ValueError(f"sample rate {wanted:g} Hz is not between {slowest:.2g} and {fastest:g} Hz, what this DAQ has")
+        raise ValueError(
+            f"sample rate {wanted:g} Hz is not between {slowest:.2g} and {fastest:g} Hz, what this DAQ has"
+        )
     dec = min(math.ceil(dividend / wanted / SRATE[1]), DEC[1])
     deca = min(math.ceil(dividend / wanted / SRATE[1] / dec), DECA[1])
     srate = round(dividend / wanted / dec / deca)

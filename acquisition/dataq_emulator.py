@@ -68,6 +68,8 @@ class DataqFaults:
     """The buffer runs over after so many scans, once."""
     streaming_at_connect: bool = False
     """A program before this one has left it scanning."""
+    deaf: bool = False
+    """No command is heeded."""
 
 
 class DataqEmulator(EmulatorThread):
@@ -97,7 +99,8 @@ class DataqEmulator(EmulatorThread):
         self._scan_list = [0]
         self._settings = {"srate": 6000, "dec": 1, "deca": 1, "ps": 0, "encode": 1}
         self._received = b""
-        self._streaming = False
+        self.streaming = False
+        """Whether it is scanning."""
         self._may_overflow = True
         if self._faults.streaming_at_connect:
             self._start()
@@ -105,23 +108,23 @@ class DataqEmulator(EmulatorThread):
     def serve_once(self) -> bool:
         """See EmulatorThread."""
         lines, self._received = split_lines(self._received + self.wire.exchange(self._patience()))
-        for line in lines:
+        for line in [] if self._faults.deaf else lines:
             self._obey(line)
-        if self._streaming:
+        if self.streaming:
             self._stream()
         limit = self._faults.unplug_after
-        return limit is None or not self._streaming or self._scan < limit
+        return limit is None or not self.streaming or self._scan < limit
 
     def _patience(self) -> float:
         """How long to wait for the host (s)."""
-        if not self._streaming:
+        if not self.streaming:
             return 0.05
         return 0.002 if self._realtime or not self._has_room() else 0.0
 
     def _obey(self, line: str) -> None:
-        if self._streaming:
+        if self.streaming:
             if line == "stop":
-                self._streaming = False
+                self.streaming = False
                 if self._traits.echoes_stop:
                     self._say(line)
             return
@@ -145,10 +148,10 @@ class DataqEmulator(EmulatorThread):
             if arguments[0] != "*" or not 0 <= int(arguments[1]) <= 3:
                 raise ValueError(line)
         elif name in limits:
-            low, high = limits[name]
-            self._settings[name] = int(arguments[0])
-            if not low <= self._settings[name] <= high:
+            value = int(arguments[0])
+            if not limits[name][0] <= value <= limits[name][1]:
                 raise ValueError(line)
+            self._settings[name] = value
         elif name != "stop":
             return UNKNOWN
         return line
@@ -170,7 +173,7 @@ class DataqEmulator(EmulatorThread):
         self._signal = self._signal_at(self._rate * (len(self._scan_list) if self._traits.scanned else 1))
         self._started, self._scan, self._sent = self._clock(), 0, 0
         self._waiting = b""
-        self._streaming = True
+        self.streaming = True
 
     def _stream(self) -> None:
         """Make the scans that are due and send them in whole packets; stop where the host has fallen behind."""
@@ -200,7 +203,7 @@ class DataqEmulator(EmulatorThread):
 
     def _overflow(self) -> None:
         self.wire.pending += OVERFLOW + b"1\r"
-        self._streaming = False
+        self.streaming = False
 
     def _send(self, packet: bytes) -> None:
         if self._faults.drop_at is not None:

@@ -38,7 +38,8 @@ SILENCE = 3.0
 DEFAULT_RATE = 50_000.0
 """Hz, where none is asked for: force and acceleration with the digital word are 150 000 words a second."""
 CDC_HINT = (
-    "its LED must blink yellow (CDC mode): plug it in, hold its button while the LED is green until it turns red, let go"
+    "its LED must blink yellow (CDC mode): "
+    "plug it in, press its button while the LED is green, hold it until the LED is red, let go"
 )
 
 
@@ -146,8 +147,8 @@ class DataqSource:
     def _failed(self, sends: bool) -> DeviceError:
         if sends:
             return DeviceError(
-                f"the digital inputs of the DAQ on {self._link.port} do not hold still, so that lost bytes cannot be told: "
-                "leave them unconnected, or set loss_detection = false in [daq]"
+                f"the digital inputs of the DAQ on {self._link.port} do not hold still, so that lost bytes cannot be "
+                "told: leave them unconnected, or set loss_detection = false in [daq]"
             )
         return DeviceError(
             f"the DAQ on {self._link.port} has sent no samples for {SILENCE:g} s; "

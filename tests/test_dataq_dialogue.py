@@ -40,7 +40,7 @@ class ScriptedLink:
     port = "COM9"
     script: list[Pair]
 
-    def __init__(self, port: str) -> None:
+    def __init__(self, _port: str) -> None:
         self._received = b""
 
     def write(self, data: bytes) -> None:
@@ -49,7 +49,7 @@ class ScriptedLink:
         assert data == sent
         self._received += received
 
-    def read(self, timeout: float) -> bytes:
+    def read(self, _timeout: float) -> bytes:
         data, self._received = self._received, b""
         return data
 
@@ -115,7 +115,9 @@ def test_a_refused_command_is_told_with_the_words_of_the_device(answer: bytes) -
 
 
 def test_a_silent_device_gets_the_hint_to_cdc_mode() -> None:
-    with pytest.raises(DeviceError, match=r"no DATAQ device answers on COM9 \(info 0, 3 tries\); its LED must blink ye"):
+    with pytest.raises(
+        DeviceError, match=r"no DATAQ device answers on COM9 \(info 0, 3 tries\); its LED must blink ye"
+    ):
         connect([IDENTITY[0], *[(b"info 0\r", b"")] * 3])
 
 
@@ -167,7 +169,7 @@ def test_every_rate_within_reach_is_met_within_a_thousandth_and_others_are_refus
         assert 375 <= chosen.srate <= 65_535
         assert 1 <= chosen.dec <= 512
         assert 1 <= chosen.deca <= 40_000
-    with pytest.raises(ValueError, match="sample rate 200000 Hz is not between .* and 160000 Hz"):
+    with pytest.raises(ValueError, match=r"sample rate 200000 Hz is not between .* and 160000 Hz"):
         choose_rate(200_000.0, 60_000_000)
 
 
@@ -180,7 +182,12 @@ def test_packets_are_the_smallest_with_at_most_100_a_second(bytes_per_second: fl
 
 def test_small_facts_of_the_protocol() -> None:
     assert split_lines(b"info 0 DATAQ\r\0\nstop\rinf") == (["info 0 DATAQ", "stop"], b"inf")
-    assert [model_of(text) for text in ("4108", "DI-2108-P", "2108p", "DI-4718B")] == ["4108", "2108P", "2108P", "4718B"]
+    assert [model_of(text) for text in ("4108", "DI-2108-P", "2108p", "DI-4718B")] == [
+        "4108",
+        "2108P",
+        "2108P",
+        "4718B",
+    ]
     assert [firmware_of(text) for text in ("1.35", "87", "newest")] == [1.35, 1.35, None]
     assert [range_code("4108", volts) for volts in (10, 5, 2, 1, 0.5, 0.2)] == [0, 1, 2, 3, 4, 5]
     assert [range_code("1120", volts) for volts in (100, 50, 20, 10, 5, 2)] == [0, 1, 2, 3, 4, 5]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -22,9 +24,7 @@ def noise(n: int, seed: int, digital: int | None = PULLED_UP) -> NDArray[np.int1
 def decoded(stream: bytes, digital: bool = True, cuts: list[int] | None = None) -> list[Piece]:
     decoder = ScanDecoder(2, digital)
     edges = [0, *sorted(cuts or []), len(stream)]
-    return [
-        piece for start, end in zip(edges, edges[1:], strict=False) for piece in decoder.feed(stream[start:end])
-    ]
+    return [piece for start, end in itertools.pairwise(edges) for piece in decoder.feed(stream[start:end])]
 
 
 def placed(pieces: list[Piece]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:

@@ -218,7 +218,7 @@ def test_a_device_that_scans_already_is_taken_over(emulated: Make) -> None:
 
 def test_a_device_that_never_stops_is_refused(emulated: Make) -> None:
     with (
-        emulated(realtime=True, streaming_at_connect=True, deaf=True) as device,
+        emulated(streaming_at_connect=True, deaf=True) as device,
         pytest.raises(DeviceError, match=r"does not stop sending \(3 tries\)"),
     ):
         DataqSource(device.port, INPUTS, RATE)

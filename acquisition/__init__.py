@@ -19,8 +19,10 @@ from acquisition.tap_file import read_tap, read_tap_hits, write_hit, write_tap
 from acquisition.tap_test import Circumstances, SourceFile, TapTest, average_good, new_tap_id
 from acquisition.taps_emulator import Faults, TapsEmulator
 from acquisition.taps_source import TapsSource
+from acquisition.units import STANDARD_GRAVITY
 
 __all__ = [
+    "STANDARD_GRAVITY",
     "Block",
     "Channel",
     "Circumstances",

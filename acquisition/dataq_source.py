@@ -13,34 +13,22 @@ from acquisition.dataq import (
     DIGITAL_INPUTS,
     OLDEST_FIRMWARE,
     DataqInput,
-    answer_in,
     choose_packet,
     choose_rate,
     encode_command,
     firmware_of,
-    model_of,
     range_code,
     scan_code,
-    split_lines,
 )
+from acquisition.dataq_dialogue import DataqDialogue, DataqIdentity
 from acquisition.dataq_stream import Piece, ScanDecoder
 from acquisition.errors import DeviceError
 from acquisition.serial_link import SerialLink
 
-ANSWER_TIME = 0.5
-"""How long a command may stay without its echo before it is sent again (s)."""
-TRIES = 3
-"""How often a command is sent."""
-QUIET = 0.2
-"""A device that sends nothing for so long has stopped (s)."""
 SILENCE = 3.0
 """A scanning device that gives no scans for so long has failed (s)."""
 DEFAULT_RATE = 50_000.0
 """Hz, where none is asked for: force and acceleration with the digital word are 150 000 words a second."""
-CDC_HINT = (
-    "its LED must blink yellow (CDC mode): "
-    "plug it in, press its button while the LED is green, hold it until the LED is red, let go"
-)
 
 
 class DataqStatus(enum.StrEnum):
@@ -73,10 +61,12 @@ class DataqSource:
         self._decoder = ScanDecoder(len(inputs), digital_word)
         self._next_scan = 0
         self._link = SerialLink(port)
+        self._dialogue = DataqDialogue(self._link)
         try:
-            self._halt()
-            self.info = self._identify()
-            self.sample_rate = self._configure(inputs, sample_rate or DEFAULT_RATE)
+            self._dialogue.halt()
+            device = self._identify()
+            self.info: dict[str, Any] = {"model": f"DI-{device.model}", "serial": device.serial, "fw": device.firmware}
+            self.sample_rate = self._configure(device, inputs, DEFAULT_RATE if sample_rate is None else sample_rate)
         except BaseException:
             self._link.close()
             raise
@@ -101,7 +91,7 @@ class DataqSource:
     def stop(self) -> None:
         """End the stream."""
         self.status = DataqStatus.STOPPED
-        self._halt()
+        self._dialogue.halt()
 
     def close(self) -> None:
         """Stop where the device still answers, then give the port back."""
@@ -140,7 +130,7 @@ class DataqSource:
         """After an overflow; heard is the time of the last scan."""
         self.status = DataqStatus.OVERFLOW
         self.overflows += 1
-        self._halt()
+        self._dialogue.halt()
         self._link.write(encode_command("start"))
         self._decoder.begin(lost=max(round((time.monotonic() - heard) * self.sample_rate), 1))
 
@@ -155,65 +145,25 @@ class DataqSource:
             "switch it off and on and give the same command again"
         )
 
-    def _halt(self) -> None:
-        """Stop scanning and read until nothing more comes; a scanning device does not echo."""
-        for _ in range(TRIES):
-            self._link.write(encode_command("stop"))
-            deadline = time.monotonic() + 5 * QUIET
-            while time.monotonic() < deadline:
-                if not self._link.read(QUIET):
-                    return
-        raise DeviceError(
-            f"the device on {self._link.port} does not stop sending ({TRIES} tries); "
-            "check that this is the DAQ's port, then unplug it and plug it in again"
-        )
-
-    def _identify(self) -> dict[str, Any]:
-        """Model, serial number, firmware and dividend of the rate formula."""
-        maker, model, firmware, serial, dividend = (self._command(f"info {i}") for i in (0, 1, 2, 6, 9))
-        try:
-            if maker.upper() != "DATAQ":
-                raise ValueError(f"maker {maker!r} is not DATAQ")
-            info = {"model": f"DI-{model_of(model)}", "serial": serial[:8], "fw": firmware, "dividend": int(dividend)}
-        except ValueError as error:
-            raise DeviceError(f"the device on {self._link.port} is none that this driver knows: {error}") from error
-        version = firmware_of(firmware)
+    def _identify(self) -> DataqIdentity:
+        identity = self._dialogue.identify()
+        version = firmware_of(identity.firmware)
         if version is not None and version < OLDEST_FIRMWARE:
             raise DeviceError(
-                f"the {info['model']} on {self._link.port} has firmware {version:.2f}; "
+                f"the DI-{identity.model} on {self._link.port} has firmware {version:.2f}; "
                 f"{OLDEST_FIRMWARE} or newer is needed: install it with the maker's upgrade tool"
             )
-        return info
+        return identity
 
-    def _configure(self, inputs: Sequence[DataqInput], wanted: float) -> float:
+    def _configure(self, device: DataqIdentity, inputs: Sequence[DataqInput], wanted: float) -> float:
         """Send the set-up; the rate that results (Hz)."""
-        model, dividend = self.info["model"].removeprefix("DI-"), self.info["dividend"]
-        codes = [scan_code(one.number, range_code(model, one.channel.full_scale)) for one in inputs]
+        codes = [scan_code(one.number, range_code(device.model, one.channel.full_scale)) for one in inputs]
         if self.loss_detection != "none":
             codes.append(DIGITAL_INPUTS)
-        setting = choose_rate(wanted, dividend)
-        rate = setting.rate(dividend)
+        setting = choose_rate(wanted, device.dividend)
+        rate = setting.rate(device.dividend)
         commands = ["encode 0", *(f"slist {position} {code}" for position, code in enumerate(codes)), "filter * 0"]
         commands += [f"srate {setting.srate}", f"dec {setting.dec}", f"deca {setting.deca}"]
         for command in (*commands, f"ps {choose_packet(2 * len(codes) * rate)}"):
-            self._command(command)
+            self._dialogue.ask(command)
         return rate
-
-    def _command(self, command: str) -> str:
-        """Send, and wait for the echo; what the device adds to it."""
-        said = ""
-        for _ in range(TRIES):
-            self._link.write(encode_command(command))
-            rest = b""
-            deadline = time.monotonic() + ANSWER_TIME
-            while (left := deadline - time.monotonic()) > 0:
-                lines, rest = split_lines(rest + self._link.read(left))
-                for line in lines:
-                    if (answer := answer_in(command, line)) is not None:
-                        return answer
-                    said = line or said
-        if not said:
-            raise DeviceError(f"no DATAQ device answers on {self._link.port} ({command}, {TRIES} tries); {CDC_HINT}")
-        raise DeviceError(
-            f"the device on {self._link.port} does not take {command!r} ({TRIES} tries); it says {said[:60]!r}"
-        )

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from acquisition import TapsSource
-from lobewatch.machine import Daq
+from acquisition import DataqSource, TapsSource
+from lobewatch.daq_tables import Daq
 
 
-def open_source(daq: Daq, port: str) -> TapsSource:
+def open_source(daq: Daq, port: str) -> TapsSource | DataqSource:
     """A connected source on a port, as [daq] sets it up; DeviceError where there is none."""
+    if daq.driver == "dataq":
+        inputs = [channel.build() for channel in daq.channel]
+        return DataqSource(port, inputs, daq.sample_rate_hz, digital_word=daq.loss_detection)
     return TapsSource(port, daq.sample_rate_hz)

@@ -48,7 +48,7 @@ Make = Callable[..., DataqEmulator]
 @pytest.fixture(autouse=True)
 def impatience(monkeypatch: pytest.MonkeyPatch) -> None:
     """An emulated device is quiet at once."""
-    monkeypatch.setattr("acquisition.dataq_source.QUIET", 0.05)
+    monkeypatch.setattr("acquisition.dataq_dialogue.QUIET", 0.05)
 
 
 @pytest.fixture

@@ -60,7 +60,7 @@ class ScriptedLink:
 @pytest.fixture(autouse=True)
 def impatience(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("acquisition.dataq_source.SerialLink", ScriptedLink)
-    monkeypatch.setattr("acquisition.dataq_source.ANSWER_TIME", 0.01)
+    monkeypatch.setattr("acquisition.dataq_dialogue.ANSWER_TIME", 0.01)
 
 
 def connect(script: list[Pair], sample_rate: float | None = None, digital_word: bool = True) -> DataqSource:
@@ -72,7 +72,7 @@ def connect(script: list[Pair], sample_rate: float | None = None, digital_word: 
 
 def test_the_connect_sequence_byte_for_byte() -> None:
     source = connect(IDENTITY + SET_UP)
-    assert source.info == {"model": "DI-4108", "serial": "5E0ABC12", "fw": "1.36", "dividend": 60_000_000}
+    assert source.info == {"model": "DI-4108", "serial": "5E0ABC12", "fw": "1.36"}
     assert source.sample_rate == 50_000.0
     assert source.loss_detection == "digital word"
     assert [channel.quantity for channel in source.channels] == ["force", "acceleration"]

@@ -12,6 +12,9 @@ from acquisition.estimate_frf import cross_spectra, estimate_frf
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hammered_structure import HammeredStructure, Hammering, Structure
 from acquisition.hit import Hit, HitFlags
+from acquisition.list_ports import PortInfo, list_ports
+from acquisition.port_hints import no_ports_hint
+from acquisition.probe_port import DeviceIdentity, probe_port
 from acquisition.read_recording import read_frf, read_hits, read_recording, recorded_as
 from acquisition.simulated_source import SimulatedSource
 from acquisition.source import Source
@@ -33,12 +36,14 @@ __all__ = [
     "DataqSource",
     "DataqTraits",
     "DeviceError",
+    "DeviceIdentity",
     "Faults",
     "Frf",
     "HammeredStructure",
     "Hammering",
     "Hit",
     "HitFlags",
+    "PortInfo",
     "SimulatedSource",
     "Source",
     "SourceFile",
@@ -54,7 +59,10 @@ __all__ = [
     "cross_spectra",
     "estimate_frf",
     "from_accelerance",
+    "list_ports",
     "new_tap_id",
+    "no_ports_hint",
+    "probe_port",
     "read_frf",
     "read_hits",
     "read_recording",

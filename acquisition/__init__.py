@@ -9,6 +9,8 @@ from acquisition.dataq_emulator import DataqEmulator, DataqFaults, DataqTraits
 from acquisition.dataq_source import DataqSource
 from acquisition.errors import DataError, DeviceError
 from acquisition.estimate_frf import cross_spectra, estimate_frf
+from acquisition.file_source import FileSource
+from acquisition.find_port import find_port, usb_identity
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hammered_structure import HammeredStructure, Hammering, Structure
 from acquisition.hit import Hit, HitFlags
@@ -20,7 +22,9 @@ from acquisition.simulated_source import SimulatedSource
 from acquisition.source import Source
 from acquisition.tap_file import read_tap, read_tap_hits, write_hit, write_tap
 from acquisition.tap_test import Circumstances, SourceFile, TapTest, average_good, new_tap_id
-from acquisition.taps_emulator import Faults, TapsEmulator
+from acquisition.taps_emulator import TapsEmulator
+from acquisition.taps_event import Event, EventKind
+from acquisition.taps_faults import Faults
 from acquisition.taps_source import TapsSource
 from acquisition.units import STANDARD_GRAVITY
 
@@ -37,7 +41,10 @@ __all__ = [
     "DataqTraits",
     "DeviceError",
     "DeviceIdentity",
+    "Event",
+    "EventKind",
     "Faults",
+    "FileSource",
     "Frf",
     "HammeredStructure",
     "Hammering",
@@ -58,6 +65,7 @@ __all__ = [
     "check_hit",
     "cross_spectra",
     "estimate_frf",
+    "find_port",
     "from_accelerance",
     "list_ports",
     "new_tap_id",
@@ -69,6 +77,7 @@ __all__ = [
     "read_tap",
     "read_tap_hits",
     "recorded_as",
+    "usb_identity",
     "write_hit",
     "write_tap",
 ]

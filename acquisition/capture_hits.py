@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import functools
+import operator
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.channel import Block, Channel
+from acquisition.channel import Channel
 from acquisition.errors import DataError
 from acquisition.hit import Hit
 from acquisition.source import Source
@@ -40,13 +42,15 @@ def capture_hits(source: Source, trigger: Trigger) -> Iterator[Hit]:
 
     Nothing is interpolated: a record with a gap has its samples closed up and `lost_scans` > 0.
     """
-    force, response = input_channels(source.channels)
+    force, response = inputs = input_channels(source.channels)
     pair = (source.channels[force], source.channels[response])
-    search = _Search(trigger, trigger.level / pair[0].scale)
+    search = _Search(trigger, pair[0].scale)
     for block in source.blocks():
-        search.add(block, block.codes[[force, response]])
+        overload = (block.overload >> force & 1) | (block.overload >> response & 1) << 1
+        search.add(block.codes if inputs == (0, 1) else block.codes[[force, response]], block.lost_before, overload)
         while (record := search.next_record()) is not None:
-            yield Hit.from_codes(record[0], pair, source.sample_rate, trigger.pre_trigger, record[1])
+            codes, lost, overload = record
+            yield Hit.from_codes(codes, pair, source.sample_rate, trigger.pre_trigger, lost, overload)
 
 
 def input_channels(channels: tuple[Channel, ...]) -> tuple[int, int]:
@@ -63,34 +67,49 @@ def input_channels(channels: tuple[Channel, ...]) -> tuple[int, int]:
 class _Search:
     """The scans not yet done with, and where in them the search stands (positions count scans received)."""
 
-    def __init__(self, trigger: Trigger, level: float) -> None:
-        self._trigger, self._level = trigger, level
+    def __init__(self, trigger: Trigger, newton_per_code: float) -> None:
+        self._trigger = trigger
+        self._level, self._sign = trigger.level / abs(newton_per_code), 1 if newton_per_code > 0 else -1
         self._codes: NDArray[np.int32] = np.empty((2, 0), np.int32)
+        self._added: list[NDArray[np.int32]] = []
+        self._size = 0
         self._from = 0
         self._quiet = 0
         self._crossing: int | None = None
         self._gaps: list[tuple[int, int]] = []
+        self._overloads: list[tuple[int, int, int]] = []
 
-    def add(self, block: Block, codes: NDArray[np.int32]) -> None:
-        if block.lost_before:
-            self._gaps.append((self._codes.shape[1], block.lost_before))
-        self._codes = np.concatenate([self._codes, codes], axis=1)
+    def add(self, codes: NDArray[np.int32], lost_before: int, overload: int) -> None:
+        if lost_before:
+            self._gaps.append((self._size, lost_before))
+        if overload:
+            self._overloads.append((self._size, self._size + codes.shape[1], overload))
+        self._added.append(codes)
+        self._size += codes.shape[1]
 
-    def next_record(self) -> tuple[NDArray[np.int32], int] | None:
-        """The next complete record and the scans lost in it; None until more blocks have come."""
+    def next_record(self) -> tuple[NDArray[np.int32], int, int] | None:
+        """The next complete record, the scans lost in it and its overloads; None until more blocks have come."""
         if self._crossing is None:
+            self._join()
             self._crossing = self._find_crossing()
         if self._crossing is None:
             self._forget(self._from - self._trigger.pre_trigger)
             return None
         start = self._crossing - self._trigger.pre_trigger
         end = start + self._trigger.n_samples
-        if end > self._codes.shape[1]:
+        if end > self._size:
             return None
+        self._join()
         record = self._codes[:, start:end].copy()
         lost = sum(count for position, count in self._gaps if start < position < end)
+        masks = (mask for first, last, mask in self._overloads if first < end and last > start)
         self._from, self._quiet, self._crossing = end, 0, None
-        return record, lost
+        return record, lost, functools.reduce(operator.or_, masks, 0)
+
+    def _join(self) -> None:
+        """Not at every block: a record under way would be copied as often."""
+        self._codes = np.concatenate([self._codes, *self._added], axis=1)
+        self._added.clear()
 
     def _find_crossing(self) -> int | None:
         """First sample at the level in a loud run that follows pre_trigger quiet samples.
@@ -98,7 +117,7 @@ class _Search:
         Loud is above the hysteresis level. A run that is still open at the end is looked at again with the next
         block, unless it has lasted a whole record (an offset, not a hit).
         """
-        force = self._codes[0, self._from :]
+        force = self._sign * self._codes[0, self._from :]
         loud = np.flatnonzero(force >= self._trigger.hysteresis * self._level)
         starts = loud[np.diff(loud, prepend=-2) > 1]
         ends = loud[np.diff(loud, append=force.size + 1) > 1] + 1
@@ -120,5 +139,7 @@ class _Search:
         if count <= 0:
             return
         self._codes = self._codes[:, count:]
+        self._size -= count
         self._from -= count
         self._gaps = [(position - count, lost) for position, lost in self._gaps if position > count]
+        self._overloads = [(first - count, last - count, mask) for first, last, mask in self._overloads if last > count]

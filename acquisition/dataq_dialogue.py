@@ -15,6 +15,8 @@ TRIES = 3
 """How often a command is sent."""
 QUIET = 0.2
 """A device that sends nothing for so long has stopped (s)."""
+DRAIN_TIME = 1.0
+"""How long a device may go on sending after a `stop` before it is sent again (s)."""
 CDC_HINT = (
     "its LED must blink yellow (CDC mode): "
     "plug it in, press its button while the LED is green, hold it until the LED is red, let go"
@@ -46,14 +48,20 @@ class DataqDialogue:
         """Stop scanning and read until nothing more comes; a scanning device does not echo."""
         for _ in range(self._tries):
             self._link.write(encode_command("stop"))
-            deadline = time.monotonic() + 5 * QUIET
-            while time.monotonic() < deadline:
-                if not self._link.read(QUIET):
-                    return
+            if self.drain():
+                return
         raise DeviceError(
             f"the device on {self._link.port} does not stop sending ({self._tries} tries); "
             "check that this is the DAQ's port, then unplug it and plug it in again"
         )
+
+    def drain(self) -> bool:
+        """Read until nothing more comes; whether that was so in time."""
+        deadline = time.monotonic() + DRAIN_TIME
+        while time.monotonic() < deadline:
+            if not self._link.read(QUIET):
+                return True
+        return False
 
     def identify(self) -> DataqIdentity:
         """Who the device is; DeviceError for one that is not of this family."""

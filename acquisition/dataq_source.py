@@ -59,7 +59,8 @@ class DataqSource:
         self.status = DataqStatus.STOPPED
         self.overflows = 0
         self._decoder = ScanDecoder(len(inputs), digital_word)
-        self._next_scan = 0
+        self._next_scan = self._overruns = 0
+        self._heard = 0.0
         self._link = SerialLink(port)
         self._dialogue = DataqDialogue(self._link)
         try:
@@ -84,6 +85,7 @@ class DataqSource:
     def start(self) -> None:
         """Begin an endless stream."""
         self._next_scan = 0
+        self._heard = time.monotonic()
         self._decoder.begin()
         self._link.write(encode_command("start"))  # no echo: the stream begins
         self.status = DataqStatus.SCANNING
@@ -106,18 +108,22 @@ class DataqSource:
     def blocks(self) -> Iterator[Block]:
         """Blocks with the scans lost before each; DeviceError where the device falls silent or is unplugged.
 
-        A device whose buffer ran over is started again; the gap is told by the clock.
+        Where the device's buffer ran over, or ours because nobody asked for blocks for too long, it is started again;
+        the gap is told by the clock.
         """
-        heard = time.monotonic()
+        since = time.monotonic()
         while self.status != DataqStatus.STOPPED:
             data = self._link.read(0.1)
+            if self._link.overruns > self._overruns or (not data and self._decoder.ran_over()):
+                if self.status == DataqStatus.SCANNING:
+                    since = time.monotonic()
+                self._start_again()
+                continue
             for piece in self._decoder.feed(data):
                 self.status = DataqStatus.SCANNING
                 yield self._block(piece)
-                heard = time.monotonic()
-            if not data and self._decoder.ran_over():
-                self._start_again(heard)
-            if time.monotonic() - heard > SILENCE:
+                since = self._heard = time.monotonic()
+            if time.monotonic() - since > SILENCE:
                 raise self._failed(bool(data))
 
     def _block(self, piece: Piece) -> Block:
@@ -126,13 +132,14 @@ class DataqSource:
         self._next_scan = first + codes.shape[1]
         return Block(first, codes, lost_before=lost)
 
-    def _start_again(self, heard: float) -> None:
-        """After an overflow; heard is the time of the last scan."""
+    def _start_again(self) -> None:
+        """After an overflow, there or here."""
         self.status = DataqStatus.OVERFLOW
         self.overflows += 1
         self._dialogue.halt()
         self._link.write(encode_command("start"))
-        self._decoder.begin(lost=max(round((time.monotonic() - heard) * self.sample_rate), 1))
+        self._overruns = self._link.overruns
+        self._decoder.begin(lost=max(round((time.monotonic() - self._heard) * self.sample_rate), 1))
 
     def _failed(self, sends: bool) -> DeviceError:
         if sends:
@@ -166,4 +173,5 @@ class DataqSource:
         commands += [f"srate {setting.srate}", f"dec {setting.dec}", f"deca {setting.deca}"]
         for command in (*commands, f"ps {choose_packet(2 * len(codes) * rate)}"):
             self._dialogue.ask(command)
+        self._dialogue.drain()  # a NUL after the last echo would be taken for the first byte of the stream
         return rate

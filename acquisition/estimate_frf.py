@@ -46,30 +46,45 @@ def cross_spectra(hits: Sequence[Hit]) -> Spectra:
     shapes = {(hit.force.size, hit.sample_rate) for hit in hits}
     if len(shapes) > 1:
         raise ValueError(f"hits differ in length or sample rate: {sorted(shapes)}; average only hits of one set-up")
-    force = np.fft.rfft([_windowed_force(hit) for hit in hits])
-    response = np.fft.rfft([hit.acceleration for hit in hits])
+    n = hits[0].force.size
+    records = np.zeros((2, n))
+    spectra = np.empty((2, n // 2 + 1), np.complex128)
+    product = np.empty_like(spectra[0])
+    s_fx = np.zeros_like(product)
+    parts = spectra.view(np.float64)
+    powers = np.zeros_like(parts)
+    for hit in hits:  # one at a time and in place: what is needed stays in the processor's cache
+        sample, force = _windowed_force(hit)
+        records[0, sample] = force
+        records[1] = hit.acceleration
+        np.fft.rfft(records, out=spectra)
+        records[0, sample] = 0.0
+        np.conjugate(spectra[0], out=product)
+        product *= spectra[1]
+        s_fx += product
+        parts *= parts
+        powers += parts
     skew = _skew(hits[0])
     if skew:
-        response *= np.exp(-2j * np.pi * np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate) * skew)
-    return (
-        np.mean(np.abs(force) ** 2, axis=0),
-        np.mean(np.abs(response) ** 2, axis=0),
-        np.mean(np.conj(force) * response, axis=0),
-    )
+        s_fx *= np.exp(-2j * np.pi * np.fft.rfftfreq(n, 1 / hits[0].sample_rate) * skew)
+    s_ff, s_xx = (powers[:, ::2] + powers[:, 1::2]) / len(hits)
+    return s_ff, s_xx, s_fx / len(hits)
 
 
-def _windowed_force(hit: Hit) -> NDArray[np.float64]:
-    """The pulse with one of its widths on either side kept whole, then tapered to zero over one more (raised cosine).
+def _windowed_force(hit: Hit) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """The samples inside the force window, and the force there (N).
 
+    The pulse with one of its widths on either side is kept whole, then tapered to zero over one more (raised cosine).
     A tight window matters: noise inside it is alike at neighbouring lines, and so passes for a shift of the mode.
     """
     pulse = find_pulse(hit)
     if pulse is None:
         raise ValueError("a hit has no force pulse; check hits with check_hit before averaging")
     width = max(pulse.end - pulse.start, 8)
-    sample = np.arange(pulse.force.size)
+    sample = np.arange(max(pulse.start - 2 * width, 0), min(pulse.end + 2 * width, pulse.force.size))
     beyond = np.maximum(sample - (pulse.end + width), (pulse.start - width) - sample)
-    return np.asarray(pulse.force * 0.5 * (1 + np.cos(np.pi * np.clip(beyond / width, 0.0, 1.0))))
+    taper = 0.5 * (1 + np.cos(np.pi * np.clip(beyond / width, 0.0, 1.0)))
+    return sample, pulse.force[sample] * taper
 
 
 def _skew(hit: Hit) -> float:

@@ -203,6 +203,18 @@ def test_a_host_that_does_not_read_makes_the_buffer_run_over(emulated: Make, mon
     assert len(stream) > 4000
 
 
+def test_a_consumer_that_comes_too_late_is_told_of_the_gap(emulated: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("acquisition.serial_link.BUFFER_BYTES", 20_000)
+    with emulated(realtime=True) as device, DataqSource(device.port, INPUTS, RATE) as source:
+        source.start()
+        while not source._link.overruns:  # noqa: SLF001
+            threading.Event().wait(0.02)
+        first = next(source.blocks())
+    assert source.overflows == 1
+    assert first.lost_before == first.first_scan > 3000  # 20 000 bytes were thrown away
+    assert np.abs(first.codes).max() < 100
+
+
 def test_a_device_that_scans_already_is_taken_over(emulated: Make) -> None:
     with emulated(realtime=True, streaming_at_connect=True) as device:
         handle = os.open(device.port, os.O_RDWR | os.O_NOCTTY)
@@ -216,7 +228,9 @@ def test_a_device_that_scans_already_is_taken_over(emulated: Make) -> None:
         assert all(np.abs(block.codes).max() < 100 for block in blocks)  # noise: nobody taps so early
 
 
-def test_a_device_that_never_stops_is_refused(emulated: Make) -> None:
+def test_a_device_that_never_stops_is_refused(emulated: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("acquisition.dataq_dialogue.QUIET", 0.5)
+    monkeypatch.setattr("acquisition.dataq_dialogue.DRAIN_TIME", 0.2)
     with (
         emulated(streaming_at_connect=True, deaf=True) as device,
         pytest.raises(DeviceError, match=r"does not stop sending \(3 tries\)"),

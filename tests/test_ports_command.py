@@ -17,7 +17,16 @@ import numpy as np
 import pytest
 import serial
 
-from acquisition import DataqSource, DataqTraits, PortInfo, TapsSource, list_ports, no_ports_hint, probe_port
+from acquisition import (
+    DataqSource,
+    DataqTraits,
+    FileSource,
+    PortInfo,
+    TapsSource,
+    list_ports,
+    no_ports_hint,
+    probe_port,
+)
 from acquisition.port_hints import explain_open_error
 from acquisition.taps import Frame, MessageType, encode_frame
 from lobewatch.cli import main
@@ -102,13 +111,14 @@ def test_a_tap_test_through_a_dataq_device_finds_the_emulated_spindle(run: Any, 
     assert "followed: 1713." in said.out  # the skew of a third of a scan, left in, makes it 1715
     assert re.search(r"bearing stiffness +(1280\.|1279\.)", said.out)
     (entry,) = trial.taps()
-    assert (channels := trial.read(entry).hits[0].channels) is not None
+    channels = trial.read(entry).hits[0].channels
+    assert channels is not None
     hammer, accelerometer = channels
     assert (hammer.serial_number, hammer.calibration_date) == ("H-4711", "2026-01-15")
     assert accelerometer.full_scale == 5.0
 
 
-def test_the_driver_is_the_one_that_machine_toml_names(trial: MachineFolder) -> None:
+def test_the_driver_is_the_one_that_machine_toml_names(trial: MachineFolder, beam: Path) -> None:
     with dataq_device(trial) as device, open_source(trial.machine.daq, device.port) as source:
         assert isinstance(source, DataqSource)
         assert source.loss_detection == "digital word"
@@ -119,6 +129,9 @@ def test_the_driver_is_the_one_that_machine_toml_names(trial: MachineFolder) -> 
         assert isinstance(source, DataqSource)
         assert source.loss_detection == "none"
     trial.toml.write_text(toml.replace(CHANNELS, ""), "utf-8")
+    with open_source(trial.machine.daq, f"file:{beam}") as source:
+        assert isinstance(source, FileSource)
+        assert source.sample_rate == pytest.approx(50_000, rel=1e-3)
     with taps_device(trial) as device, open_source(MachineFolder("trial").machine.daq, device.port) as source:
         assert isinstance(source, TapsSource)
 

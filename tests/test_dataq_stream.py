@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -72,6 +72,8 @@ def test_lost_bytes_are_found_and_the_scans_after_them_stand_in_their_place(
     seed=st.integers(0, 99),
     places=st.lists(st.tuples(st.integers(200, 9000), st.integers(1, 200).filter(lambda n: n % 6)), max_size=6),
 )
+@example(seed=0, places=[(200, 1), (307, 5)])
+@example(seed=0, places=[(1200, 64), (1290, 128)])
 def test_no_scan_is_ever_made_up(seed: int, places: list[tuple[int, int]]) -> None:
     """Each decoded scan is one that was sent, in order, unless whole scans' worth of bytes is lost within one scan."""
     words = noise(1600, seed)

@@ -4,6 +4,9 @@ from acquisition.atomic_write import atomic_write
 from acquisition.capture_hits import Trigger, capture_hits
 from acquisition.channel import Block, Channel
 from acquisition.check_hit import check_hit
+from acquisition.dataq import DataqInput
+from acquisition.dataq_emulator import DataqEmulator, DataqFaults, DataqTraits
+from acquisition.dataq_source import DataqSource
 from acquisition.errors import DataError, DeviceError
 from acquisition.estimate_frf import cross_spectra, estimate_frf
 from acquisition.file_source import FileSource
@@ -11,6 +14,9 @@ from acquisition.find_port import find_port, usb_identity
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hammered_structure import HammeredStructure, Hammering, Structure
 from acquisition.hit import Hit, HitFlags
+from acquisition.list_ports import PortInfo, list_ports
+from acquisition.port_hints import no_ports_hint
+from acquisition.probe_port import DeviceIdentity, probe_port
 from acquisition.read_recording import read_frf, read_hits, read_recording, recorded_as
 from acquisition.simulated_source import SimulatedSource
 from acquisition.source import Source
@@ -20,13 +26,21 @@ from acquisition.taps_emulator import TapsEmulator
 from acquisition.taps_event import Event, EventKind
 from acquisition.taps_faults import Faults
 from acquisition.taps_source import TapsSource
+from acquisition.units import STANDARD_GRAVITY
 
 __all__ = [
+    "STANDARD_GRAVITY",
     "Block",
     "Channel",
     "Circumstances",
     "DataError",
+    "DataqEmulator",
+    "DataqFaults",
+    "DataqInput",
+    "DataqSource",
+    "DataqTraits",
     "DeviceError",
+    "DeviceIdentity",
     "Event",
     "EventKind",
     "Faults",
@@ -36,6 +50,7 @@ __all__ = [
     "Hammering",
     "Hit",
     "HitFlags",
+    "PortInfo",
     "SimulatedSource",
     "Source",
     "SourceFile",
@@ -52,7 +67,10 @@ __all__ = [
     "estimate_frf",
     "find_port",
     "from_accelerance",
+    "list_ports",
     "new_tap_id",
+    "no_ports_hint",
+    "probe_port",
     "read_frf",
     "read_hits",
     "read_recording",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import select
 import socket
 import threading
@@ -15,6 +14,7 @@ from urllib.parse import urlsplit
 import serial
 
 from acquisition.errors import DeviceError
+from acquisition.port_hints import explain_open_error
 
 try:
     from termios import error as TermiosError  # noqa: N812  (not an OSError, and not there on Windows)
@@ -34,7 +34,7 @@ class SerialLink:
         try:
             self._serial = _open(port)
         except (OSError, ValueError, TermiosError) as error:
-            raise DeviceError(_explain(port, error)) from error
+            raise DeviceError(explain_open_error(port, error)) from error
         self._chunks: deque[bytes] = deque()
         self._waiting = 0
         self.overruns = 0
@@ -137,20 +137,3 @@ def _open(port: str) -> Any:  # a pyserial port, which has no types, or a _TcpPo
     if hasattr(opened, "set_buffer_size"):  # Windows only
         opened.set_buffer_size(rx_size=1 << 20)
     return opened
-
-
-def _explain(port: str, error: Exception) -> str:
-    """One sentence with the system's words and what to do."""
-    text = str(error)
-    hints = {
-        "lock": "another program uses it: close that program",
-        "busy": "another program uses it: close that program",
-        "Permission denied": "you may not use it (Linux: sudo usermod -aG dialout $USER, then log in again)",
-        "Access is denied": "another program uses it: close that program",
-        "No such file": "check the cable and the port's name",
-        "FileNotFound": "check the cable and the port's name",
-        "refused": "nothing listens there: start the device or emulator first",
-    }
-    cure = next((hint for word, hint in hints.items() if word in text), "check the port's name and the cable")
-    reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else text
-    return f"port {port} cannot be opened ({reason}); {cure}"

@@ -296,7 +296,11 @@ def test_modes_of_bad_files_and_bands(run: Run, beam: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    "name", ["demo", "init", "tap", "replay", "modes", "model", "calibrate", "lobes", "check", "report", "emulate taps"]
+    "name",
+    [
+        *("demo", "init", "ports", "tap", "replay", "modes", "model", "calibrate", "lobes", "check", "report"),
+        *("emulate taps", "emulate dataq"),
+    ],
 )
 def test_every_command_has_help_with_examples_and_json(run: Run, name: str) -> None:
     said = run(*name.split(), "--help")

@@ -50,7 +50,7 @@ def cross_spectra(hits: Sequence[Hit]) -> Spectra:
     response = np.fft.rfft([hit.acceleration for hit in hits])
     skew = _skew(hits[0])
     if skew:
-        response *= np.exp(2j * np.pi * np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate) * skew)
+        response *= np.exp(-2j * np.pi * np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate) * skew)
     return (
         np.mean(np.abs(force) ** 2, axis=0),
         np.mean(np.abs(response) ** 2, axis=0),
@@ -73,6 +73,7 @@ def _windowed_force(hit: Hit) -> NDArray[np.float64]:
 
 
 def _skew(hit: Hit) -> float:
+    """How much later the response is sampled than the force (s): its spectrum leads by 2 pi f skew."""
     return hit.channels[1].skew - hit.channels[0].skew if hit.channels else 0.0
 
 

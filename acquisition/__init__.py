@@ -9,6 +9,10 @@ from acquisition.estimate_frf import cross_spectra, estimate_frf
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hammered_structure import HammeredStructure, Hammering, Structure
 from acquisition.hit import Hit, HitFlags
+from acquisition.mass_calibration import MassCalibration, calibrate_by_mass
+from acquisition.measure_rate import MeasuredRate, check_rate, measure_rate
+from acquisition.measure_skew import MeasuredSkew, measure_skew
+from acquisition.plausibility import calibration_doubt, channel_doubts, stiffness_doubt, unit_mistake
 from acquisition.read_recording import read_frf, read_hits, read_recording, recorded_as
 from acquisition.simulated_source import SimulatedSource
 from acquisition.source import Source
@@ -29,6 +33,9 @@ __all__ = [
     "Hammering",
     "Hit",
     "HitFlags",
+    "MassCalibration",
+    "MeasuredRate",
+    "MeasuredSkew",
     "SimulatedSource",
     "Source",
     "SourceFile",
@@ -39,11 +46,17 @@ __all__ = [
     "Trigger",
     "atomic_write",
     "average_good",
+    "calibrate_by_mass",
+    "calibration_doubt",
     "capture_hits",
+    "channel_doubts",
     "check_hit",
+    "check_rate",
     "cross_spectra",
     "estimate_frf",
     "from_accelerance",
+    "measure_rate",
+    "measure_skew",
     "new_tap_id",
     "read_frf",
     "read_hits",
@@ -51,6 +64,8 @@ __all__ = [
     "read_tap",
     "read_tap_hits",
     "recorded_as",
+    "stiffness_doubt",
+    "unit_mistake",
     "write_hit",
     "write_tap",
 ]

@@ -46,6 +46,8 @@ class Daq(Table, frozen=True):
 
     port: str = ""
     sample_rate_hz: Positive | None = None
+    accept_measured_rate: bool = False
+    calibration_interval_months: Positive = 12.0
 
 
 class ModeChoice(Table, frozen=True):

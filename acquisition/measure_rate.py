@@ -47,8 +47,8 @@ def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float
     The standard error is that of the slope, enlarged where neighbouring residuals are alike (lag-1 correlation), and
     joined with that of two ends each known to 1 ms (rectangular: 1 ms / sqrt(6) over the whole time).
 
-    Raises ValueError for seconds that are not > 0, DeviceError where fewer than 10 blocks arrive or the arrivals
-    scatter so much that the standard error exceeds 0.05 %, and what the source raises.
+    Raises ValueError for seconds that are not > 0, DeviceError where fewer than 10 blocks arrive, the stream ends
+    before, or the arrivals scatter so much that the standard error exceeds 0.05 %, and what the source raises.
     """
     if not (np.isfinite(seconds) and seconds > 0):
         raise ValueError(f"seconds={seconds} is not > 0; the rate of a device takes about 5 s")
@@ -61,12 +61,12 @@ def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float
         if arrived[-1] - arrived[0] >= seconds:
             break
     source.stop()
-    if len(scans) < FEWEST_BLOCKS:
+    elapsed, n_scans = (arrived[-1] - arrived[0], scans[-1] - scans[0]) if scans else (0.0, 0)
+    if len(scans) < FEWEST_BLOCKS or elapsed < seconds:
         raise DeviceError(
-            f"only {len(scans)} blocks of samples came in {seconds:g} s, {FEWEST_BLOCKS} are needed to measure the "
-            "rate; check the DAQ's sample rate and cable"
+            f"the DAQ sent {len(scans)} blocks of samples in {elapsed:.2g} s; to measure its rate, at least "
+            f"{FEWEST_BLOCKS} over {seconds:g} s are needed: check its sample rate and the cable"
         )
-    elapsed, n_scans = arrived[-1] - arrived[0], scans[-1] - scans[0]
     period, scatter = _slope(np.array(scans, dtype=np.float64), np.array(arrived))
     std = float(np.hypot(scatter, LATENCY / np.sqrt(6) / n_scans) / period**2)
     if std > LARGEST_STD / period:

@@ -131,9 +131,13 @@ def test_chaos_is_refused() -> None:
         measured(np.sort(arrival + np.random.default_rng(1).exponential(0.5, arrival.size)))
 
 
-def test_too_few_blocks_and_no_time_are_refused() -> None:
-    with pytest.raises(DeviceError, match="only 5 blocks of samples came in 5 s, 10 are needed"):
-        measured(even(512.0, seconds=5.5))
+def test_too_few_blocks_a_stream_that_ends_and_no_time_are_refused() -> None:
+    with pytest.raises(DeviceError, match=r"sent 6 blocks of samples in 5 s; .* at least 10 over 5 s are needed"):
+        measured(even(512.0, seconds=7.0))
+    with pytest.raises(DeviceError, match=r"sent 50 blocks of samples in 0\.98 s"):
+        measured(even(25600.0, seconds=1.0))
+    with pytest.raises(DeviceError, match="sent 0 blocks"):
+        measured(np.array([]))
     with pytest.raises(ValueError, match="seconds=0 is not > 0"):
         measured(even(25600.0), seconds=0)
 

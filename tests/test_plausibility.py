@@ -3,13 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from datetime import date
+from datetime import UTC, date, datetime
+from importlib import resources
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition import Channel, calibration_doubt, channel_doubts, stiffness_doubt, unit_mistake
+from acquisition import (
+    Channel,
+    Circumstances,
+    TapTest,
+    calibration_doubt,
+    channel_doubts,
+    stiffness_doubt,
+    unit_mistake,
+)
+from lobewatch.machine import parse_machine
+from lobewatch.pipeline import analyse
+from modal import Mode, synthesize
 
 HAMMER = Channel("force", 2.25e-3, 5.0, calibration_date="2026-01-15")
 TODAY = date(2026, 11, 1)
@@ -77,6 +90,14 @@ def test_stiffnesses_of_machine_tools_are_believed(stiffness: float) -> None:
 @pytest.mark.parametrize("stiffness", [3.5e4, 3.5e10, -9e4])
 def test_other_stiffnesses_are_not(stiffness: float) -> None:
     assert f"K = {stiffness:.3g} N/m is outside 100000 to 1e+10" in stiffness_doubt(stiffness)
+
+
+@pytest.mark.parametrize(("stiffness", "noted"), [(3.5e7, False), (3.5e4, True)])
+def test_a_measurement_whose_stiffness_is_not_believed_says_so(stiffness: float, noted: bool) -> None:
+    machine = parse_machine(resources.files("sim_data").joinpath("new_machine.toml").read_text("utf-8"))
+    frf = synthesize([Mode(1500.0, 0.03, stiffness)], np.arange(4.0, 4000.0, 4.0))
+    measurement = analyse(TapTest("t", Circumstances("mill", datetime(2026, 1, 15, tzinfo=UTC)), frf), machine)
+    assert any("check the units of both sensitivities" in note for note in measurement.notes) is noted
 
 
 def test_the_date_of_calibration() -> None:

@@ -9,6 +9,7 @@ from acquisition.estimate_frf import cross_spectra, estimate_frf
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hammered_structure import HammeredStructure, Hammering, Structure
 from acquisition.hit import Hit, HitFlags
+from acquisition.judge_hit import judge_hit
 from acquisition.mass_calibration import MassCalibration, calibrate_by_mass
 from acquisition.measure_rate import MeasuredRate, check_rate, measure_rate
 from acquisition.measure_skew import MeasuredSkew, measure_skew
@@ -20,6 +21,7 @@ from acquisition.tap_file import read_tap, read_tap_hits, write_hit, write_tap
 from acquisition.tap_test import Circumstances, SourceFile, TapTest, average_good, new_tap_id
 from acquisition.taps_emulator import Faults, TapsEmulator
 from acquisition.taps_source import TapsSource
+from acquisition.verdict import Verdict
 
 __all__ = [
     "Block",
@@ -44,6 +46,7 @@ __all__ = [
     "TapsEmulator",
     "TapsSource",
     "Trigger",
+    "Verdict",
     "atomic_write",
     "average_good",
     "calibrate_by_mass",
@@ -55,6 +58,7 @@ __all__ = [
     "cross_spectra",
     "estimate_frf",
     "from_accelerance",
+    "judge_hit",
     "measure_rate",
     "measure_skew",
     "new_tap_id",

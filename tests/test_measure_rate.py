@@ -93,9 +93,12 @@ def test_the_time_and_the_scans_are_those_listened_to() -> None:
 
 
 def jitters(kind: str, arrival: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
-    """Late arrivals: waiting times, a host that looks every 9.3 ms, bursts of four blocks."""
+    """Late arrivals: waiting times, a delay that swells slowly, a host that looks every 9.3 ms, bursts of four blocks."""
     if kind == "waiting":
         return arrival + random.exponential(3e-3, arrival.size)
+    if kind == "swell":
+        swell = 0.5e-3 * (1 + np.sin(2 * np.pi * 0.2 * arrival + random.uniform(0, 2 * np.pi)))
+        return arrival + swell + random.exponential(1e-4, arrival.size)
     if kind == "polling":
         phase = random.uniform(0, 9.3e-3)
         return np.asarray(np.ceil((arrival - phase) / 9.3e-3) * 9.3e-3 + phase)
@@ -103,7 +106,7 @@ def jitters(kind: str, arrival: NDArray[np.float64], random: np.random.Generator
     return np.asarray(arrival[np.minimum(last_of_burst, arrival.size - 1)])
 
 
-@pytest.mark.parametrize("kind", ["waiting", "polling", "bursts"])
+@pytest.mark.parametrize("kind", ["waiting", "swell", "polling", "bursts"])
 def test_the_standard_error_is_honest_under_jitter(kind: str) -> None:
     random = np.random.default_rng(5)
     deviations = []

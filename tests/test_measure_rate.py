@@ -93,7 +93,7 @@ def test_the_time_and_the_scans_are_those_listened_to() -> None:
 
 
 def jitters(kind: str, arrival: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.float64]:
-    """Late arrivals: waiting times, a delay that swells slowly, a host that looks every 9.3 ms, bursts of four blocks."""
+    """Late arrivals: waiting times, a slowly swelling delay, a host that looks every 9.3 ms, bursts of four blocks."""
     if kind == "waiting":
         return arrival + random.exponential(3e-3, arrival.size)
     if kind == "swell":

@@ -12,10 +12,12 @@ from acquisition.pulse import baseline
 
 RAIL_SAMPLES = 3
 """Samples at a rail of the converter, or in a row at the extreme value of a recording without codes."""
-FLAT_SAMPLES = 5
-"""Samples in the top band that make a flat top ..."""
-FLAT_SHARE = 0.75
-"""... where at least this share of those in a band three times as deep lies in it: a parabola has 1/sqrt(3) = 0.58."""
+FLAT_SHARE = 0.7
+"""Share of the samples of a band below the maximum that lie in its uppermost third: a round top has 1/sqrt(3) = 0.58 ..."""
+FLAT_SAMPLES = 2.5
+"""... and a flat one this many samples more than that."""
+SCALES = (1.0, 0.25, 0.0625)
+"""Half widths of the uppermost third against 3 times the noise before the hit, which a saturated amplifier cuts off too."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ def find_overload(hit: Hit, index: int) -> Overload | None:
     noise = float(np.std(baseline(signal, hit.pre_trigger or int(np.argmax(hit.force)))))
     for sign in (1, -1):
         above = sign * (signal - middle)
-        count = _flat_top(above, 3 * noise + step) or (_longest_run(above == above.max()) if not step else 0)
+        count = max(_flat_top(above, 3 * noise * scale + step) for scale in SCALES) or (_longest_run(above == above.max()) if not step else 0)
         if count >= RAIL_SAMPLES and above.max() > 0:
             return Overload(middle + sign * float(above.max()), count, inferred=True)
     return None
@@ -65,7 +67,8 @@ def _flat_top(above: NDArray[np.float64], half: float) -> int:
     if top <= 8 * half:
         return 0
     inside, deeper = (int(np.count_nonzero(above > top - bands * half)) for bands in (2, 6))
-    return inside if inside >= FLAT_SAMPLES and inside >= FLAT_SHARE * deeper else 0
+    flat = inside >= FLAT_SHARE * deeper and inside >= deeper / np.sqrt(3) + FLAT_SAMPLES
+    return inside if flat else 0
 
 
 def _longest_run(equal: NDArray[np.bool_]) -> int:

@@ -22,8 +22,10 @@ SOFT_NOISE_RATIO = 20.0
 """A pulse below this many times the baseline's rms is too soft."""
 DECAYED_SHARE = 0.02
 """rms of the last tenth of the response against that of the loudest: above this and twice the noise it was cut off."""
-FAR = 0.25
-"""Distance from the mean that makes a hit inconsistent: it would move a mean of ten by 2.5 %."""
+FAR = 0.3
+"""Distance from the mean that makes a hit inconsistent: it would move a mean of ten by 3 % ..."""
+FAR_NOISE_RATIO = 4.0
+"""... and at least this many times what the scatter of the hits in the mean would give."""
 
 
 def judge_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | None = None) -> Verdict:
@@ -118,8 +120,9 @@ def _in_frequency(hit: Hit, mean: Frf | None, band: tuple[float, float] | None) 
         findings[HitFlags.NARROW_BAND] = f"The force reaches to {reach:.0f} Hz (-20 dB) of the {band[1]:g} Hz wanted"
     if mean is not None and mean.random_error is not None:
         distance, noise = distance_from_mean(frf, mean)
-        if distance > max(FAR, 3 * noise):
+        limit = max(FAR, FAR_NOISE_RATIO * noise)
+        if distance > limit:
             findings[HitFlags.INCONSISTENT] = (
-                f"FRF {distance:.0%} away from the mean of {mean.n_averages} hits (limit {max(FAR, 3 * noise):.0%})"
+                f"FRF {distance:.0%} away from the mean of {mean.n_averages} hits (limit {limit:.0%})"
             )
     return findings

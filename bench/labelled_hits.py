@@ -266,13 +266,12 @@ def _clipped(index: int, *, amplifier: bool, codes: bool = True) -> Callable[[Se
 
 
 def not_decayed(one: Session) -> Hit:
-    """A structure whose slowest mode rings for 1 to 2.5 time constants of the record and is heard at its end."""
+    """A structure whose modes ring for so long that the record holds 1 to 2.5 time constants, and are heard at its end."""
     setting = one.setting
     while True:
         blow = replace(one.blow(), width=one.random.uniform(0.3e-3, 0.8e-3))
         tau = (setting.record - setting.pre_trigger) / setting.sample_rate / one.random.uniform(1, 2.5)
-        zeta = setting.structure.damping_ratio.copy()
-        zeta[0] = 1 / (2 * np.pi * setting.structure.frequency[0] * tau)
+        zeta = 1 / (2 * np.pi * setting.structure.frequency * tau)
         clean = one.signal([blow], replace(setting.structure, damping_ratio=zeta))
         end = int(1.5 * setting.pre_trigger) + setting.record - setting.pre_trigger
         tenths = [np.std(part) for part in np.array_split(clean[1, end - setting.record : end], 10)]

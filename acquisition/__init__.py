@@ -14,7 +14,12 @@ from acquisition.find_port import find_port, usb_identity
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hammered_structure import HammeredStructure, Hammering, Structure
 from acquisition.hit import Hit, HitFlags
+from acquisition.judge_hit import judge_hit
 from acquisition.list_ports import PortInfo, list_ports
+from acquisition.mass_calibration import MassCalibration, calibrate_by_mass
+from acquisition.measure_rate import MeasuredRate, check_rate, measure_rate
+from acquisition.measure_skew import MeasuredSkew, measure_skew
+from acquisition.plausibility import calibration_doubt, channel_doubts, stiffness_doubt, unit_mistake
 from acquisition.port_hints import no_ports_hint
 from acquisition.probe_port import DeviceIdentity, probe_port
 from acquisition.read_recording import read_frf, read_hits, read_recording, recorded_as
@@ -27,6 +32,7 @@ from acquisition.taps_event import Event, EventKind
 from acquisition.taps_faults import Faults
 from acquisition.taps_source import TapsSource
 from acquisition.units import STANDARD_GRAVITY
+from acquisition.verdict import Verdict
 
 __all__ = [
     "STANDARD_GRAVITY",
@@ -50,6 +56,9 @@ __all__ = [
     "Hammering",
     "Hit",
     "HitFlags",
+    "MassCalibration",
+    "MeasuredRate",
+    "MeasuredSkew",
     "PortInfo",
     "SimulatedSource",
     "Source",
@@ -59,15 +68,23 @@ __all__ = [
     "TapsEmulator",
     "TapsSource",
     "Trigger",
+    "Verdict",
     "atomic_write",
     "average_good",
+    "calibrate_by_mass",
+    "calibration_doubt",
     "capture_hits",
+    "channel_doubts",
     "check_hit",
+    "check_rate",
     "cross_spectra",
     "estimate_frf",
     "find_port",
     "from_accelerance",
+    "judge_hit",
     "list_ports",
+    "measure_rate",
+    "measure_skew",
     "new_tap_id",
     "no_ports_hint",
     "probe_port",
@@ -77,6 +94,8 @@ __all__ = [
     "read_tap",
     "read_tap_hits",
     "recorded_as",
+    "stiffness_doubt",
+    "unit_mistake",
     "usb_identity",
     "write_hit",
     "write_tap",

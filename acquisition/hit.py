@@ -24,6 +24,9 @@ class HitFlags(enum.Flag):
     LOST_SCANS = enum.auto()
     NO_HIT = enum.auto()
     SWAPPED_CHANNELS = enum.auto()
+    TOO_HARD = enum.auto()
+    NARROW_BAND = enum.auto()
+    INCONSISTENT = enum.auto()
 
     @property
     def words(self) -> str:
@@ -64,14 +67,11 @@ _WORDS: Mapping[HitFlags, tuple[str, str]] = {
         "lost scans",
         "Hit again; if it stays, lower the sample rate or use another cable.",
     ),
-    HitFlags.NO_HIT: (
-        "no hit",
-        "No hammer pulse in this record: check the hammer cable and the trigger level.",
-    ),
-    HitFlags.SWAPPED_CHANNELS: (
-        "swapped channels",
-        "The force rings and the response does not: swap the two cables.",
-    ),
+    HitFlags.NO_HIT: ("no hit", "Check the hammer cable and the trigger level."),
+    HitFlags.SWAPPED_CHANNELS: ("swapped channels", "Swap the two cables."),
+    HitFlags.TOO_HARD: ("too hard", "Hit softer or choose a larger force range."),
+    HitFlags.NARROW_BAND: ("narrow band", "Use a harder hammer tip."),
+    HitFlags.INCONSISTENT: ("inconsistent", "Hit the same spot in the same direction as before."),
 }
 
 

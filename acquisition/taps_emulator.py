@@ -192,7 +192,7 @@ class TapsEmulator:
             "adc_bits": self._channels[0].adc_bits,
             "fs_choices": [self._rate],
             "simultaneous": True,
-            "clock_ppm": 0,
+            "clock_ppm": 0 if self._realtime else None,
             "channels": [
                 {
                     "i": i,

@@ -64,6 +64,8 @@ class Daq(Table, frozen=True):
     driver: Literal["taps", "dataq"] = "taps"
     sample_rate_hz: Positive | None = None
     loss_detection: bool = True
+    accept_measured_rate: bool = False
+    calibration_interval_months: Positive = 12.0
     channel: tuple[ChannelTable, ...] = ()
 
     def __post_init__(self) -> None:

@@ -57,6 +57,8 @@ class TakenHit:
     """N."""
     undone: bool = False
     """Taken back by the operator."""
+    reason: str = ""
+    """One sentence with figures: what was wrong with it; empty where it is averaged."""
 
 
 @dataclass(frozen=True, eq=False)

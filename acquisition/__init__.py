@@ -1,7 +1,7 @@
 """From the DAQ to hits, averaged FRF and HDF5 files."""
 
 from acquisition.atomic_write import atomic_write
-from acquisition.capture_hits import Trigger, capture_hits
+from acquisition.capture_hits import HitSearch, Trigger, capture_hits
 from acquisition.channel import Block, Channel
 from acquisition.check_hit import check_hit
 from acquisition.errors import DataError, DeviceError
@@ -10,6 +10,8 @@ from acquisition.frf import Frf, from_accelerance
 from acquisition.hammered_structure import HammeredStructure, Hammering, Structure
 from acquisition.hit import Hit, HitFlags
 from acquisition.read_recording import read_frf, read_hits, read_recording, recorded_as
+from acquisition.ring_down import ring_down
+from acquisition.running_mean import RunningMean
 from acquisition.simulated_source import SimulatedSource
 from acquisition.source import Source
 from acquisition.tap_file import read_tap, read_tap_hits, write_hit, write_tap
@@ -29,6 +31,8 @@ __all__ = [
     "Hammering",
     "Hit",
     "HitFlags",
+    "HitSearch",
+    "RunningMean",
     "SimulatedSource",
     "Source",
     "SourceFile",
@@ -51,6 +55,7 @@ __all__ = [
     "read_tap",
     "read_tap_hits",
     "recorded_as",
+    "ring_down",
     "write_hit",
     "write_tap",
 ]

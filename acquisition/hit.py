@@ -24,6 +24,7 @@ class HitFlags(enum.Flag):
     LOST_SCANS = enum.auto()
     NO_HIT = enum.auto()
     SWAPPED_CHANNELS = enum.auto()
+    UNDONE = enum.auto()
 
     @property
     def words(self) -> str:
@@ -72,6 +73,7 @@ _WORDS: Mapping[HitFlags, tuple[str, str]] = {
         "swapped channels",
         "The force rings and the response does not: swap the two cables.",
     ),
+    HitFlags.UNDONE: ("undone", "Taken back by the operator."),
 }
 
 

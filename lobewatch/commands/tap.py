@@ -8,13 +8,13 @@ from typing import Annotated
 
 import typer
 
-from acquisition import Circumstances, Hit, HitFlags
+from acquisition import Circumstances
 from lobewatch.describe import measurement_json, measurement_texts
 from lobewatch.devices import open_source
-from lobewatch.history import update_history
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.output import Json, emit, notes
-from lobewatch.tapping import OnHit, begin_tap, take_hits, trigger_for
+from lobewatch.tap_printer import TapPrinter
+from lobewatch.tap_session import TapSession, TapStopped
 
 
 def tap(
@@ -50,31 +50,15 @@ def tap(
         operator,
         folder.toml.read_text("utf-8"),
     )
-    with folder.locked():
-        running = begin_tap(folder, about, resume=not new)
-        if running.hits:
-            begun = f"{running.circumstances.created:%Y-%m-%d %H:%M} UTC"
-            notes.print(f"going on with the test begun {begun}: {running.good} of {setup.tap.hits} good hits are there")
+    session = TapSession(folder, lambda: open_source(setup.daq, port), about, resume=not new)
+    with TapPrinter(session, notes):
         try:
-            with open_source(setup.daq, port) as source:
-                device = f"{source.info['model']} on {port}, {source.sample_rate:g} Hz"
-                notes.print(f"{device}. TAP the tool, again and again.", markup=False)
-                take_hits(
-                    running, source, trigger_for(folder, source.sample_rate), setup.tap.hits, _show(setup.tap.hits)
-                )
+            done = session.run()
+        except TapStopped as stopped:
+            notes.print(str(stopped))
+            raise KeyboardInterrupt from stopped
         except KeyboardInterrupt:
-            notes.print(f"stopped with {running.good} good hits; the same command goes on with them")
+            notes.print(f"stopped with {session.state.good} good hits; the same command goes on with them")
             raise
-        folder.commit(running.finish())
-        notes.print(f"saved {running.id}")
-        _, measurements = update_history(folder)
-    found = next(measurement for measurement in measurements if measurement.tap_id == running.id)
-    emit(measurement_json(found, setup), as_json, *measurement_texts(found, setup))
-
-
-def _show(wanted: int) -> OnHit:
-    def on_hit(hit: Hit, flags: HitFlags, good: int) -> None:
-        verdict = f"[bold red]✗ {flags.words.upper()}[/]  {flags.cure}" if flags else "[bold green]✓ GOOD[/]"
-        notes.print(f"{good:3d} / {wanted}  {verdict}  ({hit.force.max():.0f} N)")
-
-    return on_hit
+    notes.print(f"saved {done.id}")
+    emit(measurement_json(session.measurement, setup), as_json, *measurement_texts(session.measurement, setup))

@@ -6,6 +6,8 @@ from acquisition.channel import Block, Channel
 from acquisition.check_hit import check_hit
 from acquisition.errors import DataError, DeviceError
 from acquisition.estimate_frf import cross_spectra, estimate_frf
+from acquisition.file_source import FileSource
+from acquisition.find_port import find_port, usb_identity
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hammered_structure import HammeredStructure, Hammering, Structure
 from acquisition.hit import Hit, HitFlags
@@ -16,7 +18,9 @@ from acquisition.simulated_source import SimulatedSource
 from acquisition.source import Source
 from acquisition.tap_file import read_tap, read_tap_hits, write_hit, write_tap
 from acquisition.tap_test import Circumstances, SourceFile, TapTest, average_good, new_tap_id
-from acquisition.taps_emulator import Faults, TapsEmulator
+from acquisition.taps_emulator import TapsEmulator
+from acquisition.taps_event import Event, EventKind
+from acquisition.taps_faults import Faults
 from acquisition.taps_source import TapsSource
 
 __all__ = [
@@ -25,7 +29,10 @@ __all__ = [
     "Circumstances",
     "DataError",
     "DeviceError",
+    "Event",
+    "EventKind",
     "Faults",
+    "FileSource",
     "Frf",
     "HammeredStructure",
     "Hammering",
@@ -47,6 +54,7 @@ __all__ = [
     "check_hit",
     "cross_spectra",
     "estimate_frf",
+    "find_port",
     "from_accelerance",
     "new_tap_id",
     "read_frf",
@@ -56,6 +64,7 @@ __all__ = [
     "read_tap_hits",
     "recorded_as",
     "ring_down",
+    "usb_identity",
     "write_hit",
     "write_tap",
 ]

@@ -3,7 +3,8 @@ again when the structure is at rest."""
 
 from __future__ import annotations
 
-from collections import deque
+import functools
+import operator
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -13,16 +14,11 @@ from numpy.typing import NDArray
 from acquisition.channel import Block, Channel
 from acquisition.errors import DataError
 from acquisition.hit import Hit
+from acquisition.rest import Rest
 from acquisition.source import Source
 
-REST_FACTOR = 2.0
-"""The response is at rest where its rms is at most this many times that of the baseline ..."""
-REST_CODES = 2.0
-"""... or this many steps of the converter."""
-STEADY_TIME = 1.0
-"""A response that has not fallen over twice this time is the new baseline (s)."""
-STEADY_SHARE = 0.8
-"""It has not fallen where the median of the second half is at least this share of that of the first."""
+PATIENCE = 2.0
+"""A response that has not fallen for so long is no ringing but the new baseline (s)."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +34,7 @@ class Trigger:
     hysteresis: float = 0.5
     """The trigger arms only after the force has stayed below this share of the level for pre_trigger samples."""
     rest_rms: float | None = None
-    """rms of the acceleration at rest (m/s^2): armed only after pre_trigger samples within REST_FACTOR of it; None arms
+    """rms of the acceleration at rest (m/s^2): armed only after pre_trigger samples at rest; None arms
     by the force alone."""
 
     def __post_init__(self) -> None:
@@ -75,18 +71,24 @@ class HitSearch:
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate: float, trigger: Trigger) -> None:
         """Search a stream of these channels from its next scan on."""
-        self._rows = list(input_channels(channels))
-        self._pair = (channels[self._rows[0]], channels[self._rows[1]])
+        self._inputs = input_channels(channels)
+        self._pair = (channels[self._inputs[0]], channels[self._inputs[1]])
         self._rate, self._trigger = sample_rate, trigger
-        self._level = trigger.level / self._pair[0].scale
+        newton_per_code = self._pair[0].scale
+        self._level, self._sign = trigger.level / abs(newton_per_code), 1 if newton_per_code > 0 else -1
         self._codes: NDArray[np.int32] = np.empty((2, 0), np.int32)
+        self._added: list[NDArray[np.int32]] = []
+        self._size = 0
         self._from = 0
         self._quiet = 0
         self._crossing: int | None = None
         self._gaps: list[tuple[int, int]] = []
-        self._rest = None if trigger.rest_rms is None else trigger.rest_rms / abs(self._pair[1].scale)
+        self._overloads: list[tuple[int, int, int]] = []
+        self._rest: Rest | None = None
+        if trigger.rest_rms is not None:
+            patience = max(round(PATIENCE * sample_rate / trigger.pre_trigger), 2)
+            self._rest = Rest(trigger.rest_rms / abs(self._pair[1].scale), patience)
         self._settled = self._rest is None
-        self._levels: deque[float] = deque(maxlen=2 * max(round(STEADY_TIME * sample_rate / trigger.pre_trigger), 1))
         self.too_early = 0
         """Hits passed over because the structure was not at rest."""
 
@@ -103,70 +105,74 @@ class HitSearch:
     def feed(self, block: Block) -> Iterator[Hit]:
         """The hits that are complete with this block."""
         if block.lost_before:
-            self._gaps.append((self._codes.shape[1], block.lost_before))
-        self._codes = np.concatenate([self._codes, block.codes[self._rows]], axis=1)
+            self._gaps.append((self._size, block.lost_before))
+        self._add(block)
         while (record := self._next_record()) is not None:
-            yield Hit.from_codes(record[0], self._pair, self._rate, self._trigger.pre_trigger, record[1])
+            codes, lost, overload = record
+            yield Hit.from_codes(codes, self._pair, self._rate, self._trigger.pre_trigger, lost, overload)
 
-    def _next_record(self) -> tuple[NDArray[np.int32], int] | None:
-        """The next complete record and the scans lost in it; None until more blocks have come."""
-        before = self._trigger.pre_trigger
-        while self._crossing is None:
-            found = self._find_crossing() if self._settled or self._settle() else None
-            if found is None:
-                self._forget(self._from - before)
-                return None
-            self._accept(found)
-        start = self._crossing - before
-        end = start + self._trigger.n_samples
-        if end > self._codes.shape[1]:
+    def _add(self, block: Block) -> None:
+        force, response = self._inputs
+        overload = (block.overload >> force & 1) | (block.overload >> response & 1) << 1
+        end = self._size + block.codes.shape[1]
+        if overload:
+            self._overloads.append((self._size, end, overload))
+        self._added.append(block.codes if self._inputs == (0, 1) else block.codes[[force, response]])
+        self._size = end
+
+    def _next_record(self) -> tuple[NDArray[np.int32], int, int] | None:
+        """The next complete record, the scans lost in it and its overloads; None until more blocks have come."""
+        if self._crossing is None and not self._trigger_on_crossing():
+            self._forget(self._from - self._trigger.pre_trigger)
             return None
+        start = (self._crossing or 0) - self._trigger.pre_trigger
+        end = start + self._trigger.n_samples
+        if end > self._size:
+            return None
+        self._join()
         record = self._codes[:, start:end].copy()
         lost = sum(count for position, count in self._gaps if start < position < end)
+        masks = (mask for first, last, mask in self._overloads if first < end and last > start)
         self._from, self._quiet, self._crossing, self._settled = end, 0, None, self._rest is None
-        self._levels.clear()
-        return record, lost
+        return record, lost, functools.reduce(operator.or_, masks, 0)
 
-    def _accept(self, crossing: int) -> None:
-        """Record the hit that crosses here where the response was at rest before it, else pass it over."""
-        before = self._codes[1, crossing - self._trigger.pre_trigger : crossing]
-        if self._is_at_rest(float(np.std(before[: max(int(0.8 * before.size), 1)]))):
-            self._crossing = crossing
-        else:
+    def _join(self) -> None:
+        """Not at every block: a record under way would be copied as often."""
+        self._codes = np.concatenate([self._codes, *self._added], axis=1)
+        self._added.clear()
+
+    def _force(self, start: int, end: int | None = None) -> NDArray[np.int32]:
+        return self._sign * self._codes[0, start:end]
+
+    def _trigger_on_crossing(self) -> bool:
+        """Find the next crossing that is preceded by rest; hits before it are passed over."""
+        self._join()
+        before = self._trigger.pre_trigger
+        while self._settled or self._settle():
+            found = self._find_crossing()
+            if found is None:
+                return False
+            quiet = self._codes[1, found - before : found - before // 5]  # the pulse may begin before its crossing
+            if self._rest is None or self._rest.holds(quiet):
+                self._crossing = found
+                return True
             self.too_early += 1
-            self._from, self._quiet, self._settled = crossing, 0, False
-            self._step()
-
-    def _is_at_rest(self, rms: float) -> bool:
-        """Whether the response has this rms (codes) at rest."""
-        return self._rest is None or rms <= max(REST_FACTOR * self._rest, REST_CODES)
+            self._from, self._quiet, self._settled = found + 1, 0, False
+        return False
 
     def _settle(self) -> bool:
         """Step over stretches of pre_trigger samples to the end of the first one without force and at rest."""
         width = self._trigger.pre_trigger
-        while not self._settled and self._from + width <= self._codes.shape[1]:
-            above = self._codes[0, max(self._from - 1, 0) : self._from + width] >= self._level
+        while self._rest is not None and self._from + width <= self._codes.shape[1]:
+            start, self._from = self._from, self._from + width
+            force = self._force(max(start - 1, 0), self._from)
+            above = force >= self._level
             self.too_early += int(np.count_nonzero(above[1:] & ~above[:-1]))
-            force, response = self._step()
-            self._levels.append(float(np.std(response)))
-            self._relearn()
-            quiet = bool(np.max(force) < self._trigger.hysteresis * self._level)
-            if quiet and self._is_at_rest(self._levels[-1]):
+            still = self._rest.wait(self._codes[1, start : self._from])
+            if still and np.max(force) < self._trigger.hysteresis * self._level:
                 self._settled, self._quiet = True, width
-        return self._settled
-
-    def _step(self) -> NDArray[np.int32]:
-        stretch = self._codes[:, self._from : self._from + self._trigger.pre_trigger]
-        self._from += stretch.shape[1]
-        return stretch
-
-    def _relearn(self) -> None:
-        """What has not fallen for long is no ringing but the new baseline, e.g. of a machine started next door."""
-        if self._rest is None or len(self._levels) < (self._levels.maxlen or 0):
-            return
-        first, second = np.median(np.reshape(self._levels, (2, -1)), axis=1)
-        if second >= STEADY_SHARE * first:
-            self._rest = max(self._rest, float(second))
+                return True
+        return False
 
     def _find_crossing(self) -> int | None:
         """First sample at the level in a loud run that follows pre_trigger quiet samples.
@@ -174,7 +180,7 @@ class HitSearch:
         Loud is above the hysteresis level. A run that is still open at the end is looked at again with the next
         block, unless it has lasted a whole record (an offset, not a hit).
         """
-        force = self._codes[0, self._from :]
+        force = self._force(self._from)
         loud = np.flatnonzero(force >= self._trigger.hysteresis * self._level)
         starts = loud[np.diff(loud, prepend=-2) > 1]
         ends = loud[np.diff(loud, append=force.size + 1) > 1] + 1
@@ -196,5 +202,7 @@ class HitSearch:
         if count <= 0:
             return
         self._codes = self._codes[:, count:]
+        self._size -= count
         self._from -= count
         self._gaps = [(position - count, lost) for position, lost in self._gaps if position > count]
+        self._overloads = [(first - count, last - count, mask) for first, last, mask in self._overloads if last > count]

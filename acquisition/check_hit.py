@@ -26,7 +26,8 @@ def check_hit(hit: Hit) -> HitFlags:
     """All that is wrong with a hit; falsy when it may be averaged.
 
     Rails are known from ADC codes; a recording without codes is taken as overloaded where its extreme value
-    stands exactly equal in a run of at least 3 samples (inferred). Source: ISO 7626-5 practice.
+    stands exactly equal in a run of at least 3 samples (inferred); what the device reports as overloaded is.
+    Source: ISO 7626-5 practice.
     """
     flags = _overloads(hit)
     if hit.lost_scans:
@@ -53,7 +54,7 @@ def _overloads(hit: Hit) -> HitFlags:
             rails = set(hit.channels[i].rails)
         else:
             rails = {signals[i].min(), signals[i].max()} - {np.median(signals[i])}  # a resting value is no rail
-        if any(_longest_run(signals[i] == rail) >= RAIL_RUN for rail in rails):
+        if hit.overload >> i & 1 or any(_longest_run(signals[i] == rail) >= RAIL_RUN for rail in rails):
             flags |= flag
     return flags
 

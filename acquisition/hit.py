@@ -98,6 +98,8 @@ class Hit:
     """Force and response channel, where the hit came from a DAQ."""
     codes: NDArray[np.int32] | None = None
     """Raw ADC codes, shape (2, n), force first; None where the recording has none."""
+    overload: int = 0
+    """What the device itself reports as overloaded: bit 0 the force, bit 1 the response."""
 
     def __post_init__(self) -> None:
         """Convert to arrays and check them."""
@@ -123,11 +125,13 @@ class Hit:
         sample_rate: float,
         pre_trigger: int = 0,
         lost_scans: int = 0,
+        overload: int = 0,
     ) -> Hit:
         """A hit from ADC codes (2, n), force first, scaled by the sensitivities of its channels."""
         raw = np.asarray(codes, dtype=np.int32)
         force, response = channels
-        return cls(raw[0] * force.scale, raw[1] * response.scale, sample_rate, pre_trigger, lost_scans, channels, raw)
+        values = raw[0] * force.scale, raw[1] * response.scale
+        return cls(*values, sample_rate, pre_trigger, lost_scans, channels, raw, overload)
 
     @property
     def time(self) -> NDArray[np.float64]:

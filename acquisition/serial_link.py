@@ -33,10 +33,12 @@ class SerialLink:
         self.port = port
         try:
             self._serial = _open(port)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, TermiosError) as error:
             raise DeviceError(_explain(port, error)) from error
         self._chunks: deque[bytes] = deque()
         self._waiting = 0
+        self.overruns = 0
+        """How often the consumer was so late that all that waited was thrown away."""
         self._arrived = threading.Condition()
         self._running = True
         self._failure: Exception | None = None
@@ -47,6 +49,10 @@ class SerialLink:
         """Send bytes; DeviceError where the device is gone."""
         try:
             self._serial.write(data)
+        except serial.SerialTimeoutException as error:
+            raise DeviceError(
+                f"the DAQ on {self.port} takes no commands; switch it off and on and repeat the command"
+            ) from error
         except (OSError, TermiosError) as error:
             raise self._unplugged() from error
 
@@ -59,10 +65,8 @@ class SerialLink:
                     raise self._unplugged() from self._failure
                 if not self._arrived.wait(max(deadline - time.monotonic(), 0)):
                     return b""
-            data = b"".join(self._chunks)
-            self._chunks.clear()
-            self._waiting = 0
-            return data
+            chunks, self._chunks, self._waiting = self._chunks, deque(), 0
+        return b"".join(chunks)  # outside the lock: the reader does not wait for it
 
     def close(self) -> None:
         """Stop the reader and give the port back."""
@@ -87,6 +91,7 @@ class SerialLink:
             if self._waiting + len(data) > BUFFER_BYTES:
                 self._chunks.clear()  # the gap shows in the scan indices of the frames that follow
                 self._waiting = 0
+                self.overruns += 1
             if data:
                 self._chunks.append(data)
                 self._waiting += len(data)
@@ -139,6 +144,7 @@ def _explain(port: str, error: Exception) -> str:
     text = str(error)
     hints = {
         "lock": "another program uses it: close that program",
+        "busy": "another program uses it: close that program",
         "Permission denied": "you may not use it (Linux: sudo usermod -aG dialout $USER, then log in again)",
         "Access is denied": "another program uses it: close that program",
         "No such file": "check the cable and the port's name",

@@ -126,6 +126,7 @@ def _write_raw(file: h5py.File, hits: Sequence[Hit], flags: Sequence[HitFlags]) 
         _dataset(raw, "samples", samples, "N, m/s^2", chunks=(1, *samples.shape[1:]), **packed)
     raw.attrs.update(sample_rate_hz=first.sample_rate, pre_trigger_samples=first.pre_trigger)
     _dataset(raw, "lost_scans", [hit.lost_scans for hit in hits], "1")
+    _dataset(raw, "overload", [hit.overload for hit in hits], "1")
     _dataset(raw, "accepted", [not flag for flag in flags], "1")
     raw["verdict"] = [flag.words for flag in flags]
 
@@ -135,14 +136,15 @@ def _read_raw(file: h5py.File) -> tuple[tuple[Hit, ...], tuple[HitFlags, ...]]:
         return (), ()
     raw = file["raw"]
     rate, before = float(raw.attrs["sample_rate_hz"]), int(raw.attrs["pre_trigger_samples"])
-    lost = raw["lost_scans"][()]
+    lost = raw["lost_scans"][()].tolist()
+    overload = raw["overload"][()].tolist() if "overload" in raw else [0] * len(lost)  # not in the first files
     flags = tuple(HitFlags.from_words(words) for words in raw["verdict"].asstr()[()])
     if "codes" in raw:
         pair = (_read_channel(raw["channel_0"]), _read_channel(raw["channel_1"]))
-        coded = zip(raw["codes"][()], lost, strict=True)
-        return tuple(Hit.from_codes(codes, pair, rate, before, int(n)) for codes, n in coded), flags
-    sampled = zip(raw["samples"][()], lost, strict=True)
-    return tuple(Hit(force, response, rate, before, int(n)) for (force, response), n in sampled), flags
+        coded = zip(raw["codes"][()], lost, overload, strict=True)
+        return tuple(Hit.from_codes(codes, pair, rate, before, n, mask) for codes, n, mask in coded), flags
+    sampled = zip(raw["samples"][()], lost, overload, strict=True)
+    return tuple(Hit(force, response, rate, before, n, overload=mask) for (force, response), n, mask in sampled), flags
 
 
 def _read_channel(group: h5py.Group) -> Channel:

@@ -14,7 +14,7 @@ from acquisition.hit import Hit
 
 SETTLED_HITS = 4
 """Under so many hits a mean is not called settled."""
-SETTLED_ERROR = 0.01
+SETTLED_ERROR = 0.005
 """Standard error of |H| near the highest peak below which the mean has settled (-)."""
 PEAK_SHARE = 0.5
 """Near the peak is where |accelerance| is at least this share of its largest value in the usable band."""

@@ -84,6 +84,8 @@ class TapPrinter:
 
 def verdict(hit: TakenHit) -> str:
     """Symbol, words and cure, with colours."""
+    if hit.undone:
+        return "[bold]↶ UNDONE[/]"
     if not hit.flags:
         return "[bold green]✓ GOOD[/]"
     return f"[bold red]✗ {hit.flags.words.upper()}[/]  {escape(hit.reason)}"

@@ -83,7 +83,7 @@ class ScriptedSession:
     """A live tap test without device and clock: the test says what it shows next."""
 
     def __init__(self) -> None:
-        self.state = TapState(1, Word.CHECKING, "mill-3, tool reference, direction x", device="DI-2108 on COM3, 51200 Hz")
+        self.state = TapState(1, Word.CHECKING, "mill-3, tool reference, direction x", device="DI-2108, 51200 Hz")
         self.undone = threading.Event()
         self.stopped = threading.Event()
         self.refusal = ""

@@ -93,5 +93,5 @@ def _check_token(request: web.Request, token: str) -> None:
     given = [request.headers.get("Authorization", "").removeprefix("Bearer ")]
     protocols = request.headers.get("Sec-WebSocket-Protocol", "").split(",")
     given += [name.strip().removeprefix("token.") for name in protocols]
-    if not any([hmac.compare_digest(one.encode("utf-8", "surrogateescape"), token.encode()) for one in given]):
+    if not any(hmac.compare_digest(one.encode("utf-8", "surrogateescape"), token.encode()) for one in given):
         raise web.HTTPUnauthorized(text="open the whole address that lobewatch printed, with its token")

@@ -12,15 +12,16 @@ function fail(text) {
 function fallText({ fall, fall_std: std, series }) {
   if (fall === null) return series;
   if (std === 0) return `${series}: first test, nothing to compare it with yet`;
-  const moved = fall >= 0 ? `fallen by ${fall.toFixed(2)}` : `risen by ${(-fall).toFixed(2)}`;
-  return `${series}: frequency has ${moved}${std === null ? "" : ` ± ${std.toPrecision(2)}`} % since the first test`;
+  const digits = std === null ? 2 : Math.min(Math.max(1 - Math.floor(Math.log10(std)), 1), 4);
+  const error = std === null ? "" : ` ± ${std.toFixed(digits)}`;
+  return `${series}: frequency ${fall >= 0 ? "fallen" : "risen"} by ${Math.abs(fall).toFixed(digits)}${error} % since the first test`;
 }
 
 function dueText({ last_tap: last, days_left: left }) {
   if (!last) return ["", ""];
   const days = Math.abs(Math.round(left));
   const many = `${days} day${days === 1 ? "" : "s"}`;
-  return [`last tap test ${last.slice(0, 10)}, `, left < 0 ? `overdue by ${many}` : `next due in ${many}`];
+  return [`last tap test ${last.slice(0, 10)}`, left < 0 ? `overdue by ${many}` : `next due in ${many}`];
 }
 
 // The address that an action leads to is opened; what went wrong stands on the page.
@@ -42,7 +43,7 @@ function row(machine) {
   part("fall").textContent = fallText(machine);
   part("note").textContent = machine.note;
   const [last, due] = dueText(machine);
-  part("dates").append(last, Object.assign(document.createElement("span"), { textContent: due, className: machine.days_left < 0 ? "overdue" : "" }));
+  part("dates").append(last, document.createElement("br"), Object.assign(document.createElement("span"), { textContent: due, className: machine.days_left < 0 ? "overdue" : "" }));
   part("report").disabled = !machine.last_tap;
   part("report").addEventListener("click", ({ target }) => go(target, `${path}/report`));
   for (const button of item.querySelectorAll(".start")) {

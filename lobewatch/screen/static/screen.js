@@ -5,7 +5,6 @@ import { isMuted, play, status, toggleMute, unlock } from "./sounds.js";
 const UNDO_KEYS = ["u", "U", "PageUp"];
 const STOP_AGAIN_MS = 3000;
 const VERDICTS = ["good", "refused"];
-const ONE_VERDICT_MS = 400;
 const LIGHTS = ["good", "warn", "alarm"];
 const at = (id) => document.getElementById(id);
 const put = (id, text) => { if (at(id).textContent !== text) at(id).textContent = text; };
@@ -14,7 +13,7 @@ let state = null;
 let stopTimer = null;
 let undoing = false;
 let over = false;
-let announcedAt = -ONE_VERDICT_MS;
+let aheadOfHit = false;
 
 function element(tag, text, className = "") {
   return Object.assign(document.createElement(tag), { textContent: text, className });
@@ -66,14 +65,18 @@ function showState(next) {
   if (before) announce(before);
 }
 
-// A verdict comes as a word and as a new hit, maybe in two pictures; pictures may have been left out.
+// A verdict comes as a word and as a new hit, maybe in two pictures; the pictures in between may have been left out.
 function announce(before) {
   const changed = state.kind !== before.kind;
   const another = (state.hits.at(-1)?.number ?? 0) > (before.hits.at(-1)?.number ?? 0);
-  if (VERDICTS.includes(state.kind) && (changed || another) && performance.now() - announcedAt > ONE_VERDICT_MS) {
-    announcedAt = performance.now();
+  if (!VERDICTS.includes(state.kind)) {
+    aheadOfHit = false;
+  } else if (changed || (another && !aheadOfHit)) {
     flash();
     play(state.kind);
+    aheadOfHit = !another;
+  } else if (another) {
+    aheadOfHit = false;
   }
   if (changed && state.kind === "done") play("done");
   if (changed && ["no-device", "failed"].includes(state.kind)) play("lost");

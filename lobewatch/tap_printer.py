@@ -57,10 +57,11 @@ class TapPrinter:
 
     def _follow(self) -> None:
         while not self._ended.wait(INTERVAL):
-            self._print(self._session.state)
-        self._print(self._session.state)
+            self.show(self._session.state)
+        self.show(self._session.state)
 
-    def _print(self, state: TapState) -> None:
+    def show(self, state: TapState) -> None:
+        """Print what is new in a state."""
         before, self._before = self._before, state
         if state.device != before.device:
             self._console.print(f"{state.device}. TAP the tool, again and again.", markup=False)

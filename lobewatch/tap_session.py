@@ -191,7 +191,7 @@ class TapSession:
             except DeviceError as again:
                 error = again
             else:
-                self._show(reason="The DAQ is back.")
+                self._show(word=Word.WAIT, reason="")
                 return
 
     def _blocks(self) -> Iterator[Block]:

@@ -51,12 +51,14 @@ class TerminalScreen:
         self._session = session
         self._console = console or Console(stderr=True, highlight=False, emoji=False)
         self._muted = False
+        self._keys = Keys()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="terminal screen", daemon=True)
         self._live = Live(console=self._console, get_renderable=self._picture, refresh_per_second=10)
 
     def __enter__(self) -> Self:
         """Show it, and listen to keys."""
+        self._keys.__enter__()
         self._live.start()
         self._thread.start()
         return self
@@ -68,19 +70,20 @@ class TerminalScreen:
         self._ended.set()
         self._thread.join()
         self._live.stop()
+        self._keys.__exit__(kind, error, trace)
 
     def _watch(self) -> None:
         """Keys and bells."""
         before = self._session.state
-        with Keys() as keys:
-            while not self._ended.wait(INTERVAL):
-                for key in keys.pressed():
-                    self._press(key)
-                state = self._session.state
-                self._ring(before, state)
-                before = state
+        while not self._ended.wait(INTERVAL):
+            for key in self._keys.pressed():
+                self.press(key)
+            state = self._session.state
+            self.ring(before, state)
+            before = state
 
-    def _press(self, key: str) -> None:
+    def press(self, key: str) -> None:
+        """Do what a key stands for."""
         if key == "u":
             self._session.undo()
         elif key == "q":
@@ -88,7 +91,8 @@ class TerminalScreen:
         elif key == "m":
             self._muted = not self._muted
 
-    def _ring(self, before: TapState, state: TapState) -> None:
+    def ring(self, before: TapState, state: TapState) -> None:
+        """The bells of a new word or hit."""
         told = state.word != before.word or len(state.hits) > len(before.hits)
         for _ in range(BELLS.get(state.word, 0) if told and not self._muted else 0):
             self._console.bell()
@@ -124,6 +128,8 @@ def _banner(state: TapState) -> RenderableType:
     """The full-width word."""
     symbol, style = LOOKS[state.word]
     word = state.verdict.upper() if state.word is Word.REFUSED else str(state.word)
+    if state.word is Word.GOOD and state.verdict != "good":
+        word = f"{word} ({state.verdict})"
     text = Text(f"{symbol}  {word}   {state.good} / {state.wanted}", "bold")
     return Panel(Align.center(text), style=style, padding=(1, 1))
 

@@ -142,7 +142,7 @@ def scripted_plots(good: int) -> Plots:
     frequency = np.linspace(4.0, 12800.0, 1500)
     ringing = np.where(time > 0, np.exp(-300 * time) * np.sin(2 * np.pi * 1722 * time), 0.0)
     ratio = frequency / 1722
-    receptance = np.abs(1 / (3.2e7 * (1 - ratio**2 + 0.06j * ratio))) + 1e-9
+    receptance = np.abs(1 / (3.2e7 * (1 - ratio**2 + 0.06j * ratio))) + 1e-9 + 1e-4 / frequency**2
     return Plots(
         time,
         312 * np.exp(-(((time - 4e-4) / 3e-4) ** 2)),

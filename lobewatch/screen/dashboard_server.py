@@ -38,13 +38,13 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class DashboardServer(WebThread):
     """Serves a machine or a folder of machines from __enter__ to __exit__, in a thread of its own."""
 
-    def __init__(self, path: Path, *, listen: str = "127.0.0.1", port: int = 0, token: str | None = None) -> None:
+    def __init__(self, path: Path | str, *, listen: str = "127.0.0.1", port: int = 0, token: str | None = None) -> None:
         """Brings the histories up to date. Port 0: any free one; token None: a new one.
 
         DataError where there is no machine, ValueError for a token that does not fit into an address.
         """
         super().__init__(listen, port, token)
-        self._machines = find_machines(path)
+        self._machines = find_machines(Path(path))
         self._tests: dict[str, LiveTest] = {}
         self._reports: dict[str, tuple[str, str]] = {}
         for folder in self._machines.values():

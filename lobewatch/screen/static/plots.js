@@ -5,11 +5,12 @@ const INK = "#111";
 const GRID = { stroke: "#ddd", width: 1 };
 const FONT = "13px system-ui, 'DejaVu Sans', sans-serif";
 const COHERENCE_LIMIT = 0.8;
+const LOWEST_SHARE = 0.05;
 const FORCE_LIMIT_DB = -20;
 const MICRO = 1e6;
 
 let curves = { band: null };
-let shown = { pulse: [0, 1], frequency: [0, 1] };
+let shown = { pulse: [0, 1], frequency: [0, 1], receptance: [0.001, 1] };
 const charts = {};
 
 const line = (stroke, dash) => ({ stroke, dash, width: 2, points: { show: false } });
@@ -64,11 +65,14 @@ function shadeBand(plot) {
 
 const whole = (_, low, high) => (low === high ? [low - 1, high + 1] : uPlot.rangeNum(low, high, 0.05, true));
 
-// Whole decades, no more than four below the largest value: what lies lower is noise or an antiresonance.
-function decades(_, low, high) {
-  if (!(high > 0)) return [0.001, 1];
-  const top = Math.ceil(Math.log10(high));
-  const bottom = Math.max(Math.floor(Math.log10(Math.max(low, 1e-12))), top - 4);
+// Whole decades about the lines that can be trusted: near 0 Hz an accelerometer shows noise over the square of f.
+function decades({ frequency, mean, last, coherence, band }) {
+  const trusted = (f, i) => (coherence ? coherence[i] >= COHERENCE_LIMIT : f >= LOWEST_SHARE * shown.frequency[1]);
+  const inBand = (f, i) => f <= (band?.[1] ?? Infinity) && trusted(f, i);
+  const values = (mean ?? last ?? []).filter((v, i) => v > 0 && inBand(frequency[i], i)).map((v) => v * MICRO);
+  if (!values.length) return [0.001, 1];
+  const top = Math.ceil(Math.log10(Math.max(...values)));
+  const bottom = Math.max(Math.floor(Math.log10(Math.min(...values))), top - 4);
   return [10 ** Math.min(bottom, top - 1), 10 ** top];
 }
 
@@ -77,7 +81,7 @@ export function makePlots() {
   chart("force", { x: "time (ms)", range: whole, xRange: () => shown.pulse, series: [line(INK)] });
   chart("response", { x: "time (ms)", range: whole, series: [line(INK)] });
   chart("frf", {
-    x: "frequency (Hz)", range: decades, xRange: frequency, log: true,
+    x: "frequency (Hz)", range: () => shown.receptance, xRange: frequency, log: true,
     series: [line(LAST, [6, 4]), line(MEAN)],
   });
   chart("coherence", {
@@ -96,6 +100,7 @@ export function showPlots(latest) {
   const time = curves.time.map((t) => t * 1000);
   const micro = (values) => values?.map((v) => (v > 0 ? v * MICRO : null)) ?? none;
   shown = { pulse: aroundPulse(time, curves.force), frequency: [0, top(curves)] };
+  shown.receptance = decades(curves);
   charts.force.setData([time, curves.force]);
   charts.response.setData([time, curves.acceleration]);
   charts.frf.setData([curves.frequency, micro(curves.last), micro(curves.mean)]);

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,26 +16,42 @@ LEVEL_TIME = 0.05
 """Length of the live levels (s)."""
 
 
+class Device(Source, Protocol):
+    """A connected source that can be given back."""
+
+    @property
+    def info(self) -> Mapping[str, Any]:
+        """What it says of itself, with its "model"."""
+        ...
+
+    def close(self) -> None:
+        """Stop, and give the port back."""
+        ...
+
+
 class LiveSignal:
     """Force and acceleration of one connected source."""
 
     def __init__(self, source: Source) -> None:
         """DataError unless it has one force and one acceleration channel."""
         self._rows = list(input_channels(source.channels))
-        self._pair = (source.channels[self._rows[0]], source.channels[self._rows[1]])
+        self.channels = (source.channels[self._rows[0]], source.channels[self._rows[1]])
+        """Force and acceleration channel."""
         self._rate = source.sample_rate
         self._recent: deque[NDArray[np.int32]] = deque(maxlen=64)
 
     @property
     def levels(self) -> tuple[float, float]:
         """rms about the mean of force (N) and acceleration (m/s^2) over the newest LEVEL_TIME."""
-        newest = np.concatenate(self._recent, axis=1)[:, -round(LEVEL_TIME * self._rate) :]
+        newest = np.concatenate([codes[self._rows] for codes in self._recent], axis=1)[
+            :, -round(LEVEL_TIME * self._rate) :
+        ]
         force, response = np.std(newest, axis=1)
-        return float(force * abs(self._pair[0].scale)), float(response * abs(self._pair[1].scale))
+        return float(force * abs(self.channels[0].scale)), float(response * abs(self.channels[1].scale))
 
     def add(self, block: Block) -> None:
         """Take note of a block."""
-        self._recent.append(block.codes[self._rows])
+        self._recent.append(block.codes)
 
     def record(self, blocks: Iterable[Block], duration: float) -> Hit:
         """The next blocks that make up a duration (s), as one record."""
@@ -44,7 +61,7 @@ class LiveSignal:
             lost += block.lost_before
             if sum(part.shape[1] for part in codes) >= duration * self._rate:
                 break
-        return Hit.from_codes(np.concatenate(codes, axis=1), self._pair, self._rate, 0, lost)
+        return Hit.from_codes(np.concatenate(codes, axis=1), self.channels, self._rate, 0, lost)
 
 
 def resting_rms(baseline: Hit, width: int) -> float:

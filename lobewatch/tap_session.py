@@ -5,9 +5,9 @@ from __future__ import annotations
 import shutil
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any
 
 from acquisition import (
     Block,
@@ -18,19 +18,18 @@ from acquisition import (
     HitFlags,
     HitSearch,
     RunningMean,
-    Source,
     TapTest,
     Trigger,
     check_hit,
 )
 from lobewatch.history import update_history
-from lobewatch.live_signal import LEVEL_TIME, LiveSignal, resting_rms
+from lobewatch.live_signal import LEVEL_TIME, Device, LiveSignal, resting_rms
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.outcome import outcome_of
 from lobewatch.pipeline import Measurement
 from lobewatch.self_check import quiet_stretch, self_check
 from lobewatch.tap_plots import plots_of
-from lobewatch.tap_state import TakenHit, TapState, Word
+from lobewatch.tap_state import TapState, Word
 from lobewatch.tapping import TapInProgress, begin_tap
 from lobewatch.trial import Trial, trigger_of
 
@@ -42,19 +41,6 @@ UNDO_TIME = 2.0
 """Time in which the last hit needed can be taken back (s)."""
 RETRY_TIME = 0.5
 """Pause between two tries to find the device again (s)."""
-
-
-class Device(Source, Protocol):
-    """A connected source that can be given back."""
-
-    @property
-    def info(self) -> Mapping[str, Any]:
-        """What it says of itself, with its "model"."""
-        ...
-
-    def close(self) -> None:
-        """Stop, and give the port back."""
-        ...
 
 
 class TapStopped(Exception):  # noqa: N818  (no error: the operator wished it)
@@ -75,15 +61,14 @@ class TapSession:
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
-        """Nothing is opened yet. guided False leaves out what only a person needs: self-check, re-arming by decay, and
-        the time to take back the last hit."""
+        """Nothing is opened yet. guided False leaves out what only a person needs: self-check, re-arming by decay,
+        curves, and the time to take back the last hit."""
         self._folder, self._open_device, self._about = folder, open_device, circumstances
         self._resume, self._guided, self._clock, self._sleep = resume, guided, clock, sleep
         about = f"{circumstances.machine}, tool {circumstances.tool}, direction {circumstances.direction}"
         self._state = TapState(0, Word.CHECKING, about, wanted=folder.machine.tap.hits)
         self._undos, self._stopping = threading.Semaphore(0), threading.Event()
         self._mean = RunningMean()
-        self._reasons: list[str] = []
         self._baseline: Hit | None = None
         self._trial: Trial | None = None
         self._verdict = Word.TAP
@@ -135,11 +120,9 @@ class TapSession:
     def _begin(self) -> None:
         self._tap: TapInProgress = begin_tap(self._folder, self._about, self._resume)
         for hit, flags in zip(self._tap.hits, self._tap.flags, strict=True):
-            self._reasons.append(flags.cure)
             if not flags:
                 self._mean.add(hit)
-        self._earlier = len(self._tap.hits)
-        if self._earlier:
+        if self._tap.hits:
             begun = f"{self._tap.circumstances.created:%Y-%m-%d %H:%M} UTC"
             there = f"{self._tap.good} of {self._state.wanted} good hits are there"
             self._show_hits(resumed=f"going on with the test begun {begun}: {there}")
@@ -164,7 +147,8 @@ class TapSession:
         try:
             self._signal = LiveSignal(self._device)
             known = self._tap.hits[-1] if self._tap.hits else self._baseline
-            if known is not None and known.sample_rate != self._device.sample_rate:
+            now = self._device.sample_rate, self._signal.channels
+            if known is not None and (known.sample_rate, known.channels) != now:
                 raise self._other_setup()
             self._device.start()
         except BaseException:
@@ -174,7 +158,7 @@ class TapSession:
 
     def _other_setup(self) -> ValueError:
         return ValueError(
-            f"the interrupted test {self._tap.id} was recorded with another length or sample rate; "
+            f"the interrupted test {self._tap.id} was recorded with another length, sample rate or sensor; "
             "begin anew with --new"
         )
 
@@ -215,6 +199,7 @@ class TapSession:
             if number is not None:
                 self._mean.remove(self._tap.hits[number])
                 self._show_hits(verdict="undone", reason=f"Hit {number + 1} was taken back.")
+                self._draw(self._tap.hits[-1])
 
     def _check(self) -> None:
         """The self-check, once a session."""
@@ -242,7 +227,7 @@ class TapSession:
             hit = next(hit for hit in self._hits(self._trial.trigger) if hit is not None)
             refused = self._trial.add(hit)
             self._show_verdict(refused or HitFlags.OK, "trial hit", refused.cure or self._trial.text)
-            self._show(plots=plots_of(hit, self._mean))
+            self._draw(hit)
         self._tap.trigger = self._trial.trigger
 
     def _tap_on(self) -> None:
@@ -283,12 +268,12 @@ class TapSession:
     def _take(self, hit: Hit) -> None:
         """Judge a hit, keep it, and only then show it."""
         flags, reason = _judge(hit)
-        self._tap.add(hit, flags)
-        self._reasons.append(reason)
+        self._tap.add(hit, flags, reason)
         if not flags:
             self._mean.add(hit)
         self._show_verdict(flags, flags.words, reason)
-        self._show_hits(plots=plots_of(hit, self._mean))
+        self._show_hits()
+        self._draw(hit)
 
     def _show_verdict(self, flags: HitFlags, verdict: str, reason: str) -> None:
         self._verdict, self._verdict_at = Word.REFUSED if flags else Word.GOOD, self._heard
@@ -296,13 +281,12 @@ class TapSession:
 
     def _show_hits(self, **changes: Any) -> None:
         """The list of hits and what follows from it."""
-        told = zip(self._tap.hits, self._tap.flags, self._reasons, strict=True)
-        hits = tuple(
-            TakenHit(i, flags, float(hit.force.max()), bool(flags & HitFlags.UNDONE), reason, i <= self._earlier)
-            for i, (hit, flags, reason) in enumerate(told, 1)
-        )
-        mean = self._mean
-        self._show(hits=hits, good=self._tap.good, mean_change=mean.change, settled=mean.settled, **changes)
+        tap, mean = self._tap, self._mean
+        self._show(hits=tap.taken, good=tap.good, mean_change=mean.change, settled=mean.settled, **changes)
+
+    def _draw(self, hit: Hit) -> None:
+        if self._guided:
+            self._show(plots=plots_of(hit, self._mean))
 
     def _show(self, **changes: Any) -> None:
         self._state = replace(self._state, revision=self._state.revision + 1, **changes)

@@ -23,6 +23,7 @@ from acquisition import (
     write_hit,
 )
 from lobewatch.machine_folder import MachineFolder
+from lobewatch.tap_state import TakenHit
 
 RESERVE_BYTES = 50_000_000
 """Free disk space needed before the trigger is armed."""
@@ -45,6 +46,10 @@ class TapInProgress:
     """All hits so far."""
     flags: list[HitFlags] = field(default_factory=list)
     """The verdict on each; UNDONE where the operator took a good one back."""
+    reasons: list[str] = field(default_factory=list)
+    """What was wrong with each, in a sentence; empty where it is averaged."""
+    earlier: int = 0
+    """How many of them were there when it was gone on with."""
     trigger: Trigger | None = None
     """How its hits are recorded; None until that is chosen."""
 
@@ -53,7 +58,16 @@ class TapInProgress:
         """How many hits may be averaged."""
         return sum(not flags for flags in self.flags)
 
-    def add(self, hit: Hit, flags: HitFlags) -> None:
+    @property
+    def taken(self) -> tuple[TakenHit, ...]:
+        """The hits as a screen lists them."""
+        told = enumerate(zip(self.hits, self.flags, self.reasons, strict=True), 1)
+        return tuple(
+            TakenHit(i, flags, float(hit.force.max()), bool(flags & HitFlags.UNDONE), reason, i <= self.earlier)
+            for i, (hit, flags, reason) in told
+        )
+
+    def add(self, hit: Hit, flags: HitFlags, reason: str) -> None:
         """Keep a hit; on the disk when this returns."""
         self.folder.mkdir(parents=True, exist_ok=True)
         if not self.hits and self.trigger is not None:
@@ -61,6 +75,7 @@ class TapInProgress:
         self._write(len(self.hits), hit, flags)
         self.hits.append(hit)
         self.flags.append(flags)
+        self.reasons.append(reason)
 
     def undo(self) -> int | None:
         """Take back the last good hit and return its index; None where there is none. It stays stored, as undone."""
@@ -102,11 +117,12 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
 
 
 def _resumed(path: Path, files: list[Path], about: Circumstances) -> TapInProgress:
-    tap = TapInProgress(path.name, about, path)
+    tap = TapInProgress(path.name, about, path, earlier=len(files))
     for file in files:
         (hit,), _, (flags,) = read_tap_hits(file)
         tap.hits.append(hit)
         tap.flags.append(flags | check_hit(hit))
+        tap.reasons.append(tap.flags[-1].cure)
     if (path / SETUP).is_file():
         tap.trigger = Trigger(**json.loads((path / SETUP).read_text("utf-8")))
     return tap

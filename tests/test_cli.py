@@ -116,7 +116,7 @@ def test_an_interrupted_tap_is_gone_on_with_and_new_begins_anew(
         running = begin_tap(trial, Circumstances("trial", datetime.now(UTC), "reference"))
         source.start()
         for hit in islice(capture_hits(source, Trigger(20.0, 6400, 512)), 4):
-            running.add(hit, check_hit(hit))
+            running.add(hit, check_hit(hit), "")
     anew = run("tap", "trial", "--port", device.port, "--new")
     assert "going on" not in anew.err
     said = run("tap", "trial", "--port", device.port)

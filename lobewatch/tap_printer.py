@@ -70,7 +70,9 @@ class TapPrinter:
                 self._console.print(f"[bold yellow]![/] {escape(check.name)}: {escape(check.text)}")
         if state.resumed != before.resumed:
             self._console.print(state.resumed)
-        if state.reason != before.reason and state.word in (Word.NO_DEVICE, Word.WAIT, Word.TAP):
+        with_hit = state.word in (Word.GOOD, Word.REFUSED) and state.verdict != "trial hit"
+        told = with_hit or state.word is Word.FAILED or state.reason == before.reason
+        if state.reason and not told:
             self._console.print(escape(state.reason))
         self._print_hits(state)
 

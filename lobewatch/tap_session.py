@@ -138,6 +138,8 @@ class TapSession:
                     self._tap_on()
                     return
                 except DeviceError as error:
+                    if not self._missing:
+                        return
                     self._reconnect(error)
         finally:
             self._device.close()

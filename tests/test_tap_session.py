@@ -305,3 +305,12 @@ def test_a_device_with_another_sensor_does_not_go_on_with_the_test(
     session = session_of(folder, lambda: next(devices))
     with pytest.raises(ValueError, match="another length, sample rate or sensor; begin anew with --new"):
         session.run()
+
+
+def test_a_cable_pulled_after_the_last_hit_does_not_keep_the_result_back(
+    folder: MachineFolder, tapper: Tapper, channels: Pair
+) -> None:
+    devices = iter([Simulated(tapper(), channels, unplugged=lambda: session.state.good == 10)])
+    session = session_of(folder, lambda: next(devices))
+    assert len(session.run().accepted) == 10
+    assert session.state.word is Word.DONE

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from acquisition import Circumstances, TapTest
+from acquisition import Circumstances
 from lobewatch.describe import measurement_json, measurement_texts
 from lobewatch.devices import open_source
 from lobewatch.machine_folder import MachineFolder
@@ -59,22 +59,17 @@ def tap(
         folder.toml.read_text("utf-8"),
     )
     session = TapSession(folder, lambda: open_source(setup.daq, port), about, resume=not new)
-    with contextlib.ExitStack() as screens:
-        if screen:
-            from lobewatch.screen import ScreenServer  # brings aiohttp, which most commands do not need
-
-            server = screens.enter_context(ScreenServer(session, listen=listen, token=token))
-            show_address(server.url)
-        screens.enter_context(TerminalScreen(session) if notes.is_terminal else TapPrinter(session, notes))
-        done = _run(session)
-    notes.print(f"saved {done.id}")
-    emit(measurement_json(session.measurement, setup), as_json, *measurement_texts(session.measurement, setup))
-
-
-def _run(session: TapSession) -> TapTest:
-    """The finished test; stopped by its key, it ends like Ctrl-C."""
     try:
-        return session.run()
+        with contextlib.ExitStack() as screens:
+            if screen:
+                from lobewatch.screen import ScreenServer  # brings aiohttp, which most commands do not need
+
+                server = screens.enter_context(ScreenServer(session, listen=listen, token=token))
+                show_address(server.url)
+            screens.enter_context(TerminalScreen(session) if notes.is_terminal else TapPrinter(session, notes))
+            done = session.run()
     except (TapStopped, KeyboardInterrupt) as stopped:
         notes.print(f"stopped with {session.state.good} good hits; the same command goes on with them")
         raise KeyboardInterrupt from stopped
+    notes.print(f"saved {done.id}")
+    emit(measurement_json(session.measurement, setup), as_json, *measurement_texts(session.measurement, setup))

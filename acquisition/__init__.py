@@ -1,7 +1,7 @@
 """From the DAQ to hits, averaged FRF and HDF5 files."""
 
 from acquisition.atomic_write import atomic_write
-from acquisition.capture_hits import Trigger, capture_hits
+from acquisition.capture_hits import HitSearch, Trigger, capture_hits
 from acquisition.channel import Block, Channel
 from acquisition.check_hit import check_hit
 from acquisition.dataq import DataqInput
@@ -23,6 +23,8 @@ from acquisition.plausibility import calibration_doubt, channel_doubts, stiffnes
 from acquisition.port_hints import no_ports_hint
 from acquisition.probe_port import DeviceIdentity, probe_port
 from acquisition.read_recording import read_frf, read_hits, read_recording, recorded_as
+from acquisition.ring_down import ring_down
+from acquisition.running_mean import RunningMean
 from acquisition.simulated_source import SimulatedSource
 from acquisition.source import Source
 from acquisition.tap_file import read_tap, read_tap_hits, write_hit, write_tap
@@ -56,10 +58,12 @@ __all__ = [
     "Hammering",
     "Hit",
     "HitFlags",
+    "HitSearch",
     "MassCalibration",
     "MeasuredRate",
     "MeasuredSkew",
     "PortInfo",
+    "RunningMean",
     "SimulatedSource",
     "Source",
     "SourceFile",
@@ -94,6 +98,7 @@ __all__ = [
     "read_tap",
     "read_tap_hits",
     "recorded_as",
+    "ring_down",
     "stiffness_doubt",
     "unit_mistake",
     "usb_identity",

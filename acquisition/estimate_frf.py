@@ -36,7 +36,7 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
     }
     frequency = np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate)
     coherence = np.minimum(np.abs(s_fx) ** 2 / (s_ff * s_xx), 1.0) if len(hits) > 1 else None
-    return from_accelerance(frequency, forms[estimator](), coherence, len(hits), _usable_band(frequency, s_ff))
+    return from_accelerance(frequency, forms[estimator](), coherence, len(hits), usable_band(frequency, s_ff))
 
 
 def cross_spectra(hits: Sequence[Hit]) -> Spectra:
@@ -87,7 +87,7 @@ def _skew(hit: Hit) -> float:
     return hit.channels[1].skew - hit.channels[0].skew if hit.channels else 0.0
 
 
-def _usable_band(frequency: NDArray[np.floating[Any]], s_ff: NDArray[np.float64]) -> tuple[float, float]:
+def usable_band(frequency: NDArray[np.floating[Any]], s_ff: NDArray[np.float64]) -> tuple[float, float]:
     """From the first line to the first one where the force spectrum has fallen 20 dB below its largest value."""
     weak = np.flatnonzero(s_ff[1:] < 0.01 * np.max(s_ff[1:]))
     return float(frequency[1]), float(frequency[weak[0] if weak.size else -1])

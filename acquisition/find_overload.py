@@ -51,7 +51,9 @@ def find_overload(hit: Hit, index: int) -> Overload | None:
     noise = float(np.std(baseline(signal, hit.pre_trigger or int(np.argmax(hit.force)))))
     for sign in (1, -1):
         above = sign * (signal - middle)
-        count = max(_flat_top(above, 3 * noise * scale + step) for scale in SCALES) or (_longest_run(above == above.max()) if not step else 0)
+        count = max(_flat_top(above, 3 * noise * scale + step) for scale in SCALES) or (
+            _longest_run(above == above.max()) if not step else 0
+        )
         if count >= RAIL_SAMPLES and above.max() > 0:
             return Overload(middle + sign * float(above.max()), count, inferred=True)
     return None

@@ -27,6 +27,7 @@ class HitFlags(enum.Flag):
     TOO_HARD = enum.auto()
     NARROW_BAND = enum.auto()
     INCONSISTENT = enum.auto()
+    UNDONE = enum.auto()
 
     @property
     def words(self) -> str:
@@ -72,6 +73,7 @@ _WORDS: Mapping[HitFlags, tuple[str, str]] = {
     HitFlags.TOO_HARD: ("too hard", "Hit softer or choose a larger force range."),
     HitFlags.NARROW_BAND: ("narrow band", "Use a harder hammer tip."),
     HitFlags.INCONSISTENT: ("inconsistent", "Hit the same spot in the same direction as before."),
+    HitFlags.UNDONE: ("undone", "Taken back by the operator."),
 }
 
 

@@ -59,20 +59,21 @@ def read_tap(path: Path | str) -> TapTest:
             raise DataError(f"{path}: incomplete tap file ({error}); take it again from a backup") from error
 
 
-def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances) -> None:
-    """One hit of a test in progress, on the disk when this returns."""
+def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: HitFlags) -> None:
+    """One hit of a test in progress and the verdict on it, on the disk when this returns."""
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         file.attrs.update(format=FORMAT, version=VERSION)
         _write_circumstances(file, circumstances)
-        _write_raw(file, [hit], [HitFlags.OK])
+        _write_raw(file, [hit], [flags])
     atomic_write(Path(path), memory.getvalue())
 
 
-def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances]:
-    """The hits of a tap file or of a hit file, and their circumstances."""
+def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tuple[HitFlags, ...]]:
+    """The hits of a tap file or of a hit file, their circumstances, and the verdicts of then."""
     with _open(Path(path)) as file:
-        return _read_raw(file)[0], _read_circumstances(file)
+        hits, flags = _read_raw(file)
+        return hits, _read_circumstances(file), flags
 
 
 def _open(path: Path) -> h5py.File:

@@ -32,13 +32,13 @@ class Identity(Table, frozen=True):
 
 
 class TapSetup(Table, frozen=True):
-    """[tap]: how the tap test is done."""
+    """[tap]: how the tap test is done; record_s and trigger_n that are not given are chosen by trial hits."""
 
     tool: str = "reference"
     hits: Annotated[int, Meta(ge=3, le=1000)] = 10
-    record_s: Positive = 0.25
+    record_s: Positive | None = None
     pre_trigger_s: Positive = 0.02
-    trigger_n: Positive = 20.0
+    trigger_n: Positive | None = None
     position_mm: NotNegative = 0.0
 
 

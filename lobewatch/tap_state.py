@@ -57,6 +57,10 @@ class TakenHit:
     """N."""
     undone: bool = False
     """Taken back by the operator."""
+    reason: str = ""
+    """One sentence with figures: what was wrong with it; empty where it is averaged."""
+    earlier: bool = False
+    """Taken before the test was interrupted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +109,8 @@ class TapState:
     """See Word."""
     title: str
     """Machine, tool and direction."""
+    resumed: str = ""
+    """Where an interrupted test is gone on with: which one and how many good hits it had; empty for a new one."""
     device: str = ""
     """DAQ, port and rate."""
     verdict: str = ""

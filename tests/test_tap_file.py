@@ -132,10 +132,11 @@ def test_the_file_is_plain_hdf5_with_units_and_scales(tap: TapTest, tmp_path: Pa
 
 
 def test_a_hit_in_progress_is_read_back_with_its_circumstances(tap: TapTest, tmp_path: Path) -> None:
-    write_hit(tmp_path / "0000.h5", tap.hits[0], ABOUT)
-    (hit,), about = read_tap_hits(tmp_path / "0000.h5")
+    write_hit(tmp_path / "0000.h5", tap.hits[0], ABOUT, HitFlags.UNDONE)
+    (hit,), about, flags = read_tap_hits(tmp_path / "0000.h5")
     assert same_hit(hit, tap.hits[0])
     assert about == ABOUT
+    assert flags == (HitFlags.UNDONE,)
 
 
 def test_identities_are_unique_file_names_that_sort_by_time() -> None:

@@ -56,7 +56,7 @@ class FileSource:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End it."""
-        self.stop()
+        self.close()
 
     def start(self) -> None:
         """Begin at the first hit."""
@@ -65,6 +65,10 @@ class FileSource:
     def stop(self) -> None:
         """End at the next block."""
         self._stopped.set()
+
+    def close(self) -> None:
+        """End at the next block; the file is closed already."""
+        self.stop()
 
     def blocks(self) -> Iterator[Block]:
         """The blocks; they end some quiet after the last hit."""

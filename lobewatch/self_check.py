@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from datetime import UTC, datetime
+
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Channel, Hit
+from lobewatch.sensor_doubts import sensor_doubts
 from lobewatch.tap_state import Check
 from lobewatch.tapping import RESERVE_BYTES
 
@@ -61,6 +65,14 @@ def self_check(baseline: Hit, level: float | None, free_bytes: int) -> tuple[Che
         _hum(baseline),
         _spindle(baseline),
         _disk(free_bytes),
+    )
+
+
+def calibration_check(channels: Sequence[Channel], interval_months: float) -> Check:
+    """Sensitivities and calibration dates."""
+    warnings, errors = sensor_doubts(channels, datetime.now(UTC).date(), interval_months)
+    return Check(
+        "calibration", not (warnings or errors), "; ".join([*errors, *warnings]) or "dates known and not too old"
     )
 
 

@@ -20,14 +20,16 @@ from acquisition import (
     RunningMean,
     TapTest,
     Trigger,
-    check_hit,
+    Verdict,
+    judge_hit,
 )
 from lobewatch.history import update_history
+from lobewatch.known_devices import checked_rate, has_clock, known_rate
 from lobewatch.live_signal import LEVEL_TIME, Device, LiveSignal, resting_rms
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.outcome import outcome_of
 from lobewatch.pipeline import Measurement
-from lobewatch.self_check import quiet_stretch, self_check
+from lobewatch.self_check import calibration_check, quiet_stretch, self_check
 from lobewatch.tap_plots import plots_of
 from lobewatch.tap_state import TapState, Word
 from lobewatch.tapping import TapInProgress, begin_tap
@@ -39,6 +41,8 @@ VERDICT_TIME = 0.8
 """How long a verdict is shown at least (s); the trigger may be armed before."""
 UNDO_TIME = 2.0
 """Time in which the last hit needed can be taken back (s)."""
+FEWEST_FOR_MEAN = 3
+"""Hits in a mean that others are compared with."""
 RETRY_TIME = 0.5
 """Pause between two tries to find the device again (s)."""
 
@@ -147,6 +151,7 @@ class TapSession:
     def _connect(self) -> None:
         self._device = self._open_device()
         try:
+            self._measure_rate()
             self._signal = LiveSignal(self._device)
             known = self._tap.hits[-1] if self._tap.hits else self._baseline
             now = self._device.sample_rate, self._signal.channels
@@ -157,6 +162,12 @@ class TapSession:
             self._device.close()
             raise
         self._show(device=f"{self._device.info['model']}, {self._device.sample_rate:g} Hz")
+
+    def _measure_rate(self) -> None:
+        """Against the clock, of a device that this machine does not know yet."""
+        if has_clock(self._device) and known_rate(self._folder, self._device) is None:
+            self._show(reason="New device: its sample rate is measured against the clock for 5 s.")
+        checked_rate(self._folder, self._device)
 
     def _other_setup(self) -> ValueError:
         return ValueError(
@@ -210,9 +221,9 @@ class TapSession:
             return
         self._show(word=Word.CHECKING, reason="Keep the hammer away for a second.")
         self._baseline = quiet_stretch(self._signal.record(self._blocks(), BASELINE_TIME))
-        checks = self_check(
-            self._baseline, trigger.level if trigger else None, shutil.disk_usage(self._folder.path).free
-        )
+        free = shutil.disk_usage(self._folder.path).free
+        calibration = calibration_check(self._signal.channels, self._folder.machine.daq.calibration_interval_months)
+        checks = (*self_check(self._baseline, trigger.level if trigger else None, free), calibration)
         failed = [f"{check.name}: {check.text}." for check in checks if not check.passed]
         self._show(checks=checks, reason=" ".join(failed))
 
@@ -224,8 +235,8 @@ class TapSession:
             return
         self._trial = self._trial or Trial(self._folder.machine.tap, self._baseline)
         while not self._trial.done:
-            if not self._state.reason:
-                self._show(reason=self._trial.text)
+            if self._trial.text not in self._state.reason:
+                self._show(reason=f"{self._state.reason} {self._trial.text}".strip())
             hit = next(hit for hit in self._hits(self._trial.trigger) if hit is not None)
             refused = self._trial.add(hit)
             self._show_verdict(refused or HitFlags.OK, "trial hit", refused.cure or self._trial.text)
@@ -269,13 +280,18 @@ class TapSession:
 
     def _take(self, hit: Hit) -> None:
         """Judge a hit, keep it, and only then show it."""
-        flags, reason = _judge(hit)
-        self._tap.add(hit, flags, reason)
-        if not flags:
+        verdict = self._judge(hit)
+        self._tap.add(hit, verdict.flags, verdict.text)
+        if not verdict.flags:
             self._mean.add(hit)
-        self._show_verdict(flags, flags.words, reason)
+        self._show_verdict(verdict.flags, verdict.flags.words, verdict.text)
         self._show_hits()
         self._draw(hit)
+
+    def _judge(self, hit: Hit) -> Verdict:
+        """Against the mean, too, where that has enough hits to tell how far they scatter."""
+        mean = self._mean.frf if len(self._mean.hits) >= FEWEST_FOR_MEAN else None
+        return judge_hit(hit, mean, self._folder.machine.mode.band_hz)
 
     def _show_verdict(self, flags: HitFlags, verdict: str, reason: str) -> None:
         self._verdict, self._verdict_at = Word.REFUSED if flags else Word.GOOD, self._heard
@@ -304,9 +320,3 @@ class TapSession:
         outcome = outcome_of(self._measurement, history, self._folder.machine)
         self._show(reason="", outcome=outcome)
         return tap
-
-
-def _judge(hit: Hit) -> tuple[HitFlags, str]:
-    """The verdict on a hit, and its reason and cure."""
-    flags = check_hit(hit)
-    return flags, flags.cure

@@ -16,8 +16,8 @@ from acquisition import (
     TapTest,
     Trigger,
     atomic_write,
-    check_hit,
     estimate_frf,
+    judge_hit,
     new_tap_id,
     read_tap_hits,
     write_hit,
@@ -121,8 +121,9 @@ def _resumed(path: Path, files: list[Path], about: Circumstances) -> TapInProgre
     for file in files:
         (hit,), _, (flags,) = read_tap_hits(file)
         tap.hits.append(hit)
-        tap.flags.append(flags | check_hit(hit))
-        tap.reasons.append(tap.flags[-1].cure)
+        found = judge_hit(hit)
+        tap.flags.append(flags | found.flags)
+        tap.reasons.append(found.text or flags.cure)
     if (path / SETUP).is_file():
         tap.trigger = Trigger(**json.loads((path / SETUP).read_text("utf-8")))
     return tap

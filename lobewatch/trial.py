@@ -28,7 +28,8 @@ RANGE_LOW, RANGE_HIGH = 0.02, 0.9
 """Share of its range that a channel should stay between."""
 MOST = 3
 """Trial hits at most."""
-_USABLE = HitFlags.NOT_DECAYED | HitFlags.TOO_SOFT | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
+_RANGES = HitFlags.TOO_SOFT | HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
+_USABLE = HitFlags.NOT_DECAYED | _RANGES
 """What a trial hit may be: that is what trial hits are for."""
 
 

@@ -259,6 +259,7 @@ def test_hits_have_the_measured_rate(folder: MachineFolder, tapper: Callable[...
         TapsEmulator(tapper(), PAIR, 25600.0, realtime=False) as device,
         TapsSource(device.port) as source,
     ):
+        source.info["clock_ppm"] = 0
         halved = Stream(even(12800.0), info=source.info)
         check(accepting(folder), halved)
         rate = checked_rate(MachineFolder(folder.path), source)

@@ -231,7 +231,7 @@ def test_hits_of_a_24_bit_device_keep_their_codes_on_disk(tapper: Tapper, channe
     with TapsEmulator(tapper(), fine, RATE, realtime=False) as device, TapsSource(device.port) as source:
         source.start()
         hit = next(capture_hits(source, TRIGGER))
-    write_hit(tmp_path / "hit.h5", hit, Circumstances("mill", datetime(2026, 1, 15, tzinfo=UTC)))
+    write_hit(tmp_path / "hit.h5", hit, Circumstances("mill", datetime(2026, 1, 15, tzinfo=UTC)), HitFlags.OK)
     (kept,) = read_tap_hits(tmp_path / "hit.h5")[0]
     assert hit.codes is not None
     assert np.max(np.abs(hit.codes)) > 32767
@@ -266,7 +266,7 @@ def test_an_overload_that_the_device_reports_refuses_the_hit(
         source.start()
         hit = next(capture_hits(source, TRIGGER))
     assert check_hit(hit) == flags
-    write_hit(tmp_path / "hit.h5", hit, Circumstances("mill", datetime(2026, 1, 15, tzinfo=UTC)))
+    write_hit(tmp_path / "hit.h5", hit, Circumstances("mill", datetime(2026, 1, 15, tzinfo=UTC)), HitFlags.OK)
     assert check_hit(read_tap_hits(tmp_path / "hit.h5")[0][0]) == flags
 
 

@@ -19,10 +19,8 @@ from acquisition import (
     MeasuredSkew,
     Source,
     calibrate_by_mass,
-    calibration_doubt,
     capture_hits,
-    channel_doubts,
-    check_hit,
+    judge_hit,
     measure_rate,
     measure_skew,
 )
@@ -30,12 +28,17 @@ from acquisition.mass_calibration import AGREES
 from acquisition.units import STANDARD_GRAVITY
 from lobewatch.devices import open_source
 from lobewatch.known_devices import Device, checked_rate, has_clock, use_rate
+from lobewatch.live_signal import LiveSignal
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.output import Json, emit, notes, plus_minus, table
-from lobewatch.tapping import trigger_for
+from lobewatch.self_check import quiet_stretch
+from lobewatch.sensor_doubts import sensor_doubts
+from lobewatch.trial import Trial
 
 RATE_SECONDS = 5.0
 """How long the rate is measured (s)."""
+BASELINE_SECONDS = 0.5
+"""How long is listened before the first hit (s)."""
 SKEW_SECONDS = 2.0
 """How long a common signal is recorded (s)."""
 
@@ -77,7 +80,8 @@ def sensors(
 
 
 def _list(folder: MachineFolder, source: Source, as_json: bool) -> None:
-    warnings, errors = _doubts(source.channels, folder.machine.daq.calibration_interval_months)
+    today = datetime.now(UTC).date()
+    warnings, errors = sensor_doubts(source.channels, today, folder.machine.daq.calibration_interval_months)
     nominal = source.sample_rate
     measured = _rate(folder, source, errors)
     found = "not measured" if measured is None else f"measured {plus_minus(measured.rate, measured.std)} Hz"
@@ -123,19 +127,6 @@ def _rate(folder: MachineFolder, source: Source, errors: list[str]) -> MeasuredR
     return measured
 
 
-def _doubts(channels: tuple[Channel, ...], interval_months: float) -> tuple[list[str], list[str]]:
-    """Warnings and errors."""
-    warnings: list[str] = []
-    errors: list[str] = []
-    for channel in channels:
-        warnings += channel_doubts(channel)
-        try:
-            warnings.append(calibration_doubt(channel, datetime.now(UTC).date(), interval_months))
-        except ValueError as error:
-            errors.append(str(error))
-    return list(filter(None, warnings)), errors
-
-
 def _channel_json(channel: Channel) -> dict[str, Any]:
     return {
         "quantity": channel.quantity,
@@ -174,15 +165,16 @@ def _check_mass(folder: MachineFolder, source: Source, mass: float, as_json: boo
 
 def _good_hits(folder: MachineFolder, source: Source) -> list[Hit]:
     wanted = folder.machine.tap.hits
-    trigger = trigger_for(folder, checked_rate(folder, source))
+    checked_rate(folder, source)
     notes.print(f"HIT the hung mass opposite the accelerometer, {wanted} times; wait until it is still")
     good: list[Hit] = []
     source.start()
-    for hit in capture_hits(source, trigger):
-        flags = check_hit(hit)
-        if not flags:
+    baseline = quiet_stretch(LiveSignal(source).record(source.blocks(), BASELINE_SECONDS))
+    for hit in capture_hits(source, Trial(folder.machine.tap, baseline).trigger):
+        found = judge_hit(hit)
+        if not found.flags:
             good.append(hit)
-        verdict = f"✗ {flags.words.upper()}  {flags.cure}" if flags else "✓ GOOD"
+        verdict = f"✗ {found.flags.words.upper()}  {found.text}" if found.flags else "✓ GOOD"
         notes.print(f"{len(good):3d} / {wanted}  {verdict}", markup=False)
         if len(good) >= wanted:
             break

@@ -128,7 +128,7 @@ class Session:
         time = np.arange(n) / self.setting.sample_rate
         white = 1 / np.sqrt(2) if self.background == "hum" else 1.0
         levels = np.array([[self.force_noise], [self.response_noise]])
-        result = self.random.normal(size=(2, n)) * levels * white
+        result: Signal = self.random.normal(size=(2, n)) * levels * white
         if self.background == "drift":
             u = time / time[-1]
             offset, slope, bend = self.random.uniform(-10, 10, 3)
@@ -150,7 +150,9 @@ class Session:
         trigger = Trigger(0.5 * highest, setting.record, setting.pre_trigger, hysteresis=1.0)
         cut = int(2.5 * setting.pre_trigger)
         rate = setting.sample_rate
-        stream: Source = SimulatedSource(lambda first, count: signal[:, first : first + count], pair, rate, signal.shape[1])
+        stream: Source = SimulatedSource(
+            lambda first, count: signal[:, first : first + count], pair, rate, signal.shape[1]
+        )
         if gap:
             stream = Lossy(stream, cut, gap)
         return next(iter(capture_hits(stream, trigger)))
@@ -178,7 +180,9 @@ class Lossy:
 
     def blocks(self) -> Iterator[Block]:
         for block in self.source.blocks():
-            low, high = (int(np.clip(at - block.first_scan, 0, block.codes.shape[1])) for at in (self.at, self.at + self.gap))
+            low, high = (
+                int(np.clip(at - block.first_scan, 0, block.codes.shape[1])) for at in (self.at, self.at + self.gap)
+            )
             if low == high:
                 yield block
                 continue
@@ -191,7 +195,9 @@ def session(setting: Setting, random: np.random.Generator, number: int) -> Sessi
     background = BACKGROUNDS[number % len(BACKGROUNDS)]
     soft = number // len(BACKGROUNDS) % 2
     width = np.exp(random.uniform(*np.log((1e-3, 4e-3) if soft else (0.3e-3, 1e-3))))
-    force_noise = {"quiet": 0.05, "5 N rms": 5.0, "drift": random.uniform(0.1, 1.0), "hum": random.uniform(1, 4)}[background]
+    force_noise = {"quiet": 0.05, "5 N rms": 5.0, "drift": random.uniform(0.1, 1.0), "hum": random.uniform(1, 4)}[
+        background
+    ]
     force = Channel("force", 2.2e-3, 2.2e-3 * FORCE_RANGE)
     response = Channel("acceleration", 1e-3, 1.0)
     room = Session(setting, random, background, width, force_noise, 0.0, (force, response))
@@ -218,7 +224,11 @@ def double(one: Session) -> Hit:
     least = max(0.03, 6 * one.force_noise / first.peak)
     share = np.exp(one.random.uniform(np.log(least), np.log(max(0.6, 1.2 * least))))
     room = 0.8 * one.setting.record / one.setting.sample_rate
-    early = least < 0.2 and one.random.uniform() < 0.3 and 4 * first.width < 0.7 * one.setting.pre_trigger / one.setting.sample_rate
+    early = (
+        least < 0.2
+        and one.random.uniform() < 0.3
+        and 4 * first.width < 0.7 * one.setting.pre_trigger / one.setting.sample_rate
+    )
     if early:
         room = 0.7 * one.setting.pre_trigger / one.setting.sample_rate - 2 * first.width
         share = one.random.uniform(least, 0.3)
@@ -266,7 +276,7 @@ def _clipped(index: int, *, amplifier: bool, codes: bool = True) -> Callable[[Se
 
 
 def not_decayed(one: Session) -> Hit:
-    """A structure whose modes ring for so long that the record holds 1 to 2.5 time constants, and are heard at its end."""
+    """Modes that ring so long that the record holds 1 to 2.5 time constants, and are heard at its end."""
     setting = one.setting
     while True:
         blow = replace(one.blow(), width=one.random.uniform(0.3e-3, 0.8e-3))
@@ -274,7 +284,7 @@ def not_decayed(one: Session) -> Hit:
         zeta = 1 / (2 * np.pi * setting.structure.frequency * tau)
         clean = one.signal([blow], replace(setting.structure, damping_ratio=zeta))
         end = int(1.5 * setting.pre_trigger) + setting.record - setting.pre_trigger
-        tenths = [np.std(part) for part in np.array_split(clean[1, end - setting.record : end], 10)]
+        tenths = [float(np.std(part)) for part in np.array_split(clean[1, end - setting.record : end], 10)]
         if tenths[-1] > max(0.03 * max(tenths), 4 * one.response_noise):
             break
     channels = (one.channels[0], replace(one.channels[1], full_scale=2e-3 * float(np.abs(clean[1]).max())))
@@ -301,7 +311,10 @@ def swapped(one: Session) -> Hit:
     noisy = clean + one.noise(clean.shape[1])
     ratio = one.channels[1].sensitivity / one.channels[0].sensitivity
     scale = np.array([[ratio], [1 / ratio]])
-    wide = tuple(replace(c, full_scale=2 * c.sensitivity * float(np.abs(s).max())) for c, s in zip(one.channels, noisy[::-1] * scale, strict=True))
+    wide = tuple(
+        replace(c, full_scale=2 * c.sensitivity * float(np.abs(s).max()))
+        for c, s in zip(one.channels, noisy[::-1] * scale, strict=True)
+    )
     return one.take(noisy[::-1] * scale, (wide[0], wide[1]))
 
 
@@ -321,7 +334,9 @@ def other_direction(one: Session) -> Hit:
     else:
         shift = one.random.choice([-1, 1]) * one.random.uniform(0.08, 0.2)
         factor = one.random.uniform(1.3, 2.0)
-        structure = replace(structure, frequency=structure.frequency * (1 + shift), stiffness=structure.stiffness * factor)
+        structure = replace(
+            structure, frequency=structure.frequency * (1 + shift), stiffness=structure.stiffness * factor
+        )
     clean = one.signal([one.blow()], structure, sign)
     return one.take(clean + one.noise(clean.shape[1]), _wide(one, clean))
 

@@ -333,7 +333,7 @@ def other_direction(one: Session) -> Hit:
         sign = -1.0
     else:
         shift = one.random.choice([-1, 1]) * one.random.uniform(0.08, 0.2)
-        factor = one.random.uniform(1.3, 2.0)
+        factor = one.random.uniform(1.6, 2.5)
         structure = replace(
             structure, frequency=structure.frequency * (1 + shift), stiffness=structure.stiffness * factor
         )

@@ -111,7 +111,7 @@ def main() -> None:
         print(f"\nrefused as double hit, first peak {PEAK:g} N, noise {noise:g} N rms\n\n{head}")
         for share in SHARES:
             cells = " | ".join(f"{detection(share, gap, noise):.0%}" for gap in GAPS)
-            print(f"| {share:.0%} = {share * PEAK / noise:.2g} x noise | {cells} |")
+            print(f"| {share:.0%} = {share * PEAK / noise:.3g} x noise | {cells} |")
     print(f"\nerror in K with one such hit among ten\n\n{head}")
     for share in SHARES:
         print(f"| {share:.0%} | " + " | ".join(f"{stiffness_error(share, gap):+.2%}" for gap in GAPS) + " |")

@@ -24,8 +24,8 @@ def distance_from_mean(frf: Frf, mean: Frf) -> tuple[float, float]:
         raise ValueError(f"a mean of {n} hits (with its coherence) cannot tell how far hits scatter; 3 are needed")
     if not np.array_equal(frf.frequency, mean.frequency):
         raise ValueError(
-            f"the hit has {frf.frequency.size} lines up to {frf.frequency[-1]:g} Hz, the mean {mean.frequency.size} up to "
-            f"{mean.frequency[-1]:g} Hz; compare hits of one set-up only"
+            f"the hit has {frf.frequency.size} lines up to {frf.frequency[-1]:g} Hz, the mean "
+            f"{mean.frequency.size} up to {mean.frequency[-1]:g} Hz; compare hits of one set-up only"
         )
     reach = min(one.usable_band[1] if one.usable_band else np.inf for one in (frf, mean))
     used = mean.frequency <= reach

@@ -11,13 +11,13 @@ from acquisition.hit import Hit
 from acquisition.pulse import baseline
 
 RAIL_SAMPLES = 3
-"""Samples at a rail of the converter, or in a row at the extreme value of a recording without codes."""
+"""Samples at a rail of the converter, or in a row at the extreme value of one without codes."""
 FLAT_SHARE = 0.7
-"""Share of the samples of a band below the maximum that lie in its uppermost third: a round top has 1/sqrt(3) = 0.58 ..."""
+"""Share of the samples of a band below the maximum in its uppermost third: a round top has 1/sqrt(3) = 0.58 ..."""
 FLAT_SAMPLES = 2.5
 """... and a flat one this many samples more than that."""
 SCALES = (1.0, 0.25, 0.0625)
-"""Half widths of the uppermost third against 3 times the noise before the hit, which a saturated amplifier cuts off too."""
+"""Half widths of the uppermost third, in 3 times the noise before the hit; a saturated amplifier cuts that off too."""
 
 
 @dataclass(frozen=True)

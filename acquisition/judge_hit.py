@@ -15,7 +15,7 @@ from acquisition.second_touch import find_second_touch
 from acquisition.verdict import Verdict
 
 HARD_SHARE_OF_SCALE = 0.9
-"""A pulse above this share of the force range is too hard: the next one clips, and sensors saturate before converters."""
+"""A pulse above this share of the force range is too hard: the sensor may saturate before its converter does."""
 SOFT_SHARE_OF_SCALE = 0.02
 """A pulse below this share of the force range is too soft: the converter's steps show."""
 SOFT_NOISE_RATIO = 20.0
@@ -86,9 +86,9 @@ def _strength(hit: Hit, pulse: Pulse, *, clipped: bool) -> dict[HitFlags, str]:
     full = hit.channels[0].full_scale / abs(hit.channels[0].sensitivity) if hit.channels else np.inf
     peak = f"Peak of {pulse.peak:.4g} N is"
     if pulse.peak > HARD_SHARE_OF_SCALE * full and not clipped:
-        return {HitFlags.TOO_HARD: f"{peak} {pulse.peak / full:.0%} of the range of {full:.4g} N"}
+        return {HitFlags.TOO_HARD: f"{peak} {pulse.peak / full:.0%} of the range of {full:.0f} N"}
     if hit.channels and pulse.peak < SOFT_SHARE_OF_SCALE * full:
-        return {HitFlags.TOO_SOFT: f"{peak} below {SOFT_SHARE_OF_SCALE:.0%} of the range of {full:.4g} N"}
+        return {HitFlags.TOO_SOFT: f"{peak} below {SOFT_SHARE_OF_SCALE:.0%} of the range of {full:.0f} N"}
     if pulse.peak < SOFT_NOISE_RATIO * pulse.baseline_rms:
         return {HitFlags.TOO_SOFT: f"{peak} below {SOFT_NOISE_RATIO:.0f} times the noise of {pulse.baseline_rms:.3g} N"}
     return {}

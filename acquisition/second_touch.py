@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from acquisition.pulse import Pulse
 
 SHARE = 0.025
-"""A second pulse above this share of the first makes a double hit: one of 3 % is found though its estimate scatters."""
+"""A second pulse above this share of the first makes a double hit: one of 3 % is found whatever its shape ..."""
+CERTAINTY = 3.0
+"""... and in noise: it is let pass only where it is smaller by this many times the noise of its height."""
 WIDTHS = (0.7, 1.0, 1.4, 2.0)
 """Widths searched for, against that of the first pulse: a lighter touch lasts longer."""
 FALSE_ALARM = 1e-3
@@ -36,8 +38,8 @@ def find_second_touch(pulse: Pulse) -> SecondTouch | None:
     The force is correlated with a raised-cosine bump less its own mean over three times its length: offset, drift and
     mains hum drop out, and noise is averaged over a pulse. A pulse counts where it stands out of the noise of that
     estimate (found by its median absolute deviation in the same record) farther than noise alone would do in
-    one of a thousand hits, however many samples it has, and is above 2.5 % of the main pulse. Source of the matched
-    filter: Turin, IRE Trans. Inform. Theory 6 (1960) 311.
+    one of a thousand hits, however many samples it has, and is not for certain below 2.5 % of the main pulse.
+    Source of the matched filter: Turin, IRE Trans. Inform. Theory 6 (1960) 311.
     """
     width = pulse.end - pulse.start
     step = max(1, width // BINS)
@@ -55,7 +57,7 @@ def find_second_touch(pulse: Pulse) -> SecondTouch | None:
         noise = 1.4826 * float(np.median(np.abs(outside - np.median(outside))))
         at = int(np.argmax(outside))
         share = float(outside[at]) / pulse.peak
-        if outside[at] > limit * noise and share > max(SHARE, best.share):
+        if outside[at] > limit * noise and share > max(SHARE - CERTAINTY * noise / pulse.peak, best.share):
             bin_ = at if at < near[0] else at - max(near[0], 0) + near[1]
             best = SecondTouch((bin_ + 0.5) * step - float(np.argmax(pulse.force)), share)
     return best if best.share else None

@@ -128,7 +128,7 @@ class Session:
         time = np.arange(n) / self.setting.sample_rate
         white = 1 / np.sqrt(2) if self.background == "hum" else 1.0
         levels = np.array([[self.force_noise], [self.response_noise]])
-        result = self.random.normal(size=(2, n)) * levels * white
+        result: Signal = self.random.normal(size=(2, n)) * levels * white
         if self.background == "drift":
             u = time / time[-1]
             offset, slope, bend = self.random.uniform(-10, 10, 3)
@@ -276,7 +276,7 @@ def _clipped(index: int, *, amplifier: bool, codes: bool = True) -> Callable[[Se
 
 
 def not_decayed(one: Session) -> Hit:
-    """A structure whose modes ring for so long that the record holds 1 to 2.5 time constants, and are heard at its end."""
+    """Modes that ring so long that the record holds 1 to 2.5 time constants, and are heard at its end."""
     setting = one.setting
     while True:
         blow = replace(one.blow(), width=one.random.uniform(0.3e-3, 0.8e-3))
@@ -284,7 +284,7 @@ def not_decayed(one: Session) -> Hit:
         zeta = 1 / (2 * np.pi * setting.structure.frequency * tau)
         clean = one.signal([blow], replace(setting.structure, damping_ratio=zeta))
         end = int(1.5 * setting.pre_trigger) + setting.record - setting.pre_trigger
-        tenths = [np.std(part) for part in np.array_split(clean[1, end - setting.record : end], 10)]
+        tenths = [float(np.std(part)) for part in np.array_split(clean[1, end - setting.record : end], 10)]
         if tenths[-1] > max(0.03 * max(tenths), 4 * one.response_noise):
             break
     channels = (one.channels[0], replace(one.channels[1], full_scale=2e-3 * float(np.abs(clean[1]).max())))
@@ -333,7 +333,7 @@ def other_direction(one: Session) -> Hit:
         sign = -1.0
     else:
         shift = one.random.choice([-1, 1]) * one.random.uniform(0.08, 0.2)
-        factor = one.random.uniform(1.3, 2.0)
+        factor = one.random.uniform(1.6, 2.5)
         structure = replace(
             structure, frequency=structure.frequency * (1 + shift), stiffness=structure.stiffness * factor
         )

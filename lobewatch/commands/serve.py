@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import threading
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -31,4 +31,5 @@ def serve(
 
     with DashboardServer(folder, listen=listen, port=http_port, token=token) as server:
         show_address(server.url, as_json)
-        threading.Event().wait()
+        while True:
+            time.sleep(1)

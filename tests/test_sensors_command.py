@@ -147,8 +147,8 @@ def test_a_device_at_half_its_rate_is_refused(
 ) -> None:
     monkeypatch.setattr("lobewatch.commands.sensors.RATE_SECONDS", 1.5)
     folder.toml.write_text(folder.toml.read_text("utf-8").replace("[daq]", DATAQ), "utf-8")
-    inputs = [table.build() for table in MachineFolder(folder.path).machine.daq.channel]
-    with DataqEmulator(lambda rate: silence, inputs, faults=DataqFaults(halved_rate=True)) as device:
+    inputs = tuple(table.build() for table in MachineFolder(folder.path).machine.daq.channel)
+    with DataqEmulator(lambda _: silence, inputs, faults=DataqFaults(halved_rate=True)) as device:
         monkeypatch.setattr(sys, "argv", ["lobewatch", "sensors", str(folder.path), "--port", device.port])
         with pytest.raises(SystemExit) as end:
             main()

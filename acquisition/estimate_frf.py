@@ -30,7 +30,7 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
         raise ValueError(f"estimator={estimator!r} is none of {', '.join(get_args(Estimator))}")
     s_ff, s_xx, s_fx = cross_spectra(hits)
     forms: dict[Estimator, Callable[[], NDArray[np.complex128]]] = {
-        "H1": lambda: s_fx / s_ff,
+        "H1": lambda: s_fx * (1 / s_ff),
         "H2": lambda: s_xx * s_fx / np.abs(s_fx) ** 2,
         "Hv": lambda: np.sqrt(s_xx / s_ff) * np.exp(1j * np.angle(s_fx)),
     }
@@ -49,21 +49,21 @@ def cross_spectra(hits: Sequence[Hit]) -> Spectra:
     n = hits[0].force.size
     records = np.zeros((2, n))
     spectra = np.empty((2, n // 2 + 1), np.complex128)
-    s_fx = np.zeros_like(spectra[0])
-    powers = np.zeros((2, 2 * s_fx.size))
+    parts = spectra.view(np.float64)
+    s_fx, powers = np.zeros_like(spectra[0]), np.zeros_like(parts)
     for hit in hits:  # one at a time: ten hits at once are ten times the cache of a processor
         sample, force = _windowed_force(hit)
-        records[0, sample] = force
+        records[0, -sample] = force  # backwards in time: its spectrum is conj(F)
         records[1] = hit.acceleration
         np.fft.rfft(records, out=spectra)
-        records[0, sample] = 0.0
-        s_fx += np.conj(spectra[0]) * spectra[1]
-        powers += np.square(spectra.view(np.float64))
+        records[0, -sample] = 0.0
+        s_fx += spectra[0] * spectra[1]
+        powers += np.square(parts, out=parts)
     skew = _skew(hits[0])
     if skew:
         s_fx *= np.exp(-2j * np.pi * np.fft.rfftfreq(n, 1 / hits[0].sample_rate) * skew)
     s_ff, s_xx = (powers[:, ::2] + powers[:, 1::2]) / len(hits)
-    return s_ff, s_xx, s_fx / len(hits)
+    return s_ff, s_xx, s_fx * (1 / len(hits))
 
 
 def _windowed_force(hit: Hit) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
@@ -76,10 +76,10 @@ def _windowed_force(hit: Hit) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
     if pulse is None:
         raise ValueError("a hit has no force pulse; check hits with check_hit before averaging")
     width = max(pulse.end - pulse.start, 8)
-    sample = np.arange(max(pulse.start - 2 * width, 0), min(pulse.end + 2 * width, pulse.force.size))
-    beyond = np.maximum(sample - (pulse.end + width), (pulse.start - width) - sample)
-    taper = 0.5 * (1 + np.cos(np.pi * np.clip(beyond / width, 0.0, 1.0)))
-    return sample, pulse.force[sample] * taper
+    corners = np.array([pulse.start - 2 * width, pulse.start - width, pulse.end + width, pulse.end + 2 * width])
+    sample = np.arange(max(corners[0], 0), min(corners[3], pulse.recorded.size))
+    taper = 0.5 + 0.5 * np.cos(np.pi * np.interp(sample, corners, [1.0, 0.0, 0.0, 1.0]))
+    return sample, (pulse.recorded[sample] - pulse.offset) * taper
 
 
 def _skew(hit: Hit) -> float:

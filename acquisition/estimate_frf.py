@@ -28,7 +28,12 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
     """
     if estimator not in get_args(Estimator):
         raise ValueError(f"estimator={estimator!r} is none of {', '.join(get_args(Estimator))}")
-    s_ff, s_xx, s_fx = cross_spectra(hits)
+    return frf_of_spectra(cross_spectra(hits), hits, estimator)
+
+
+def frf_of_spectra(spectra: Spectra, hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
+    """The same from the mean, or the sum, of the spectra of these hits."""
+    s_ff, s_xx, s_fx = spectra
     forms: dict[Estimator, Callable[[], NDArray[np.complex128]]] = {
         "H1": lambda: s_fx * (1 / s_ff),
         "H2": lambda: s_xx * s_fx / np.abs(s_fx) ** 2,

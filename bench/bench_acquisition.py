@@ -137,6 +137,7 @@ def live(seconds: float) -> None:
             test.join()
     shown, sent = (np.array(json.loads(process.communicate()[0])) for process in (page, device))
     status = sources[-1].status
+    assert status is not None
     lost = sources[-1].lost_scans + sources[-1].overruns + status.overruns
     late = 1e3 * (shown - sent[np.searchsorted(sent, shown) - 1])
     print(

@@ -66,7 +66,7 @@ class TapSession:
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         """Nothing is opened yet. guided False leaves out what only a person needs: self-check, re-arming by decay,
-        curves, and the time to take back the last hit."""
+        curves, the time to take back the last hit, and the outcome."""
         self._folder, self._open_device, self._about = folder, open_device, circumstances
         self._resume, self._guided, self._clock, self._sleep = resume, guided, clock, sleep
         about = f"{circumstances.machine}, tool {circumstances.tool}, direction {circumstances.direction}"
@@ -317,6 +317,6 @@ class TapSession:
         self._folder.commit(tap)
         history, measurements = update_history(self._folder)
         self._measurement = next(found for found in measurements if found.tap_id == tap.id)
-        outcome = outcome_of(self._measurement, history, self._folder.machine)
+        outcome = outcome_of(self._measurement, history, self._folder.machine) if self._guided else None
         self._show(reason="", outcome=outcome)
         return tap

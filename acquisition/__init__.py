@@ -6,6 +6,7 @@ from acquisition.channel import Block, Channel
 from acquisition.check_hit import check_hit
 from acquisition.errors import DataError, DeviceError
 from acquisition.estimate_frf import cross_spectra, estimate_frf
+from acquisition.force_noise import force_noise
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hammered_structure import HammeredStructure, Hammering, Structure
 from acquisition.hit import Hit, HitFlags
@@ -43,6 +44,7 @@ __all__ = [
     "check_hit",
     "cross_spectra",
     "estimate_frf",
+    "force_noise",
     "from_accelerance",
     "new_tap_id",
     "read_frf",

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hit import Hit
-from acquisition.pulse import find_pulse
+from acquisition.windowed_force import windowed_force
 
 Estimator = Literal["H1", "H2", "Hv"]
 
@@ -59,17 +59,11 @@ def cross_spectra(hits: Sequence[Hit]) -> Spectra:
 
 
 def _windowed_force(hit: Hit) -> NDArray[np.float64]:
-    """The pulse with one of its widths on either side kept whole, then tapered to zero over one more (raised cosine).
-
-    A tight window matters: noise inside it is alike at neighbouring lines, and so passes for a shift of the mode.
-    """
-    pulse = find_pulse(hit)
-    if pulse is None:
-        raise ValueError("a hit has no force pulse; check hits with check_hit before averaging")
-    width = max(pulse.end - pulse.start, 8)
-    sample = np.arange(pulse.force.size)
-    beyond = np.maximum(sample - (pulse.end + width), (pulse.start - width) - sample)
-    return np.asarray(pulse.force * 0.5 * (1 + np.cos(np.pi * np.clip(beyond / width, 0.0, 1.0))))
+    """On the time axis of the hit."""
+    part = windowed_force(hit)
+    force = np.zeros(hit.force.size)
+    force[part.start : part.start + part.force.size] = part.force
+    return force
 
 
 def _skew(hit: Hit) -> float:

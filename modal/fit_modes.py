@@ -26,14 +26,15 @@ def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[
     not converge to a mode inside its local band, or leaves its damping ratio or stiffness uncertain by more than a
     third; `pick_peaks` may still list it. What else speaks against a mode stands in its `doubts`.
 
-    hits: those that the FRF was averaged from (H1), three or more; then the modes also have a jackknife over hits,
-    which holds for errors that are alike at neighbouring lines (noise of the hammer), too.
+    hits: those that the FRF was averaged from (H1). Noise of the hammer is alike at neighbouring lines, so the fit does
+    not see it: the covariance then has it from the baselines of the hits. With three or more the modes also have a
+    jackknife over hits, which holds for any error that differs from hit to hit.
 
     Source: Peeters et al. (2004), Shock and Vibration 11, 395 (LSCF); Ewins, Modal Testing, ch. 4 (curve fitting
     with residuals); Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, 413.
 
     Raises ValueError for fewer than 8 usable lines, an FRF of zeros, one with its phase conjugated, one without
-    phase, and hits that have other lines than the FRF.
+    phase, and hits that have other lines than the FRF or no pulse.
     """
     state = extract(frf, band)
     return modes_of(state, hits)

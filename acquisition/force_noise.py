@@ -22,7 +22,7 @@ def force_noise(hits: Sequence[Hit], frequency: NDArray[np.float64]) -> Iterator
     F_i(f) is the spectrum of the windowed force, w_i the window, sigma_i the rms of the baseline, in which the noise
     is taken as white: each column has an independent real factor of variance one. A column is smooth over lines
     closer than one over the length of the window. Left out: the error of the mean of the baseline, which the window
-    passes below one over its length only.
+    passes below one over its length only, and which is small where the baseline has far more samples than the window.
 
     Source: H1 of `estimate_frf` with F + N for F, expanded in N. Raises ValueError for a hit without a pulse.
     """

@@ -15,8 +15,7 @@ LINES = np.array([50.0, 300.0, 500.0, 550.0, 900.0])
 
 def impulse(peak: float, noise: float) -> Hit:
     """One sample of force, on a baseline that swings by noise: rms noise and mean 0, exactly."""
-    force = noise * (-1.0) ** np.arange(SIZE)
-    force[PRE_TRIGGER:] = 0.0
+    force = noise * np.tile([1.0, -1.0], SIZE // 2)
     force[PRE_TRIGGER - 40 :] = 0.0
     force[PRE_TRIGGER] = peak
     return Hit(force, force, RATE, PRE_TRIGGER)

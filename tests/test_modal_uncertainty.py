@@ -98,7 +98,7 @@ def test_hits_of_another_record_are_refused(n_hits: int) -> None:
 
 @pytest.mark.parametrize("n_hits", [1, 2, 10])
 def test_noise_of_the_hammer_is_seen_by_the_fit_where_the_hits_are_there(n_hits: int) -> None:
-    tests = [tap(seed, n_hits, hammer_noise=0.5) for seed in range(40)]
+    tests = [tap(seed, n_hits, hammer_noise=0.5) for seed in range(30)]
     modes = [first_mode(hits) for hits in tests]
     scatter = np.std([values(mode) for mode in modes], axis=0)
     with_hits = np.sqrt(np.mean([mode.fit_error**2 for mode in modes], axis=0))

@@ -36,8 +36,7 @@ def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[
     Raises ValueError for fewer than 8 usable lines, an FRF of zeros, one with its phase conjugated, one without
     phase, and hits that have other lines than the FRF or no pulse.
     """
-    state = extract(frf, band)
-    return modes_of(state, hits)
+    return modes_of(extract(frf, band), hits)
 
 
 def modes_of(state: Extraction, hits: Sequence[Hit] = ()) -> list[Mode]:

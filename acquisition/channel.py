@@ -30,7 +30,7 @@ class Channel:
     calibration_date: str = ""
     """ISO date of the sensor's calibration; empty where not known."""
     skew: float = 0.0
-    """Sampling delay against channel 0 (s)."""
+    """This channel is sampled so much later than channel 0 (s): its value k is taken at t_k + skew."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a channel."""

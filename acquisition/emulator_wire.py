@@ -6,6 +6,7 @@ import contextlib
 import os
 import select
 import socket
+from pathlib import Path
 from typing import Protocol
 
 
@@ -29,8 +30,8 @@ class Wire(Protocol):
 class PtyWire:
     """A pseudo-terminal in raw mode."""
 
-    def __init__(self) -> None:
-        """Open it; the host's end stays open here too, so that a host may come and go."""
+    def __init__(self, link: Path | None = None) -> None:
+        """Open it, and make link lead to it; the host's end stays open here too, so that a host may come and go."""
         import pty
         import tty
 
@@ -40,6 +41,9 @@ class PtyWire:
         os.set_blocking(self._master, False)
         self.port = os.ttyname(self._slave)
         self.pending = bytearray()
+        if link is not None:
+            link.unlink(missing_ok=True)
+            link.symlink_to(self.port)
 
     def exchange(self, timeout: float) -> bytes:
         """See Wire."""
@@ -61,9 +65,9 @@ class PtyWire:
 class TcpWire:
     """A listening socket on 127.0.0.1; one host at a time."""
 
-    def __init__(self) -> None:
-        """Listen on a free port."""
-        self._listener = socket.create_server(("127.0.0.1", 0))
+    def __init__(self, number: int = 0) -> None:
+        """Listen on this port, 0 for a free one."""
+        self._listener = socket.create_server(("127.0.0.1", number))
         self._host: socket.socket | None = None
         self.port = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
         self.pending = bytearray()

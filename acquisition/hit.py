@@ -24,6 +24,10 @@ class HitFlags(enum.Flag):
     LOST_SCANS = enum.auto()
     NO_HIT = enum.auto()
     SWAPPED_CHANNELS = enum.auto()
+    TOO_HARD = enum.auto()
+    NARROW_BAND = enum.auto()
+    INCONSISTENT = enum.auto()
+    UNDONE = enum.auto()
 
     @property
     def words(self) -> str:
@@ -64,14 +68,12 @@ _WORDS: Mapping[HitFlags, tuple[str, str]] = {
         "lost scans",
         "Hit again; if it stays, lower the sample rate or use another cable.",
     ),
-    HitFlags.NO_HIT: (
-        "no hit",
-        "No hammer pulse in this record: check the hammer cable and the trigger level.",
-    ),
-    HitFlags.SWAPPED_CHANNELS: (
-        "swapped channels",
-        "The force rings and the response does not: swap the two cables.",
-    ),
+    HitFlags.NO_HIT: ("no hit", "Check the hammer cable and the trigger level."),
+    HitFlags.SWAPPED_CHANNELS: ("swapped channels", "Swap the two cables."),
+    HitFlags.TOO_HARD: ("too hard", "Hit softer or choose a larger force range."),
+    HitFlags.NARROW_BAND: ("narrow band", "Use a harder hammer tip."),
+    HitFlags.INCONSISTENT: ("inconsistent", "Hit the same spot in the same direction as before."),
+    HitFlags.UNDONE: ("undone", "Taken back by the operator."),
 }
 
 
@@ -96,6 +98,8 @@ class Hit:
     """Force and response channel, where the hit came from a DAQ."""
     codes: NDArray[np.int32] | None = None
     """Raw ADC codes, shape (2, n), force first; None where the recording has none."""
+    overload: int = 0
+    """What the device itself reports as overloaded: bit 0 the force, bit 1 the response."""
 
     def __post_init__(self) -> None:
         """Convert to arrays and check them."""
@@ -121,11 +125,13 @@ class Hit:
         sample_rate: float,
         pre_trigger: int = 0,
         lost_scans: int = 0,
+        overload: int = 0,
     ) -> Hit:
         """A hit from ADC codes (2, n), force first, scaled by the sensitivities of its channels."""
         raw = np.asarray(codes, dtype=np.int32)
         force, response = channels
-        return cls(raw[0] * force.scale, raw[1] * response.scale, sample_rate, pre_trigger, lost_scans, channels, raw)
+        values = raw[0] * force.scale, raw[1] * response.scale
+        return cls(*values, sample_rate, pre_trigger, lost_scans, channels, raw, overload)
 
     @property
     def time(self) -> NDArray[np.float64]:

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from acquisition.hit import Hit
 
 FALLEN = 0.05
-"""The pulse ends where the force has first fallen below this share of its peak."""
+"""The pulse ends where the force has first fallen below this share of its peak, or into its noise ..."""
+NOISE_RATIO = 3.0
+"""... which reaches to this many times the baseline's rms."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,9 +24,9 @@ class Pulse:
     peak: float
     """Largest force (N)."""
     start: int
-    """First sample above 5 % of the peak."""
+    """First sample above 5 % of the peak and the noise."""
     end: int
-    """First sample below 5 % of the peak after it."""
+    """First sample below 5 % of the peak or in the noise after it."""
     baseline_rms: float
     """rms of the force before the pulse, or after it where nothing was recorded before (N)."""
 
@@ -32,19 +34,18 @@ class Pulse:
 def find_pulse(hit: Hit) -> Pulse | None:
     """The highest force pulse; None where no sample stands out of the baseline by 6 times its rms."""
     top = int(np.argmax(hit.force))
-    baseline = _baseline(hit, top)
-    force = hit.force - np.mean(baseline)
-    rms, peak = float(np.std(baseline)), float(force[top])
+    quiet = baseline(hit.force, hit.pre_trigger or top)
+    force = hit.force - np.mean(quiet)
+    rms, peak = float(np.std(quiet)), float(force[top])
     if peak <= 6 * rms or peak <= 0:
         return None
-    below = force < FALLEN * peak
+    below = force < max(FALLEN * peak, NOISE_RATIO * rms)
     start = top - int(np.argmax(below[top::-1])) + 1 if below[: top + 1].any() else 0
     end = top + int(np.argmax(below[top:])) if below[top:].any() else force.size
     return Pulse(force, peak, start, end, rms)
 
 
-def _baseline(hit: Hit, top: int) -> NDArray[np.float64]:
-    """Samples before the pulse (the first four fifths of the pre-trigger), else the last tenth of the record."""
-    before = hit.pre_trigger or top
-    quiet = hit.force[: int(0.8 * before)]
-    return quiet if quiet.size >= 8 else hit.force[-max(hit.force.size // 10, 8) :]
+def baseline(signal: NDArray[np.float64], before: int) -> NDArray[np.float64]:
+    """The first four fifths of the `before` samples ahead of the pulse, else the last tenth of the record."""
+    quiet = signal[: int(0.8 * before)]
+    return quiet if quiet.size >= 8 else signal[-max(signal.size // 10, 8) :]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from acquisition.errors import DataError
 from acquisition.frf import Frf
-from acquisition.hit import Hit
+from acquisition.hit import Hit, HitFlags
 from acquisition.read_csv import frf_of, hit_of, is_frf, read_table
 from acquisition.read_lvm import MAGIC, lvm_time, read_lvm
 from acquisition.tap_file import read_tap, read_tap_hits
@@ -42,14 +42,20 @@ def _magic(path: Path) -> bytes:
         return file.read(len(_HDF5))
 
 
+_BEYOND_THE_SIGNALS = HitFlags.UNDONE | HitFlags.INCONSISTENT | HitFlags.NARROW_BAND
+
+
 def read_recording(path: Path | str) -> list[Hit] | Frf:
-    """Hits where the file holds time histories, an FRF where it holds only that."""
+    """Hits where the file holds time histories, an FRF where it holds only that; left out are those that their
+    own time signals do not speak against: taken back, of another spot, of a force that does not reach far enough."""
     path = Path(path)
     magic = _magic(path)
     if not magic:
         raise DataError(f"{path}: the file is empty")
     if magic == _HDF5:
-        return list(read_tap_hits(path)[0]) or read_tap(path).frf
+        hits, _, flags = read_tap_hits(path)
+        kept = [hit for hit, flag in zip(hits, flags, strict=True) if not flag & _BEYOND_THE_SIGNALS]
+        return kept or read_tap(path).frf
     if MAGIC.encode().startswith(magic):
         return read_lvm(path)
     if b"\x00" in path.read_bytes()[:4096]:

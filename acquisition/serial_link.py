@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import select
 import socket
 import threading
@@ -15,6 +14,7 @@ from urllib.parse import urlsplit
 import serial
 
 from acquisition.errors import DeviceError
+from acquisition.port_hints import explain_open_error
 
 try:
     from termios import error as TermiosError  # noqa: N812  (not an OSError, and not there on Windows)
@@ -33,10 +33,12 @@ class SerialLink:
         self.port = port
         try:
             self._serial = _open(port)
-        except (OSError, ValueError) as error:
-            raise DeviceError(_explain(port, error)) from error
+        except (OSError, ValueError, TermiosError) as error:
+            raise DeviceError(explain_open_error(port, error)) from error
         self._chunks: deque[bytes] = deque()
         self._waiting = 0
+        self.overruns = 0
+        """How often the consumer was so late that all that waited was thrown away."""
         self._arrived = threading.Condition()
         self._running = True
         self._failure: Exception | None = None
@@ -47,6 +49,10 @@ class SerialLink:
         """Send bytes; DeviceError where the device is gone."""
         try:
             self._serial.write(data)
+        except serial.SerialTimeoutException as error:
+            raise DeviceError(
+                f"the DAQ on {self.port} takes no commands; switch it off and on and repeat the command"
+            ) from error
         except (OSError, TermiosError) as error:
             raise self._unplugged() from error
 
@@ -59,10 +65,8 @@ class SerialLink:
                     raise self._unplugged() from self._failure
                 if not self._arrived.wait(max(deadline - time.monotonic(), 0)):
                     return b""
-            data = b"".join(self._chunks)
-            self._chunks.clear()
-            self._waiting = 0
-            return data
+            chunks, self._chunks, self._waiting = self._chunks, deque(), 0
+        return b"".join(chunks)  # outside the lock: the reader does not wait for it
 
     def close(self) -> None:
         """Stop the reader and give the port back."""
@@ -87,6 +91,7 @@ class SerialLink:
             if self._waiting + len(data) > BUFFER_BYTES:
                 self._chunks.clear()  # the gap shows in the scan indices of the frames that follow
                 self._waiting = 0
+                self.overruns += 1
             if data:
                 self._chunks.append(data)
                 self._waiting += len(data)
@@ -132,19 +137,3 @@ def _open(port: str) -> Any:  # a pyserial port, which has no types, or a _TcpPo
     if hasattr(opened, "set_buffer_size"):  # Windows only
         opened.set_buffer_size(rx_size=1 << 20)
     return opened
-
-
-def _explain(port: str, error: Exception) -> str:
-    """One sentence with the system's words and what to do."""
-    text = str(error)
-    hints = {
-        "lock": "another program uses it: close that program",
-        "Permission denied": "you may not use it (Linux: sudo usermod -aG dialout $USER, then log in again)",
-        "Access is denied": "another program uses it: close that program",
-        "No such file": "check the cable and the port's name",
-        "FileNotFound": "check the cable and the port's name",
-        "refused": "nothing listens there: start the device or emulator first",
-    }
-    cure = next((hint for word, hint in hints.items() if word in text), "check the port's name and the cable")
-    reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else text
-    return f"port {port} cannot be opened ({reason}); {cure}"

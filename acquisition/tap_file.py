@@ -59,20 +59,21 @@ def read_tap(path: Path | str) -> TapTest:
             raise DataError(f"{path}: incomplete tap file ({error}); take it again from a backup") from error
 
 
-def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances) -> None:
-    """One hit of a test in progress, on the disk when this returns."""
+def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: HitFlags) -> None:
+    """One hit of a test in progress and the verdict on it, on the disk when this returns."""
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         file.attrs.update(format=FORMAT, version=VERSION)
         _write_circumstances(file, circumstances)
-        _write_raw(file, [hit], [HitFlags.OK])
+        _write_raw(file, [hit], [flags])
     atomic_write(Path(path), memory.getvalue())
 
 
-def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances]:
-    """The hits of a tap file or of a hit file, and their circumstances."""
+def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tuple[HitFlags, ...]]:
+    """The hits of a tap file or of a hit file, their circumstances, and the verdicts of then."""
     with _open(Path(path)) as file:
-        return _read_raw(file)[0], _read_circumstances(file)
+        hits, flags = _read_raw(file)
+        return hits, _read_circumstances(file), flags
 
 
 def _open(path: Path) -> h5py.File:
@@ -125,6 +126,7 @@ def _write_raw(file: h5py.File, hits: Sequence[Hit], flags: Sequence[HitFlags]) 
         _dataset(raw, "samples", samples, "N, m/s^2", chunks=(1, *samples.shape[1:]), **packed)
     raw.attrs.update(sample_rate_hz=first.sample_rate, pre_trigger_samples=first.pre_trigger)
     _dataset(raw, "lost_scans", [hit.lost_scans for hit in hits], "1")
+    _dataset(raw, "overload", [hit.overload for hit in hits], "1")
     _dataset(raw, "accepted", [not flag for flag in flags], "1")
     raw["verdict"] = [flag.words for flag in flags]
 
@@ -134,14 +136,15 @@ def _read_raw(file: h5py.File) -> tuple[tuple[Hit, ...], tuple[HitFlags, ...]]:
         return (), ()
     raw = file["raw"]
     rate, before = float(raw.attrs["sample_rate_hz"]), int(raw.attrs["pre_trigger_samples"])
-    lost = raw["lost_scans"][()]
+    lost = raw["lost_scans"][()].tolist()
+    overload = raw["overload"][()].tolist() if "overload" in raw else [0] * len(lost)  # not in the first files
     flags = tuple(HitFlags.from_words(words) for words in raw["verdict"].asstr()[()])
     if "codes" in raw:
         pair = (_read_channel(raw["channel_0"]), _read_channel(raw["channel_1"]))
-        coded = zip(raw["codes"][()], lost, strict=True)
-        return tuple(Hit.from_codes(codes, pair, rate, before, int(n)) for codes, n in coded), flags
-    sampled = zip(raw["samples"][()], lost, strict=True)
-    return tuple(Hit(force, response, rate, before, int(n)) for (force, response), n in sampled), flags
+        coded = zip(raw["codes"][()], lost, overload, strict=True)
+        return tuple(Hit.from_codes(codes, pair, rate, before, n, mask) for codes, n, mask in coded), flags
+    sampled = zip(raw["samples"][()], lost, overload, strict=True)
+    return tuple(Hit(force, response, rate, before, n, overload=mask) for (force, response), n, mask in sampled), flags
 
 
 def _read_channel(group: h5py.Group) -> Channel:

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from acquisition.check_hit import check_hit
 from acquisition.errors import DataError
 from acquisition.estimate_frf import estimate_frf
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
+from acquisition.judge_hit import judge_hit
 
 
 @dataclass(frozen=True)
@@ -83,18 +83,9 @@ def new_tap_id(circumstances: Circumstances) -> str:
 
 def average_good(hits: Sequence[Hit]) -> tuple[Frf, tuple[HitFlags, ...]]:
     """H1 FRF of the good hits, and the verdict on each; DataError with the reasons where no hit is good."""
-    flags = tuple(check_hit(hit) for hit in hits)
-    good = [hit for hit, flag in zip(hits, flags, strict=True) if not flag]
+    verdicts = [judge_hit(hit) for hit in hits]
+    good = [hit for hit, verdict in zip(hits, verdicts, strict=True) if not verdict.flags]
     if not good:
-        reasons = "; ".join(
-            f"hit {i}: {_reason(hit, flag)}" for i, (hit, flag) in enumerate(zip(hits, flags, strict=True), 1)
-        )
+        reasons = "; ".join(f"hit {i}: {verdict.flags.words}. {verdict.text}" for i, verdict in enumerate(verdicts, 1))
         raise DataError(f"no good hit of {len(hits)}: {reasons}")
-    return estimate_frf(good), flags
-
-
-def _reason(hit: Hit, flags: HitFlags) -> str:
-    """The verdict; an overload of a recording without converter codes is inferred, and says from what."""
-    inferred = hit.codes is None and flags & (HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE)
-    why = " (inferred: its extreme value stands in a run of equal samples)" if inferred else ""
-    return f"{flags.words}{why}. {flags.cure}"
+    return estimate_frf(good), tuple(verdict.flags for verdict in verdicts)

@@ -23,6 +23,8 @@ LOST_BEFORE = 0x01
 """Flag of a DATA frame: the device lost samples before it."""
 SAMPLE_BITS = (16, 24, 32)
 """ADC word of DATA formats 0 (i16), 1 (i24 packed) and 2 (i32)."""
+MAX_ENCODED = MAX_FRAME + -(-MAX_FRAME // 254)
+"""The same in COBS, without its delimiter (bytes)."""
 _HEADER = struct.Struct("<BBHI")
 _DATA = struct.Struct("<QHBBI")
 _STATUS = struct.Struct("<QQIIh")
@@ -95,7 +97,9 @@ def encode_frame(frame: Frame) -> bytes:
 
 
 def decode_frame(encoded: bytes) -> Frame | None:
-    """The frame in COBS bytes without their delimiter; None where COBS or CRC do not fit."""
+    """The frame in COBS bytes without their delimiter; None where length, COBS or CRC do not fit."""
+    if len(encoded) > MAX_ENCODED:
+        return None
     try:
         raw = cobs.decode(encoded)
     except cobs.DecodeError:
@@ -118,7 +122,7 @@ class FrameDecoder:
     def feed(self, data: bytes) -> list[Frame]:
         """The frames that are complete with these bytes."""
         *pieces, rest = (self._rest + data).split(b"\x00")
-        self._rest = rest if len(rest) <= 2 * MAX_FRAME else rest[-2 * MAX_FRAME :]
+        self._rest = rest[: MAX_ENCODED + 1]  # what is too long stays too long until its delimiter comes
         frames = [decode_frame(piece) for piece in pieces if piece]
         good = [frame for frame in frames if frame is not None]
         self.dropped += len(frames) - len(good)

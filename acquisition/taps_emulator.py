@@ -7,7 +7,9 @@ import os
 import struct
 import threading
 import time
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import replace
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -24,25 +26,13 @@ from acquisition.taps import (
     encode_data,
     encode_frame,
 )
+from acquisition.taps_event import Event, EventKind
+from acquisition.taps_faults import NOISE, Faults
 
 BUFFER_SECONDS = 1.0
 """What the device keeps for a slow host before it drops scans (s)."""
 STATUS_INTERVAL = 0.5
 """Time between STATUS frames (s)."""
-
-
-@dataclass(frozen=True)
-class Faults:
-    """What goes wrong on purpose; all off."""
-
-    unplug_after: int | None = None
-    """Hang up after so many scans."""
-    drop_every: int | None = None
-    """Every so many frames, one is lost on the wire."""
-    corrupt_every: int | None = None
-    """Every so many frames, one byte of one is altered."""
-    stall_after: int | None = None
-    """Send nothing more after so many scans."""
 
 
 class TapsEmulator:
@@ -56,15 +46,31 @@ class TapsEmulator:
         *,
         realtime: bool = True,
         tcp: bool = False,
+        link: Path | None = None,
         faults: Faults | None = None,
     ) -> None:
-        """realtime=False sends as fast as the host reads; tcp listens on loopback instead of a pseudo-terminal."""
+        """realtime=False sends as fast as the host reads; tcp listens on loopback instead of a pseudo-terminal.
+
+        link: a name that always leads to the pseudo-terminal, also after replug(), as /dev/serial/by-id does.
+        """
         self._signal, self._channels, self._rate = signal, channels, sample_rate
         self._realtime, self._faults = realtime, faults or Faults()
-        self._wire: Wire = TcpWire() if tcp or os.name == "nt" else PtyWire()
+        self._tcp, self._link = tcp or os.name == "nt", link
+        self.port = ""
+        """What the host opens."""
+        self._clock = 0
+        self._restarted = False
+        self._pressed: deque[Event] = deque()
+        self._standing: dict[tuple[int, int | None], Event] = {}
+        self._plug_in()
+
+    def _plug_in(self) -> None:
+        """Power on."""
+        self._wire: Wire = TcpWire(int(self.port.rpartition(":")[2] or 0)) if self._tcp else PtyWire(self._link)
         self.port = self._wire.port
         self._decoder = FrameDecoder()
-        self._seq = self._session = self._frames = self._scan = self._clock = self._overruns = 0
+        self._seq = self._session = self._frames = self._infos = 0
+        self._scan = self._sent = self._overruns = self._peak = 0
         self._streaming = self._lost = False
         self._n_scans, self._started, self._status_due = 0, 0.0, 0.0
         self._per_frame, self._bits = 512, SAMPLE_BITS[0]
@@ -74,21 +80,47 @@ class TapsEmulator:
 
     def __enter__(self) -> Self:
         """Start serving."""
-        self._thread.start()
+        self._serve_on()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Hang up."""
+        self.unplug()
+
+    def unplug(self) -> None:
+        """Pull the cable: the host's port fails, whatever it was doing."""
         self._stopping = True
         self._thread.join(timeout=5.0)
         self._wire.close()
+
+    def replug(self) -> None:
+        """Plug it in again: powered on anew, nothing configured; the signal goes on where it was.
+
+        With tcp the port is the same, and so is `link`; a pseudo-terminal has a new name: see `port`. unplug_after
+        is over.
+        """
+        self.unplug()
+        self._faults = replace(self._faults, unplug_after=None)
+        self._plug_in()
+        self._serve_on()
+
+    def send_event(self, event: Event) -> None:
+        """A button is pressed or a cable pulled, now; its scan is filled in here. A fault is told again at START."""
+        self._pressed.append(event)
 
     def wait(self) -> None:
         """Serve until interrupted or unplugged."""
         while not self._ended.wait(timeout=0.2):  # an interrupted Thread.join takes the thread for ended
             pass
+
+    def _serve_on(self) -> None:
+        if self._faults.noise_at_start:
+            self._wire.pending += NOISE
+        if self._faults.start_streaming:
+            self._start(0)
+        self._thread.start()
 
     def _serve(self) -> None:
         try:
@@ -100,22 +132,37 @@ class TapsEmulator:
         while not self._stopping:
             for frame in self._decoder.feed(self._wire.exchange(0.0 if self._streaming and self._has_room() else 0.05)):
                 self._answer(frame)
+            while self._pressed:
+                self._tell(self._pressed.popleft())
             if self._streaming:
                 self._stream()
             if self._faults.unplug_after is not None and self._scan >= self._faults.unplug_after:
-                self._wire.close()
+                self._hang_up_in_a_frame()
                 return
+
+    def _hang_up_in_a_frame(self) -> None:
+        del self._wire.pending[-self._per_frame :]
+        for _ in range(20):
+            if not self._wire.pending:
+                break
+            self._wire.exchange(0.05)
+        self._wire.close()
 
     def _send(self, kind: MessageType, body: bytes = b"", flags: int = 0) -> None:
         encoded = encode_frame(Frame(kind, self._seq, body, self._session, flags))
         self._seq += 1
         if kind == MessageType.DATA:
             self._frames += 1
-            if self._faults.drop_every and self._frames % self._faults.drop_every == 0:
-                return
-            if self._faults.corrupt_every and self._frames % self._faults.corrupt_every == 0:
-                encoded = encoded[:40] + bytes([encoded[40] ^ 0x55 or 1]) + encoded[41:]
+            encoded = self._faults.on_wire(encoded, self._frames)
+        elif kind == MessageType.INFO:
+            self._infos += 1
+            encoded = encoded[: len(encoded) // 2] if self._infos <= self._faults.cut_infos else encoded
         self._wire.pending += encoded
+
+    def _tell(self, event: Event) -> None:
+        if event.kind != EventKind.BUTTON:
+            self._standing[event.kind, event.channel] = event
+        self._send(MessageType.EVENT, replace(event, scan=self._scan).encode())
 
     def _answer(self, frame: Frame) -> None:
         about = frame.seq.to_bytes(4, "little")
@@ -145,7 +192,7 @@ class TapsEmulator:
             "adc_bits": self._channels[0].adc_bits,
             "fs_choices": [self._rate],
             "simultaneous": True,
-            "clock_ppm": 0,
+            "clock_ppm": 0 if self._realtime else None,
             "channels": [
                 {
                     "i": i,
@@ -171,30 +218,42 @@ class TapsEmulator:
         self._per_frame, self._bits = int(wish["samples_per_frame"]), SAMPLE_BITS[wish["format"]]
 
     def _start(self, n_scans: int) -> None:
+        """Begin a session, and tell what is wrong since earlier."""
         self._session = (self._session + 1) % 0x10000
         self._n_scans, self._scan, self._streaming, self._lost = n_scans, 0, True, False
+        self._sent = self._overruns = self._peak = 0
         self._started = self._status_due = time.monotonic()
+        self._pressed.extend(event for event in self._standing.values() if event.begins)
 
     def _stream(self) -> None:
         """Send the frames that are due, drop them where the host has fallen behind, report now and then."""
         now = time.monotonic()
+        if self._is_hindered():
+            return
         due = self._scan + self._per_frame if not self._realtime else int((now - self._started) * self._rate)
-        if not self._realtime and not self._has_room():
-            return
-        if self._faults.stall_after is not None and self._scan >= self._faults.stall_after:
-            return
         while self._scan + self._per_frame <= due:
             self._send_scans(overrun=not self._has_room())
         if now >= self._status_due:
             self._status_due = now + STATUS_INTERVAL
-            self._send(MessageType.STATUS, Status(self._scan, self._scan, 0, self._overruns, 31.5).encode())
+            self._send(MessageType.STATUS, Status(self._scan, self._sent, self._peak, self._overruns, 31.5).encode())
         if self._realtime:
             time.sleep(0.5 * self._per_frame / self._rate)
 
+    def _is_hindered(self) -> bool:
+        faults = self._faults
+        if faults.restart_after is not None and self._scan >= faults.restart_after and not self._restarted:
+            self._restarted = True
+            self._start(0)
+        stalled = faults.stall_after is not None and self._scan >= faults.stall_after
+        return stalled or not (self._realtime or self._has_room())
+
     def _has_room(self) -> bool:
         """Whether the device's buffer takes another frame; when not in real time, little is sent ahead of the host."""
-        size = int(BUFFER_SECONDS * self._rate) * 4 if self._realtime else 1 << 16
-        return len(self._wire.pending) <= size
+        return len(self._wire.pending) <= self._buffer_bytes()
+
+    def _buffer_bytes(self) -> int:
+        scan_bytes = self._bits // 8 * len(self._channels)
+        return int(BUFFER_SECONDS * self._rate) * scan_bytes if self._realtime else 1 << 16
 
     def _send_scans(self, overrun: bool) -> None:
         codes = quantise(self._signal(self._clock, self._per_frame), self._channels)
@@ -203,9 +262,11 @@ class TapsEmulator:
             self._lost = True
             self._overruns += 1
         else:
-            body = encode_data(self._scan, codes, self._bits)
+            body = encode_data(self._scan, codes, self._bits, self._faults.overload)
             self._send(MessageType.DATA, body, LOST_BEFORE if self._lost else 0)
+            self._sent += self._per_frame
             self._lost = False
+            self._peak = max(self._peak, min(100 * len(self._wire.pending) // self._buffer_bytes(), 100))
         self._scan += self._per_frame
         if self._n_scans and self._scan >= self._n_scans:
             self._streaming = False

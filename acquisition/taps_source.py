@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import struct
 import time
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
 from acquisition.channel import Block, Channel
 from acquisition.errors import DeviceError
 from acquisition.serial_link import SerialLink
-from acquisition.taps import Frame, FrameDecoder, MessageType, decode_data, encode_frame
+from acquisition.taps import SAMPLE_BITS, Frame, FrameDecoder, MessageType, Status, encode_frame
+from acquisition.taps_event import Event, EventLog
+from acquisition.taps_stream import ScanStream
 
 ANSWER_TIME = 1.0
 """How long a command may stay unanswered before it is sent again (s)."""
@@ -37,9 +40,11 @@ class TapsSource:
         self._decoder = FrameDecoder()
         self._frames: deque[Frame] = deque()
         self._seq = 0
-        self._session: int | None = None
-        self._next_scan = 0
+        self._events = EventLog()
+        self._stream: ScanStream | None = None
         self._streaming = False
+        self.status: Status | None = None
+        """What the device has last reported of itself (every 0.5 s of a stream)."""
         try:
             self._command(MessageType.STOP)
             self.info, self.channels = self._identify()
@@ -59,21 +64,40 @@ class TapsSource:
         self.close()
 
     @property
+    def events(self) -> deque[Event]:
+        """What has happened at the device, oldest first: take with popleft(), in any thread (IndexError: empty)."""
+        return self._events.new
+
+    @property
+    def fault(self) -> str:
+        """One sentence on a pulled cable or a sensor without supply while that lasts; empty where all is well."""
+        return self._events.fault(self.channels)
+
+    @property
+    def lost_scans(self) -> int:
+        """Scans of this or the last stream that never came."""
+        return self._stream.lost_scans if self._stream else 0
+
+    @property
     def dropped_frames(self) -> int:
-        """Damaged frames so far."""
-        return self._decoder.dropped
+        """Frames that were damaged, so far, and DATA frames of this stream that came twice or late."""
+        return self._decoder.dropped + (self._stream.refused if self._stream else 0)
+
+    @property
+    def overruns(self) -> int:
+        """How often this program was so late that what had been received was thrown away."""
+        return self._link.overruns
 
     def start(self) -> None:
         """Begin an endless stream."""
+        self.status = None
         answer = self._command(MessageType.START, (0).to_bytes(8, "little"))
-        self._session = answer.session
-        self._next_scan = 0
+        self._stream = ScanStream(answer.session, len(self.channels))
         self._streaming = True
 
     def stop(self) -> None:
-        """End the stream."""
+        """End the stream; in the thread that reads the blocks."""
         self._streaming = False
-        self._session = None
         self._command(MessageType.STOP)
 
     def close(self) -> None:
@@ -88,22 +112,22 @@ class TapsSource:
     def blocks(self) -> Iterator[Block]:
         """Blocks with the scans lost before each; DeviceError where the device falls silent or is unplugged."""
         heard = time.monotonic()
-        while self._streaming:
+        while self._stream is not None and self._streaming:
             frame = self._next_frame(0.1)
-            if frame is not None and frame.type == MessageType.DATA and frame.session == self._session:
-                heard = time.monotonic()
-                yield self._block(frame)
+            if frame is not None and frame.type == MessageType.DATA:
+                block = self._stream.accept(frame)
+                if block is not None:
+                    yield block
+                    heard = time.monotonic()  # not before: a slow consumer is no silent device
             if time.monotonic() - heard > SILENCE:
-                raise DeviceError(
-                    f"the DAQ on {self._link.port} has sent no samples for {SILENCE:g} s; "
-                    "switch it off and on and give the same command again"
-                )
+                raise self._silent()
 
-    def _block(self, frame: Frame) -> Block:
-        block = decode_data(frame.body)
-        lost = max(block.first_scan - self._next_scan, 0)
-        self._next_scan = block.first_scan + block.codes.shape[1]
-        return replace(block, lost_before=lost)
+    def _silent(self) -> DeviceError:
+        restarted = self._stream is not None and self._stream.foreign
+        reason = "has begun another stream by itself" if restarted else f"has sent no samples for {SILENCE:g} s"
+        return DeviceError(
+            f"the DAQ on {self._link.port} {reason}; switch it off and on and give the same command again"
+        )
 
     def _identify(self) -> tuple[dict[str, Any], tuple[Channel, ...]]:
         body = self._command(MessageType.HELLO, answer=MessageType.INFO).body
@@ -126,8 +150,8 @@ class TapsSource:
             raise ValueError(f"sample rate {rate:g} Hz is none of this device's: {listed} Hz")
         wish = {
             "fs": rate,
-            "channels": list(range(len(self.channels))),
-            "format": 0 if self.info["adc_bits"] <= 16 else 2,
+            "channels": [entry["i"] for entry in self.info["channels"]],
+            "format": next(form for form, bits in enumerate(SAMPLE_BITS) if self.info["adc_bits"] <= bits),
             "samples_per_frame": SCANS_PER_FRAME,
         }
         self._command(MessageType.CONFIG, json.dumps(wish).encode())
@@ -155,7 +179,15 @@ class TapsSource:
         """The next frame in order of arrival; None where nothing came in time (s)."""
         if not self._frames:
             self._frames.extend(self._decoder.feed(self._link.read(timeout)))
-        return self._frames.popleft() if self._frames else None
+        if not self._frames:
+            return None
+        frame = self._frames.popleft()
+        if frame.type == MessageType.EVENT:
+            self._events.add(frame)
+        elif frame.type == MessageType.STATUS:
+            with contextlib.suppress(struct.error):
+                self.status = Status.decode(frame.body)
+        return frame
 
     def _answers(self, frame: Frame, answer: MessageType) -> bool:
         about = int.from_bytes(frame.body[:4], "little")
@@ -167,7 +199,14 @@ class TapsSource:
 
 
 def _channels(info: dict[str, Any]) -> tuple[Channel, ...]:
-    """Channels as the device reports them; sens_V_per_EU is V per N or V per m/s^2, before its gain."""
+    """Channels as the device reports them; sens_V_per_EU is V per N or V per m/s^2, before its gain.
+
+    Raises KeyError, TypeError or ValueError where they are none.
+    """
+    if not 2 <= info["adc_bits"] <= SAMPLE_BITS[-1]:
+        raise ValueError(f"adc_bits={info['adc_bits']} is not between 2 and {SAMPLE_BITS[-1]}")
+    if len({entry["i"] for entry in info["channels"]}) != len(info["channels"]):
+        raise ValueError("two channels have the same number i")
     return tuple(
         Channel(
             quantity=entry["quantity"],

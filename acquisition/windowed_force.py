@@ -15,8 +15,8 @@ from acquisition.pulse import find_pulse
 class WindowedForce:
     """The samples about the pulse of a hit, tapered; all others are taken as zero."""
 
-    start: int
-    """Sample of the hit that is the first here."""
+    samples: slice
+    """Where in the hit."""
     force: NDArray[np.float64]
     """Baseline's mean taken off, times window (N), shape (m,)."""
     window: NDArray[np.float64]
@@ -35,8 +35,8 @@ def windowed_force(hit: Hit) -> WindowedForce:
     if pulse is None:
         raise ValueError("a hit has no force pulse; check hits with check_hit before averaging")
     width = max(pulse.end - pulse.start, 8)
-    start = max(pulse.start - 2 * width, 0)
-    sample = np.arange(start, min(pulse.end + 2 * width, pulse.force.size))
+    samples = slice(max(pulse.start - 2 * width, 0), min(pulse.end + 2 * width, pulse.force.size))
+    sample = np.arange(samples.start, samples.stop)
     beyond = np.maximum(sample - (pulse.end + width), (pulse.start - width) - sample)
     window = 0.5 * (1 + np.cos(np.pi * np.clip(beyond / width, 0.0, 1.0)))
-    return WindowedForce(start, pulse.force[sample] * window, window, pulse.baseline_rms)
+    return WindowedForce(samples, pulse.force[samples] * window, window, pulse.baseline_rms)

@@ -117,10 +117,10 @@ def _brackets(growth: Growth, steps: _Steps) -> _Steps:
 
 
 def _refine(growth: Growth, found: _Steps) -> Floats:
-    """The zero in each step by the false position, with the weight of an end that stays put halved (Illinois)."""
+    """The zero in each step by the false position, with the weight of an end that stays put twice halved (Illinois)."""
     row, low, high = found.row, found.low.copy(), found.high.copy()
     at_low, at_high = found.at_low.copy(), found.at_high.copy()
-    zero = (low + high) / 2
+    zero, was_lower = (low + high) / 2, np.full(row.size, -1)
     busy = np.arange(row.size)
     for _ in range(MOST_STEPS):
         if not busy.size:
@@ -131,7 +131,9 @@ def _refine(growth: Growth, found: _Steps) -> Floats:
         lower = (value < 0) == (fa < 0)
         left = value * np.where(lower, guess - b, a - guess) / np.where(lower, fb - value, value - fa)
         zero[busy] = guess + left
-        low[busy], at_low[busy] = np.where(lower, guess, a), np.where(lower, value, fa / 2)
-        high[busy], at_high[busy] = np.where(lower, b, guess), np.where(lower, fb / 2, value)
+        weight = np.where(lower == was_lower[busy], 0.5, 1.0)
+        low[busy], at_low[busy] = np.where(lower, guess, a), np.where(lower, value, weight * fa)
+        high[busy], at_high[busy] = np.where(lower, b, guess), np.where(lower, weight * fb, value)
+        was_lower[busy] = lower
         busy = busy[np.abs(left) > ACCURACY * guess]
     return zero

@@ -11,7 +11,7 @@ from lobes.cut import Cut
 from lobes.stability_lobes import Lobe, StabilityLobes
 from lobes.tip_response import TipResponse
 
-FIRST_BLOCK = 128
+FIRST_BLOCK = 64
 """Grid steps searched first; every further block is twice as long ..."""
 BLOCK = 2_000_000
 """... up to this many grid values (speeds times steps): it bounds the memory."""
@@ -88,7 +88,7 @@ def _out_of_band(branches: Sequence[TipResponse], responses: Sequence[Complexes]
 
 def _out_of_range(method: str, cut: Cut, chatter: float, speed_rpm: Floats) -> str:
     """Whether the cut is too slender, or the teeth too fast, for a mean force, in words."""
-    instead = "use semi-discretisation (stability_boundary)"
+    instead = "use semi-discretisation"
     if cut.immersion < LOW_IMMERSION:
         return (
             f"{method} knows no flip lobes: at immersion {cut.immersion:g} (below {LOW_IMMERSION}) the true limit can "
@@ -122,8 +122,8 @@ def _chatter_frequency(branch: TipResponse, response: Complexes, tooth_frequency
     """
     turn = 0.5 - np.unwrap(np.angle(response)) / np.pi
     lowest = np.minimum(response.real[1:], response.real[:-1])
-    order = np.argsort(lowest)
-    order = order[: np.searchsorted(lowest[order], 0.0)]
+    order = np.flatnonzero(lowest < 0)
+    order = order[np.argsort(lowest[order])]
     best, step, whole = np.zeros(tooth_frequency.shape), np.zeros(tooth_frequency.shape, np.intp), 0 * tooth_frequency
     begin, size = 0, FIRST_BLOCK
     while begin < order.size:
@@ -152,8 +152,8 @@ def _lowest_step(
     """
     lower = block + (real[block + 1] < real[block])
     upper = 2 * block + 1 - lower
-    at_lower = grid[lower] / tooth_frequency[:, np.newaxis] + turn[lower]
-    at_upper = grid[upper] / tooth_frequency[:, np.newaxis] + turn[upper]
+    period = 1 / tooth_frequency[:, np.newaxis]
+    at_lower, at_upper = grid[lower] * period + turn[lower], grid[upper] * period + turn[upper]
     floor = np.floor(at_lower)
     row, column = np.nonzero(floor != np.floor(at_upper))
     start, end = at_lower[row, column], at_upper[row, column]
@@ -172,7 +172,7 @@ def _lowest_step(
 def _refine(branch: TipResponse, step: Rows, missing: Floats, tooth_frequency: Floats) -> Floats:
     """Frequency (Hz) inside each grid step at which `missing` turns, counted from its lower end, have been made.
 
-    By the false position, with the weight of an end that stays put halved (Illinois).
+    By the false position, with the weight of an end that stays put twice halved (Illinois).
     """
     start, low, high = branch.grid[step], branch.grid[step], branch.grid[step + 1]
     origin = branch.receptance(start)
@@ -182,31 +182,33 @@ def _refine(branch: TipResponse, step: Rows, missing: Floats, tooth_frequency: F
         return np.asarray((frequency - start) / tooth_frequency - turned - missing)
 
     at_low, at_high = -missing, excess(high)
-    middle = low
+    middle, was_before = low, np.full(step.shape, -1)
     for _ in range(MOST_STEPS):
         middle = np.clip(high - at_high * (high - low) / (at_high - at_low), low, high)
         value = excess(middle)
         if np.all(np.abs(value) < ROUNDING):
             break
         before = value * at_high < 0
+        weight = np.where(before == was_before, 0.5, 1.0)
         low, high = np.where(before, middle, low), np.where(before, high, middle)
-        at_low, at_high = np.where(before, value, at_low / 2), np.where(before, at_high / 2, value)
+        at_low, at_high = np.where(before, value, weight * at_low), np.where(before, weight * at_high, value)
+        was_before = before
     return middle
 
 
 def _lobes(
     grid: Floats, response: Complexes, cut: Cut, numbers: NDArray[np.int64], speed_rpm: Floats
 ) -> Iterator[Lobe]:
-    slowest, fastest = np.min(speed_rpm), np.max(speed_rpm)
     index = np.flatnonzero(response.real < 0)
     frequency, response = grid[index], response[index]
     depth = -1 / (2 * response.real)
     fraction = np.arctan2(-response.real, response.imag) / np.pi
+    unbroken = np.diff(index) == 1
     for number in numbers:
-        speed = 60 * frequency / (cut.teeth * (number + fraction))
-        reaching = (np.minimum(speed[1:], speed[:-1]) <= fastest) & (np.maximum(speed[1:], speed[:-1]) >= slowest)
-        steps = np.flatnonzero(reaching & (np.diff(index) == 1))
-        for run in np.split(steps, np.flatnonzero(np.diff(steps) > 1) + 1):
+        speed = 60 / cut.teeth * frequency / (number + fraction)
+        slow, fast = speed <= np.max(speed_rpm), speed >= np.min(speed_rpm)
+        reaching = np.flatnonzero((slow[1:] | slow[:-1]) & (fast[1:] | fast[:-1]) & unbroken)
+        for run in np.split(reaching, np.flatnonzero(np.diff(reaching) > 1) + 1):
             if run.size:
                 piece = slice(run[0], run[-1] + 2)
                 yield Lobe(int(number), speed[piece], depth[piece], frequency[piece])

@@ -11,6 +11,9 @@ from scipy.signal import find_peaks
 
 from lobes.stability_lobes import StabilityLobes
 
+SHARE = 0.8
+"""Between the ends of a pocket the limit is at least this share of its depth."""
+
 
 class Pocket(NamedTuple):
     """One pocket of a diagram."""
@@ -19,6 +22,10 @@ class Pocket(NamedTuple):
     """Speed of its deepest point (rpm), the middle of a flat one."""
     depth: float
     """Its limit (m), or the deepest cut of interest where that is less."""
+    from_rpm: float
+    """Slowest speed around it from which on the limit is SHARE of its depth or more (rpm) ..."""
+    to_rpm: float
+    """... and the fastest up to which it is; an end of the range of speeds where it is so up to there."""
 
 
 class PocketShift(NamedTuple):
@@ -53,7 +60,22 @@ def pockets(lobes: StabilityLobes, deepest: ArrayLike) -> list[Pocket]:
     speed, depth = lobes.speed_rpm[order], np.minimum(lobes.depth[order], most)
     padded = np.concatenate(([0.0], depth, [0.0]))
     peaks = find_peaks(padded, plateau_size=1, prominence=0.05 * depth.min())[0] - 1
-    return [Pocket(float(speed[i]), float(depth[i])) for i in peaks]
+    return [Pocket(float(speed[i]), float(depth[i]), *_ends(speed, depth, i)) for i in peaks]
+
+
+def _ends(speed: NDArray[np.float64], depth: NDArray[np.float64], peak: int) -> tuple[float, float]:
+    """The speeds on each side of a peak where the depth falls to SHARE of it, linear between the speeds given."""
+    level = SHARE * depth[peak]
+    low = np.flatnonzero(depth < level)
+    before, after = low[low < peak], low[low > peak]
+    slowest, fastest = speed[0], speed[-1]
+    if before.size:
+        sides = [before[-1], before[-1] + 1]
+        slowest = np.interp(level, depth[sides], speed[sides])
+    if after.size:
+        sides = [after[0], after[0] - 1]
+        fastest = np.interp(level, depth[sides], speed[sides])
+    return float(slowest), float(fastest)
 
 
 def best_pockets(found: Sequence[Pocket], count: int = 3, by: str = "depth") -> list[Pocket]:

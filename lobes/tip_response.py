@@ -89,6 +89,8 @@ def common_grid(tips: Sequence[TipResponse]) -> NDArray[np.float64]:
             f"x and y have no band in common: one ends at {high:g} Hz, the other begins at {low:g} Hz; "
             "give FRFs that overlap"
         )
+    if all(np.array_equal(tip.grid, tips[0].grid) for tip in tips[1:]):
+        return tips[0].grid
     grid = np.unique(np.concatenate([tip.grid for tip in tips]))
     return np.asarray(grid[(grid >= low) & (grid <= high)])
 

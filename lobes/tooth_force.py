@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,16 +25,30 @@ def interval_forces(cut: Cut, intervals: int, depth: Floats) -> Floats:
 
     depth (c,) in m counts for helical teeth only. Returns Pa, shape (c, intervals, 2, 2).
     """
-    first = np.arange(cut.teeth)[:, np.newaxis] * 2 * np.pi / cut.teeth
-    step = 2 * np.pi / (cut.teeth * intervals)
-    edges = first + step * np.arange(intervals + 1)
+    step, edges = _edges(cut, intervals)
     lag = cut.helix_lag * np.asarray(depth, dtype=np.float64)
-    straight = np.diff(_once(cut, edges), axis=1).sum(axis=0) / step
+    straight = _straight(cut, intervals)
     forces = np.broadcast_to(straight, (lag.size, *straight.shape)).copy()
     for i in np.flatnonzero(lag > 0):
         along = _twice(cut, edges) - _twice(cut, edges - lag[i])
         forces[i] = np.diff(along, axis=1).sum(axis=0) / (step * lag[i])
     return forces
+
+
+def _edges(cut: Cut, intervals: int) -> tuple[float, Floats]:
+    """Angle of an interval, and the angles of all teeth where intervals begin and end, shape (teeth, intervals + 1)."""
+    first = np.arange(cut.teeth)[:, np.newaxis] * 2 * np.pi / cut.teeth
+    step = 2 * np.pi / (cut.teeth * intervals)
+    return step, first + step * np.arange(intervals + 1)
+
+
+@lru_cache(maxsize=64)
+def _straight(cut: Cut, intervals: int) -> Floats:
+    """Forces of straight teeth (Pa), shape (intervals, 2, 2); asked for again and again."""
+    step, edges = _edges(cut, intervals)
+    forces = np.diff(_once(cut, edges), axis=1).sum(axis=0) / step
+    forces.flags.writeable = False
+    return np.asarray(forces)
 
 
 def _once(cut: Cut, angle: Floats) -> Floats:

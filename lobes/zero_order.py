@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +13,12 @@ from lobes.loop_limits import loop_limits
 from lobes.speeds import check_speeds
 from lobes.stability_lobes import StabilityLobes
 from lobes.tip_response import Tip, TipResponse, common_grid, tip_responses, weighted_sum
-from lobes.tooth_force import mean_force
+from lobes.tooth_force import interval_forces, mean_force
+
+CANCELS = 0.7
+"""Mean force of one direction over the mean of its magnitude, below which zero order is no picture of it."""
+SAMPLES = 400
+"""Intervals of a tooth period that they are taken over."""
 
 
 def zero_order(x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: ArrayLike) -> StabilityLobes:
@@ -37,8 +43,21 @@ def zero_order(x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: ArrayLike) -> 
     force = mean_force(cut)
     if len(tips) == 1:
         ((axis, tip),) = tips
-        return loop_limits([weighted_sum([(force[axis, axis], tip)])], cut, speed, "zero order")
+        lobes = loop_limits([weighted_sum([(force[axis, axis], tip)])], cut, speed, "zero order")
+        return replace(lobes, warning=lobes.warning or _cancelling(cut, axis))
     return loop_limits(_eigenvalues(force, [tip for _, tip in tips]), cut, speed, "zero order")
+
+
+def _cancelling(cut: Cut, axis: int) -> str:
+    """Whether most of the force in the one direction that is known cancels over a turn, in words."""
+    forces = interval_forces(cut, SAMPLES, np.zeros(1))[0, :, axis, axis]
+    share = abs(np.mean(forces)) / np.mean(np.abs(forces))
+    if share >= CANCELS:
+        return ""
+    return (
+        f"zero order knows the mean force alone, and {100 * (1 - share):.0f} % of the force in {'xy'[axis]}, the one "
+        "direction known, cancels over a turn: the true limit can be far lower; use semi-discretisation"
+    )
 
 
 def _eigenvalues(force: NDArray[np.float64], tips: Sequence[TipResponse]) -> list[TipResponse]:

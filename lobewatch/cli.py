@@ -19,8 +19,11 @@ from lobewatch.commands.init import init
 from lobewatch.commands.lobes import lobes
 from lobewatch.commands.model import model
 from lobewatch.commands.modes import modes
+from lobewatch.commands.ports import ports
 from lobewatch.commands.replay import replay
 from lobewatch.commands.report import report
+from lobewatch.commands.sensors import sensors
+from lobewatch.commands.serve import serve
 from lobewatch.commands.tap import tap
 from lobewatch.output import notes, results
 
@@ -31,7 +34,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (demo, init, tap, replay, modes, model, calibrate, lobes, check, report):
+for command in (demo, init, ports, sensors, tap, replay, modes, model, calibrate, lobes, check, report, serve):
     app.command()(command)
 app.add_typer(emulate, name="emulate")
 

@@ -2,21 +2,51 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from lobes import Pocket, PocketShift, cutting_coefficients
+from lobes import Pocket, PocketShift, ProgramCheck, cutting_coefficients
+from lobes.check_program import DEEPEST
+from lobes.pockets import SHARE
 from lobewatch.machine import Machine
+
+POCKET_RANGE = f"at least {100 * SHARE:.0f} % of the depth"
+"""What holds between the ends of a pocket."""
 
 
 def pocket_json(pocket: Pocket) -> dict[str, float]:
     """One pocket."""
-    return {"speed_rpm": pocket.speed_rpm, "depth_mm": pocket.depth * 1e3}
+    return {
+        "speed_rpm": pocket.speed_rpm,
+        "depth_mm": pocket.depth * 1e3,
+        "from_rpm": pocket.from_rpm,
+        "to_rpm": pocket.to_rpm,
+    }
 
 
 def pocket_list(best: Sequence[Pocket]) -> str:
-    """Pockets in one line."""
-    return ", ".join(f"{pocket.depth * 1e3:.2f} mm at {pocket.speed_rpm:.0f} rpm" for pocket in best) or "none"
+    """Pockets in one line, in brackets the speeds at which POCKET_RANGE holds."""
+    texts = (
+        f"{pocket.depth * 1e3:.2f} mm at {pocket.speed_rpm:.0f} ({pocket.from_rpm:.0f}..{pocket.to_rpm:.0f}) rpm"
+        for pocket in best
+    )
+    return ", ".join(texts) or "none"
+
+
+def limit_text(found: ProgramCheck, depth_mm: float) -> str:
+    """The limit of a program of this depth (mm)."""
+    return f"> {DEEPEST * depth_mm:g}" if math.isinf(found.limit) else f"{found.limit * 1e3:.2f}"
+
+
+def margin_text(found: ProgramCheck) -> str:
+    """The margin of a program in depth."""
+    return "-" if math.isinf(found.depth_margin) else f"{100 * found.depth_margin:+.0f} %"
+
+
+def with_option(warning: str) -> str:
+    """A warning of a method, with the option of `lobewatch lobes` for what it asks for."""
+    return warning.replace("use semi-discretisation", "use semi-discretisation (--method semi-discretisation)")
 
 
 def shift_json(shift: PocketShift) -> dict[str, Any]:

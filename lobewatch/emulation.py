@@ -1,4 +1,4 @@
-"""The emulated spindle: the model's modes behind a TAPS/1 emulator. Its truth is known."""
+"""The emulated spindle: the model's modes behind an emulated DAQ. Its truth is known."""
 
 from __future__ import annotations
 
@@ -6,7 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from acquisition import Channel, HammeredStructure, Hammering, Structure, TapsEmulator
+from acquisition import (
+    Channel,
+    DataqEmulator,
+    DataqInput,
+    DataqTraits,
+    HammeredStructure,
+    Hammering,
+    Structure,
+    TapsEmulator,
+)
 from dsm import Spindle, modes_at, static_stiffness
 
 MODES = 8
@@ -40,3 +49,24 @@ def emulator(structure: Structure, random: np.random.Generator, *, realtime: boo
     """Somebody taps this structure, again and again, on a TAPS/1 device."""
     signal = HammeredStructure(structure, SAMPLE_RATE, random, Hammering())
     return TapsEmulator(signal, CHANNELS, SAMPLE_RATE, realtime=realtime, tcp=tcp)
+
+
+def dataq_emulator(
+    structure: Structure,
+    inputs: tuple[DataqInput, ...],
+    random: np.random.Generator,
+    *,
+    realtime: bool,
+    tcp: bool = False,
+) -> DataqEmulator:
+    """Somebody taps this structure, again and again, with these sensors on a DATAQ device.
+
+    Where a skew is given for one of them, the device converts its inputs one after the other.
+    """
+    return DataqEmulator(
+        lambda rate: HammeredStructure(structure, rate, random, Hammering()),
+        inputs,
+        realtime=realtime,
+        tcp=tcp,
+        traits=DataqTraits(scanned=any(one.channel.skew for one in inputs)),
+    )

@@ -16,6 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from lobes import DepthBand, Pocket, RadialLobes
+from lobes.pockets import SHARE
 from lobewatch.figures import ALARM, GOOD, NOW, THEN, new_axes
 
 Floats = NDArray[np.float64]
@@ -56,8 +57,8 @@ def lobes_figure(
         _fill(axes, speed_rpm, band, top, color=NOW, alpha=0.35, label="95 % band of the tap")
     axes.fill_between(speed_rpm, np.minimum(now[1] * 1e3, top), top, color=NOW, alpha=0.10, lw=0)
     axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
-    for pocket in pockets:
-        _draw_pocket(axes, pocket)
+    for i, pocket in enumerate(pockets):
+        _draw_pocket(axes, pocket, f"pocket, at least {100 * SHARE:.0f} % as deep" if i == 0 else "")
     for program in programs:
         _draw_program(axes, program)
     axes.set(xlabel="spindle speed (rpm)", ylabel="limiting depth (mm)")
@@ -122,9 +123,11 @@ def _fill(axes: Axes, speed_rpm: Floats, band: DepthBand, top: float, **style: A
     axes.fill_between(speed_rpm, low, high, lw=0, **style)
 
 
-def _draw_pocket(axes: Axes, pocket: Pocket) -> None:
-    """A line at the speed of a pocket, with the speed at its foot."""
+def _draw_pocket(axes: Axes, pocket: Pocket, label: str) -> None:
+    """A line at the speed of a pocket, with the speed at its foot, and a bar as wide as the pocket."""
     axes.axvline(pocket.speed_rpm, color=NOW, ls=":", lw=1)
+    ends, depth = (pocket.from_rpm, pocket.to_rpm), SHARE * pocket.depth * 1e3
+    axes.plot(ends, (depth, depth), color=NOW, lw=1, marker="|", ms=7, label=label)
     axes.annotate(
         f"{pocket.speed_rpm:.0f} rpm",
         (pocket.speed_rpm, 0.02),

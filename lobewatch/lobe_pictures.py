@@ -58,8 +58,8 @@ def _bands(machine: Machine, now: Chart) -> tuple[DepthBand | None, DepthBand | 
     measured = spread = None
     if any(mode.best_covariance is not None for mode in (*(x or ()), *(y or ()))):
         measured = carried(measurement_band(lambda x, y: chart(Method.ZERO_ORDER, x, y, now.cut, speeds), x, y))
-    alloy = machine.coefficients(now.table).alloy
-    published = [one for one in cutting_coefficients() if alloy and one.alloy == alloy]
+    used, known = machine.coefficients(now.table), cutting_coefficients()
+    published = [one for one in known if any(used is other for other in known) and one.alloy == used.alloy]
     if len(published) >= 2:
         spread = carried(coefficient_range(lambda cut: chart(Method.ZERO_ORDER, x, y, cut, speeds), now.cut, published))
     return measured, spread

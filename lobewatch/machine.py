@@ -17,6 +17,7 @@ from acquisition import DataError
 from dsm import Spindle
 from lobes import Coefficients, Cut, cutting_coefficients
 from lobewatch.cut_tables import CutTable, Drive, MaterialTable, Program
+from lobewatch.daq_tables import ChannelTable, Daq
 from lobewatch.spindle_tables import BearingTable, JointTable, MassTable, SegmentTable, SpindleTable, ToolTable
 from lobewatch.toml_table import NotNegative, Positive, Table
 
@@ -31,21 +32,14 @@ class Identity(Table, frozen=True):
 
 
 class TapSetup(Table, frozen=True):
-    """[tap]: how the tap test is done."""
+    """[tap]: how the tap test is done; record_s and trigger_n that are not given are chosen by trial hits."""
 
     tool: str = "reference"
     hits: Annotated[int, Meta(ge=3, le=1000)] = 10
-    record_s: Positive = 0.25
+    record_s: Positive | None = None
     pre_trigger_s: Positive = 0.02
-    trigger_n: Positive = 20.0
+    trigger_n: Positive | None = None
     position_mm: NotNegative = 0.0
-
-
-class Daq(Table, frozen=True):
-    """[daq]: the port is remembered here by hand, never written by the program."""
-
-    port: str = ""
-    sample_rate_hz: Positive | None = None
 
 
 class ModeChoice(Table, frozen=True):
@@ -227,7 +221,19 @@ def _readable(message: str) -> str:
 
 
 def _suggestion(key: str) -> str:
-    tables = [Machine, Identity, TapSetup, Daq, ModeChoice, Limits, SpeedRange, Drive, MaterialTable, Program]
+    tables = [
+        Machine,
+        Identity,
+        TapSetup,
+        Daq,
+        ChannelTable,
+        ModeChoice,
+        Limits,
+        SpeedRange,
+        Drive,
+        MaterialTable,
+        Program,
+    ]
     tables += [SpindleTable, SegmentTable, BearingTable, MassTable, JointTable, ToolTable]
     known = {field for table in tables for field in table.__struct_fields__}
     near = difflib.get_close_matches(key, known, n=1)

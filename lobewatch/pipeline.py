@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from acquisition import TapTest
+from acquisition import TapTest, stiffness_doubt
 from dsm import Calibration, calibrate, modal_stiffness
 from lobes import StabilityLobes, zero_order
 from lobewatch.machine import Machine
@@ -100,6 +100,8 @@ def _dynamics(tap: TapTest, machine: Machine, notes: list[str], last: Mode | Non
         notes.append(f"no modes: {error}")
         return Dynamics([], None, None, [])
     followed = _follow(modes, machine, notes, last)
+    if followed is not None:
+        notes.extend(filter(None, [stiffness_doubt(followed.stiffness)]))
     calibration = _calibrate(followed, machine, tap.circumstances.tool, notes)
     return Dynamics(modes, followed, calibration, _modes_at_tip(modes, followed, calibration, machine, notes))
 

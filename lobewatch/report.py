@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from acquisition import Frf, TapTest
 from lobes import ProgramCheck, SldHistory
 from lobewatch.advice import ProgramAdvice, advise
+from lobewatch.describe_lobes import limit_text, margin_text
 from lobewatch.figures import frf_figure, svg, trend_figure
 from lobewatch.figures_lobes import lobes_figure
 from lobewatch.history import measure, series
@@ -181,13 +182,12 @@ def _program(one: ProgramAdvice) -> dict[str, Any]:
             "remark": "; ".join(one.notes),
         }
     low, high = (edge * 1e3 for edge in one.limit_band)
-    limit = f"{found.limit * 1e3:.2f}"
     return row | {
         "stable": found.stable,
         "was_stable": one.was_stable if one.measured else None,
-        "limit": limit if np.isfinite(found.limit) else f"> {20 * one.table.depth_mm:g}",
+        "limit": limit_text(found, one.table.depth_mm),
         "band": f"{low:.2f} to {high:.2f}" if np.isfinite(high) else "",
-        "margin": f"{100 * found.depth_margin:+.0f} %" if np.isfinite(found.depth_margin) else "-",
+        "margin": margin_text(found),
         "remark": _remark(one, found, low),
     }
 

@@ -1,10 +1,10 @@
-"""The live tap test: hits from a source, each spooled before its verdict is shown, until enough are good."""
+"""A tap test in progress: its hits and its set-up, spooled one by one, so that nothing of it is lost."""
 
 from __future__ import annotations
 
+import json
 import shutil
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from datetime import timedelta
 from pathlib import Path
 
@@ -13,25 +13,23 @@ from acquisition import (
     DataError,
     Hit,
     HitFlags,
-    Source,
     TapTest,
     Trigger,
-    average_good,
-    capture_hits,
-    check_hit,
+    atomic_write,
+    estimate_frf,
+    judge_hit,
     new_tap_id,
     read_tap_hits,
     write_hit,
 )
 from lobewatch.machine_folder import MachineFolder
+from lobewatch.tap_state import TakenHit
 
 RESERVE_BYTES = 50_000_000
 """Free disk space needed before the trigger is armed."""
 RESUMABLE = timedelta(hours=12)
 """An interrupted test older than this is not gone on with."""
-
-OnHit = Callable[[Hit, HitFlags, int], None]
-"""Called with each hit, its verdict and the number of good ones so far."""
+SETUP = "setup.json"
 
 
 @dataclass
@@ -46,22 +44,55 @@ class TapInProgress:
     """Where its hits are spooled."""
     hits: list[Hit] = field(default_factory=list)
     """All hits so far."""
+    flags: list[HitFlags] = field(default_factory=list)
+    """The verdict on each; UNDONE where the operator took a good one back."""
+    reasons: list[str] = field(default_factory=list)
+    """What was wrong with each, in a sentence; empty where it is averaged."""
+    earlier: int = 0
+    """How many of them were there when it was gone on with."""
+    trigger: Trigger | None = None
+    """How its hits are recorded; None until that is chosen."""
 
     @property
     def good(self) -> int:
         """How many hits may be averaged."""
-        return sum(not check_hit(hit) for hit in self.hits)
+        return sum(not flags for flags in self.flags)
 
-    def add(self, hit: Hit) -> None:
+    @property
+    def taken(self) -> tuple[TakenHit, ...]:
+        """The hits as a screen lists them."""
+        told = enumerate(zip(self.hits, self.flags, self.reasons, strict=True), 1)
+        return tuple(
+            TakenHit(i, flags, float(hit.force.max()), bool(flags & HitFlags.UNDONE), reason, i <= self.earlier)
+            for i, (hit, flags, reason) in told
+        )
+
+    def add(self, hit: Hit, flags: HitFlags, reason: str) -> None:
         """Keep a hit; on the disk when this returns."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        write_hit(self.folder / f"{len(self.hits):04d}.h5", hit, self.circumstances)
+        if not self.hits and self.trigger is not None:
+            atomic_write(self.folder / SETUP, json.dumps(asdict(self.trigger)).encode())
+        self._write(len(self.hits), hit, flags)
         self.hits.append(hit)
+        self.flags.append(flags)
+        self.reasons.append(reason)
+
+    def undo(self) -> int | None:
+        """Take back the last good hit and return its index; None where there is none. It stays stored, as undone."""
+        for i in reversed(range(len(self.hits))):
+            if not self.flags[i]:
+                self._write(i, self.hits[i], HitFlags.UNDONE)
+                self.flags[i] = HitFlags.UNDONE
+                return i
+        return None
 
     def finish(self) -> TapTest:
-        """The averaged tap test."""
-        frf, flags = average_good(self.hits)
-        return TapTest(self.id, self.circumstances, frf, tuple(self.hits), flags)
+        """The averaged tap test; ValueError where no hit is good."""
+        good = [hit for hit, flags in zip(self.hits, self.flags, strict=True) if not flags]
+        return TapTest(self.id, self.circumstances, estimate_frf(good), tuple(self.hits), tuple(self.flags))
+
+    def _write(self, number: int, hit: Hit, flags: HitFlags) -> None:
+        write_hit(self.folder / f"{number:04d}.h5", hit, self.circumstances, flags)
 
 
 def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool = True) -> TapInProgress:
@@ -80,36 +111,19 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
         about = read_tap_hits(files[0])[1]
         same = (about.tool, about.direction) == (circumstances.tool, circumstances.direction)
         if same and circumstances.created - about.created < RESUMABLE:
-            return TapInProgress(path.name, about, path, [read_tap_hits(file)[0][0] for file in files])
+            return _resumed(path, files, about)
     tap_id = new_tap_id(circumstances)
     return TapInProgress(tap_id, circumstances, folder.spool / tap_id)
 
 
-def take_hits(tap: TapInProgress, source: Source, trigger: Trigger, wanted: int, on_hit: OnHit) -> None:
-    """Add hits until `wanted` are good. The source is started and stopped here.
-
-    Raises DeviceError where the source fails, ValueError where earlier hits were recorded with another set-up.
-    """
-    good = tap.good
-    setups = {(hit.force.size, hit.sample_rate) for hit in tap.hits}
-    if setups - {(trigger.n_samples, source.sample_rate)}:
-        raise ValueError(
-            f"the interrupted test {tap.id} was recorded with another length or sample rate; begin anew with --new"
-        )
-    if good >= wanted:
-        return
-    source.start()
-    for hit in capture_hits(source, trigger):
-        tap.add(hit)
-        flags = check_hit(hit)
-        good += not flags
-        on_hit(hit, flags, good)
-        if good >= wanted:
-            break
-    source.stop()
-
-
-def trigger_for(folder: MachineFolder, sample_rate: float) -> Trigger:
-    """Trigger and record as machine.toml sets them."""
-    tap = folder.machine.tap
-    return Trigger(tap.trigger_n, round(tap.record_s * sample_rate), round(tap.pre_trigger_s * sample_rate))
+def _resumed(path: Path, files: list[Path], about: Circumstances) -> TapInProgress:
+    tap = TapInProgress(path.name, about, path, earlier=len(files))
+    for file in files:
+        (hit,), _, (flags,) = read_tap_hits(file)
+        tap.hits.append(hit)
+        found = judge_hit(hit)
+        tap.flags.append(flags | found.flags)
+        tap.reasons.append(found.text or flags.cure)
+    if (path / SETUP).is_file():
+        tap.trigger = Trigger(**json.loads((path / SETUP).read_text("utf-8")))
+    return tap

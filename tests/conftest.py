@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquisition import Channel, HammeredStructure, Hammering, Structure
+from acquisition import Channel, HammeredStructure, Hammering, HitFlags, Structure
+from lobewatch.tap_state import Check, Outcome, Plots, TakenHit, TapState, Word
 
 DATA = Path(__file__).parent / "data"
 
@@ -74,3 +77,86 @@ def true_receptance(structure: Structure) -> Callable[[NDArray[np.float64]], NDA
         return np.asarray(modes.sum(axis=1) + structure.residual)
 
     return at
+
+
+class ScriptedSession:
+    """A live tap test without device and clock: the test says what it shows next."""
+
+    def __init__(self) -> None:
+        self.state = TapState(1, Word.CHECKING, "mill-3, tool reference, direction x", device="DI-2108, 51200 Hz")
+        self.undone = threading.Event()
+        self.stopped = threading.Event()
+        self.refusal = ""
+
+    def show(self, word: Word, **changes: object) -> TapState:
+        """The next state."""
+        self.state = replace(self.state, revision=self.state.revision + 1, word=word, **changes)  # type: ignore[arg-type]
+        return self.state
+
+    def check(self) -> None:
+        """The self-check, one line of it failed."""
+        passed = [("device", "DI-2108, serial 5C0A"), ("hum", "0.02 N at 50 Hz"), ("disk", "112 GB free")]
+        failed = Check("noise floor", False, "4.1 N rms is above 2 N: is the spindle stopped, the hammer at rest?")
+        self.show(Word.CHECKING, checks=(*(Check(name, True, text) for name, text in passed), failed))
+
+    def hit(self, flags: HitFlags = HitFlags.OK, reason: str = "") -> None:
+        """One more hit."""
+        good = self.state.good + (not flags)
+        taken = TakenHit(len(self.state.hits) + 1, flags, 312.0 + 7 * len(self.state.hits))
+        self.show(
+            Word.REFUSED if flags else Word.GOOD,
+            verdict=flags.words,
+            reason=reason,
+            good=good,
+            hits=(*self.state.hits, taken),
+            mean_change=0.3 / good**2 if good > 1 else None,
+            settled=good >= 8,
+            levels=(0.4, 12.5),
+            plots=scripted_plots(good),
+        )
+
+    def finish(self) -> None:
+        """All hits are there."""
+        texts = ("f_1 1688.20 ± 0.12 Hz, 1.9 % below the first test", "K 33.1 ± 0.2 N/um, bearing stiffness 1190 N/um")
+        done = Outcome("warn", texts, "Tap again in 14 days, and run lobewatch check mill-3 today.")
+        self.show(Word.DONE, reason="", outcome=done)
+
+    def undo(self) -> None:
+        """Take back the last good hit."""
+        if self.refusal:
+            raise ValueError(self.refusal)
+        hits = list(self.state.hits)
+        last = max(i for i, hit in enumerate(hits) if not hit.flags and not hit.undone)
+        hits[last] = replace(hits[last], undone=True)
+        self.show(Word.TAP, hits=tuple(hits), good=self.state.good - 1)
+        self.undone.set()
+
+    def stop(self) -> None:
+        """Remember that it was asked for."""
+        self.stopped.set()
+
+
+def scripted_plots(good: int) -> Plots:
+    """A pulse, a ring-down and the FRF of one mode at 1722 Hz."""
+    time = np.linspace(-0.02, 0.23, 2001)
+    frequency = np.linspace(4.0, 12800.0, 1500)
+    ringing = np.where(time > 0, np.exp(-300 * time) * np.sin(2 * np.pi * 1722 * time), 0.0)
+    ratio = frequency / 1722
+    receptance = np.abs(1 / (3.2e7 * (1 - ratio**2 + 0.06j * ratio))) + 1e-9 + 1e-4 / frequency**2
+    return Plots(
+        time,
+        312 * np.exp(-(((time - 4e-4) / 3e-4) ** 2)),
+        900 * ringing,
+        frequency,
+        receptance if good else None,
+        receptance * (1 + 0.1 * np.sin(frequency / 90)),
+        np.clip(1 - 0.02 * (frequency / 4000) ** 4, 0, 1) if good >= 3 else None,
+        -((frequency / 900) ** 1.4),
+        (4.0, 7600.0),
+    )
+
+
+@pytest.fixture
+def session() -> ScriptedSession:
+    """A tap test that shows what a test tells it to."""
+    return ScriptedSession()

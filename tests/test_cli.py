@@ -109,14 +109,14 @@ def test_an_interrupted_tap_is_gone_on_with_and_new_begins_anew(
     from datetime import UTC, datetime
     from itertools import islice
 
-    from acquisition import Circumstances, TapsSource, capture_hits
-    from lobewatch.tapping import begin_tap, trigger_for
+    from acquisition import Circumstances, TapsSource, Trigger, capture_hits, check_hit
+    from lobewatch.tapping import begin_tap
 
     with TapsSource(device.port) as source:
         running = begin_tap(trial, Circumstances("trial", datetime.now(UTC), "reference"))
         source.start()
-        for hit in islice(capture_hits(source, trigger_for(trial, source.sample_rate)), 4):
-            running.add(hit)
+        for hit in islice(capture_hits(source, Trigger(20.0, 6400, 512)), 4):
+            running.add(hit, check_hit(hit), "")
     anew = run("tap", "trial", "--port", device.port, "--new")
     assert "going on" not in anew.err
     said = run("tap", "trial", "--port", device.port)
@@ -296,7 +296,11 @@ def test_modes_of_bad_files_and_bands(run: Run, beam: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    "name", ["demo", "init", "tap", "replay", "modes", "model", "calibrate", "lobes", "check", "report", "emulate taps"]
+    "name",
+    [
+        *("demo", "init", "ports", "tap", "replay", "modes", "model", "calibrate", "lobes", "check", "report"),
+        *("emulate taps", "emulate dataq"),
+    ],
 )
 def test_every_command_has_help_with_examples_and_json(run: Run, name: str) -> None:
     said = run(*name.split(), "--help")

@@ -93,7 +93,7 @@ def test_skew_of_the_response_channel_is_corrected(tapper: Tapper, channels: Pai
     force, response = channels
     skewed = [replace(hit, channels=(force, replace(response, skew=2e-6))) for hit in hits(tapper, channels)]
     turned = estimate_frf(skewed).receptance / straight.receptance
-    assert np.angle(turned) == pytest.approx(2 * np.pi * straight.frequency * 2e-6, abs=1e-9)
+    assert np.angle(turned) == pytest.approx(-2 * np.pi * straight.frequency * 2e-6, abs=1e-9)
 
 
 def test_an_offset_of_force_and_response_changes_nothing(tapper: Tapper, channels: Pair) -> None:

@@ -180,9 +180,9 @@ def chart(depth: list[float], speed: NDArray[np.float64] | None = None) -> Stabi
 
 def test_pockets_are_the_tops_of_the_diagram() -> None:
     found = pockets(chart([4.0, 1.0, 3.0, 1.0, math.inf, math.inf, math.inf, 2.0]), 5.0)
-    assert found == [(1000.0, 4.0), (3000.0, 3.0), (6000.0, 5.0)]
-    assert best_pockets(found, 2) == [(6000.0, 5.0), (1000.0, 4.0)]
-    assert best_pockets(found, 2, by="removal") == [(6000.0, 5.0), (3000.0, 3.0)]
+    assert [pocket[:2] for pocket in found] == [(1000.0, 4.0), (3000.0, 3.0), (6000.0, 5.0)]
+    assert [pocket[:2] for pocket in best_pockets(found, 2)] == [(6000.0, 5.0), (1000.0, 4.0)]
+    assert [pocket[:2] for pocket in best_pockets(found, 2, by="removal")] == [(6000.0, 5.0), (3000.0, 3.0)]
     with pytest.raises(ValueError, match="by='speed'"):
         best_pockets(found, by="speed")
     with pytest.raises(ValueError, match="deepest"):
@@ -191,7 +191,15 @@ def test_pockets_are_the_tops_of_the_diagram() -> None:
 
 def test_the_drive_cuts_pockets_off() -> None:
     lobes = chart([1.0, 8.0, 1.0, 1.0, 9.0, 1.0])
-    assert pockets(lobes, np.array([9.0, 9, 9, 2, 2, 2]))[1] == (5000.0, 2.0)
+    assert pockets(lobes, np.array([9.0, 9, 9, 2, 2, 2]))[1][:2] == (5000.0, 2.0)
+
+
+def test_a_pocket_reaches_as_far_as_four_fifths_of_its_depth() -> None:
+    found = pockets(chart([4.0, 1.0, 3.0, 1.0, math.inf, math.inf, 5.0, 2.0, 9.0]), 5.0)
+    ends = [(pocket.from_rpm, pocket.to_rpm) for pocket in found]
+    np.testing.assert_allclose(
+        ends, [(1000, 1000 + 800 / 3), (2700, 3300), (4750, 7000 + 1000 / 3), (8000 + 2000 / 3, 9000)]
+    )
 
 
 def test_pockets_move_with_the_frequency() -> None:

@@ -65,7 +65,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
 @pytest.fixture
 def folder(tmp_path: Path) -> MachineFolder:
     make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
-    return MachineFolder(tmp_path / "m")
+    return edit(MachineFolder(tmp_path / "m"), "high_rpm = 24000", "high_rpm = 24000\nsteps = 300")
 
 
 def tap(
@@ -206,8 +206,6 @@ def test_check_without_anything_to_check_is_refused(run: Run, folder: MachineFol
 
 
 def test_methods_pockets_and_shifts(run: Run, folder: MachineFolder) -> None:
-    edit(folder, "high_rpm = 24000", "high_rpm = 24000\nsteps = 300")
-    folder = MachineFolder(folder.path)
     tap(folder, 1713.0)
     tap(folder, 1713.0 * 0.95, days=300)
     zero, angle, semi = (
@@ -233,7 +231,7 @@ def test_methods_pockets_and_shifts(run: Run, folder: MachineFolder) -> None:
 
 
 def test_pictures(run: Run, folder: MachineFolder) -> None:
-    edit(folder, "high_rpm = 24000", "high_rpm = 24000\nsteps = 60")
+    edit(folder, "steps = 300", "steps = 60")
     edit(folder, "tangential_n_per_mm2 = 1400\nradial_n_per_mm2 = 500", 'material = "Al 7075 (HSS; dry)"')
     folder = MachineFolder(folder.path)
     tap(folder, 1713.0)
@@ -242,6 +240,38 @@ def test_pictures(run: Run, folder: MachineFolder) -> None:
     assert Path("l.png").read_bytes().startswith(b"\x89PNG")
     assert Path("w.png").read_bytes().startswith(b"\x89PNG")
     assert "radial depth (mm)" in Path("r.svg").read_text("utf-8")
+
+
+def test_an_own_material_has_no_published_spread(run: Run, folder: MachineFolder) -> None:
+    edit(folder, "tangential_n_per_mm2 = 1400\nradial_n_per_mm2 = 500", 'material = "Al 7075 (HSS; dry)"')
+    tap(folder, 1713.0)
+    run("lobes", "m", "--figure", "published.svg")
+    own = '[[material]]\nname = "Al 7075 (HSS; dry)"\ntangential_n_per_mm2 = 800\nradial_n_per_mm2 = 200\n\n[speed]'
+    edit(folder, "[speed]", own)
+    run("lobes", "m", "--figure", "own.svg")
+    texts = [Path(name).read_text("utf-8") for name in ("published.svg", "own.svg")]
+    assert ["range of published coefficients" in text for text in texts] == [True, False]
+
+
+def test_a_verdict_by_zero_order_sends_to_check(run: Run, folder: MachineFolder) -> None:
+    tap(folder, 1713.0)
+    program = ("lobes", "m", "--cut", "A: slot at 12 900 rpm")
+    said = [run(*program, "--method", method).out for method in ("zero-order", "semi-discretisation")]
+    assert ["lobewatch check has the verdict" in text for text in said] == [True, False]
+    assert "lobewatch check" not in run("lobes", "m").out
+
+
+def test_pockets_have_a_width(run: Run, folder: MachineFolder) -> None:
+    tap(folder, 1713.0)
+    said = json.loads(run("lobes", "m", "--json").out)
+    depths = dict(zip(said["speed_rpm"], said["depth_mm"], strict=True))
+    for pocket in said["pockets_by_depth"]:
+        assert pocket["from_rpm"] < pocket["speed_rpm"] < pocket["to_rpm"]
+        inside = [deep for speed, deep in depths.items() if pocket["from_rpm"] <= speed <= pocket["to_rpm"]]
+        assert min(inside) >= 0.8 * pocket["depth_mm"]
+    best = said["pockets_by_depth"][0]
+    text = f"{best['depth_mm']:.2f} mm at {best['speed_rpm']:.0f} ({best['from_rpm']:.0f}..{best['to_rpm']:.0f}) rpm"
+    assert text in run("lobes", "m").out
 
 
 def test_materials_are_listed_with_their_sources(run: Run, folder: MachineFolder) -> None:
@@ -318,7 +348,8 @@ def test_the_report_says_what_check_says(run: Run, folder: MachineFolder) -> Non
     ):
         own = cut.replace('"reference"', f'"{tool}"').replace("speed_rpm = 12900", f"speed_rpm = {speed}")
         added += f'[[program]]\nname = "{name}"' + own.replace("depth_mm = 6.0", f"depth_mm = {depth}")
-    folder.toml.write_text(f"{text}\n{added}", "utf-8")
+    head, tail = text[: text.index("[[program]]")], text[text.index("# The spindle of the example") :]
+    folder.toml.write_text(f"{head}{added}\n{tail}", "utf-8")
     folder = MachineFolder(folder.path)
     tap(folder, 1541.7)
     said = {entry["name"]: entry for entry in json.loads(run("check", "m", "--json").out)["programs"]}
@@ -356,7 +387,12 @@ def test_low_immersions_are_noted_once_and_where_they_concern(run: Run, folder: 
     folder = edit(folder, "radial_depth_mm = 20 ", "radial_depth_mm = 2 ")
     tap(folder, 1713.0)
     note = "zero order knows no flip lobes"
-    assert run("lobes", "m").out.count(note) == 1
+    said = run("lobes", "m").out
+    assert (said.count(note), "(--method semi-discretisation)" in said, "stability_boundary" in said) == (
+        1,
+        True,
+        False,
+    )
     assert note not in run("lobes", "m", "--cut", "A: slot at 12 900 rpm").out
     assert note not in run("lobes", "m", "--method", "semi-discretisation").out
     said = run("lobes", "m", "--cut", "A: slot at 12 900 rpm", "--radial", "r.svg").out
@@ -368,12 +404,13 @@ def test_a_cut_without_limit_is_said_to_have_none(run: Run, folder: MachineFolde
     folder = edit(folder, "radial_n_per_mm2 = 500", "radial_n_per_mm2 = 0")
     for days in (0.0, 300.0):
         tap(folder, 1713.0 - days / 10, days)
-        said = run("lobes", "m", "--figure", "l.png", "--radial", "r.png", "--waterfall", "w.png")
+        said = run("lobes", "m", "--figure", "l.svg")
         assert said.code == 0, said.err
         assert "no limit in this speed range (zero order)" in said.out
         assert not any(word in said.out for word in ("nan", "inf ", "pocket"))
-        assert run("report", "m").code == 0
-        assert "has no limit in this speed range (zero order)" in Path("m/report.html").read_text("utf-8")
+    assert run("lobes", "m", "--radial", "r.svg", "--waterfall", "w.svg").code == 0
+    assert run("report", "m").code == 0
+    assert "has no limit in this speed range (zero order)" in Path("m/report.html").read_text("utf-8")
 
 
 def test_an_unknown_ending_names_those_that_are_known(run: Run, folder: MachineFolder) -> None:
@@ -468,9 +505,10 @@ def test_bands_and_pockets_are_drawn() -> None:
         {"now": depth},
         band=DepthBand(0.9 * depth, 1.1 * depth),
         spread=DepthBand(0.5 * depth, 2 * depth),
-        pockets=[Pocket(1500.0, 2e-3)],
+        pockets=[Pocket(1500.0, 2e-3, 1400.0, 1650.0)],
     )
     for collection, edges in zip(figure.axes[0].collections, ((1.0, 4.0), (1.8, 2.2)), strict=False):
         heights = np.asarray(collection.get_paths()[0].vertices)[:, 1]
         assert (heights.min(), heights.max()) == pytest.approx(edges)
     assert any("1500 rpm" in text.get_text() for text in figure.axes[0].texts)
+    assert any(list(np.asarray(line.get_xdata())) == [1400.0, 1650.0] for line in figure.axes[0].lines)

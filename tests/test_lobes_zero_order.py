@@ -138,4 +138,23 @@ def test_fast_teeth_are_warned_of_where_flip_lobes_make_the_limit_lower(directio
         true = stability_boundary(mode, None, cut, speeds, deepest).depth
         assert bool(np.any(np.minimum(mean.depth, deepest) > 1.1 * true)) == far_off
         assert ("above 1" in mean.warning, "no flip lobes" in mean.warning) == (far_off, far_off)
-        assert zero_order(mode, None, cut, speeds / 6).warning == ""
+        assert "no flip lobes" not in zero_order(mode, None, cut, speeds / 6).warning
+
+
+@pytest.mark.parametrize(
+    ("axis", "direction", "immersion", "is_warned"),
+    [("x", "down", 0.7, True), ("x", "up", 0.7, False), ("y", "up", 0.8, True), ("y", "down", 0.8, False)],
+)
+def test_a_force_that_cancels_in_the_one_direction_known_is_warned_of(
+    axis: str, direction: Literal["up", "down"], immersion: float, is_warned: bool
+) -> None:
+    modes = [Mode(1000.0, 0.03, 3e7)]
+    x, y = (modes, None) if axis == "x" else (None, modes)
+    cut = Cut(4, immersion, direction, 8e8, 2.4e8)
+    speeds = np.linspace(2500.0, 7000.0, 20)
+    found = zero_order(x, y, cut, speeds)
+    true = stability_boundary(x, y, cut, speeds, 6 * found.minimum.depth)
+    too_deep = np.max(np.minimum(found.depth, 6 * found.minimum.depth) / true.depth)
+    assert (f"of the force in {axis}" in found.warning) == is_warned
+    assert (too_deep > 1.2) == is_warned
+    assert "cancels" not in zero_order(modes, modes, cut, speeds).warning

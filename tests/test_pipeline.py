@@ -13,12 +13,11 @@ import pytest
 from acquisition import (
     Circumstances,
     DataError,
-    DeviceError,
     Faults,
     Frf,
     HammeredStructure,
     Hit,
-    SimulatedSource,
+    HitFlags,
     TapsEmulator,
     TapsSource,
     TapTest,
@@ -34,9 +33,11 @@ from lobewatch.emulation import CHANNELS, SAMPLE_RATE, emulated_structure, emula
 from lobewatch.history import series, update_history
 from lobewatch.machine import REFERENCE_CUT, parse_machine
 from lobewatch.machine_folder import MachineFolder
-from lobewatch.pipeline import analyse
+from lobewatch.pipeline import Measurement, analyse
 from lobewatch.report import render_report
-from lobewatch.tapping import begin_tap, take_hits, trigger_for
+from lobewatch.tap_session import TapSession, TapStopped
+from lobewatch.tap_state import Word
+from lobewatch.tapping import begin_tap
 from modal import Mode, synthesize
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
@@ -58,17 +59,14 @@ def recorded(circumstances: Circumstances, *modes: Mode) -> TapTest:
     return TapTest(new_tap_id(circumstances), circumstances, from_accelerance(LINES, frf.accelerance))
 
 
-def live_tap(folder: MachineFolder, k: float, days: float = 0.0, direction: str = "x", seed: int = 3) -> None:
+def live_tap(folder: MachineFolder, k: float, days: float = 0.0, direction: str = "x", seed: int = 3) -> Measurement:
     table = folder.machine.spindle
     assert table is not None
     structure = emulated_structure(with_bearing_stiffness(table.build(), k), table.damping_ratio)
-    with (
-        emulator(structure, np.random.default_rng(seed), realtime=False) as device,
-        TapsSource(device.port) as source,
-    ):
-        running = begin_tap(folder, about(folder, days, direction))
-        take_hits(running, source, trigger_for(folder, source.sample_rate), folder.machine.tap.hits, lambda *_: None)
-        folder.commit(running.finish())
+    with emulator(structure, np.random.default_rng(seed), realtime=False) as device:
+        session = TapSession(folder, lambda: TapsSource(device.port), about(folder, days, direction), guided=False)
+        session.run()
+    return session.measurement
 
 
 def test_the_emulated_structure_has_the_receptance_of_the_model() -> None:
@@ -92,8 +90,8 @@ def test_live_taps_find_what_was_emulated_and_the_history_grows(folder: MachineF
     table = folder.machine.spindle
     assert table is not None
     for month, k in enumerate((1.28e9, 0.9e9)):
-        live_tap(folder, k, 30.0 * month)
-        history, (found,) = update_history(folder)
+        found = live_tap(folder, k, 30.0 * month)
+        history, _ = update_history(folder)
         (f, *_), (stiffness, *_) = modes_at(with_bearing_stiffness(table.build(), k), 3)
         assert found.dynamics.followed is not None
         assert found.dynamics.calibration is not None
@@ -131,23 +129,24 @@ def test_an_unplugged_cable_costs_no_hit(folder: MachineFolder) -> None:
     assert table is not None
     structure = emulated_structure(table.build(), table.damping_ratio)
     signal = HammeredStructure(structure, SAMPLE_RATE, np.random.default_rng(1))
-    seen = []
     with TapsEmulator(signal, CHANNELS, SAMPLE_RATE, realtime=False, faults=Faults(unplug_after=100_000)) as device:
-        source = TapsSource(device.port)
-        running = begin_tap(folder, about(folder))
-        with pytest.raises(DeviceError, match="unplugged"):
-            take_hits(running, source, trigger_for(folder, SAMPLE_RATE), 10, lambda hit, *_: seen.append(hit))
-        source.close()
-    assert len(seen) >= 3
+        session = TapSession(folder, lambda: TapsSource(device.port), about(folder), sleep=lambda _: session.stop())
+        with pytest.raises(TapStopped):
+            session.run()
+    assert session.state.word is Word.NO_DEVICE
+    assert "unplugged" in session.state.reason
+    seen = session.state.hits
+    assert len(seen) >= 2
     resumed = begin_tap(folder, about(folder, days=0.1))
-    assert resumed.id == running.id
-    assert all(np.array_equal(a.force, b.force) for a, b in zip(resumed.hits, seen, strict=True))
+    assert [float(hit.force.max()) for hit in resumed.hits] == [hit.peak_force for hit in seen]
+    assert resumed.flags == [hit.flags for hit in seen]
     assert begin_tap(folder, about(folder, days=0.1, direction="y")).hits == []
     assert begin_tap(folder, about(folder, days=2.0)).hits == []
     assert begin_tap(folder, about(folder), resume=False).hits == []
-    other = SimulatedSource(signal, CHANNELS, 2 * SAMPLE_RATE, 1)
-    with pytest.raises(ValueError, match="another length or sample rate; begin anew with --new"):
-        take_hits(resumed, other, trigger_for(folder, 2 * SAMPLE_RATE), 10, lambda *_: None)
+    with TapsEmulator(signal, CHANNELS, 2 * SAMPLE_RATE, realtime=False) as other:
+        again = TapSession(folder, lambda: TapsSource(other.port), about(folder, days=0.1))
+        with pytest.raises(ValueError, match="another length, sample rate or sensor; begin anew with --new"):
+            again.run()
 
 
 def test_a_committed_test_whose_spool_was_left_is_not_gone_on_with(folder: MachineFolder) -> None:
@@ -155,7 +154,7 @@ def test_a_committed_test_whose_spool_was_left_is_not_gone_on_with(folder: Machi
     folder.commit(tap)
     (folder.spool / tap.id).mkdir(parents=True)
     hit = Hit(np.ones(100), np.ones(100), 1000.0)
-    write_hit(folder.spool / tap.id / "0000.h5", hit, about(folder))
+    write_hit(folder.spool / tap.id / "0000.h5", hit, about(folder), HitFlags.OK)
     assert begin_tap(folder, about(folder)).hits == []
 
 
@@ -289,8 +288,8 @@ def test_modes_of_many_hits_agree_with_the_frf_they_come_from(
 
 
 def test_standard_errors_are_those_over_the_hits(folder: MachineFolder) -> None:
-    live_tap(folder, 1.28e9)
-    history, (found,) = update_history(folder)
+    found = live_tap(folder, 1.28e9)
+    history, _ = update_history(folder)
     followed = found.dynamics.followed
     assert followed is not None
     assert followed.n_hits == folder.machine.tap.hits

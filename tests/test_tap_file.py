@@ -82,6 +82,15 @@ def test_a_tap_test_is_read_back_to_the_bit(tap: TapTest, tmp_path: Path) -> Non
     assert HitFlags.LOST_SCANS in read.flags[-1]
 
 
+def test_a_file_from_before_overloads_were_reported_is_read(tap: TapTest, tmp_path: Path) -> None:
+    reported = (replace(tap.hits[0], overload=2), *tap.hits[1:])
+    write_tap(tmp_path / "tap.h5", replace(tap, hits=reported))
+    assert [hit.overload for hit in read_tap(tmp_path / "tap.h5").hits] == [2] + [0] * (len(tap.hits) - 1)
+    with h5py.File(tmp_path / "tap.h5", "a") as file:
+        del file["raw/overload"]
+    assert not any(hit.overload for hit in read_tap(tmp_path / "tap.h5").hits)
+
+
 def test_the_frf_can_be_made_again_from_the_stored_codes(tap: TapTest, tmp_path: Path) -> None:
     write_tap(tmp_path / "tap.h5", tap)
     again, flags = average_good(read_tap(tmp_path / "tap.h5").hits)
@@ -123,10 +132,11 @@ def test_the_file_is_plain_hdf5_with_units_and_scales(tap: TapTest, tmp_path: Pa
 
 
 def test_a_hit_in_progress_is_read_back_with_its_circumstances(tap: TapTest, tmp_path: Path) -> None:
-    write_hit(tmp_path / "0000.h5", tap.hits[0], ABOUT)
-    (hit,), about = read_tap_hits(tmp_path / "0000.h5")
+    write_hit(tmp_path / "0000.h5", tap.hits[0], ABOUT, HitFlags.UNDONE)
+    (hit,), about, flags = read_tap_hits(tmp_path / "0000.h5")
     assert same_hit(hit, tap.hits[0])
     assert about == ABOUT
+    assert flags == (HitFlags.UNDONE,)
 
 
 def test_identities_are_unique_file_names_that_sort_by_time() -> None:
@@ -172,3 +182,14 @@ def test_a_direction_that_is_none_and_a_time_without_zone_are_refused() -> None:
         replace(ABOUT, direction="z")
     with pytest.raises(ValueError, match="no time zone"):
         replace(ABOUT, created=datetime(2026, 1, 1))  # noqa: DTZ001
+
+
+@pytest.mark.parametrize("beyond", [HitFlags.UNDONE, HitFlags.INCONSISTENT, HitFlags.NARROW_BAND])
+def test_hits_refused_for_what_their_signals_do_not_show_stay_out_of_a_replay(
+    tap: TapTest, tmp_path: Path, beyond: HitFlags
+) -> None:
+    flags = (beyond, *tap.flags[1:])
+    write_tap(tmp_path / "tap.h5", replace(tap, flags=flags))
+    read = read_hits(tmp_path / "tap.h5")
+    assert len(read) == len(tap.hits) - 1
+    assert same_hit(read[0], tap.hits[1])

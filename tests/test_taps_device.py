@@ -5,24 +5,37 @@ from __future__ import annotations
 import json
 import os
 import threading
+import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from datetime import UTC, datetime
 from itertools import islice, pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from acquisition import (
+    Block,
     Channel,
+    Circumstances,
     DeviceError,
+    Event,
+    EventKind,
     Faults,
     HammeredStructure,
+    HitFlags,
     SimulatedSource,
     TapsEmulator,
     TapsSource,
     Trigger,
     capture_hits,
+    check_hit,
+    read_tap_hits,
+    write_hit,
 )
-from acquisition.taps import Frame, FrameDecoder, MessageType, encode_frame
+from acquisition.serial_link import SerialLink
+from acquisition.taps import Frame, FrameDecoder, MessageType, decode_data, encode_frame
 
 RATE = 25600.0
 TRIGGER = Trigger(level=20.0, n_samples=6400, pre_trigger=512)
@@ -69,21 +82,48 @@ def test_a_device_that_streams_already_is_taken_over(tapper: Tapper, channels: P
             assert next(source.blocks()).first_scan == 0
 
 
-@pytest.mark.parametrize("fault", [Faults(drop_every=7), Faults(corrupt_every=7)], ids=["dropped", "corrupted"])
-def test_lost_frames_are_counted_exactly_and_mark_the_hits(fault: Faults, tapper: Tapper, channels: Pair) -> None:
+@pytest.mark.parametrize(
+    ("fault", "lost_each", "damaged"),
+    [
+        (Faults(drop_every=7), 1, False),
+        (Faults(corrupt_every=7), 1, True),
+        (Faults(noise_every=7), 1, True),
+        (Faults(cut_every=7), 2, True),
+        (Faults(duplicate_every=7), 0, True),
+    ],
+    ids=["dropped", "corrupted", "noise", "cut", "duplicated"],
+)
+def test_lost_frames_are_counted_exactly_and_mark_the_hits(
+    fault: Faults, lost_each: int, damaged: bool, tapper: Tapper, channels: Pair
+) -> None:
     with (
         TapsEmulator(tapper(), channels, RATE, realtime=False, faults=fault) as device,
         TapsSource(device.port) as source,
     ):
         source.start()
+        expected = np.concatenate(
+            [block.codes for block in SimulatedSource(tapper(), channels, RATE, 50 * 512).blocks()], axis=1
+        )
         received = list(islice(source.blocks(), 30))
+        lost = 512 * sum(lost_each for at in range(7, 30 + 12, 7) if (at + lost_each - 1) * 512 < last(received))
+        assert source.lost_scans == sum(block.lost_before for block in received) == lost
+        assert (lost > 0) == (lost_each > 0)
+        assert (source.dropped_frames > 0) == damaged
+        for block in received:
+            assert np.array_equal(block.codes, expected[:, block.first_scan : block.first_scan + 512])
+        assert all(b.first_scan == a.first_scan + 512 + b.lost_before for a, b in pairwise(received))
         source.stop()
-        assert sum(block.lost_before for block in received) == 4 * 512
-        assert received[-1].first_scan + 512 == 30 * 512 + 4 * 512
+        assert list(source.blocks()) == []
+        assert source.lost_scans == lost
         source.start()
         hits = list(islice(capture_hits(source, TRIGGER), 3))
-    # 6400 scans have 12 or 13 joints between frames inside them, every sixth of which is a gap of 512
-    assert {hit.lost_scans for hit in hits} <= {1024, 1536}
+    # 6400 scans have 12 or 13 joints between frames inside them, every sixth (fifth) of which is a gap
+    assert all(1024 * lost_each <= hit.lost_scans <= 1536 * lost_each for hit in hits)
+
+
+def last(blocks: list[Block]) -> int:
+    """The scan after the last one."""
+    return int(blocks[-1].first_scan + blocks[-1].codes.shape[1])
 
 
 def test_unplugging_is_said_in_one_sentence(tapper: Tapper, channels: Pair) -> None:
@@ -164,14 +204,207 @@ def test_a_device_that_describes_itself_wrongly_is_refused(tapper: Tapper) -> No
         TapsSource(device.port)
 
 
-def test_a_24_bit_device_sends_long_words(tapper: Tapper) -> None:
-    fine = (Channel("force", 2.25e-3, 5.0, adc_bits=24), Channel("acceleration", 1.02e-3, 5.0, adc_bits=24))
+@pytest.mark.parametrize(("bits", "form"), [(12, 0), (16, 0), (18, 1), (24, 1), (32, 2)])
+def test_a_device_is_asked_for_the_shortest_words_that_hold_its_codes(
+    bits: int, form: int, tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    formats = set()
+
+    def look(body: bytes) -> Block:
+        formats.add(body[11])
+        return decode_data(body)
+
+    monkeypatch.setattr("acquisition.taps_stream.decode_data", look)
+    fine = tuple(replace(channel, adc_bits=bits) for channel in channels)
+    with TapsEmulator(tapper(), fine, RATE, realtime=False) as device, TapsSource(device.port) as source:
+        assert source.channels == fine
+        source.start()
+        received = list(islice(source.blocks(), 30))
+    expected = SimulatedSource(tapper(), fine, RATE, 30 * 512).blocks()
+    assert all(np.array_equal(a.codes, b.codes) for a, b in zip(received, expected, strict=True))
+    assert formats == {form}
+    assert np.max(np.abs([block.codes for block in received])) > 2 ** (bits - 4)
+
+
+def test_hits_of_a_24_bit_device_keep_their_codes_on_disk(tapper: Tapper, channels: Pair, tmp_path: Path) -> None:
+    fine = tuple(replace(channel, adc_bits=24) for channel in channels)
     with TapsEmulator(tapper(), fine, RATE, realtime=False) as device, TapsSource(device.port) as source:
         source.start()
-        received = next(source.blocks())
-    expected = next(SimulatedSource(tapper(), fine, RATE, 512).blocks())
-    assert np.array_equal(received.codes, expected.codes)
-    assert np.max(np.abs(received.codes)) > 32767 or np.std(received.codes) > 100
+        hit = next(capture_hits(source, TRIGGER))
+    write_hit(tmp_path / "hit.h5", hit, Circumstances("mill", datetime(2026, 1, 15, tzinfo=UTC)), HitFlags.OK)
+    (kept,) = read_tap_hits(tmp_path / "hit.h5")[0]
+    assert hit.codes is not None
+    assert np.max(np.abs(hit.codes)) > 32767
+    assert np.array_equal(hit.codes, kept.codes)  # type: ignore[arg-type]
+    assert check_hit(hit) == check_hit(kept) == HitFlags.OK
+
+
+@pytest.mark.parametrize(
+    ("mask", "flags"),
+    [
+        (0, HitFlags.OK),
+        (1, HitFlags.OVERLOAD_RESPONSE),
+        (2, HitFlags.OVERLOAD_FORCE),
+        (3, HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE),
+        (4, HitFlags.OK),
+    ],
+)
+def test_an_overload_that_the_device_reports_refuses_the_hit(
+    mask: int, flags: HitFlags, tapper: Tapper, channels: Pair, tmp_path: Path
+) -> None:
+    signal = tapper()
+    with (
+        TapsEmulator(
+            lambda first, n: signal(first, n)[::-1],
+            channels[::-1],
+            RATE,
+            realtime=False,
+            faults=Faults(overload=mask),
+        ) as device,
+        TapsSource(device.port) as source,
+    ):
+        source.start()
+        hit = next(capture_hits(source, TRIGGER))
+    assert check_hit(hit) == flags
+    write_hit(tmp_path / "hit.h5", hit, Circumstances("mill", datetime(2026, 1, 15, tzinfo=UTC)), HitFlags.OK)
+    assert check_hit(read_tap_hits(tmp_path / "hit.h5")[0][0]) == flags
+
+
+def test_events_and_standing_faults_reach_the_user(device: TapsEmulator) -> None:
+    with TapsSource(device.port) as source:
+        assert source.fault == ""
+        device.send_event(Event(EventKind.CABLE, channel=1))
+        source.start()
+        blocks = source.blocks()
+        wait_for(blocks, lambda: bool(source.events))
+        assert source.fault.startswith("the cable of the acceleration sensor is broken or not plugged in")
+        device.send_event(Event(EventKind.BUTTON))
+        device.send_event(Event(EventKind.CABLE, begins=False, channel=1))
+        source.events.clear()
+        wait_for(blocks, lambda: len(source.events) == 2)
+        button = source.events.popleft()
+        assert (button.kind, button.begins, button.channel) == (EventKind.BUTTON, True, None)
+        assert button.scan > 0
+        assert source.fault == ""
+
+
+def test_a_fault_from_before_the_start_is_told_again(device: TapsEmulator) -> None:
+    device.send_event(Event(EventKind.SENSOR_BIAS, channel=0))
+    for _ in range(2):
+        with TapsSource(device.port) as source:
+            source.start()
+            wait_for(source.blocks(), lambda: source.fault.startswith("the force sensor has no proper supply"))
+
+
+def wait_for(blocks: Iterator[Block], happened: Callable[[], bool]) -> None:
+    for _ in islice(blocks, 2000):
+        if happened():
+            return
+    pytest.fail("did not happen within 2000 blocks")
+
+
+def test_status_is_kept(device: TapsEmulator) -> None:
+    with TapsSource(device.port) as source:
+        source.start()
+        assert source.status is None
+        wait_for(source.blocks(), lambda: source.status is not None)
+        assert source.status is not None
+        assert source.status.samples_sent == source.status.samples_taken
+        assert (source.status.overruns, source.status.temperature) == (0, 31.5)
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        Faults(start_streaming=True),
+        Faults(noise_at_start=True),
+        Faults(cut_infos=1),
+        Faults(start_streaming=True, noise_at_start=True),
+    ],
+    ids=["streaming", "noise", "INFO cut", "both"],
+)
+def test_a_bad_beginning_is_overcome(
+    fault: Faults, tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("acquisition.taps_source.ANSWER_TIME", 0.3)
+    with TapsEmulator(tapper(), channels, RATE, faults=fault) as device, TapsSource(device.port) as source:
+        assert source.channels == channels
+        source.start()
+        first, second = islice(source.blocks(), 2)
+        assert [first.first_scan, second.first_scan, source.lost_scans] == [0, 512, 0]
+
+
+def test_a_device_whose_info_never_arrives_is_refused(
+    tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("acquisition.taps_source.ANSWER_TIME", 0.05)
+    with (
+        TapsEmulator(tapper(), channels, RATE, faults=Faults(cut_infos=99)) as device,
+        pytest.raises(DeviceError, match=r"no TAPS/1 device answers .*HELLO, 3 tries"),
+    ):
+        TapsSource(device.port)
+
+
+def test_a_device_that_begins_anew_by_itself_is_told_from_a_silent_one(
+    tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("acquisition.taps_source.SILENCE", 0.3)
+    with (
+        TapsEmulator(tapper(), channels, RATE, realtime=False, faults=Faults(restart_after=20 * 512)) as device,
+        TapsSource(device.port) as source,
+    ):
+        source.start()
+        with pytest.raises(DeviceError, match="has begun another stream by itself"):
+            list(source.blocks())
+        source.start()
+        assert next(source.blocks()).first_scan == 0
+
+
+def test_a_slow_consumer_is_no_silent_device(device: TapsEmulator, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("acquisition.taps_source.SILENCE", 0.1)
+    with TapsSource(device.port) as source:
+        source.start()
+        for _ in islice(source.blocks(), 3):
+            time.sleep(0.15)
+
+
+@pytest.mark.parametrize("tcp", [False, True], ids=["pty", "tcp"])
+def test_a_device_that_is_plugged_in_again_goes_on(tcp: bool, tapper: Tapper, channels: Pair, tmp_path: Path) -> None:
+    link = tmp_path / "daq"
+    with TapsEmulator(tapper(), channels, RATE, realtime=False, tcp=tcp, link=link) as device:
+        port = device.port if tcp else str(link)
+        for _ in range(3):
+            with TapsSource(port) as source:
+                source.start()
+                assert next(source.blocks()).first_scan == 0
+                device.unplug()
+                with pytest.raises(DeviceError, match="unplugged or switched off; plug it in"):
+                    list(source.blocks())
+                device.replug()
+        assert not tcp or device.port == port
+
+
+@pytest.mark.parametrize("state", ["opened", "idle", "starting", "stopping"])
+def test_unplugged_in_any_state_it_is_the_same_sentence(
+    state: str, device: TapsEmulator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if state == "opened":
+
+        def opened(port: str) -> SerialLink:
+            link = SerialLink(port)
+            device.unplug()
+            return link
+
+        monkeypatch.setattr("acquisition.taps_source.SerialLink", opened)
+        with pytest.raises(DeviceError, match="unplugged or switched off; plug it in"):
+            TapsSource(device.port)
+        return
+    with TapsSource(device.port) as source:
+        if state == "stopping":
+            source.start()
+        device.unplug()
+        with pytest.raises(DeviceError, match="unplugged or switched off; plug it in"):
+            (source.stop if state == "stopping" else source.start)()
 
 
 def test_a_rate_that_the_device_does_not_have_is_refused(device: TapsEmulator) -> None:

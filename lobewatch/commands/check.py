@@ -13,6 +13,7 @@ from rich.table import Table
 
 from acquisition import DataError
 from lobewatch.advice import ProgramAdvice, advise
+from lobewatch.describe_lobes import limit_text, margin_text
 from lobewatch.machine import SpeedRange
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.output import Json, emit, table
@@ -102,10 +103,9 @@ def _verdict(one: ProgramAdvice) -> tuple[str, str, str, str]:
     if found is None:
         return "-", "-", "-", "not checked"
     low, high = (edge * 1e3 for edge in one.limit_band)
-    limit = f"{found.limit * 1e3:.2f}" + (f" ({low:.2f}..{high:.2f})" if one.measured else "")
-    if math.isinf(found.limit):
-        limit = f"> {20 * one.table.depth_mm:g}"
-    margin = "-" if math.isinf(found.depth_margin) else f"{100 * found.depth_margin:+.0f} %"
+    limit, margin = limit_text(found, one.table.depth_mm), margin_text(found)
+    if one.measured and math.isfinite(found.limit):
+        limit += f" ({low:.2f}..{high:.2f})"
     beyond = one.table.depth_mm > one.drive_limit * 1e3
     predicted = "" if one.measured else " (predicted)"
     if not found.stable:

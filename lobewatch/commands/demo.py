@@ -19,11 +19,10 @@ from dsm import Spindle, calibrate, natural_frequencies
 from lobewatch.commands.init import make_machine_folder
 from lobewatch.commands.report import write_report
 from lobewatch.emulation import emulated_structure, emulator, with_bearing_stiffness
-from lobewatch.history import update_history
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.output import Json, emit, notes, table
 from lobewatch.pipeline import Measurement
-from lobewatch.tapping import begin_tap, take_hits, trigger_for
+from lobewatch.tap_session import TapSession
 
 FALL = 0.10
 """Fall of the first natural frequency over the demo."""
@@ -113,17 +112,11 @@ def _tap(folder: MachineFolder, date: datetime, spindle: Spindle, random: np.ran
     damping = machine.spindle.damping_ratio if machine.spindle else 0.0
     structure = emulated_structure(spindle, damping)
     about = Circumstances(machine.machine.name, date, machine.tap.tool, "x", "the demo", folder.toml.read_text("utf-8"))
-    with (
-        folder.locked(),
-        emulator(structure, random, realtime=False) as device,
-        TapsSource(device.port) as source,
-    ):
-        running = begin_tap(folder, about, resume=False)
-        take_hits(running, source, trigger_for(folder, source.sample_rate), machine.tap.hits, lambda *_: None)
-        folder.commit(running.finish())
-        _, measurements = update_history(folder)
+    with emulator(structure, random, realtime=False) as device:
+        session = TapSession(folder, lambda: TapsSource(device.port), about, resume=False, guided=False)
+        session.run()
     truth = (structure.frequency[0], damping, structure.stiffness[0], spindle.bearings[0].stiffness)
-    return Month(date, dict(zip(FIELDS, map(float, truth), strict=True)), _found(measurements[-1]))
+    return Month(date, dict(zip(FIELDS, map(float, truth), strict=True)), _found(session.measurement))
 
 
 def _found(measurement: Measurement) -> dict[str, float]:

@@ -15,12 +15,14 @@ from lobes.tip_response import Tip
 from lobewatch.charts import DEEPEST, Chart, Dynamics, Method, chart
 from lobewatch.describe import lobes_json, program_json, program_table
 from lobewatch.describe_lobes import (
+    POCKET_RANGE,
     material_lines,
     materials_json,
     pocket_json,
     pocket_list,
     shift_json,
     shift_lines,
+    with_option,
 )
 from lobewatch.drive import drive_limit
 from lobewatch.figures import save_figure
@@ -74,7 +76,7 @@ def lobes(
     if radial is not None:
         picture, warning = radial_picture(folder.machine, now, method)
         pictures.append((picture, radial))
-        notes += [f"--radial: {warning}"] if warning else []
+        notes += [f"--radial: {with_option(warning)}"] if warning else []
     if waterfall is not None:
         pictures.append((waterfall_picture(folder, newest, cut), waterfall))
     for picture, path in pictures:
@@ -91,7 +93,11 @@ def _say(
     as_json: bool,
 ) -> None:
     found, programs = now.lobes, program_json({now.name: now.lobes}, machine)
-    warnings = [found.warning] if found.warning else []
+    warnings = [with_option(found.warning)] if found.warning else []
+    if programs and not found.method.startswith("semi"):
+        warnings.append(
+            f"stable or not by {found.method.partition(',')[0]}, in this chart; lobewatch check has the verdict"
+        )
     notes = dict.fromkeys([*now.measurement.reasons, *warnings, *remarks])
     payload = lobes_json(now.name, found) | {
         "tap_id": now.measurement.tap_id,
@@ -123,7 +129,8 @@ def _limit_lines(found: StabilityLobes, best: Sequence[Pocket]) -> list[str]:
         return [f"no limit in this speed range ({found.method})"]
     return [
         f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm, chatter at {low.chatter_frequency:.1f} Hz",
-        f"best pockets up to {USEFUL * low.depth * 1e3:.1f} mm, by depth: {pocket_list(best_pockets(best))}",
+        f"best pockets up to {USEFUL * low.depth * 1e3:.1f} mm (in brackets: {POCKET_RANGE}), by depth: "
+        f"{pocket_list(best_pockets(best))}",
         f"by removal rate: {pocket_list(best_pockets(best, by='removal'))}",
     ]
 

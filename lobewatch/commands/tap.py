@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from acquisition import Circumstances, Hit, HitFlags, TapsSource
+from acquisition import Circumstances
 from lobewatch.describe import measurement_json, measurement_texts
-from lobewatch.history import update_history
+from lobewatch.devices import open_source
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.output import Json, emit, notes
-from lobewatch.tapping import OnHit, begin_tap, take_hits, trigger_for
+from lobewatch.show_address import Listen, Token, show_address
+from lobewatch.tap_printer import TapPrinter
+from lobewatch.tap_session import TapSession, TapStopped
+from lobewatch.terminal_screen import TerminalScreen
 
 
 def tap(
@@ -23,18 +27,23 @@ def tap(
     direction: Annotated[str, typer.Option(help="Direction at the tool tip, x or y.")] = "x",
     operator: Annotated[str, typer.Option(help="Who holds the hammer.")] = "",
     new: Annotated[bool, typer.Option("--new", help="Begin anew, do not go on with an interrupted test.")] = False,
+    screen: Annotated[bool, typer.Option("--screen", help="Show the test in a browser too.")] = False,
+    listen: Listen = "127.0.0.1",
+    token: Token = None,
     as_json: Json = False,
 ) -> None:
     """The live tap test: hit until ten hits are good, then see what has changed.
 
-    Every hit is on the disk before its verdict is shown. After a crash or an unplugged cable the same command
-    goes on at the same hit.
+    Keys: u takes the last good hit back, q stops, m mutes. Every hit is on the disk before its verdict is shown. After
+    a crash the same command goes on at the same hit; after an unplugged cable the test waits and goes on by itself.
 
     Examples:
 
       lobewatch tap mill-3 --port /dev/ttyACM0
 
       lobewatch tap mill-3 --port COM3 --direction y --operator Kim
+
+      lobewatch tap mill-3 --screen --listen 0.0.0.0     (watched on a tablet)
     """
     folder = MachineFolder(machine)
     setup = folder.machine
@@ -49,31 +58,18 @@ def tap(
         operator,
         folder.toml.read_text("utf-8"),
     )
-    with folder.locked():
-        running = begin_tap(folder, about, resume=not new)
-        if running.hits:
-            begun = f"{running.circumstances.created:%Y-%m-%d %H:%M} UTC"
-            notes.print(f"going on with the test begun {begun}: {running.good} of {setup.tap.hits} good hits are there")
-        try:
-            with TapsSource(port, setup.daq.sample_rate_hz) as source:
-                device = f"{source.info['model']} on {port}, {source.sample_rate:g} Hz"
-                notes.print(f"{device}. TAP the tool, again and again.", markup=False)
-                take_hits(
-                    running, source, trigger_for(folder, source.sample_rate), setup.tap.hits, _show(setup.tap.hits)
-                )
-        except KeyboardInterrupt:
-            notes.print(f"stopped with {running.good} good hits; the same command goes on with them")
-            raise
-        folder.commit(running.finish())
-        notes.print(f"saved {running.id}")
-        _, measurements = update_history(folder)
-    found = next(measurement for measurement in measurements if measurement.tap_id == running.id)
-    emit(measurement_json(found, setup), as_json, *measurement_texts(found, setup))
+    session = TapSession(folder, lambda: open_source(setup.daq, port), about, resume=not new)
+    try:
+        with contextlib.ExitStack() as screens:
+            if screen:
+                from lobewatch.screen import ScreenServer  # brings aiohttp, which most commands do not need
 
-
-def _show(wanted: int) -> OnHit:
-    def on_hit(hit: Hit, flags: HitFlags, good: int) -> None:
-        verdict = f"[bold red]✗ {flags.words.upper()}[/]  {flags.cure}" if flags else "[bold green]✓ GOOD[/]"
-        notes.print(f"{good:3d} / {wanted}  {verdict}  ({hit.force.max():.0f} N)")
-
-    return on_hit
+                server = screens.enter_context(ScreenServer(session, listen=listen, token=token))
+                show_address(server.url)
+            screens.enter_context(TerminalScreen(session) if notes.is_terminal else TapPrinter(session, notes))
+            done = session.run()
+    except (TapStopped, KeyboardInterrupt) as stopped:
+        notes.print(f"stopped with {session.state.good} good hits; the same command goes on with them")
+        raise KeyboardInterrupt from stopped
+    notes.print(f"saved {done.id}")
+    emit(measurement_json(session.measurement, setup), as_json, *measurement_texts(session.measurement, setup))

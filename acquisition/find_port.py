@@ -1,0 +1,25 @@
+"""A USB serial port by what is plugged in there: its number may change when it is plugged in again."""
+
+from __future__ import annotations
+
+from serial.tools import list_ports
+
+
+def find_port(vid: int, serial_number: str) -> str | None:
+    """The port of the USB device with this vendor id and serial number; None while it is not plugged in.
+
+    A look at the list of ports, for a caller that waits for a device to come back.
+    """
+    wanted = (vid, serial_number.casefold())
+    found = (
+        port.device for port in list_ports.comports() if (port.vid, (port.serial_number or "").casefold()) == wanted
+    )
+    return next(found, None)
+
+
+def usb_identity(port: str) -> tuple[int, str] | None:
+    """Vendor id and serial number of what is plugged in at a port; None where it is no USB device."""
+    for known in list_ports.comports(include_links=True):
+        if known.device == port and known.vid is not None:
+            return known.vid, known.serial_number or ""
+    return None

@@ -1,0 +1,31 @@
+"""The serial ports of this computer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from serial.tools.list_ports import comports
+
+
+@dataclass(frozen=True)
+class PortInfo:
+    """What the system knows of a port; pseudo-terminals are never listed."""
+
+    device: str
+    """What is opened, e.g. /dev/ttyACM0 or COM3."""
+    vendor: int | None = None
+    """USB vendor; None where it is no USB device."""
+    product: int | None = None
+    """USB product."""
+    serial_number: str = ""
+    """Of the USB device."""
+    description: str = ""
+    """In the system's words."""
+
+
+def list_ports() -> list[PortInfo]:
+    """All ports, by name."""
+    return [
+        PortInfo(port.device, port.vid, port.pid, port.serial_number or "", port.description or "")
+        for port in sorted(comports())
+    ]

@@ -1,0 +1,116 @@
+"""The sample rate of a device, measured against the clock of this computer."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import theilslopes
+
+from acquisition.errors import DeviceError
+from acquisition.source import Source
+
+TOLERANCE = 0.002
+"""Share by which the measured rate may differ from the nominal one."""
+LARGEST_STD = TOLERANCE / 4
+"""Standard error of the rate, as a share of it, above which nothing can be said."""
+FEWEST_BLOCKS = 10
+"""Arrivals needed for a slope and its error."""
+LATENCY = 1e-3
+"""A USB host asks its devices once a millisecond: neither end of the time is known better (s)."""
+BINS = 20
+"""Stretches of the stream; of each only the least delayed block counts."""
+
+
+@dataclass(frozen=True)
+class MeasuredRate:
+    """The rate of a stream of scans."""
+
+    rate: float
+    """Scans a second (Hz)."""
+    std: float
+    """Standard error of the rate (Hz)."""
+    n_scans: int
+    """Scans between the first and the last block."""
+    seconds: float
+    """Time between them (s)."""
+
+
+def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float] = time.monotonic) -> MeasuredRate:
+    """Start a source, count its scans against the clock (s) for so many seconds, and stop it.
+
+    A block can arrive late, never early. The stream is cut into 20 stretches; of each the block with the least delay
+    is kept, stretches that are late as a whole (a busy computer) are left out, and time is regressed on the scan count.
+    The standard error is that of the slope, enlarged where neighbouring residuals are alike (lag-1 correlation), and
+    joined with that of two ends each known to 1 ms (rectangular: 1 ms / sqrt(6) over the whole time).
+
+    Raises ValueError for seconds that are not > 0, DeviceError where fewer than 10 blocks arrive, the stream ends
+    before, or the arrivals scatter so much that the standard error exceeds 0.05 %, and what the source raises.
+    """
+    if not (np.isfinite(seconds) and seconds > 0):
+        raise ValueError(f"seconds={seconds} is not > 0; the rate of a device takes about 5 s")
+    arrived: list[float] = []
+    scans: list[int] = []
+    source.start()
+    for block in source.blocks():
+        arrived.append(clock())
+        scans.append(block.first_scan + block.codes.shape[1])
+        if arrived[-1] - arrived[0] >= seconds:
+            break
+    source.stop()
+    elapsed, n_scans = (arrived[-1] - arrived[0], scans[-1] - scans[0]) if scans else (0.0, 0)
+    if len(scans) < FEWEST_BLOCKS or elapsed < seconds:
+        raise DeviceError(
+            f"the DAQ sent {len(scans)} blocks of samples in {elapsed:.2g} s; to measure its rate, at least "
+            f"{FEWEST_BLOCKS} over {seconds:g} s are needed: check its sample rate and the cable"
+        )
+    period, scatter = _slope(np.array(scans, dtype=np.float64), np.array(arrived))
+    std = float(np.hypot(scatter, LATENCY / np.sqrt(6) / n_scans) / period**2)
+    if std > LARGEST_STD / period:
+        raise DeviceError(
+            f"the DAQ's rate cannot be measured: its samples arrive too unevenly ({1 / period:.6g} Hz "
+            f"± {std * period:.2%}, needed ± {LARGEST_STD:.2%}); close other programs and try again"
+        )
+    return MeasuredRate(float(1 / period), std, n_scans, float(elapsed))
+
+
+def check_rate(measured: MeasuredRate, nominal: float) -> None:
+    """DeviceError where the measured rate differs by more than 0.2 % from the nominal one (Hz)."""
+    off = nominal / measured.rate - 1
+    if abs(measured.rate / nominal - 1) > TOLERANCE:
+        raise DeviceError(
+            f"the DAQ delivers {measured.rate:.2f} ± {measured.std:.2f} scans a second, not {nominal:g}: every "
+            f"frequency would be {abs(off):.1%} too {'high' if off > 0 else 'low'}; correct the DAQ's sample rate "
+            "or work with the measured one"
+        )
+
+
+def _slope(scans: NDArray[np.float64], arrived: NDArray[np.float64]) -> tuple[float, float]:
+    """Seconds a scan and standard error, from the least delayed block of each stretch."""
+    period = (arrived[-1] - arrived[0]) / (scans[-1] - scans[0])
+    std = 0.0
+    stretches = np.array_split(np.arange(scans.size), min(BINS, scans.size))
+    for _ in range(4):  # which block is the least delayed depends on the period
+        delay = arrived - arrived[0] - period * (scans - scans[0])
+        best = np.array([stretch[np.argmin(delay[stretch])] for stretch in stretches])
+        correction, std = _robust_slope(scans[best], delay[best])
+        period += correction
+    return period, std
+
+
+def _robust_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
+    """Least-squares slope and standard error without the points that lie far above the others."""
+    rough = y - theilslopes(y, x)[0] * x
+    above = rough - np.median(rough)
+    spread = 1.4826 * np.median(np.abs(above))
+    keep = above <= 4 * spread + 1e-9
+    x, y = x[keep] - np.mean(x[keep]), y[keep] - np.mean(y[keep])
+    slope = float(x @ y / (x @ x))
+    residual = y - slope * x
+    energy = float(residual @ residual)
+    alike = float(np.clip(residual[1:] @ residual[:-1] / energy, 0.0, 0.9)) if energy > 0 else 0.0
+    variance = energy / (x.size - 2) / float(x @ x) * (1 + alike) / (1 - alike)
+    return slope, float(np.sqrt(variance))

@@ -1,0 +1,35 @@
+"""lobewatch serve."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lobewatch.output import Json
+from lobewatch.show_address import Listen, Token, show_address
+
+
+def serve(
+    folder: Annotated[Path, typer.Argument(help="Machine folder, or a folder of machine folders.")],
+    listen: Listen = "127.0.0.1",
+    http_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the pages; 0: any free one.")] = 0,
+    token: Token = None,
+    as_json: Json = False,
+) -> None:
+    """Machines in a browser, worst first; START begins a tap test on the port that machine.toml names. Ctrl-C ends it.
+
+    Examples:
+
+      lobewatch serve mills
+
+      lobewatch serve mills --listen 0.0.0.0 --http-port 8080
+    """
+    from lobewatch.screen import DashboardServer  # brings aiohttp, which most commands do not need
+
+    with DashboardServer(folder, listen=listen, port=http_port, token=token) as server:
+        show_address(server.url, as_json)
+        while True:
+            time.sleep(1)

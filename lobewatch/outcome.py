@@ -1,0 +1,62 @@
+"""What a finished tap test means to the one who tapped: a light, the result in sentences, the next step."""
+
+from __future__ import annotations
+
+import math
+from datetime import timedelta
+
+import numpy as np
+
+from lobes import SldHistory
+from lobewatch.advice import unstable_programs
+from lobewatch.history import series
+from lobewatch.machine import Machine
+from lobewatch.output import plus_minus
+from lobewatch.pipeline import Measurement
+from lobewatch.tap_state import Outcome
+
+ORDER = ("good", "warn", "alarm")
+
+
+def outcome_of(found: Measurement, history: SldHistory, machine: Machine) -> Outcome:
+    """Against the first measurement of the same tool and direction, the limits of machine.toml and its programs."""
+    mode = found.dynamics.followed
+    if mode is None:
+        return Outcome("warn", list(found.reasons), "Tap again: the mode that is followed was not found in this test.")
+    first = _first(found, history)
+    fall = 100 * (1 - mode.frequency / first) if first else 0.0
+    limits = machine.limits
+    light = ORDER[(fall >= limits.frequency_warn_percent) + (fall >= limits.frequency_alarm_percent)]
+    frequency = f"f_n {plus_minus(mode.frequency, float(mode.standard_error[0]))} Hz"
+    against = f"{-fall:+.2f} % against the first test" if first else "the first test of this tool and direction"
+    stiffness = plus_minus(mode.stiffness, float(mode.standard_error[2]), 1e6)
+    damping = plus_minus(100 * mode.damping_ratio, 100 * float(mode.standard_error[1]))
+    texts = [f"{frequency}, {against}.", f"K {stiffness} N/um, zeta {damping} %."]
+    unstable = unstable_programs(found, machine)
+    if unstable:
+        texts.append(f"Not stable: {', '.join(unstable)}.")
+        light = max(light, "warn", key=ORDER.index)
+    return Outcome(light, texts, _next_step(found, machine, light, bool(unstable)))
+
+
+def _first(found: Measurement, history: SldHistory) -> float | None:
+    """Frequency in the first measurement of this tool and direction (Hz); None where that is this one."""
+    columns = history.columns
+    rows = [row for row in series(history, found.tool, found.direction) if np.isfinite(columns["frequency"][row])]
+    if not rows or columns["tap_id"][rows[0]] == found.tap_id:
+        return None
+    return float(columns["frequency"][rows[0]])
+
+
+def _next_step(found: Measurement, machine: Machine, light: str, unstable: bool) -> str:
+    if light == "alarm":
+        return "Do not cut on: have the bearings, the tool and its clamping looked at, then tap again."
+    if unstable:
+        return "Change these programs before the next part: lobewatch check names a stable speed and depth for each."
+    if light == "warn":
+        return "Tap again to be sure; if it stays, have the bearings and the tool's clamping looked at soon."
+    if found.x is None or found.y is None:
+        other = "y" if found.direction == "x" else "x"
+        return f"Tap direction {other} of the same tool within a day: the lobes are of one direction alone."
+    due = found.time + timedelta(days=math.floor(machine.machine.tap_interval_days))
+    return f"All is well: tap again by {due:%Y-%m-%d}."

@@ -1,0 +1,129 @@
+"""The dashboard: machines, their reports, and a button that starts a tap test."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+from dataclasses import asdict
+from pathlib import Path
+from types import TracebackType
+from typing import Literal
+from urllib.parse import quote
+
+import msgspec
+from aiohttp import web
+
+from acquisition import DataError
+from lobewatch.history import update_history
+from lobewatch.machine_folder import MachineFolder
+from lobewatch.report import render_report
+from lobewatch.screen.dashboard import find_machines, standing
+from lobewatch.screen.guard import OPEN
+from lobewatch.screen.live_tests import LiveTest
+from lobewatch.screen.pages import add_pages
+from lobewatch.screen.screen_server import add_session
+from lobewatch.screen.web_thread import WebThread
+from lobewatch.tap_printer import Watched
+
+REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'; sandbox"
+"""A report has its style in it, and no script."""
+
+
+class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Body of the request that starts a tap test."""
+
+    direction: Literal["x", "y"]
+
+
+class DashboardServer(WebThread):
+    """Serves a machine or a folder of machines from __enter__ to __exit__, in a thread of its own."""
+
+    def __init__(self, path: Path | str, *, listen: str = "127.0.0.1", port: int = 0, token: str | None = None) -> None:
+        """Brings the histories up to date. Port 0: any free one; token None: a new one.
+
+        DataError where there is no machine, ValueError for a token that does not fit into an address.
+        """
+        super().__init__(listen, port, token)
+        self._machines = find_machines(Path(path))
+        self._tests: dict[str, LiveTest] = {}
+        self._reports: dict[str, tuple[str, str]] = {}
+        for folder in self._machines.values():
+            _refresh(folder)
+        add_pages(self.application, {"/": "dashboard.html", "/tap/{machine}/": "screen.html"})
+        add_session(self.application, "/tap/{machine}/", self._find_test)
+        router = self.application.router
+        router.add_get("/machines", self._list)
+        router.add_post("/machines/{machine}/start", self._start)
+        router.add_post("/machines/{machine}/report", self._write_report)
+        router.add_get("/report/{machine}/{key}", self._report, name=f"{OPEN}report")
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop the tap tests that run, then close; their hits stay in the spool."""
+        for test in self._tests.values():
+            test.stop()
+        for test in self._tests.values():
+            test.join()
+        super().__exit__(kind, error, trace)
+
+    def _find_machine(self, request: web.Request) -> tuple[str, MachineFolder]:
+        key = request.match_info["machine"]
+        if key not in self._machines:
+            raise web.HTTPNotFound(text="there is no such machine")
+        return key, MachineFolder(self._machines[key].path)
+
+    def _find_test(self, request: web.Request) -> Watched:
+        key, _ = self._find_machine(request)
+        if key not in self._tests:
+            raise web.HTTPNotFound(text="no tap test runs on this machine; go to All machines and press START")
+        return self._tests[key]
+
+    async def _list(self, _: web.Request) -> web.Response:
+        found = await asyncio.to_thread(lambda: [standing(key, folder) for key, folder in self._machines.items()])
+        running = {key for key, test in self._tests.items() if test.running}
+        rows = [asdict(one) | {"running": one.key in running} for one in sorted(found, key=lambda one: one.rank)]
+        return web.json_response({"machines": rows})
+
+    async def _start(self, request: web.Request) -> web.Response:
+        key, folder = self._find_machine(request)
+        try:
+            wish = msgspec.json.decode(await request.read(), type=StartRequest)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            raise web.HTTPBadRequest(text='the body must be {"direction": "x"} or {"direction": "y"}') from None
+        test = self._tests.get(key)
+        if test is None or not test.running:
+            self._tests[key] = LiveTest(folder, wish.direction)
+        return web.json_response({"url": f"/tap/{quote(key)}/"})
+
+    async def _write_report(self, request: web.Request) -> web.Response:
+        key, folder = self._find_machine(request)
+        html = await asyncio.to_thread(_render, folder)
+        self._reports[key] = (secrets.token_urlsafe(24), html)
+        return web.json_response({"url": f"/report/{quote(key)}/{self._reports[key][0]}"})
+
+    async def _report(self, request: web.Request) -> web.Response:
+        """By a name that cannot be guessed, so that the browser can open it as a page."""
+        key, html = self._reports.get(request.match_info["machine"], ("", ""))
+        if not key or not secrets.compare_digest(key.encode(), request.match_info["key"].encode()):
+            raise web.HTTPNotFound(text="this report is gone; open it from the list of machines")
+        return web.Response(text=html, content_type="text/html", headers={"Content-Security-Policy": REPORT_POLICY})
+
+
+def _refresh(folder: MachineFolder) -> None:
+    """Bring the history up to date; a machine that cannot be read says so on the dashboard."""
+    try:
+        if folder.taps():
+            with folder.locked():
+                update_history(folder)
+    except (ValueError, OSError):
+        pass
+
+
+def _render(folder: MachineFolder) -> str:
+    taps = folder.taps()
+    if not taps:
+        raise DataError("no tap test yet: press START")
+    with folder.locked():
+        history, _ = update_history(folder)
+    return render_report(folder, history, taps[-1].tool, taps[-1].direction)

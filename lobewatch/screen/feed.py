@@ -1,0 +1,63 @@
+"""The newest state to one page, over a WebSocket; what the page is too slow for is left out."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from aiohttp import WSCloseCode, web
+
+from lobewatch.screen.messages import plots_message, state_message
+from lobewatch.tap_state import Plots, TapState
+
+PERIOD = 0.05
+"""At most so often (s)."""
+SIGN_OF_LIFE = 1.0
+"""An empty message where nothing has changed for so long (s): the page takes 3 s of silence for a lost connection."""
+
+ENDING = web.AppKey("ENDING", asyncio.Event)
+"""Set when the server is about to close."""
+
+
+async def feed(request: web.Request, newest: Callable[[], TapState]) -> web.WebSocketResponse:
+    """Send what newest() gives until the page or the server closes; only here is waited for a slow page."""
+    socket = web.WebSocketResponse(protocols=("lobewatch",), heartbeat=10, max_msg_size=1024, compress=False)
+    await socket.prepare(request)
+    ending = request.app[ENDING]
+    closed = asyncio.create_task(_until_closed(socket))
+    try:
+        await _send_changes(socket, newest, lambda: ending.is_set() or closed.done())
+        await socket.close(code=WSCloseCode.GOING_AWAY)
+    except ConnectionError:
+        pass  # the page is gone
+    finally:
+        closed.cancel()
+    return socket
+
+
+async def _send_changes(
+    socket: web.WebSocketResponse, newest: Callable[[], TapState], over: Callable[[], bool]
+) -> None:
+    clock = asyncio.get_running_loop().time
+    sent: TapState | None = None
+    plots: Plots | None = None
+    last = clock()
+    while True:
+        ended = over()
+        state = newest()
+        if state is not sent:
+            if state.plots is not None and state.plots is not plots:
+                await socket.send_bytes(plots_message(state.plots))
+            await socket.send_str(state_message(state))
+            sent, plots, last = state, state.plots, clock()
+        elif clock() - last > SIGN_OF_LIFE:
+            await socket.send_str("{}")
+            last = clock()
+        if ended:
+            return
+        await asyncio.sleep(PERIOD)
+
+
+async def _until_closed(socket: web.WebSocketResponse) -> None:
+    """Pages send nothing; whatever comes ends the feed."""
+    await socket.receive()

@@ -1,0 +1,97 @@
+"""Who may ask for what: Host, Origin and token of every request, and the headers of every answer."""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import logging
+import re
+import secrets
+
+from aiohttp import web
+from aiohttp.typedefs import Handler, Middleware
+from yarl import URL
+
+OPEN = "open-"
+"""A route whose name begins with this answers without a token; it must neither tell nor alter anything."""
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+_log = logging.getLogger(__name__)
+
+
+def checked_token(token: str | None) -> str:
+    """A token that fits into an address and a header; a new one for None. ValueError for one that does not fit."""
+    if token is None:
+        return secrets.token_urlsafe(24)
+    if not re.fullmatch(r"[A-Za-z0-9_-]{12,200}", token):
+        raise ValueError("the token must be 12 to 200 characters of A-Z, a-z, 0-9, _ and -; leave it out for a new one")
+    return token
+
+
+def guarded_application(token: str, listen: str) -> web.Application:
+    """An application that answers only to its own page, and tells and alters nothing without the token."""
+    application = web.Application(middlewares=[_guard(token, listen)], client_max_size=4096)
+    application.on_response_prepare.append(_add_headers)
+    return application
+
+
+async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:
+    for name, value in HEADERS.items():
+        response.headers.setdefault(name, value)
+
+
+def _guard(token: str, listen: str) -> Middleware:
+    @web.middleware
+    async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
+        try:
+            _check_host(request, listen)
+            _check_origin(request)
+            if not (request.match_info.route.name or "").startswith(OPEN):
+                _check_token(request, token)
+            return await handler(request)
+        except web.HTTPException as refusal:
+            return web.json_response({"error": refusal.text or refusal.reason}, status=refusal.status)
+        except (ValueError, OSError) as error:
+            return web.json_response({"error": str(error)}, status=409)
+        except Exception:  # noqa: BLE001 - the page must not see a traceback, the log must
+            _log.exception("%s %s failed", request.method, request.path)
+            return web.json_response({"error": "lobewatch failed here; see its terminal"}, status=500)
+
+    return guard
+
+
+def _check_host(request: web.Request, listen: str) -> None:
+    """An address in figures or our own name: a foreign name that points here is another page's trick."""
+    try:
+        host = URL(f"http://{request.host}").host or ""
+    except ValueError:
+        host = ""
+    if host not in ("localhost", listen):
+        try:
+            ipaddress.ip_address(host)
+        except ValueError:
+            raise web.HTTPForbidden(text="this host name is not ours; use the address that lobewatch printed") from None
+
+
+def _check_origin(request: web.Request) -> None:
+    """Requests that alter something or open a feed must come from our own page, others not from another one."""
+    origin = request.headers.get("Origin")
+    must = request.method != "GET" or "Upgrade" in request.headers
+    if origin != f"http://{request.host}" and (must or origin is not None):
+        raise web.HTTPForbidden(text="this request does not come from lobewatch's own page")
+
+
+def _check_token(request: web.Request, token: str) -> None:
+    """In the header Authorization, or for a WebSocket, which has none, among its protocols."""
+    given = [request.headers.get("Authorization", "").removeprefix("Bearer ")]
+    protocols = request.headers.get("Sec-WebSocket-Protocol", "").split(",")
+    given += [name.strip().removeprefix("token.") for name in protocols]
+    if not any(hmac.compare_digest(one.encode("utf-8", "surrogateescape"), token.encode()) for one in given):
+        raise web.HTTPUnauthorized(text="open the whole address that lobewatch printed, with its token")

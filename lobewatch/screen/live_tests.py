@@ -1,0 +1,59 @@
+"""The tap tests that the dashboard has started, one a machine at a time."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+from datetime import UTC, datetime
+
+from acquisition import Circumstances, DataError
+from lobewatch.devices import open_source
+from lobewatch.machine_folder import MachineFolder
+from lobewatch.tap_session import TapSession, TapStopped
+from lobewatch.tap_state import TapState, Word
+
+
+class LiveTest:
+    """A tap test that runs in a thread of its own from the beginning on."""
+
+    def __init__(self, folder: MachineFolder, direction: str) -> None:
+        """Begin; DataError where machine.toml names no port."""
+        machine = folder.machine
+        if not machine.daq.port:
+            raise DataError(f"{folder.toml}: no port in [daq]; write port there, as lobewatch tap --port takes it")
+        text = folder.toml.read_text("utf-8")
+        about = Circumstances(machine.machine.name, datetime.now(UTC), machine.tap.tool, direction, "", text)
+        self._session = TapSession(folder, lambda: open_source(machine.daq, machine.daq.port), about)
+        self._end: TapState | None = None
+        self._thread = threading.Thread(target=self._run, name="tap test", daemon=True)
+        self._thread.start()
+
+    @property
+    def state(self) -> TapState:
+        """The newest picture of it, also after its end."""
+        return self._end or self._session.state
+
+    @property
+    def running(self) -> bool:
+        """Whether it holds the device."""
+        return self._thread.is_alive()
+
+    def undo(self) -> None:
+        """Take the last good hit back."""
+        self._session.undo()
+
+    def stop(self) -> None:
+        """End it; the hits so far stay in the spool."""
+        self._session.stop()
+
+    def join(self) -> None:
+        """Wait until it has given the device back."""
+        self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            self._session.run()
+        except TapStopped as stopped:
+            self._end = replace(self._session.state, word=Word.FAILED, reason=f"{stopped}: START goes on with them.")
+        except (OSError, ValueError):
+            pass  # the session shows its failure itself

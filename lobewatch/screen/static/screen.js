@@ -1,0 +1,209 @@
+import { ask, follow } from "./link.js";
+import { makePlots, showPlots } from "./plots.js";
+import { isMuted, play, status, toggleMute, unlock } from "./sounds.js";
+
+const UNDO_KEYS = ["u", "U", "PageUp"];
+const STOP_AGAIN_MS = 3000;
+const VERDICTS = ["good", "refused"];
+const LIGHTS = ["good", "warn", "alarm"];
+const at = (id) => document.getElementById(id);
+const put = (id, text) => { if (at(id).textContent !== text) at(id).textContent = text; };
+
+let state = null;
+let stopTimer = null;
+let undoing = false;
+let over = false;
+let aheadOfHit = false;
+
+function element(tag, text, className = "") {
+  return Object.assign(document.createElement(tag), { textContent: text, className });
+}
+
+function showWord(kind, word) {
+  const lines = word.replaceAll(", ", "\n");
+  if (document.body.dataset.kind === kind && at("text").textContent === lines) return;
+  document.body.dataset.kind = kind;
+  at("symbol").setAttribute("href", `#is-${kind}`);
+  put("text", lines);
+  fitWord();
+}
+
+// As large as the panel allows.
+function fitWord() {
+  const word = at("word");
+  word.style.fontSize = "100px";
+  const text = at("text").getBoundingClientRect();
+  const width = (99 * word.clientWidth) / (text.right - word.getBoundingClientRect().left);
+  word.style.fontSize = `${Math.min(width, (90 * word.clientHeight) / text.height, 0.8 * word.clientHeight)}px`;
+}
+
+function flash() {
+  at("now").classList.remove("fresh");
+  void at("now").offsetWidth;
+  at("now").classList.add("fresh");
+}
+
+function showState(next) {
+  const before = state;
+  state = next;
+  document.title = `${state.word} ${state.good}/${state.wanted}: ${state.title}`;
+  put("title", state.title || "lobewatch");
+  put("device", state.device);
+  put("good", String(state.good));
+  put("wanted", String(state.wanted));
+  put("reason", state.reason);
+  showWord(state.kind, state.word);
+  showMean();
+  showLevels();
+  if (JSON.stringify(state.hits) !== JSON.stringify(before?.hits)) showHits();
+  if (JSON.stringify(state.checks) !== JSON.stringify(before?.checks)) showChecks();
+  if (JSON.stringify(state.outcome) !== JSON.stringify(before?.outcome)) showOutcome();
+  over = false;
+  const finished = ["done", "failed"].includes(state.kind);
+  at("undo").disabled = finished || state.good === 0;
+  at("stop").disabled = finished;
+  if (before) announce(before);
+}
+
+// A verdict comes as a word and as a new hit, maybe in two pictures; the pictures in between may have been left out.
+function announce(before) {
+  const changed = state.kind !== before.kind;
+  const another = (state.hits.at(-1)?.number ?? 0) > (before.hits.at(-1)?.number ?? 0);
+  if (!VERDICTS.includes(state.kind)) {
+    aheadOfHit = false;
+  } else if (changed || (another && !aheadOfHit)) {
+    flash();
+    play(state.kind);
+    aheadOfHit = !another;
+  } else if (another) {
+    aheadOfHit = false;
+  }
+  if (changed && state.kind === "done") play("done");
+  if (changed && ["no-device", "failed"].includes(state.kind)) play("lost");
+}
+
+function showMean() {
+  const { mean_change: change, good, settled } = state;
+  const percent = change === null ? "" : `${(100 * change).toPrecision(2)} %`;
+  if (settled) put("change", `✓ The mean has settled (${percent || "steady"}).`);
+  else if (percent) put("change", `The mean still moves by ${percent}.`);
+  else put("change", good ? "One good hit: no change known yet." : "No good hit yet.");
+}
+
+// Bars over six decades, 0.001 to 1000 of the unit.
+function showLevels() {
+  const units = ["N", "m/s²"];
+  ["force", "response"].forEach((name, i) => {
+    const value = state.levels?.[i] ?? null;
+    put(`${name}-level`, value === null ? "-" : `${value < 100 ? value.toPrecision(2) : value.toFixed(0)} ${units[i]}`);
+    const share = value > 0 ? (Math.log10(value) + 3) / 6 : 0;
+    at(`${name}-bar`).style.width = `${100 * Math.min(Math.max(share, 0), 1)}%`;
+  });
+}
+
+function showHits() {
+  at("hits").replaceChildren(
+    ...state.hits.toReversed().map((hit) => {
+      const good = hit.verdict === "good";
+      const row = element("li", "", hit.undone ? "undone" : good ? "" : "bad");
+      row.append(element("span", `${hit.number}`), element("span", hit.undone ? "" : good ? "✓" : "✗"));
+      row.append(element("span", hit.verdict), element("span", hit.peak_force === null ? "" : `${hit.peak_force.toFixed(0)} N`));
+      return row;
+    }),
+  );
+}
+
+function showChecks() {
+  const failedFirst = state.checks.toSorted((a, b) => a.passed - b.passed);
+  put("passed", state.checks.length ? `${state.checks.filter((one) => one.passed).length} of ${state.checks.length} passed` : "");
+  at("checks").replaceChildren(
+    ...failedFirst.map(({ name, passed, text }) => element("li", `${passed ? "✓" : "✗"} ${name}: ${text}`, passed ? "" : "bad")),
+  );
+}
+
+function showOutcome() {
+  const { outcome } = state;
+  at("outcome").hidden = !outcome;
+  if (!outcome) return;
+  for (const lamp of at("light").children) lamp.classList.toggle("on", lamp.dataset.light === outcome.light);
+  at("light").hidden = !LIGHTS.includes(outcome.light);
+  at("texts").replaceChildren(...outcome.texts.map((text) => element("li", text)));
+  put("next", outcome.next_step && `Next: ${outcome.next_step}`);
+}
+
+// Where lobewatch has ended as it should, its last picture stays, or the word says so.
+function showLost(why, ended) {
+  over ||= ended;
+  const finished = ["done", "failed"].includes(state?.kind);
+  if (over && finished) return put("device", "lobewatch has ended; this is its last picture");
+  showWord("no-connection", over ? "ENDED" : "NO CONNECTION");
+  put("reason", over ? "lobewatch has ended. The hits are kept: the same command goes on with them." : why);
+  document.title = at("text").textContent;
+  at("undo").disabled = at("stop").disabled = true;
+}
+
+function toast(text) {
+  put("toast", text);
+  at("toast").hidden = false;
+  clearTimeout(toast.timer);
+  toast.timer = setTimeout(() => { at("toast").hidden = true; }, 4000);
+}
+
+async function undo() {
+  if (undoing || at("undo").disabled) return;
+  undoing = true;
+  await ask("undo", "POST").catch((error) => toast(error.message));
+  undoing = false;
+}
+
+// Twice within three seconds: a hammer handle on the keyboard must not end a test, and no dialog stands in the way.
+async function stop() {
+  if (at("stop").disabled) return;
+  const again = stopTimer !== null;
+  clearTimeout(stopTimer);
+  stopTimer = again ? null : setTimeout(() => { stopTimer = null; showStop(); }, STOP_AGAIN_MS);
+  showStop();
+  if (again) await ask("stop", "POST").catch((error) => toast(error.message));
+}
+
+function showStop() {
+  at("stop").classList.toggle("armed", stopTimer !== null);
+  put("stop-text", stopTimer === null ? "Stop" : "Again to stop");
+}
+
+function showSound() {
+  put("sound", status());
+  at("mute").setAttribute("aria-pressed", String(isMuted()));
+}
+
+function mute() {
+  toggleMute();
+  showSound();
+}
+
+function onKey(event) {
+  unlock();
+  showSound();
+  if (event.repeat || event.ctrlKey || event.altKey || event.metaKey) return;
+  if (UNDO_KEYS.includes(event.key)) undo();
+  else if (event.key.toLowerCase() === "m") mute();
+  else if (event.key === "Escape") stop();
+  else return;
+  event.preventDefault();
+}
+
+// A button that keeps the focus would be pressed again by the space bar of a foot switch.
+function onClick(id, action) {
+  at(id).addEventListener("click", () => { at(id).blur(); action(); });
+}
+
+at("back").hidden = location.pathname === "/";
+onClick("undo", undo);
+onClick("mute", mute);
+onClick("stop", stop);
+addEventListener("keydown", onKey);
+addEventListener("pointerdown", () => { unlock(); showSound(); });
+new ResizeObserver(fitWord).observe(at("now"));
+makePlots();
+showSound();
+follow(showState, showPlots, showLost);

@@ -1,0 +1,97 @@
+"""A web application in a thread of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import socket
+import threading
+from types import TracebackType
+from typing import Self
+
+from aiohttp import web
+
+from acquisition import DeviceError
+from lobewatch.screen.feed import ENDING
+from lobewatch.screen.guard import checked_token, guarded_application
+
+QUIET = logging.getLogger("lobewatch.screen.http")
+"""Requests that are no HTTP are answered with 400 and not logged: anybody could fill the operator's terminal."""
+QUIET.addHandler(logging.NullHandler())
+QUIET.propagate = False
+
+
+class WebThread:
+    """Base of the servers: `application` is served from __enter__ to __exit__; add its routes before."""
+
+    def __init__(self, listen: str, port: int, token: str | None) -> None:
+        """ValueError for a token that does not fit into an address."""
+        self.token = checked_token(token)
+        self.application = guarded_application(self.token, listen)
+        self._listen = listen
+        self._port = port
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="lobewatch screen", daemon=True)
+        self._ready = threading.Event()
+        self._error: OSError | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._stop = asyncio.Event()
+
+    def __enter__(self) -> Self:
+        """Listen; DeviceError where the address cannot be had."""
+        self._thread.start()
+        self._ready.wait()
+        if self._error is not None:
+            raise DeviceError(
+                f"cannot listen on {self._listen} port {self._port} ({self._error.strerror or self._error}); "
+                "choose another port or address"
+            ) from self._error
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Send the last state to every page that still listens, then close."""
+        if self._loop is not None:
+            self._loop.call_soon_threadsafe(self._stop.set)
+        self._thread.join()
+
+    @property
+    def origin(self) -> str:
+        """Address without the token, e.g. http://127.0.0.1:40123."""
+        host = _own_address() if self._listen in ("0.0.0.0", "::") else self._listen
+        return f"http://{f'[{host}]' if ':' in host else host}:{self._port}"
+
+    @property
+    def url(self) -> str:
+        """Address with the token behind #, which browsers keep to themselves."""
+        return f"{self.origin}/#token={self.token}"
+
+    async def _serve(self) -> None:
+        self.application[ENDING] = asyncio.Event()
+        self.application.on_shutdown.append(_end)
+        runner = web.AppRunner(self.application, access_log=None, logger=QUIET, shutdown_timeout=2.0)
+        try:
+            await runner.setup()
+            await web.TCPSite(runner, self._listen, self._port).start()
+            self._port = runner.addresses[0][1]
+            self._loop = asyncio.get_running_loop()
+        except OSError as error:
+            self._error = error
+            self._stop.set()
+        self._ready.set()
+        await self._stop.wait()
+        await runner.cleanup()
+
+
+async def _end(application: web.Application) -> None:
+    application[ENDING].set()
+
+
+def _own_address() -> str:
+    """Of this computer in its network; nothing is sent for it."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(("192.0.2.1", 9))
+            return str(probe.getsockname()[0])
+        except OSError:
+            return "127.0.0.1"

@@ -14,15 +14,14 @@ from acquisition.windowed_force import windowed_force
 def force_noise(hits: Sequence[Hit], frequency: NDArray[np.float64]) -> Iterator[NDArray[np.complex128]]:
     """Errors that noise of the hammer brings into H1 at these lines (Hz), as shares of it; an array for each hit.
 
-    Column t of that of hit i, shape (n, samples in its force window), is the error that one standard deviation of the
-    noise at sample t makes, to first order:
+    Column t of that of hit i, shape (n, samples in its force window + 1), is the error that one standard deviation of
+    the noise at sample t makes, to first order:
 
         -sigma_i w_i(t) conj(F_i) exp(-2 pi j f t) / sum_k |F_k|^2
 
     F_i(f) is the spectrum of the windowed force, w_i the window, sigma_i the rms of the baseline, in which the noise
-    is taken as white: each column has an independent real factor of variance one. A column is smooth over lines
-    closer than one over the length of the window. Left out: the error of the mean of the baseline, which the window
-    passes below one over its length only, and which is small where the baseline has far more samples than the window.
+    is taken as white. The last column is that of the mean of the baseline, which is taken off all samples. Each column
+    has an independent real factor of variance one, and is smooth over lines closer than one over the window's length.
 
     Source: H1 of `estimate_frf` with F + N for F, expanded in N. Raises ValueError for a hit without a pulse.
     """
@@ -32,5 +31,6 @@ def force_noise(hits: Sequence[Hit], frequency: NDArray[np.float64]) -> Iterator
     spectra = [waves[:, : part.force.size] @ part.force for part in parts]
     power = np.sum(np.abs(spectra) ** 2, axis=0)
     for part, spectrum in zip(parts, spectra, strict=True):
-        turned = waves[:, : part.window.size] * (-part.noise * part.window)
-        yield (np.conj(spectrum) / power)[:, None] * turned
+        by_sample = waves[:, : part.window.size] * part.window
+        by_mean = np.sum(by_sample, axis=1, keepdims=True)
+        yield (-np.conj(spectrum) / power)[:, None] * np.hstack([part.noise * by_sample, -part.mean_noise * by_mean])

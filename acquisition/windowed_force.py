@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.hit import Hit
-from acquisition.pulse import find_pulse
+from acquisition.pulse import baseline, find_pulse
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +23,8 @@ class WindowedForce:
     """Weight of each sample, 0 to 1, shape (m,)."""
     noise: float
     """rms of the baseline (N)."""
+    mean_noise: float
+    """Standard error of the baseline's mean (N)."""
 
 
 def windowed_force(hit: Hit) -> WindowedForce:
@@ -39,4 +41,6 @@ def windowed_force(hit: Hit) -> WindowedForce:
     sample = np.arange(samples.start, samples.stop)
     beyond = np.maximum(sample - (pulse.end + width), (pulse.start - width) - sample)
     window = 0.5 * (1 + np.cos(np.pi * np.clip(beyond / width, 0.0, 1.0)))
-    return WindowedForce(samples, pulse.force[samples] * window, window, pulse.baseline_rms)
+    quiet = baseline(hit.force, hit.pre_trigger or int(np.argmax(hit.force)))
+    noise = pulse.baseline_rms
+    return WindowedForce(samples, pulse.force[samples] * window, window, noise, noise / np.sqrt(quiet.size))

@@ -36,7 +36,7 @@ def impulse_variance() -> NDArray[np.float64]:
     taper = np.cos(np.pi * np.arange(1, 8) / 16) ** 2
     window = np.concatenate([taper[::-1], np.ones(18), taper])
     spectrum = np.exp(-2j * np.pi * np.outer(LINES, np.arange(32)) / RATE) @ window
-    return 23 + np.abs(spectrum) ** 2 / BASELINE
+    return np.asarray(23 + np.abs(spectrum) ** 2 / BASELINE)
 
 
 def test_impulse() -> None:

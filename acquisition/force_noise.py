@@ -31,6 +31,9 @@ def force_noise(hits: Sequence[Hit], frequency: NDArray[np.float64]) -> Iterator
     spectra = [waves[:, : part.force.size] @ part.force for part in parts]
     power = np.sum(np.abs(spectra) ** 2, axis=0)
     for part, spectrum in zip(parts, spectra, strict=True):
-        by_sample = waves[:, : part.window.size] * part.window
-        by_mean = np.sum(by_sample, axis=1, keepdims=True)
-        yield (-np.conj(spectrum) / power)[:, None] * np.hstack([part.noise * by_sample, -part.mean_noise * by_mean])
+        size = part.window.size
+        columns = np.empty((frequency.size, size + 1), np.complex128)
+        np.multiply(waves[:, :size], -part.noise * part.window, out=columns[:, :size])
+        columns[:, size] = part.mean_noise * (waves[:, :size] @ part.window)
+        columns *= (np.conj(spectrum) / power)[:, None]
+        yield columns

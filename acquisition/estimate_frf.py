@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hit import Hit
-from acquisition.pulse import find_pulse
+from acquisition.windowed_force import windowed_force
 
 Estimator = Literal["H1", "H2", "Hv"]
 
@@ -52,11 +52,11 @@ def cross_spectra(hits: Sequence[Hit]) -> Spectra:
     s_fx = np.zeros_like(spectra[0])
     powers = np.zeros((2, 2 * s_fx.size))
     for hit in hits:  # one at a time: ten hits at once are ten times the cache of a processor
-        sample, force = _windowed_force(hit)
-        records[0, sample] = force
+        part = windowed_force(hit)
+        records[0, part.samples] = part.force
         records[1] = hit.acceleration
         np.fft.rfft(records, out=spectra)
-        records[0, sample] = 0.0
+        records[0, part.samples] = 0.0
         s_fx += np.conj(spectra[0]) * spectra[1]
         powers += np.square(spectra.view(np.float64))
     skew = _skew(hits[0])
@@ -64,22 +64,6 @@ def cross_spectra(hits: Sequence[Hit]) -> Spectra:
         s_fx *= np.exp(-2j * np.pi * np.fft.rfftfreq(n, 1 / hits[0].sample_rate) * skew)
     s_ff, s_xx = (powers[:, ::2] + powers[:, 1::2]) / len(hits)
     return s_ff, s_xx, s_fx / len(hits)
-
-
-def _windowed_force(hit: Hit) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """The samples inside the force window, and the force there (N).
-
-    The pulse with one of its widths on either side is kept whole, then tapered to zero over one more (raised cosine).
-    A tight window matters: noise inside it is alike at neighbouring lines, and so passes for a shift of the mode.
-    """
-    pulse = find_pulse(hit)
-    if pulse is None:
-        raise ValueError("a hit has no force pulse; check hits with check_hit before averaging")
-    width = max(pulse.end - pulse.start, 8)
-    sample = np.arange(max(pulse.start - 2 * width, 0), min(pulse.end + 2 * width, pulse.force.size))
-    beyond = np.maximum(sample - (pulse.end + width), (pulse.start - width) - sample)
-    taper = 0.5 * (1 + np.cos(np.pi * np.clip(beyond / width, 0.0, 1.0)))
-    return sample, pulse.force[sample] * taper
 
 
 def _skew(hit: Hit) -> float:

@@ -200,8 +200,9 @@ class TapSession:
             yield block
             if self._clock() - self._shown_at >= LEVEL_TIME:
                 self._show(levels=self._signal.levels)
-        good = self._tap.good
-        raise DataError(f"the samples have ended with {good} of {self._state.wanted} good hits; record more of them")
+        if self._missing:
+            good = f"{self._tap.good} of {self._state.wanted} good hits"
+            raise DataError(f"the samples have ended with {good}; record more of them")
 
     def _serve(self) -> None:
         """What other threads have asked for."""

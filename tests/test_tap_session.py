@@ -258,6 +258,17 @@ def test_samples_that_end_are_told(folder: MachineFolder, tapper: Tapper, channe
         session.run()
 
 
+def test_samples_that_end_with_the_last_hit_are_enough(folder: MachineFolder, tapper: Tapper, channels: Pair) -> None:
+    """As those of a recorded tap test do: the time to take the last hit back is over with them."""
+
+    class Ending(Simulated):
+        def blocks(self) -> Iterator[Block]:
+            return itertools.takewhile(lambda _: session.state.good < 10, super().blocks())
+
+    session = session_of(folder, lambda: Ending(tapper(), channels))
+    assert session.run().frf.n_averages == 10
+
+
 def test_no_scan_is_lost_to_a_slow_disk_and_slow_mathematics(
     folder: MachineFolder, tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -263,7 +263,7 @@ def test_samples_that_end_with_the_last_hit_are_enough(folder: MachineFolder, ta
 
     class Ending(Simulated):
         def blocks(self) -> Iterator[Block]:
-            return itertools.takewhile(lambda _: session.state.good < 10, super().blocks())
+            return takewhile(lambda _: session.state.good < 10, super().blocks())
 
     session = session_of(folder, lambda: Ending(tapper(), channels))
     assert session.run().frf.n_averages == 10

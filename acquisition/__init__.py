@@ -11,6 +11,7 @@ from acquisition.errors import DataError, DeviceError
 from acquisition.estimate_frf import cross_spectra, estimate_frf
 from acquisition.file_source import FileSource
 from acquisition.find_port import find_port, usb_identity
+from acquisition.force_noise import force_noise
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hammered_structure import HammeredStructure, Hammering, Structure
 from acquisition.hit import Hit, HitFlags
@@ -84,6 +85,7 @@ __all__ = [
     "cross_spectra",
     "estimate_frf",
     "find_port",
+    "force_noise",
     "from_accelerance",
     "judge_hit",
     "list_ports",

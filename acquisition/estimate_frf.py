@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hit import Hit
-from acquisition.pulse import find_pulse
+from acquisition.windowed_force import windowed_force
 
 Estimator = Literal["H1", "H2", "Hv"]
 
@@ -57,11 +57,12 @@ def cross_spectra(hits: Sequence[Hit]) -> Spectra:
     parts = spectra.view(np.float64)
     s_fx, powers = np.zeros_like(spectra[0]), np.zeros_like(parts)
     for hit in hits:  # one at a time: ten hits at once are ten times the cache of a processor
-        sample, force = _windowed_force(hit)
-        records[0, -sample] = force  # backwards in time: its spectrum is conj(F)
+        part = windowed_force(hit)
+        backwards = -np.arange(part.samples.start, part.samples.stop)
+        records[0, backwards] = part.force  # in time: its spectrum is conj(F)
         records[1] = hit.acceleration
         np.fft.rfft(records, out=spectra)
-        records[0, -sample] = 0.0
+        records[0, backwards] = 0.0
         s_fx += spectra[0] * spectra[1]
         powers += np.square(parts, out=parts)
     skew = _skew(hits[0])
@@ -69,22 +70,6 @@ def cross_spectra(hits: Sequence[Hit]) -> Spectra:
         s_fx *= np.exp(-2j * np.pi * np.fft.rfftfreq(n, 1 / hits[0].sample_rate) * skew)
     s_ff, s_xx = (powers[:, ::2] + powers[:, 1::2]) / len(hits)
     return s_ff, s_xx, s_fx * (1 / len(hits))
-
-
-def _windowed_force(hit: Hit) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """The samples inside the force window, and the force there (N).
-
-    The pulse with one of its widths on either side is kept whole, then tapered to zero over one more (raised cosine).
-    A tight window matters: noise inside it is alike at neighbouring lines, and so passes for a shift of the mode.
-    """
-    pulse = find_pulse(hit)
-    if pulse is None:
-        raise ValueError("a hit has no force pulse; check hits with check_hit before averaging")
-    width = max(pulse.end - pulse.start, 8)
-    corners = np.array([pulse.start - 2 * width, pulse.start - width, pulse.end + width, pulse.end + 2 * width])
-    sample = np.arange(max(corners[0], 0), min(corners[3], pulse.recorded.size))
-    taper = 0.5 + 0.5 * np.cos(np.pi * np.interp(sample, corners, [1.0, 0.0, 0.0, 1.0]))
-    return sample, (pulse.recorded[sample] - pulse.offset) * taper
 
 
 def _skew(hit: Hit) -> float:

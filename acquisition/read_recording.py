@@ -42,15 +42,19 @@ def _magic(path: Path) -> bytes:
         return file.read(len(_HDF5))
 
 
+_BEYOND_THE_SIGNALS = HitFlags.UNDONE | HitFlags.INCONSISTENT | HitFlags.NARROW_BAND
+
+
 def read_recording(path: Path | str) -> list[Hit] | Frf:
-    """Hits where the file holds time histories, an FRF where it holds only that; hits taken back are left out."""
+    """Hits where the file holds time histories, an FRF where it holds only that; left out are those that their
+    own time signals do not speak against: taken back, of another spot, of a force that does not reach far enough."""
     path = Path(path)
     magic = _magic(path)
     if not magic:
         raise DataError(f"{path}: the file is empty")
     if magic == _HDF5:
         hits, _, flags = read_tap_hits(path)
-        kept = [hit for hit, flag in zip(hits, flags, strict=True) if not flag & HitFlags.UNDONE]
+        kept = [hit for hit, flag in zip(hits, flags, strict=True) if not flag & _BEYOND_THE_SIGNALS]
         return kept or read_tap(path).frf
     if MAGIC.encode().startswith(magic):
         return read_lvm(path)

@@ -146,7 +146,7 @@ def _unknown(table: ProgramTable, tap_id: str, reason: str) -> ProgramAdvice:
 
 
 def _advise(table: ProgramTable, machine: Machine, now: Measurement, then: Measurement) -> ProgramAdvice:
-    program = Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
+    program = _program(table, machine)
     speeds = speed_grid(machine)
     check = check_program(program, now.x, now.y, speeds, drive_limit(machine, table, speeds))
     modes_at, assumption = aging(now)
@@ -176,7 +176,25 @@ def _remarks(table: ProgramTable, machine: Machine, now: Measurement) -> Iterato
 def _was_stable(program: Program, now: Measurement, then: Measurement) -> bool | None:
     if (bool(now.x), bool(now.y)) != (bool(then.x), bool(then.y)):
         return None
-    return bool(stability_boundary(then.x, then.y, program.cut, program.speed_rpm, program.depth).depth[0] == np.inf)
+    return _is_stable(program, then)
+
+
+def _is_stable(program: Program, measurement: Measurement) -> bool:
+    x, y = measurement.x, measurement.y
+    return bool(stability_boundary(x, y, program.cut, program.speed_rpm, program.depth).depth[0] == np.inf)
+
+
+def unstable_programs(measurement: Measurement, machine: Machine) -> list[str]:
+    """Names of the programs with lobes in this measurement that are not stable; the method is that of `advise`."""
+    return [
+        table.name
+        for table in machine.program
+        if table.name in measurement.lobes and not _is_stable(_program(table, machine), measurement)
+    ]
+
+
+def _program(table: ProgramTable, machine: Machine) -> Program:
+    return Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
 
 
 def _limits(program: Program, x: Modes, y: Modes) -> StabilityLobes:

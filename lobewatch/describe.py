@@ -225,5 +225,5 @@ def measurement_texts(m: Measurement, machine: Machine) -> list[str | Table]:
         texts.append(f"{REFERENCE_CUT}: lowest limit {low.depth * 1e3:.2f} mm at {low.speed_rpm:.0f} rpm")
     programs = program_json(m.lobes, machine)
     if programs:
-        texts.append(program_table(programs))
+        texts += [program_table(programs), "limits by zero order; lobewatch check has the verdict"]
     return [*texts, *(f"note: {note}" for note in m.notes)]

@@ -8,7 +8,7 @@ from datetime import timedelta
 import numpy as np
 
 from lobes import SldHistory
-from lobewatch.describe import program_json
+from lobewatch.advice import unstable_programs
 from lobewatch.history import series
 from lobewatch.machine import Machine
 from lobewatch.output import plus_minus
@@ -29,8 +29,10 @@ def outcome_of(found: Measurement, history: SldHistory, machine: Machine) -> Out
     light = ORDER[(fall >= limits.frequency_warn_percent) + (fall >= limits.frequency_alarm_percent)]
     frequency = f"f_n {plus_minus(mode.frequency, float(mode.standard_error[0]))} Hz"
     against = f"{-fall:+.2f} % against the first test" if first else "the first test of this tool and direction"
-    texts = [f"{frequency}, {against}.", f"K {mode.stiffness / 1e6:.4g} N/um, zeta {100 * mode.damping_ratio:.3g} %."]
-    unstable = [entry["name"] for entry in program_json(found.lobes, machine) if not entry["stable"]]
+    stiffness = plus_minus(mode.stiffness, float(mode.standard_error[2]), 1e6)
+    damping = plus_minus(100 * mode.damping_ratio, 100 * float(mode.standard_error[1]))
+    texts = [f"{frequency}, {against}.", f"K {stiffness} N/um, zeta {damping} %."]
+    unstable = unstable_programs(found, machine)
     if unstable:
         texts.append(f"Not stable: {', '.join(unstable)}.")
         light = max(light, "warn", key=ORDER.index)

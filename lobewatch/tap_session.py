@@ -66,7 +66,7 @@ class TapSession:
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         """Nothing is opened yet. guided False leaves out what only a person needs: self-check, re-arming by decay,
-        curves, and the time to take back the last hit."""
+        curves, the time to take back the last hit, and the outcome."""
         self._folder, self._open_device, self._about = folder, open_device, circumstances
         self._resume, self._guided, self._clock, self._sleep = resume, guided, clock, sleep
         about = f"{circumstances.machine}, tool {circumstances.tool}, direction {circumstances.direction}"
@@ -200,8 +200,9 @@ class TapSession:
             yield block
             if self._clock() - self._shown_at >= LEVEL_TIME:
                 self._show(levels=self._signal.levels)
-        good = self._tap.good
-        raise DataError(f"the samples have ended with {good} of {self._state.wanted} good hits; record more of them")
+        if self._missing:
+            good = f"{self._tap.good} of {self._state.wanted} good hits"
+            raise DataError(f"the samples have ended with {good}; record more of them")
 
     def _serve(self) -> None:
         """What other threads have asked for."""
@@ -317,6 +318,6 @@ class TapSession:
         self._folder.commit(tap)
         history, measurements = update_history(self._folder)
         self._measurement = next(found for found in measurements if found.tap_id == tap.id)
-        outcome = outcome_of(self._measurement, history, self._folder.machine)
+        outcome = outcome_of(self._measurement, history, self._folder.machine) if self._guided else None
         self._show(reason="", outcome=outcome)
         return tap

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from acquisition import Frf, Hit
 from modal.assess import assess
 from modal.extract import Extraction, FittedBand, extract
+from modal.hammer_covariance import hammer_covariance
 from modal.jackknife import jackknife, left_out
 from modal.mode import Mode
 
@@ -25,35 +26,37 @@ def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[
     not converge to a mode inside its local band, or leaves its damping ratio or stiffness uncertain by more than a
     third; `pick_peaks` may still list it. What else speaks against a mode stands in its `doubts`.
 
-    hits: those that the FRF was averaged from (H1), three or more; then the modes also have a jackknife over hits,
-    which holds for errors that are alike at neighbouring lines (noise of the hammer), too.
+    hits: those that the FRF was averaged from (H1). Noise of the hammer is alike at neighbouring lines, so the fit does
+    not see it: the covariance then has it from the baselines of the hits. With three or more the modes also have a
+    jackknife over hits, which holds for any error that differs from hit to hit.
 
     Source: Peeters et al. (2004), Shock and Vibration 11, 395 (LSCF); Ewins, Modal Testing, ch. 4 (curve fitting
     with residuals); Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, 413.
 
     Raises ValueError for fewer than 8 usable lines, an FRF of zeros, one with its phase conjugated, one without
-    phase, and hits that have other lines than the FRF.
+    phase, and hits that have other lines than the FRF or no pulse.
     """
-    state = extract(frf, band)
-    return modes_of(state, left_out(hits, state.frf))
+    return modes_of(extract(frf, band), hits)
 
 
-def modes_of(state: Extraction, without: Sequence[Frf] = ()) -> list[Mode]:
-    """Modes of an extraction, by rising frequency; without: FRFs that lack one hit each."""
-    found = [mode for band in state.bands for mode in _modes(state, band, without)]
+def modes_of(state: Extraction, hits: Sequence[Hit] = ()) -> list[Mode]:
+    """Modes of an extraction, by rising frequency; hits: those that its FRF was averaged from."""
+    without = left_out(hits, state.frf)
+    found = [mode for band in state.bands for mode in _modes(state, band, hits, without)]
     return sorted(found, key=lambda mode: mode.frequency)
 
 
-def _modes(state: Extraction, band: FittedBand, without: Sequence[Frf]) -> list[Mode]:
+def _modes(state: Extraction, band: FittedBand, hits: Sequence[Hit], without: Sequence[Frf]) -> list[Mode]:
     f, n, fit = state.frf.frequency[band.lines], band.height.size, band.fit
     method = f"least squares, {f[0]:.0f}..{f[-1]:.0f} Hz" + (f", {n} modes together" if n > 1 else "")
+    covariance = fit.covariance + hammer_covariance(state, band, hits)
     scatter = jackknife(state, band, without) if without else None
     modes = [
         Mode(
             float(fit.frequency[i]),
             float(fit.damping_ratio[i]),
             float(1 / fit.flexibility[0, i]),
-            of_one(fit.covariance, i, fit.flexibility[0]),
+            of_one(covariance, i, fit.flexibility[0]),
             fit.freedom,
             method,
             None if scatter is None else of_one(scatter, i, fit.flexibility[0]),

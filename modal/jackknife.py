@@ -17,16 +17,23 @@ FEWEST_HITS = 3
 def left_out(hits: Sequence[Hit], frf: Frf) -> list[Frf]:
     """FRFs of all hits but one, for each hit, on the lines of frf; none for fewer than three hits.
 
-    Raises ValueError where the hits have other lines than the FRF.
+    Raises ValueError where a hit has other lines than the FRF.
     """
+    parts = [_lines(hit, frf) for hit in hits]
     if len(hits) < FEWEST_HITS:
         return []
     found = [estimate_frf([*hits[:i], *hits[i + 1 :]]) for i in range(len(hits))]
-    first = int(np.searchsorted(found[0].frequency, frf.frequency[0]))
+    return [Frf(frf.frequency, one.receptance[part]) for one, part in zip(found, parts, strict=True)]
+
+
+def _lines(hit: Hit, frf: Frf) -> slice:
+    """Those of frf among the lines above 0 Hz that an FRF of this hit has."""
+    frequency = np.fft.rfftfreq(hit.force.size, 1 / hit.sample_rate)[1:]
+    first = int(np.searchsorted(frequency, frf.frequency[0]))
     part = slice(first, first + frf.frequency.size)
-    if not np.array_equal(found[0].frequency[part], frf.frequency):
+    if not np.array_equal(frequency[part], frf.frequency):
         raise ValueError("hits and FRF differ in their frequency lines; give the hits that this FRF was averaged from")
-    return [Frf(one.frequency[part], one.receptance[part]) for one in found]
+    return part
 
 
 def jackknife(state: Extraction, band: FittedBand, without: Sequence[Frf]) -> NDArray[np.float64]:

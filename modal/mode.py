@@ -26,7 +26,8 @@ class Mode:
     covariance: NDArray[np.float64] | None = None
     """Covariance of (frequency, damping_ratio, stiffness) from the residual of the fit, SI units, shape (3, 3).
 
-    It takes the errors of neighbouring lines as independent. None where not estimated."""
+    That takes the errors of neighbouring lines as independent; what noise of the hammer adds, alike over many lines,
+    is in it where the hits were given. None where not estimated."""
     freedom: float = np.inf
     """Degrees of freedom of that covariance: real values fitted less unknowns, all of its band."""
     method: str = ""
@@ -82,7 +83,7 @@ class Mode:
 
     @property
     def fit_error(self) -> NDArray[np.float64]:
-        """Standard errors from the residual of the fit alone, shape (3,); NaN where not estimated."""
+        """Standard errors from `covariance`, with or without a jackknife, shape (3,); NaN where not estimated."""
         return _root_of_diagonal(self.covariance)
 
     @property

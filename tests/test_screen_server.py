@@ -325,7 +325,7 @@ def test_a_real_test_through_an_emulated_device(tmp_path: Path, tapper: Callable
 
     with TapsEmulator(tapper(), CHANNELS, SAMPLE_RATE, realtime=False) as device:
         folder = MachineFolder(tmp_path / "mill")
-        session = TapSession(folder, lambda: TapsSource(device.port), about, guided=False)
+        session = TapSession(folder, lambda: TapsSource(device.port), about)
         with ScreenServer(session, token=TOKEN) as server:
             follow(server, talk)
     assert (shown[-1]["word"], shown[-1]["good"]) == ("DONE", 10)

@@ -182,3 +182,14 @@ def test_a_direction_that_is_none_and_a_time_without_zone_are_refused() -> None:
         replace(ABOUT, direction="z")
     with pytest.raises(ValueError, match="no time zone"):
         replace(ABOUT, created=datetime(2026, 1, 1))  # noqa: DTZ001
+
+
+@pytest.mark.parametrize("beyond", [HitFlags.UNDONE, HitFlags.INCONSISTENT, HitFlags.NARROW_BAND])
+def test_hits_refused_for_what_their_signals_do_not_show_stay_out_of_a_replay(
+    tap: TapTest, tmp_path: Path, beyond: HitFlags
+) -> None:
+    flags = (beyond, *tap.flags[1:])
+    write_tap(tmp_path / "tap.h5", replace(tap, flags=flags))
+    read = read_hits(tmp_path / "tap.h5")
+    assert len(read) == len(tap.hits) - 1
+    assert same_hit(read[0], tap.hits[1])

@@ -7,7 +7,7 @@ import re
 import time
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
-from itertools import count, groupby
+from itertools import count, groupby, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -256,6 +256,17 @@ def test_samples_that_end_are_told(folder: MachineFolder, tapper: Tapper, channe
     session = session_of(folder, lambda: Simulated(tapper(), channels, seconds=2.5), guided=False)
     with pytest.raises(DataError, match=r"the samples have ended with [45] of 10 good hits"):
         session.run()
+
+
+def test_samples_that_end_with_the_last_hit_are_enough(folder: MachineFolder, tapper: Tapper, channels: Pair) -> None:
+    """As those of a recorded tap test do: the time to take the last hit back is over with them."""
+
+    class Ending(Simulated):
+        def blocks(self) -> Iterator[Block]:
+            return takewhile(lambda _: session.state.good < 10, super().blocks())
+
+    session = session_of(folder, lambda: Ending(tapper(), channels))
+    assert session.run().frf.n_averages == 10
 
 
 def test_no_scan_is_lost_to_a_slow_disk_and_slow_mathematics(

@@ -39,7 +39,7 @@ def taps(machine: Machine, tcp: Tcp = False, fast: Fast = False, seed: Seed = 1,
 
 
 @emulate.command()
-def dataq(machine: Machine, tcp: Tcp = False, fast: Fast = False, seed: Seed = 1, as_json: Json = False) -> None:
+def dataq(machine: Machine, tcp: Tcp = False, seed: Seed = 1, as_json: Json = False) -> None:
     """A DATAQ DI-4108 with the sensors of \\[\\[daq.channel]] and somebody who taps twice a second; Ctrl-C ends it.
 
     Examples:
@@ -57,7 +57,7 @@ def dataq(machine: Machine, tcp: Tcp = False, fast: Fast = False, seed: Seed = 1
             "(docs/devices.md shows them)"
         )
     random = np.random.default_rng(seed)
-    _serve(dataq_emulator(structure, inputs, random, realtime=not fast, tcp=tcp), structure, machine, as_json)
+    _serve(dataq_emulator(structure, inputs, random, realtime=True, tcp=tcp), structure, machine, as_json)
 
 
 def _structure(folder: MachineFolder) -> Structure:

@@ -22,7 +22,7 @@ from lobewatch.terminal_screen import TerminalScreen
 
 def tap(
     machine: Annotated[Path, typer.Argument(help="Machine folder.")],
-    port: Annotated[str, typer.Option(help="Serial port of the DAQ, or socket://HOST:PORT.")] = "",
+    port: Annotated[str, typer.Option(help="Serial port of the DAQ, socket://HOST:PORT, or file:RECORDING.")] = "",
     tool: Annotated[str, typer.Option(help=r"What is in the spindle; \[tap] tool where not given.")] = "",
     direction: Annotated[str, typer.Option(help="Direction at the tool tip, x or y.")] = "x",
     operator: Annotated[str, typer.Option(help="Who holds the hammer.")] = "",
@@ -44,6 +44,8 @@ def tap(
       lobewatch tap mill-3 --port COM3 --direction y --operator Kim
 
       lobewatch tap mill-3 --screen --listen 0.0.0.0     (watched on a tablet)
+
+      lobewatch tap trial --port file:taps/ID.h5     (recorded hits as if they were made now)
     """
     folder = MachineFolder(machine)
     setup = folder.machine

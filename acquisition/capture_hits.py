@@ -182,6 +182,10 @@ class HitSearch:
         """
         force = self._force(self._from)
         loud = np.flatnonzero(force >= self._trigger.hysteresis * self._level)
+        if not loud.size:
+            self._quiet += force.size
+            self._from += force.size
+            return None
         starts = loud[np.diff(loud, prepend=-2) > 1]
         ends = loud[np.diff(loud, append=force.size + 1) > 1] + 1
         quiet = starts - np.concatenate(([-self._quiet], ends[:-1]))
@@ -190,11 +194,11 @@ class HitSearch:
             above = force[start:end] >= self._level
             if above.any():
                 return self._from + int(start) + int(np.argmax(above))
-        if ends.size and ends[-1] == force.size and force.size - starts[-1] < self._trigger.n_samples:
+        if ends[-1] == force.size and force.size - starts[-1] < self._trigger.n_samples:
             self._quiet = int(quiet[-1])
             self._from += int(starts[-1])
         else:
-            self._quiet = int(force.size - ends[-1]) if ends.size else self._quiet + force.size
+            self._quiet = int(force.size - ends[-1])
             self._from += force.size
         return None
 

@@ -28,9 +28,14 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
     """
     if estimator not in get_args(Estimator):
         raise ValueError(f"estimator={estimator!r} is none of {', '.join(get_args(Estimator))}")
-    s_ff, s_xx, s_fx = cross_spectra(hits)
+    return frf_of_spectra(cross_spectra(hits), hits, estimator)
+
+
+def frf_of_spectra(spectra: Spectra, hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
+    """The same from the mean, or the sum, of the spectra of these hits."""
+    s_ff, s_xx, s_fx = spectra
     forms: dict[Estimator, Callable[[], NDArray[np.complex128]]] = {
-        "H1": lambda: s_fx / s_ff,
+        "H1": lambda: s_fx * (1 / s_ff),
         "H2": lambda: s_xx * s_fx / np.abs(s_fx) ** 2,
         "Hv": lambda: np.sqrt(s_xx / s_ff) * np.exp(1j * np.angle(s_fx)),
     }
@@ -49,21 +54,22 @@ def cross_spectra(hits: Sequence[Hit]) -> Spectra:
     n = hits[0].force.size
     records = np.zeros((2, n))
     spectra = np.empty((2, n // 2 + 1), np.complex128)
-    s_fx = np.zeros_like(spectra[0])
-    powers = np.zeros((2, 2 * s_fx.size))
+    parts = spectra.view(np.float64)
+    s_fx, powers = np.zeros_like(spectra[0]), np.zeros_like(parts)
     for hit in hits:  # one at a time: ten hits at once are ten times the cache of a processor
         part = windowed_force(hit)
-        records[0, part.samples] = part.force
+        backwards = -np.arange(part.samples.start, part.samples.stop)
+        records[0, backwards] = part.force  # in time: its spectrum is conj(F)
         records[1] = hit.acceleration
         np.fft.rfft(records, out=spectra)
-        records[0, part.samples] = 0.0
-        s_fx += np.conj(spectra[0]) * spectra[1]
-        powers += np.square(spectra.view(np.float64))
+        records[0, backwards] = 0.0
+        s_fx += spectra[0] * spectra[1]
+        powers += np.square(parts, out=parts)
     skew = _skew(hits[0])
     if skew:
         s_fx *= np.exp(-2j * np.pi * np.fft.rfftfreq(n, 1 / hits[0].sample_rate) * skew)
     s_ff, s_xx = (powers[:, ::2] + powers[:, 1::2]) / len(hits)
-    return s_ff, s_xx, s_fx / len(hits)
+    return s_ff, s_xx, s_fx * (1 / len(hits))
 
 
 def _skew(hit: Hit) -> float:

@@ -118,6 +118,6 @@ def from_accelerance(
     """FRF from acceleration over force (m/s^2/N) by division with -(2 pi f)^2; a line at 0 Hz is left out."""
     f = np.asarray(frequency, dtype=np.float64)
     keep = slice(1 if f.size and f.flat[0] == 0 else 0, None)
-    receptance = -np.asarray(accelerance, dtype=np.complex128)[keep] / (2 * np.pi * f[keep]) ** 2
+    receptance = np.asarray(accelerance, dtype=np.complex128)[keep] * (-1 / (2 * np.pi * f[keep]) ** 2)
     g2 = None if coherence is None else np.asarray(coherence, dtype=np.float64)[keep]
     return Frf(f[keep], receptance, g2, n_averages, "accelerance", usable_band)

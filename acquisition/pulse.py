@@ -13,16 +13,22 @@ FALLEN = 0.05
 """The pulse ends where the force has first fallen below this share of its peak, or into its noise ..."""
 NOISE_RATIO = 3.0
 """... which reaches to this many times the baseline's rms."""
+PIECE = 1024
+"""Samples looked at together."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pulse:
     """The main force pulse of a hit."""
 
-    force: NDArray[np.float64]
-    """Force with the baseline's mean taken off (N), shape (n,)."""
+    recorded: NDArray[np.float64]
+    """Force as it was recorded (N), shape (n,)."""
+    offset: float
+    """Mean of its baseline (N)."""
+    top: int
+    """Sample of the largest force."""
     peak: float
-    """Largest force (N)."""
+    """Largest force above the baseline (N)."""
     start: int
     """First sample above 5 % of the peak and the noise."""
     end: int
@@ -30,19 +36,33 @@ class Pulse:
     baseline_rms: float
     """rms of the force before the pulse, or after it where nothing was recorded before (N)."""
 
+    @property
+    def force(self) -> NDArray[np.float64]:
+        """Force with the baseline's mean taken off (N), shape (n,)."""
+        return self.recorded - self.offset
+
 
 def find_pulse(hit: Hit) -> Pulse | None:
     """The highest force pulse; None where no sample stands out of the baseline by 6 times its rms."""
     top = int(np.argmax(hit.force))
     quiet = baseline(hit.force, hit.pre_trigger or top)
-    force = hit.force - np.mean(quiet)
-    rms, peak = float(np.std(quiet)), float(force[top])
+    offset, rms = float(np.mean(quiet)), float(np.std(quiet))
+    peak = float(hit.force[top]) - offset
     if peak <= 6 * rms or peak <= 0:
         return None
-    below = force < max(FALLEN * peak, NOISE_RATIO * rms)
-    start = top - int(np.argmax(below[top::-1])) + 1 if below[: top + 1].any() else 0
-    end = top + int(np.argmax(below[top:])) if below[top:].any() else force.size
-    return Pulse(force, peak, start, end, rms)
+    foot = offset + max(FALLEN * peak, NOISE_RATIO * rms)
+    start = top - _length_above(foot, hit.force[top::-1]) + 1
+    end = top + _length_above(foot, hit.force[top:])
+    return Pulse(hit.force, offset, top, peak, start, end, rms)
+
+
+def _length_above(foot: float, signal: NDArray[np.float64]) -> int:
+    """How many samples stand before the first one below the foot; looked for piece by piece, as pulses are short."""
+    for at in range(0, signal.size, PIECE):
+        below = np.flatnonzero(signal[at : at + PIECE] < foot)
+        if below.size:
+            return at + int(below[0])
+    return signal.size
 
 
 def baseline(signal: NDArray[np.float64], before: int) -> NDArray[np.float64]:

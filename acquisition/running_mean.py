@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.estimate_frf import Spectra, cross_spectra, usable_band
-from acquisition.frf import Frf, from_accelerance
+from acquisition.estimate_frf import Spectra, cross_spectra, frf_of_spectra
+from acquisition.frf import Frf
 from acquisition.hit import Hit
 
 SETTLED_HITS = 4
@@ -21,24 +18,16 @@ PEAK_SHARE = 0.5
 
 
 class RunningMean:
-    """H1 of hits of one set-up from their spectra, which are kept one by one."""
+    """H1 of hits of one set-up from the sum of their spectra."""
 
     def __init__(self) -> None:
         """No hit yet."""
-        self._spectra: list[tuple[Hit, Spectra]] = []
-        self._frf: Frf | None = None
-
-    @property
-    def hits(self) -> tuple[Hit, ...]:
+        self.hits: tuple[Hit, ...] = ()
         """The hits in it, in the order in which they came."""
-        return tuple(hit for hit, _ in self._spectra)
-
-    @property
-    def frf(self) -> Frf | None:
+        self.frf: Frf | None = None
         """H1 with coherence and usable band, as estimate_frf gives it for the same hits; None where there is none."""
-        if self._frf is None and self._spectra:
-            self._frf = _h1(self.hits, [spectra for _, spectra in self._spectra])
-        return self._frf
+        self._sums: Spectra | None = None
+        self._before: Frf | None = None
 
     @property
     def change(self) -> float | None:
@@ -46,24 +35,23 @@ class RunningMean:
 
         rms of the difference of the accelerance with and without it over rms of the accelerance, in the usable band.
         """
-        if self.frf is None or len(self._spectra) < 2:
+        if self.frf is None or self._before is None:
             return None
         inside = _usable(self.frf)
-        now = self.frf.accelerance[inside]
-        before = _h1(self.hits[:-1], [spectra for _, spectra in self._spectra[:-1]]).accelerance[inside]
+        now, before = (frf.accelerance[inside] for frf in (self.frf, self._before))
         return float(np.linalg.norm(now - before) / np.linalg.norm(now))
 
     @property
     def settled(self) -> bool:
         """Whether more hits would hardly change the peak: at least SETTLED_HITS of them, and the random error of |H|,
         sqrt((1 - g2) / (2 n g2)), as rms over the lines near the highest peak, is below SETTLED_ERROR."""
-        return len(self._spectra) >= SETTLED_HITS and self.peak_error < SETTLED_ERROR
+        return len(self.hits) >= SETTLED_HITS and self.peak_error < SETTLED_ERROR
 
     @property
     def peak_error(self) -> float:
         """Standard error of |H| near the highest peak (-); inf under 3 hits, where coherence says nothing yet."""
         frf = self.frf
-        if frf is None or frf.random_error is None or len(self._spectra) < 3:
+        if frf is None or frf.random_error is None:
             return float("inf")
         size = np.abs(frf.accelerance) * _usable(frf)
         near = size >= PEAK_SHARE * np.max(size)
@@ -71,31 +59,25 @@ class RunningMean:
 
     def add(self, hit: Hit) -> None:
         """Take a good hit in; ValueError where it has no pulse, or another length or rate than those before."""
-        if self._spectra and (hit.force.size, hit.sample_rate) != (self.hits[0].force.size, self.hits[0].sample_rate):
+        if self.hits and (hit.force.size, hit.sample_rate) != (self.hits[0].force.size, self.hits[0].sample_rate):
             raise ValueError(
                 f"a hit of {hit.force.size} samples at {hit.sample_rate:g} Hz cannot join a mean of hits of "
                 f"{self.hits[0].force.size} samples at {self.hits[0].sample_rate:g} Hz; begin a new test"
             )
-        self._spectra.append((hit, cross_spectra([hit])))
-        self._frf = None
+        own = cross_spectra([hit])
+        sums = self._sums
+        self._sums = own if sums is None else (sums[0] + own[0], sums[1] + own[1], sums[2] + own[2])
+        self.hits += (hit,)
+        self._before, self.frf = self.frf, frf_of_spectra(self._sums, self.hits)
 
     def remove(self, hit: Hit) -> None:
         """Take a hit back; ValueError where it is not in the mean."""
-        kept = [entry for entry in self._spectra if entry[0] is not hit]
-        if len(kept) == len(self._spectra):
+        kept = [one for one in self.hits if one is not hit]
+        if len(kept) == len(self.hits):
             raise ValueError("this hit is not in the mean; only hits that were added can be taken back")
-        self._spectra, self._frf = kept, None
-
-
-def _h1(hits: Sequence[Hit], spectra: Sequence[Spectra]) -> Frf:
-    s_ff, s_xx, s_fx = (_mean([one[i] for one in spectra]) for i in range(3))
-    frequency = np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate)
-    coherence = np.minimum(np.abs(s_fx) ** 2 / (s_ff * s_xx), 1.0) if len(hits) > 1 else None
-    return from_accelerance(frequency, s_fx / s_ff, coherence, len(hits), usable_band(frequency, s_ff.real))
-
-
-def _mean(arrays: Sequence[NDArray[Any]]) -> NDArray[Any]:
-    return np.asarray(np.mean(arrays, axis=0))
+        self.hits, self.frf, self._sums = (), None, None
+        for one in kept:  # anew: subtraction would leave its rounding errors
+            self.add(one)
 
 
 def _usable(frf: Frf) -> NDArray[np.bool_]:

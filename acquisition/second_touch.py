@@ -59,14 +59,14 @@ def find_second_touch(pulse: Pulse) -> SecondTouch | None:
         share = float(outside[at]) / pulse.peak
         if outside[at] > limit * noise and share > max(SHARE - CERTAINTY * noise / pulse.peak, best.share):
             bin_ = at if at < near[0] else at - max(near[0], 0) + near[1]
-            best = SecondTouch((bin_ + 0.5) * step - float(np.argmax(pulse.force)), share)
+            best = SecondTouch((bin_ + 0.5) * step - pulse.top, share)
     return best if best.share else None
 
 
 def _without_main_pulse(pulse: Pulse, width: int) -> NDArray[np.float64]:
     """The force with a straight line where the main pulse stands, half its width on either side included."""
-    low, high = max(pulse.start - width // 2, 0), min(pulse.end + width // 2, pulse.force.size)
-    force = pulse.force.copy()
+    low, high = max(pulse.start - width // 2, 0), min(pulse.end + width // 2, pulse.recorded.size)
+    force = pulse.force
     before, after = force[max(low - width // 2, 0) : low], force[high : high + max(width // 2, 1)]
     ends = [float(np.mean(side)) if side.size else None for side in (before, after)]
     left, right = (end if end is not None else other or 0.0 for end, other in (ends, ends[::-1]))

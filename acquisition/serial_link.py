@@ -80,7 +80,10 @@ class SerialLink:
     def _read_all(self) -> None:
         try:
             while self._running:
-                self._keep(self._serial.read(self._serial.in_waiting or 1))
+                data = self._serial.read(1)
+                if waiting := self._serial.in_waiting:
+                    data += self._serial.read(waiting)  # one piece: the consumer is not woken for its first byte
+                self._keep(data)
         except (OSError, TermiosError, TypeError) as error:  # TypeError: pyserial's read after a hang-up
             with self._arrived:
                 self._failure = error
@@ -104,10 +107,13 @@ class SerialLink:
 class _TcpPort:
     """What SerialLink needs of a port, over TCP: pyserial's own socket:// hands over one byte a call."""
 
-    in_waiting = 65536
-
     def __init__(self, host: str, number: int) -> None:
         self._socket = socket.create_connection((host, number), timeout=2.0)
+
+    @property
+    def in_waiting(self) -> int:
+        """How much to ask for: as TCP does not tell how much there is, as much as there may be."""
+        return 65536 if select.select([self._socket], [], [], 0)[0] else 0
 
     def read(self, size: int) -> bytes:
         if not select.select([self._socket], [], [], 0.1)[0]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from acquisition.channel import Block
 from acquisition.taps import LOST_BEFORE, Frame, decode_data
 
@@ -43,4 +41,4 @@ class ScanStream:
         self._next_scan = block.first_scan + block.codes.shape[1]
         self.lost_scans += lost
         self.foreign = 0
-        return replace(block, lost_before=lost)
+        return Block(block.first_scan, block.codes, block.overload, lost)

@@ -37,10 +37,11 @@ def windowed_force(hit: Hit) -> WindowedForce:
     if pulse is None:
         raise ValueError("a hit has no force pulse; check hits with check_hit before averaging")
     width = max(pulse.end - pulse.start, 8)
-    samples = slice(max(pulse.start - 2 * width, 0), min(pulse.end + 2 * width, pulse.force.size))
-    sample = np.arange(samples.start, samples.stop)
-    beyond = np.maximum(sample - (pulse.end + width), (pulse.start - width) - sample)
-    window = 0.5 * (1 + np.cos(np.pi * np.clip(beyond / width, 0.0, 1.0)))
-    quiet = baseline(hit.force, hit.pre_trigger or int(np.argmax(hit.force)))
+    corners = np.array([pulse.start - 2 * width, pulse.start - width, pulse.end + width, pulse.end + 2 * width])
+    samples = slice(max(int(corners[0]), 0), min(int(corners[3]), hit.force.size))
+    beyond = np.interp(np.arange(samples.start, samples.stop), corners, [1.0, 0.0, 0.0, 1.0])
+    window = 0.5 + 0.5 * np.cos(np.pi * beyond)
+    quiet = baseline(hit.force, hit.pre_trigger or pulse.top)
     noise = pulse.baseline_rms
-    return WindowedForce(samples, pulse.force[samples] * window, window, noise, noise / np.sqrt(quiet.size))
+    force = (hit.force[samples] - pulse.offset) * window
+    return WindowedForce(samples, force, window, noise, noise / np.sqrt(quiet.size))

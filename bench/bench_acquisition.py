@@ -3,28 +3,42 @@
     python -m pip install -e .[bench]      (in an environment of its own)
     python bench/bench_acquisition.py [--seconds 60]
 
-Live: 2 channels x 102.4 kS/s x 16 bit through a pseudo-terminal, the emulator in a process of its own; one hit a
-second, each checked and averaged with the nine before it. The CPU time is that of the receiving process, all threads.
+Live: 2 channels x 102.4 kS/s x 16 bit through a pseudo-terminal into a whole tap test (reader, trigger, verdicts, disk,
+mean, curves) with its screen's server, one hit a second; the emulator and the page that follows the test run in
+processes of their own. The CPU time is that of the process under test, all threads, from the first TAP on.
 """
 
 from __future__ import annotations
 
 import argparse
+import asyncio
+import contextlib
+import json
 import os
 import platform
+import re
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from datetime import UTC, datetime
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import aiohttp
 import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from acquisition import Channel, Hit, TapsEmulator, TapsSource, Trigger, capture_hits, check_hit, estimate_frf
+from acquisition import Channel, Circumstances, Hit, TapsEmulator, TapsSource, Trigger, estimate_frf
 from acquisition.taps import Frame, FrameDecoder, MessageType, encode_data, encode_frame
 from acquisition.taps_stream import ScanStream
+from lobewatch.commands.init import make_machine_folder
+from lobewatch.machine_folder import MachineFolder
+from lobewatch.screen import ScreenServer
+from lobewatch.tap_session import TapSession, TapStopped
+from lobewatch.tap_state import Word
 
 RATE = 102_400.0
 CHANNELS = (Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0))
@@ -35,23 +49,15 @@ CROSSING = 30_000
 """Near here in each period."""
 AVERAGED = 10
 ROUNDS = 25
+QUIET = 8 * PERIOD
+"""Scans before the first hit, for the check of the rate and the self-check."""
 
 
-class Received(NamedTuple):
-    """What came of a stream."""
-
-    scans: int
-    lost: int
-    hits: int
-
-
-Receiver = Callable[[str, float], Received]
-"""(port, seconds): takes a stream for so long."""
-
-
-def one_period(seed: int = 1) -> NDArray[np.float64]:
-    """Force (N) and acceleration (m/s^2) of one hit, with noise, shape (2, PERIOD)."""
+def one_period(seed: int = 1, hammer: bool = True) -> NDArray[np.float64]:
+    """Force (N) and acceleration (m/s^2) of one hit, with noise, or of the noise alone, shape (2, PERIOD)."""
     noise = np.random.default_rng(seed).normal(scale=[[0.1], [2.0]], size=(2, PERIOD))
+    if not hammer:
+        return noise
     width = 70
     noise[0, CROSSING : CROSSING + width] += 250 * np.sin(np.pi * np.arange(width) / width) ** 4
     time_ = np.arange(PERIOD - CROSSING) / RATE
@@ -60,70 +66,119 @@ def one_period(seed: int = 1) -> NDArray[np.float64]:
 
 
 def emulate() -> None:
-    """The emulator's process: tells its port, serves until its input is closed."""
-    signal = np.tile(one_period(), 2)
-    with TapsEmulator(lambda first, n: signal[:, first % PERIOD : first % PERIOD + n], CHANNELS, RATE) as device:
+    """The emulator's process: tells its port, serves until its input is closed, tells when each record ended."""
+    hits, quiet = (np.tile(one, 2) for one in (one_period(), one_period(hammer=False)))
+    crossing = CROSSING + int(np.argmax(hits[0, CROSSING:] >= TRIGGER.level))
+    last = crossing - TRIGGER.pre_trigger + TRIGGER.n_samples - 1
+    sent: list[float] = []
+
+    def signal(first: int, n: int) -> NDArray[np.float64]:
+        if first >= QUIET and (last - first) % PERIOD < n:
+            sent.append(time.monotonic())
+        at = first % PERIOD
+        return (hits if first >= QUIET else quiet)[:, at : at + n]
+
+    with TapsEmulator(signal, CHANNELS, RATE) as device:
         print(device.port, flush=True)
         sys.stdin.read()
+    print(json.dumps(sent))
 
 
-def receive_hits(port: str, seconds: float) -> Received:
-    """The live test without its screen: capture, verdict, average of the last ten hits."""
-    hits: list[Hit] = []
-    taken = 0
-    ends = time.monotonic() + seconds
-    with TapsSource(port) as source:
-        source.start()
-        for hit in capture_hits(source, TRIGGER):
-            taken += 1
-            if not check_hit(hit):
-                hits = [*hits[1 - AVERAGED :], hit]
-                estimate_frf(hits)
-            if time.monotonic() > ends:
-                break
-        status = source.status
-        assert status is not None
-        return Received(status.samples_taken, source.lost_scans + source.overruns + status.overruns, taken)
+def watch(url: str) -> None:
+    """The page's process: follows the test until it ends, then tells when each verdict came."""
+    shown: list[float] = []
+
+    async def follow() -> None:
+        origin, _, token = url.partition("/#token=")
+        names = ("lobewatch", f"token.{token}")
+        kind = ""
+        async with (
+            aiohttp.ClientSession() as client,
+            client.ws_connect(f"{origin}/feed", protocols=names, headers={"Origin": origin}, max_msg_size=0) as feed,
+        ):
+            print("connected", flush=True)
+            async for message in feed:
+                now = time.monotonic()
+                if message.type is not aiohttp.WSMsgType.TEXT:
+                    continue
+                before, kind = kind, json.loads(message.data).get("kind", kind)
+                if kind != before and kind in ("good", "refused"):
+                    shown.append(now)
+
+    asyncio.run(follow())
+    print(json.dumps(shown))
 
 
-def live(seconds: float, receive: Receiver = receive_hits) -> None:
-    with subprocess.Popen(
-        [sys.executable, __file__, "--emulate"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as device:
-        assert device.stdout is not None
-        port = device.stdout.readline().strip()
-        wall, cpu = time.monotonic(), time.process_time()
-        received = receive(port, seconds)
-        wall, cpu = time.monotonic() - wall, time.process_time() - cpu
-        device.communicate("")
-    print(f"live, 2 x {RATE:g} S/s x 16 bit for {wall:.0f} s: {received.scans} scans, {received.lost} lost, ", end="")
-    print(f"{received.hits} hits, {100 * cpu / wall:.1f} % of one core")
+def live(seconds: float) -> None:
+    """CPU share and lost scans of a live tap test, and from the end of each record to its verdict on the page."""
+    sources: list[TapsSource] = []
+    device = helper("--emulate")
+    port = line_of(device)
+
+    def open_device() -> TapsSource:
+        sources.append(TapsSource(port))
+        return sources[-1]
+
+    with TemporaryDirectory() as directory:
+        folder = machine_folder(Path(directory) / "machine")
+        about = Circumstances("bench", datetime.now(UTC), "reference", machine_toml=folder.toml.read_text("utf-8"))
+        session = TapSession(folder, open_device, about)
+        with ScreenServer(session) as server:
+            page = helper("--watch", server.url)
+            line_of(page)
+            test = threading.Thread(target=until_stopped, args=(session,))
+            test.start()
+            while session.state.word is not Word.TAP and test.is_alive():
+                time.sleep(0.05)
+            wall, cpu = time.monotonic(), time.process_time()
+            test.join(seconds)
+            wall, cpu = time.monotonic() - wall, time.process_time() - cpu
+            session.stop()
+            test.join()
+    shown, sent = (np.array(json.loads(process.communicate()[0])) for process in (page, device))
+    status = sources[-1].status
+    assert status is not None
+    lost = sources[-1].lost_scans + sources[-1].overruns + status.overruns
+    late = 1e3 * (shown - sent[np.searchsorted(sent, shown) - 1])
+    print(
+        f"live, 2 x {RATE:g} S/s x 16 bit, with screen, for {wall:.0f} s: {status.samples_taken} scans, {lost} lost, ",
+        end="",
+    )
+    print(f"{session.state.good} good hits, {100 * cpu / wall:.1f} % of one core")
+    print(f"from the end of a record to its verdict on the page: median {np.median(late):.0f} ms, ", end="")
+    print(f"largest of {late.size}: {late.max():.0f} ms")
 
 
-def latency(n_hits: int = 12) -> None:
-    """From the end of a hit's record to its verdict and the new average; the clock is that of the frames sent."""
-    signal, sent = np.tile(one_period(), 2), {}
+def machine_folder(path: Path) -> MachineFolder:
+    """That of the example, with the record and the trigger of this bench."""
+    make_machine_folder(path, "surrogate_machine.toml")
+    folder = MachineFolder(path)
+    own = {
+        "hits": 1000,
+        "record_s": TRIGGER.n_samples / RATE,
+        "pre_trigger_s": TRIGGER.pre_trigger / RATE,
+        "trigger_n": TRIGGER.level,
+    }
+    text = folder.toml.read_text("utf-8")
+    for key, value in own.items():
+        text = re.sub(rf"^{key} = [\d.]+", f"{key} = {value}", text, flags=re.MULTILINE)
+    folder.toml.write_text(text, "utf-8")
+    return MachineFolder(path)
 
-    def timed(first: int, n: int) -> NDArray[np.float64]:
-        sent[first + n] = time.monotonic()
-        return signal[:, first % PERIOD : first % PERIOD + n]
 
-    verdicts, hits = [], []
-    with TapsEmulator(timed, CHANNELS, RATE) as device, TapsSource(device.port) as source:
-        source.start()
-        for hit in capture_hits(source, TRIGGER):
-            check_hit(hit)
-            hits.append(hit)
-            estimate_frf(hits[-AVERAGED:])
-            verdicts.append(time.monotonic())
-            if len(hits) == n_hits:
-                break
-    began = min(at - scan / RATE for scan, at in sent.items())
-    crossing = CROSSING + int(np.argmax(one_period()[0, CROSSING:] >= TRIGGER.level))
-    ends = crossing - TRIGGER.pre_trigger + TRIGGER.n_samples + PERIOD * np.arange(n_hits)
-    late = 1e3 * (np.array(verdicts) - began - ends / RATE)
-    print(f"from the end of a record to its verdict and the new average: median {np.median(late):.0f} ms, ", end="")
-    print(f"largest of {n_hits}: {late.max():.0f} ms")
+def until_stopped(session: TapSession) -> None:
+    with contextlib.suppress(TapStopped):
+        session.run()
+
+
+def helper(*arguments: str) -> subprocess.Popen[str]:
+    """This file in a process of its own."""
+    command = [sys.executable, __file__, *arguments]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+def line_of(process: subprocess.Popen[str]) -> str:
+    return process.stdout.readline().strip() if process.stdout else ""
 
 
 def decode(megabytes: float = 64.0) -> None:
@@ -186,14 +241,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--seconds", type=float, default=60.0, help="length of the live stream")
     parser.add_argument("--emulate", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--watch", metavar="URL", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.emulate:
         emulate()
         return
+    if arguments.watch:
+        watch(arguments.watch)
+        return
     print(f"Python {platform.python_version()}, numpy {np.__version__}, {os.cpu_count()} cores, one BLAS thread")
     decode()
     average()
-    latency()
     live(arguments.seconds)
 
 

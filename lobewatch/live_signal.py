@@ -43,10 +43,13 @@ class LiveSignal:
     @property
     def levels(self) -> tuple[float, float]:
         """rms about the mean of force (N) and acceleration (m/s^2) over the newest LEVEL_TIME."""
-        newest = np.concatenate([codes[self._rows] for codes in self._recent], axis=1)[
-            :, -round(LEVEL_TIME * self._rate) :
-        ]
-        force, response = np.std(newest, axis=1)
+        wanted = round(LEVEL_TIME * self._rate)
+        newest: list[NDArray[np.int32]] = []
+        for codes in reversed(self._recent):
+            newest.insert(0, codes[self._rows])
+            if sum(part.shape[1] for part in newest) >= wanted:
+                break
+        force, response = np.std(np.concatenate(newest, axis=1)[:, -wanted:], axis=1)
         return float(force * abs(self.channels[0].scale)), float(response * abs(self.channels[1].scale))
 
     def add(self, block: Block) -> None:

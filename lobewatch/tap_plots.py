@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Frf, Hit, RunningMean, cross_spectra, estimate_frf
+from acquisition import Frf, Hit, RunningMean, cross_spectra
+from acquisition.estimate_frf import frf_of_spectra
 from acquisition.pulse import find_pulse
 from lobewatch.tap_state import Plots
 
@@ -23,10 +24,11 @@ LEAST_COHERENT = 3
 def plots_of(hit: Hit, mean: RunningMean) -> Plots:
     """What the screen shows after a hit, good or not."""
     shown = _samples(hit)
-    last = None if find_pulse(hit) is None else estimate_frf([hit])
+    spectra = None if find_pulse(hit) is None else cross_spectra([hit])
+    last = None if spectra is None else frf_of_spectra(spectra, [hit])
     band = next((frf.usable_band for frf in (mean.frf, last) if frf is not None), None)
     frequency = np.arange(1, hit.force.size // 2 + 1) * hit.sample_rate / hit.force.size
-    spectrum = None if last is None else _decibels(cross_spectra([hit])[0][1:])
+    spectrum = None if spectra is None else _decibels(spectra[0][1:])
     sizes = [None if frf is None else np.abs(frf.receptance) for frf in (mean.frf, last)]
     end = frequency.size if band is None else int(np.searchsorted(frequency, BEYOND_BAND * band[1], side="right"))
     lines = _kept([curve for curve in (*sizes, spectrum) if curve is not None], end)

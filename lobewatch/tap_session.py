@@ -280,12 +280,12 @@ class TapSession:
             self._show(word=word)
 
     def _take(self, hit: Hit) -> None:
-        """Judge a hit, keep it, and only then show it."""
+        """Judge a hit and show the verdict at once; it is counted when it is on the disk."""
         verdict = self._judge(hit)
+        self._show_verdict(verdict.flags, verdict.flags.words, verdict.text)
         self._tap.add(hit, verdict.flags, verdict.text)
         if not verdict.flags:
             self._mean.add(hit)
-        self._show_verdict(verdict.flags, verdict.flags.words, verdict.text)
         self._show_hits()
         self._draw(hit)
 

@@ -56,7 +56,7 @@ class TapInProgress:
     @property
     def good(self) -> int:
         """How many hits may be averaged."""
-        return sum(not flags for flags in self.flags)
+        return self.flags.count(HitFlags.OK)
 
     @property
     def taken(self) -> tuple[TakenHit, ...]:

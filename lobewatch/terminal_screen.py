@@ -50,7 +50,7 @@ class TerminalScreen:
         """Nothing is shown yet; console None: standard error."""
         self._session = session
         self._console = console or Console(stderr=True, highlight=False, emoji=False)
-        self._muted = False
+        self._muted = self._ahead_of_hit = False
         self._keys = Keys()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="terminal screen", daemon=True)
@@ -92,8 +92,11 @@ class TerminalScreen:
             self._muted = not self._muted
 
     def ring(self, before: TapState, state: TapState) -> None:
-        """The bells of a new word or hit."""
-        told = state.word != before.word or len(state.hits) > len(before.hits)
+        """The bells of a new word or hit; a verdict's word may come a picture ahead of its hit, and then rings once."""
+        word, hit = state.word != before.word, len(state.hits) > len(before.hits)
+        told = word or (hit and not self._ahead_of_hit)
+        if word or hit:
+            self._ahead_of_hit = not hit
         for _ in range(BELLS.get(state.word, 0) if told and not self._muted else 0):
             self._console.bell()
             self._ended.wait(BELL_PAUSE)

@@ -64,6 +64,12 @@ def read_until(link: SerialLink, n: int) -> bytes:
     return data
 
 
+def test_what_comes_together_is_handed_over_together(cable: Cable, link: SerialLink) -> None:
+    for _ in range(50):
+        os.write(cable.master, bytes(2000))
+        assert len(link.read(5.0)) == 2000
+
+
 def test_a_sleeping_consumer_never_blocks_the_reader_and_loses_nothing_below_the_limit(
     cable: Cable, link: SerialLink
 ) -> None:

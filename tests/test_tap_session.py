@@ -300,6 +300,21 @@ def test_no_scan_is_lost_to_a_slow_disk_and_slow_mathematics(
     assert len(lost) > 3 * 0.4 * RATE / 512
 
 
+def test_a_verdict_does_not_wait_for_the_disk_and_counts_once_it_is_there(
+    folder: MachineFolder, tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[tuple[Word, str, int]] = []
+
+    def keep(*arguments: Any) -> None:
+        shown.append((session.state.word, session.state.verdict, session.state.good))
+        write_hit(*arguments)
+
+    monkeypatch.setattr("lobewatch.tapping.write_hit", keep)
+    session = session_of(folder, lambda: Simulated(tapper(), channels))
+    session.run()
+    assert shown == [(Word.GOOD, "good", good) for good in range(10)]
+
+
 def test_there_is_no_measurement_before_the_end(folder: MachineFolder, tapper: Tapper, channels: Pair) -> None:
     session = session_of(folder, lambda: Simulated(tapper(), channels))
     with pytest.raises(ValueError, match="not finished"):

@@ -172,3 +172,15 @@ def test_lines_for_a_log_tell_everything_once() -> None:
     assert said.count(" / 10") == 1
     assert "  1 / 10  ✗ DOUBLE HIT  Second peak 12 ms after the first (18 %): let it bounce [back].  (310 N)" in said
     assert said.count(away) == 1
+
+
+def test_a_word_ahead_of_its_hit_rings_once_and_the_next_hit_again(terminal: int) -> None:
+    screen, file = screen_of(Session())
+    word = replace(STATE, word=Word.GOOD)
+    first = replace(word, hits=(*STATE.hits, GOOD))
+    second = replace(first, hits=(*first.hits, GOOD))
+    bells = []
+    for before, state in ((STATE, word), (word, first), (first, second)):
+        screen.ring(before, state)
+        bells.append(file.getvalue().count("\a"))
+    assert bells == [1, 1, 2]

@@ -11,7 +11,9 @@ from lobewatch.screen.messages import plots_message, state_message
 from lobewatch.tap_state import Plots, TapState
 
 PERIOD = 0.05
-"""At most so often (s)."""
+"""At most so often, but for a new word (s)."""
+LOOK = 0.01
+"""How often is looked for one (s)."""
 SIGN_OF_LIFE = 1.0
 """An empty message where nothing has changed for so long (s): the page takes 3 s of silence for a lost connection."""
 
@@ -45,7 +47,8 @@ async def _send_changes(
     while True:
         ended = over()
         state = newest()
-        if state is not sent:
+        due = sent is None or state.word is not sent.word or clock() - last >= PERIOD or ended
+        if state is not sent and due:
             if state.plots is not None and state.plots is not plots:
                 await socket.send_bytes(plots_message(state.plots))
             await socket.send_str(state_message(state))
@@ -55,7 +58,7 @@ async def _send_changes(
             last = clock()
         if ended:
             return
-        await asyncio.sleep(PERIOD)
+        await asyncio.sleep(LOOK)
 
 
 async def _until_closed(socket: web.WebSocketResponse) -> None:

@@ -11,6 +11,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import islice, pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -202,6 +203,33 @@ def test_a_device_that_describes_itself_wrongly_is_refused(tapper: Tapper) -> No
         pytest.raises(DeviceError, match=r"describes itself wrongly .*quantity='temperature'"),
     ):
         TapsSource(device.port)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("serial", "", "serial is empty"),
+        ("fs_choices", [], r"fs_choices=\[\] are no sample rates"),
+        ("fs_choices", [0], r"fs_choices=\[0\] are no sample rates"),
+        ("skew_s", float("nan"), "skew=nan s is not a finite number"),
+    ],
+)
+def test_an_info_that_would_spoil_the_time_base_is_refused(
+    device: TapsEmulator, monkeypatch: pytest.MonkeyPatch, key: str, value: Any, message: str
+) -> None:
+    said = device._info()  # noqa: SLF001
+    (said if key in said else said["channels"][1])[key] = value
+    monkeypatch.setattr(device, "_info", lambda: said)
+    with pytest.raises(DeviceError, match=rf"describes itself wrongly .*{message}"):
+        TapsSource(device.port)
+
+
+def test_a_sensor_without_a_calibration_date_is_taken(device: TapsEmulator, monkeypatch: pytest.MonkeyPatch) -> None:
+    said = device._info()  # noqa: SLF001
+    said["channels"][0]["sens_date"] = None
+    monkeypatch.setattr(device, "_info", lambda: said)
+    with TapsSource(device.port) as source:
+        assert source.channels[0].calibration_date == ""
 
 
 @pytest.mark.parametrize(("bits", "form"), [(12, 0), (16, 0), (18, 1), (24, 1), (32, 2)])

@@ -71,7 +71,8 @@ class TapsSource:
     @property
     def fault(self) -> str:
         """One sentence on a pulled cable or a sensor without supply while that lasts; empty where all is well."""
-        return self._events.fault(self.channels)
+        numbers = (entry["i"] for entry in self.info["channels"])
+        return self._events.fault(dict(zip(numbers, self.channels, strict=True)))
 
     @property
     def lost_scans(self) -> int:

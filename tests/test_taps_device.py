@@ -316,6 +316,22 @@ def test_events_and_standing_faults_reach_the_user(device: TapsEmulator) -> None
         assert source.fault == ""
 
 
+def test_a_fault_names_the_sensor_by_the_number_that_info_gives_it(
+    device: TapsEmulator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = device._info()  # noqa: SLF001
+    said["channels"][0]["i"], said["channels"][1]["i"] = 1, 0
+    monkeypatch.setattr(device, "_info", lambda: said)
+    monkeypatch.setattr(device, "_configure", lambda _: None)
+    with TapsSource(device.port) as source:
+        source.start()
+        device.send_event(Event(EventKind.CABLE, channel=0))
+        for _ in source.blocks():
+            if source.fault:
+                break
+        assert source.fault.startswith("the cable of the acceleration sensor")
+
+
 def test_a_fault_from_before_the_start_is_told_again(device: TapsEmulator) -> None:
     device.send_event(Event(EventKind.SENSOR_BIAS, channel=0))
     for _ in range(2):

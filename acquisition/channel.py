@@ -40,6 +40,8 @@ class Channel:
             raise ValueError(f"{self.quantity} sensitivity={self.sensitivity} is not a finite number other than 0")
         if not (np.isfinite(self.full_scale) and self.full_scale > 0):
             raise ValueError(f"{self.quantity} full_scale={self.full_scale} V is not > 0")
+        if not np.isfinite(self.skew):
+            raise ValueError(f"{self.quantity} skew={self.skew} s is not a finite number")
 
     @property
     def scale(self) -> float:

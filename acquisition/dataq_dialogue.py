@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from acquisition.dataq import answer_in, encode_command, model_of, split_lines
+from acquisition.dataq import REFUSALS, answer_in, encode_command, model_of, split_lines
 from acquisition.errors import DeviceError
 from acquisition.serial_link import SerialLink
 
@@ -69,6 +69,8 @@ class DataqDialogue:
         try:
             if maker.upper() != "DATAQ":
                 raise ValueError(f"maker {maker!r} is not DATAQ")
+            if not serial:
+                raise ValueError("it names no serial number, by which its measured sample rate is known again")
             return DataqIdentity(model_of(model), serial[:8], firmware, int(dividend))
         except ValueError as error:
             raise DeviceError(f"the device on {self._link.port} is none that this driver knows: {error}") from error
@@ -83,7 +85,8 @@ class DataqDialogue:
             while (left := deadline - time.monotonic()) > 0:
                 lines, rest = split_lines(rest + self._link.read(left))
                 for line in lines:
-                    if (answer := answer_in(command, line)) is not None:
+                    answer = answer_in(command, line)
+                    if answer is not None and not any(refusal in answer for refusal in REFUSALS):
                         return answer
                     said = line or said
         tries = f"{self._tries} tries"

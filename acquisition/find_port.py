@@ -18,8 +18,8 @@ def find_port(vid: int, serial_number: str) -> str | None:
 
 
 def usb_identity(port: str) -> tuple[int, str] | None:
-    """Vendor id and serial number of what is plugged in at a port; None where it is no USB device."""
+    """Vendor id and serial number of what is plugged in at a port; None where it is no USB device or has no number."""
     for known in list_ports.comports(include_links=True):
-        if known.device == port and known.vid is not None:
-            return known.vid, known.serial_number or ""
+        if known.device == port and known.vid is not None and known.serial_number:
+            return known.vid, known.serial_number
     return None

@@ -41,7 +41,8 @@ def explain_open_error(port: str, error: Exception, platform: str = sys.platform
         "refused": "nothing listens there: start the device or emulator first",
     }
     cure = next((hint for word, hint in hints.items() if word in text), "check the port's name and the cable")
-    reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else text
+    number = (error.errno or 0) if isinstance(error, OSError) else 0
+    reason = os.strerror(number) if number > 0 else text  # a host that has no address comes with a negative number
     return f"port {port} cannot be opened ({reason}); {cure}"
 
 

@@ -48,7 +48,7 @@ def probe_port(port: str, vendor: int | None = None) -> DeviceIdentity | None:
 
 def _ask_taps(link: SerialLink) -> DeviceIdentity | None:
     decoder = FrameDecoder()
-    link.write(encode_frame(Frame(MessageType.HELLO)))
+    link.write(b"\x00" + encode_frame(Frame(MessageType.HELLO)))  # ends what another program has left half said
     deadline = time.monotonic() + ANSWER_TIME
     while (left := deadline - time.monotonic()) > 0:
         for frame in decoder.feed(link.read(left)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import struct
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from acquisition.channel import Channel
@@ -77,12 +78,12 @@ class EventLog:
         others = (fault for fault in self._standing if (fault.kind, fault.channel) != (event.kind, event.channel))
         self._standing = (*others, event) if event.begins and event.kind in _FAULTS else tuple(others)
 
-    def fault(self, channels: tuple[Channel, ...]) -> str:
-        """One sentence on the faults that stand; empty where all is well."""
+    def fault(self, channels: Mapping[int, Channel]) -> str:
+        """One sentence on the faults that stand; empty where all is well. channels: by their i in INFO."""
         return "; ".join(_FAULTS[EventKind(event.kind)].format(_name(event, channels)) for event in self._standing)
 
 
-def _name(event: Event, channels: tuple[Channel, ...]) -> str:
+def _name(event: Event, channels: Mapping[int, Channel]) -> str:
     if event.channel is None:
         return "force or acceleration"
-    return channels[event.channel].quantity if event.channel < len(channels) else f"(channel {event.channel})"
+    return channels[event.channel].quantity if event.channel in channels else f"(channel {event.channel})"

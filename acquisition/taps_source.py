@@ -71,7 +71,8 @@ class TapsSource:
     @property
     def fault(self) -> str:
         """One sentence on a pulled cable or a sensor without supply while that lasts; empty where all is well."""
-        return self._events.fault(self.channels)
+        numbers = (entry["i"] for entry in self.info["channels"])
+        return self._events.fault(dict(zip(numbers, self.channels, strict=True)))
 
     @property
     def lost_scans(self) -> int:
@@ -134,7 +135,9 @@ class TapsSource:
         try:
             info = json.loads(body)
             channels = _channels(info)
-            info["model"], info["fs_choices"] = str(info["model"]), [float(rate) for rate in info["fs_choices"]]
+            info["model"], info["fs_choices"] = str(info["model"]), _rates(info["fs_choices"])
+            if not info["serial"]:
+                raise ValueError("serial is empty; the measured sample rate is kept by it")
         except (ValueError, KeyError, TypeError) as error:
             raise DeviceError(
                 f"the DAQ on {self._link.port} describes itself wrongly ({type(error).__name__}: {error}); "
@@ -198,6 +201,13 @@ class TapsSource:
         return frame.type == answer and (answer != MessageType.ACK or about == self._seq)
 
 
+def _rates(choices: list[float]) -> list[float]:
+    rates = [float(rate) for rate in choices]
+    if not rates or not all(0 < rate < float("inf") for rate in rates):
+        raise ValueError(f"fs_choices={choices} are no sample rates > 0")
+    return rates
+
+
 def _channels(info: dict[str, Any]) -> tuple[Channel, ...]:
     """Channels as the device reports them; sens_V_per_EU is V per N or V per m/s^2, before its gain.
 
@@ -213,7 +223,7 @@ def _channels(info: dict[str, Any]) -> tuple[Channel, ...]:
             sensitivity=entry["sens_V_per_EU"] * entry.get("gain", 1.0),
             full_scale=entry["fs_V"],
             adc_bits=info["adc_bits"],
-            calibration_date=entry.get("sens_date", ""),
+            calibration_date=str(entry.get("sens_date") or ""),
             skew=entry.get("skew_s", 0.0),
         )
         for entry in info["channels"]

@@ -2,8 +2,32 @@
 
 from __future__ import annotations
 
-from acquisition import DataqSource, FileSource, TapsSource
+from acquisition import DataqSource, DeviceError, FileSource, TapsSource, find_port, usb_identity
 from lobewatch.daq_tables import Daq
+
+
+class Plug:
+    """Opens one device again and again: a USB device wherever it is plugged in after the first time.
+
+    A USB device without a serial number, and what is no USB device, is known by the name of its port alone.
+    """
+
+    def __init__(self, daq: Daq, port: str) -> None:
+        """As [daq] sets it up; port: where it is the first time."""
+        self._daq, self._port = daq, port
+        self._identity: tuple[int, str] | None = None
+
+    def open(self) -> TapsSource | DataqSource | FileSource:
+        """See open_source; DeviceError, too, while the USB device is nowhere: no other one at its port is touched."""
+        if self._identity is not None and usb_identity(self._port) != self._identity:
+            found = find_port(*self._identity)
+            if found is None:
+                number = self._identity[1]
+                raise DeviceError(f"the DAQ with the USB serial number {number} is not plugged in; plug it in")
+            self._port = found
+        source = open_source(self._daq, self._port)
+        self._identity = self._identity or usb_identity(self._port)
+        return source
 
 
 def open_source(daq: Daq, port: str) -> TapsSource | DataqSource | FileSource:

@@ -110,7 +110,10 @@ def test_a_command_without_its_echo_is_sent_three_times() -> None:
     assert connect(script).sample_rate == 50_000.0
 
 
-@pytest.mark.parametrize("answer", [b"Invalid Parameter\r", b"Command not found\r", b"Command not available\r"])
+@pytest.mark.parametrize(
+    "answer",
+    [b"Invalid Parameter\r", b"Command not found\r", b"Command not available\r", b"slist 1 1027 Invalid Parameter\r"],
+)
 def test_a_refused_command_is_told_with_the_words_of_the_device(answer: bytes) -> None:
     script = [*IDENTITY, *SET_UP[:2], *[(b"slist 1 1027\r", answer)] * 3]
     words = answer.decode().strip()
@@ -132,6 +135,7 @@ def test_a_silent_device_gets_the_hint_to_cdc_mode() -> None:
         (2, b"info 1 1100\r", "model '1100' is none of DI-1120, DI-2108"),
         (3, b"info 2 1.20\r", "has firmware 1.20; 1.35 or newer is needed"),
         (3, b"info 2 78\r", "has firmware 1.20; 1.35 or newer is needed"),
+        (4, b"info 6\r", "it names no serial number"),
         (5, b"info 9 fast\r", "is none that this driver knows"),
     ],
 )

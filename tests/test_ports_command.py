@@ -227,7 +227,7 @@ def test_the_group_in_the_cure_is_that_of_the_port(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("vendor", "first"),
-    [(0x0683, b"stop\r"), (0x16C0, encode_frame(Frame(MessageType.HELLO)))],
+    [(0x0683, b"stop\r"), (0x16C0, b"\x00" + encode_frame(Frame(MessageType.HELLO)))],
     ids=["dataq", "other"],
 )
 def test_a_strange_device_hears_one_question_only(monkeypatch: pytest.MonkeyPatch, vendor: int, first: bytes) -> None:
@@ -245,6 +245,16 @@ def test_a_strange_device_hears_one_question_only(monkeypatch: pytest.MonkeyPatc
         os.close(master)
         os.close(slave)
     assert heard in (first, first + b"info 0\r")
+
+
+def test_a_device_that_the_wrong_driver_has_talked_to_is_named_all_the_same(trial: MachineFolder) -> None:
+    with taps_device(trial) as device:
+        handle = os.open(device.port, os.O_RDWR | os.O_NOCTTY)
+        os.write(handle, b"stop\rinfo 0\r")
+        found = probe_port(device.port)
+        os.close(handle)
+    assert found is not None
+    assert found.driver == "taps"
 
 
 def test_a_device_that_talks_nonsense_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -14,6 +15,7 @@ import pytest
 import serial
 
 from acquisition import DeviceError, find_port, usb_identity
+from acquisition.port_hints import explain_open_error
 from acquisition.serial_link import SerialLink
 
 pty = pytest.importorskip("pty", reason="pseudo-terminals are needed")
@@ -170,6 +172,11 @@ def test_a_port_that_cannot_be_opened_says_why(error: Exception, cure: str, monk
         SerialLink("/dev/ttyACM0")
 
 
+def test_a_host_without_an_address_is_said_in_the_words_of_the_system() -> None:
+    error = socket.gaierror(-2, "Name or service not known")
+    assert "(" + str(error) + ")" in explain_open_error("socket://daq.invalid:5", error)
+
+
 def test_a_device_is_found_wherever_it_is_plugged_in(monkeypatch: pytest.MonkeyPatch) -> None:
     modem = SimpleNamespace(device="/dev/ttyS0", vid=None, serial_number=None)
     other = SimpleNamespace(device="/dev/ttyACM0", vid=0x0683, serial_number="5C2A")
@@ -182,4 +189,6 @@ def test_a_device_is_found_wherever_it_is_plugged_in(monkeypatch: pytest.MonkeyP
     assert find_port(*identity) is None
     ports.append(SimpleNamespace(device="/dev/ttyACM4", vid=0x0683, serial_number="5c2b"))
     assert find_port(*identity) == "/dev/ttyACM4"
+    ports.append(SimpleNamespace(device="/dev/ttyACM5", vid=0x0683, serial_number=None))
+    assert usb_identity("/dev/ttyACM5") is None  # any other of its kind would be taken for it
     assert usb_identity("/dev/ttyS0") is usb_identity("/dev/pts/3") is None

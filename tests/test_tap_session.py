@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from itertools import count, groupby, takewhile
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ from acquisition import (
     write_hit,
 )
 from lobewatch.commands.init import make_machine_folder
+from lobewatch.devices import Plug
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.tap_plots import plots_of
 from lobewatch.tap_session import TapSession, TapStopped
@@ -241,6 +243,34 @@ def test_a_cable_pulled_from_a_real_port(folder: MachineFolder, tapper: Tapper, 
     assert Word.NO_DEVICE in {state.word for state in states}
     assert len(tap.accepted) == 10
     assert not any(hit.lost_scans for hit in tap.hits)
+
+
+def test_a_device_that_comes_back_elsewhere_is_found_and_a_stranger_at_its_port_is_left_alone(
+    folder: MachineFolder, tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[str] = []
+
+    def open_taps(port: str, sample_rate: float | None) -> TapsSource:
+        opened.append(port)
+        return TapsSource(port, sample_rate)
+
+    with (
+        TapsEmulator(tapper(1), channels, RATE, realtime=False, faults=Faults(unplug_after=100_000)) as first,
+        TapsEmulator(tapper(2), channels, RATE, realtime=False) as second,
+    ):
+        ports = [SimpleNamespace(device=first.port, vid=0x16C0, serial_number="5C2B")]
+
+        def plug(state: TapState) -> None:
+            if state.word is Word.NO_DEVICE:
+                ports[0] = SimpleNamespace(device=first.port, vid=0x16C0, serial_number="a stranger")
+            if "serial number 5C2B is not plugged in; plug it in: the test goes on" in state.reason:
+                ports.append(SimpleNamespace(device=second.port, vid=0x16C0, serial_number="5C2B"))
+
+        monkeypatch.setattr("serial.tools.list_ports.comports", lambda **_: ports)
+        monkeypatch.setattr("lobewatch.devices.TapsSource", open_taps)
+        tap = session_of(folder, Plug(folder.machine.daq, first.port).open, plug).run()
+    assert opened == [first.port, second.port]
+    assert len(tap.accepted) == 10
 
 
 def test_a_taken_port_is_told_at_the_start(folder: MachineFolder, tapper: Tapper, channels: Pair) -> None:

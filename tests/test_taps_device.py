@@ -11,6 +11,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import islice, pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -204,6 +205,33 @@ def test_a_device_that_describes_itself_wrongly_is_refused(tapper: Tapper) -> No
         TapsSource(device.port)
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("serial", "", "serial is empty"),
+        ("fs_choices", [], r"fs_choices=\[\] are no sample rates"),
+        ("fs_choices", [0], r"fs_choices=\[0\] are no sample rates"),
+        ("skew_s", float("nan"), "skew=nan s is not a finite number"),
+    ],
+)
+def test_an_info_that_would_spoil_the_time_base_is_refused(
+    device: TapsEmulator, monkeypatch: pytest.MonkeyPatch, key: str, value: Any, message: str
+) -> None:
+    said = device._info()  # noqa: SLF001
+    (said if key in said else said["channels"][1])[key] = value
+    monkeypatch.setattr(device, "_info", lambda: said)
+    with pytest.raises(DeviceError, match=rf"describes itself wrongly .*{message}"):
+        TapsSource(device.port)
+
+
+def test_a_sensor_without_a_calibration_date_is_taken(device: TapsEmulator, monkeypatch: pytest.MonkeyPatch) -> None:
+    said = device._info()  # noqa: SLF001
+    said["channels"][0]["sens_date"] = None
+    monkeypatch.setattr(device, "_info", lambda: said)
+    with TapsSource(device.port) as source:
+        assert source.channels[0].calibration_date == ""
+
+
 @pytest.mark.parametrize(("bits", "form"), [(12, 0), (16, 0), (18, 1), (24, 1), (32, 2)])
 def test_a_device_is_asked_for_the_shortest_words_that_hold_its_codes(
     bits: int, form: int, tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch
@@ -286,6 +314,22 @@ def test_events_and_standing_faults_reach_the_user(device: TapsEmulator) -> None
         assert (button.kind, button.begins, button.channel) == (EventKind.BUTTON, True, None)
         assert button.scan > 0
         assert source.fault == ""
+
+
+def test_a_fault_names_the_sensor_by_the_number_that_info_gives_it(
+    device: TapsEmulator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = device._info()  # noqa: SLF001
+    said["channels"][0]["i"], said["channels"][1]["i"] = 1, 0
+    monkeypatch.setattr(device, "_info", lambda: said)
+    monkeypatch.setattr(device, "_configure", lambda _: None)
+    with TapsSource(device.port) as source:
+        source.start()
+        device.send_event(Event(EventKind.CABLE, channel=0))
+        for _ in source.blocks():
+            if source.fault:
+                break
+        assert source.fault.startswith("the cable of the acceleration sensor")
 
 
 def test_a_fault_from_before_the_start_is_told_again(device: TapsEmulator) -> None:

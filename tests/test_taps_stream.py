@@ -169,7 +169,7 @@ def test_an_event_that_comes_twice_happens_once_and_rubbish_is_none() -> None:
     for seq, body in [(1, press.encode()), (1, press.encode()), (2, press.encode()), (3, NOISE), (4, b"")]:
         log.add(Frame(MessageType.EVENT, seq, body, SESSION))
     assert list(log.new) == [press, press]
-    assert log.fault(()) == ""
+    assert log.fault({}) == ""
 
 
 def test_faults_stand_until_they_are_gone() -> None:
@@ -183,7 +183,7 @@ def test_faults_stand_until_they_are_gone() -> None:
     said = []
     for seq, event in enumerate(events):
         log.add(Frame(MessageType.EVENT, seq, event.encode()))
-        said.append(log.fault(()))
+        said.append(log.fault({}))
     assert said[0].startswith("the cable of the (channel 5) sensor is broken")
     assert said[1].count(";") == said[2].count(";") == 1
     assert said[3].startswith("the force or acceleration sensor has no proper supply")

@@ -11,7 +11,7 @@ import typer
 
 from acquisition import Circumstances
 from lobewatch.describe import measurement_json, measurement_texts
-from lobewatch.devices import open_source
+from lobewatch.devices import Plug
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.output import Json, emit, notes
 from lobewatch.show_address import Listen, Token, show_address
@@ -60,7 +60,7 @@ def tap(
         operator,
         folder.toml.read_text("utf-8"),
     )
-    session = TapSession(folder, lambda: open_source(setup.daq, port), about, resume=not new)
+    session = TapSession(folder, Plug(setup.daq, port).open, about, resume=not new)
     try:
         with contextlib.ExitStack() as screens:
             if screen:

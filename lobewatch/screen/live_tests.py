@@ -7,7 +7,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 from acquisition import Circumstances, DataError
-from lobewatch.devices import open_source
+from lobewatch.devices import Plug
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.tap_session import TapSession, TapStopped
 from lobewatch.tap_state import TapState, Word
@@ -23,7 +23,7 @@ class LiveTest:
             raise DataError(f"{folder.toml}: no port in [daq]; write port there, as lobewatch tap --port takes it")
         text = folder.toml.read_text("utf-8")
         about = Circumstances(machine.machine.name, datetime.now(UTC), machine.tap.tool, direction, "", text)
-        self._session = TapSession(folder, lambda: open_source(machine.daq, machine.daq.port), about)
+        self._session = TapSession(folder, Plug(machine.daq, machine.daq.port).open, about)
         self._end: TapState | None = None
         self._thread = threading.Thread(target=self._run, name="tap test", daemon=True)
         self._thread.start()

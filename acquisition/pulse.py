@@ -34,7 +34,7 @@ class Pulse:
 def find_pulse(hit: Hit) -> Pulse | None:
     """The highest force pulse; None where no sample stands out of the baseline by 6 times its rms."""
     top = int(np.argmax(hit.force))
-    quiet = baseline(hit.force, hit.pre_trigger or top)
+    quiet = baseline(hit.force, samples_before(hit))
     force = hit.force - np.mean(quiet)
     rms, peak = float(np.std(quiet)), float(force[top])
     if peak <= 6 * rms or peak <= 0:
@@ -43,6 +43,15 @@ def find_pulse(hit: Hit) -> Pulse | None:
     start = top - int(np.argmax(below[top::-1])) + 1 if below[: top + 1].any() else 0
     end = top + int(np.argmax(below[top:])) if below[top:].any() else force.size
     return Pulse(force, peak, start, end, rms)
+
+
+def samples_before(hit: Hit) -> int:
+    """The pre-trigger, or where it is not known the samples before the force last rises above 5 % of its peak."""
+    if hit.pre_trigger:
+        return hit.pre_trigger
+    above = hit.force[: int(np.argmax(hit.force)) + 1] - np.median(hit.force)
+    low = np.flatnonzero(above < FALLEN * above[-1])
+    return int(low[-1]) + 1 if low.size else 0
 
 
 def baseline(signal: NDArray[np.float64], before: int) -> NDArray[np.float64]:

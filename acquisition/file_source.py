@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from acquisition.channel import Block, Channel, ChannelQuantity
 from acquisition.hit import Hit
+from acquisition.pulse import samples_before
 from acquisition.read_recording import read_hits
 
 PAUSE = 1.0
@@ -111,7 +112,7 @@ def _channel(quantity: ChannelQuantity, hits: list[Hit]) -> Channel:
 
 def _quiet(hit: Hit, codes: NDArray[np.int32]) -> NDArray[np.int32]:
     """Scans before the pulse (four fifths of them: its foot is left out), forwards and backwards, (n, 2)."""
-    before = int(0.8 * (hit.pre_trigger or np.argmax(hit.force)))
+    before = int(0.8 * samples_before(hit))
     noise = codes.T[: max(before, 1)]
     return np.concatenate([noise, noise[::-1]])
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.hit import Hit
-from acquisition.pulse import baseline
+from acquisition.pulse import baseline, samples_before
 
 RAIL_SAMPLES = 3
 """Samples at a rail of the converter, or in a row at the extreme value of one without codes."""
@@ -18,6 +18,9 @@ FLAT_SAMPLES = 2.5
 """... and a flat one this many samples more than that."""
 SCALES = (1.0, 0.25, 0.0625)
 """Half widths of the uppermost third, in 3 times the noise before the hit; a saturated amplifier cuts that off too."""
+
+DIGITS = 1e-4
+"""Finest step, as a share of the maximum, that is believed of a recording without codes."""
 
 
 @dataclass(frozen=True)
@@ -35,25 +38,25 @@ class Overload:
 def find_overload(hit: Hit, index: int) -> Overload | None:
     """Overload of the force (index 0) or of the response (1); None where there is none.
 
-    Certain: three codes at one rail. Inferred: the extreme value three times in a row in a recording without codes;
-    or a flat top, as an amplifier makes it that saturates before the converter does, with noise on top.
+    Certain: three codes at one rail. Inferred: the extreme value three times in a row in a recording without codes
+    whose steps are not that coarse; or a flat top, as an amplifier makes it that saturates before the converter does,
+    with noise on top.
     """
     signal = np.asarray((hit.force, hit.acceleration)[index])
+    scale = 0.0
     if hit.codes is not None and hit.channels is not None:
+        scale = hit.channels[index].scale
         for rail in hit.channels[index].rails:
             count = int(np.count_nonzero(hit.codes[index] == rail))
             if count >= RAIL_SAMPLES:
-                return Overload(rail * hit.channels[index].scale, count, inferred=False)
-        step = abs(hit.channels[index].scale)
-    else:
-        step = 0.0
+                return Overload(rail * scale, count, inferred=False)
     middle = float(np.median(signal))
-    noise = float(np.std(baseline(signal, hit.pre_trigger or int(np.argmax(hit.force)))))
+    noise = float(np.std(baseline(signal, samples_before(hit))))
     for sign in (1, -1):
         above = sign * (signal - middle)
-        count = max(_flat_top(above, 3 * noise * scale + step) for scale in SCALES) or (
-            _longest_run(above == above.max()) if not step else 0
-        )
+        step = abs(scale) or _finest_step(above)
+        count = max(_flat_top(above, 3 * noise * share + step) for share in SCALES)
+        count = count or (0 if scale else _at_a_rail(above, step))
         if count >= RAIL_SAMPLES and above.max() > 0:
             return Overload(middle + sign * float(above.max()), count, inferred=True)
     return None
@@ -73,6 +76,19 @@ def _flat_top(above: NDArray[np.float64], half: float) -> int:
     return inside if flat else 0
 
 
-def _longest_run(equal: NDArray[np.bool_]) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], equal.astype(np.int8), [0]))))
-    return int(np.max(edges[1::2] - edges[::2], initial=0))
+def _finest_step(above: NDArray[np.float64]) -> float:
+    """Smallest step between two values: that of the converter; at least that of four written digits."""
+    top = float(above.max())
+    return max(float(np.min(np.diff(np.unique(above)), initial=top)), DIGITS * top)
+
+
+def _at_a_rail(above: NDArray[np.float64], step: float) -> int:
+    """Samples at the maximum where it stands three times in a row; 0 where it does so because the steps are coarse.
+
+    The three steps below the one that holds a round top together hold at least as many samples as that one.
+    """
+    equal = above == above.max()
+    in_a_row = np.convolve(equal, np.ones(RAIL_SAMPLES), "valid").max() >= RAIL_SAMPLES
+    count = int(np.count_nonzero(equal))
+    near = int(np.count_nonzero(above > above.max() - 3.5 * step))
+    return count if in_a_row and near <= 1.5 * count else 0

@@ -10,7 +10,7 @@ from acquisition.estimate_frf import estimate_frf
 from acquisition.find_overload import Overload, find_overload
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
-from acquisition.pulse import Pulse, baseline, find_pulse
+from acquisition.pulse import Pulse, baseline, find_pulse, samples_before
 from acquisition.second_touch import find_second_touch
 from acquisition.verdict import Verdict
 
@@ -106,7 +106,7 @@ def _second(hit: Hit, pulse: Pulse) -> dict[HitFlags, str]:
 
 def _cut_off(hit: Hit) -> dict[HitFlags, str]:
     levels = [float(np.std(tenth)) for tenth in np.array_split(hit.acceleration, 10)]
-    quiet = hit.acceleration[: int(0.8 * hit.pre_trigger)]
+    quiet = hit.acceleration[: int(0.8 * samples_before(hit))]
     noise = float(np.std(quiet)) if quiet.size >= 8 else 0.0
     if levels[-1] <= max(DECAYED_SHARE * max(levels), 2 * noise):
         return {}

@@ -45,7 +45,7 @@ class Pulse:
 def find_pulse(hit: Hit) -> Pulse | None:
     """The highest force pulse; None where no sample stands out of the baseline by 6 times its rms."""
     top = int(np.argmax(hit.force))
-    quiet = baseline(hit.force, hit.pre_trigger or top)
+    quiet = baseline(hit.force, samples_before(hit))
     offset, rms = float(np.mean(quiet)), float(np.std(quiet))
     peak = float(hit.force[top]) - offset
     if peak <= 6 * rms or peak <= 0:
@@ -63,6 +63,15 @@ def _length_above(foot: float, signal: NDArray[np.float64]) -> int:
         if below.size:
             return at + int(below[0])
     return signal.size
+
+
+def samples_before(hit: Hit) -> int:
+    """The pre-trigger, or where it is not known the samples before the force last rises above 5 % of its peak."""
+    if hit.pre_trigger:
+        return hit.pre_trigger
+    above = hit.force[: int(np.argmax(hit.force)) + 1] - np.median(hit.force)
+    low = np.flatnonzero(above < FALLEN * above[-1])
+    return int(low[-1]) + 1 if low.size else 0
 
 
 def baseline(signal: NDArray[np.float64], before: int) -> NDArray[np.float64]:

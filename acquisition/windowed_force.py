@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.hit import Hit
-from acquisition.pulse import baseline, find_pulse
+from acquisition.pulse import baseline, find_pulse, samples_before
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ def windowed_force(hit: Hit) -> WindowedForce:
     samples = slice(max(int(corners[0]), 0), min(int(corners[3]), hit.force.size))
     beyond = np.interp(np.arange(samples.start, samples.stop), corners, [1.0, 0.0, 0.0, 1.0])
     window = 0.5 + 0.5 * np.cos(np.pi * beyond)
-    quiet = baseline(hit.force, hit.pre_trigger or pulse.top)
+    quiet = baseline(hit.force, samples_before(hit))
     noise = pulse.baseline_rms
     force = (hit.force[samples] - pulse.offset) * window
     return WindowedForce(samples, force, window, noise, noise / np.sqrt(quiet.size))

@@ -44,7 +44,7 @@ def zero_order(x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: ArrayLike) -> 
     if len(tips) == 1:
         ((axis, tip),) = tips
         lobes = loop_limits([weighted_sum([(force[axis, axis], tip)])], cut, speed, "zero order")
-        return replace(lobes, warning=lobes.warning or _cancelling(cut, axis))
+        return replace(lobes, warning="; ".join(filter(None, (_cancelling(cut, axis), lobes.warning))))
     return loop_limits(_eigenvalues(force, [tip for _, tip in tips]), cut, speed, "zero order")
 
 

@@ -158,3 +158,14 @@ def test_a_force_that_cancels_in_the_one_direction_known_is_warned_of(
     assert (f"of the force in {axis}" in found.warning) == is_warned
     assert (too_deep > 1.2) == is_warned
     assert "cancels" not in zero_order(modes, modes, cut, speeds).warning
+
+
+def test_a_cancelling_force_is_warned_of_at_every_speed_also_where_fast_teeth_are() -> None:
+    """Zero order's limit is more than 10 times the true one far below the speeds of the flip lobes."""
+    modes, cut = [Mode(1722.0, 0.029, 3.2e7)], Cut(4, 0.75, "down", 7e8, 2.1e8)
+    fast = zero_order(modes, None, cut, np.linspace(4000.0, 20000.0, 20)).warning
+    assert "of the force in x" in fast
+    assert "no flip lobes: above 1" in fast
+    slow = zero_order(modes, None, cut, np.linspace(4000.0, 5000.0, 5))
+    true = stability_boundary(modes, None, cut, slow.speed_rpm, float(np.min(slow.depth)) / 10)
+    assert np.max(true.depth) < np.min(slow.depth) / 10

@@ -49,8 +49,7 @@ class RunningMean:
         if self.frf is None or len(self._spectra) < 2:
             return None
         inside = _usable(self.frf)
-        now = self.frf.accelerance[inside]
-        before = _h1(self.hits[:-1], [spectra for _, spectra in self._spectra[:-1]]).accelerance[inside]
+        now, before = self.frf.accelerance[inside], self.without(self.hits[-1]).accelerance[inside]
         return float(np.linalg.norm(now - before) / np.linalg.norm(now))
 
     @property
@@ -79,12 +78,22 @@ class RunningMean:
         self._spectra.append((hit, cross_spectra([hit])))
         self._frf = None
 
+    def without(self, hit: Hit) -> Frf:
+        """H1 of the other hits; ValueError where this one is not in the mean, or alone in it."""
+        others = self._others(hit)
+        if not others:
+            raise ValueError("this hit is the only one in the mean; there is no mean of the others")
+        return _h1([other for other, _ in others], [spectra for _, spectra in others])
+
     def remove(self, hit: Hit) -> None:
         """Take a hit back; ValueError where it is not in the mean."""
+        self._spectra, self._frf = self._others(hit), None
+
+    def _others(self, hit: Hit) -> list[tuple[Hit, Spectra]]:
         kept = [entry for entry in self._spectra if entry[0] is not hit]
         if len(kept) == len(self._spectra):
             raise ValueError("this hit is not in the mean; only hits that were added can be taken back")
-        self._spectra, self._frf = kept, None
+        return kept
 
 
 def _h1(hits: Sequence[Hit], spectra: Sequence[Spectra]) -> Frf:

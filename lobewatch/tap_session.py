@@ -210,9 +210,7 @@ class TapSession:
         while self._undos.acquire(blocking=False):
             number = self._tap.undo()
             if number is not None:
-                self._mean.remove(self._tap.hits[number])
-                self._show_hits(verdict="undone", reason=f"Hit {number + 1} was taken back.")
-                self._draw(self._tap.hits[-1])
+                self._show_taken_out(number, "undone", f"Hit {number + 1} was taken back.")
 
     def _check(self) -> None:
         """The self-check, once a session."""
@@ -287,6 +285,20 @@ class TapSession:
         self._show_verdict(verdict.flags, verdict.flags.words, verdict.text)
         self._show_hits()
         self._draw(hit)
+        if not verdict.flags:
+            self._look_back()
+
+    def _look_back(self) -> None:
+        """Judge the first hits, which had no mean to be compared with, against the mean of all others."""
+        first = self._mean.hits[:FEWEST_FOR_MEAN]
+        for hit in first if len(self._mean.hits) > FEWEST_FOR_MEAN else ():
+            verdict = judge_hit(hit, self._mean.without(hit))
+            if verdict.flags:
+                number = next(i for i, other in enumerate(self._tap.hits) if other is hit)
+                self._tap.take_out(number, verdict.flags, verdict.text)
+                reason = f"Hit {number + 1} does not fit the others and counts no more. {verdict.text}"
+                self._show_taken_out(number, verdict.flags.words, reason)
+                return
 
     def _judge(self, hit: Hit) -> Verdict:
         """Against the mean, too, where that has enough hits to tell how far they scatter."""
@@ -296,6 +308,14 @@ class TapSession:
     def _show_verdict(self, flags: HitFlags, verdict: str, reason: str) -> None:
         self._verdict, self._verdict_at = Word.REFUSED if flags else Word.GOOD, self._heard
         self._show(word=self._verdict, verdict=verdict, reason=reason)
+
+    def _show_taken_out(self, number: int, verdict: str, reason: str) -> None:
+        """A hit that was good counts no more: the word GOOD must not stand there any longer."""
+        self._mean.remove(self._tap.hits[number])
+        self._verdict_at = 0
+        word = Word.WAIT if self._state.word in (Word.GOOD, Word.REFUSED) else self._state.word
+        self._show_hits(word=word, verdict=verdict, reason=reason)
+        self._draw(self._tap.hits[-1])
 
     def _show_hits(self, **changes: Any) -> None:
         """The list of hits and what follows from it."""

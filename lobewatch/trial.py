@@ -79,7 +79,6 @@ class Trial:
         if self._setup.record_s is None:
             self._record = max(self._record, _long_enough(ring_down(hit), self._setup.pre_trigger_s))
         return flags
-        return ""
 
     def _level(self) -> float:
         if self._setup.trigger_n is not None:

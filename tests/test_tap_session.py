@@ -6,6 +6,7 @@ import json
 import re
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import count, groupby
 from pathlib import Path
@@ -22,8 +23,10 @@ from acquisition import (
     DeviceError,
     Faults,
     HammeredStructure,
+    Hammering,
     HitFlags,
     SimulatedSource,
+    Structure,
     TapsEmulator,
     TapsSource,
     estimate_frf,
@@ -162,6 +165,39 @@ def test_undo_takes_back_the_last_good_hits_one_by_one_and_the_last_one_too(
     path = folder.path / "taps" / f"{tap.id}.h5"
     assert read_tap(path).flags == tap.flags
     assert len(read_hits(path)) == 10
+
+
+def test_a_first_hit_at_another_spot_is_found_out_by_those_after_it(
+    folder: MachineFolder, tapper: Tapper, structure: Structure, channels: Pair
+) -> None:
+    spot = replace(structure, stiffness=structure.stiffness * np.array([1.0, 1.5, 1.0]))
+    how = Hammering(double_hits=0.0, overloads=0.0)
+    astray = HammeredStructure(spot, RATE, np.random.default_rng(3), how)
+    devices = iter(
+        (Simulated(astray, channels, unplugged=lambda: session.state.good == 1), Simulated(tapper(), channels))
+    )
+    states: list[TapState] = []
+    session = session_of(folder, lambda: next(devices), states.append)
+    tap = session.run()
+    assert tap.flags == (HitFlags.INCONSISTENT, *[HitFlags.OK] * 10)
+    told = next(state for state in states if state.verdict == "inconsistent")
+    assert (told.good, len(told.hits), told.word) == (3, 4, Word.WAIT)
+    assert re.match(r"Hit 1 does not fit the others and counts no more\. FRF \d+% away from the mean of 3", told.reason)
+    assert np.array_equal(tap.frf.receptance, estimate_frf(tap.hits[1:]).receptance)
+
+
+def test_good_is_not_said_of_a_hit_taken_back(folder: MachineFolder, tapper: Tapper, channels: Pair) -> None:
+    def watch(state: TapState) -> None:
+        states.append(state)
+        if state.word is Word.GOOD and state.good == len(state.hits) == 3:
+            session.undo()
+
+    states: list[TapState] = []
+    session = session_of(folder, lambda: Simulated(tapper(), channels), watch)
+    session.run()
+    undone = [state for state in states if state.verdict == "undone"]
+    assert undone[0].reason == "Hit 3 was taken back."
+    assert {state.word for state in undone} <= {Word.WAIT, Word.TAP}
 
 
 def test_a_stopped_test_is_gone_on_with_by_the_set_up_it_began_with(

@@ -112,9 +112,15 @@ class TapSession:
                 if self._missing:
                     self._take_hits()
                 return self._finish()
-        except (OSError, ValueError) as error:
+        except (DeviceError, ValueError) as error:
             self._show(word=Word.FAILED, reason=str(error))
             raise
+        except TapStopped:
+            raise
+        except Exception as error:
+            told = _told(error)
+            self._show(word=Word.FAILED, reason=str(told))
+            raise told from error
 
     @property
     def _missing(self) -> int:
@@ -340,3 +346,11 @@ class TapSession:
         outcome = outcome_of(self._measurement, history, self._folder.machine) if self._guided else None
         self._show(reason="", outcome=outcome)
         return tap
+
+
+def _told(error: Exception) -> Exception:
+    """A failure of the system (a full disk) or of the program in a sentence that the operator can act on."""
+    kept = "the hits so far are kept: the same command goes on with them"
+    if isinstance(error, OSError):
+        return DataError(f"{error.filename}: {error.strerror}; make room or put the disk right, {kept}")
+    return RuntimeError(f"lobewatch itself has failed ({type(error).__name__}: {error}); {kept}")

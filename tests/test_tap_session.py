@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import re
 import time
@@ -184,6 +185,39 @@ def test_a_first_hit_at_another_spot_is_found_out_by_those_after_it(
     assert (told.good, len(told.hits), told.word) == (3, 4, Word.WAIT)
     assert re.match(r"Hit 1 does not fit the others and counts no more\. FRF \d+% away from the mean of 3", told.reason)
     assert np.array_equal(tap.frf.receptance, estimate_frf(tap.hits[1:]).receptance)
+
+
+@pytest.mark.parametrize(
+    ("failure", "told"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device", "m/spool/x/0003.h5"), DataError),
+        (MemoryError("no room"), RuntimeError),
+    ],
+)
+def test_a_full_disk_or_a_mistake_of_ours_is_told_and_costs_no_hit(
+    failure: Exception,
+    told: type[Exception],
+    folder: MachineFolder,
+    tapper: Tapper,
+    channels: Pair,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def failing(*arguments: Any) -> None:
+        if session.state.good == 3:
+            raise failure
+        write_hit(*arguments)
+
+    monkeypatch.setattr("lobewatch.tapping.write_hit", failing)
+    session = session_of(folder, lambda: Simulated(tapper(), channels))
+    with pytest.raises(told, match="the hits so far are kept: the same command goes on with them") as raised:
+        session.run()
+    assert session.state.word is Word.FAILED
+    assert session.state.reason == str(raised.value)
+    assert "Errno" not in session.state.reason
+    monkeypatch.undo()
+    session = session_of(folder, lambda: Simulated(tapper(2), channels))
+    assert len(session.run().hits) == 10
+    assert sum(hit.earlier for hit in session.state.hits) == 3
 
 
 def test_good_is_not_said_of_a_hit_taken_back(folder: MachineFolder, tapper: Tapper, channels: Pair) -> None:

@@ -31,7 +31,7 @@ from lobewatch.outcome import outcome_of
 from lobewatch.pipeline import Measurement
 from lobewatch.self_check import calibration_check, quiet_stretch, self_check
 from lobewatch.tap_plots import plots_of
-from lobewatch.tap_state import TapState, Word
+from lobewatch.tap_state import Check, TapState, Word
 from lobewatch.tapping import TapInProgress, begin_tap
 from lobewatch.trial import Trial, trigger_of
 
@@ -243,9 +243,12 @@ class TapSession:
                 self._show(reason=f"{self._state.reason} {self._trial.text}".strip())
             hit = next(hit for hit in self._hits(self._trial.trigger) if hit is not None)
             refused = self._trial.add(hit)
-            self._show_verdict(refused or HitFlags.OK, "trial hit", refused.cure or self._trial.text)
+            words = f"{refused.words}, trial hit" if refused else "trial hit"
+            self._show_verdict(refused, words, refused.cure or self._trial.text)
             self._draw(hit)
         self._tap.trigger = self._trial.trigger
+        found = Check("trial hits", not self._trial.advice, self._trial.text.removesuffix("."))
+        self._show(checks=(*self._state.checks, found))
 
     def _tap_on(self) -> None:
         """Hits until enough are good, and time has passed to take the last one back."""
@@ -352,5 +355,5 @@ def _told(error: Exception) -> Exception:
     """A failure of the system (a full disk) or of the program in a sentence that the operator can act on."""
     kept = "the hits so far are kept: the same command goes on with them"
     if isinstance(error, OSError):
-        return DataError(f"{error.filename}: {error.strerror}; make room or put the disk right, {kept}")
+        return DataError(f"{error.filename}: {error.strerror or error}; make room or put the disk right, {kept}")
     return RuntimeError(f"lobewatch itself has failed ({type(error).__name__}: {error}); {kept}")

@@ -122,7 +122,7 @@ def _lines(state: TapState) -> Iterator[RenderableType]:
     yield _banner(state)
     yield Text(state.reason or " ", "bold")
     yield Text(_numbers(state))
-    for check in state.checks if not state.hits else ():
+    for check in (check for check in state.checks if not (state.hits and check.passed)):
         yield Text(f"{'✓' if check.passed else '✗'} {check.name}: {check.text}")
     for hit in state.hits[-SHOWN_HITS:]:
         yield Text.from_markup(f"{hit.number:3d}  {hit.peak_force:6.0f} N  {verdict(hit)}")

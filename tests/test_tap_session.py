@@ -141,7 +141,20 @@ def test_trial_hits_choose_what_is_open_and_do_not_count(
     chosen = next(reason for reason in reasons if reason.startswith("Trigger at"))
     assert re.match(r"Trigger at [12]\d N, record 0.25 s, \d\d time constants of the slowest mode\.$", chosen)
     assert next(state for state in states if state.verdict == "trial hit").good == 0
+    assert (session.state.checks[-1].name, session.state.checks[-1].text) == ("trial hits", chosen.removesuffix("."))
     assert len(tap.hits) == 10
+
+
+def test_a_refused_trial_hit_says_what_is_wrong_with_it(
+    open_folder: MachineFolder, tapper: Tapper, channels: Pair
+) -> None:
+    states: list[TapState] = []
+    double = Simulated(tapper(double_hits=1.0), channels, unplugged=lambda: session.state.word is Word.REFUSED)
+    devices = iter((double, Simulated(tapper(), channels)))
+    session = session_of(open_folder, lambda: next(devices), states.append)
+    assert len(session.run().hits) == 10
+    refused = next(state for state in states if state.word is Word.REFUSED)
+    assert (refused.verdict, refused.reason) == ("double hit, trial hit", HitFlags.DOUBLE_HIT.cure)
 
 
 def test_undo_takes_back_the_last_good_hits_one_by_one_and_the_last_one_too(

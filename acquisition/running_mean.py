@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.estimate_frf import Spectra, cross_spectra, frf_of_spectra
+from acquisition.estimate_frf import Spectra, cross_spectra, estimate_frf, frf_of_spectra
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 
@@ -70,14 +70,25 @@ class RunningMean:
         self.hits += (hit,)
         self._before, self.frf = self.frf, frf_of_spectra(self._sums, self.hits)
 
+    def without(self, hit: Hit) -> Frf:
+        """H1 of the other hits; ValueError where this one is not in the mean, or alone in it."""
+        others = self._others(hit)
+        if not others:
+            raise ValueError("this hit is the only one in the mean; there is no mean of the others")
+        return estimate_frf(others)
+
     def remove(self, hit: Hit) -> None:
         """Take a hit back; ValueError where it is not in the mean."""
-        kept = [one for one in self.hits if one is not hit]
-        if len(kept) == len(self.hits):
-            raise ValueError("this hit is not in the mean; only hits that were added can be taken back")
+        kept = self._others(hit)
         self.hits, self.frf, self._sums = (), None, None
         for one in kept:  # anew: subtraction would leave its rounding errors
             self.add(one)
+
+    def _others(self, hit: Hit) -> list[Hit]:
+        kept = [one for one in self.hits if one is not hit]
+        if len(kept) == len(self.hits):
+            raise ValueError("this hit is not in the mean; only hits that were added can be taken back")
+        return kept
 
 
 def _usable(frf: Frf) -> NDArray[np.bool_]:

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from types import TracebackType
 from typing import Any, Self
+
+PAGE_UP = ("\x1b[5~", "\xe0I", "\0I")
+"""As terminals and as Windows send it: presenters and foot switches do."""
+SPECIAL = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|O.)|[\xe0\0].", re.DOTALL)
+"""Arrows and the like."""
 
 
 class Keys:
@@ -42,11 +48,18 @@ class Keys:
             keys = []
             while msvcrt.kbhit():
                 keys.append(msvcrt.getwch())
-            return "".join(keys).lower()
+            return letters("".join(keys))
         if self._before is None:
             return ""
         import os
         import select
 
         ready = select.select([sys.stdin], [], [], 0)[0]
-        return os.read(sys.stdin.fileno(), 64).decode("ascii", "ignore").lower() if ready else ""
+        return letters(os.read(sys.stdin.fileno(), 64).decode("ascii", "ignore")) if ready else ""
+
+
+def letters(typed: str) -> str:
+    """What was typed in lower case, Page Up as "u"; other keys that send more than one character count for nothing."""
+    for page_up in PAGE_UP:
+        typed = typed.replace(page_up, "u")
+    return SPECIAL.sub("", typed).lower()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import hashlib
 import json
 import os
@@ -125,10 +126,14 @@ class MachineFolder:
         last = whole.splitlines()[-1] if whole else b""
         entry["previous"] = hashlib.sha256(last).hexdigest() if last else ""
         entry["crc"] = _crc(entry)
+        line = json.dumps(entry).encode() + b"\n"
         handle = os.open(self._journal, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
         try:
-            os.write(handle, json.dumps(entry).encode() + b"\n")
+            if os.write(handle, line) < len(line):  # what a full disk does with the last bytes it has
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             os.fsync(handle)
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, str(self._journal)) from error
         finally:
             os.close(handle)
 

@@ -14,6 +14,7 @@ from lobewatch.machine import Machine
 from lobewatch.output import plus_minus
 from lobewatch.pipeline import Measurement
 from lobewatch.tap_state import Outcome
+from modal import Mode
 
 ORDER = ("good", "warn", "alarm")
 
@@ -23,12 +24,13 @@ def outcome_of(found: Measurement, history: SldHistory, machine: Machine) -> Out
     mode = found.dynamics.followed
     if mode is None:
         return Outcome("warn", list(found.reasons), "Tap again: the mode that is followed was not found in this test.")
-    first = _first(found, history)
-    fall = 100 * (1 - mode.frequency / first) if first else 0.0
+    fall, error = _fall(found, mode, history) or (0.0, None)
     limits = machine.limits
     light = ORDER[(fall >= limits.frequency_warn_percent) + (fall >= limits.frequency_alarm_percent)]
     frequency = f"f_n {plus_minus(mode.frequency, float(mode.standard_error[0]))} Hz"
-    against = f"{-fall:+.2f} % against the first test" if first else "the first test of this tool and direction"
+    against = "the first test of this tool and direction"
+    if error is not None:
+        against = f"{'+' if fall < 0 else ''}{plus_minus(-fall, error)} % against the first test"
     stiffness = plus_minus(mode.stiffness, float(mode.standard_error[2]), 1e6)
     damping = plus_minus(100 * mode.damping_ratio, 100 * float(mode.standard_error[1]))
     texts = [f"{frequency}, {against}.", f"K {stiffness} N/um, zeta {damping} %."]
@@ -39,13 +41,19 @@ def outcome_of(found: Measurement, history: SldHistory, machine: Machine) -> Out
     return Outcome(light, texts, _next_step(found, machine, light, bool(unstable)))
 
 
-def _first(found: Measurement, history: SldHistory) -> float | None:
-    """Frequency in the first measurement of this tool and direction (Hz); None where that is this one."""
+def _fall(found: Measurement, mode: Mode, history: SldHistory) -> tuple[float, float] | None:
+    """Of the frequency since the first measurement of this tool and direction, and its standard error (%).
+
+    None where this is the first.
+    """
     columns = history.columns
     rows = [row for row in series(history, found.tool, found.direction) if np.isfinite(columns["frequency"][row])]
     if not rows or columns["tap_id"][rows[0]] == found.tap_id:
         return None
-    return float(columns["frequency"][rows[0]])
+    first, first_error = (float(columns[name][rows[0]]) for name in ("frequency", "frequency_std"))
+    share = mode.frequency / first
+    error = math.hypot(first_error / first, float(mode.standard_error[0]) / mode.frequency)
+    return 100 * (1 - share), 100 * share * error
 
 
 def _next_step(found: Measurement, machine: Machine, light: str, unstable: bool) -> str:

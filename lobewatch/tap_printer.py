@@ -65,12 +65,12 @@ class TapPrinter:
         before, self._before = self._before, state
         if state.device != before.device:
             self._console.print(f"{state.device}. TAP the tool, again and again.", markup=False)
-        for check in state.checks if state.checks != before.checks else ():
-            if not check.passed:
+        for check in state.checks:
+            if not check.passed and check not in before.checks:
                 self._console.print(f"[bold yellow]![/] {escape(check.name)}: {escape(check.text)}")
         if state.resumed != before.resumed:
             self._console.print(state.resumed)
-        with_hit = state.word in (Word.GOOD, Word.REFUSED) and state.verdict != "trial hit"
+        with_hit = state.word in (Word.GOOD, Word.REFUSED) and "trial hit" not in state.verdict
         told = with_hit or state.word is Word.FAILED or state.reason == before.reason
         if state.reason and not told:
             self._console.print(escape(state.reason))

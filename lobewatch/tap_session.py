@@ -31,7 +31,7 @@ from lobewatch.outcome import outcome_of
 from lobewatch.pipeline import Measurement
 from lobewatch.self_check import calibration_check, quiet_stretch, self_check
 from lobewatch.tap_plots import plots_of
-from lobewatch.tap_state import TapState, Word
+from lobewatch.tap_state import Check, TapState, Word
 from lobewatch.tapping import TapInProgress, begin_tap
 from lobewatch.trial import Trial, trigger_of
 
@@ -112,9 +112,15 @@ class TapSession:
                 if self._missing:
                     self._take_hits()
                 return self._finish()
-        except (OSError, ValueError) as error:
+        except (DeviceError, ValueError) as error:
             self._show(word=Word.FAILED, reason=str(error))
             raise
+        except TapStopped:
+            raise
+        except Exception as error:
+            told = _told(error)
+            self._show(word=Word.FAILED, reason=str(told))
+            raise told from error
 
     @property
     def _missing(self) -> int:
@@ -211,9 +217,7 @@ class TapSession:
         while self._undos.acquire(blocking=False):
             number = self._tap.undo()
             if number is not None:
-                self._mean.remove(self._tap.hits[number])
-                self._show_hits(verdict="undone", reason=f"Hit {number + 1} was taken back.")
-                self._draw(self._tap.hits[-1])
+                self._show_taken_out(number, "undone", f"Hit {number + 1} was taken back.")
 
     def _check(self) -> None:
         """The self-check, once a session."""
@@ -240,9 +244,12 @@ class TapSession:
                 self._show(reason=f"{self._state.reason} {self._trial.text}".strip())
             hit = next(hit for hit in self._hits(self._trial.trigger) if hit is not None)
             refused = self._trial.add(hit)
-            self._show_verdict(refused or HitFlags.OK, "trial hit", refused.cure or self._trial.text)
+            words = f"{refused.words}, trial hit" if refused else "trial hit"
+            self._show_verdict(refused, words, refused.cure or self._trial.text)
             self._draw(hit)
         self._tap.trigger = self._trial.trigger
+        found = Check("trial hits", not self._trial.advice, self._trial.text.removesuffix("."))
+        self._show(checks=(*self._state.checks, found))
 
     def _tap_on(self) -> None:
         """Hits until enough are good, and time has passed to take the last one back."""
@@ -288,6 +295,21 @@ class TapSession:
             self._mean.add(hit)
         self._show_hits()
         self._draw(hit)
+        if not verdict.flags:
+            self._look_back()
+
+    def _look_back(self) -> None:
+        """Judge the first hits, which had no mean to be compared with, against the mean of all others."""
+        if not FEWEST_FOR_MEAN < len(self._mean.hits) <= 2 * FEWEST_FOR_MEAN:
+            return
+        for hit in self._mean.hits[:FEWEST_FOR_MEAN]:
+            verdict = judge_hit(hit, self._mean.without(hit))
+            if verdict.flags:
+                number = next(i for i, other in enumerate(self._tap.hits) if other is hit)
+                self._tap.take_out(number, verdict.flags, verdict.text)
+                reason = f"Hit {number + 1} does not fit the others and counts no more. {verdict.text}"
+                self._show_taken_out(number, verdict.flags.words, reason)
+                return
 
     def _judge(self, hit: Hit) -> Verdict:
         """Against the mean, too, where that has enough hits to tell how far they scatter."""
@@ -297,6 +319,14 @@ class TapSession:
     def _show_verdict(self, flags: HitFlags, verdict: str, reason: str) -> None:
         self._verdict, self._verdict_at = Word.REFUSED if flags else Word.GOOD, self._heard
         self._show(word=self._verdict, verdict=verdict, reason=reason)
+
+    def _show_taken_out(self, number: int, verdict: str, reason: str) -> None:
+        """A hit that was good counts no more: the word GOOD must not stand there any longer."""
+        self._mean.remove(self._tap.hits[number])
+        self._verdict_at = 0
+        word = Word.WAIT if self._state.word in (Word.GOOD, Word.REFUSED) else self._state.word
+        self._show_hits(word=word, verdict=verdict, reason=reason)
+        self._draw(self._tap.hits[-1])
 
     def _show_hits(self, **changes: Any) -> None:
         """The list of hits and what follows from it."""
@@ -321,3 +351,11 @@ class TapSession:
         outcome = outcome_of(self._measurement, history, self._folder.machine) if self._guided else None
         self._show(reason="", outcome=outcome)
         return tap
+
+
+def _told(error: Exception) -> Exception:
+    """A failure of the system (a full disk) or of the program in a sentence that the operator can act on."""
+    kept = "the hits so far are kept: the same command goes on with them"
+    if isinstance(error, OSError):
+        return DataError(f"{error.filename}: {error.strerror or error}; make room or put the disk right, {kept}")
+    return RuntimeError(f"lobewatch itself has failed ({type(error).__name__}: {error}); {kept}")

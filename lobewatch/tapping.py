@@ -81,10 +81,14 @@ class TapInProgress:
         """Take back the last good hit and return its index; None where there is none. It stays stored, as undone."""
         for i in reversed(range(len(self.hits))):
             if not self.flags[i]:
-                self._write(i, self.hits[i], HitFlags.UNDONE)
-                self.flags[i] = HitFlags.UNDONE
+                self.take_out(i, HitFlags.UNDONE, "")
                 return i
         return None
+
+    def take_out(self, number: int, flags: HitFlags, reason: str) -> None:
+        """Refuse a good hit (by its index) afterwards; it stays stored."""
+        self._write(number, self.hits[number], flags)
+        self.flags[number], self.reasons[number] = flags, reason
 
     def finish(self) -> TapTest:
         """The averaged tap test; ValueError where no hit is good."""

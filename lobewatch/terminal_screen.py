@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import threading
+import time
 from collections.abc import Iterator, Mapping
 from types import TracebackType
 from typing import Self
@@ -23,6 +25,8 @@ SHOWN_HITS = 6
 """Newest hits that are listed."""
 BELL_PAUSE = 0.2
 """Between two bells (s)."""
+HELD_TIME = 0.7
+"""Undo keys that follow each other faster (s) are one that is held down: it counts once."""
 LOOKS: Mapping[Word, tuple[str, str]] = {
     Word.CHECKING: ("…", "black on #56b4e9"),
     Word.TAP: ("▼", "black on #56b4e9"),
@@ -51,6 +55,7 @@ class TerminalScreen:
         self._session = session
         self._console = console or Console(stderr=True, highlight=False, emoji=False)
         self._muted = self._ahead_of_hit = False
+        self._undo_at = -math.inf
         self._keys = Keys()
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._watch, name="terminal screen", daemon=True)
@@ -85,7 +90,10 @@ class TerminalScreen:
     def press(self, key: str) -> None:
         """Do what a key stands for."""
         if key == "u":
-            self._session.undo()
+            now = time.monotonic()
+            if now - self._undo_at > HELD_TIME:
+                self._session.undo()
+            self._undo_at = now
         elif key == "q":
             self._session.stop()
         elif key == "m":
@@ -117,7 +125,7 @@ def _lines(state: TapState) -> Iterator[RenderableType]:
     yield _banner(state)
     yield Text(state.reason or " ", "bold")
     yield Text(_numbers(state))
-    for check in state.checks if not state.hits else ():
+    for check in (check for check in state.checks if not (state.hits and check.passed)):
         yield Text(f"{'✓' if check.passed else '✗'} {check.name}: {check.text}")
     for hit in state.hits[-SHOWN_HITS:]:
         yield Text.from_markup(f"{hit.number:3d}  {hit.peak_force:6.0f} N  {verdict(hit)}")

@@ -68,7 +68,12 @@ class Trial:
             return f"Trial hit {len(self._hits) + 1}: it chooses trigger level and record length and does not count."
         slowest = max(ring_down(hit) for hit in self._hits)
         chosen = f"Trigger at {self.trigger.level:.3g} N, record {self._record:g} s, {_holds(self._record, slowest)}."
-        return " ".join([chosen, *_range_advice(self._hits)])
+        return " ".join([chosen, *self.advice])
+
+    @property
+    def advice(self) -> list[str]:
+        """A sentence for each channel that the trial hits do not fit into."""
+        return _range_advice(self._hits)
 
     def add(self, hit: Hit) -> HitFlags:
         """Take a trial hit; returns why it is no use, falsy where it is."""
@@ -79,7 +84,6 @@ class Trial:
         if self._setup.record_s is None:
             self._record = max(self._record, _long_enough(ring_down(hit), self._setup.pre_trigger_s))
         return flags
-        return ""
 
     def _level(self) -> float:
         if self._setup.trigger_n is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import http.client
 import json
 import sys
@@ -12,6 +13,7 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import aiohttp
 import numpy as np
 import pytest
 
@@ -171,6 +173,26 @@ def test_start_begins_a_test_once_and_stop_gives_the_device_back(tmp_path: Path)
                 assert time.monotonic() < deadline
         with TapsSource(device.port):
             pass
+
+
+def test_a_page_that_has_watched_a_test_to_its_end_sees_the_next(tmp_path: Path) -> None:
+    machine(tmp_path / "mill", 'port = "/dev/nothing-here"')
+
+    async def titles(server: DashboardServer) -> list[str]:
+        found: list[str] = []
+        async with aiohttp.ClientSession(headers={"Origin": server.origin}) as client:
+            feed = client.ws_connect(f"{server.origin}/tap/mill/feed", protocols=("lobewatch", f"token.{server.token}"))
+            async with asyncio.timeout(20), feed as messages:
+                while len(found) < 2:
+                    state = json.loads(await messages.receive_str())
+                    if state.get("kind") == "failed" and state["title"] not in found:
+                        found.append(state["title"])
+                        await asyncio.to_thread(ask, server, "POST", "/machines/mill/start", {"direction": "y"})
+        return found
+
+    with DashboardServer(tmp_path) as server:
+        assert ask(server, "POST", "/machines/mill/start", {"direction": "x"})[0] == 200
+        assert [title[-1] for title in asyncio.run(titles(server))] == ["x", "y"]
 
 
 def test_no_machine_is_one_sentence_and_exit_code_2(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -59,6 +60,22 @@ def test_a_torn_last_line_counts_for_nothing_and_does_not_block(folder: MachineF
         assert len(folder.taps()) == 1
         folder.commit(tap(2))
         assert len(folder.taps()) == 2
+
+
+def test_a_line_cut_short_by_a_full_disk_is_no_commit(folder: MachineFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    spooled = folder.spool / tap(0).id
+    committed = replace(tap(0), id=spooled.name)
+    spooled.mkdir(parents=True)
+    write = os.write
+    monkeypatch.setattr("os.write", lambda handle, line: write(handle, line[: len(line) // 2]))
+    with pytest.raises(OSError, match=r"journal\.jsonl"):
+        folder.commit(committed)
+    monkeypatch.undo()
+    assert spooled.is_dir()
+    assert folder.taps() == []
+    folder.commit(committed)
+    assert len(folder.taps()) == 1
+    assert not spooled.exists()
 
 
 def test_a_damaged_line_in_the_middle_is_told_by_its_number(folder: MachineFolder) -> None:

@@ -311,6 +311,25 @@ def test_a_port_in_use_is_said(session: Session) -> None:
             pass
 
 
+@pytest.mark.parametrize("listen", ["a..b", "x" * 70, "no such name"])
+def test_an_address_that_cannot_be_is_said(session: Session, listen: str) -> None:
+    with pytest.raises(DeviceError, match=f"cannot listen on {listen} port 0"), ScreenServer(session, listen=listen):
+        pass
+
+
+def test_no_address_is_not_every_address(session: Session) -> None:
+    with pytest.raises(ValueError, match="no address to listen at"):
+        ScreenServer(session, listen="")
+
+
+@pytest.mark.parametrize("listen", ["0.0.0.0", "::", "LocalHost"])
+def test_the_address_told_is_one_that_answers(session: Session, listen: str) -> None:
+    if listen == "::" and not socket.has_dualstack_ipv6():
+        pytest.skip("no IPv6 here")
+    with ScreenServer(session, listen=listen) as server:
+        assert ask(server, "GET", "/access")[0] == 200
+
+
 def test_a_real_test_through_an_emulated_device(tmp_path: Path, tapper: Callable[..., HammeredStructure]) -> None:
     make_machine_folder(tmp_path / "mill", "surrogate_machine.toml")
     about = Circumstances("mill", datetime.now(UTC), "reference", "x")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -62,8 +63,22 @@ def test_the_light_follows_the_fall_of_the_frequency(folder: MachineFolder) -> N
     lights = [tapped(folder, 30 * month, 1720 * share).light for month, share in enumerate((0.96, 0.94, 0.89), 1)]
     assert lights == ["good", "warn", "alarm"]
     worn = tapped(folder, 120, 0.88 * 1720)
-    assert "-12.00 % against the first test" in worn.texts[0]
+    assert "-12 % against the first test" in worn.texts[0]
     assert worn.next_step.startswith("Do not cut on")
+
+
+def test_the_fall_has_the_standard_error_of_both_frequencies(folder: MachineFolder) -> None:
+    """0.1 % each: 0.96 sqrt(2) 0.1 % = 0.14 %."""
+    tapped(folder, 0, 1720.0)
+    tapped(folder, 30, 0.96 * 1720)
+    (folder.path / "history.h5").unlink()
+    history, measurements = update_history(folder)
+    history.columns["frequency_std"][:] = 1.72
+    found = measurements[-1]
+    assert found.dynamics.followed is not None
+    mode = replace(found.dynamics.followed, covariance=np.diag([(0.96 * 1.72) ** 2, 1e-8, 1e12]))
+    told = outcome_of(replace(found, dynamics=replace(found.dynamics, followed=mode)), history, folder.machine)
+    assert "-4.00 ± 0.14 % against the first test" in told.texts[0]
 
 
 def test_a_program_that_chatters_is_named(folder: MachineFolder) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import re
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import count, groupby, takewhile
 from pathlib import Path
@@ -23,8 +25,10 @@ from acquisition import (
     DeviceError,
     Faults,
     HammeredStructure,
+    Hammering,
     HitFlags,
     SimulatedSource,
+    Structure,
     TapsEmulator,
     TapsSource,
     estimate_frf,
@@ -139,7 +143,20 @@ def test_trial_hits_choose_what_is_open_and_do_not_count(
     chosen = next(reason for reason in reasons if reason.startswith("Trigger at"))
     assert re.match(r"Trigger at [12]\d N, record 0.25 s, \d\d time constants of the slowest mode\.$", chosen)
     assert next(state for state in states if state.verdict == "trial hit").good == 0
+    assert (session.state.checks[-1].name, session.state.checks[-1].text) == ("trial hits", chosen.removesuffix("."))
     assert len(tap.hits) == 10
+
+
+def test_a_refused_trial_hit_says_what_is_wrong_with_it(
+    open_folder: MachineFolder, tapper: Tapper, channels: Pair
+) -> None:
+    states: list[TapState] = []
+    double = Simulated(tapper(double_hits=1.0), channels, unplugged=lambda: session.state.word is Word.REFUSED)
+    devices = iter((double, Simulated(tapper(), channels)))
+    session = session_of(open_folder, lambda: next(devices), states.append)
+    assert len(session.run().hits) == 10
+    refused = next(state for state in states if state.word is Word.REFUSED)
+    assert (refused.verdict, refused.reason) == ("double hit, trial hit", HitFlags.DOUBLE_HIT.cure)
 
 
 def test_undo_takes_back_the_last_good_hits_one_by_one_and_the_last_one_too(
@@ -164,6 +181,72 @@ def test_undo_takes_back_the_last_good_hits_one_by_one_and_the_last_one_too(
     path = folder.path / "taps" / f"{tap.id}.h5"
     assert read_tap(path).flags == tap.flags
     assert len(read_hits(path)) == 10
+
+
+def test_a_first_hit_at_another_spot_is_found_out_by_those_after_it(
+    folder: MachineFolder, tapper: Tapper, structure: Structure, channels: Pair
+) -> None:
+    spot = replace(structure, stiffness=structure.stiffness * np.array([1.0, 1.5, 1.0]))
+    how = Hammering(double_hits=0.0, overloads=0.0)
+    astray = HammeredStructure(spot, RATE, np.random.default_rng(3), how)
+    devices = iter(
+        (Simulated(astray, channels, unplugged=lambda: session.state.good == 1), Simulated(tapper(), channels))
+    )
+    states: list[TapState] = []
+    session = session_of(folder, lambda: next(devices), states.append)
+    tap = session.run()
+    assert tap.flags == (HitFlags.INCONSISTENT, *[HitFlags.OK] * 10)
+    told = next(state for state in states if state.verdict == "inconsistent")
+    assert (told.good, len(told.hits), told.word) == (3, 4, Word.WAIT)
+    assert re.match(r"Hit 1 does not fit the others and counts no more\. FRF \d+% away from the mean of 3", told.reason)
+    assert np.array_equal(tap.frf.receptance, estimate_frf(tap.hits[1:]).receptance)
+
+
+@pytest.mark.parametrize(
+    ("failure", "told"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device", "m/spool/x/0003.h5"), DataError),
+        (MemoryError("no room"), RuntimeError),
+    ],
+)
+def test_a_full_disk_or_a_mistake_of_ours_is_told_and_costs_no_hit(
+    failure: Exception,
+    told: type[Exception],
+    folder: MachineFolder,
+    tapper: Tapper,
+    channels: Pair,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def failing(*arguments: Any) -> None:
+        if session.state.good == 3:
+            raise failure
+        write_hit(*arguments)
+
+    monkeypatch.setattr("lobewatch.tapping.write_hit", failing)
+    session = session_of(folder, lambda: Simulated(tapper(), channels))
+    with pytest.raises(told, match="the hits so far are kept: the same command goes on with them") as raised:
+        session.run()
+    assert session.state.word is Word.FAILED
+    assert session.state.reason == str(raised.value)
+    assert "Errno" not in session.state.reason
+    monkeypatch.undo()
+    session = session_of(folder, lambda: Simulated(tapper(2), channels))
+    assert len(session.run().hits) == 10
+    assert sum(hit.earlier for hit in session.state.hits) == 3
+
+
+def test_good_is_not_said_of_a_hit_taken_back(folder: MachineFolder, tapper: Tapper, channels: Pair) -> None:
+    def watch(state: TapState) -> None:
+        states.append(state)
+        if state.word is Word.GOOD and state.good == len(state.hits) == 3:
+            session.undo()
+
+    states: list[TapState] = []
+    session = session_of(folder, lambda: Simulated(tapper(), channels), watch)
+    session.run()
+    undone = [state for state in states if state.verdict == "undone"]
+    assert undone[0].reason == "Hit 3 was taken back."
+    assert {state.word for state in undone} <= {Word.WAIT, Word.TAP}
 
 
 def test_a_stopped_test_is_gone_on_with_by_the_set_up_it_began_with(

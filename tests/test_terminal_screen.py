@@ -13,6 +13,7 @@ import pytest
 from rich.console import Console
 
 from acquisition import HitFlags
+from lobewatch.keys import letters
 from lobewatch.tap_printer import TapPrinter
 from lobewatch.tap_state import Check, Outcome, TakenHit, TapState, Word
 from lobewatch.terminal_screen import TerminalScreen, picture
@@ -92,7 +93,9 @@ def test_checks_before_the_first_hit_and_the_result_after_the_last() -> None:
     text = plain(replace(STATE, hits=(), good=0, checks=checks))
     assert "✓ disk: 78 GB free" in text
     assert "✗ hum: 1 N rms at 50 Hz" in text
-    assert "disk" not in plain(replace(STATE, checks=checks))
+    later = plain(replace(STATE, checks=checks))
+    assert "disk" not in later
+    assert "✗ hum: 1 N rms at 50 Hz" in later
     done = plain(replace(STATE, word=Word.DONE, outcome=Outcome("warn", ["f_n 1700 Hz."], "Tap again.")))
     assert "! WARN" in done
     assert "f_n 1700 Hz. Tap again." in done
@@ -122,13 +125,30 @@ def screen_of(session: Session) -> tuple[TerminalScreen, io.StringIO]:
     return TerminalScreen(session, Console(file=file, width=80, force_terminal=True)), file
 
 
-@pytest.mark.parametrize(("key", "asked"), [(b"u", "undo"), (b"Q", "stop")])
+@pytest.mark.parametrize(("key", "asked"), [(b"u", "undo"), (b"Q", "stop"), (b"\x1b[5~", "undo")])
 def test_keys_reach_the_test(terminal: int, key: bytes, asked: str) -> None:
     session = Session()
     with screen_of(session)[0]:
         os.write(terminal, key)
         assert session.called.wait(5)
     assert session.asked == [asked]
+
+
+def test_a_key_held_down_counts_once_and_arrows_for_nothing() -> None:
+    session = Session()
+    screen = screen_of(session)[0]
+    for key in letters("uuuuu\x1bOq\x1b[1;5Q\x1b[A\xe0uU"):
+        screen.press(key)
+    assert session.asked == ["undo"]
+
+
+def test_undo_again_after_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+    session = Session()
+    screen = screen_of(session)[0]
+    for now in (10.0, 10.4, 11.2, 12.0):
+        monkeypatch.setattr("lobewatch.terminal_screen.time.monotonic", lambda now=now: now)
+        screen.press("u")
+    assert session.asked == ["undo"] * 3
 
 
 def test_the_terminal_is_left_as_it_was(terminal: int) -> None:

@@ -34,8 +34,8 @@ def tap(
 ) -> None:
     """The live tap test: hit until ten hits are good, then see what has changed.
 
-    Keys: u takes the last good hit back, q stops, m mutes. Every hit is on the disk before it is counted. After
-    a crash the same command goes on at the same hit; after an unplugged cable the test waits and goes on by itself.
+    Keys: u or Page Up takes the last good hit back, q stops, m mutes. Every hit is on the disk before it is counted.
+    After a crash the same command goes on at the same hit; an unplugged cable is waited for.
 
     Examples:
 

@@ -74,10 +74,11 @@ class DashboardServer(WebThread):
         return key, MachineFolder(self._machines[key].path)
 
     def _find_test(self, request: web.Request) -> Watched:
-        key, _ = self._find_machine(request)
-        if key not in self._tests:
+        """The newest of a machine: a page that has watched one to its end sees the next."""
+        test = self._tests.get(request.match_info["machine"])
+        if test is None:
             raise web.HTTPNotFound(text="no tap test runs on this machine; go to All machines and press START")
-        return self._tests[key]
+        return test
 
     async def _list(self, _: web.Request) -> web.Response:
         found = await asyncio.to_thread(lambda: [standing(key, folder) for key, folder in self._machines.items()])

@@ -31,8 +31,8 @@ def add_session(application: web.Application, prefix: str, find: Callable[[web.R
     """Routes of the screen of a session: its feed, undo and stop. `find` raises HTTPNotFound where there is none."""
 
     async def follow(request: web.Request) -> web.StreamResponse:
-        session = find(request)
-        return await feed(request, lambda: session.state)
+        find(request)
+        return await feed(request, lambda: find(request).state)
 
     async def undo(request: web.Request) -> web.Response:
         await asyncio.to_thread(find(request).undo)

@@ -19,20 +19,27 @@ QUIET = logging.getLogger("lobewatch.screen.http")
 """Requests that are no HTTP are answered with 400 and not logged: anybody could fill the operator's terminal."""
 QUIET.addHandler(logging.NullHandler())
 QUIET.propagate = False
+FAR_AWAY = {
+    "0.0.0.0": (socket.AF_INET, "192.0.2.1", "127.0.0.1"),
+    "::": (socket.AF_INET6, "2001:db8::1", "::1"),
+}
+"""All addresses of this computer: their family, an address elsewhere, and its own where it has no network."""
 
 
 class WebThread:
     """Base of the servers: `application` is served from __enter__ to __exit__; add its routes before."""
 
     def __init__(self, listen: str, port: int, token: str | None) -> None:
-        """ValueError for a token that does not fit into an address."""
+        """ValueError for a token that does not fit into an address, and for no address to listen at."""
+        if not listen:
+            raise ValueError("no address to listen at; use 127.0.0.1 for this computer alone, 0.0.0.0 for the network")
         self.token = checked_token(token)
-        self.application = guarded_application(self.token, listen)
-        self._listen = listen
+        self._listen = listen.lower()
+        self.application = guarded_application(self.token, self._listen)
         self._port = port
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="lobewatch screen", daemon=True)
         self._ready = threading.Event()
-        self._error: OSError | None = None
+        self._error: Exception | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
         self._stop = asyncio.Event()
 
@@ -41,9 +48,9 @@ class WebThread:
         self._thread.start()
         self._ready.wait()
         if self._error is not None:
+            why = getattr(self._error, "strerror", None) or self._error
             raise DeviceError(
-                f"cannot listen on {self._listen} port {self._port} ({self._error.strerror or self._error}); "
-                "choose another port or address"
+                f"cannot listen on {self._listen} port {self._port} ({why}); choose another port or address"
             ) from self._error
         return self
 
@@ -58,7 +65,7 @@ class WebThread:
     @property
     def origin(self) -> str:
         """Address without the token, e.g. http://127.0.0.1:40123."""
-        host = _own_address() if self._listen in ("0.0.0.0", "::") else self._listen
+        host = _own_address(self._listen) if self._listen in FAR_AWAY else self._listen
         return f"http://{f'[{host}]' if ':' in host else host}:{self._port}"
 
     @property
@@ -75,7 +82,7 @@ class WebThread:
             await web.TCPSite(runner, self._listen, self._port).start()
             self._port = runner.addresses[0][1]
             self._loop = asyncio.get_running_loop()
-        except OSError as error:
+        except (OSError, ValueError) as error:  # ValueError: a name that no network can have
             self._error = error
             self._stop.set()
         self._ready.set()
@@ -87,11 +94,12 @@ async def _end(application: web.Application) -> None:
     application[ENDING].set()
 
 
-def _own_address() -> str:
+def _own_address(listen: str) -> str:
     """Of this computer in its network; nothing is sent for it."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        try:
-            probe.connect(("192.0.2.1", 9))
+    family, far_away, alone = FAR_AWAY[listen]
+    try:
+        with socket.socket(family, socket.SOCK_DGRAM) as probe:
+            probe.connect((far_away, 9))
             return str(probe.getsockname()[0])
-        except OSError:
-            return "127.0.0.1"
+    except OSError:
+        return alone

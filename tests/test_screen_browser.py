@@ -441,7 +441,7 @@ def test_a_real_test_from_the_first_tap_to_the_light(
     folder = MachineFolder(tmp_path / "mill")
     about = Circumstances("mill", datetime.now(UTC), "reference", "x")
     with TapsEmulator(tapper(), CHANNELS, SAMPLE_RATE, realtime=False) as device:
-        session = TapSession(folder, lambda: TapsSource(device.port), about, guided=False)
+        session = TapSession(folder, lambda: TapsSource(device.port), about)
         with ScreenServer(session) as server:
             browser.open(server.url)
             browser.see("text", "CHECKING")

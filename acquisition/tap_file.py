@@ -92,7 +92,7 @@ def _open(path: Path) -> h5py.File:
 def _write_circumstances(file: h5py.File, about: Circumstances) -> None:
     file.attrs["created"] = about.created.isoformat()
     file.attrs["machine_toml_sha256"] = hashlib.sha256(about.machine_toml.encode()).hexdigest()
-    for name in ("machine", "tool", "direction", "operator"):
+    for name in ("machine", "tool", "direction", "operator", "device"):
         file.attrs[name] = getattr(about, name)
     file["machine_toml"] = about.machine_toml
 
@@ -100,7 +100,8 @@ def _write_circumstances(file: h5py.File, about: Circumstances) -> None:
 def _read_circumstances(file: h5py.File) -> Circumstances:
     named = {name: str(file.attrs[name]) for name in ("machine", "tool", "direction", "operator")}
     created = datetime.fromisoformat(file.attrs["created"])
-    return Circumstances(created=created, machine_toml=file["machine_toml"][()].decode(), **named)
+    device = str(file.attrs.get("device", ""))
+    return Circumstances(created=created, machine_toml=file["machine_toml"][()].decode(), device=device, **named)
 
 
 def _dataset(group: h5py.Group, name: str, data: Any, units: str, **options: Any) -> None:

@@ -31,6 +31,8 @@ class Circumstances:
     """Who held the hammer."""
     machine_toml: str = ""
     """Text of the machine file at that time."""
+    device: str = ""
+    """What recorded it: model, serial number and firmware of the DAQ, and how lost scans were found."""
 
     def __post_init__(self) -> None:
         """Refuse a direction that is none, and a time without its zone."""

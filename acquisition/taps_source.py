@@ -31,6 +31,9 @@ SCANS_PER_FRAME = 512
 class TapsSource:
     """Connects, asks the device who it is, configures it, and yields its scans. A context manager."""
 
+    loss_detection = "scan numbers"
+    """How lost scans are found."""
+
     def __init__(self, port: str, sample_rate: float | None = None) -> None:
         """Open a port: a device name or socket://host:port. sample_rate None takes the device's highest (Hz).
 

@@ -29,6 +29,14 @@ class Device(Source, Protocol):
         ...
 
 
+def description(device: Device) -> str:
+    """Model, serial number, firmware, and how it finds lost scans, as far as it says."""
+    told = {"serial number": device.info.get("serial"), "firmware": device.info.get("fw")}
+    found = getattr(device, "loss_detection", None)
+    parts = [f"{name} {value}" for name, value in told.items() if value]
+    return ", ".join([str(device.info["model"]), *parts, *([f"loss detection: {found}"] if found else [])])
+
+
 class LiveSignal:
     """Force and acceleration of one connected source."""
 

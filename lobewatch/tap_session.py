@@ -25,7 +25,7 @@ from acquisition import (
 )
 from lobewatch.history import update_history
 from lobewatch.known_devices import checked_rate, has_clock, known_rate
-from lobewatch.live_signal import LEVEL_TIME, Device, LiveSignal, resting_rms
+from lobewatch.live_signal import LEVEL_TIME, Device, LiveSignal, description, resting_rms
 from lobewatch.machine_folder import MachineFolder
 from lobewatch.outcome import outcome_of
 from lobewatch.pipeline import Measurement
@@ -167,6 +167,8 @@ class TapSession:
         except BaseException:
             self._device.close()
             raise
+        if not self._tap.hits:
+            self._tap.circumstances = replace(self._tap.circumstances, device=description(self._device))
         self._show(device=f"{self._device.info['model']}, {self._device.sample_rate:g} Hz")
 
     def _measure_rate(self) -> None:

@@ -115,7 +115,9 @@ def test_a_tap_test_through_a_dataq_device_finds_the_emulated_spindle(run: Any, 
     assert "followed: 1713." in said.out  # the skew of a third of a scan, left in, makes it 1715
     assert re.search(r"bearing stiffness +(1280\.|1279\.)", said.out)
     (entry,) = trial.taps()
-    channels = trial.read(entry).hits[0].channels
+    tap = trial.read(entry)
+    assert tap.circumstances.device == "DI-4108, serial number 5E0ABC12, firmware 1.35, loss detection: digital word"
+    channels = tap.hits[0].channels
     assert channels is not None
     hammer, accelerometer = channels
     assert (hammer.serial_number, hammer.calibration_date) == ("H-4711", "2026-01-15")

@@ -37,7 +37,9 @@ from acquisition import (
     write_tap,
 )
 
-ABOUT = Circumstances("mill 3", datetime(2026, 1, 15, 9, 30, 0, 123456, UTC), "20 mm/ø", "y", "Kim", "[machine]\n")
+ABOUT = Circumstances(
+    "mill 3", datetime(2026, 1, 15, 9, 30, 0, 123456, UTC), "20 mm/ø", "y", "Kim", "[machine]\n", "DI-4108"
+)
 
 
 @pytest.fixture
@@ -193,3 +195,11 @@ def test_hits_refused_for_what_their_signals_do_not_show_stay_out_of_a_replay(
     read = read_hits(tmp_path / "tap.h5")
     assert len(read) == len(tap.hits) - 1
     assert same_hit(read[0], tap.hits[1])
+
+
+def test_a_file_from_before_the_device_was_kept_is_read(tap: TapTest, tmp_path: Path) -> None:
+    write_tap(tmp_path / "tap.h5", tap)
+    assert read_tap(tmp_path / "tap.h5").circumstances.device == "DI-4108"
+    with h5py.File(tmp_path / "tap.h5", "a") as file:
+        del file.attrs["device"]
+    assert read_tap(tmp_path / "tap.h5").circumstances.device == ""

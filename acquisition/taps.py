@@ -23,6 +23,8 @@ LOST_BEFORE = 0x01
 """Flag of a DATA frame: the device lost samples before it."""
 SAMPLE_BITS = (16, 24, 32)
 """ADC word of DATA formats 0 (i16), 1 (i24 packed) and 2 (i32)."""
+FRAME_OVERHEAD = 28
+"""Bytes of a DATA frame besides its samples."""
 MAX_ENCODED = MAX_FRAME + -(-MAX_FRAME // 254)
 """The same in COBS, without its delimiter (bytes)."""
 _HEADER = struct.Struct("<BBHI")

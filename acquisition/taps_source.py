@@ -14,7 +14,16 @@ from typing import Any, Self
 from acquisition.channel import Block, Channel
 from acquisition.errors import DeviceError
 from acquisition.serial_link import SerialLink
-from acquisition.taps import SAMPLE_BITS, Frame, FrameDecoder, MessageType, Status, encode_frame
+from acquisition.taps import (
+    FRAME_OVERHEAD,
+    MAX_FRAME,
+    SAMPLE_BITS,
+    Frame,
+    FrameDecoder,
+    MessageType,
+    Status,
+    encode_frame,
+)
 from acquisition.taps_event import Event, EventLog
 from acquisition.taps_stream import ScanStream
 
@@ -25,7 +34,9 @@ TRIES = 3
 SILENCE = 3.0
 """A streaming device that sends no scans for so long has failed (s); it reports itself every 0.5 s."""
 SCANS_PER_FRAME = 512
-"""Asked of the device."""
+"""Asked of the device at least, where so many fit into a frame; more ..."""
+FRAME_TIME = 0.01
+"""... where they come faster than so (s)."""
 
 
 class TapsSource:
@@ -154,11 +165,14 @@ class TapsSource:
         if rate not in choices:
             listed = ", ".join(f"{choice:g}" for choice in choices)
             raise ValueError(f"sample rate {rate:g} Hz is none of this device's: {listed} Hz")
+        form = next(form for form, bits in enumerate(SAMPLE_BITS) if self.info["adc_bits"] <= bits)
+        channels = [entry["i"] for entry in self.info["channels"]]
+        fit = (MAX_FRAME - FRAME_OVERHEAD) * 8 // (len(channels) * SAMPLE_BITS[form])
         wish = {
             "fs": rate,
-            "channels": [entry["i"] for entry in self.info["channels"]],
-            "format": next(form for form, bits in enumerate(SAMPLE_BITS) if self.info["adc_bits"] <= bits),
-            "samples_per_frame": SCANS_PER_FRAME,
+            "channels": channels,
+            "format": form,
+            "samples_per_frame": min(max(SCANS_PER_FRAME, round(FRAME_TIME * rate)), fit),
         }
         self._command(MessageType.CONFIG, json.dumps(wish).encode())
         return float(rate)

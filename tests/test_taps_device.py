@@ -254,6 +254,25 @@ def test_a_device_is_asked_for_the_shortest_words_that_hold_its_codes(
     assert np.max(np.abs([block.codes for block in received])) > 2 ** (bits - 4)
 
 
+@pytest.mark.parametrize(
+    ("n_channels", "bits", "rate", "scans"),
+    [(2, 16, 25600.0, 512), (2, 16, 102400.0, 1024), (2, 16, 1e6, 2041), (8, 32, 102400.0, 255)],
+)
+def test_frames_hold_ten_milliseconds_but_never_more_than_fits(
+    n_channels: int, bits: int, rate: float, scans: int, channels: Pair
+) -> None:
+    """Eight channels of 32 bits fill 32 bytes a scan: (8192 - 28) // 32 of them fit."""
+    many = (channels * 4)[:n_channels]
+    fine = tuple(replace(channel, adc_bits=bits) for channel in many)
+    zeros = np.zeros((n_channels, 1))
+    with (
+        TapsEmulator(lambda _, n: np.repeat(zeros, n, axis=1), fine, rate, realtime=False) as device,
+        TapsSource(device.port) as source,
+    ):
+        source.start()
+        assert {block.codes.shape for block in islice(source.blocks(), 3)} == {(n_channels, scans)}
+
+
 def test_hits_of_a_24_bit_device_keep_their_codes_on_disk(tapper: Tapper, channels: Pair, tmp_path: Path) -> None:
     fine = tuple(replace(channel, adc_bits=24) for channel in channels)
     with TapsEmulator(tapper(), fine, RATE, realtime=False) as device, TapsSource(device.port) as source:

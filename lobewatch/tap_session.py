@@ -74,6 +74,7 @@ class TapSession:
         self._undos, self._stopping = threading.Semaphore(0), threading.Event()
         self._mean = RunningMean()
         self._baseline: Hit | None = None
+        self._fault = ""
         self._trial: Trial | None = None
         self._verdict = Word.TAP
         self._heard, self._verdict_at, self._shown_at = 0, 0, clock()
@@ -205,12 +206,20 @@ class TapSession:
             self._heard += block.codes.shape[1]
             self._signal.add(block)
             self._serve()
+            self._tell_fault()
             yield block
             if self._clock() - self._shown_at >= LEVEL_TIME:
                 self._show(levels=self._signal.levels)
         if self._missing:
             good = f"{self._tap.good} of {self._state.wanted} good hits"
             raise DataError(f"the samples have ended with {good}; record more of them")
+
+    def _tell_fault(self) -> None:
+        """A pulled sensor cable or a sensor without supply, where the device reports that, and that it is mended."""
+        fault = getattr(self._device, "fault", "")
+        if fault != self._fault:
+            self._fault = fault
+            self._show(reason=fault or "The sensor is connected again.")
 
     def _serve(self) -> None:
         """What other threads have asked for."""

@@ -365,6 +365,21 @@ def test_a_taken_port_is_told_at_the_start(folder: MachineFolder, tapper: Tapper
     assert "another program uses it" in session.state.reason
 
 
+def test_a_fault_that_the_device_reports_is_told_and_its_end_too(
+    folder: MachineFolder, tapper: Tapper, channels: Pair
+) -> None:
+    class Faulty(Simulated):
+        @property
+        def fault(self) -> str:
+            return "acceleration: cable open" if 2 <= session.state.good < 4 else ""
+
+    states: list[TapState] = []
+    session = session_of(folder, lambda: Faulty(tapper(), channels), states.append)
+    session.run()
+    told = [state.reason for state in states]
+    assert told.index("acceleration: cable open") < told.index("The sensor is connected again.")
+
+
 def test_samples_that_end_are_told(folder: MachineFolder, tapper: Tapper, channels: Pair) -> None:
     session = session_of(folder, lambda: Simulated(tapper(), channels, seconds=2.5), guided=False)
     with pytest.raises(DataError, match=r"the samples have ended with [45] of 10 good hits"):

@@ -79,12 +79,6 @@ class Spindle:
         """Mass of the shaft with all that sits on it (kg)."""
         return math.fsum([*map(self._segment_mass, self.segments), *(part.mass for part in self.masses)])
 
-    @property
-    def mean_bearing_stiffness(self) -> float:
-        """Mean of the bearing stiffnesses (N/m)."""
-        require_support(self)
-        return math.fsum(bearing.stiffness for bearing in self.bearings) / len(self.bearings)
-
     def _segment_mass(self, segment: Segment) -> float:
         """Volume by Simpson's rule, exact for a cone."""
         ends = [segment.diameters_at(share) for share in (0.0, 0.5, 1.0)]

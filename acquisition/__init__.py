@@ -24,6 +24,7 @@ from acquisition.plausibility import calibration_doubt, channel_doubts, stiffnes
 from acquisition.port_hints import no_ports_hint
 from acquisition.probe_port import DeviceIdentity, probe_port
 from acquisition.read_recording import read_frf, read_hits, read_recording, recorded_as
+from acquisition.remark import Remark, joined
 from acquisition.ring_down import ring_down
 from acquisition.running_mean import RunningMean
 from acquisition.simulated_source import SimulatedSource
@@ -64,6 +65,7 @@ __all__ = [
     "MeasuredRate",
     "MeasuredSkew",
     "PortInfo",
+    "Remark",
     "RunningMean",
     "SimulatedSource",
     "Source",
@@ -87,6 +89,7 @@ __all__ = [
     "find_port",
     "force_noise",
     "from_accelerance",
+    "joined",
     "judge_hit",
     "list_ports",
     "measure_rate",

@@ -1,0 +1,32 @@
+"""What a person should know beside a result: data for the program, words for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+
+@dataclass(frozen=True)
+class Remark:
+    """One thing to know. Programs look at `code` and `about`; `text` and `cure` are for people and may be reworded."""
+
+    code: str
+    """What kind of remark it is: words in lower case joined by hyphens, listed in docs/remarks.md, never changed."""
+    about: str
+    """What it concerns: a program, a tap test, a mode ("1713 Hz"), a channel, a file; empty for the whole."""
+    text: str
+    """What is so, with figures and units, without a full stop."""
+    cure: str = ""
+    """What to do about it; empty where nothing can be done or need be."""
+
+    def __str__(self) -> str:
+        """One sentence."""
+        return ": ".join(filter(None, (self.about, self.text))) + (f"; {self.cure}" if self.cure else "")
+
+
+def joined(remarks: Iterable[Remark]) -> list[Remark]:
+    """Remarks that differ in nothing but what they are about as one, in the order of the first of each."""
+    about: dict[Remark, list[str]] = {}
+    for remark in remarks:
+        about.setdefault(replace(remark, about=""), []).append(remark.about)
+    return [replace(one, about=", ".join(dict.fromkeys(filter(None, names)))) for one, names in about.items()]

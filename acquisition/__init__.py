@@ -1,6 +1,7 @@
 """From the DAQ to hits, averaged FRF and HDF5 files."""
 
 from acquisition.atomic_write import atomic_write
+from acquisition.average_good import average_good
 from acquisition.capture_hits import HitSearch, Trigger, capture_hits
 from acquisition.channel import Block, Channel
 from acquisition.check_hit import check_hit
@@ -30,7 +31,7 @@ from acquisition.running_mean import RunningMean
 from acquisition.simulated_source import SimulatedSource
 from acquisition.source import Source
 from acquisition.tap_file import read_tap, read_tap_hits, write_hit, write_tap
-from acquisition.tap_test import Circumstances, SourceFile, TapTest, average_good, new_tap_id
+from acquisition.tap_test import Circumstances, SourceFile, TapTest, new_tap_id
 from acquisition.taps_emulator import TapsEmulator
 from acquisition.taps_event import Event, EventKind
 from acquisition.taps_faults import Faults

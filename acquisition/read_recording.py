@@ -5,13 +5,14 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
+from acquisition.average_good import average_good
 from acquisition.errors import DataError
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
 from acquisition.read_csv import frf_of, hit_of, is_frf, read_table
 from acquisition.read_lvm import MAGIC, lvm_time, read_lvm
 from acquisition.tap_file import read_tap, read_tap_hits
-from acquisition.tap_test import Circumstances, average_good
+from acquisition.tap_test import Circumstances
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import re
 import secrets
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from acquisition.errors import DataError
-from acquisition.estimate_frf import estimate_frf
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
-from acquisition.judge_hit import judge_hit
 
 
 @dataclass(frozen=True)
@@ -81,13 +77,3 @@ def new_tap_id(circumstances: Circumstances) -> str:
     names = (circumstances.machine, circumstances.tool, circumstances.direction)
     slugs = [re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-")[:24] for name in names]
     return "_".join([stamp, *filter(None, slugs), secrets.token_hex(2)])
-
-
-def average_good(hits: Sequence[Hit]) -> tuple[Frf, tuple[HitFlags, ...]]:
-    """H1 FRF of the good hits, and the verdict on each; DataError with the reasons where no hit is good."""
-    verdicts = [judge_hit(hit) for hit in hits]
-    good = [hit for hit, verdict in zip(hits, verdicts, strict=True) if not verdict.flags]
-    if not good:
-        reasons = "; ".join(f"hit {i}: {verdict.flags.words}. {verdict.text}" for i, verdict in enumerate(verdicts, 1))
-        raise DataError(f"no good hit of {len(hits)}: {reasons}")
-    return estimate_frf(good), tuple(verdict.flags for verdict in verdicts)

@@ -21,6 +21,7 @@ from dsm.mode_shapes import mode_shapes
 from dsm.modes import Modes
 from dsm.modes_at import modes_at
 from dsm.natural_frequencies import natural_frequencies
+from dsm.plus_minus import plus_minus
 from dsm.receptance import receptance
 from dsm.receptance_map import receptance_map
 from dsm.segment import Segment
@@ -71,6 +72,7 @@ __all__ = [
     "mode_shapes",
     "modes_at",
     "natural_frequencies",
+    "plus_minus",
     "receptance",
     "receptance_map",
     "spindle_side",

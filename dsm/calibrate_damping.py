@@ -67,8 +67,8 @@ class DampingCalibration:
 
     def __str__(self) -> str:
         """The report."""
-        damping = plus_minus(self.bearing_damping, self.bearing_damping_std, "N s/m")
-        measured = plus_minus(self.damping_ratio, self.damping_ratio_std, "of critical")
+        damping = plus_minus(self.bearing_damping, self.bearing_damping_std, unit="N s/m", percent=True)
+        measured = plus_minus(self.damping_ratio, self.damping_ratio_std, unit="of critical", percent=True)
         return "\n".join(
             [
                 f"bearing damping  {damping} each on average",

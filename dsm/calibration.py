@@ -87,10 +87,10 @@ class Calibration:
         start = self.bearing_stiffness / self.factor / 1e6
         static = self.static_stiffness_before / 1e6, self.static_stiffness_after / 1e6
         modal = self.modal_stiffness_before / 1e6, self.modal_stiffness_after / 1e6
-        stiffness = plus_minus(self.bearing_stiffness, self.bearing_stiffness_std, "N/um", 1e6)
+        stiffness = plus_minus(self.bearing_stiffness, self.bearing_stiffness_std, 1e6, "N/um", percent=True)
         lines = [
             ("bearing stiffness", f"{stiffness} each"),
-            (f"from mode {self.mode}", plus_minus(self.frequency, self.frequency_std, "Hz")),
+            (f"from mode {self.mode}", plus_minus(self.frequency, self.frequency_std, unit="Hz", percent=True)),
             ("start", f"{start:.5g} N/um each: factor {self.factor:.5f}"),
             ("energy share", f"{100 * self.energy_share:.1f} % of the mode's strain energy is in these bearings"),
             ("sensitivity", f"bearings 1 % softer lower the frequency by {self.sensitivity:.3f} %"),

@@ -4,15 +4,23 @@ from __future__ import annotations
 
 import math
 
+SMALLEST = 1e-7
+"""Share of its value below which an error is not shown: a fit of computed data has such."""
 
-def plus_minus(value: float, std: float | None, unit: str, scale: float = 1.0) -> str:
-    """Value, standard error with two digits, unit and error in percent, e.g. "1326.8 ± 5.3 N/um (0.40 %)".
 
-    Both are divided by `scale` first. None, or an error below 1e-7 of the value: without one.
+def plus_minus(value: float, std: float | None, scale: float = 1.0, unit: str = "", *, percent: bool = False) -> str:
+    """Value and standard error with two digits of the error, e.g. "1326.8 ± 5.3 N/um (0.40 %)"; "-" without a value.
+
+    Both are divided by `scale` first. Without an error where there is none (None, NaN, infinite) or next to none.
     """
-    shown = value / scale
-    if std is None or not 1e-7 * abs(value) < std < math.inf:
-        return f"{shown:.6g} {unit}"
+    if not math.isfinite(value):
+        return "-"
+    shown, behind = value / scale, f" {unit}" if unit else ""
+    if std is None or not math.isfinite(std):
+        return f"{shown:.6g}{behind}"
+    if std <= SMALLEST * abs(value):
+        return f"{shown:.8g}{behind}"
     error = std / scale
     decimals = max(1 - math.floor(math.log10(error)), 0)
-    return f"{shown:.{decimals}f} ± {error:.{decimals}f} {unit} ({100 * std / abs(value):.2g} %)"
+    share = f" ({100 * std / abs(value):.2g} %)" if percent else ""
+    return f"{shown:.{decimals}f} ± {error:.{decimals}f}{behind}{share}"

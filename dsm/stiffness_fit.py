@@ -109,7 +109,7 @@ class StiffnessFit:
         for index, (group, factor, stiffness) in enumerate(zip(self.groups, self.factor, self.stiffness, strict=True)):
             std = None if self.stiffness_std is None else float(self.stiffness_std[index])
             lines.append(
-                f"stiffness {group:{width}}  {plus_minus(stiffness, std, 'N/um', 1e6)} each on average, "
+                f"stiffness {group:{width}}  {plus_minus(stiffness, std, 1e6, 'N/um', percent=True)} each on average, "
                 f"start {stiffness / factor / 1e6:.5g} N/um: factor {factor:.5f}"
             )
         return lines
@@ -131,7 +131,7 @@ class StiffnessFit:
                 f"{group} {100 * share:.1f} %"
                 for group, share in zip(self.groups, self.energy_share[index], strict=True)
             )
-            measured = plus_minus(float(self.frequency[index]), std, "Hz")
+            measured = plus_minus(float(self.frequency[index]), std, unit="Hz", percent=True)
             lines.append(f"{number:4d}  {measured}, {self.residual[index]:+.2g} Hz, {shares}")
         return lines
 

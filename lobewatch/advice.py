@@ -26,7 +26,6 @@ from lobewatch.drive import drive_limit
 from lobewatch.history import measure
 from lobewatch.machine import Machine
 from lobewatch.machine_folder import MachineFolder, TapEntry
-from lobewatch.output import notes
 from lobewatch.pipeline import Measurement, speed_grid
 from lobewatch.prediction import predict
 from modal import Mode
@@ -65,15 +64,15 @@ class ProgramAdvice:
     """Assumptions, and why something is missing."""
 
 
-def advise(folder: MachineFolder) -> list[ProgramAdvice]:
-    """Advice for every program of a machine, from the newest tap test with its tool."""
+def advise(folder: MachineFolder, tell: Callable[[str], None] = lambda _: None) -> list[ProgramAdvice]:
+    """Advice for every program of a machine, from the newest tap test with its tool; tell: hears how far it is."""
     taps, programs = folder.taps(), folder.machine.program
     measured: dict[str, Measurement] = {}
     found: list[ProgramAdvice] = []
     begin, told = monotonic(), False
     for table in programs:
         if not told and monotonic() - begin > PATIENCE:
-            notes.print(f"{len(found)} of {len(programs)} programs are checked; the others take a while too")
+            tell(f"{len(found)} of {len(programs)} programs are checked; the others take a while too")
             told = True
         of_tool = [tap for tap in taps if tap.tool == table.tool]
         if not of_tool:

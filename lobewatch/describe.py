@@ -8,10 +8,10 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
-from dsm import Calibration, DampingCalibration, StiffnessFit
+from dsm import Calibration, DampingCalibration, StiffnessFit, plus_minus
 from lobes import StabilityLobes
 from lobewatch.machine import REFERENCE_CUT, Machine
-from lobewatch.output import plus_minus, table
+from lobewatch.output import table
 from lobewatch.pipeline import Measurement
 from modal import Mode
 
@@ -50,17 +50,12 @@ def mode_table(modes: Sequence[Mode]) -> Table:
         values = (mode.frequency, mode.damping_ratio, mode.stiffness)
         made.add_row(
             *(
-                plus_minus(value, std, scale) + _percent(std / abs(value))
+                plus_minus(value, std, scale, percent=True)
                 for value, std, scale in zip(values, mode.standard_error, (1.0, 0.01, 1e6), strict=True)
             ),
             "" if mode.is_driving_point else "not a driving point",
         )
     return made
-
-
-def _percent(share: float) -> str:
-    """A standard error as a share; empty where there is none or no error worth the name."""
-    return f" ({100 * share:.2g} %)" if share > 1e-7 else ""
 
 
 def mode_lines(modes: Sequence[Mode]) -> list[str]:

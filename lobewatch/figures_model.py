@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
@@ -15,37 +14,12 @@ from numpy.typing import NDArray
 from acquisition import Frf
 from dsm import Modes, Segment, Spindle, WhirlMap
 from lobewatch.figures import ALARM, GOOD, NOW, STYLE, THEN
+from lobewatch.model_picture import ModelPicture
 
 _Float = NDArray[np.float64]
 STEEL = "#c9d3dc"
 SHAPES = ((NOW, "-"), (ALARM, "--"), (GOOD, "-."), (THEN, ":"))
 """Colour and dashes of the modes, in order."""
-
-
-@dataclass(frozen=True, eq=False)
-class ModelPicture:
-    """What is drawn of a model."""
-
-    title: str
-    """Headline."""
-    spindle: Spindle
-    """The shaft."""
-    modes: Modes
-    """Its modes along the shaft."""
-    curve: tuple[_Float, _Float]
-    """Bearing stiffness (N/m) and frequency (Hz) of the followed mode, shape (n,) each."""
-    points: tuple[_Float, _Float]
-    """The same of the tap tests."""
-    whirl: WhirlMap
-    """Whirl frequencies over speed."""
-    highest_speed: float
-    """End of the speed range of the machine (rpm)."""
-    frf_place: str
-    """Where force and motion of the frequency responses are, in words."""
-    model_frf: Frf
-    """Of the model."""
-    measured_frf: Frf | None
-    """Newest measured one of the same tool."""
 
 
 def model_figure(picture: ModelPicture) -> Figure:

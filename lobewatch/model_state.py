@@ -20,9 +20,9 @@ from dsm import (
     stiffness_curve,
     whirl_map,
 )
-from lobewatch.figures_model import ModelPicture
 from lobewatch.history import measure, update_history
 from lobewatch.machine_folder import MachineFolder, TapEntry
+from lobewatch.model_picture import ModelPicture
 from modal import Mode
 
 _Float = NDArray[np.float64]

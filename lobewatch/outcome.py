@@ -7,11 +7,11 @@ from datetime import timedelta
 
 import numpy as np
 
+from dsm import plus_minus
 from lobes import SldHistory
 from lobewatch.advice import unstable_programs
 from lobewatch.history import series
 from lobewatch.machine import Machine
-from lobewatch.output import plus_minus
 from lobewatch.pipeline import Measurement
 from lobewatch.tap_state import Outcome
 from modal import Mode

@@ -36,22 +36,6 @@ def table(*headings: str) -> Table:
     return made
 
 
-def plus_minus(value: float, std: float, scale: float = 1.0) -> str:
-    """Value and standard error with two digits of the error, e.g. "1722.03 ± 0.05"; "-" where there is no value.
-
-    An error below 1e-7 of the value, as a fit of computed data has, is not shown.
-    """
-    value, std = value / scale, std / scale
-    if not math.isfinite(value):
-        return "-"
-    if not math.isfinite(std):
-        return f"{value:.5g}"
-    if std < 1e-7 * abs(value):
-        return f"{value:.8g}"
-    decimals = max(1 - math.floor(math.log10(std)), 0)
-    return f"{value:.{decimals}f} ± {std:.{decimals}f}"
-
-
 def _finite(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}

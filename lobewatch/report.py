@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Frf, TapTest
+from dsm import plus_minus
 from lobes import ProgramCheck, SldHistory
 from lobewatch.advice import ProgramAdvice, advise
 from lobewatch.describe_lobes import limit_text, margin_text
@@ -20,7 +21,6 @@ from lobewatch.figures_lobes import lobes_figure
 from lobewatch.history import measure, series
 from lobewatch.machine import Machine
 from lobewatch.machine_folder import MachineFolder
-from lobewatch.output import plus_minus
 from lobewatch.pipeline import Measurement
 
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from lobewatch.output import plus_minus
+from dsm import plus_minus
 
 
 @pytest.mark.parametrize(
@@ -17,7 +17,7 @@ from lobewatch.output import plus_minus
         (1722.0312, 47.1, 1.0, "1722 ± 47"),
         (3.2289e7, 1.2e4, 1e6, "32.289 ± 0.012"),
         (-0.0029136, 0.00012, 0.01, "-0.291 ± 0.012"),
-        (1722.0312, math.nan, 1.0, "1722"),
+        (1722.0312, math.nan, 1.0, "1722.03"),
         (1722.0312, 1e-12, 1.0, "1722.0312"),
         (math.nan, math.nan, 1.0, "-"),
     ],

@@ -16,7 +16,7 @@ from lobewatch.advice import ProgramAdvice, advise
 from lobewatch.describe_lobes import limit_text, margin_text
 from lobewatch.machine import SpeedRange
 from lobewatch.machine_folder import MachineFolder
-from lobewatch.output import Json, emit, table
+from lobewatch.output import Json, emit, notes, table
 
 
 def check(
@@ -39,7 +39,7 @@ def check(
         raise DataError(f"{folder.toml}: no [[program]] to check; add one for each cut that the shop runs")
     if not folder.taps():
         raise DataError(f"{folder.path}: no tap test yet; take one with lobewatch tap, or replay a recorded file")
-    advice = advise(folder)
+    advice = advise(folder, notes.print)
     unstable = sum(one.check is not None and not one.check.stable for one in advice)
     checked = sum(one.check is not None for one in advice)
     missing = len(advice) - checked

@@ -26,11 +26,12 @@ from acquisition import (
 )
 from acquisition.mass_calibration import AGREES
 from acquisition.units import STANDARD_GRAVITY
+from dsm import plus_minus
 from lobewatch.devices import open_source
 from lobewatch.known_devices import Device, checked_rate, has_clock, use_rate
 from lobewatch.live_signal import LiveSignal
 from lobewatch.machine_folder import MachineFolder
-from lobewatch.output import Json, emit, notes, plus_minus, table
+from lobewatch.output import Json, emit, notes, table
 from lobewatch.self_check import quiet_stretch
 from lobewatch.sensor_doubts import sensor_doubts
 from lobewatch.trial import Trial

@@ -1,43 +1,46 @@
 """From the DAQ to hits, averaged FRF and HDF5 files."""
 
-from acquisition.atomic_write import atomic_write
-from acquisition.average_good import average_good
-from acquisition.capture_hits import HitSearch, Trigger, capture_hits
+from acquisition.atomic import atomic_write
 from acquisition.channel import Block, Channel
-from acquisition.check_hit import check_hit
-from acquisition.dataq import DataqInput
-from acquisition.dataq_emulator import DataqEmulator, DataqFaults, DataqTraits
-from acquisition.dataq_source import DataqSource
+from acquisition.dataq import DataqEmulator, DataqFaults, DataqInput, DataqSource, DataqTraits
+from acquisition.devices import DeviceIdentity, probe_port
+from acquisition.emulation import HammeredStructure, Hammering, SimulatedSource, Structure
 from acquisition.errors import DataError, DeviceError
-from acquisition.estimate_frf import cross_spectra, estimate_frf
-from acquisition.file_source import FileSource
-from acquisition.find_port import find_port, usb_identity
-from acquisition.force_noise import force_noise
+from acquisition.estimation import RunningMean, cross_spectra, estimate_frf, force_noise
+from acquisition.files import (
+    STANDARD_GRAVITY,
+    FileSource,
+    read_frf,
+    read_hits,
+    read_recording,
+    read_tap,
+    read_tap_hits,
+    recorded_as,
+    write_hit,
+    write_tap,
+)
 from acquisition.frf import Frf, from_accelerance
-from acquisition.hammered_structure import HammeredStructure, Hammering, Structure
 from acquisition.hit import Hit, HitFlags
-from acquisition.judge_hit import judge_hit
-from acquisition.list_ports import PortInfo, list_ports
-from acquisition.mass_calibration import MassCalibration, calibrate_by_mass
-from acquisition.measure_rate import MeasuredRate, check_rate, measure_rate
-from acquisition.measure_skew import MeasuredSkew, measure_skew
-from acquisition.plausibility import calibration_doubt, channel_doubts, stiffness_doubt, unit_mistake
-from acquisition.port_hints import no_ports_hint
-from acquisition.probe_port import DeviceIdentity, probe_port
-from acquisition.read_recording import read_frf, read_hits, read_recording, recorded_as
+from acquisition.hits import HitSearch, Trigger, capture_hits, ring_down
+from acquisition.ports import PortInfo, find_port, list_ports, no_ports_hint, usb_identity
 from acquisition.remark import Remark, joined
-from acquisition.ring_down import ring_down
-from acquisition.running_mean import RunningMean
-from acquisition.simulated_source import SimulatedSource
+from acquisition.sensors import (
+    MassCalibration,
+    MeasuredRate,
+    MeasuredSkew,
+    calibrate_by_mass,
+    calibration_doubt,
+    channel_doubts,
+    check_rate,
+    measure_rate,
+    measure_skew,
+    stiffness_doubt,
+    unit_mistake,
+)
 from acquisition.source import Source
-from acquisition.tap_file import read_tap, read_tap_hits, write_hit, write_tap
-from acquisition.tap_test import Circumstances, SourceFile, TapTest, new_tap_id
-from acquisition.taps_emulator import TapsEmulator
-from acquisition.taps_event import Event, EventKind
-from acquisition.taps_faults import Faults
-from acquisition.taps_source import TapsSource
-from acquisition.units import STANDARD_GRAVITY
-from acquisition.verdict import Verdict
+from acquisition.tap import Circumstances, SourceFile, TapTest, new_tap_id
+from acquisition.taps import Event, EventKind, Faults, TapsEmulator, TapsSource
+from acquisition.verdicts import Verdict, average_good, check_hit, judge_hit
 
 __all__ = [
     "STANDARD_GRAVITY",

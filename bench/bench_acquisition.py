@@ -32,13 +32,13 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from acquisition import Channel, Circumstances, Hit, TapsEmulator, TapsSource, Trigger, estimate_frf
-from acquisition.taps import Frame, FrameDecoder, MessageType, encode_data, encode_frame
-from acquisition.taps_stream import ScanStream
+from acquisition.taps.protocol import Frame, FrameDecoder, MessageType, encode_data, encode_frame
+from acquisition.taps.stream import ScanStream
 from lobewatch.commands.init import make_machine_folder
-from lobewatch.machine_folder import MachineFolder
+from lobewatch.machine.folder import MachineFolder
 from lobewatch.screen import ScreenServer
-from lobewatch.tap_session import TapSession, TapStopped
-from lobewatch.tap_state import Word
+from lobewatch.tap.session import TapSession, TapStopped
+from lobewatch.tap.state import Word
 
 RATE = 102_400.0
 CHANNELS = (Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0))

@@ -37,7 +37,7 @@ from dsm import (
     receptance_map,
     spindle_side,
 )
-from lobewatch.machine import read_machine
+from lobewatch.machine.machine_file import read_machine
 
 MACHINE = Path(__file__).parent.parent / "sim_data" / "surrogate_machine.toml"
 MEASURED = 1722.0

@@ -4,36 +4,44 @@ Beams on springs, Euler-Bernoulli or Timoshenko, exact at every frequency. Sourc
 Effects of Machine Tool Spindle Decay on the Stability Lobe Diagram, Shock and Vibration, 2015, without its poles.
 """
 
-from dsm.attachments import Bearing, Joint, LumpedMass
-from dsm.calibrate import calibrate
-from dsm.calibrate_damping import DampingCalibration, UnreachableDampingError, calibrate_damping
-from dsm.calibration import Calibration, UnreachableFrequencyError
-from dsm.change_tool import change_tool
-from dsm.couple_tool import couple_tool
-from dsm.critical_speed import critical_speed
-from dsm.damped_modes import DampedModes, damped_modes
-from dsm.energy_shares import EnergyShares, energy_shares
-from dsm.fit_stiffness import fit_stiffness
-from dsm.linearized_stiffness import linearized_stiffness
-from dsm.material import MATERIALS, Material
-from dsm.modal_stiffness import modal_stiffness
-from dsm.mode_shapes import mode_shapes
-from dsm.modes import Modes
-from dsm.modes_at import modes_at
-from dsm.natural_frequencies import natural_frequencies
-from dsm.plus_minus import plus_minus
-from dsm.receptance import receptance
-from dsm.receptance_map import receptance_map
-from dsm.segment import Segment
-from dsm.spindle import Spindle, Theory
-from dsm.spindle_side import SpindleSide, spindle_side
-from dsm.spinning_beam import SpinningBeam, SpinningSegment, SpinningSpring
-from dsm.spinning_element import spinning_element
-from dsm.spinning_frequencies import UnstableSpinError, spinning_frequencies
-from dsm.static_stiffness import static_stiffness
-from dsm.stiffness_curve import stiffness_curve
-from dsm.stiffness_fit import StiffnessFit, StiffnessFitError
-from dsm.whirl_map import WhirlMap, whirl_map
+from dsm.calibration import (
+    Calibration,
+    DampingCalibration,
+    StiffnessFit,
+    StiffnessFitError,
+    UnreachableDampingError,
+    UnreachableFrequencyError,
+    calibrate,
+    calibrate_damping,
+    fit_stiffness,
+    plus_minus,
+    receptance_map,
+    stiffness_curve,
+)
+from dsm.modes import (
+    DampedModes,
+    EnergyShares,
+    Modes,
+    WhirlMap,
+    critical_speed,
+    damped_modes,
+    energy_shares,
+    modal_stiffness,
+    mode_shapes,
+    modes_at,
+    natural_frequencies,
+    whirl_map,
+)
+from dsm.response import SpindleSide, couple_tool, linearized_stiffness, receptance, spindle_side, static_stiffness
+from dsm.spindle import MATERIALS, Bearing, Joint, LumpedMass, Material, Segment, Spindle, Theory, change_tool
+from dsm.spinning import (
+    SpinningBeam,
+    SpinningSegment,
+    SpinningSpring,
+    UnstableSpinError,
+    spinning_element,
+    spinning_frequencies,
+)
 
 __all__ = [
     "MATERIALS",

@@ -25,7 +25,7 @@ from lobewatch.commands.report import report
 from lobewatch.commands.sensors import sensors
 from lobewatch.commands.serve import serve
 from lobewatch.commands.tap import tap
-from lobewatch.output import notes, results
+from lobewatch.show.output import notes, results
 
 app = typer.Typer(
     help="Tap test in, stability lobes out: which cuts stop being safe as a spindle ages.",

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Channel, HammeredStructure, Hammering, HitFlags, Structure
-from lobewatch.tap_state import Check, Outcome, Plots, TakenHit, TapState, Word
+from lobewatch.tap.state import Check, Outcome, Plots, TakenHit, TapState, Word
 
 DATA = Path(__file__).parent / "data"
 

@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 
 import dsm
-from lobewatch.describe import calibration_json, damping_json, stiffness_fit_json
-from lobewatch.machine_folder import MachineFolder
-from lobewatch.output import Json, emit
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.show.describe import calibration_json, damping_json, stiffness_fit_json
+from lobewatch.show.output import Json, emit
 
 
 def calibrate(

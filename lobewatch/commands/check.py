@@ -12,11 +12,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from acquisition import DataError
-from lobewatch.advice import ProgramAdvice, advise
-from lobewatch.describe_lobes import limit_text, margin_text
-from lobewatch.machine import SpeedRange
-from lobewatch.machine_folder import MachineFolder
-from lobewatch.output import Json, emit, notes, table
+from lobewatch.analysis.advice import ProgramAdvice, advise
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.machine_file import SpeedRange
+from lobewatch.show.describe_lobes import limit_text, margin_text
+from lobewatch.show.output import Json, emit, notes, table
 
 
 def check(

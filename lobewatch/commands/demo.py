@@ -16,13 +16,13 @@ from rich.table import Table
 
 from acquisition import Circumstances, TapsSource
 from dsm import Spindle, calibrate, natural_frequencies
+from lobewatch.analysis.pipeline import Measurement
 from lobewatch.commands.init import make_machine_folder
 from lobewatch.commands.report import write_report
-from lobewatch.emulation import emulated_structure, emulator, with_bearing_stiffness
-from lobewatch.machine_folder import MachineFolder
-from lobewatch.output import Json, emit, notes, table
-from lobewatch.pipeline import Measurement
-from lobewatch.tap_session import TapSession
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.show.output import Json, emit, notes, table
+from lobewatch.tap.emulated_spindle import emulated_structure, emulator, with_bearing_stiffness
+from lobewatch.tap.session import TapSession
 
 FALL = 0.10
 """Fall of the first natural frequency over the demo."""

@@ -11,9 +11,9 @@ import numpy as np
 import typer
 
 from acquisition import DataError, DataqEmulator, Structure, TapsEmulator
-from lobewatch.emulation import dataq_emulator, emulated_structure, emulator
-from lobewatch.machine_folder import MachineFolder
-from lobewatch.output import Json, notes, results
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.show.output import Json, notes, results
+from lobewatch.tap.emulated_spindle import dataq_emulator, emulated_structure, emulator
 
 emulate = typer.Typer(help="A data acquisition device made of software, on a pseudo-terminal.", no_args_is_help=True)
 

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from acquisition import DataError, atomic_write
-from lobewatch.output import Json, emit
+from lobewatch.show.output import Json, emit
 
 
 def init(

@@ -12,9 +12,16 @@ import typer
 from acquisition import DataError, Frf
 from lobes import Pocket, PocketShift, StabilityLobes, best_pockets, pocket_shifts, pockets
 from lobes.tip_response import Tip
-from lobewatch.charts import DEEPEST, Chart, Dynamics, Method, chart
-from lobewatch.describe import lobes_json, program_json, program_table
-from lobewatch.describe_lobes import (
+from lobewatch.analysis.charts import DEEPEST, Chart, Dynamics, Method, chart
+from lobewatch.analysis.history import measure, partner
+from lobewatch.analysis.model_state import model_frf, model_state
+from lobewatch.analysis.pipeline import Measurement, speed_grid
+from lobewatch.analysis.prediction import predict
+from lobewatch.machine.drive import drive_limit
+from lobewatch.machine.folder import MachineFolder, TapEntry
+from lobewatch.machine.machine_file import REFERENCE_CUT, Machine
+from lobewatch.show.describe import lobes_json, program_json, program_table
+from lobewatch.show.describe_lobes import (
     POCKET_RANGE,
     material_lines,
     materials_json,
@@ -24,16 +31,9 @@ from lobewatch.describe_lobes import (
     shift_lines,
     with_option,
 )
-from lobewatch.drive import drive_limit
-from lobewatch.figures import save_figure
-from lobewatch.history import measure, partner
-from lobewatch.lobe_pictures import lobes_picture, radial_picture, waterfall_picture
-from lobewatch.machine import REFERENCE_CUT, Machine
-from lobewatch.machine_folder import MachineFolder, TapEntry
-from lobewatch.model_state import model_frf, model_state
-from lobewatch.output import Json, emit
-from lobewatch.pipeline import Measurement, speed_grid
-from lobewatch.prediction import predict
+from lobewatch.show.figures import save_figure
+from lobewatch.show.lobe_pictures import lobes_picture, radial_picture, waterfall_picture
+from lobewatch.show.output import Json, emit
 
 USEFUL = 5.0
 """Pockets are cut off at this many times the lowest limit, where the diagram ends."""

@@ -16,11 +16,11 @@ from dsm import (
     natural_frequencies,
     static_stiffness,
 )
-from lobewatch.figures import save_figure
-from lobewatch.figures_model import model_figure
-from lobewatch.machine_folder import MachineFolder
-from lobewatch.model_state import first_critical_speed, model_picture, model_state
-from lobewatch.output import Json, emit, table
+from lobewatch.analysis.model_state import first_critical_speed, model_picture, model_state
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.show.figures import save_figure
+from lobewatch.show.figures_model import model_figure
+from lobewatch.show.output import Json, emit, table
 
 
 def model(

@@ -9,10 +9,10 @@ from typing import Annotated
 import typer
 
 from acquisition import Frf, Hit, check_hit, read_frf, read_recording
-from lobewatch.describe import doubt_lines, mode_json, mode_lines, mode_table, picked_table
-from lobewatch.figures import save_figure
-from lobewatch.figures_modes import modes_figure
-from lobewatch.output import Json, emit
+from lobewatch.show.describe import doubt_lines, mode_json, mode_lines, mode_table, picked_table
+from lobewatch.show.figures import save_figure
+from lobewatch.show.figures_modes import modes_figure
+from lobewatch.show.output import Json, emit
 from modal import Mode, cut_edges, extract, fit_modes, pick_peaks, remove_window
 
 

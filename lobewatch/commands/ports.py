@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from acquisition import DeviceError, DeviceIdentity, PortInfo, list_ports, no_ports_hint, probe_port
-from lobewatch.output import Json, emit, table
+from lobewatch.show.output import Json, emit, table
 
 
 @dataclass(frozen=True)

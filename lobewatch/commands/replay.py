@@ -21,10 +21,10 @@ from acquisition import (
     read_recording,
     recorded_as,
 )
-from lobewatch.describe import measurement_json, measurement_texts
-from lobewatch.history import update_history
-from lobewatch.machine_folder import MachineFolder
-from lobewatch.output import Json, emit, notes
+from lobewatch.analysis.history import update_history
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.show.describe import measurement_json, measurement_texts
+from lobewatch.show.output import Json, emit, notes
 
 
 def replay(

@@ -8,10 +8,10 @@ from typing import Annotated
 import typer
 
 from acquisition import DataError, atomic_write
-from lobewatch.history import update_history
-from lobewatch.machine_folder import MachineFolder
-from lobewatch.output import Json, emit
-from lobewatch.report import render_report
+from lobewatch.analysis.history import update_history
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.show.output import Json, emit
+from lobewatch.show.report import render_report
 
 
 def report(

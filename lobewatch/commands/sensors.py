@@ -24,17 +24,17 @@ from acquisition import (
     measure_rate,
     measure_skew,
 )
-from acquisition.mass_calibration import AGREES
-from acquisition.units import STANDARD_GRAVITY
+from acquisition.files.units import STANDARD_GRAVITY
+from acquisition.sensors.mass_calibration import AGREES
 from dsm import plus_minus
-from lobewatch.devices import open_source
-from lobewatch.known_devices import Device, checked_rate, has_clock, use_rate
-from lobewatch.live_signal import LiveSignal
-from lobewatch.machine_folder import MachineFolder
-from lobewatch.output import Json, emit, notes, table
-from lobewatch.self_check import quiet_stretch
-from lobewatch.sensor_doubts import sensor_doubts
-from lobewatch.trial import Trial
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.known_devices import Device, checked_rate, has_clock, use_rate
+from lobewatch.show.output import Json, emit, notes, table
+from lobewatch.tap.live_signal import LiveSignal
+from lobewatch.tap.plug import open_source
+from lobewatch.tap.self_check import quiet_stretch
+from lobewatch.tap.sensor_doubts import sensor_doubts
+from lobewatch.tap.trial import Trial
 
 RATE_SECONDS = 5.0
 """How long the rate is measured (s)."""

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.output import Json
-from lobewatch.show_address import Listen, Token, show_address
+from lobewatch.show.output import Json
+from lobewatch.show.show_address import Listen, Token, show_address
 
 
 def serve(

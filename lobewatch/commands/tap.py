@@ -10,14 +10,14 @@ from typing import Annotated
 import typer
 
 from acquisition import Circumstances
-from lobewatch.describe import measurement_json, measurement_texts
-from lobewatch.devices import Plug
-from lobewatch.machine_folder import MachineFolder
-from lobewatch.output import Json, emit, notes
-from lobewatch.show_address import Listen, Token, show_address
-from lobewatch.tap_printer import TapPrinter
-from lobewatch.tap_session import TapSession, TapStopped
-from lobewatch.terminal_screen import TerminalScreen
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.show.describe import measurement_json, measurement_texts
+from lobewatch.show.output import Json, emit, notes
+from lobewatch.show.printer import TapPrinter
+from lobewatch.show.show_address import Listen, Token, show_address
+from lobewatch.show.terminal_screen import TerminalScreen
+from lobewatch.tap.plug import Plug
+from lobewatch.tap.session import TapSession, TapStopped
 
 
 def tap(

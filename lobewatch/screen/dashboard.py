@@ -12,9 +12,9 @@ import numpy as np
 
 from acquisition import DataError
 from lobes import SldHistory, read_history
-from lobewatch.history import series
-from lobewatch.machine import Machine
-from lobewatch.machine_folder import MachineFolder
+from lobewatch.analysis.history import series
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.machine_file import Machine
 
 LIGHTS = ("alarm", "warn", "unknown", "good")
 """Worst first."""

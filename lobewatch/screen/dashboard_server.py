@@ -14,16 +14,16 @@ import msgspec
 from aiohttp import web
 
 from acquisition import DataError
-from lobewatch.history import update_history
-from lobewatch.machine_folder import MachineFolder
-from lobewatch.report import render_report
+from lobewatch.analysis.history import update_history
+from lobewatch.machine.folder import MachineFolder
 from lobewatch.screen.dashboard import find_machines, standing
 from lobewatch.screen.guard import OPEN
 from lobewatch.screen.live_tests import LiveTest
 from lobewatch.screen.pages import add_pages
 from lobewatch.screen.screen_server import add_session
 from lobewatch.screen.web_thread import WebThread
-from lobewatch.tap_printer import Watched
+from lobewatch.show.printer import Watched
+from lobewatch.show.report import render_report
 
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'; sandbox"
 """A report has its style in it, and no script."""

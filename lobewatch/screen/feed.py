@@ -8,7 +8,7 @@ from collections.abc import Callable
 from aiohttp import WSCloseCode, web
 
 from lobewatch.screen.messages import plots_message, state_message
-from lobewatch.tap_state import Plots, TapState
+from lobewatch.tap.state import Plots, TapState
 
 PERIOD = 0.05
 """At most so often, but for a new word (s)."""

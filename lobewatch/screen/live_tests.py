@@ -7,10 +7,10 @@ from dataclasses import replace
 from datetime import UTC, datetime
 
 from acquisition import Circumstances, DataError
-from lobewatch.devices import Plug
-from lobewatch.machine_folder import MachineFolder
-from lobewatch.tap_session import TapSession, TapStopped
-from lobewatch.tap_state import TapState, Word
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap.plug import Plug
+from lobewatch.tap.session import TapSession, TapStopped
+from lobewatch.tap.state import TapState, Word
 
 
 class LiveTest:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lobewatch.tap_state import Plots, TapState, Word
+from lobewatch.tap.state import Plots, TapState, Word
 
 CURVES = ("time", "force", "acceleration", "frequency", "mean", "last", "coherence", "force_spectrum")
 

@@ -10,7 +10,7 @@ from aiohttp import web
 from lobewatch.screen.feed import feed
 from lobewatch.screen.pages import add_pages
 from lobewatch.screen.web_thread import WebThread
-from lobewatch.tap_printer import Watched
+from lobewatch.show.printer import Watched
 
 
 class ScreenServer(WebThread):

@@ -1,0 +1,231 @@
+"""A DATAQ DI-x108 device made of software: the same bytes on a pseudo-terminal or a TCP port."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.dataq.protocol import (
+    DEC,
+    DECA,
+    DIGITAL_INPUTS,
+    OVERFLOW,
+    RANGES,
+    REFUSALS,
+    SRATE,
+    DataqInput,
+    RateSetting,
+    packet_bytes,
+    split_lines,
+)
+from acquisition.emulation.simulated_source import Signal
+from acquisition.emulation.thread import EmulatorThread
+
+BUFFER_SECONDS = 1.0
+"""What the device keeps for a slow host before it stops (s)."""
+CHUNK = 512
+"""Most scans that are made at a time."""
+UNKNOWN, INVALID = REFUSALS[:2]
+
+
+@dataclass(frozen=True)
+class DataqTraits:
+    """What the device is; the defaults of the lower ones are assumptions that no real device has confirmed yet."""
+
+    model: str = "4108"
+    """Answer to `info 1`."""
+    firmware: str = "1.35"
+    """Answer to `info 2`; some say it in hexadecimal hundredths, "87"."""
+    trailing_nul: bool = False
+    """Lines end with CR NUL, not with CR alone."""
+    digital_word: int = 0x7F00
+    """What the digital inputs give: pulled up where nothing is connected."""
+    scanned: bool = False
+    """Inputs are converted one after the other within a scan, not at once."""
+    echoes_stop: bool = False
+    """A `stop` that ends scanning is echoed."""
+
+
+@dataclass(frozen=True)
+class DataqFaults:
+    """What goes wrong on purpose; all off."""
+
+    halved_rate: bool = False
+    """Scans come at half the rate of the formula."""
+    drop_at: int | None = None
+    """Byte of the stream at which bytes are lost."""
+    drop_bytes: int = 64
+    """How many."""
+    stall_after: int | None = None
+    """Send nothing more after so many scans."""
+    unplug_after: int | None = None
+    """Hang up after so many scans."""
+    overflow_after: int | None = None
+    """The buffer runs over after so many scans, once."""
+    streaming_at_connect: bool = False
+    """A program before this one has left it scanning."""
+    deaf: bool = False
+    """No command is heeded."""
+
+
+class DataqEmulator(EmulatorThread):
+    """Serves a signal as a DAQ; a context manager whose `port` can be opened like a real one."""
+
+    def __init__(
+        self,
+        signal_at: Callable[[float], Signal],
+        inputs: tuple[DataqInput, ...],
+        *,
+        realtime: bool = True,
+        tcp: bool = False,
+        traits: DataqTraits | None = None,
+        faults: DataqFaults | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """signal_at gives, for the rate the host has chosen (Hz), what the sensors on `inputs` feel.
+
+        realtime=False sends as fast as the host reads; tcp listens on loopback instead of a pseudo-terminal.
+        """
+        super().__init__(tcp)
+        self._signal_at, self._inputs = signal_at, {one.number: (i, one) for i, one in enumerate(inputs)}
+        self._realtime, self._clock = realtime, clock
+        self._traits, self._faults = traits or DataqTraits(), faults or DataqFaults()
+        self._info = {0: "DATAQ", 1: self._traits.model, 2: self._traits.firmware, 6: "5E0ABC12", 9: "60000000"}
+        self._ranges = RANGES[self._traits.model]
+        self._scan_list = [0]
+        self._settings = {"srate": 6000, "dec": 1, "deca": 1, "ps": 0, "encode": 1}
+        self._received = b""
+        self.streaming = False
+        """Whether it is scanning."""
+        self._may_overflow = True
+        if self._faults.streaming_at_connect:
+            self._start()
+
+    def serve_once(self) -> bool:
+        """See EmulatorThread."""
+        lines, self._received = split_lines(self._received + self.wire.exchange(self._patience()))
+        for line in [] if self._faults.deaf else lines:
+            self._obey(line)
+        if self.streaming:
+            self._stream()
+        limit = self._faults.unplug_after
+        return limit is None or not self.streaming or self._scan < limit
+
+    def _patience(self) -> float:
+        """How long to wait for the host (s)."""
+        if not self.streaming:
+            return 0.05
+        return 0.002 if self._realtime or not self._has_room() else 0.0
+
+    def _obey(self, line: str) -> None:
+        if self.streaming:
+            if line == "stop":
+                self.streaming = False
+                if self._traits.echoes_stop:
+                    self._say(line)
+            return
+        name, *arguments = line.split() or [""]
+        if name == "start":
+            self._start()
+            return
+        try:
+            self._say(self._answer(name, arguments, line))
+        except (ValueError, LookupError):
+            self._say(INVALID)
+
+    def _answer(self, name: str, arguments: list[str], line: str) -> str:
+        """Echo with what is added to it; ValueError or LookupError for arguments that do not fit."""
+        limits = {"srate": SRATE, "dec": DEC, "deca": DECA, "ps": (0, 7), "encode": (0, 1)}
+        if name == "info":
+            return f"{line} {self._info[int(arguments[0])]}"
+        if name == "slist":
+            self._set_scan_list(*map(int, arguments))
+        elif name == "filter":
+            if arguments[0] != "*" or not 0 <= int(arguments[1]) <= 3:
+                raise ValueError(line)
+        elif name in limits:
+            value = int(arguments[0])
+            if not limits[name][0] <= value <= limits[name][1]:
+                raise ValueError(line)
+            self._settings[name] = value
+        elif name != "stop":
+            return UNKNOWN
+        return line
+
+    def _set_scan_list(self, position: int, code: int) -> None:
+        source, gain = code & 0xF, code >> 8
+        if source > DIGITAL_INPUTS or (source < DIGITAL_INPUTS and gain >= len(self._ranges)):
+            raise ValueError(code)
+        if position > len(self._scan_list):
+            raise ValueError(position)
+        self._scan_list[position:] = [code]
+
+    def _say(self, line: str) -> None:
+        self.wire.pending += line.encode() + (b"\r\0" if self._traits.trailing_nul else b"\r")
+
+    def _start(self) -> None:
+        setting = RateSetting(*(self._settings[name] for name in ("srate", "dec", "deca")))
+        self._rate = setting.rate(int(self._info[9])) * (0.5 if self._faults.halved_rate else 1.0)
+        self._signal = self._signal_at(self._rate * (len(self._scan_list) if self._traits.scanned else 1))
+        self._started, self._scan, self._sent = self._clock(), 0, 0
+        self._waiting = b""
+        self.streaming = True
+
+    def _stream(self) -> None:
+        """Make the scans that are due and send them in whole packets; stop where the host has fallen behind."""
+        if self._faults.stall_after is not None and self._scan >= self._faults.stall_after:
+            return
+        if self._realtime and not self._has_room():
+            self._overflow()
+            return
+        due = CHUNK if self._has_room() else 0
+        if self._realtime:
+            due = min(int((self._clock() - self._started) * self._rate) - self._scan, CHUNK)
+        if due > 0:
+            self._waiting += self._scans(due).tobytes()
+        size = packet_bytes(self._settings["ps"])
+        while len(self._waiting) >= size:
+            self._send(self._waiting[:size])
+            self._waiting = self._waiting[size:]
+        limit = self._faults.overflow_after
+        if limit is not None and self._scan >= limit and self._may_overflow:
+            self._may_overflow = False
+            self._overflow()
+
+    def _has_room(self) -> bool:
+        """Whether the device's buffer takes more; when not in real time, little is sent ahead of the host."""
+        size = int(BUFFER_SECONDS * self._rate) * 2 * len(self._scan_list) if self._realtime else 1 << 16
+        return len(self.wire.pending) <= size
+
+    def _overflow(self) -> None:
+        self.wire.pending += OVERFLOW + b"1\r"
+        self.streaming = False
+
+    def _send(self, packet: bytes) -> None:
+        if self._faults.drop_at is not None:
+            start = max(self._faults.drop_at - self._sent, 0)
+            end = max(self._faults.drop_at + self._faults.drop_bytes - self._sent, 0)
+            self.wire.pending += packet[:start] + packet[end:]
+        else:
+            self.wire.pending += packet
+        self._sent += len(packet)
+
+    def _scans(self, count: int) -> NDArray[np.int16]:
+        """The next words, shape (count, length of the scan list)."""
+        step = len(self._scan_list) if self._traits.scanned else 1
+        values = self._signal(self._scan * step, count * step)
+        self._scan += count
+        words = np.zeros((count, len(self._scan_list)), "<i2")
+        for position, code in enumerate(self._scan_list):
+            number, gain = code & 0xF, code >> 8
+            if number == DIGITAL_INPUTS:
+                words[:, position] = self._traits.digital_word
+            elif number in self._inputs:
+                row, one = self._inputs[number]
+                channel = replace(one.channel, full_scale=self._ranges[gain])
+                words[:, position] = channel.encode(values[row, position % step :: step])
+        return words

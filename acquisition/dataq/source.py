@@ -1,0 +1,177 @@
+"""A DATAQ DI-x108 device on its virtual serial port as a source of scans."""
+
+from __future__ import annotations
+
+import enum
+import time
+from collections.abc import Iterator, Sequence
+from types import TracebackType
+from typing import Any, Self
+
+from acquisition.channel import Block
+from acquisition.dataq.dialogue import DataqDialogue, DataqIdentity
+from acquisition.dataq.protocol import (
+    DIGITAL_INPUTS,
+    OLDEST_FIRMWARE,
+    DataqInput,
+    choose_packet,
+    choose_rate,
+    encode_command,
+    firmware_of,
+    range_code,
+    scan_code,
+)
+from acquisition.dataq.stream import Piece, ScanDecoder
+from acquisition.errors import DeviceError
+from acquisition.ports.serial_link import SerialLink
+
+SILENCE = 3.0
+"""A scanning device that gives no scans for so long has failed (s)."""
+DEFAULT_RATE = 50_000.0
+"""Hz, where none is asked for: force and acceleration with the digital word are 150 000 words a second."""
+
+
+class DataqStatus(enum.StrEnum):
+    """What the device is doing."""
+
+    STOPPED = "stopped"
+    SCANNING = "scanning"
+    OVERFLOW = "overflow"
+    """Its buffer ran over and it stopped by itself; scanning has been started again and no scan has come yet."""
+
+
+class DataqSource:
+    """Connects, asks the device who it is, configures it, and yields its scans. A context manager."""
+
+    def __init__(
+        self, port: str, inputs: Sequence[DataqInput], sample_rate: float | None = None, digital_word: bool = True
+    ) -> None:
+        """Open a port: a device name or socket://host:port. The rate is the nearest the device has (Hz).
+
+        digital_word scans the digital inputs too, whose word shows when bytes are lost. Raises DeviceError where there
+        is no port or no such device, ValueError for inputs, ranges and rates it does not have.
+        """
+        numbers = [one.number for one in inputs]
+        if not numbers or len(set(numbers)) < len(numbers):
+            raise ValueError(f"inputs {numbers} of a DATAQ device must be different ones, at least one")
+        self.channels = tuple(one.channel for one in inputs)
+        self.loss_detection = "digital word" if digital_word else "none"
+        self.status = DataqStatus.STOPPED
+        self.overflows = 0
+        self._decoder = ScanDecoder(len(inputs), digital_word)
+        self._next_scan = self._overruns = 0
+        self._heard = 0.0
+        self._link = SerialLink(port)
+        self._dialogue = DataqDialogue(self._link)
+        try:
+            self._dialogue.halt()
+            device = self._identify()
+            self.info: dict[str, Any] = {"model": f"DI-{device.model}", "serial": device.serial, "fw": device.firmware}
+            self.sample_rate = self._configure(device, inputs, DEFAULT_RATE if sample_rate is None else sample_rate)
+        except BaseException:
+            self._link.close()
+            raise
+
+    def __enter__(self) -> Self:
+        """The connected source."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop the device and close the port."""
+        self.close()
+
+    def start(self) -> None:
+        """Begin an endless stream."""
+        self._next_scan = 0
+        self._heard = time.monotonic()
+        self._decoder.begin()
+        self._link.write(encode_command("start"))  # no echo: the stream begins
+        self.status = DataqStatus.SCANNING
+
+    def stop(self) -> None:
+        """End the stream."""
+        self.status = DataqStatus.STOPPED
+        self._dialogue.halt()
+
+    def close(self) -> None:
+        """Stop where the device still answers, then give the port back."""
+        self.status = DataqStatus.STOPPED
+        try:
+            self._link.write(encode_command("stop"))
+        except DeviceError:
+            pass
+        finally:
+            self._link.close()
+
+    def blocks(self) -> Iterator[Block]:
+        """Blocks with the scans lost before each; DeviceError where the device falls silent or is unplugged.
+
+        Where the device's buffer ran over, or ours because nobody asked for blocks for too long, it is started again;
+        the gap is told by the clock.
+        """
+        since = time.monotonic()
+        while self.status != DataqStatus.STOPPED:
+            data = self._link.read(0.1)
+            if self._link.overruns > self._overruns or (not data and self._decoder.ran_over()):
+                if self.status == DataqStatus.SCANNING:
+                    since = time.monotonic()
+                self._start_again()
+                continue
+            for piece in self._decoder.feed(data):
+                self.status = DataqStatus.SCANNING
+                yield self._block(piece)
+                since = self._heard = time.monotonic()
+            if time.monotonic() - since > SILENCE:
+                raise self._failed(bool(data))
+
+    def _block(self, piece: Piece) -> Block:
+        codes, lost = piece
+        first = self._next_scan + lost
+        self._next_scan = first + codes.shape[1]
+        return Block(first, codes, lost_before=lost)
+
+    def _start_again(self) -> None:
+        """After an overflow, there or here."""
+        self.status = DataqStatus.OVERFLOW
+        self.overflows += 1
+        self._dialogue.halt()
+        self._link.write(encode_command("start"))
+        self._overruns = self._link.overruns
+        self._decoder.begin(lost=max(round((time.monotonic() - self._heard) * self.sample_rate), 1))
+
+    def _failed(self, sends: bool) -> DeviceError:
+        if sends:
+            return DeviceError(
+                f"the digital inputs of the DAQ on {self._link.port} do not hold still, so that lost bytes cannot be "
+                "told: leave them unconnected, or set loss_detection = false in [daq]"
+            )
+        return DeviceError(
+            f"the DAQ on {self._link.port} has sent no samples for {SILENCE:g} s; "
+            "switch it off and on and give the same command again"
+        )
+
+    def _identify(self) -> DataqIdentity:
+        identity = self._dialogue.identify()
+        version = firmware_of(identity.firmware)
+        if version is not None and version < OLDEST_FIRMWARE:
+            raise DeviceError(
+                f"the DI-{identity.model} on {self._link.port} has firmware {version:.2f}; "
+                f"{OLDEST_FIRMWARE} or newer is needed: install it with the maker's upgrade tool"
+            )
+        return identity
+
+    def _configure(self, device: DataqIdentity, inputs: Sequence[DataqInput], wanted: float) -> float:
+        """Send the set-up; the rate that results (Hz)."""
+        codes = [scan_code(one.number, range_code(device.model, one.channel.full_scale)) for one in inputs]
+        if self.loss_detection != "none":
+            codes.append(DIGITAL_INPUTS)
+        setting = choose_rate(wanted, device.dividend)
+        rate = setting.rate(device.dividend)
+        commands = ["encode 0", *(f"slist {position} {code}" for position, code in enumerate(codes)), "filter * 0"]
+        commands += [f"srate {setting.srate}", f"dec {setting.dec}", f"deca {setting.deca}"]
+        for command in (*commands, f"ps {choose_packet(2 * len(codes) * rate)}"):
+            self._dialogue.ask(command)
+        self._dialogue.drain()  # a NUL after the last echo would be taken for the first byte of the stream
+        return rate

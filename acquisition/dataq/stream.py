@@ -1,0 +1,115 @@
+"""From the bare byte stream of a DATAQ device to scans; what is missing is found by the word of the digital inputs.
+
+That word stands last in each scan and holds still; its low byte is always 0. Bytes that are lost move everything that
+follows, and another word appears in its place: the stream is then read on from where the word is found again.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.dataq.protocol import OVERFLOW, USB_PACKET
+
+HELD_BACK = 32
+"""Bytes that stay in hand: the end of a stream that has run over is text, not samples."""
+WINDOW = 32
+"""Scans that must agree before a place in the stream is taken for that of the digital word."""
+
+Piece = tuple[NDArray[np.int32], int]
+"""Codes, shape (n_channels, n), and the scans lost before them."""
+
+
+class ScanDecoder:
+    """Cuts a byte stream into scans."""
+
+    def __init__(self, n_channels: int, digital_word: bool) -> None:
+        """digital_word: each scan ends with the word of the digital inputs."""
+        self._n_channels, self._checked = n_channels, digital_word
+        self._scan_bytes = 2 * (n_channels + digital_word)
+        self.begin()
+
+    def begin(self, lost: int = 0) -> None:
+        """A new stream, whose first byte begins a scan; scans lost before it are told with its first piece."""
+        self._bytes = b""
+        self._word: int | None = None
+        self._in_place = False
+        self._lost = lost
+
+    def feed(self, data: bytes) -> list[Piece]:
+        """The scans that these bytes complete."""
+        self._bytes += data
+        pieces = []
+        while (piece := self._next_piece()) is not None:
+            pieces.append(piece)
+        return pieces
+
+    def ran_over(self) -> bool:
+        """Whether the stream ends with the device's word that its buffer ran over."""
+        return OVERFLOW in self._bytes[-HELD_BACK:]
+
+    def _next_piece(self) -> Piece | None:
+        """Scans up to the next gap; None until more bytes have come."""
+        while (count := (len(self._bytes) - HELD_BACK) // self._scan_bytes) > 0:
+            intact = self._intact(count)
+            if intact:
+                return self._take(intact)
+            if count < WINDOW + 2:
+                return None
+            self._find_word()
+        return None
+
+    def _intact(self, count: int) -> int:
+        """How many of the next scans have the digital word in its place."""
+        if not self._checked:
+            return count
+        if not self._in_place:
+            return 0
+        wrong = np.flatnonzero(self._digital_words(0, count) != self._word)
+        self._in_place = wrong.size == 0
+        return count if self._in_place else int(wrong[0])
+
+    def _take(self, count: int) -> Piece:
+        size = count * self._scan_bytes
+        words = np.frombuffer(self._bytes[:size], "<i2").reshape(count, -1)
+        self._bytes = self._bytes[size:]
+        lost, self._lost = self._lost, 0
+        return words[:, : self._n_channels].T.astype(np.int32), lost
+
+    def _find_word(self) -> None:
+        """Put the next scan at the head of the bytes in hand; where it cannot be told, give one up."""
+        shift = self._shift()
+        if shift is None:
+            self._bytes = self._bytes[self._scan_bytes :]
+            self._lost += 1
+            return
+        word = int(self._digital_words(shift, 1)[0])
+        if shift or word == self._word:  # not a new word in the old place: the next scan may be made of two
+            self._lost += (shift + self._scan_bytes + self._missing_bytes(shift)) // self._scan_bytes
+            self._bytes = self._bytes[shift + self._scan_bytes :]
+        self._word, self._in_place = word, True
+
+    def _shift(self) -> int | None:
+        """Bytes to the next scan: the known word counts first, then a new one in the old place, then anywhere."""
+        found = {shift: self._steady_word(shift) for shift in range(self._scan_bytes)}
+        steady = [shift for shift, word in found.items() if word is not None]
+        known = [shift for shift in steady if found[shift] == self._word]
+        if self._word is not None and not known:
+            return 0 if 0 in steady else None
+        return next(iter(known or steady), None)
+
+    def _steady_word(self, shift: int) -> int | None:
+        words = self._digital_words(shift, WINDOW)
+        first = int(words[0])
+        return first if first & 0x80FF == 0 and np.all(words == first) else None
+
+    def _digital_words(self, shift: int, count: int) -> NDArray[np.int16]:
+        size = self._scan_bytes
+        return np.frombuffer(self._bytes[shift : shift + count * size], "<i2").reshape(count, -1)[:, -1]
+
+    def _missing_bytes(self, shift: int) -> int:
+        """The fewest bytes whose loss moves the stream so far: whole USB packets, where these can."""
+        if not shift:
+            return 0
+        packets = (USB_PACKET * k for k in range(1, self._scan_bytes))
+        return next((n for n in packets if (n + shift) % self._scan_bytes == 0), self._scan_bytes - shift)

@@ -1,0 +1,8 @@
+"""Which device answers on a port."""
+
+from acquisition.devices.probe_port import DeviceIdentity, probe_port
+
+__all__ = [
+    "DeviceIdentity",
+    "probe_port",
+]

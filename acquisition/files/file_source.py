@@ -1,0 +1,123 @@
+"""Recorded hits as if they were being made now."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.channel import Block, Channel, ChannelQuantity
+from acquisition.files.read_recording import read_hits
+from acquisition.hit import Hit
+from acquisition.hits.pulse import samples_before
+
+PAUSE = 1.0
+"""Quiet before, between and after the hits (s)."""
+SCANS_PER_BLOCK = 512
+"""Scans handed over at a time."""
+BITS = 24
+"""Converter that recordings without codes are read through."""
+
+
+class FileSource:
+    """The hits of a recording one after the other, with quiet between them.
+
+    Codes are those of the recording, bit by bit; lost scans and reported overloads are there again. A recording
+    without codes (LVM, text) is read through a converter of 24 bits whose rail is the largest value in the file:
+    its steps are 1e-7 of that, and a value that stands at a rail for long is an overload, as it was before.
+    The quiet is the recording's own: the noise before a pulse, over and over.
+    """
+
+    def __init__(self, path: Path | str, realtime: bool = True) -> None:
+        """Read a file that `read_hits` can read; realtime=False hands it over as fast as it is asked for.
+
+        Raises DataError where there are no hits in it.
+        """
+        hits = read_hits(path)
+        self.channels: tuple[Channel, ...] = hits[0].channels or (
+            _channel("force", hits),
+            _channel("acceleration", hits),
+        )
+        self.sample_rate = hits[0].sample_rate
+        self.info = {"model": f"replay of {Path(path).name}"}
+        self._hits, self._realtime = hits, realtime
+        self._stopped = threading.Event()
+
+    def __enter__(self) -> Self:
+        """The source."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End it."""
+        self.close()
+
+    def start(self) -> None:
+        """Begin at the first hit."""
+        self._stopped.clear()
+
+    def stop(self) -> None:
+        """End at the next block."""
+        self._stopped.set()
+
+    def close(self) -> None:
+        """End at the next block; the file is closed already."""
+        self.stop()
+
+    def blocks(self) -> Iterator[Block]:
+        """The blocks; they end some quiet after the last hit."""
+        began, scan = time.monotonic(), 0
+        for block in self._pieces():
+            scan += block.lost_before
+            due = began + (scan + block.codes.shape[1]) / self.sample_rate
+            if self._stopped.wait(max(due - time.monotonic(), 0.0) if self._realtime else 0.0):
+                return
+            yield Block(scan, block.codes, block.overload, block.lost_before)
+            scan += block.codes.shape[1]
+
+    def _pieces(self) -> Iterator[Block]:
+        """Blocks without their index."""
+        pause = round(PAUSE * self.sample_rate)
+        for hit in self._hits:
+            codes = self._codes(hit)
+            quiet = _quiet(hit, codes)
+            yield from _cut(np.resize(quiet, (pause, 2)).T)
+            middle = codes.shape[1] // 2
+            yield from _cut(codes[:, :middle], hit.overload)
+            yield from _cut(codes[:, middle:], hit.overload, hit.lost_scans)
+        yield from _cut(np.resize(quiet, (pause, 2)).T)
+
+    def _codes(self, hit: Hit) -> NDArray[np.int32]:
+        if hit.codes is not None:
+            return hit.codes
+        signals = (hit.force, hit.acceleration)
+        return np.stack([channel.encode(values) for channel, values in zip(self.channels, signals, strict=True)])
+
+
+def _channel(quantity: ChannelQuantity, hits: list[Hit]) -> Channel:
+    """A channel of 1 V per unit whose rail is the largest value, of the sign that this has."""
+    values = np.concatenate([getattr(hit, quantity) for hit in hits])
+    largest = float(values[np.argmax(np.abs(values))])
+    top = 2 ** (BITS - 1)
+    full_scale = largest * top / (top - 1) if largest > 0 else -largest
+    return Channel(quantity, 1.0, full_scale or 1.0, BITS)
+
+
+def _quiet(hit: Hit, codes: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Scans before the pulse (four fifths of them: its foot is left out), forwards and backwards, (n, 2)."""
+    before = int(0.8 * samples_before(hit))
+    noise = codes.T[: max(before, 1)]
+    return np.concatenate([noise, noise[::-1]])
+
+
+def _cut(codes: NDArray[np.int32], overload: int = 0, lost_before: int = 0) -> Iterator[Block]:
+    for first in range(0, codes.shape[1], SCANS_PER_BLOCK):
+        block = codes[:, first : first + SCANS_PER_BLOCK]
+        yield Block(0, block, overload, lost_before if first == 0 else 0)

@@ -1,0 +1,217 @@
+"""Tap tests as HDF5 files, one file a test, written whole and never rewritten.
+
+Built in memory, then temporary name + fsync + rename: a file of this name is always complete. Every dataset has a
+`units` attribute; no pickles, so that h5dump, MATLAB and Julia read it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Sequence
+from dataclasses import fields
+from datetime import datetime
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.atomic import atomic_write
+from acquisition.channel import Channel
+from acquisition.errors import DataError
+from acquisition.estimation.estimate_frf import cross_spectra
+from acquisition.frf import Frf
+from acquisition.hit import Hit, HitFlags
+from acquisition.tap import Circumstances, SourceFile, TapTest
+
+FORMAT = "lobewatch-tap"
+VERSION = 1
+
+
+def write_tap(path: Path | str, tap: TapTest) -> bytes:
+    """Write a tap test; returns the bytes of the file, on the disk when this returns."""
+    memory = io.BytesIO()
+    with h5py.File(memory, "w") as file:
+        file.attrs.update(format=FORMAT, version=VERSION, software=f"lobewatch {version('lobewatch')}", id=tap.id)
+        _write_circumstances(file, tap.circumstances)
+        _write_raw(file, tap.hits, tap.flags)
+        _write_frf(file, tap.frf)
+        if tap.hits:
+            _write_spectra(file, tap)
+        if tap.source is not None:
+            _write_source(file, tap.source)
+    atomic_write(Path(path), memory.getvalue())
+    return memory.getvalue()
+
+
+def read_tap(path: Path | str) -> TapTest:
+    """A tap test from its file; DataError where it is none or damaged."""
+    with _open(Path(path)) as file:
+        try:
+            hits, flags = _read_raw(file)
+            return TapTest(
+                file.attrs["id"], _read_circumstances(file), _read_frf(file), hits, flags, _read_source(file)
+            )
+        except KeyError as error:
+            raise DataError(f"{path}: incomplete tap file ({error}); take it again from a backup") from error
+
+
+def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: HitFlags) -> None:
+    """One hit of a test in progress and the verdict on it, on the disk when this returns."""
+    memory = io.BytesIO()
+    with h5py.File(memory, "w") as file:
+        file.attrs.update(format=FORMAT, version=VERSION)
+        _write_circumstances(file, circumstances)
+        _write_raw(file, [hit], [flags])
+    atomic_write(Path(path), memory.getvalue())
+
+
+def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tuple[HitFlags, ...]]:
+    """The hits of a tap file or of a hit file, their circumstances, and the verdicts of then."""
+    with _open(Path(path)) as file:
+        hits, flags = _read_raw(file)
+        return hits, _read_circumstances(file), flags
+
+
+def _open(path: Path) -> h5py.File:
+    try:
+        file = h5py.File(io.BytesIO(path.read_bytes()), "r")
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        raise DataError(f"{path}: no readable HDF5 file ({error}); is it cut short?") from error
+    if file.attrs.get("format") != FORMAT:
+        file.close()
+        raise DataError(f"{path}: an HDF5 file, but no tap test of lobewatch (attribute format is not {FORMAT!r})")
+    return file
+
+
+def _write_circumstances(file: h5py.File, about: Circumstances) -> None:
+    file.attrs["created"] = about.created.isoformat()
+    file.attrs["machine_toml_sha256"] = hashlib.sha256(about.machine_toml.encode()).hexdigest()
+    for name in ("machine", "tool", "direction", "operator", "device"):
+        file.attrs[name] = getattr(about, name)
+    file["machine_toml"] = about.machine_toml
+
+
+def _read_circumstances(file: h5py.File) -> Circumstances:
+    named = {name: str(file.attrs[name]) for name in ("machine", "tool", "direction", "operator")}
+    created = datetime.fromisoformat(file.attrs["created"])
+    device = str(file.attrs.get("device", ""))
+    return Circumstances(created=created, machine_toml=file["machine_toml"][()].decode(), device=device, **named)
+
+
+def _dataset(group: h5py.Group, name: str, data: Any, units: str, **options: Any) -> None:
+    group.create_dataset(name, data=data, **options).attrs["units"] = units
+
+
+def _write_raw(file: h5py.File, hits: Sequence[Hit], flags: Sequence[HitFlags]) -> None:
+    if not hits:
+        return
+    raw = file.create_group("raw")
+    first = hits[0]
+    packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
+    if first.codes is not None and first.channels is not None:
+        word = np.int16 if max(channel.adc_bits for channel in first.channels) <= 16 else np.int32
+        codes = np.stack([hit.codes for hit in hits if hit.codes is not None]).astype(word)
+        _dataset(raw, "codes", codes, "ADC code", chunks=(1, *codes.shape[1:]), **packed)
+        for i, channel in enumerate(first.channels):
+            raw.create_group(f"channel_{i}").attrs.update(
+                {field.name: getattr(channel, field.name) for field in fields(Channel)}
+            )
+    else:
+        samples = np.stack([[hit.force, hit.acceleration] for hit in hits])
+        _dataset(raw, "samples", samples, "N, m/s^2", chunks=(1, *samples.shape[1:]), **packed)
+    raw.attrs.update(sample_rate_hz=first.sample_rate, pre_trigger_samples=first.pre_trigger)
+    _dataset(raw, "lost_scans", [hit.lost_scans for hit in hits], "1")
+    _dataset(raw, "overload", [hit.overload for hit in hits], "1")
+    _dataset(raw, "accepted", [not flag for flag in flags], "1")
+    raw["verdict"] = [flag.words for flag in flags]
+
+
+def _read_raw(file: h5py.File) -> tuple[tuple[Hit, ...], tuple[HitFlags, ...]]:
+    if "raw" not in file:
+        return (), ()
+    raw = file["raw"]
+    rate, before = float(raw.attrs["sample_rate_hz"]), int(raw.attrs["pre_trigger_samples"])
+    lost = raw["lost_scans"][()].tolist()
+    overload = raw["overload"][()].tolist() if "overload" in raw else [0] * len(lost)  # not in the first files
+    flags = tuple(HitFlags.from_words(words) for words in raw["verdict"].asstr()[()])
+    if "codes" in raw:
+        pair = (_read_channel(raw["channel_0"]), _read_channel(raw["channel_1"]))
+        coded = zip(raw["codes"][()], lost, overload, strict=True)
+        return tuple(Hit.from_codes(codes, pair, rate, before, n, mask) for codes, n, mask in coded), flags
+    sampled = zip(raw["samples"][()], lost, overload, strict=True)
+    return tuple(Hit(force, response, rate, before, n, overload=mask) for (force, response), n, mask in sampled), flags
+
+
+def _read_channel(group: h5py.Group) -> Channel:
+    values = {name: value.item() if isinstance(value, np.generic) else value for name, value in group.attrs.items()}
+    return Channel(**values)
+
+
+def _write_frf(file: h5py.File, frf: Frf) -> None:
+    group = file.create_group("frf")
+    group.attrs.update(n_averages=frf.n_averages, measured_as=frf.measured_as)
+    if frf.usable_band is not None:
+        group.attrs["usable_band_hz"] = frf.usable_band
+    _write_lines(
+        group,
+        frf.frequency,
+        receptance=(frf.receptance, "m/N"),
+        coherence=(frf.coherence, "1"),
+        random_error=(frf.random_error, "1"),
+    )
+
+
+def _write_lines(
+    group: h5py.Group, frequency: NDArray[np.floating[Any]], **arrays: tuple[NDArray[Any] | None, str]
+) -> None:
+    """Arrays over frequency, which becomes their dimension scale."""
+    _dataset(group, "frequency", frequency, "Hz")
+    group["frequency"].make_scale("frequency")
+    for name, (data, units) in arrays.items():
+        if data is not None:
+            _dataset(group, name, data, units)
+            group[name].dims[0].attach_scale(group["frequency"])
+
+
+def _read_frf(file: h5py.File) -> Frf:
+    group = file["frf"]
+    coherence = group["coherence"][()] if "coherence" in group else None
+    band = group.attrs.get("usable_band_hz")
+    return Frf(
+        group["frequency"][()],
+        group["receptance"][()],
+        coherence,
+        int(group.attrs["n_averages"]),
+        group.attrs["measured_as"],
+        None if band is None else (float(band[0]), float(band[1])),
+    )
+
+
+def _write_spectra(file: h5py.File, tap: TapTest) -> None:
+    s_ff, s_xx, s_fx = cross_spectra(tap.accepted)
+    hit = tap.hits[0]
+    _write_lines(
+        file.create_group("spectra"),
+        np.fft.rfftfreq(hit.force.size, 1 / hit.sample_rate),
+        S_ff=(s_ff, "N^2"),
+        S_xx=(s_xx, "(m/s^2)^2"),
+        S_fx=(s_fx, "N m/s^2"),
+    )
+
+
+def _write_source(file: h5py.File, source: SourceFile) -> None:
+    stored = file.create_dataset("source", data=np.frombuffer(source.content, np.uint8), compression="gzip")
+    digest = hashlib.sha256(source.content).hexdigest()
+    stored.attrs.update(name=source.name, sha256=digest, units="byte")
+
+
+def _read_source(file: h5py.File) -> SourceFile | None:
+    if "source" not in file:
+        return None
+    return SourceFile(str(file["source"].attrs["name"]), file["source"][()].tobytes())

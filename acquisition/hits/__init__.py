@@ -1,0 +1,19 @@
+"""From a stream of scans to single hits, and what a hit is made of: rest, pulse, ringing, window."""
+
+from acquisition.hits.capture_hits import HitSearch, Trigger, capture_hits, input_channels
+from acquisition.hits.pulse import Pulse, baseline, find_pulse, samples_before
+from acquisition.hits.ring_down import ring_down
+from acquisition.hits.windowed_force import windowed_force
+
+__all__ = [
+    "HitSearch",
+    "Pulse",
+    "Trigger",
+    "baseline",
+    "capture_hits",
+    "find_pulse",
+    "input_channels",
+    "ring_down",
+    "samples_before",
+    "windowed_force",
+]

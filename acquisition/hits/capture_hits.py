@@ -1,0 +1,212 @@
+"""From a stream of scans to single hits: trigger on a crossing, with hysteresis and real pre-trigger samples, armed
+again when the structure is at rest."""
+
+from __future__ import annotations
+
+import functools
+import operator
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.channel import Block, Channel
+from acquisition.errors import DataError
+from acquisition.hit import Hit
+from acquisition.hits.rest import Rest
+from acquisition.source import Source
+
+PATIENCE = 2.0
+"""A response that has not fallen for so long is no ringing but the new baseline (s)."""
+
+
+@dataclass(frozen=True)
+class Trigger:
+    """When a record begins and how long it is."""
+
+    level: float
+    """Force that starts a record when crossed upwards (N)."""
+    n_samples: int
+    """Length of a record (samples)."""
+    pre_trigger: int
+    """Samples kept from before the crossing."""
+    hysteresis: float = 0.5
+    """The trigger arms only after the force has stayed below this share of the level for pre_trigger samples."""
+    rest_rms: float | None = None
+    """rms of the acceleration at rest (m/s^2): armed only after pre_trigger samples at rest; None arms
+    by the force alone."""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot trigger."""
+        if not (np.isfinite(self.level) and self.level > 0):
+            raise ValueError(f"trigger level={self.level} N is not > 0")
+        if not 0 < self.pre_trigger < self.n_samples:
+            raise ValueError(f"pre_trigger={self.pre_trigger} samples is not between 1 and n_samples={self.n_samples}")
+
+
+def capture_hits(source: Source, trigger: Trigger) -> Iterator[Hit]:
+    """Hits of a started source, one after the other, unchecked; scans that were lost inside one are counted in it.
+
+    Nothing is interpolated: a record with a gap has its samples closed up and `lost_scans` > 0.
+    """
+    search = HitSearch(source.channels, source.sample_rate, trigger)
+    for block in source.blocks():
+        yield from search.feed(block)
+
+
+def input_channels(channels: tuple[Channel, ...]) -> tuple[int, int]:
+    """Index of the force and of the acceleration channel; DataError unless there is one of each."""
+    quantities = [channel.quantity for channel in channels]
+    if quantities.count("force") != 1 or quantities.count("acceleration") != 1:
+        raise DataError(
+            f"the DAQ has channels for {', '.join(quantities) or 'nothing'}; "
+            "one force and one acceleration channel are needed"
+        )
+    return quantities.index("force"), quantities.index("acceleration")
+
+
+class HitSearch:
+    """The scans not yet done with, and where in them the search stands (positions count scans received)."""
+
+    def __init__(self, channels: tuple[Channel, ...], sample_rate: float, trigger: Trigger) -> None:
+        """Search a stream of these channels from its next scan on."""
+        self._inputs = input_channels(channels)
+        self._pair = (channels[self._inputs[0]], channels[self._inputs[1]])
+        self._rate, self._trigger = sample_rate, trigger
+        newton_per_code = self._pair[0].scale
+        self._level, self._sign = trigger.level / abs(newton_per_code), 1 if newton_per_code > 0 else -1
+        self._codes: NDArray[np.int32] = np.empty((2, 0), np.int32)
+        self._added: list[NDArray[np.int32]] = []
+        self._size = 0
+        self._from = 0
+        self._quiet = 0
+        self._crossing: int | None = None
+        self._gaps: list[tuple[int, int]] = []
+        self._overloads: list[tuple[int, int, int]] = []
+        self._rest: Rest | None = None
+        if trigger.rest_rms is not None:
+            patience = max(round(PATIENCE * sample_rate / trigger.pre_trigger), 2)
+            self._rest = Rest(trigger.rest_rms / abs(self._pair[1].scale), patience)
+        self._settled = self._rest is None
+        self.too_early = 0
+        """Hits passed over because the structure was not at rest."""
+
+    @property
+    def recording(self) -> bool:
+        """Whether a hit is being recorded."""
+        return self._crossing is not None
+
+    @property
+    def armed(self) -> bool:
+        """Whether a hit that comes now is recorded."""
+        return self._crossing is None and self._settled and self._quiet >= self._trigger.pre_trigger
+
+    def feed(self, block: Block) -> Iterator[Hit]:
+        """The hits that are complete with this block."""
+        if block.lost_before:
+            self._gaps.append((self._size, block.lost_before))
+        self._add(block)
+        while (record := self._next_record()) is not None:
+            codes, lost, overload = record
+            yield Hit.from_codes(codes, self._pair, self._rate, self._trigger.pre_trigger, lost, overload)
+
+    def _add(self, block: Block) -> None:
+        force, response = self._inputs
+        overload = (block.overload >> force & 1) | (block.overload >> response & 1) << 1
+        end = self._size + block.codes.shape[1]
+        if overload:
+            self._overloads.append((self._size, end, overload))
+        self._added.append(block.codes if self._inputs == (0, 1) else block.codes[[force, response]])
+        self._size = end
+
+    def _next_record(self) -> tuple[NDArray[np.int32], int, int] | None:
+        """The next complete record, the scans lost in it and its overloads; None until more blocks have come."""
+        if self._crossing is None and not self._trigger_on_crossing():
+            self._forget(self._from - self._trigger.pre_trigger)
+            return None
+        start = (self._crossing or 0) - self._trigger.pre_trigger
+        end = start + self._trigger.n_samples
+        if end > self._size:
+            return None
+        self._join()
+        record = self._codes[:, start:end].copy()
+        lost = sum(count for position, count in self._gaps if start < position < end)
+        masks = (mask for first, last, mask in self._overloads if first < end and last > start)
+        self._from, self._quiet, self._crossing, self._settled = end, 0, None, self._rest is None
+        return record, lost, functools.reduce(operator.or_, masks, 0)
+
+    def _join(self) -> None:
+        """Not at every block: a record under way would be copied as often."""
+        self._codes = np.concatenate([self._codes, *self._added], axis=1)
+        self._added.clear()
+
+    def _force(self, start: int, end: int | None = None) -> NDArray[np.int32]:
+        return self._sign * self._codes[0, start:end]
+
+    def _trigger_on_crossing(self) -> bool:
+        """Find the next crossing that is preceded by rest; hits before it are passed over."""
+        self._join()
+        before = self._trigger.pre_trigger
+        while self._settled or self._settle():
+            found = self._find_crossing()
+            if found is None:
+                return False
+            quiet = self._codes[1, found - before : found - before // 5]  # the pulse may begin before its crossing
+            if self._rest is None or self._rest.holds(quiet):
+                self._crossing = found
+                return True
+            self.too_early += 1
+            self._from, self._quiet, self._settled = found + 1, 0, False
+        return False
+
+    def _settle(self) -> bool:
+        """Step over stretches of pre_trigger samples to the end of the first one without force and at rest."""
+        width = self._trigger.pre_trigger
+        while self._rest is not None and self._from + width <= self._codes.shape[1]:
+            start, self._from = self._from, self._from + width
+            force = self._force(max(start - 1, 0), self._from)
+            above = force >= self._level
+            self.too_early += int(np.count_nonzero(above[1:] & ~above[:-1]))
+            still = self._rest.wait(self._codes[1, start : self._from])
+            if still and np.max(force) < self._trigger.hysteresis * self._level:
+                self._settled, self._quiet = True, width
+                return True
+        return False
+
+    def _find_crossing(self) -> int | None:
+        """First sample at the level in a loud run that follows pre_trigger quiet samples.
+
+        Loud is above the hysteresis level. A run that is still open at the end is looked at again with the next
+        block, unless it has lasted a whole record (an offset, not a hit).
+        """
+        force = self._force(self._from)
+        loud = np.flatnonzero(force >= self._trigger.hysteresis * self._level)
+        if not loud.size:
+            self._quiet += force.size
+            self._from += force.size
+            return None
+        starts = loud[np.diff(loud, prepend=-2) > 1]
+        ends = loud[np.diff(loud, append=force.size + 1) > 1] + 1
+        quiet = starts - np.concatenate(([-self._quiet], ends[:-1]))
+        armed = quiet >= self._trigger.pre_trigger
+        for start, end in zip(starts[armed], ends[armed], strict=True):
+            above = force[start:end] >= self._level
+            if above.any():
+                return self._from + int(start) + int(np.argmax(above))
+        if ends[-1] == force.size and force.size - starts[-1] < self._trigger.n_samples:
+            self._quiet = int(quiet[-1])
+            self._from += int(starts[-1])
+        else:
+            self._quiet = int(force.size - ends[-1])
+            self._from += force.size
+        return None
+
+    def _forget(self, count: int) -> None:
+        if count <= 0:
+            return
+        self._codes = self._codes[:, count:]
+        self._size -= count
+        self._from -= count
+        self._gaps = [(position - count, lost) for position, lost in self._gaps if position > count]
+        self._overloads = [(first - count, last - count, mask) for first, last, mask in self._overloads if last > count]

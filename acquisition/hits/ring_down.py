@@ -1,0 +1,53 @@
+"""How long a structure rings after a hit."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.hit import Hit
+from acquisition.hits.pulse import find_pulse
+
+FINE, COARSE = 200, 8
+"""Pieces of what is looked at whose rms make the envelope: many for a fast decay, few for one that outlasts them."""
+NOISE_RATIO = 3.0
+"""The envelope counts while its rms is above this many times that of the baseline."""
+
+
+def ring_down(hit: Hit) -> float:
+    """Time constant of the slowest decay that stands out of the noise in the response of a hit (s).
+
+    The slope of the logarithm of the response's envelope over the later half of what is visible; inf where nothing
+    falls, 0 where nothing rings. Raises ValueError for a hit without a pulse.
+    """
+    pulse = find_pulse(hit)
+    if pulse is None:
+        raise ValueError("a hit has no force pulse; its ring-down cannot be seen")
+    quiet = hit.acceleration[: max(pulse.start, 1)]
+    ringing = hit.acceleration[min(pulse.end, hit.force.size - 1) :] - np.mean(quiet)
+    noise = NOISE_RATIO * float(np.std(quiet))
+    width = max(hit.force.size // FINE, 8)
+    loud = np.flatnonzero(_envelope(ringing, width) > noise)
+    if not loud.size:
+        return 0.0
+    visible = ringing[: (int(loud[-1]) + 1) * width]
+    found = _time_constant(visible, width)
+    wide = visible.size // COARSE
+    if found > 2 * wide:  # a slow mode: pieces shorter than its period would ripple
+        found = _time_constant(visible, wide)
+    return found / hit.sample_rate
+
+
+def _envelope(signal: NDArray[np.float64], width: int) -> NDArray[np.float64]:
+    pieces = signal[: signal.size // width * width].reshape(-1, width)
+    return np.asarray(np.sqrt(np.mean(pieces**2, axis=1)))
+
+
+def _time_constant(signal: NDArray[np.float64], width: int) -> float:
+    """Of the later half of a ringing (samples)."""
+    rms = _envelope(signal, width)
+    late = rms[rms.size // 2 :] if rms.size >= 4 else rms
+    if late.size < 2:
+        return float(width)
+    slope = np.polyfit(np.arange(late.size) * width, np.log(np.maximum(late, 1e-300)), 1)[0]
+    return float(-1 / slope) if slope < 0 else float("inf")

@@ -1,0 +1,145 @@
+"""Bytes from and to a serial port, with one reader thread that does nothing but read."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import threading
+import time
+from collections import deque
+from typing import Any
+from urllib.parse import urlsplit
+
+import serial
+
+from acquisition.errors import DeviceError
+from acquisition.ports.port_hints import explain_open_error
+
+try:
+    from termios import error as TermiosError  # noqa: N812  (not an OSError, and not there on Windows)
+except ImportError:
+    TermiosError = OSError  # type: ignore[misc,assignment]
+
+BUFFER_BYTES = 16 << 20
+"""Bytes kept for a slow consumer: ten seconds at 1.6 MB/s."""
+
+
+class SerialLink:
+    """An open port; `read` hands over what the reader thread has gathered."""
+
+    def __init__(self, port: str) -> None:
+        """Open the port for this program alone; DeviceError with the system's own words and a cure."""
+        self.port = port
+        try:
+            self._serial = _open(port)
+        except (OSError, ValueError, TermiosError) as error:
+            raise DeviceError(explain_open_error(port, error)) from error
+        self._chunks: deque[bytes] = deque()
+        self._waiting = 0
+        self.overruns = 0
+        """How often the consumer was so late that all that waited was thrown away."""
+        self._arrived = threading.Condition()
+        self._running = True
+        self._failure: Exception | None = None
+        self._reader = threading.Thread(target=self._read_all, name=f"reader {port}", daemon=True)
+        self._reader.start()
+
+    def write(self, data: bytes) -> None:
+        """Send bytes; DeviceError where the device is gone."""
+        try:
+            self._serial.write(data)
+        except serial.SerialTimeoutException as error:
+            raise DeviceError(
+                f"the DAQ on {self.port} takes no commands; switch it off and on and repeat the command"
+            ) from error
+        except (OSError, TermiosError) as error:
+            raise self._unplugged() from error
+
+    def read(self, timeout: float) -> bytes:
+        """All that has arrived, after at most timeout (s); empty where nothing came. DeviceError: unplugged."""
+        deadline = time.monotonic() + timeout
+        with self._arrived:
+            while not self._chunks:
+                if self._failure is not None:
+                    raise self._unplugged() from self._failure
+                if not self._arrived.wait(max(deadline - time.monotonic(), 0)):
+                    return b""
+            chunks, self._chunks, self._waiting = self._chunks, deque(), 0
+        return b"".join(chunks)  # outside the lock: the reader does not wait for it
+
+    def close(self) -> None:
+        """Stop the reader and give the port back."""
+        self._running = False
+        with contextlib.suppress(OSError, AttributeError, TermiosError):
+            self._serial.cancel_read()
+        self._reader.join(timeout=2.0)
+        with contextlib.suppress(OSError, TermiosError):
+            self._serial.close()
+
+    def _read_all(self) -> None:
+        try:
+            while self._running:
+                data = self._serial.read(1)
+                if waiting := self._serial.in_waiting:
+                    data += self._serial.read(waiting)  # one piece: the consumer is not woken for its first byte
+                self._keep(data)
+        except (OSError, TermiosError, TypeError) as error:  # TypeError: pyserial's read after a hang-up
+            with self._arrived:
+                self._failure = error
+                self._arrived.notify()
+
+    def _keep(self, data: bytes) -> None:
+        with self._arrived:
+            if self._waiting + len(data) > BUFFER_BYTES:
+                self._chunks.clear()  # the gap shows in the scan indices of the frames that follow
+                self._waiting = 0
+                self.overruns += 1
+            if data:
+                self._chunks.append(data)
+                self._waiting += len(data)
+                self._arrived.notify()
+
+    def _unplugged(self) -> DeviceError:
+        return DeviceError(f"the DAQ on {self.port} was unplugged or switched off; plug it in and repeat the command")
+
+
+class _TcpPort:
+    """What SerialLink needs of a port, over TCP: pyserial's own socket:// hands over one byte a call."""
+
+    def __init__(self, host: str, number: int) -> None:
+        self._socket = socket.create_connection((host, number), timeout=2.0)
+
+    @property
+    def in_waiting(self) -> int:
+        """How much to ask for: as TCP does not tell how much there is, as much as there may be."""
+        return 65536 if select.select([self._socket], [], [], 0)[0] else 0
+
+    def read(self, size: int) -> bytes:
+        if not select.select([self._socket], [], [], 0.1)[0]:
+            return b""
+        data = self._socket.recv(size)
+        if not data:
+            raise ConnectionError("the other end has hung up")
+        return data
+
+    def write(self, data: bytes) -> None:
+        self._socket.sendall(data)
+
+    def cancel_read(self) -> None:
+        """read() comes back by itself within 0.1 s."""
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+def _open(port: str) -> Any:  # a pyserial port, which has no types, or a _TcpPort
+    url = urlsplit(port)
+    if url.scheme == "socket":
+        if not url.hostname or not url.port:
+            raise ValueError("socket://HOST:PORT is expected")
+        return _TcpPort(url.hostname, url.port)
+    opened = serial.Serial(port, timeout=0.1, write_timeout=2.0, exclusive=True)
+    if hasattr(opened, "set_buffer_size"):  # Windows only
+        opened.set_buffer_size(rx_size=1 << 20)
+    return opened

@@ -1,0 +1,169 @@
+"""Hammer and accelerometer checked together: a hung mass must obey F = m a."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.channel import Channel
+from acquisition.estimation.estimate_frf import cross_spectra, estimate_frf
+from acquisition.hit import Hit
+from acquisition.sensors.plausibility import unit_mistake
+
+LOWEST = 50.0
+"""Below it the pendulum (about 1 Hz) and the conditioner's high pass show (Hz)."""
+FLATNESS = 0.05
+"""The band ends where F/(m a) has left its low-frequency value by this share: mount or block resonate."""
+SMOOTHED = 200.0
+"""Width over which F/(m a) is averaged before its end is looked for (Hz)."""
+FEWEST_LINES = 20
+"""Lines needed in the band."""
+AGREES = 0.05
+"""Share by which both sensitivities together may be off; the stiffness K is off by the same share."""
+STRAIGHT = 10.0
+"""Largest phase of F/(m a) of a rigid mass (deg)."""
+
+
+@dataclass(frozen=True)
+class MassCalibration:
+    """F/(m a) of a known mass. `str()` is the verdict."""
+
+    ratio: float
+    """|F|/(m |a|) towards low frequency, 1 where force and acceleration sensitivity agree."""
+    ratio_std: float
+    """Standard error of the ratio over the hits."""
+    phase: float
+    """Phase of a against F over the band, sign taken off (deg)."""
+    inverted: bool
+    """Whether force and acceleration have opposite signs."""
+    flatness: float
+    """Change of F/(m a) from low frequency to the end of the band, a share of it."""
+    band: tuple[float, float]
+    """Band of the fit (Hz)."""
+    mass: float
+    """Total moving mass (kg)."""
+    n_hits: int
+    """Hits used."""
+    channels: tuple[Channel, Channel] | None = None
+    """Force and acceleration channel, where known."""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether both sensitivities together are right within 5 %, signs included."""
+        return abs(self.ratio - 1) <= AGREES and not self.inverted
+
+    @property
+    def force_sensitivity(self) -> float | None:
+        """Force sensitivity (V/N) if the accelerometer is trusted; None without channels."""
+        return self.channels[0].sensitivity * self.ratio if self.channels else None
+
+    @property
+    def acceleration_sensitivity(self) -> float | None:
+        """Acceleration sensitivity (V per m/s^2) if the hammer is trusted; None without channels."""
+        return self.channels[1].sensitivity / self.ratio if self.channels else None
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """The verdict in sentences."""
+        low, high = self.band
+        said = [
+            f"F/(m a) = {self.ratio:.4f} ± {self.ratio_std:.4f} over {self.n_hits} hits on {self.mass:g} kg, "
+            f"{low:.0f} to {high:.0f} Hz, flat within {abs(self.flatness):.1%}, phase {self.phase:+.1f} deg"
+        ]
+        if abs(self.phase) > STRAIGHT:
+            said.append(
+                f"The phase of {self.phase:+.1f} deg is not that of a rigid mass: measure the skew of the "
+                "channels, hit in line with the accelerometer and the centre of the mass."
+            )
+        if self.inverted:
+            said.append("Force and acceleration have opposite signs: turn the accelerometer or negate its sensitivity.")
+        return (*said, *self._about_size())
+
+    def _about_size(self) -> tuple[str, ...]:
+        if abs(self.ratio - 1) <= AGREES:
+            return (f"Both sensitivities agree within {AGREES:.0%}.",)
+        large, share = ("force", self.ratio - 1) if self.ratio > 1 else ("acceleration", 1 / self.ratio - 1)
+        much = f"{share:.1%}" if share < 1 else f"{1 + share:.4g} times"
+        wrong = "large" if self.ratio > 1 else "small"
+        said = [f"Against the other, the {large} is read {much} too large: every stiffness is as much too {wrong}."]
+        said.append(unit_mistake(self.ratio))
+        if self.channels is not None:
+            old = [channel.sensitivity * 1e3 for channel in self.channels]
+            said.append(
+                f"If the accelerometer is trusted, the hammer has {old[0] * self.ratio:.4g} mV/N instead of "
+                f"{old[0]:.4g}; if the hammer is trusted, the accelerometer has {old[1] / self.ratio:.4g} mV per m/s^2 "
+                f"instead of {old[1]:.4g}."
+            )
+        said.append("Before you change one: is the mass the total that moves, with accelerometer and mount?")
+        return tuple(filter(None, said))
+
+    def __str__(self) -> str:
+        """All of it, a sentence a line."""
+        return "\n".join(self.texts)
+
+
+def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:
+    """Check both sensitivities with good hits on a freely hung rigid mass (kg; all that moves, accelerometer included).
+
+    Per hit, m A = (q0 + q2 f^2) F is fitted by least squares weighted with |F|^2, from 50 Hz to where the force has
+    fallen by 20 dB or F/(m a) by 5 %; q2 takes up the foot of the mount's resonance f_m, A ~ 1/(1 - (f/f_m)^2). The
+    ratio is 1/q0 (noise on the acceleration averages out of it). Source: ISO 7626-5, calibration by a mass.
+
+    Raises ValueError for a mass that is not > 0, fewer than 3 hits, hits of unlike length or rate, and where fewer
+    than 20 lines are left of the band.
+    """
+    if not (np.isfinite(mass) and mass > 0):
+        raise ValueError(f"mass={mass} kg is not > 0; give the total moving mass, accelerometer included")
+    if len(hits) < 3:
+        raise ValueError(f"{len(hits)} good hits; at least 3 are needed for a standard error")
+    upper = (estimate_frf(hits).usable_band or (0.0, 0.0))[1]
+    frequency = np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate)
+    inside = (frequency >= LOWEST) & (frequency <= upper)
+    spectra = [cross_spectra([hit]) for hit in hits]
+    s_ff = np.array([force[inside] for force, _, _ in spectra])
+    s_fa = mass * np.array([cross[inside] for _, _, cross in spectra])
+    n = _flat_lines(frequency[inside], s_ff.sum(axis=0), s_fa.sum(axis=0))
+    if n < FEWEST_LINES:
+        raise ValueError(
+            f"force and acceleration of this mass keep no fixed ratio: {n} lines from {LOWEST:g} Hz up, {FEWEST_LINES} "
+            "are needed; hang the mass on long thin threads, screw the accelerometer on, hit harder, record longer"
+        )
+    f, s_ff, s_fa = frequency[inside][:n], s_ff[:, :n], s_fa[:, :n]
+    sign = float(np.sign(np.sum(s_fa).real))
+    fits = np.array([_fit(f, force, sign * cross.real) for force, cross in zip(s_ff, s_fa, strict=True)])
+    q0, q2 = np.mean(fits, axis=0)
+    return MassCalibration(
+        ratio=float(np.mean(1 / fits[:, 0])),
+        ratio_std=float(np.std(1 / fits[:, 0], ddof=1) / np.sqrt(len(hits))),
+        phase=float(np.angle(sign * np.sum(s_fa), deg=True)),
+        inverted=sign < 0,
+        flatness=float(q0 / (q0 + q2 * f[-1] ** 2) - 1),
+        band=(float(f[0]), float(f[-1])),
+        mass=mass,
+        n_hits=len(hits),
+        channels=hits[0].channels,
+    )
+
+
+def _flat_lines(f: NDArray[np.floating[Any]], s_ff: NDArray[np.float64], s_fa: NDArray[np.complex128]) -> int:
+    """How many lines there are before m A/F leaves the value of the first ones by 5 % of it."""
+    if f.size < FEWEST_LINES:
+        return f.size
+    near = max(FEWEST_LINES, round(SMOOTHED / (f[1] - f[0])))
+    window = np.ones(min(near, f.size))
+    smooth = np.convolve(s_fa, window, "same") / np.convolve(s_ff, window, "same")
+    start = s_fa[:near].sum() / s_ff[:near].sum()
+    off = np.flatnonzero(np.abs(np.abs(smooth / start) - 1) > FLATNESS)
+    return int(off[0]) if off.size else f.size
+
+
+def _fit(f: NDArray[np.floating[Any]], s_ff: NDArray[np.float64], s_fa: NDArray[np.float64]) -> NDArray[np.float64]:
+    """q0 and q2 of m A = (q0 + q2 f^2) F, least squares weighted with |F|^2."""
+    root = np.sqrt(s_ff)
+    return np.asarray(
+        np.linalg.lstsq(np.stack([root, root * (f / f[-1]) ** 2], axis=1), s_fa / root)[0] / [1, f[-1] ** 2]
+    )

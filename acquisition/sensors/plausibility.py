@@ -1,0 +1,100 @@
+"""Sensitivities, units, dates and stiffnesses that cannot be right: a sentence each, empty where all is well."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import date
+
+from acquisition.channel import Channel, ChannelQuantity
+from acquisition.files.units import FACTORS, STANDARD_GRAVITY
+
+SENSITIVITIES: Mapping[ChannelQuantity, tuple[float, float, float, str]] = {
+    "force": (0.1e-3, 25e-3, 1.0, "hammers have 0.1 to 25 mV/N without gain"),
+    "acceleration": (1e-3, 1.0, STANDARD_GRAVITY, "accelerometers have 1 to 1000 mV/g without gain"),
+}
+"""Lowest and highest sensitivity on the market (V per shop unit), SI units in one shop unit, and both in words."""
+FULL_SCALES = (0.01, 100.0)
+"""Smallest and largest range of a converter (V)."""
+STIFFNESSES = (1e5, 1e10)
+"""Modal stiffness at a tool tip or holder (N/m), from a thin end mill to a bare spindle nose."""
+SPREAD = 1.2
+"""Single sensors lie this factor beside their nominal sensitivity."""
+NEAR = 0.15
+"""How near to the factor of a unit mistake a ratio must be."""
+DAYS_PER_MONTH = 365.25 / 12
+
+_LBF = FACTORS["lbf"][1]
+_MISTAKES: Mapping[float, str] = {
+    STANDARD_GRAVITY: "9.81: is the acceleration in g, not m/s^2? A sensitivity in V/g is divided by 9.80665.",
+    1
+    / STANDARD_GRAVITY: "1/9.81: was an acceleration sensitivity in V per m/s^2 divided by 9.80665 as if it were V/g?",
+    1 / _LBF: "1/4.45: is the force in lbf, not N? A sensitivity in V/lbf is divided by 4.44822.",
+    _LBF: "4.45: was a force sensitivity in V/N divided by 4.44822 as if it were V/lbf?",
+    1e3: "1000: is one sensitivity in mV, the other in V (force 1000 times too large or acceleration too small)?",
+    1e-3: "1/1000: is one sensitivity in mV, the other in V (force 1000 times too small or acceleration too large)?",
+}
+
+
+def unit_mistake(ratio: float) -> str:
+    """The unit mistake that explains F/(m a) of a known mass, within 15 %; empty where none does."""
+    for factor, words in _MISTAKES.items():
+        if abs(ratio / factor - 1) < NEAR:
+            return f"The ratio {ratio:.4g} is near {words}"
+    return ""
+
+
+def channel_doubts(channel: Channel) -> tuple[str, ...]:
+    """What speaks against a channel's sensitivity and range."""
+    low, high, unit, known = SENSITIVITIES[channel.quantity]
+    per = "N" if channel.quantity == "force" else "m/s^2"
+    said = f"{channel.quantity}: a sensitivity of {channel.sensitivity:g} V per {per} is not believed"
+    doubts = [_unbelieved(abs(channel.sensitivity) * unit, low / SPREAD, high * SPREAD, said, known)]
+    said = f"{channel.quantity}: a range of ±{channel.full_scale:g} V is not believed"
+    doubts.append(_unbelieved(channel.full_scale, *FULL_SCALES, said, "converters have 0.01 to 100 V"))
+    return tuple(filter(None, doubts))
+
+
+def _unbelieved(value: float, low: float, high: float, said: str, known: str) -> str:
+    if low <= value <= high:
+        return ""
+    hints = {value / 1e3: ", did you mean mV?", value * 1e3: ", was it divided by 1000 twice?"}
+    hint = next((words for other, words in hints.items() if low <= other <= high), "")
+    return f"{said}{hint} ({known})"
+
+
+def stiffness_doubt(stiffness: float) -> str:
+    """Whether a modal stiffness (N/m) is outside what machine tools have."""
+    low, high = STIFFNESSES
+    if low <= abs(stiffness) <= high:
+        return ""
+    return (
+        f"K = {stiffness:.3g} N/m is outside {low:g} to {high:g} N/m: check the units of both sensitivities "
+        "(g or m/s^2, mV or V, lbf or N) with a known mass"
+    )
+
+
+def calibration_doubt(channel: Channel, today: date, interval_months: float = 12.0) -> str:
+    """Whether a sensor's calibration is not known or longer ago than the interval.
+
+    Raises ValueError for a date that is none or lies in the future.
+    """
+    if not channel.calibration_date:
+        return f"{channel.quantity}: date of calibration not known; enter it beside the sensitivity"
+    try:
+        calibrated = date.fromisoformat(channel.calibration_date[:10])
+    except ValueError as error:
+        raise ValueError(
+            f"{channel.quantity}: calibration date {channel.calibration_date!r} is no date; give YYYY-MM-DD"
+        ) from error
+    if calibrated > today:
+        raise ValueError(
+            f"{channel.quantity}: calibration date {calibrated} lies in the future (today is {today}); correct it, or "
+            "the clock of this computer"
+        )
+    months = (today - calibrated).days / DAYS_PER_MONTH
+    if months <= interval_months:
+        return ""
+    return (
+        f"{channel.quantity}: calibrated {calibrated}, {months:.0f} months ago (interval {interval_months:g}); "
+        "check it with a known mass or have it calibrated"
+    )

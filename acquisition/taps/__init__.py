@@ -1,0 +1,19 @@
+"""TAPS/1, the open frame for data acquisition boards: protocol, events, stream, source and emulator."""
+
+from acquisition.taps.emulator import TapsEmulator
+from acquisition.taps.event import Event, EventKind
+from acquisition.taps.faults import Faults
+from acquisition.taps.protocol import Frame, FrameDecoder, MessageType, encode_frame
+from acquisition.taps.source import TapsSource
+
+__all__ = [
+    "Event",
+    "EventKind",
+    "Faults",
+    "Frame",
+    "FrameDecoder",
+    "MessageType",
+    "TapsEmulator",
+    "TapsSource",
+    "encode_frame",
+]

@@ -1,0 +1,272 @@
+"""A TAPS/1 device made of software: the same bytes on a pseudo-terminal or a TCP port."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import threading
+import time
+from collections import deque
+from dataclasses import replace
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from acquisition.channel import Channel
+from acquisition.emulation.simulated_source import Signal, quantise
+from acquisition.emulation.wire import PtyWire, TcpWire, Wire
+from acquisition.taps.event import Event, EventKind
+from acquisition.taps.faults import NOISE, Faults
+from acquisition.taps.protocol import (
+    LOST_BEFORE,
+    SAMPLE_BITS,
+    Frame,
+    FrameDecoder,
+    MessageType,
+    Status,
+    encode_data,
+    encode_frame,
+)
+
+BUFFER_SECONDS = 1.0
+"""What the device keeps for a slow host before it drops scans (s)."""
+STATUS_INTERVAL = 0.5
+"""Time between STATUS frames (s)."""
+
+
+class TapsEmulator:
+    """Serves one signal function as a DAQ; a context manager whose `port` can be opened like a real one."""
+
+    def __init__(
+        self,
+        signal: Signal,
+        channels: tuple[Channel, ...],
+        sample_rate: float,
+        *,
+        realtime: bool = True,
+        tcp: bool = False,
+        link: Path | None = None,
+        faults: Faults | None = None,
+    ) -> None:
+        """realtime=False sends as fast as the host reads; tcp listens on loopback instead of a pseudo-terminal.
+
+        link: a name that always leads to the pseudo-terminal, also after replug(), as /dev/serial/by-id does.
+        """
+        self._signal, self._channels, self._rate = signal, channels, sample_rate
+        self._realtime, self._faults = realtime, faults or Faults()
+        self._tcp, self._link = tcp or os.name == "nt", link
+        self.port = ""
+        """What the host opens."""
+        self._clock = 0
+        self._restarted = False
+        self._pressed: deque[Event] = deque()
+        self._standing: dict[tuple[int, int | None], Event] = {}
+        self._plug_in()
+
+    def _plug_in(self) -> None:
+        """Power on."""
+        self._wire: Wire = TcpWire(int(self.port.rpartition(":")[2] or 0)) if self._tcp else PtyWire(self._link)
+        self.port = self._wire.port
+        self._decoder = FrameDecoder()
+        self._seq = self._session = self._frames = self._infos = 0
+        self._scan = self._sent = self._overruns = self._peak = 0
+        self._streaming = self._lost = False
+        self._n_scans, self._started, self._status_due = 0, 0.0, 0.0
+        self._per_frame, self._bits = 512, SAMPLE_BITS[0]
+        self._stopping = False
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._serve, name="TAPS emulator", daemon=True)
+
+    def __enter__(self) -> Self:
+        """Start serving."""
+        self._serve_on()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Hang up."""
+        self.unplug()
+
+    def unplug(self) -> None:
+        """Pull the cable: the host's port fails, whatever it was doing."""
+        self._stopping = True
+        self._thread.join(timeout=5.0)
+        self._wire.close()
+
+    def replug(self) -> None:
+        """Plug it in again: powered on anew, nothing configured; the signal goes on where it was.
+
+        With tcp the port is the same, and so is `link`; a pseudo-terminal has a new name: see `port`. unplug_after
+        is over.
+        """
+        self.unplug()
+        self._faults = replace(self._faults, unplug_after=None)
+        self._plug_in()
+        self._serve_on()
+
+    def send_event(self, event: Event) -> None:
+        """A button is pressed or a cable pulled, now; its scan is filled in here. A fault is told again at START."""
+        self._pressed.append(event)
+
+    def wait(self) -> None:
+        """Serve until interrupted or unplugged."""
+        while not self._ended.wait(timeout=0.2):  # an interrupted Thread.join takes the thread for ended
+            pass
+
+    def _serve_on(self) -> None:
+        if self._faults.noise_at_start:
+            self._wire.pending += NOISE
+        if self._faults.start_streaming:
+            self._start(0)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        try:
+            self._answer_and_stream()
+        finally:
+            self._ended.set()
+
+    def _answer_and_stream(self) -> None:
+        while not self._stopping:
+            for frame in self._decoder.feed(self._wire.exchange(0.0 if self._streaming and self._has_room() else 0.05)):
+                self._answer(frame)
+            while self._pressed:
+                self._tell(self._pressed.popleft())
+            if self._streaming:
+                self._stream()
+            if self._faults.unplug_after is not None and self._scan >= self._faults.unplug_after:
+                self._hang_up_in_a_frame()
+                return
+
+    def _hang_up_in_a_frame(self) -> None:
+        del self._wire.pending[-self._per_frame :]
+        for _ in range(20):
+            if not self._wire.pending:
+                break
+            self._wire.exchange(0.05)
+        self._wire.close()
+
+    def _send(self, kind: MessageType, body: bytes = b"", flags: int = 0) -> None:
+        encoded = encode_frame(Frame(kind, self._seq, body, self._session, flags))
+        self._seq += 1
+        if kind == MessageType.DATA:
+            self._frames += 1
+            encoded = self._faults.on_wire(encoded, self._frames)
+        elif kind == MessageType.INFO:
+            self._infos += 1
+            encoded = encoded[: len(encoded) // 2] if self._infos <= self._faults.cut_infos else encoded
+        self._wire.pending += encoded
+
+    def _tell(self, event: Event) -> None:
+        if event.kind != EventKind.BUTTON:
+            self._standing[event.kind, event.channel] = event
+        self._send(MessageType.EVENT, replace(event, scan=self._scan).encode())
+
+    def _answer(self, frame: Frame) -> None:
+        about = frame.seq.to_bytes(4, "little")
+        try:
+            if frame.type == MessageType.HELLO:
+                self._send(MessageType.INFO, json.dumps(self._info()).encode())
+                return
+            if frame.type == MessageType.CONFIG:
+                self._configure(json.loads(frame.body))
+            elif frame.type == MessageType.START:
+                self._start(int.from_bytes(frame.body, "little"))
+            elif frame.type == MessageType.STOP:
+                self._streaming = False
+            else:
+                raise ValueError(f"unknown command {frame.type:#04x}")
+        except (ValueError, LookupError, TypeError) as error:
+            self._send(MessageType.NACK, about + struct.pack("<H", 1) + str(error).encode())
+        else:
+            self._send(MessageType.ACK, about + struct.pack("<H", 0))
+
+    def _info(self) -> dict[str, Any]:
+        return {
+            "proto": 1,
+            "model": "lobewatch emulator",
+            "serial": "EMU-1",
+            "fw": "1.0",
+            "adc_bits": self._channels[0].adc_bits,
+            "fs_choices": [self._rate],
+            "simultaneous": True,
+            "clock_ppm": 0 if self._realtime else None,
+            "channels": [
+                {
+                    "i": i,
+                    "name": channel.quantity,
+                    "quantity": channel.quantity,
+                    "sens_V_per_EU": channel.sensitivity,
+                    "sens_date": channel.calibration_date,
+                    "fs_V": channel.full_scale,
+                    "gain": 1.0,
+                    "coupling": "IEPE",
+                    "skew_s": channel.skew,
+                    "delay_s": 0.0,
+                }
+                for i, channel in enumerate(self._channels)
+            ],
+        }
+
+    def _configure(self, wish: dict[str, Any]) -> None:
+        if self._streaming:
+            raise ValueError("CONFIG while streaming; send STOP first")
+        if wish["fs"] != self._rate or wish["channels"] != list(range(len(self._channels))):
+            raise ValueError(f"CONFIG asks for what this device does not have: {wish}")
+        self._per_frame, self._bits = int(wish["samples_per_frame"]), SAMPLE_BITS[wish["format"]]
+
+    def _start(self, n_scans: int) -> None:
+        """Begin a session, and tell what is wrong since earlier."""
+        self._session = (self._session + 1) % 0x10000
+        self._n_scans, self._scan, self._streaming, self._lost = n_scans, 0, True, False
+        self._sent = self._overruns = self._peak = 0
+        self._started = self._status_due = time.monotonic()
+        self._pressed.extend(event for event in self._standing.values() if event.begins)
+
+    def _stream(self) -> None:
+        """Send the frames that are due, drop them where the host has fallen behind, report now and then."""
+        now = time.monotonic()
+        if self._is_hindered():
+            return
+        due = self._scan + self._per_frame if not self._realtime else int((now - self._started) * self._rate)
+        while self._scan + self._per_frame <= due:
+            self._send_scans(overrun=not self._has_room())
+        if now >= self._status_due:
+            self._status_due = now + STATUS_INTERVAL
+            self._send(MessageType.STATUS, Status(self._scan, self._sent, self._peak, self._overruns, 31.5).encode())
+        if self._realtime:
+            time.sleep(0.5 * self._per_frame / self._rate)
+
+    def _is_hindered(self) -> bool:
+        faults = self._faults
+        if faults.restart_after is not None and self._scan >= faults.restart_after and not self._restarted:
+            self._restarted = True
+            self._start(0)
+        stalled = faults.stall_after is not None and self._scan >= faults.stall_after
+        return stalled or not (self._realtime or self._has_room())
+
+    def _has_room(self) -> bool:
+        """Whether the device's buffer takes another frame; when not in real time, little is sent ahead of the host."""
+        return len(self._wire.pending) <= self._buffer_bytes()
+
+    def _buffer_bytes(self) -> int:
+        scan_bytes = self._bits // 8 * len(self._channels)
+        return int(BUFFER_SECONDS * self._rate) * scan_bytes if self._realtime else 1 << 16
+
+    def _send_scans(self, overrun: bool) -> None:
+        codes = quantise(self._signal(self._clock, self._per_frame), self._channels)
+        self._clock += self._per_frame
+        if overrun:
+            self._lost = True
+            self._overruns += 1
+        else:
+            body = encode_data(self._scan, codes, self._bits, self._faults.overload)
+            self._send(MessageType.DATA, body, LOST_BEFORE if self._lost else 0)
+            self._sent += self._per_frame
+            self._lost = False
+            self._peak = max(self._peak, min(100 * len(self._wire.pending) // self._buffer_bytes(), 100))
+        self._scan += self._per_frame
+        if self._n_scans and self._scan >= self._n_scans:
+            self._streaming = False

@@ -1,0 +1,247 @@
+"""A TAPS/1 device on a serial port as a source of scans."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import struct
+import time
+from collections import deque
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Any, Self
+
+from acquisition.channel import Block, Channel
+from acquisition.errors import DeviceError
+from acquisition.ports.serial_link import SerialLink
+from acquisition.taps.event import Event, EventLog
+from acquisition.taps.protocol import (
+    FRAME_OVERHEAD,
+    MAX_FRAME,
+    SAMPLE_BITS,
+    Frame,
+    FrameDecoder,
+    MessageType,
+    Status,
+    encode_frame,
+)
+from acquisition.taps.stream import ScanStream
+
+ANSWER_TIME = 1.0
+"""How long a command may stay unanswered before it is sent again (s)."""
+TRIES = 3
+"""How often a command is sent."""
+SILENCE = 3.0
+"""A streaming device that sends no scans for so long has failed (s); it reports itself every 0.5 s."""
+SCANS_PER_FRAME = 512
+"""Asked of the device at least, where so many fit into a frame; more ..."""
+FRAME_TIME = 0.01
+"""... where they come faster than so (s)."""
+
+
+class TapsSource:
+    """Connects, asks the device who it is, configures it, and yields its scans. A context manager."""
+
+    loss_detection = "scan numbers"
+    """How lost scans are found."""
+
+    def __init__(self, port: str, sample_rate: float | None = None) -> None:
+        """Open a port: a device name or socket://host:port. sample_rate None takes the device's highest (Hz).
+
+        Raises DeviceError where there is no port or no TAPS/1 device, ValueError for a rate it does not have.
+        """
+        self._link = SerialLink(port)
+        self._decoder = FrameDecoder()
+        self._frames: deque[Frame] = deque()
+        self._seq = 0
+        self._events = EventLog()
+        self._stream: ScanStream | None = None
+        self._streaming = False
+        self.status: Status | None = None
+        """What the device has last reported of itself (every 0.5 s of a stream)."""
+        try:
+            self._command(MessageType.STOP)
+            self.info, self.channels = self._identify()
+            self.sample_rate = self._configure(sample_rate)
+        except BaseException:
+            self._link.close()
+            raise
+
+    def __enter__(self) -> Self:
+        """The connected source."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Stop the device and close the port."""
+        self.close()
+
+    @property
+    def events(self) -> deque[Event]:
+        """What has happened at the device, oldest first: take with popleft(), in any thread (IndexError: empty)."""
+        return self._events.new
+
+    @property
+    def fault(self) -> str:
+        """One sentence on a pulled cable or a sensor without supply while that lasts; empty where all is well."""
+        numbers = (entry["i"] for entry in self.info["channels"])
+        return self._events.fault(dict(zip(numbers, self.channels, strict=True)))
+
+    @property
+    def lost_scans(self) -> int:
+        """Scans of this or the last stream that never came."""
+        return self._stream.lost_scans if self._stream else 0
+
+    @property
+    def dropped_frames(self) -> int:
+        """Frames that were damaged, so far, and DATA frames of this stream that came twice or late."""
+        return self._decoder.dropped + (self._stream.refused if self._stream else 0)
+
+    @property
+    def overruns(self) -> int:
+        """How often this program was so late that what had been received was thrown away."""
+        return self._link.overruns
+
+    def start(self) -> None:
+        """Begin an endless stream."""
+        self.status = None
+        answer = self._command(MessageType.START, (0).to_bytes(8, "little"))
+        self._stream = ScanStream(answer.session, len(self.channels))
+        self._streaming = True
+
+    def stop(self) -> None:
+        """End the stream; in the thread that reads the blocks."""
+        self._streaming = False
+        self._command(MessageType.STOP)
+
+    def close(self) -> None:
+        """Stop where the device still answers, then give the port back."""
+        try:
+            self._link.write(self._encode(MessageType.STOP))
+        except DeviceError:
+            pass
+        finally:
+            self._link.close()
+
+    def blocks(self) -> Iterator[Block]:
+        """Blocks with the scans lost before each; DeviceError where the device falls silent or is unplugged."""
+        heard = time.monotonic()
+        while self._stream is not None and self._streaming:
+            frame = self._next_frame(0.1)
+            if frame is not None and frame.type == MessageType.DATA:
+                block = self._stream.accept(frame)
+                if block is not None:
+                    yield block
+                    heard = time.monotonic()  # not before: a slow consumer is no silent device
+            if time.monotonic() - heard > SILENCE:
+                raise self._silent()
+
+    def _silent(self) -> DeviceError:
+        restarted = self._stream is not None and self._stream.foreign
+        reason = "has begun another stream by itself" if restarted else f"has sent no samples for {SILENCE:g} s"
+        return DeviceError(
+            f"the DAQ on {self._link.port} {reason}; switch it off and on and give the same command again"
+        )
+
+    def _identify(self) -> tuple[dict[str, Any], tuple[Channel, ...]]:
+        body = self._command(MessageType.HELLO, answer=MessageType.INFO).body
+        try:
+            info = json.loads(body)
+            channels = _channels(info)
+            info["model"], info["fs_choices"] = str(info["model"]), _rates(info["fs_choices"])
+            if not info["serial"]:
+                raise ValueError("serial is empty; the measured sample rate is kept by it")
+        except (ValueError, KeyError, TypeError) as error:
+            raise DeviceError(
+                f"the DAQ on {self._link.port} describes itself wrongly ({type(error).__name__}: {error}); "
+                "its firmware must send the INFO of TAPS/1"
+            ) from error
+        return info, channels
+
+    def _configure(self, sample_rate: float | None) -> float:
+        choices = self.info["fs_choices"]
+        rate = max(choices) if sample_rate is None else sample_rate
+        if rate not in choices:
+            listed = ", ".join(f"{choice:g}" for choice in choices)
+            raise ValueError(f"sample rate {rate:g} Hz is none of this device's: {listed} Hz")
+        form = next(form for form, bits in enumerate(SAMPLE_BITS) if self.info["adc_bits"] <= bits)
+        channels = [entry["i"] for entry in self.info["channels"]]
+        fit = (MAX_FRAME - FRAME_OVERHEAD) * 8 // (len(channels) * SAMPLE_BITS[form])
+        wish = {
+            "fs": rate,
+            "channels": channels,
+            "format": form,
+            "samples_per_frame": min(max(SCANS_PER_FRAME, round(FRAME_TIME * rate)), fit),
+        }
+        self._command(MessageType.CONFIG, json.dumps(wish).encode())
+        return float(rate)
+
+    def _encode(self, kind: MessageType, body: bytes = b"") -> bytes:
+        self._seq += 1
+        return encode_frame(Frame(kind, self._seq, body))
+
+    def _command(self, kind: MessageType, body: bytes = b"", answer: MessageType = MessageType.ACK) -> Frame:
+        """Send, and wait for ACK of this command, or for the one frame it asks for."""
+        for _ in range(TRIES):
+            self._link.write(self._encode(kind, body))
+            deadline = time.monotonic() + ANSWER_TIME
+            while (left := deadline - time.monotonic()) > 0:
+                frame = self._next_frame(left)
+                if frame is not None and self._answers(frame, answer):
+                    return frame
+        raise DeviceError(
+            f"no TAPS/1 device answers on {self._link.port} ({kind.name}, {TRIES} tries); "
+            "check that this is the DAQ's port and that it is switched on"
+        )
+
+    def _next_frame(self, timeout: float) -> Frame | None:
+        """The next frame in order of arrival; None where nothing came in time (s)."""
+        if not self._frames:
+            self._frames.extend(self._decoder.feed(self._link.read(timeout)))
+        if not self._frames:
+            return None
+        frame = self._frames.popleft()
+        if frame.type == MessageType.EVENT:
+            self._events.add(frame)
+        elif frame.type == MessageType.STATUS:
+            with contextlib.suppress(struct.error):
+                self.status = Status.decode(frame.body)
+        return frame
+
+    def _answers(self, frame: Frame, answer: MessageType) -> bool:
+        about = int.from_bytes(frame.body[:4], "little")
+        if frame.type == MessageType.NACK and about == self._seq:
+            raise DeviceError(
+                f"the DAQ on {self._link.port} refuses a command: {frame.body[6:].decode(errors='replace')}"
+            )
+        return frame.type == answer and (answer != MessageType.ACK or about == self._seq)
+
+
+def _rates(choices: list[float]) -> list[float]:
+    rates = [float(rate) for rate in choices]
+    if not rates or not all(0 < rate < float("inf") for rate in rates):
+        raise ValueError(f"fs_choices={choices} are no sample rates > 0")
+    return rates
+
+
+def _channels(info: dict[str, Any]) -> tuple[Channel, ...]:
+    """Channels as the device reports them; sens_V_per_EU is V per N or V per m/s^2, before its gain.
+
+    Raises KeyError, TypeError or ValueError where they are none.
+    """
+    if not 2 <= info["adc_bits"] <= SAMPLE_BITS[-1]:
+        raise ValueError(f"adc_bits={info['adc_bits']} is not between 2 and {SAMPLE_BITS[-1]}")
+    if len({entry["i"] for entry in info["channels"]}) != len(info["channels"]):
+        raise ValueError("two channels have the same number i")
+    return tuple(
+        Channel(
+            quantity=entry["quantity"],
+            sensitivity=entry["sens_V_per_EU"] * entry.get("gain", 1.0),
+            full_scale=entry["fs_V"],
+            adc_bits=info["adc_bits"],
+            calibration_date=str(entry.get("sens_date") or ""),
+            skew=entry.get("skew_s", 0.0),
+        )
+        for entry in info["channels"]
+    )

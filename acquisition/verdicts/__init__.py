@@ -1,0 +1,13 @@
+"""Whether a hit is good."""
+
+from acquisition.verdicts.average_good import average_good
+from acquisition.verdicts.check_hit import check_hit
+from acquisition.verdicts.judge_hit import judge_hit
+from acquisition.verdicts.verdict import Verdict
+
+__all__ = [
+    "Verdict",
+    "average_good",
+    "check_hit",
+    "judge_hit",
+]

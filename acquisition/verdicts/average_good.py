@@ -1,0 +1,21 @@
+"""The mean of recorded hits, without those that are no good."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from acquisition.errors import DataError
+from acquisition.estimation.estimate_frf import estimate_frf
+from acquisition.frf import Frf
+from acquisition.hit import Hit, HitFlags
+from acquisition.verdicts.judge_hit import judge_hit
+
+
+def average_good(hits: Sequence[Hit]) -> tuple[Frf, tuple[HitFlags, ...]]:
+    """H1 FRF of the good hits, and the verdict on each; DataError with the reasons where no hit is good."""
+    verdicts = [judge_hit(hit) for hit in hits]
+    good = [hit for hit, verdict in zip(hits, verdicts, strict=True) if not verdict.flags]
+    if not good:
+        reasons = "; ".join(f"hit {i}: {verdict.flags.words}. {verdict.text}" for i, verdict in enumerate(verdicts, 1))
+        raise DataError(f"no good hit of {len(hits)}: {reasons}")
+    return estimate_frf(good), tuple(verdict.flags for verdict in verdicts)

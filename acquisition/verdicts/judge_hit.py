@@ -1,0 +1,130 @@
+"""The verdict on one hit: everything that speaks against averaging it, with figures."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.estimation.estimate_frf import estimate_frf
+from acquisition.frf import Frf
+from acquisition.hit import Hit, HitFlags
+from acquisition.hits.pulse import Pulse, baseline, find_pulse, samples_before
+from acquisition.verdicts.distance_from_mean import distance_from_mean
+from acquisition.verdicts.find_overload import Overload, find_overload
+from acquisition.verdicts.second_touch import find_second_touch
+from acquisition.verdicts.verdict import Verdict
+
+HARD_SHARE_OF_SCALE = 0.9
+"""A pulse above this share of the force range is too hard: the sensor may saturate before its converter does."""
+SOFT_SHARE_OF_SCALE = 0.02
+"""A pulse below this share of the force range is too soft: the converter's steps show."""
+SOFT_NOISE_RATIO = 20.0
+"""A pulse below this many times the baseline's rms is too soft."""
+DECAYED_SHARE = 0.02
+"""rms of the last tenth of the response against that of the loudest: above this and twice the noise it was cut off."""
+FAR = 0.3
+"""Distance from the mean that makes a hit inconsistent: it would move a mean of ten by 3 % ..."""
+FAR_NOISE_RATIO = 4.0
+"""... and at least this many times what the scatter of the hits in the mean would give."""
+
+
+def judge_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | None = None) -> Verdict:
+    """All that is wrong with a hit; its flags are falsy when it may be averaged.
+
+    Without `mean` and `band` the time signals alone decide. With the mean of 3 or more good hits, one without other
+    faults is compared with it (INCONSISTENT); with the band that is followed (Hz), its force must reach to the end of
+    it (NARROW_BAND: 20 dB below its largest value). Source: ISO 7626-5 practice; docs/hit-verdicts.md.
+    """
+    findings = _overloads(hit)
+    if hit.lost_scans:
+        findings[HitFlags.LOST_SCANS] = f"{hit.lost_scans} scans are missing in this record"
+    if _is_swapped(hit):
+        findings[HitFlags.SWAPPED_CHANNELS] = "The force rings and the response does not"
+        return Verdict.of(findings)
+    pulse = find_pulse(hit)
+    if pulse is None:
+        findings[HitFlags.NO_HIT] = "No hammer pulse stands out of the noise of the force"
+        return Verdict.of(findings)
+    findings |= _strength(hit, pulse, clipped=HitFlags.OVERLOAD_FORCE in findings)
+    findings |= _second(hit, pulse) | _cut_off(hit)
+    if band is not None or (mean is not None and not findings):
+        findings |= _in_frequency(hit, mean if not findings else None, band)
+    return Verdict.of(findings)
+
+
+def _overloads(hit: Hit) -> dict[HitFlags, str]:
+    flags = (HitFlags.OVERLOAD_FORCE, HitFlags.OVERLOAD_RESPONSE)
+    found = {flag: find_overload(hit, i) for i, flag in enumerate(flags)}
+    texts = {flag: _overload_text(flag, overload) for flag, overload in found.items() if overload is not None}
+    reported = {flag: "The device reports an overload" for i, flag in enumerate(flags) if hit.overload >> i & 1}
+    return reported | texts
+
+
+def _overload_text(flag: HitFlags, overload: Overload) -> str:
+    name, unit = ("Force", "N") if flag is HitFlags.OVERLOAD_FORCE else ("Response", "m/s^2")
+    how = " (inferred from its flat top)" if overload.inferred else ""
+    return f"{name} cut off at {overload.level:.4g} {unit} for {overload.samples} samples{how}"
+
+
+def _is_swapped(hit: Hit) -> bool:
+    """The response is one short pulse of one sign while the force swings through both."""
+    force, response = hit.force - np.median(hit.force), hit.acceleration - np.median(hit.acceleration)
+    noise = float(np.std(baseline(response, hit.pre_trigger)))
+    sided = min(response.max(), -response.min()) < max(0.1 * np.max(np.abs(response)), 6 * noise)
+    swings = min(force.max(), -force.min()) > 0.3 * np.max(np.abs(force))
+    return bool(sided and swings and _duration(force) > 3 * _duration(response))
+
+
+def _duration(signal: NDArray[np.float64]) -> int:
+    """Number of samples that hold the middle 90 % of the energy."""
+    energy = np.cumsum(signal**2)
+    low, high = np.searchsorted(energy, [0.05 * energy[-1], 0.95 * energy[-1]])
+    return int(high - low) + 1
+
+
+def _strength(hit: Hit, pulse: Pulse, *, clipped: bool) -> dict[HitFlags, str]:
+    full = hit.channels[0].full_scale / abs(hit.channels[0].sensitivity) if hit.channels else np.inf
+    peak = f"Peak of {pulse.peak:.4g} N is"
+    if pulse.peak > HARD_SHARE_OF_SCALE * full and not clipped:
+        return {HitFlags.TOO_HARD: f"{peak} {pulse.peak / full:.0%} of the range of {full:.0f} N"}
+    if hit.channels and pulse.peak < SOFT_SHARE_OF_SCALE * full:
+        return {HitFlags.TOO_SOFT: f"{peak} below {SOFT_SHARE_OF_SCALE:.0%} of the range of {full:.0f} N"}
+    if pulse.peak < SOFT_NOISE_RATIO * pulse.baseline_rms:
+        return {HitFlags.TOO_SOFT: f"{peak} below {SOFT_NOISE_RATIO:.0f} times the noise of {pulse.baseline_rms:.3g} N"}
+    return {}
+
+
+def _second(hit: Hit, pulse: Pulse) -> dict[HitFlags, str]:
+    second = find_second_touch(pulse)
+    if second is None:
+        return {}
+    when = (
+        f"{abs(second.delay) / hit.sample_rate * 1e3:.2g} ms {'after' if second.delay > 0 else 'before'} the main one"
+    )
+    return {HitFlags.DOUBLE_HIT: f"Second peak {when} ({100 * second.share:.2g} %)"}
+
+
+def _cut_off(hit: Hit) -> dict[HitFlags, str]:
+    levels = [float(np.std(tenth)) for tenth in np.array_split(hit.acceleration, 10)]
+    quiet = hit.acceleration[: int(0.8 * samples_before(hit))]
+    noise = float(np.std(quiet)) if quiet.size >= 8 else 0.0
+    if levels[-1] <= max(DECAYED_SHARE * max(levels), 2 * noise):
+        return {}
+    share = levels[-1] / max(levels)
+    return {HitFlags.NOT_DECAYED: f"The last tenth of the record still rings with {share:.1%} of the loudest"}
+
+
+def _in_frequency(hit: Hit, mean: Frf | None, band: tuple[float, float] | None) -> dict[HitFlags, str]:
+    frf = estimate_frf([hit])
+    reach = frf.usable_band[1] if frf.usable_band else np.inf
+    findings = {}
+    if band is not None and reach < band[1]:
+        findings[HitFlags.NARROW_BAND] = f"The force reaches to {reach:.0f} Hz (-20 dB) of the {band[1]:g} Hz wanted"
+    if mean is not None and mean.random_error is not None:
+        distance, noise = distance_from_mean(frf, mean)
+        limit = max(FAR, FAR_NOISE_RATIO * noise)
+        if distance > limit:
+            findings[HitFlags.INCONSISTENT] = (
+                f"FRF {distance:.0%} away from the mean of {mean.n_averages} hits (limit {limit:.0%})"
+            )
+    return findings

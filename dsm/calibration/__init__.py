@@ -1,0 +1,25 @@
+"""Stiffness and damping of bearings and joints from measured modes."""
+
+from dsm.calibration.calibrate import calibrate
+from dsm.calibration.calibrate_damping import DampingCalibration, UnreachableDampingError, calibrate_damping
+from dsm.calibration.calibration import Calibration, UnreachableFrequencyError
+from dsm.calibration.fit_stiffness import fit_stiffness
+from dsm.calibration.plus_minus import plus_minus
+from dsm.calibration.receptance_map import receptance_map
+from dsm.calibration.stiffness_curve import stiffness_curve
+from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
+
+__all__ = [
+    "Calibration",
+    "DampingCalibration",
+    "StiffnessFit",
+    "StiffnessFitError",
+    "UnreachableDampingError",
+    "UnreachableFrequencyError",
+    "calibrate",
+    "calibrate_damping",
+    "fit_stiffness",
+    "plus_minus",
+    "receptance_map",
+    "stiffness_curve",
+]

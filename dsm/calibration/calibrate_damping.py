@@ -1,0 +1,240 @@
+"""Damping of the bearings from one measured damping ratio."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from dsm.calibration.bearing_eigenproblem import calibrated_bearings
+from dsm.calibration.plus_minus import plus_minus
+from dsm.modes.damped_modes import given_damping
+from dsm.modes.damped_shaft import DampedMode, DampedShaft, Damping
+from dsm.spindle.spindle import Spindle
+
+_Float = NDArray[np.float64]
+
+FIRST_STEP = 0.3
+"""Longest first step: the damper's share in the force of its spring (-), far from holding the bearing still."""
+GROWTH = 0.5
+"""Longest later step, in parts of the dampers: the damping ratio may fall and rise again."""
+LOCKED = 3e3
+"""The damper's share in the force of its spring beyond which nothing is sought."""
+ROUNDS = 100
+"""Most steps towards the measured damping ratio."""
+
+
+class UnreachableDampingError(ValueError):
+    """No dampers give the mode the measured damping ratio."""
+
+    def __init__(self, message: str, limit: float) -> None:
+        """Keep the limit beside the message."""
+        super().__init__(message)
+        self.limit = limit
+        """The least or largest damping ratio that the mode can have (-), whichever was passed."""
+
+
+@dataclass(frozen=True)
+class DampingCalibration:
+    """A spindle whose bearing dampers give a mode its measured damping ratio. Printed, it is a report."""
+
+    damping_ratio: float
+    """Measured damping ratio (-)."""
+    damping_ratio_std: float | None
+    """Its standard error (-); None where it was not given."""
+    mode: int
+    """Number of the mode it belongs to; 1 is the lowest without damping."""
+    frequency: float
+    """|s|/2 pi of the mode with this damping (Hz)."""
+    other_damping_ratio: float
+    """Damping ratio of the mode without the calibrated dampers (-): of the loss factor and of other bearings."""
+    loss_factor: float
+    """Loss factor of shaft, bearings, housing and joints (-)."""
+    bearing_damping: float
+    """Mean viscous damping of the calibrated bearings (N s/m)."""
+    bearing_damping_std: float | None
+    """Its standard error from that of the damping ratio (N s/m); None where that was not given."""
+    sensitivity: float
+    """d zeta / d ln c of the mode (-): 1 % more of these dampers adds a hundredth of it to the damping ratio."""
+    given: Spindle
+    """The spindle as given."""
+    spindle: Spindle
+    """The spindle with the dampers."""
+
+    def __str__(self) -> str:
+        """The report."""
+        damping = plus_minus(self.bearing_damping, self.bearing_damping_std, unit="N s/m", percent=True)
+        measured = plus_minus(self.damping_ratio, self.damping_ratio_std, unit="of critical", percent=True)
+        return "\n".join(
+            [
+                f"bearing damping  {damping} each on average",
+                f"from mode {self.mode}      damping ratio {measured}, {self.frequency:.6g} Hz",
+                f"other damping    damping ratio {self.other_damping_ratio:.6g} without these dampers, "
+                f"loss factor {self.loss_factor:g}",
+                f"sensitivity      1 % more of this damping adds {self.sensitivity / 100:.3g} to the damping ratio",
+            ]
+        )
+
+
+class _Point(NamedTuple):
+    """The mode at one amount of the dampers."""
+
+    amount: float
+    mode: DampedMode
+    slope: float
+    """d zeta / d amount."""
+
+
+class _Dampers(NamedTuple):
+    """What is varied: dampers in a fixed ratio beside all other damping."""
+
+    shaft: DampedShaft
+    number: int
+    fixed: Damping
+    ratio: _Float
+    """Dampers (N s/m) of all bearings at amount 1, shape (n_bearings,)."""
+
+    def at(self, amount: float) -> Damping:
+        return Damping(self.fixed.viscous + amount * self.ratio, self.fixed.loss_factor)
+
+    def point(self, amount: float, mode: DampedMode) -> _Point:
+        """With d zeta = cos(arg w) Im(dw/w), as zeta = sin(arg w)."""
+        change = complex(self.shaft.by_damper(self.at(amount), mode) @ self.ratio) / mode.w
+        return _Point(amount, mode, mode.w.real / abs(mode.w) * change.imag)
+
+    def go(self, start: _Point, amount: float) -> _Point:
+        mode = self.shaft.follow(self.number, start.mode, self.at(start.amount), self.at(amount))
+        return self.point(amount, mode)
+
+
+def calibrate_damping(
+    spindle: Spindle,
+    damping_ratio: float,
+    damping_ratio_std: float | None = None,
+    mode: int = 1,
+    group: str | None = None,
+    loss_factor: float = 0.0,
+) -> DampingCalibration:
+    """Give bearings viscous dampers, so that a mode (1 is the lowest) has its measured damping ratio (-).
+
+    group: the bearings that get them; None: all that have a group. Where all of these have damping already, it keeps
+    its ratio; where none has, the dampers are in the ratio of the stiffnesses. Other bearings keep their damping.
+    loss_factor: that of the whole spindle, see damped_modes; its part of the damping ratio is taken off exactly. Of
+    the two dampers that may give the same ratio, a soft one and one that nearly locks the bearing, it is the soft one.
+    The standard error follows from that of the damping ratio (`damping_ratio_std`).
+
+    Raises UnreachableDampingError (a ValueError) where other damping alone gives more than was measured, and where it
+    is more than any such damper can give: one that is too strong holds the bearing still and damps nothing. ValueError
+    for a damping ratio outside 0 to 1, for damping given to a part of the bearings only, for a group with no bearing or
+    a rigid one, and a shaft that is not held.
+    """
+    _check(damping_ratio, damping_ratio_std, mode)
+    chosen = calibrated_bearings(spindle, group)
+    given = given_damping(spindle, loss_factor)
+    fixed = given.viscous.copy()
+    fixed[chosen] = 0.0
+    shaft = DampedShaft.of(spindle, mode)
+    dampers = _Dampers(shaft, mode, Damping(fixed, loss_factor), _ratio(spindle, chosen))
+    start = dampers.point(0.0, shaft.follow(mode, shaft.start(mode), shaft.none, dampers.fixed))
+    found = _reach(dampers, start, damping_ratio)
+    viscous = dampers.at(found.amount).viscous
+    mean, per_amount = float(np.mean(viscous[chosen])), float(np.mean(dampers.ratio[chosen]))
+    return DampingCalibration(
+        damping_ratio=damping_ratio,
+        damping_ratio_std=damping_ratio_std,
+        mode=mode,
+        frequency=abs(found.mode.w) / (2 * math.pi),
+        other_damping_ratio=start.mode.damping_ratio,
+        loss_factor=loss_factor,
+        bearing_damping=mean,
+        bearing_damping_std=None if damping_ratio_std is None else per_amount * damping_ratio_std / found.slope,
+        sensitivity=found.slope * found.amount,
+        given=spindle,
+        spindle=replace(
+            spindle, bearings=[replace(b, damping=float(c)) for b, c in zip(spindle.bearings, viscous, strict=True)]
+        ),
+    )
+
+
+def _check(damping_ratio: float, damping_ratio_std: float | None, mode: int) -> None:
+    if not 0 < damping_ratio < 1:
+        raise ValueError(f"damping_ratio={damping_ratio} is not between 0 and 1")
+    if damping_ratio_std is not None and not (math.isfinite(damping_ratio_std) and damping_ratio_std >= 0):
+        raise ValueError(f"damping_ratio_std={damping_ratio_std} is not a finite number >= 0")
+    if mode < 1:
+        raise ValueError(f"mode={mode} is not at least 1, the lowest")
+
+
+def _ratio(spindle: Spindle, chosen: list[int]) -> _Float:
+    """Dampers to start from: those given, or such that damper over stiffness is 1 us in each bearing."""
+    ratio = np.zeros(len(spindle.bearings))
+    damped = [index for index in chosen if spindle.bearings[index].damping > 0]
+    if damped and len(damped) < len(chosen):
+        raise ValueError(
+            f"{len(damped)} of the {len(chosen)} bearings to calibrate have damping; give it to all of them, for its "
+            "ratio, or to none, for the ratio of their stiffnesses"
+        )
+    for index in chosen:
+        bearing = spindle.bearings[index]
+        ratio[index] = bearing.damping if damped else 1e-6 * bearing.stiffness
+    return ratio
+
+
+def _reach(dampers: _Dampers, start: _Point, target: float) -> _Point:
+    """The weakest dampers with the damping ratio `target`."""
+    own = start.mode.damping_ratio
+    if own >= target:
+        raise UnreachableDampingError(
+            f"damping_ratio={target:g} of mode {dampers.number} leaves nothing for these dampers: the loss factor and "
+            f"other bearings alone give {own:.6g}; lower them, or check the measurement",
+            own,
+        )
+    low, high = _bracket(dampers, start, target)
+    amount = brentq(
+        lambda value: dampers.go(low, value).mode.damping_ratio - target,
+        low.amount,
+        high.amount,
+        xtol=1e-15 * high.amount,
+        rtol=1e-13,
+    )
+    return dampers.go(low, float(amount))
+
+
+def _bracket(dampers: _Dampers, low: _Point, target: float) -> tuple[_Point, _Point]:
+    """Two points with the target between them; where the curve has several humps, on the first that is high enough."""
+    springs = np.array([bearing.stiffness for bearing in dampers.shaft.spindle.bearings])
+    unit = 1 / (abs(low.mode.w) * float(np.max(dampers.ratio / springs)))
+    longest, most = math.inf, low.mode.damping_ratio
+    for _ in range(ROUNDS):
+        if low.amount > LOCKED * unit:
+            break
+        step = min(_step(low, target), max(FIRST_STEP * unit, GROWTH * low.amount), longest)
+        try:
+            high = dampers.go(low, low.amount + step)
+        except ArithmeticError:
+            longest = step / 2
+            continue
+        top = _highest(dampers, low, high) if low.slope > 0 >= high.slope else high
+        if top.mode.damping_ratio >= target:
+            return low, top
+        low, most = high, max(most, top.mode.damping_ratio)
+    raise UnreachableDampingError(
+        f"damping_ratio={target:g} of mode {dampers.number} is out of reach: {most:.4g} is the most here; "
+        "stronger dampers hold the bearings still; look for damping elsewhere (loss_factor), or check the measurement",
+        most,
+    )
+
+
+def _step(low: _Point, target: float) -> float:
+    """Twice the step of Newton, which falls short where the curve bends down."""
+    return 2 * (target - low.mode.damping_ratio) / low.slope if low.slope > 0 else math.inf
+
+
+def _highest(dampers: _Dampers, low: _Point, high: _Point) -> _Point:
+    """The point with the largest damping ratio between one where it rises and one where it falls."""
+    amount = brentq(lambda value: dampers.go(low, value).slope, low.amount, high.amount, rtol=1e-10)
+    return dampers.go(low, float(amount))

@@ -1,0 +1,101 @@
+"""What a calibration found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from dsm.calibration.plus_minus import plus_minus
+from dsm.modes.modal_stiffness import modal_stiffness
+from dsm.modes.natural_frequencies import natural_frequencies
+from dsm.response.static_stiffness import static_stiffness
+from dsm.spindle.spindle import Spindle
+
+
+class UnreachableFrequencyError(ValueError):
+    """No bearing stiffness puts the mode at the measured frequency."""
+
+    def __init__(self, message: str, reachable: tuple[float, float]) -> None:
+        """Keep the limits beside the message."""
+        super().__init__(message)
+        self.reachable = reachable
+        """Frequencies of the mode without the calibrated bearings and with rigid ones (Hz)."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A spindle whose bearing stiffnesses, scaled by one factor, put a mode at its measured frequency.
+
+    "Before" is the spindle as given, "after" the recalibrated one; stiffnesses are those at the tool tip, worked out
+    when they are asked for. Printed, it is a report.
+    """
+
+    frequency: float
+    """Measured frequency (Hz)."""
+    frequency_std: float | None
+    """Its standard error (Hz); None where it was not given."""
+    mode: int
+    """Number of the mode it belongs to; 1 is the lowest."""
+    bearing_stiffness: float
+    """Mean of the calibrated bearing stiffnesses (N/m); the common one where all were given equal.
+
+    An equivalent number of this model: compare it only with others of the same geometry and beam theory.
+    """
+    bearing_stiffness_std: float | None
+    """Its standard error from that of the frequency (N/m); None where that was not given."""
+    factor: float
+    """Bearing stiffness after over before, the same for all calibrated bearings (-)."""
+    sensitivity: float
+    """d ln f / d ln k of the mode after calibration, 0 to 1/2 (-): half these bearings' share of its strain energy."""
+    given: Spindle
+    """The spindle as given."""
+    spindle: Spindle
+    """The recalibrated spindle."""
+
+    @property
+    def energy_share(self) -> float:
+        """Share of the calibrated bearings in the strain energy of the mode (-), 0 to 1."""
+        return 2 * self.sensitivity
+
+    @cached_property
+    def residual(self) -> float:
+        """Natural frequency of the recalibrated spindle, solved anew, less the measured one (Hz)."""
+        return float(natural_frequencies(self.spindle, self.mode)[-1]) - self.frequency
+
+    @cached_property
+    def static_stiffness_before(self) -> float:
+        """Static stiffness at the tip before (N/m)."""
+        return static_stiffness(self.given)
+
+    @cached_property
+    def static_stiffness_after(self) -> float:
+        """Static stiffness at the tip after (N/m)."""
+        return static_stiffness(self.spindle)
+
+    @cached_property
+    def modal_stiffness_before(self) -> float:
+        """Modal stiffness of the mode at the tip before (N/m)."""
+        return modal_stiffness(self.given, self.mode)
+
+    @cached_property
+    def modal_stiffness_after(self) -> float:
+        """Modal stiffness of the mode at the tip after (N/m)."""
+        return modal_stiffness(self.spindle, self.mode)
+
+    def __str__(self) -> str:
+        """The report."""
+        start = self.bearing_stiffness / self.factor / 1e6
+        static = self.static_stiffness_before / 1e6, self.static_stiffness_after / 1e6
+        modal = self.modal_stiffness_before / 1e6, self.modal_stiffness_after / 1e6
+        stiffness = plus_minus(self.bearing_stiffness, self.bearing_stiffness_std, 1e6, "N/um", percent=True)
+        lines = [
+            ("bearing stiffness", f"{stiffness} each"),
+            (f"from mode {self.mode}", plus_minus(self.frequency, self.frequency_std, unit="Hz", percent=True)),
+            ("start", f"{start:.5g} N/um each: factor {self.factor:.5f}"),
+            ("energy share", f"{100 * self.energy_share:.1f} % of the mode's strain energy is in these bearings"),
+            ("sensitivity", f"bearings 1 % softer lower the frequency by {self.sensitivity:.3f} %"),
+            ("static tip stiffness", f"{static[0]:.3f} -> {static[1]:.3f} N/um (start -> calibrated)"),
+            ("modal tip stiffness", f"{modal[0]:.3f} -> {modal[1]:.3f} N/um (start -> calibrated)"),
+            ("theory", f"{self.spindle.theory}; an equivalent stiffness: compare it within one model only"),
+        ]
+        return "\n".join(f"{name:<22}{text}" for name, text in lines)

@@ -1,0 +1,109 @@
+"""Receptance for many bearing stiffnesses at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dsm.calibration.bearing_eigenproblem import calibrated_bearings
+from dsm.matrix.assemble import assemble
+from dsm.matrix.damped_blocks import damped_blocks
+from dsm.matrix.dynamic_stiffness import full_matrices
+from dsm.matrix.frequency_axis import frequency_axis
+from dsm.spindle.attachments import Bearing
+from dsm.spindle.spindle import Spindle, require_support
+
+_Float = NDArray[np.float64]
+_Complex = NDArray[np.complex128]
+
+CHUNK = 50
+"""Frequencies whose full matrices are in memory at a time."""
+
+
+def receptance_map(
+    spindle: Spindle,
+    frequency: ArrayLike,
+    factor: ArrayLike,
+    position: float = 0.0,
+    loss_factor: float = 0.0,
+    group: str | None = None,
+) -> _Complex:
+    """Deflection over force (m/N) with bearing stiffnesses times each factor, shape (n_factors, n_frequencies).
+
+    frequency: (n_frequencies,) Hz; factor: (n_factors,) > 0. position, loss_factor eta: as for receptance, which each
+    row is. group: the bearings whose springs are scaled, their dampers and housings are not; None: all with a group.
+
+    One eigenproblem of the order of the number of bearings a frequency. At one factor f0 let H0 be the receptance, S
+    the compliance across the springs and e their elongation under a unit force, both weighted with the roots of the
+    spring stiffnesses. With S = V diag(s) V^-1 and d = (1 + i eta)(f/f0 - 1), Woodbury's formula is
+    H = H0 - sum over i of p_i d/(1 + d s_i), p = (V^T e)(V^-1 e).
+
+    Raises ValueError as receptance does, for factors not finite and > 0, and a group with no bearing or a rigid one.
+    """
+    f, factors = frequency_axis(frequency), _checked(factor)
+    if np.any(f == 0):
+        require_support(spindle)
+    chosen = calibrated_bearings(spindle, group)
+    middle = float(np.sqrt(np.min(factors) * np.max(factors)))
+    bearings = [
+        replace(spindle.bearings[index], stiffness=middle * spindle.bearings[index].stiffness) for index in chosen
+    ]
+    others = [bearing for index, bearing in enumerate(spindle.bearings) if index not in chosen]
+    w = np.asarray(2 * np.pi * f, dtype=np.complex128)
+    places = [position, *(bearing.position for bearing in bearings)]
+    compliance = _compliance(replace(spindle, bearings=[*bearings, *others]), w, places, loss_factor)
+    values, products = _across_springs(bearings, compliance, w, loss_factor)
+    change = (1 + 1j * loss_factor) * (factors[:, np.newaxis] / middle - 1)
+    found = np.tile(compliance[:, 0, 0], (factors.size, 1))
+    for value, product in zip(values.T, products.T, strict=True):
+        found -= product * change / (1 + change * value)
+    return found
+
+
+def _checked(factor: ArrayLike) -> _Float:
+    factors = np.atleast_1d(np.asarray(factor, dtype=np.float64))
+    if factors.ndim != 1 or factors.size == 0:
+        raise ValueError(f"factor has shape {factors.shape}; a 1-D array of at least one factor is needed")
+    bad = factors[~(np.isfinite(factors) & (factors > 0))]
+    if bad.size:
+        raise ValueError(f"factor={bad[0]} is not a finite number > 0")
+    return factors
+
+
+def _compliance(spindle: Spindle, w: _Complex, places: Sequence[float], loss_factor: float) -> _Complex:
+    """Deflections under forces, both at `places` (m), shape (n, n_places, n_places)."""
+    model = assemble(spindle, float(np.max(w.real, initial=0.0)) / (2 * np.pi), places)
+    dofs = [2 * model.node(place) for place in places]
+    forces = np.zeros((model.held.size, len(dofs)))
+    forces[dofs, np.arange(len(dofs))] = ~model.held.ravel()[dofs]
+    found = np.empty((w.size, len(dofs), len(dofs)), dtype=np.complex128)
+    for start in range(0, w.size, CHUNK):
+        chunk = slice(start, start + CHUNK)
+        matrices = full_matrices(*damped_blocks(model, spindle, w[chunk], loss_factor))
+        found[chunk] = np.linalg.solve(matrices, forces)[:, dofs]
+    return found
+
+
+def _across_springs(
+    bearings: Sequence[Bearing], compliance: _Complex, w: _Complex, loss_factor: float
+) -> tuple[_Complex, _Complex]:
+    """s and p of the formula above, shape (n, n_bearings) each.
+
+    Of the motion x of the shaft, the share a = 1/(1 + k/h) goes into a bearing of stiffness k and the rest into its
+    housing of stiffness h. A pair of forces across the spring moves the shaft with the share a, the housing as a/h.
+    """
+    complexity = 1 + 1j * loss_factor
+    stiffness, damping, housing = np.array([(b.stiffness, b.damping, b.housing_stiffness) for b in bearings]).T
+    softness = 1 / housing / complexity
+    share = 1 / (1 + (complexity * stiffness + 1j * w[:, np.newaxis] * damping) * softness)
+    weight = np.sqrt(stiffness) * share
+    matrix = weight[:, :, np.newaxis] * compliance[:, 1:, 1:] * weight[:, np.newaxis]
+    each = np.arange(len(bearings))
+    matrix[:, each, each] += stiffness * share * softness
+    values, vectors = np.linalg.eig(matrix)
+    elongation = (weight * compliance[:, 1:, 0])[..., np.newaxis]
+    products = (vectors.swapaxes(1, 2) @ elongation) * np.linalg.solve(vectors, elongation)
+    return values, products[..., 0]

@@ -1,0 +1,159 @@
+"""Modes of a shaft at rest, followed while its damping grows."""
+
+from __future__ import annotations
+
+import cmath
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsm.matrix.assemble import assemble
+from dsm.matrix.dynamic_stiffness import DynamicStiffness
+from dsm.modes.natural_frequencies import natural_frequencies
+from dsm.spindle.spindle import Spindle, require_support
+
+_Float = NDArray[np.float64]
+_Complex = NDArray[np.complex128]
+
+OFFSET = 1e-10
+"""Relative distance from the frequency at which K is inverted: it is singular at the frequency itself."""
+NEWTON_ROUNDS = 8
+"""More are not spent on one step of damping."""
+OSCILLATES = 1e-4
+"""A mode whose damped frequency is a smaller part of |w| counts as one that has ceased to oscillate."""
+SETTLED = 1e-8
+"""Last relative change of w; Rayleigh's quotient has cubed the error once more by then."""
+FORESEEN = 0.2
+"""Largest miss of the prediction of first order, in parts of the predicted change; steps that miss more are halved."""
+SMALLEST_STEP = 2.0**-16
+"""Part of the whole change of damping; where smaller steps are needed, the mode is lost."""
+
+
+class Damping(NamedTuple):
+    """Damping of a spindle, apart from its stiffness."""
+
+    viscous: _Float
+    """Dampers of the bearings (N s/m), shape (n_bearings,)."""
+    loss_factor: float
+    """Loss factor eta of shaft, bearings, housing and joints (-)."""
+
+
+class DampedMode(NamedTuple):
+    """A motion phi exp(i w t) that dies away."""
+
+    w: complex
+    """Complex angular frequency (rad/s), in the first quadrant."""
+    shape: _Complex
+    """phi, shape (n_dofs,), scaled to phi^T (dK/dw) phi = 1."""
+
+    @property
+    def damping_ratio(self) -> float:
+        """-Re s/|s| of s = i w (-)."""
+        return self.w.imag / abs(self.w)
+
+
+@dataclass(frozen=True, eq=False)
+class DampedShaft:
+    """The dynamic stiffness of a shaft at rest, at complex w, for any damping."""
+
+    spindle: Spindle
+    """Shaft, springs and masses; its dampers are not looked at."""
+    model: DynamicStiffness
+    """The matrix without damping."""
+    undamped: _Float
+    """Frequencies of its modes (Hz), shape (n_modes,)."""
+
+    @classmethod
+    def of(cls, spindle: Spindle, count: int) -> DampedShaft:
+        """With its `count` lowest modes. ValueError for a shaft that is not held and a count below 1."""
+        require_support(spindle)
+        undamped = natural_frequencies(spindle, count)
+        # A damper that locks its bearing raises the frequency towards that of rigid bearings.
+        locked = natural_frequencies(spindle, count, rigid_bearings=True)
+        return cls(spindle, assemble(spindle, 2 * float(max(undamped[-1], locked[-1]))), undamped)
+
+    @property
+    def none(self) -> Damping:
+        """No damping."""
+        return Damping(np.zeros(len(self.spindle.bearings)), 0.0)
+
+    def start(self, number: int) -> DampedMode:
+        """Mode `number` (1 is the lowest) without damping: K(w) phi = 0."""
+        w = 2 * np.pi * float(self.undamped[number - 1])
+        values, vectors = np.linalg.eigh(self.model.dense(np.array([w * w]))[0])
+        shape = vectors[:, np.argmin(np.abs(values))].astype(np.complex128)
+        _, by_w = self.matrices(self.none, w)
+        return DampedMode(complex(w), shape / np.sqrt(shape @ by_w @ shape))
+
+    def matrices(self, damping: Damping, w: complex) -> tuple[_Complex, _Complex]:
+        """K(w) and dK/dw, shape (n_dofs, n_dofs) each."""
+        complexity = 1 + 1j * damping.loss_factor
+        x = np.array([w * w / complexity], dtype=np.complex128)
+        stiffness = complexity * self.model.dense(x)[0]
+        by_w = 2 * w * self.model.dense(x, derivative=True)[0]
+        dof, felt, slope = self._supports(damping, w)
+        undamped = complexity * np.array([self.spindle.bearings[i].support_stiffness for i in self._movable()])
+        stiffness[dof, dof] += felt - undamped
+        by_w[dof, dof] += 1j * damping.viscous[self._movable()] * slope
+        return stiffness, by_w
+
+    def by_damper(self, damping: Damping, mode: DampedMode) -> _Complex:
+        """dw/dc of the mode for the damper c of each bearing (rad/s per N s/m), shape (n_bearings,)."""
+        dof, _, slope = self._supports(damping, mode.w)
+        change = np.zeros(len(self.spindle.bearings), dtype=np.complex128)
+        change[self._movable()] = -1j * mode.w * slope * mode.shape[dof] ** 2
+        return change
+
+    def follow(self, number: int, mode: DampedMode, old: Damping, new: Damping) -> DampedMode:
+        """Mode `number` at the damping `new`, reached from that at `old` in steps small enough not to lose it.
+
+        Raises ArithmeticError where it stops oscillating, or merges with another mode, on the way.
+        """
+        done, step = 0.0, 1.0
+        while done < 1:
+            step = min(step, 1 - done)
+            share = done + step
+            viscous = old.viscous + share * (new.viscous - old.viscous)
+            moved = self._newton(mode, Damping(viscous, old.loss_factor + share * (new.loss_factor - old.loss_factor)))
+            if moved is not None:
+                mode, done, step = moved, share, 2 * step
+            elif step > SMALLEST_STEP:
+                step /= 2
+            else:
+                raise ArithmeticError(
+                    f"mode {number} is lost at a damping ratio of {mode.damping_ratio:.3g}: with more damping it stops "
+                    "oscillating or merges with another mode; give smaller dampers"
+                )
+        return mode
+
+    def _newton(self, mode: DampedMode, damping: Damping) -> DampedMode | None:
+        """The mode at a damping near by; None where it is not the one that is foreseen."""
+        w, shape = mode
+        foreseen = w
+        for number in range(NEWTON_ROUNDS):
+            trial = w * (1 + OFFSET)
+            stiffness, by_w = self.matrices(damping, trial)
+            if number == 0:
+                foreseen = trial - complex((shape @ stiffness @ shape) / (shape @ by_w @ shape))
+            moved = np.asarray(np.linalg.solve(stiffness, by_w @ shape), dtype=np.complex128)
+            shape = moved / cmath.sqrt(complex(moved @ by_w @ moved))
+            last, w = w, trial - complex(shape @ stiffness @ shape)
+            if abs(w - last) <= SETTLED * abs(w):
+                close = abs(w - foreseen) <= FORESEEN * abs(foreseen - mode.w) + SETTLED * abs(w)
+                return DampedMode(w, shape) if close and w.real > OSCILLATES * abs(w) else None
+        return None
+
+    def _movable(self) -> list[int]:
+        """Indices of the bearings that are not rigid, and so have a damper."""
+        return [index for index, bearing in enumerate(self.spindle.bearings) if np.isfinite(bearing.stiffness)]
+
+    def _supports(self, damping: Damping, w: complex) -> tuple[list[int], _Complex, _Complex]:
+        """Of each movable bearing: its dof, the stiffness felt, and the derivative of that by the bearing's own."""
+        bearings = [self.spindle.bearings[index] for index in self._movable()]
+        complexity = 1 + 1j * damping.loss_factor
+        own = complexity * np.array([bearing.stiffness for bearing in bearings])
+        own = own + 1j * w * damping.viscous[self._movable()]
+        share = 1 / (1 + own / complexity * np.array([1 / bearing.housing_stiffness for bearing in bearings]))
+        return [2 * self.model.node(bearing.position) for bearing in bearings], own * share, share**2

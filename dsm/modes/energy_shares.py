@@ -1,0 +1,95 @@
+"""Where the strain energy of a mode sits."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsm.elements.beam_series import beam_series
+from dsm.modes.find_modes import find_modes
+from dsm.modes.modes import Modes
+from dsm.spindle.sections import sections
+from dsm.spindle.spindle import Spindle, require_support
+
+_Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyShares:
+    """Shares of the parts of a spindle in the strain energy of its modes (-); over all parts they add up to 1.
+
+    A share is d ln f^2 / d ln k, k the stiffness of the part: what 1 % of it moves the square of the frequency by, in
+    percent.
+    """
+
+    frequency: _Float
+    """Natural frequencies (Hz), shape (n_modes,)."""
+    segments: _Float
+    """Bending (and shear) of the segments, shape (n_modes, n_segments)."""
+    bearings: _Float
+    """Bearings, radial spring and stiffness against tilting together, shape (n_modes, n_bearings); 0 where rigid."""
+    housings: _Float
+    """Housing behind each bearing, in series with its radial spring, shape (n_modes, n_bearings); 0 where rigid."""
+    joints: _Float
+    """Joints, both their springs together, shape (n_modes, n_joints)."""
+
+
+def energy_shares(spindle: Spindle, count: int) -> EnergyShares:
+    """Strain energy shares of the `count` lowest modes, exact, also of elements long against the wave.
+
+    With phi the shape and K_e the dynamic stiffness of an element, V_e = phi^T (K_e - w^2 dK_e/d(w^2)) phi / 2; the
+    second term is the motion inside the element. Raises ValueError for a count below 1 and a shaft that is not held,
+    ArithmeticError where rounding spoils the count of modes.
+    """
+    require_support(spindle)
+    modes = find_modes(spindle, count)
+    w2 = (2 * np.pi * modes.frequency) ** 2
+    # Twice the energy of a mode of unit modal mass is w^2.
+    segments, bearings, housings, joints = (
+        energy / w2[:, np.newaxis]
+        for energy in (_segments(spindle, modes, w2), *_supports(spindle, modes), _joints(spindle, modes))
+    )
+    return EnergyShares(modes.frequency, segments, bearings, housings, joints)
+
+
+def _segments(spindle: Spindle, modes: Modes, w2: _Float) -> _Float:
+    pieces = sections(spindle)
+    element = np.flatnonzero(np.diff(modes.position) > 0)
+    piece = pieces.index_at((modes.position[element] + modes.position[element + 1]) / 2)
+    series = beam_series(spindle, pieces, piece, modes.position[element + 1] - modes.position[element])
+    order = np.arange(series.shape[2])
+    k = series @ ((1 - order[:, np.newaxis]) * w2 ** order[:, np.newaxis])
+    u1, t1 = modes.deflection[:, element].T, modes.slope[:, element].T
+    u2, t2 = modes.deflection[:, element + 1].T, modes.slope[:, element + 1].T
+    energy = k[0] * (u1**2 + u2**2) + k[2] * (t1**2 + t2**2) + 2 * k[1] * (u1 * t1 - u2 * t2)
+    energy += 2 * (k[3] * u1 * u2 + k[4] * (u1 * t2 - t1 * u2) + k[5] * t1 * t2)
+    total = np.zeros((len(spindle.segments), w2.size))
+    np.add.at(total, pieces.segment[piece], energy)
+    return total.T
+
+
+def _supports(spindle: Spindle, modes: Modes) -> tuple[_Float, _Float]:
+    """Bearings and housings: of two springs in series the one of stiffness k takes force^2/k."""
+    bearings, housings = np.zeros((2, modes.frequency.size, len(spindle.bearings)))
+    for index, bearing in enumerate(spindle.bearings):
+        node = int(np.argmin(np.abs(modes.position - bearing.position)))
+        bearings[:, index] = bearing.rotational_stiffness * modes.slope[:, node] ** 2
+        if math.isfinite(bearing.support_stiffness):
+            squared_force = (bearing.support_stiffness * modes.deflection[:, node]) ** 2
+            bearings[:, index] += squared_force / bearing.stiffness
+            housings[:, index] = squared_force / bearing.housing_stiffness
+    return bearings, housings
+
+
+def _joints(spindle: Spindle, modes: Modes) -> _Float:
+    """A joint stands between two nodes at one place."""
+    energy = np.zeros((modes.frequency.size, len(spindle.joints)))
+    for index, joint in enumerate(spindle.joints):
+        node = int(np.argmin(np.abs(modes.position - joint.position)))
+        shift = modes.deflection[:, node + 1] - modes.deflection[:, node]
+        kink = modes.slope[:, node + 1] - modes.slope[:, node]
+        energy[:, index] = joint.stiffness * shift**2 + joint.rotational_stiffness * kink**2
+    return energy

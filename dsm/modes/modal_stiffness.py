@@ -1,0 +1,16 @@
+"""Stiffness of one mode at one place."""
+
+from __future__ import annotations
+
+from dsm.modes.modes_at import modes_at
+from dsm.spindle.spindle import Spindle
+
+
+def modal_stiffness(spindle: Spindle, mode: int = 1, position: float = 0.0) -> float:
+    """Modal stiffness K of a mode (1 is the lowest) at `position` from the tool tip (m), in N/m; see modes_at.
+
+    This, and not the static stiffness, is what the height of a peak of the measured FRF gives: |H| = 1/(2 zeta K).
+    """
+    if mode < 1:
+        raise ValueError(f"mode={mode} is not at least 1, the lowest")
+    return float(modes_at(spindle, mode, position)[1][-1])

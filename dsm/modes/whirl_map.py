@@ -1,0 +1,77 @@
+"""Whirl frequencies over speed (Campbell diagram)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dsm.modes.critical_speed import critical_speed
+from dsm.modes.find_modes import find_modes
+from dsm.spindle.spindle import Spindle, require_support
+
+_Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class WhirlMap:
+    """Whirl frequencies of a spindle over speed, in the frame that stands still and in the one that turns with it."""
+
+    speed_rpm: _Float
+    """Speeds (rpm), shape (m,)."""
+    forward: _Float
+    """Forward whirl seen from the housing (Hz), lowest first, shape (count, m)."""
+    backward: _Float
+    """Backward whirl seen from the housing (Hz), lowest first, shape (count, m)."""
+    critical_rpm: _Float
+    """Speeds at which one of these forward whirls runs as fast as the shaft (rpm), rising, within `speed_rpm`."""
+
+    @property
+    def rotating_forward(self) -> _Float:
+        """Forward whirl seen from the shaft (Hz): |forward - speed|, 0 at a critical speed; shape (count, m)."""
+        return np.abs(self.forward - self.speed_rpm / 60)
+
+    @property
+    def rotating_backward(self) -> _Float:
+        """Backward whirl seen from the shaft (Hz): backward + speed; shape (count, m)."""
+        return self.backward + self.speed_rpm / 60
+
+
+def whirl_map(spindle: Spindle, speed_rpm: ArrayLike, count: int) -> WhirlMap:
+    """The `count` lowest forward and backward whirl frequencies at each speed (rpm, (m,), >= 0), none missed.
+
+    For an Euler-Bernoulli shaft without polar inertia they are the natural frequencies at rest at every speed, and what
+    changes is only the view from the shaft, |f -+ speed/60|: figure 9 of Gaber & Hashemi, Shock and Vibration, 2015.
+    Rotary inertia (theory="timoshenko") and polar inertia of masses part them: forward rises, backward falls. Whirl is
+    circular, as the bearings are as stiff in all directions.
+
+    Raises ValueError for speeds below 0 or not finite, a count below 1 and a shaft that is not held, ArithmeticError
+    where rounding spoils the count of modes.
+    """
+    require_support(spindle)
+    speed = _speeds(speed_rpm)
+    spins = speed * np.pi / 30
+    forward, backward = (
+        np.reshape([find_modes(spindle, count, spin=sense * spin).frequency for spin in spins], (-1, count)).T
+        for sense in (1.0, -1.0)
+    )
+    return WhirlMap(speed, forward, backward, _critical(spindle, speed, forward))
+
+
+def _speeds(speed_rpm: ArrayLike) -> _Float:
+    speed = np.asarray(speed_rpm, dtype=np.float64)
+    if speed.ndim != 1 or speed.size == 0:
+        raise ValueError(f"speed_rpm has shape {speed.shape}; a 1-D array of at least one speed (rpm) is needed")
+    bad = speed[~(np.isfinite(speed) & (speed >= 0))]
+    if bad.size:
+        raise ValueError(f"speed_rpm={bad[0]} rpm is not a finite number >= 0")
+    return speed
+
+
+def _critical(spindle: Spindle, speed: _Float, forward: _Float) -> _Float:
+    """Each mode that is ahead of the slowest speed and behind the fastest has its critical speed between them."""
+    slowest, fastest = np.argmin(speed), np.argmax(speed)
+    ahead = forward[:, slowest] >= speed[slowest] / 60
+    crossed = np.flatnonzero(ahead & (forward[:, fastest] <= speed[fastest] / 60))
+    return np.array([critical_speed(spindle, int(mode) + 1) for mode in crossed], dtype=np.float64)

@@ -1,0 +1,67 @@
+"""What a spindle opposes to a tool, without the tool."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dsm.matrix.assemble import assemble
+from dsm.matrix.condense import condense
+from dsm.matrix.damped_blocks import damped_blocks
+from dsm.matrix.frequency_axis import frequency_axis
+from dsm.spindle.attachments import Joint
+from dsm.spindle.cut_spindle import cut_spindle
+from dsm.spindle.spindle import Spindle, Theory, require_support
+
+_Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class SpindleSide:
+    """Dynamic stiffness of a spindle where its tool was cut off, for deflection and slope there; see couple_tool."""
+
+    frequency: NDArray[np.float64]
+    """Frequencies (Hz), shape (n,)."""
+    force_over_deflection: _Complex
+    """N/m, shape (n,)."""
+    force_over_slope: _Complex
+    """N, shape (n,); the same as moment over deflection."""
+    moment_over_slope: _Complex
+    """N m, shape (n,)."""
+    loss_factor: float
+    """Of all stiffness; the tool gets the same."""
+    theory: Theory
+    """Beam theory, which that of the tool must be."""
+
+
+def spindle_side(spindle: Spindle, frequency: ArrayLike, position: float, loss_factor: float = 0.0) -> SpindleSide:
+    """All of a spindle beyond `position` from its tool tip (m), exactly condensed to the place of the cut.
+
+    frequency: (n,) Hz. loss_factor: as for receptance. A bearing, a mass or a joint where the spindle is cut counts as
+    part of it; all that is nearer to the tip falls away. Raises ValueError as receptance does, for a cut off the shaft,
+    and where a rigid bearing holds the shaft at the cut.
+    """
+    f = frequency_axis(frequency)
+    rest, joint = cut_spindle(spindle, position)
+    if np.any(f == 0):
+        require_support(rest)
+    model = assemble(rest, float(np.max(f, initial=0.0)))
+    if np.any(model.held[0]):
+        raise ValueError(f"position={position} m is held by a rigid bearing; cut the shaft elsewhere")
+    k = condense(*damped_blocks(model, rest, np.asarray(2 * np.pi * f, dtype=np.complex128), loss_factor), node=0)
+    stiffness = (k.uu, k.ut, k.tt)
+    if joint is not None:
+        stiffness = _through(joint, loss_factor, *stiffness)
+    return SpindleSide(f, *stiffness, loss_factor, spindle.theory)
+
+
+def _through(
+    joint: Joint, loss_factor: float, uu: _Complex, ut: _Complex, tt: _Complex
+) -> tuple[_Complex, _Complex, _Complex]:
+    """The stiffness K with the joint in series: J (K + J)^-1 K with J = diag(k, tilt)."""
+    k, tilt = (1 + 1j * loss_factor) * np.array([joint.stiffness, joint.rotational_stiffness])
+    both = uu * tt - ut * ut
+    determinant = (uu + k) * (tt + tilt) - ut * ut
+    return k * (uu * tilt + both) / determinant, k * tilt * ut / determinant, tilt * (k * tt + both) / determinant

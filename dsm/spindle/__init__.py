@@ -1,0 +1,27 @@
+"""The spindle as plain data: segments, materials, bearings, masses, joints."""
+
+from dsm.spindle.attachments import Bearing, Joint, LumpedMass
+from dsm.spindle.change_tool import change_tool, check_tool
+from dsm.spindle.cut_spindle import cut_spindle
+from dsm.spindle.material import MATERIALS, Material
+from dsm.spindle.sections import Sections, sections
+from dsm.spindle.segment import Segment
+from dsm.spindle.spindle import SAME_PLACE, Spindle, Theory, require_support
+
+__all__ = [
+    "MATERIALS",
+    "SAME_PLACE",
+    "Bearing",
+    "Joint",
+    "LumpedMass",
+    "Material",
+    "Sections",
+    "Segment",
+    "Spindle",
+    "Theory",
+    "change_tool",
+    "check_tool",
+    "cut_spindle",
+    "require_support",
+    "sections",
+]

@@ -1,0 +1,84 @@
+"""What a shaft is held by, carries and is joined with."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from dsm.spindle.checks import require_not_negative, require_positive
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """A radial spring, with or without damper, between shaft and housing; checked as part of a Spindle."""
+
+    position: float
+    """Distance from the tool tip (m)."""
+    stiffness: float
+    """Radial stiffness (N/m); inf holds the shaft (in series with the housing, where that has a stiffness)."""
+    damping: float = field(default=0.0, kw_only=True)
+    """Viscous damping beside the spring (N s/m)."""
+    rotational_stiffness: float = field(default=0.0, kw_only=True)
+    """Stiffness against tilting (N m/rad)."""
+    housing_stiffness: float = field(default=math.inf, kw_only=True)
+    """Radial stiffness of the housing behind the bearing, in series with it (N/m); inf: rigid."""
+    group: str = field(default="bearings", kw_only=True)
+    """Bearings of one group are calibrated together, in their given ratio; an empty name: known, never calibrated."""
+
+    @property
+    def support_stiffness(self) -> float:
+        """What the shaft feels of bearing and housing (N/m)."""
+        if math.isinf(self.stiffness):
+            return self.housing_stiffness
+        return self.stiffness / (1 + self.stiffness / self.housing_stiffness)
+
+    def check(self, where: str) -> None:
+        """Raise ValueError, beginning with `where`, for what is no bearing."""
+        require_positive(where, "stiffness", self.stiffness, "N/m", infinite=True)
+        require_not_negative(where, "damping", self.damping, "N s/m")
+        require_not_negative(where, "rotational_stiffness", self.rotational_stiffness, "N m/rad")
+        require_positive(where, "housing_stiffness", self.housing_stiffness, "N/m", infinite=True)
+
+
+@dataclass(frozen=True)
+class LumpedMass:
+    """A rigid body on the shaft, a pulley or a balance ring; checked as part of a Spindle."""
+
+    position: float
+    """Distance of its centre from the tool tip (m)."""
+    mass: float
+    """Mass (kg)."""
+    diametral_inertia: float = 0.0
+    """Moment of inertia about a diameter (kg m^2)."""
+    polar_inertia: float = 0.0
+    """Moment of inertia about the shaft's axis (kg m^2); makes frequencies depend on speed."""
+
+    def check(self, where: str) -> None:
+        """Raise ValueError, beginning with `where`, for what is no rigid body."""
+        require_not_negative(where, "mass", self.mass, "kg")
+        require_not_negative(where, "diametral_inertia", self.diametral_inertia, "kg m^2")
+        require_not_negative(where, "polar_inertia", self.polar_inertia, "kg m^2")
+        if self.polar_inertia > 2 * self.diametral_inertia * (1 + 1e-9):
+            raise ValueError(
+                f"{where}polar_inertia={self.polar_inertia} kg m^2 is larger than twice diametral_inertia="
+                f"{self.diametral_inertia} kg m^2, which no body of revolution has"
+            )
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A compliant joint across the shaft: tool in holder, holder in spindle; checked as part of a Spindle."""
+
+    position: float
+    """Distance from the tool tip (m)."""
+    stiffness: float
+    """Radial stiffness between its two sides (N/m)."""
+    rotational_stiffness: float
+    """Stiffness against tilting between its two sides (N m/rad)."""
+    group: str = field(default="", kw_only=True)
+    """Name under which its two stiffnesses are calibrated together; empty: known, never calibrated."""
+
+    def check(self, where: str) -> None:
+        """Raise ValueError, beginning with `where`, for what is no joint."""
+        require_positive(where, "stiffness", self.stiffness, "N/m")
+        require_positive(where, "rotational_stiffness", self.rotational_stiffness, "N m/rad")

@@ -1,0 +1,82 @@
+"""Stability lobes by the method and from the dynamics that are asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Frf
+from lobes import Cut, StabilityLobes, average_angle, stability_boundary, zero_order
+from lobes.tip_response import Tip
+from lobewatch.analysis.pipeline import Measurement
+from lobewatch.machine.cut_tables import CutTable
+
+MOST_SPEEDS = 400
+"""Speeds of a chart by semi-discretisation."""
+DEEPEST = 12.0
+"""Depth up to which it looks, as a multiple of the lowest limit by zero order."""
+
+
+class Method(StrEnum):
+    """How limits are found."""
+
+    ZERO_ORDER = "zero-order"
+    AVERAGE_ANGLE = "average-angle"
+    SEMI_DISCRETISATION = "semi-discretisation"
+
+
+class Dynamics(StrEnum):
+    """What the lobes are computed from."""
+
+    MODES = "modes"
+    FRF = "frf"
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """The lobes of one tap test, and what they came from."""
+
+    name: str
+    """Of the cut."""
+    table: CutTable
+    """The cut as it stands in machine.toml."""
+    measurement: Measurement
+    """The tap test, or the prediction."""
+    source: Dynamics
+    """What of it was used."""
+    x: Tip | None
+    """Dynamics at the tool tip in the feed direction; None where they are not known."""
+    y: Tip | None
+    """The same normal to the feed."""
+    cut: Cut
+    """The cut in SI units."""
+    lobes: StabilityLobes
+    """Its limits."""
+
+    @property
+    def directions(self) -> str:
+        """Those that the lobes know."""
+        return " and ".join(name for name, tip in (("x", self.x), ("y", self.y)) if tip is not None)
+
+    @property
+    def label(self) -> str:
+        """What a legend says."""
+        day = f"{self.measurement.time:%Y-%m-%d}"
+        return f"predicted, bearings of {day}" if self.measurement.predicted else day
+
+
+def chart(method: Method, x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: NDArray[np.float64]) -> StabilityLobes:
+    """The lobes of a cut over speeds (rpm), fewer of them by semi-discretisation, which needs modes."""
+    if method is Method.AVERAGE_ANGLE:
+        return average_angle(x, y, cut, speed_rpm)
+    mean = zero_order(x, y, cut, speed_rpm)
+    if method is Method.ZERO_ORDER:
+        return mean
+    if isinstance(x, Frf) or isinstance(y, Frf):
+        raise ValueError("--method semi-discretisation works from the modes; leave --source frf out")
+    speeds = np.linspace(speed_rpm[0], speed_rpm[-1], min(MOST_SPEEDS, speed_rpm.size))
+    lowest = mean.minimum.depth
+    return stability_boundary(x, y, cut, speeds, DEEPEST * lowest if np.isfinite(lowest) else 0.1)

@@ -1,0 +1,90 @@
+"""Tables of machine.toml about the data acquisition: the device and, where it does not know them, its sensors."""
+
+from __future__ import annotations
+
+from datetime import date
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from acquisition import STANDARD_GRAVITY, Channel, DataqInput
+from lobewatch.machine.toml_table import Positive, Table
+
+Sensitivity = Annotated[float, Meta(ge=-1e6, le=1e6)]
+"""Of either sign: an accelerometer may be mounted the other way round."""
+
+
+class ChannelTable(Table, frozen=True):
+    """[[daq.channel]]: a sensor on an input of a device that does not describe its sensors."""
+
+    input: Annotated[int, Meta(ge=0, le=7)]
+    quantity: Literal["force", "acceleration"]
+    range_v: Positive
+    sensitivity_mv_per_n: Sensitivity | None = None
+    sensitivity_mv_per_g: Sensitivity | None = None
+    gain: Positive = 1.0
+    direction: Literal["", "x", "y"] = ""
+    serial_number: str = ""
+    calibration_date: date | None = None
+    skew_us: Annotated[float, Meta(ge=-1e6, le=1e6)] = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse a sensitivity that is missing, stands twice, is zero, or belongs to another quantity."""
+        key = "sensitivity_mv_per_n" if self.quantity == "force" else "sensitivity_mv_per_g"
+        if (self.sensitivity_mv_per_n is None) == (self.sensitivity_mv_per_g is None):
+            raise ValueError("give exactly one of sensitivity_mv_per_n (force) and sensitivity_mv_per_g (acceleration)")
+        value = self.sensitivity_mv_per_n if self.quantity == "force" else self.sensitivity_mv_per_g
+        if value is None:
+            raise ValueError(f"quantity={self.quantity!r} needs {key}, not the other sensitivity")
+        if value == 0:
+            raise ValueError(f"{key}=0 is not the sensitivity of any sensor; take it from its calibration sheet")
+
+    def build(self) -> DataqInput:
+        """The input in SI units: volts at the device per N or per m/s^2."""
+        if self.sensitivity_mv_per_n is not None:
+            sensitivity = self.sensitivity_mv_per_n / 1e3
+        else:
+            sensitivity = (self.sensitivity_mv_per_g or 0.0) / 1e3 / STANDARD_GRAVITY
+        channel = Channel(
+            self.quantity,
+            sensitivity * self.gain,
+            self.range_v,
+            direction=self.direction,
+            serial_number=self.serial_number,
+            calibration_date=self.calibration_date.isoformat() if self.calibration_date else "",
+            skew=self.skew_us / 1e6,
+        )
+        return DataqInput(self.input, channel)
+
+
+class Daq(Table, frozen=True):
+    """[daq]: the port is remembered here by hand, never written by the program."""
+
+    port: str = ""
+    driver: Literal["taps", "dataq"] = "taps"
+    sample_rate_hz: Positive | None = None
+    loss_detection: bool = True
+    accept_measured_rate: bool = False
+    calibration_interval_months: Positive = 12.0
+    channel: tuple[ChannelTable, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse channels that no driver asks for, and sets of them that make no tap test."""
+        if self.driver == "taps":
+            if self.channel:
+                raise ValueError(
+                    'channel: a TAPS/1 device names its own sensors: leave [[daq.channel]] out, or driver = "dataq"'
+                )
+            if not self.loss_detection:
+                raise ValueError("loss_detection=false: a TAPS/1 device always numbers its scans; leave the key out")
+            return
+        quantities = sorted(channel.quantity for channel in self.channel)
+        if quantities != ["acceleration", "force"]:
+            listed = ", ".join(quantities) or "nothing"
+            raise ValueError(
+                f'driver = "dataq" needs two [[daq.channel]], one of force and one of acceleration; here are {listed}'
+            )
+        if self.channel[0].input == self.channel[1].input:
+            raise ValueError(
+                f"channel 2: input={self.channel[1].input} is that of channel 1; each sensor needs its own"
+            )

@@ -1,0 +1,240 @@
+"""machine.toml: what is known of one machine, hand-editable, in the units of the shop (each key names its own)."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import math
+import re
+import tomllib
+from pathlib import Path
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
+
+from acquisition import DataError
+from dsm import Spindle
+from lobes import Coefficients, Cut, cutting_coefficients
+from lobewatch.machine.cut_tables import CutTable, Drive, MaterialTable, Program
+from lobewatch.machine.daq_tables import ChannelTable, Daq
+from lobewatch.machine.spindle_tables import BearingTable, JointTable, MassTable, SegmentTable, SpindleTable, ToolTable
+from lobewatch.machine.toml_table import NotNegative, Positive, Table
+
+REFERENCE_CUT = "reference cut"
+
+
+class Identity(Table, frozen=True):
+    """[machine]."""
+
+    name: Annotated[str, Meta(min_length=1)]
+    tap_interval_days: Positive = 30.0
+
+
+class TapSetup(Table, frozen=True):
+    """[tap]: how the tap test is done; record_s and trigger_n that are not given are chosen by trial hits."""
+
+    tool: str = "reference"
+    hits: Annotated[int, Meta(ge=3, le=1000)] = 10
+    record_s: Positive | None = None
+    pre_trigger_s: Positive = 0.02
+    trigger_n: Positive | None = None
+    position_mm: NotNegative = 0.0
+
+
+class ModeChoice(Table, frozen=True):
+    """[mode]: which mode is followed."""
+
+    band_hz: tuple[NotNegative, Positive] | None = None
+    model_mode: Annotated[int, Meta(ge=1, le=50)] = 1
+
+    def __post_init__(self) -> None:
+        """Refuse an empty band."""
+        if self.band_hz is not None and not self.band_hz[0] < self.band_hz[1]:
+            raise ValueError(f"band_hz={list(self.band_hz)} does not rise; give [lowest, highest] in Hz")
+
+
+class Limits(Table, frozen=True):
+    """[limits]: fall of the frequency that calls for attention; the defaults are the paper's."""
+
+    frequency_warn_percent: Positive = 5.0
+    frequency_alarm_percent: Positive = 10.0
+
+
+class SpeedRange(Table, frozen=True):
+    """[speed]: the range of the lobe diagrams."""
+
+    low_rpm: Positive = 1000.0
+    high_rpm: Positive = 24000.0
+    steps: Annotated[int, Meta(ge=50, le=100_000)] = 1151
+
+    def __post_init__(self) -> None:
+        """Refuse an empty range."""
+        if not self.low_rpm < self.high_rpm:
+            raise ValueError(f"low_rpm={self.low_rpm:g} is not below high_rpm={self.high_rpm:g}")
+
+
+class Machine(Table, frozen=True):
+    """All of machine.toml."""
+
+    machine: Identity
+    tap: TapSetup = TapSetup()
+    daq: Daq = Daq()
+    mode: ModeChoice = ModeChoice()
+    limits: Limits = Limits()
+    speed: SpeedRange = SpeedRange()
+    drive: Drive = Drive()
+    material: tuple[MaterialTable, ...] = ()
+    reference_cut: CutTable | None = None
+    program: tuple[Program, ...] = ()
+    spindle: SpindleTable | None = None
+    tool: tuple[ToolTable, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse programs and tools that cannot be told apart, and what lies outside the speed range."""
+        self._check_tools()
+        names = [program.name for program in self.program]
+        for i, program in enumerate(self.program, 1):
+            if program.name in (*names[: i - 1], REFERENCE_CUT):
+                raise ValueError(f"program {i}: name={program.name!r} stands twice; give each program its own")
+            if not self.speed.low_rpm <= program.speed_rpm <= self.speed.high_rpm:
+                raise ValueError(
+                    f"program {i}: speed_rpm={program.speed_rpm:g} is outside [speed] "
+                    f"{self.speed.low_rpm:g}..{self.speed.high_rpm:g} rpm"
+                )
+        names = [material.name for material in self.material]
+        for i, name in enumerate(names, 1):
+            if name in names[: i - 1]:
+                raise ValueError(f"material {i}: name={name!r} stands twice; give each its own")
+        for table in (*([self.reference_cut] if self.reference_cut else []), *self.program):
+            self.coefficients(table)
+
+    def coefficients(self, table: CutTable) -> Coefficients:
+        """Cutting coefficients of a cut: its own, or those of its material; ValueError for one that is not known."""
+        if table.material is None:
+            tangential, radial = (1e6 * (k or 0) for k in (table.tangential_n_per_mm2, table.radial_n_per_mm2))
+            return Coefficients("", tangential, radial, source="machine.toml")
+        known = {one.material: one for one in cutting_coefficients()} | {one.name: one.build() for one in self.material}
+        if table.material not in known:
+            near = difflib.get_close_matches(table.material, known, n=1, cutoff=0.0)[0]
+            raise ValueError(f"material={table.material!r} is not known; is {near!r} meant? Or add a [[material]]")
+        return known[table.material]
+
+    def build_cut(self, table: CutTable) -> Cut:
+        """A cut in SI units."""
+        coefficients, diameter = self.coefficients(table), table.tool_diameter_mm / 1e3
+        return Cut(
+            teeth=table.teeth,
+            immersion=table.radial_depth_mm / table.tool_diameter_mm,
+            direction=table.direction,
+            tangential=coefficients.tangential,
+            radial=coefficients.radial,
+            helix_lag=2 * math.tan(math.radians(table.helix_deg)) / diameter,
+        )
+
+    def _check_tools(self) -> None:
+        taken = [self.tap.tool]
+        for i, tool in enumerate(self.tool, 1):
+            if tool.name in taken:
+                raise ValueError(f"tool {i}: name={tool.name!r} stands twice ([tap] tool counts); give each its own")
+            taken.append(tool.name)
+            if self.spindle is None or self.spindle.tool_length_mm is None:
+                raise ValueError(
+                    f"tool {i}: needs [spindle] tool_length_mm, the part of the shaft that is {self.tap.tool!r}"
+                )
+            try:
+                self.model(tool.name)
+            except ValueError as error:
+                raise ValueError(f"tool {i}: {error} (here in SI units)") from error
+        length = self.spindle.build().length * 1e3 if self.spindle else math.inf
+        if self.tap.position_mm > length:
+            raise ValueError(f"tap: position_mm={self.tap.position_mm:g} is off the shaft, 0 to {length:g} mm")
+
+    def model(self, tool: str) -> Spindle:
+        """The spindle with a tool in it, in SI units; DataError where there is no model of it."""
+        if self.spindle is None:
+            raise DataError("no model: add a [spindle] table (lobewatch init FOLDER --example shows one)")
+        spindle = self.spindle.build()
+        if tool == self.tap.tool:
+            return spindle
+        return self.tool_named(tool).put_into(spindle, self.spindle.tool_length_mm or 0.0)
+
+    def tool_named(self, name: str) -> ToolTable:
+        """A [[tool]]; DataError where there is none of this name."""
+        for tool in self.tool:
+            if tool.name == name:
+                return tool
+        known = ", ".join(repr(known) for known in [self.tap.tool, *(tool.name for tool in self.tool)])
+        raise DataError(f"tool {name!r} has no model; modelled are {known}: add a [[tool]] table")
+
+    def cuts(self, tool: str) -> dict[str, Cut]:
+        """The reference cut and the programs that run with a tool, by name."""
+        reference = {REFERENCE_CUT: self.build_cut(self.reference_cut)} if self.reference_cut else {}
+        return reference | {program.name: self.build_cut(program) for program in self.program if program.tool == tool}
+
+    @property
+    def cut_names(self) -> list[str]:
+        """The reference cut and all programs, whatever their tool."""
+        return [*([REFERENCE_CUT] if self.reference_cut else []), *(program.name for program in self.program)]
+
+    @property
+    def settings_hash(self) -> str:
+        """SHA-256 of all that decides what a history holds."""
+        cutting = (self.material, self.reference_cut, self.program)
+        model = (self.spindle, self.tool, self.tap.tool, self.tap.position_mm)
+        settings = ("zero order", self.mode, self.speed, cutting, model)
+        return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
+
+
+def read_machine(path: Path) -> Machine:
+    """The machine file; DataError with the place for what is wrong in it."""
+    try:
+        return parse_machine(path.read_text(encoding="utf-8"), str(path))
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: no UTF-8 text at byte {error.start}; save it as UTF-8") from error
+
+
+def parse_machine(text: str, name: str = "machine.toml") -> Machine:
+    """The machine file from its text; DataError with the place for what is wrong in it."""
+    try:
+        return msgspec.convert(tomllib.loads(text), Machine)
+    except tomllib.TOMLDecodeError as error:
+        raise DataError(f"{name}: {error}{_comma_hint(text)}") from error
+    except msgspec.ValidationError as error:
+        raise DataError(f"{name}: {_readable(str(error))}") from error
+
+
+def _comma_hint(text: str) -> str:
+    """A decimal comma is the usual cause."""
+    match = re.search(r"=\s*(-?\d+),(\d+)\s*(#|\n|,|\})", text)
+    return f"; write {match[1]}.{match[2]} with a point" if match else ""
+
+
+def _readable(message: str) -> str:
+    """The message of msgspec with its place first and a known key for a mistyped one."""
+    text, _, place = message.partition(" - at `$")
+    where = re.sub(r"\.?(\w+?)s?\[(\d+)\]", lambda m: f" {m[1]} {int(m[2]) + 1}", place.rstrip("`")).strip(" .")
+    unknown = re.search(r"unknown field `(\w+)`", text)
+    if unknown:
+        text = f"unknown key {unknown[1]!r}{_suggestion(unknown[1])}"
+    return f"{where.replace('.', ' ')}: {text}" if where else text
+
+
+def _suggestion(key: str) -> str:
+    tables = [
+        Machine,
+        Identity,
+        TapSetup,
+        Daq,
+        ChannelTable,
+        ModeChoice,
+        Limits,
+        SpeedRange,
+        Drive,
+        MaterialTable,
+        Program,
+    ]
+    tables += [SpindleTable, SegmentTable, BearingTable, MassTable, JointTable, ToolTable]
+    known = {field for table in tables for field in table.__struct_fields__}
+    near = difflib.get_close_matches(key, known, n=1)
+    return f"; is {near[0]!r} meant?" if near else ""

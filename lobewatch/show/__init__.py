@@ -1,0 +1,1 @@
+"""Results for people: texts, tables, figures, report, terminal."""

@@ -1,0 +1,224 @@
+"""Modes, calibrations, programs and measurements as JSON objects and as tables for people."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.markup import escape
+from rich.table import Table
+
+from dsm import Calibration, DampingCalibration, StiffnessFit, plus_minus
+from lobes import StabilityLobes
+from lobewatch.analysis.pipeline import Measurement
+from lobewatch.machine.machine_file import REFERENCE_CUT, Machine
+from lobewatch.show.output import table
+from modal import Mode
+
+
+def mode_json(mode: Mode) -> dict[str, Any]:
+    """One mode."""
+    frequency, damping, stiffness = mode.standard_error
+    by_fit = mode.fit_error
+    return {
+        "frequency_hz": mode.frequency,
+        "frequency_hz_std": frequency,
+        "frequency_hz_std_of_fit": by_fit[0],
+        "damping_ratio": mode.damping_ratio,
+        "damping_ratio_std": damping,
+        "damping_ratio_std_of_fit": by_fit[1],
+        "stiffness_n_per_m": mode.stiffness,
+        "stiffness_n_per_m_std": stiffness,
+        "stiffness_n_per_m_std_of_fit": by_fit[2],
+        "interval_95": mode.interval(),
+        "correlation": mode.correlation,
+        "hits": mode.n_hits,
+        "driving_point": mode.is_driving_point,
+        "residue_phase_rad": mode.residue_phase,
+        "coherence": mode.coherence,
+        "misfit": mode.misfit,
+        "half_power_damping_ratio": mode.half_power_damping,
+        "doubts": list(mode.doubts),
+        "method": mode.method,
+    }
+
+
+def mode_table(modes: Sequence[Mode]) -> Table:
+    """Modes, a line each, value ± standard error (in percent)."""
+    made = table("f_n (Hz)", "zeta (%)", "K (N/um)", "<")
+    for mode in modes:
+        values = (mode.frequency, mode.damping_ratio, mode.stiffness)
+        made.add_row(
+            *(
+                plus_minus(value, std, scale, percent=True)
+                for value, std, scale in zip(values, mode.standard_error, (1.0, 0.01, 1e6), strict=True)
+            ),
+            "" if mode.is_driving_point else "not a driving point",
+        )
+    return made
+
+
+def mode_lines(modes: Sequence[Mode]) -> list[str]:
+    """What stands below a table of modes: where ± comes from, and correlated errors."""
+    hits = max((mode.n_hits for mode in modes), default=0)
+    lines = [f"± is the standard error over the {hits} hits (jackknife, {hits - 1} degrees of freedom)"] if hits else []
+    for (i, j), names in (((0, 1), "f_n and zeta"), ((0, 2), "f_n and K"), ((1, 2), "zeta and K")):
+        high = [f"{m.correlation[i, j]:+.2f} ({m.frequency:.0f} Hz)" for m in modes if abs(m.correlation[i, j]) > 0.5]
+        if high:
+            lines.append(f"correlation of the errors of {names}: {', '.join(high)}")
+    return lines
+
+
+def doubt_lines(modes: Sequence[Mode]) -> list[str]:
+    """What speaks against modes, a line each."""
+    where: dict[str, list[str]] = {}
+    for mode in modes:
+        for doubt in mode.doubts:
+            where.setdefault(doubt, []).append(f"{mode.frequency:.0f}")
+    lines = [f"doubt at {', '.join(at)} Hz: {doubt}" for doubt, at in where.items()]
+    if len(modes) > 1 and not any(mode.is_driving_point for mode in modes):
+        lines.append("every K is negative: hammer or sensor is mounted or wired the other way round (sign swapped)")
+    return lines
+
+
+def picked_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
+    """Modes by peak picking, and how far each is from the fitted mode nearest to it."""
+    made = table("f_n (Hz)", "zeta (%)", "K (N/um)", "<against the fit")
+    for mode in picked:
+        near = min(fitted, key=lambda other: abs(other.frequency - mode.frequency), default=None)
+        same = near is not None and abs(near.frequency - mode.frequency) < mode.damping_ratio * mode.frequency
+        made.add_row(
+            f"{mode.frequency:.5g}",
+            f"{100 * mode.damping_ratio:.5g}",
+            f"{mode.stiffness / 1e6:.5g}",
+            _difference(mode, near) if same and near is not None else "not fitted",
+        )
+    return made
+
+
+def _difference(mode: Mode, fit: Mode) -> str:
+    zeta, k = mode.damping_ratio / fit.damping_ratio - 1, mode.stiffness / fit.stiffness - 1
+    return f"f_n {mode.frequency - fit.frequency:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
+
+
+def calibration_json(calibration: Calibration) -> dict[str, Any]:
+    """The recalibrated model."""
+    return {
+        "frequency_hz": calibration.frequency,
+        "mode": calibration.mode,
+        "theory": calibration.spindle.theory,
+        "bearing_stiffness_n_per_m": calibration.bearing_stiffness,
+        "bearing_stiffness_n_per_m_std": calibration.bearing_stiffness_std,
+        "residual_hz": calibration.residual,
+        "factor": calibration.factor,
+        "sensitivity": calibration.sensitivity,
+        "energy_share": calibration.energy_share,
+        "static_tip_stiffness_n_per_m": calibration.static_stiffness_after,
+        "static_tip_stiffness_before_n_per_m": calibration.static_stiffness_before,
+        "modal_tip_stiffness_n_per_m": calibration.modal_stiffness_after,
+        "modal_tip_stiffness_before_n_per_m": calibration.modal_stiffness_before,
+    }
+
+
+def stiffness_fit_json(fit: StiffnessFit) -> dict[str, Any]:
+    """Several stiffnesses from several modes."""
+    return {
+        "groups": list(fit.groups),
+        "factor": fit.factor,
+        "factor_std": fit.factor_std,
+        "stiffness_n_per_m": fit.stiffness,
+        "stiffness_n_per_m_std": fit.stiffness_std,
+        "correlation": fit.correlation,
+        "mode": fit.mode,
+        "frequency_hz": fit.frequency,
+        "residual_hz": fit.residual,
+        "energy_share": fit.energy_share,
+        "condition": fit.condition,
+        "warnings": list(fit.warnings),
+    }
+
+
+def damping_json(found: DampingCalibration) -> dict[str, Any]:
+    """The bearings' dampers."""
+    return {
+        "damping_ratio": found.damping_ratio,
+        "bearing_damping_n_s_per_m": found.bearing_damping,
+        "bearing_damping_sensitivity": found.sensitivity,
+    }
+
+
+def program_json(lobes: Mapping[str, StabilityLobes], machine: Machine) -> list[dict[str, Any]]:
+    """Each program of machine.toml that has lobes, against them."""
+    programs = [program for program in machine.program if program.name in lobes]
+    limits = [float(lobes[program.name].depth_at(program.speed_rpm)) for program in programs]
+    return [
+        {
+            "name": program.name,
+            "speed_rpm": program.speed_rpm,
+            "depth_mm": program.depth_mm,
+            "limit_mm": limit * 1e3,
+            "stable": program.depth_mm < limit * 1e3,
+        }
+        for program, limit in zip(programs, limits, strict=True)
+    ]
+
+
+def program_table(programs: Sequence[dict[str, Any]]) -> Table:
+    """Programs, a line each."""
+    made = table("<program", "speed (rpm)", "depth (mm)", "limit (mm)", "<verdict")
+    for entry in programs:
+        made.add_row(
+            escape(entry["name"]),
+            f"{entry['speed_rpm']:g}",
+            f"{entry['depth_mm']:g}",
+            f"{entry['limit_mm']:.2f}",
+            "stable" if entry["stable"] else "NOT STABLE",
+        )
+    return made
+
+
+def lobes_json(name: str, lobes: StabilityLobes) -> dict[str, Any]:
+    """The lowest point of a diagram."""
+    low = lobes.minimum
+    return {
+        "cut": name,
+        "method": lobes.method,
+        "minimum_depth_mm": low.depth * 1e3,
+        "at_speed_rpm": low.speed_rpm,
+        "chatter_frequency_hz": low.chatter_frequency,
+    }
+
+
+def measurement_json(m: Measurement, machine: Machine) -> dict[str, Any]:
+    """All of a measurement."""
+    calibration = m.dynamics.calibration
+    return {
+        "tap_id": m.tap_id,
+        "time": m.time.isoformat(),
+        "tool": m.tool,
+        "direction": m.direction,
+        "modes": [mode_json(mode) for mode in m.dynamics.modes],
+        "followed": mode_json(m.dynamics.followed) if m.dynamics.followed else None,
+        "calibration": calibration_json(calibration) if calibration else None,
+        "lobes": [lobes_json(name, lobes) for name, lobes in m.lobes.items()],
+        "programs": program_json(m.lobes, machine),
+        "notes": list(m.notes),
+    }
+
+
+def measurement_texts(m: Measurement, machine: Machine) -> list[str | Table]:
+    """All of a measurement, for people."""
+    texts: list[str | Table] = [f"{m.tap_id}  (tool {m.tool}, direction {m.direction})"]
+    if m.dynamics.modes:
+        texts += [mode_table(m.dynamics.modes), *doubt_lines(m.dynamics.modes)]
+    if m.dynamics.followed is not None:
+        texts.append(f"followed: {m.dynamics.followed.frequency:.2f} Hz")
+    if m.dynamics.calibration is not None:
+        texts.append(str(m.dynamics.calibration))
+    if REFERENCE_CUT in m.lobes:
+        low = m.lobes[REFERENCE_CUT].minimum
+        texts.append(f"{REFERENCE_CUT}: lowest limit {low.depth * 1e3:.2f} mm at {low.speed_rpm:.0f} rpm")
+    programs = program_json(m.lobes, machine)
+    if programs:
+        texts += [program_table(programs), "limits by zero order; lobewatch check has the verdict"]
+    return [*texts, *(f"note: {note}" for note in m.notes)]

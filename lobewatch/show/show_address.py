@@ -1,0 +1,30 @@
+"""The address of a screen: its options, and how it is told."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import webbrowser
+from typing import Annotated
+
+import typer
+
+from lobewatch.show.output import notes, results
+
+Listen = Annotated[str, typer.Option(help="Address of this computer at which the screen answers; 0.0.0.0: at all.")]
+Token = Annotated[
+    str | None, typer.Option(help="What a browser must know to see and alter anything; a new one where not given.")
+]
+
+
+def show_address(url: str, as_json: bool = False) -> None:
+    """Print the address, and open it where somebody sits at a screen."""
+    if as_json:
+        results.print(json.dumps({"url": url}), markup=False)
+        results.file.flush()
+    else:
+        notes.print(f"screen: {url}", markup=False)
+    display = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if sys.stdout.isatty() and display:
+        webbrowser.open(url)

@@ -1,0 +1,29 @@
+"""The live tap test: connection, hits, trial, self-check, state, outcome."""
+
+from lobewatch.tap.emulated_spindle import dataq_emulator, emulated_structure, emulator, with_bearing_stiffness
+from lobewatch.tap.live_signal import LiveSignal
+from lobewatch.tap.plug import Plug, open_source
+from lobewatch.tap.self_check import quiet_stretch
+from lobewatch.tap.sensor_doubts import sensor_doubts
+from lobewatch.tap.session import TapSession, TapStopped
+from lobewatch.tap.state import Plots, TakenHit, TapState, Word
+from lobewatch.tap.trial import Trial
+
+__all__ = [
+    "LiveSignal",
+    "Plots",
+    "Plug",
+    "TakenHit",
+    "TapSession",
+    "TapState",
+    "TapStopped",
+    "Trial",
+    "Word",
+    "dataq_emulator",
+    "emulated_structure",
+    "emulator",
+    "open_source",
+    "quiet_stretch",
+    "sensor_doubts",
+    "with_bearing_stiffness",
+]

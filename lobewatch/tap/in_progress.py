@@ -1,0 +1,133 @@
+"""A tap test in progress: its hits and its set-up, spooled one by one, so that nothing of it is lost."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import asdict, dataclass, field
+from datetime import timedelta
+from pathlib import Path
+
+from acquisition import (
+    Circumstances,
+    DataError,
+    Hit,
+    HitFlags,
+    TapTest,
+    Trigger,
+    atomic_write,
+    estimate_frf,
+    judge_hit,
+    new_tap_id,
+    read_tap_hits,
+    write_hit,
+)
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap.state import TakenHit
+
+RESERVE_BYTES = 50_000_000
+"""Free disk space needed before the trigger is armed."""
+RESUMABLE = timedelta(hours=12)
+"""An interrupted test older than this is not gone on with."""
+SETUP = "setup.json"
+
+
+@dataclass
+class TapInProgress:
+    """Hits so far, kept on disk one by one, so that a crash or an unplugged cable costs none of them."""
+
+    id: str
+    """Identity of the tap test to be."""
+    circumstances: Circumstances
+    """Who, what, when."""
+    folder: Path
+    """Where its hits are spooled."""
+    hits: list[Hit] = field(default_factory=list)
+    """All hits so far."""
+    flags: list[HitFlags] = field(default_factory=list)
+    """The verdict on each; UNDONE where the operator took a good one back."""
+    reasons: list[str] = field(default_factory=list)
+    """What was wrong with each, in a sentence; empty where it is averaged."""
+    earlier: int = 0
+    """How many of them were there when it was gone on with."""
+    trigger: Trigger | None = None
+    """How its hits are recorded; None until that is chosen."""
+
+    @property
+    def good(self) -> int:
+        """How many hits may be averaged."""
+        return self.flags.count(HitFlags.OK)
+
+    @property
+    def taken(self) -> tuple[TakenHit, ...]:
+        """The hits as a screen lists them."""
+        told = enumerate(zip(self.hits, self.flags, self.reasons, strict=True), 1)
+        return tuple(
+            TakenHit(i, flags, float(hit.force.max()), bool(flags & HitFlags.UNDONE), reason, i <= self.earlier)
+            for i, (hit, flags, reason) in told
+        )
+
+    def add(self, hit: Hit, flags: HitFlags, reason: str) -> None:
+        """Keep a hit; on the disk when this returns."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        if not self.hits and self.trigger is not None:
+            atomic_write(self.folder / SETUP, json.dumps(asdict(self.trigger)).encode())
+        self._write(len(self.hits), hit, flags)
+        self.hits.append(hit)
+        self.flags.append(flags)
+        self.reasons.append(reason)
+
+    def undo(self) -> int | None:
+        """Take back the last good hit and return its index; None where there is none. It stays stored, as undone."""
+        for i in reversed(range(len(self.hits))):
+            if not self.flags[i]:
+                self.take_out(i, HitFlags.UNDONE, "")
+                return i
+        return None
+
+    def take_out(self, number: int, flags: HitFlags, reason: str) -> None:
+        """Refuse a good hit (by its index) afterwards; it stays stored."""
+        self._write(number, self.hits[number], flags)
+        self.flags[number], self.reasons[number] = flags, reason
+
+    def finish(self) -> TapTest:
+        """The averaged tap test; ValueError where no hit is good."""
+        good = [hit for hit, flags in zip(self.hits, self.flags, strict=True) if not flags]
+        return TapTest(self.id, self.circumstances, estimate_frf(good), tuple(self.hits), tuple(self.flags))
+
+    def _write(self, number: int, hit: Hit, flags: HitFlags) -> None:
+        write_hit(self.folder / f"{number:04d}.h5", hit, self.circumstances, flags)
+
+
+def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool = True) -> TapInProgress:
+    """A new tap test, or the interrupted one of the same tool and direction; DataError where the disk is full."""
+    free = shutil.disk_usage(folder.path).free
+    if free < RESERVE_BYTES:
+        raise DataError(
+            f"{folder.path}: {free / 1e6:.0f} MB free on this disk; a tap test needs {RESERVE_BYTES / 1e6:.0f} MB"
+        )
+    spooled = sorted(folder.spool.iterdir(), reverse=True) if folder.spool.is_dir() else []
+    committed = {entry.id for entry in folder.taps()}
+    for path in spooled if resume else []:
+        files = sorted(path.glob("*.h5"))
+        if not files or path.name in committed:
+            continue
+        about = read_tap_hits(files[0])[1]
+        same = (about.tool, about.direction) == (circumstances.tool, circumstances.direction)
+        if same and circumstances.created - about.created < RESUMABLE:
+            return _resumed(path, files, about)
+    tap_id = new_tap_id(circumstances)
+    return TapInProgress(tap_id, circumstances, folder.spool / tap_id)
+
+
+def _resumed(path: Path, files: list[Path], about: Circumstances) -> TapInProgress:
+    tap = TapInProgress(path.name, about, path, earlier=len(files))
+    for file in files:
+        (hit,), _, (flags,) = read_tap_hits(file)
+        tap.hits.append(hit)
+        found = judge_hit(hit)
+        tap.flags.append(flags | found.flags)
+        tap.reasons.append(found.text or flags.cure)
+    if (path / SETUP).is_file():
+        tap.trigger = Trigger(**json.loads((path / SETUP).read_text("utf-8")))
+    return tap

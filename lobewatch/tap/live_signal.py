@@ -1,0 +1,81 @@
+"""The newest samples of a live test: its levels, and a stretch at rest."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Block, Hit, Source
+from acquisition.hits.capture_hits import input_channels
+
+LEVEL_TIME = 0.05
+"""Length of the live levels (s)."""
+
+
+class Device(Source, Protocol):
+    """A connected source that can be given back."""
+
+    @property
+    def info(self) -> Mapping[str, Any]:
+        """What it says of itself, with its "model"."""
+        ...
+
+    def close(self) -> None:
+        """Stop, and give the port back."""
+        ...
+
+
+def description(device: Device) -> str:
+    """Model, serial number, firmware, and how it finds lost scans, as far as it says."""
+    told = {"serial number": device.info.get("serial"), "firmware": device.info.get("fw")}
+    found = getattr(device, "loss_detection", None)
+    parts = [f"{name} {value}" for name, value in told.items() if value]
+    return ", ".join([str(device.info["model"]), *parts, *([f"loss detection: {found}"] if found else [])])
+
+
+class LiveSignal:
+    """Force and acceleration of one connected source."""
+
+    def __init__(self, source: Source) -> None:
+        """DataError unless it has one force and one acceleration channel."""
+        self._rows = list(input_channels(source.channels))
+        self.channels = (source.channels[self._rows[0]], source.channels[self._rows[1]])
+        """Force and acceleration channel."""
+        self._rate = source.sample_rate
+        self._recent: deque[NDArray[np.int32]] = deque(maxlen=64)
+
+    @property
+    def levels(self) -> tuple[float, float]:
+        """rms about the mean of force (N) and acceleration (m/s^2) over the newest LEVEL_TIME."""
+        wanted = round(LEVEL_TIME * self._rate)
+        newest: list[NDArray[np.int32]] = []
+        for codes in reversed(self._recent):
+            newest.insert(0, codes[self._rows])
+            if sum(part.shape[1] for part in newest) >= wanted:
+                break
+        force, response = np.std(np.concatenate(newest, axis=1)[:, -wanted:], axis=1)
+        return float(force * abs(self.channels[0].scale)), float(response * abs(self.channels[1].scale))
+
+    def add(self, block: Block) -> None:
+        """Take note of a block."""
+        self._recent.append(block.codes)
+
+    def record(self, blocks: Iterable[Block], duration: float) -> Hit:
+        """The next blocks that make up a duration (s), as one record."""
+        codes, lost = [], 0
+        for block in blocks:
+            codes.append(block.codes[self._rows])
+            lost += block.lost_before
+            if sum(part.shape[1] for part in codes) >= duration * self._rate:
+                break
+        return Hit.from_codes(np.concatenate(codes, axis=1), self.channels, self._rate, 0, lost)
+
+
+def resting_rms(baseline: Hit, width: int) -> float:
+    """rms of the acceleration about its mean over `width` samples at rest, the median of all such (m/s^2)."""
+    pieces = baseline.acceleration[: max(baseline.acceleration.size // width, 1) * width]
+    return float(np.median(np.std(pieces.reshape(-1, min(width, pieces.size)), axis=1)))

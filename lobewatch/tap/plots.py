@@ -1,0 +1,82 @@
+"""The curves of the last hit and of the mean, thinned to what a screen can show without losing a peak."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Frf, Hit, RunningMean, cross_spectra
+from acquisition.estimation.estimate_frf import frf_of_spectra
+from acquisition.hits.pulse import find_pulse
+from lobewatch.tap.state import Plots
+
+BINS = 400
+"""Of a curve; the highest and the lowest sample of every bin are shown."""
+BEYOND_BAND = 1.25
+"""Spectra are shown up to this many times the upper end of the usable band."""
+LEAST_COHERENT = 3
+"""Under so many hits coherence says nothing."""
+
+
+def plots_of(hit: Hit, mean: RunningMean) -> Plots:
+    """What the screen shows after a hit, good or not."""
+    shown = _samples(hit)
+    spectra = None if find_pulse(hit) is None else cross_spectra([hit])
+    last = None if spectra is None else frf_of_spectra(spectra, [hit])
+    band = next((frf.usable_band for frf in (mean.frf, last) if frf is not None), None)
+    frequency = np.arange(1, hit.force.size // 2 + 1) * hit.sample_rate / hit.force.size
+    spectrum = None if spectra is None else _decibels(spectra[0][1:])
+    sizes = [None if frf is None else np.abs(frf.receptance) for frf in (mean.frf, last)]
+    end = frequency.size if band is None else int(np.searchsorted(frequency, BEYOND_BAND * band[1], side="right"))
+    lines = _kept([curve for curve in (*sizes, spectrum) if curve is not None], end)
+    return Plots(
+        time=hit.time[shown],
+        force=hit.force[shown],
+        acceleration=hit.acceleration[shown],
+        frequency=frequency[lines],
+        mean=_at(sizes[0], lines),
+        last=_at(sizes[1], lines),
+        coherence=_at(_coherence(mean.frf), lines),
+        force_spectrum=_at(spectrum, lines),
+        usable_band=band,
+    )
+
+
+def _coherence(frf: Frf | None) -> NDArray[np.float64] | None:
+    return None if frf is None or frf.n_averages < LEAST_COHERENT else frf.coherence
+
+
+def _at(curve: NDArray[np.float64] | None, lines: NDArray[np.int64]) -> NDArray[np.float64] | None:
+    return None if curve is None else curve[lines]
+
+
+def _decibels(power: NDArray[np.float64]) -> NDArray[np.float64]:
+    """dB below the largest value, at most 100."""
+    return np.asarray(10 * np.log10(np.maximum(power / np.max(power), 1e-10)))
+
+
+def _samples(hit: Hit) -> NDArray[np.int64]:
+    """Samples to show: all around the pulse, elsewhere the extremes of every bin."""
+    kept = _kept([hit.force, hit.acceleration], hit.force.size)
+    pulse = find_pulse(hit)
+    if pulse is None:
+        return kept
+    width = pulse.end - pulse.start
+    around = np.arange(max(pulse.start - 2 * width, 0), min(pulse.end + 4 * width, hit.force.size))
+    return np.union1d(kept, around[:: around.size // BINS + 1])
+
+
+def _kept(curves: Sequence[NDArray[Any]], end: int) -> NDArray[np.int64]:
+    """Indices below `end` at which a curve is highest or lowest in its bin, rising."""
+    width = max(-(-end // BINS), 1)
+    if width == 1 or not curves:
+        return np.arange(0, end, width)
+    starts = np.arange(0, end, width)
+    extremes = [starts]
+    for curve in curves:
+        bins = np.pad(curve[:end], (0, -end % width), mode="edge").reshape(-1, width)
+        extremes += [starts + np.argmax(bins, axis=1), starts + np.argmin(bins, axis=1)]
+    return np.unique(np.minimum(np.concatenate(extremes), end - 1))

@@ -1,0 +1,43 @@
+"""The DAQ that a machine file names, opened."""
+
+from __future__ import annotations
+
+from acquisition import DataqSource, DeviceError, FileSource, TapsSource, find_port, usb_identity
+from lobewatch.machine.daq_tables import Daq
+
+
+class Plug:
+    """Opens one device again and again: a USB device wherever it is plugged in after the first time.
+
+    A USB device without a serial number, and what is no USB device, is known by the name of its port alone.
+    """
+
+    def __init__(self, daq: Daq, port: str) -> None:
+        """As [daq] sets it up; port: where it is the first time."""
+        self._daq, self._port = daq, port
+        self._identity: tuple[int, str] | None = None
+
+    def open(self) -> TapsSource | DataqSource | FileSource:
+        """See open_source; DeviceError, too, while the USB device is nowhere: no other one at its port is touched."""
+        if self._identity is not None and usb_identity(self._port) != self._identity:
+            found = find_port(*self._identity)
+            if found is None:
+                number = self._identity[1]
+                raise DeviceError(f"the DAQ with the USB serial number {number} is not plugged in; plug it in")
+            self._port = found
+        source = open_source(self._daq, self._port)
+        self._identity = self._identity or usb_identity(self._port)
+        return source
+
+
+def open_source(daq: Daq, port: str) -> TapsSource | DataqSource | FileSource:
+    """A connected source on a port, as [daq] sets it up, or the hits of a recording, "file:PATH".
+
+    Raises DeviceError where no device is there, DataError for a file without hits.
+    """
+    if port.startswith("file:"):
+        return FileSource(port.removeprefix("file:"))
+    if daq.driver == "dataq":
+        inputs = [channel.build() for channel in daq.channel]
+        return DataqSource(port, inputs, daq.sample_rate_hz, digital_word=daq.loss_detection)
+    return TapsSource(port, daq.sample_rate_hz)

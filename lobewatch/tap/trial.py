@@ -1,0 +1,132 @@
+"""Trial hits before a test: what machine.toml leaves open, trigger level and record length, is chosen by them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from acquisition import Hit, HitFlags, Trigger, check_hit, ring_down
+from lobewatch.machine.machine_file import TapSetup
+
+RECORD = 0.25
+"""Shortest record chosen, and that of the first trial hit (s); alike from month to month."""
+LONGEST_RECORD = 4.0
+"""Longest record chosen (s)."""
+TIME_CONSTANTS = 6
+"""Of the slowest mode, that a record holds (ISO 7626-5: then the cut-off part is < 0.5 %)."""
+RECORD_STEP = 0.05
+"""A longer record is a multiple of this (s)."""
+LEVEL_SHARE = 0.1
+"""Trigger level against the median peak of the trial hits ..."""
+LEVEL_NOISE_RATIO = 10.0
+"""... and against the rms of the force at rest: the larger of both ..."""
+LEVEL_CAP = 0.5
+"""... but at most this share of the softest trial hit."""
+RANGE_LOW, RANGE_HIGH = 0.02, 0.9
+"""Share of its range that a channel should stay between."""
+MOST = 3
+"""Trial hits at most."""
+_RANGES = HitFlags.TOO_SOFT | HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
+_USABLE = HitFlags.NOT_DECAYED | _RANGES
+"""What a trial hit may be: that is what trial hits are for."""
+
+
+def trigger_of(setup: TapSetup, sample_rate: float) -> Trigger | None:
+    """Trigger and record as machine.toml sets them; None where it leaves one of them open."""
+    if setup.trigger_n is None or setup.record_s is None:
+        return None
+    return Trigger(setup.trigger_n, round(setup.record_s * sample_rate), round(setup.pre_trigger_s * sample_rate))
+
+
+class Trial:
+    """The trial hits so far, and what they say."""
+
+    def __init__(self, setup: TapSetup, baseline: Hit) -> None:
+        """baseline: a record at rest."""
+        self._setup, self._baseline = setup, baseline
+        self._hits: list[Hit] = []
+        self._record = setup.record_s or RECORD
+
+    @property
+    def trigger(self) -> Trigger:
+        """Trigger and record as they are known by now."""
+        rate = self._baseline.sample_rate
+        samples = round(self._record * rate)
+        return Trigger(self._level(), samples, round(self._setup.pre_trigger_s * rate))
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing is open any more: two hits of the length that stands, or three."""
+        return len(self._hits) >= MOST or sum(hit.force.size == self.trigger.n_samples for hit in self._hits) >= 2
+
+    @property
+    def text(self) -> str:
+        """What to do; when done, what was chosen, and which range to choose."""
+        if not self.done:
+            return f"Trial hit {len(self._hits) + 1}: it chooses trigger level and record length and does not count."
+        slowest = max(ring_down(hit) for hit in self._hits)
+        chosen = f"Trigger at {self.trigger.level:.3g} N, record {self._record:g} s, {_holds(self._record, slowest)}."
+        return " ".join([chosen, *self.advice])
+
+    @property
+    def advice(self) -> list[str]:
+        """A sentence for each channel that the trial hits do not fit into."""
+        return _range_advice(self._hits)
+
+    def add(self, hit: Hit) -> HitFlags:
+        """Take a trial hit; returns why it is no use, falsy where it is."""
+        flags = check_hit(hit) & ~_USABLE
+        if flags:
+            return flags
+        self._hits.append(hit)
+        if self._setup.record_s is None:
+            self._record = max(self._record, _long_enough(ring_down(hit), self._setup.pre_trigger_s))
+        return flags
+
+    def _level(self) -> float:
+        if self._setup.trigger_n is not None:
+            return self._setup.trigger_n
+        noise = LEVEL_NOISE_RATIO * float(np.std(self._baseline.force))
+        if not self._hits:
+            return max(noise, 0.005 * _range(self._baseline, 0))
+        peaks = [float(np.max(hit.force)) for hit in self._hits]
+        level = min(max(LEVEL_SHARE * float(np.median(peaks)), noise), LEVEL_CAP * min(peaks))
+        return float(f"{level:.2g}")
+
+
+def _long_enough(time_constant: float, before: float) -> float:
+    """Length of a record (s) that holds enough time constants after its pre-trigger part."""
+    needed = min(before + TIME_CONSTANTS * time_constant, LONGEST_RECORD)
+    return max(RECORD, RECORD_STEP * math.ceil(needed / RECORD_STEP - 1e-9))
+
+
+def _holds(record: float, time_constant: float) -> str:
+    if not math.isfinite(time_constant):
+        return "the response does not fall in it: is the spindle still?"
+    count = record / max(time_constant, 1e-6)
+    short = "" if count >= TIME_CONSTANTS else f", fewer than {TIME_CONSTANTS}"
+    return f"{min(count, 99):.0f} time constants of the slowest mode{short}"
+
+
+def _range(hit: Hit, channel: int) -> float:
+    """Largest value of a channel (N or m/s^2)."""
+    if hit.channels is None:
+        return float("inf")
+    return hit.channels[channel].full_scale / abs(hit.channels[channel].sensitivity)
+
+
+def _range_advice(hits: Sequence[Hit]) -> list[str]:
+    """A sentence for each channel that the trial hits do not fit into."""
+    advice = []
+    for i, (name, unit) in enumerate((("force", "N"), ("acceleration", "m/s^2"))):
+        peaks = [float(np.max(np.abs((hit.force, hit.acceleration)[i]))) for hit in hits]
+        share = max(peaks) / _range(hits[0], i)
+        if share < RANGE_LOW or share > RANGE_HIGH:
+            wanted = 2 * float(np.median(peaks)) if share < RANGE_LOW else 2 * max(peaks)
+            advice.append(
+                f"The hits reach {100 * share:.2g} % of the {name} range of {_range(hits[0], i):.3g} {unit}: choose a "
+                f"range or a sensor of about {wanted:.2g} {unit}{', or hit softer' if share > RANGE_HIGH else ''}."
+            )
+    return advice

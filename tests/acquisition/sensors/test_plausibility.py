@@ -1,0 +1,113 @@
+"""Sensitivities, dates and stiffnesses that cannot be right."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, date, datetime
+from importlib import resources
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquisition import (
+    Channel,
+    Circumstances,
+    TapTest,
+    calibration_doubt,
+    channel_doubts,
+    stiffness_doubt,
+    unit_mistake,
+)
+from lobewatch.analysis.pipeline import analyse
+from lobewatch.machine.machine_file import parse_machine
+from modal import Mode, synthesize
+
+HAMMER = Channel("force", 2.25e-3, 5.0, calibration_date="2026-01-15")
+TODAY = date(2026, 11, 1)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "sensitivity"),
+    [("force", 0.23e-3), ("force", -11.2e-3), ("force", 22.5e-3), ("acceleration", 1.02e-3), ("acceleration", 0.102)],
+)
+def test_real_sensors_are_believed(quantity: str, sensitivity: float) -> None:
+    assert channel_doubts(Channel(quantity, sensitivity, 5.0)) == ()  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("channel", "words"),
+    [
+        (Channel("acceleration", 100.0, 5.0), "a sensitivity of 100 V per m/s^2 is not believed, did you mean mV?"),
+        (Channel("force", 2.25, 5.0), "a sensitivity of 2.25 V per N is not believed, did you mean mV?"),
+        (Channel("force", 2.25e-6, 5.0), "2.25e-06 V per N is not believed, was it divided by 1000 twice?"),
+        (
+            Channel("acceleration", 1e9, 5.0),
+            "1e+09 V per m/s^2 is not believed (accelerometers have 1 to 1000 mV/g without gain)",
+        ),
+        (Channel("force", 2.25e-3, 5000.0), "a range of ±5000 V is not believed, did you mean mV?"),
+    ],
+)
+def test_a_sensitivity_or_range_that_no_device_has_is_not_believed(channel: Channel, words: str) -> None:
+    (doubt,) = channel_doubts(channel)
+    assert words in doubt
+    assert doubt.startswith(f"{channel.quantity}: ")
+
+
+@given(st.floats(0.11, 24), st.sampled_from([1, -1]))
+def test_a_believed_hammer_entered_in_millivolts_is_caught(millivolts: float, sign: int) -> None:
+    assert channel_doubts(Channel("force", sign * millivolts * 1e-3, 5.0)) == ()
+    assert len(channel_doubts(Channel("force", sign * millivolts, 5.0))) == 1
+
+
+@pytest.mark.parametrize(
+    ("factor", "word"),
+    [
+        (9.80665, "in g, not"),
+        (1 / 9.80665, "V/g"),
+        (4.44822, "V/lbf"),
+        (1 / 4.44822, "in lbf"),
+        (1e3, "force 1000 times too large or acceleration too small"),
+        (1e-3, "force 1000 times too small or acceleration too large"),
+    ],
+)
+@given(st.floats(0.9, 1.1))
+def test_a_ratio_near_a_unit_mistake_names_it(factor: float, word: str, off: float) -> None:
+    assert word in unit_mistake(factor * off)
+
+
+@given(st.floats(0.3, 3.5))
+def test_a_ratio_far_from_all_names_none(ratio: float) -> None:
+    assert unit_mistake(ratio) == ""
+
+
+@pytest.mark.parametrize("stiffness", [1e5, 3.5e7, -3.5e7, 1e10])
+def test_stiffnesses_of_machine_tools_are_believed(stiffness: float) -> None:
+    assert stiffness_doubt(stiffness) == ""
+
+
+@pytest.mark.parametrize("stiffness", [3.5e4, 3.5e10, -9e4])
+def test_other_stiffnesses_are_not(stiffness: float) -> None:
+    assert f"K = {stiffness:.3g} N/m is outside 100000 to 1e+10" in stiffness_doubt(stiffness)
+
+
+@pytest.mark.parametrize(("stiffness", "noted"), [(3.5e7, False), (3.5e4, True)])
+def test_a_measurement_whose_stiffness_is_not_believed_says_so(stiffness: float, noted: bool) -> None:
+    machine = parse_machine(resources.files("sim_data").joinpath("new_machine.toml").read_text("utf-8"))
+    frf = synthesize([Mode(1500.0, 0.03, stiffness)], np.arange(4.0, 4000.0, 4.0))
+    measurement = analyse(TapTest("t", Circumstances("mill", datetime(2026, 1, 15, tzinfo=UTC)), frf), machine)
+    assert any("check the units of both sensitivities" in note for note in measurement.notes) is noted
+
+
+def test_the_date_of_calibration() -> None:
+    assert calibration_doubt(HAMMER, TODAY) == ""
+    assert "calibrated 2026-01-15, 10 months ago (interval 6)" in calibration_doubt(HAMMER, TODAY, 6)
+    assert calibration_doubt(HAMMER, date(2027, 1, 15)) == ""
+    assert "12 months ago (interval 12)" in calibration_doubt(HAMMER, date(2027, 1, 16))
+    assert "not known" in calibration_doubt(replace(HAMMER, calibration_date=""), TODAY)
+    assert calibration_doubt(HAMMER, date(2026, 1, 15)) == ""
+    with pytest.raises(ValueError, match=r"2026-01-15 lies in the future \(today is 2026-01-14\)"):
+        calibration_doubt(HAMMER, date(2026, 1, 14))
+    with pytest.raises(ValueError, match=r"'15\.1\.26' is no date; give YYYY-MM-DD"):
+        calibration_doubt(replace(HAMMER, calibration_date="15.1.26"), TODAY)

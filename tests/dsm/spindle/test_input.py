@@ -1,0 +1,258 @@
+"""What the spindle model refuses, and how it says so."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+
+from dsm import (
+    Bearing,
+    Joint,
+    LumpedMass,
+    Material,
+    Segment,
+    Spindle,
+    Theory,
+    calibrate,
+    critical_speed,
+    modal_stiffness,
+    natural_frequencies,
+    receptance,
+    static_stiffness,
+    stiffness_curve,
+)
+from dsm.modes.find_modes import find_modes
+
+PARTS = [Segment(0.2, 0.05), Segment(0.3, 0.08, 0.02)]
+BEARINGS = [Bearing(0.1, 1e8), Bearing(0.4, 2e8)]
+SPINDLE = Spindle(PARTS, BEARINGS)
+
+
+@pytest.mark.parametrize(
+    ("segment", "message"),
+    [
+        (Segment(0.0, 0.05), r"segment 3: length=0\.0 is not a finite number > 0 \(m\)"),
+        (Segment(math.nan, 0.05), "segment 3: length=nan"),
+        (Segment(0.1, -0.05), r"segment 3: outer_diameter=-0\.05"),
+        (Segment(0.1, math.inf), "segment 3: outer_diameter=inf"),
+        (Segment(0.1, 0.05, 0.05), r"segment 3: bore_diameter=0\.05 m is not .* outer_diameter=0\.05"),
+        (Segment(0.1, 0.05, -0.01), r"segment 3: bore_diameter=-0\.01"),
+        (Segment(0.1, 0.05, math.nan), "segment 3: bore_diameter=nan"),
+        (Segment(0.1, 0.05, end_outer_diameter=0.0), r"segment 3: end_outer_diameter=0\.0 is not a finite number > 0"),
+        (Segment(0.1, 0.05, end_outer_diameter=math.nan), "segment 3: end_outer_diameter=nan"),
+        (
+            Segment(0.1, 0.05, 0.03, end_outer_diameter=0.02),
+            r"segment 3: end_bore_diameter=0\.03 .*_outer_diameter=0\.02",
+        ),
+        (
+            Segment(0.1, 0.05, end_bore_diameter=0.05),
+            r"segment 3: end_bore_diameter=0\.05 m .* end_outer_diameter=0\.05",
+        ),
+        (Segment(0.1, 0.05, end_bore_diameter=-0.01), r"segment 3: end_bore_diameter=-0\.01"),
+        (Segment(0.1, 0.05, mass_diameter=0.0), r"segment 3: mass_diameter=0\.0"),
+        (Segment(0.1, 0.05, 0.03, mass_diameter=0.02), r"segment 3: bore_diameter=0\.03 .* mass_diameter=0\.02"),
+        (
+            Segment(0.1, 0.05, mass_diameter=0.06, end_outer_diameter=0.04),
+            "mass_diameter=0.06 m is for uniform segments",
+        ),
+    ],
+)
+def test_segments_are_refused_by_number(segment: Segment, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Spindle([*PARTS, segment], BEARINGS)
+
+
+@pytest.mark.parametrize(
+    ("bearing", "message"),
+    [
+        (Bearing(0.6, 1e8), r"bearing 3: position=0\.6 m is off the shaft, 0 to 0\.5 m"),
+        (Bearing(-0.1, 1e8), r"bearing 3: position=-0\.1 m"),
+        (Bearing(math.nan, 1e8), "bearing 3: position=nan"),
+        (Bearing(0.4, 1e8), r"bearing 3: position=0\.4 m is that of bearing 2"),
+        (Bearing(0.2, 0.0), r"bearing 3: stiffness=0\.0 .* \(N/m\)"),
+        (Bearing(0.2, math.nan), "bearing 3: stiffness=nan"),
+        (Bearing(0.2, 1e8, damping=-1.0), r"bearing 3: damping=-1\.0 .* \(N s/m\)"),
+        (Bearing(0.2, 1e8, rotational_stiffness=math.inf), r"bearing 3: rotational_stiffness=inf .* \(N m/rad\)"),
+        (Bearing(0.2, 1e8, housing_stiffness=0.0), r"bearing 3: housing_stiffness=0\.0 .* \(N/m\)"),
+    ],
+)
+def test_bearings_are_refused_by_number(bearing: Bearing, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Spindle(PARTS, [*BEARINGS, bearing])
+
+
+@pytest.mark.parametrize(
+    ("mass", "message"),
+    [
+        (LumpedMass(0.6, 1.0), r"mass 2: position=0\.6 m is off the shaft, 0 to 0\.5 m"),
+        (LumpedMass(0.25, 1.0), r"mass 2: position=0\.25 m is that of mass 1; put both into one mass"),
+        (LumpedMass(0.3, -1.0), r"mass 2: mass=-1\.0 is not a finite number >= 0 \(kg\)"),
+        (LumpedMass(0.3, math.nan), "mass 2: mass=nan"),
+        (LumpedMass(0.3, math.inf), "mass 2: mass=inf"),
+        (LumpedMass(0.3, 1.0, -1e-3), r"mass 2: diametral_inertia=-0\.001"),
+        (LumpedMass(0.3, 1.0, 1e-3, 3e-3), r"mass 2: polar_inertia=0\.003 kg m\^2 is larger than twice"),
+    ],
+)
+def test_masses_are_refused_by_number(mass: LumpedMass, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Spindle(PARTS, BEARINGS, masses=[LumpedMass(0.25, 1.0), mass])
+
+
+@pytest.mark.parametrize(
+    ("joint", "message"),
+    [
+        (Joint(0.0, 1e9, 1e6), r"joint 1: position=0\.0 m is an end of the shaft"),
+        (Joint(0.5, 1e9, 1e6), r"joint 1: position=0\.5 m is an end of the shaft"),
+        (Joint(0.6, 1e9, 1e6), r"joint 1: position=0\.6 m is off the shaft"),
+        (Joint(0.4, 1e9, 1e6), r"joint 1: position=0\.4 m is that of bearing 2; move the bearing"),
+        (Joint(0.25, 1e9, 1e6), r"joint 1: position=0\.25 m is that of mass 1; move the mass"),
+        (Joint(0.3, 0.0, 1e6), r"joint 1: stiffness=0\.0 is not a finite number > 0 \(N/m\)"),
+        (Joint(0.3, math.inf, 1e6), "joint 1: stiffness=inf"),
+        (Joint(0.3, 1e9, math.nan), r"joint 1: rotational_stiffness=nan .* \(N m/rad\)"),
+    ],
+)
+def test_joints_are_refused_by_number(joint: Joint, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Spindle(PARTS, BEARINGS, masses=[LumpedMass(0.25, 1.0)], joints=[joint])
+
+
+@pytest.mark.parametrize(
+    ("constants", "message"),
+    [
+        ((210e9, 7850.0, 60e9), r"shear_modulus=6e\+10 Pa gives Poisson's ratio 0\.75 .* between -1 and 0\.5"),
+        ((0.0, 7850.0, 80e9), "youngs_modulus=0.0"),
+        ((210e9, math.nan, 80e9), "density=nan"),
+        ((210e9, 7850.0, math.inf), "shear_modulus=inf"),
+    ],
+)
+def test_impossible_materials_are_refused(constants: tuple[float, float, float], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Material(*constants)
+
+
+def test_a_spindle_of_an_impossible_shear_modulus_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"shear_modulus=-1\.0"):
+        Spindle(PARTS, BEARINGS, shear_modulus=-1.0)
+    with pytest.raises(ValueError, match=r"Poisson's ratio 0\.75"):
+        natural_frequencies(Spindle(PARTS, BEARINGS, theory="timoshenko", shear_modulus=60e9), 1)
+
+
+def test_too_many_segments_are_refused() -> None:
+    with pytest.raises(ValueError, match="501 segments were given; a spindle has 1 to 500 of them"):
+        Spindle([Segment(0.001, 0.05)] * 501, BEARINGS)
+
+
+@pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
+@pytest.mark.parametrize("slenderness", [0.01, 0.05, 1.0, 1e3, 1e5])
+def test_slender_and_stubby_shafts_get_right_modes(slenderness: float, theory: Theory) -> None:
+    """Rigid on springs that are soft beside it: bounce, and pitch about the middle."""
+    length = 0.05 * slenderness
+    shaft = Segment(length, 0.05)
+    bending, shear = 210e9 * shaft.second_moment / length**3, 0.1 * 210e9 * shaft.area / length
+    soft = 1e-4 * (min(bending, shear) if theory == "timoshenko" else bending)
+    spindle = Spindle([shaft], [Bearing(0.0, soft), Bearing(length, soft)], theory=theory)
+    gyration = math.sqrt((0.05**2 / 16 if theory == "timoshenko" else 0.0) + length**2 / 12)
+    bounce, pitch = math.sqrt(2 * soft / spindle.mass), length / gyration * math.sqrt(soft / 2 / spindle.mass)
+    found = 2 * math.pi * natural_frequencies(spindle, 2)
+    assert found == pytest.approx(sorted([bounce, pitch]), rel=1e-3)
+
+
+def test_a_shaft_too_flat_for_its_springs_is_an_error() -> None:
+    flat = Spindle([Segment(5e-7, 0.05)], [Bearing(0.0, 1e9), Bearing(5e-7, 1e9)], theory="timoshenko")
+    with pytest.raises(ArithmeticError, match="rounding"):
+        natural_frequencies(flat, 2)
+
+
+def test_parts_far_too_close_are_an_error_and_no_wrong_answer() -> None:
+    """A joint 10 um from a step: the stiffness of so short a piece swallows the rest."""
+    stubby = Spindle([Segment(0.04, 0.0625), Segment(0.05, 0.0625)], [Bearing(0.02, 1e8), Bearing(0.07, 1e8)])
+    with pytest.raises(ArithmeticError, match="far too close"):
+        natural_frequencies(replace(stubby, joints=[Joint(0.04 - 10e-6, 1e8, 1e4)]), 3)
+
+
+def test_a_spindle_needs_segments_and_a_material() -> None:
+    with pytest.raises(ValueError, match=r"0 segments were given; a spindle has 1 to 500"):
+        Spindle([], BEARINGS)
+    with pytest.raises(ValueError, match=r"youngs_modulus=-1\.0 .* \(Pa\)"):
+        Spindle(PARTS, BEARINGS, youngs_modulus=-1.0)
+    with pytest.raises(ValueError, match="density=nan"):
+        Spindle(PARTS, BEARINGS, density=math.nan)
+
+
+def test_an_unknown_theory_is_refused_by_name() -> None:
+    with pytest.raises(ValueError, match="theory='rayleigh' is none of euler-bernoulli"):
+        Spindle(PARTS, BEARINGS, theory="rayleigh")  # type: ignore[arg-type]
+
+
+def test_a_spindle_is_plain_frozen_data() -> None:
+    again = Spindle(list(PARTS), list(BEARINGS))
+    assert again == SPINDLE
+    assert hash(again) == hash(SPINDLE)
+    with pytest.raises(FrozenInstanceError):
+        SPINDLE.density = 1.0  # type: ignore[misc]
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        static_stiffness,
+        critical_speed,
+        lambda s: calibrate(s, 100.0),
+        lambda s: receptance(s, [0.0, 1.0]),
+        lambda s: stiffness_curve(s, [1.0]),
+    ],
+)
+def test_a_shaft_that_can_move_freely_is_refused(ask: Callable[[Spindle], object]) -> None:
+    with pytest.raises(ValueError, match=r"held by 1 bearing\(s\).* at least two"):
+        ask(Spindle(PARTS, BEARINGS[:1]))
+
+
+def test_one_bearing_is_enough_for_natural_frequencies_and_receptance() -> None:
+    hinged = Spindle(PARTS, BEARINGS[:1])
+    assert natural_frequencies(hinged, 2)[0] == pytest.approx(0.0, abs=1e-2)
+    assert natural_frequencies(hinged, 2)[1] > 100
+    assert np.all(np.isfinite(receptance(hinged, [10.0, 100.0])))
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (lambda: natural_frequencies(SPINDLE, 0), "0 modes"),
+        (lambda: modal_stiffness(SPINDLE, 0), "mode=0"),
+        (lambda: modal_stiffness(SPINDLE, 1, 0.7), r"position=0\.7 m is off the shaft, which spans 0 to 0\.5 m"),
+        (lambda: static_stiffness(SPINDLE, math.nan), "position=nan"),
+        (lambda: receptance(SPINDLE, [10.0, -1.0]), r"frequency=-1\.0 Hz"),
+        (lambda: receptance(SPINDLE, [math.nan]), "frequency=nan"),
+        (lambda: receptance(SPINDLE, [[1.0, 2.0]]), r"shape \(1, 2\)"),
+        (lambda: receptance(SPINDLE, [1.0], loss_factor=-0.1), r"loss_factor=-0\.1"),
+        (lambda: receptance(SPINDLE, [1.0], loss_factor=math.nan), "loss_factor=nan"),
+        (lambda: calibrate(SPINDLE, 0.0), r"frequency=0\.0 Hz"),
+        (lambda: calibrate(SPINDLE, math.nan), "frequency=nan"),
+        (lambda: calibrate(SPINDLE, 500.0, -1.0), r"frequency_std=-1\.0"),
+        (lambda: calibrate(SPINDLE, 500.0, mode=0), "mode=0"),
+        (lambda: stiffness_curve(SPINDLE, [0.0]), "frequency=0 Hz"),
+    ],
+)
+def test_bad_arguments_are_refused(ask: Callable[[], object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        ask()
+
+
+def test_a_shaft_beyond_the_arithmetic_is_an_error_and_no_wrong_answer() -> None:
+    with pytest.raises(ArithmeticError, match="rounding"):
+        find_modes(Spindle([Segment(1e-7, 0.2), Segment(0.5, 0.001), Segment(1e-7, 0.2)], []), 3)
+
+
+def test_a_bearing_at_a_rounded_segment_end_makes_no_node_of_its_own() -> None:
+    thirds = [Segment(0.1, 0.05)] * 3
+    exact = Spindle(thirds, [Bearing(0.0, 1e8), Bearing(0.1 + 0.1 + 0.1, 1e8)])
+    rounded = Spindle(thirds, [Bearing(0.0, 1e8), Bearing(0.3, 1e8)])
+    assert natural_frequencies(rounded, 3) == pytest.approx(natural_frequencies(exact, 3), rel=1e-12)
+
+
+def test_no_frequencies_give_no_receptance() -> None:
+    assert receptance(SPINDLE, []).shape == (0,)

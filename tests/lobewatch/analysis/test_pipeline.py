@@ -1,0 +1,320 @@
+"""The whole chain on simulated hardware: what was emulated is found again, and nothing is lost on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition import (
+    Circumstances,
+    DataError,
+    Faults,
+    Frf,
+    HammeredStructure,
+    Hit,
+    HitFlags,
+    TapsEmulator,
+    TapsSource,
+    TapTest,
+    average_good,
+    from_accelerance,
+    new_tap_id,
+    write_hit,
+)
+from dsm import modal_stiffness, modes_at, receptance, static_stiffness
+from lobes import read_history, zero_order
+from lobewatch.analysis.history import series, update_history
+from lobewatch.analysis.pipeline import Measurement, analyse
+from lobewatch.commands.init import make_machine_folder
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.machine_file import REFERENCE_CUT, parse_machine
+from lobewatch.show.report import render_report
+from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE, emulated_structure, emulator, with_bearing_stiffness
+from lobewatch.tap.in_progress import begin_tap
+from lobewatch.tap.session import TapSession, TapStopped
+from lobewatch.tap.state import Word
+from modal import Mode, synthesize
+
+START = datetime(2026, 1, 15, 9, tzinfo=UTC)
+LINES = np.arange(4.0, 4000.0, 4.0)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> MachineFolder:
+    make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
+    return MachineFolder(tmp_path / "m")
+
+
+def about(folder: MachineFolder, days: float = 0.0, direction: str = "x") -> Circumstances:
+    return Circumstances("m", START + timedelta(days=days), "reference", direction, "", folder.toml.read_text("utf-8"))
+
+
+def recorded(circumstances: Circumstances, *modes: Mode) -> TapTest:
+    frf = synthesize(list(modes), LINES)
+    return TapTest(new_tap_id(circumstances), circumstances, from_accelerance(LINES, frf.accelerance))
+
+
+def live_tap(folder: MachineFolder, k: float, days: float = 0.0, direction: str = "x", seed: int = 3) -> Measurement:
+    table = folder.machine.spindle
+    assert table is not None
+    structure = emulated_structure(with_bearing_stiffness(table.build(), k), table.damping_ratio)
+    with emulator(structure, np.random.default_rng(seed), realtime=False) as device:
+        session = TapSession(folder, lambda: TapsSource(device.port), about(folder, days, direction), guided=False)
+        session.run()
+    return session.measurement
+
+
+def test_the_emulated_structure_has_the_receptance_of_the_model() -> None:
+    table = parse_machine(_example()).spindle
+    assert table is not None
+    spindle = table.build()
+    structure = emulated_structure(spindle, 1e-9)
+    f = np.array([1.0, 500.0, 1500.0, 2500.0])
+    modes = 1 / (structure.stiffness * (1 - (f[:, None] / structure.frequency) ** 2))
+    assert modes.sum(axis=1) + structure.residual == pytest.approx(receptance(spindle, f).real, rel=2e-3)
+    assert modes[0].sum() + structure.residual == pytest.approx(1 / static_stiffness(spindle), rel=1e-6)
+
+
+def _example() -> str:
+    from importlib import resources
+
+    return resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")
+
+
+def test_live_taps_find_what_was_emulated_and_the_history_grows(folder: MachineFolder) -> None:
+    table = folder.machine.spindle
+    assert table is not None
+    for month, k in enumerate((1.28e9, 0.9e9)):
+        found = live_tap(folder, k, 30.0 * month)
+        history, _ = update_history(folder)
+        (f, *_), (stiffness, *_) = modes_at(with_bearing_stiffness(table.build(), k), 3)
+        assert found.dynamics.followed is not None
+        assert found.dynamics.calibration is not None
+        assert found.dynamics.followed.frequency == pytest.approx(f, rel=5e-4)
+        assert found.dynamics.followed.damping_ratio == pytest.approx(table.damping_ratio, rel=0.03)
+        assert found.dynamics.followed.stiffness == pytest.approx(stiffness, rel=0.02)
+        assert found.dynamics.calibration.bearing_stiffness == pytest.approx(k, rel=0.01)
+        assert len(history) == month + 1
+    assert np.diff(history.columns["stiffness"])[0] < 0
+    again = read_history(folder.history)
+    assert np.array_equal(again.depth[REFERENCE_CUT], history.depth[REFERENCE_CUT])
+    followed = found.dynamics.at_tip
+    expected = zero_order(followed, None, folder.machine.cuts("reference")[REFERENCE_CUT], again.speed_rpm)
+    assert np.array_equal(again.depth[REFERENCE_CUT][1], expected.depth)
+    assert not list(folder.spool.iterdir())
+
+
+def test_a_history_made_again_is_the_same_and_stale_ones_are_not_used(folder: MachineFolder) -> None:
+    for month, k in enumerate((1.28e9, 1.0e9, 0.8e9)):
+        live_tap(folder, k, 30.0 * month)
+    history, _ = update_history(folder)
+    for spoil in (folder.history.unlink, lambda: folder.history.write_bytes(b"rubbish")):
+        spoil()
+        again, _ = update_history(folder)
+        for name, column in history.columns.items():
+            assert np.array_equal(column, again.columns[name], equal_nan=column.dtype.kind == "f")
+    folder.toml.write_text(folder.toml.read_text().replace("depth_mm = 8.0", "depth_mm = 1.0"))
+    changed, measurements = update_history(MachineFolder(folder.path))
+    assert len(measurements) == 3
+    assert changed.settings_hash != history.settings_hash
+
+
+def test_an_unplugged_cable_costs_no_hit(folder: MachineFolder) -> None:
+    table = folder.machine.spindle
+    assert table is not None
+    structure = emulated_structure(table.build(), table.damping_ratio)
+    signal = HammeredStructure(structure, SAMPLE_RATE, np.random.default_rng(1))
+    with TapsEmulator(signal, CHANNELS, SAMPLE_RATE, realtime=False, faults=Faults(unplug_after=100_000)) as device:
+        session = TapSession(folder, lambda: TapsSource(device.port), about(folder), sleep=lambda _: session.stop())
+        with pytest.raises(TapStopped):
+            session.run()
+    assert session.state.word is Word.NO_DEVICE
+    assert "unplugged" in session.state.reason
+    seen = session.state.hits
+    assert len(seen) >= 2
+    resumed = begin_tap(folder, about(folder, days=0.1))
+    assert [float(hit.force.max()) for hit in resumed.hits] == [hit.peak_force for hit in seen]
+    assert resumed.flags == [hit.flags for hit in seen]
+    assert begin_tap(folder, about(folder, days=0.1, direction="y")).hits == []
+    assert begin_tap(folder, about(folder, days=2.0)).hits == []
+    assert begin_tap(folder, about(folder), resume=False).hits == []
+    with TapsEmulator(signal, CHANNELS, 2 * SAMPLE_RATE, realtime=False) as other:
+        again = TapSession(folder, lambda: TapsSource(other.port), about(folder, days=0.1))
+        with pytest.raises(ValueError, match="another length, sample rate or sensor; begin anew with --new"):
+            again.run()
+
+
+def test_a_committed_test_whose_spool_was_left_is_not_gone_on_with(folder: MachineFolder) -> None:
+    tap = recorded(about(folder), Mode(1700.0, 0.03, 3.5e7))
+    folder.commit(tap)
+    (folder.spool / tap.id).mkdir(parents=True)
+    hit = Hit(np.ones(100), np.ones(100), 1000.0)
+    write_hit(folder.spool / tap.id / "0000.h5", hit, about(folder), HitFlags.OK)
+    assert begin_tap(folder, about(folder)).hits == []
+
+
+def test_a_full_disk_is_told_before_the_first_hit(folder: MachineFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Usage:
+        free = 1_000_000
+
+    monkeypatch.setattr("lobewatch.tap.in_progress.shutil.disk_usage", lambda _: Usage)
+    with pytest.raises(DataError, match="1 MB free on this disk; a tap test needs 50 MB"):
+        begin_tap(folder, about(folder))
+
+
+def test_x_and_y_within_a_day_make_one_two_directional_diagram(folder: MachineFolder) -> None:
+    x, y = Mode(1700.0, 0.03, 3.5e7), Mode(1600.0, 0.04, 2.5e7)
+    folder.commit(recorded(about(folder, 0.0, "x"), x))
+    folder.commit(recorded(about(folder, 0.5, "y"), y))
+    folder.commit(recorded(about(folder, 3.0, "y"), y))
+    _, (alone, both, late) = update_history(folder)
+    cut = folder.machine.cuts("reference")[REFERENCE_CUT]
+    speeds = alone.lobes[REFERENCE_CUT].speed_rpm
+    assert alone.lobes[REFERENCE_CUT].depth == pytest.approx(zero_order([x], None, cut, speeds).depth, rel=1e-3)
+    assert both.lobes[REFERENCE_CUT].depth == pytest.approx(zero_order([x], [y], cut, speeds).depth, rel=1e-3)
+    assert late.lobes[REFERENCE_CUT].depth == pytest.approx(zero_order(None, [y], cut, speeds).depth, rel=1e-3)
+    assert any("the y direction alone" in note for note in late.notes)
+    assert not both.notes
+
+
+def test_a_tap_recorded_earlier_and_stored_later_takes_its_place_in_time(folder: MachineFolder) -> None:
+    x, y = Mode(1700.0, 0.03, 3.5e7), Mode(1600.0, 0.04, 2.5e7)
+    folder.commit(recorded(about(folder, 1.0, "x"), x))
+    alone, _ = update_history(folder)
+    folder.commit(recorded(about(folder, 0.5, "y"), y))
+    kept_up, _ = update_history(folder)
+    folder.history.unlink()
+    made_again, _ = update_history(folder)
+    assert list(kept_up.columns["direction"]) == ["y", "x"]
+    assert np.array_equal(kept_up.depth[REFERENCE_CUT], made_again.depth[REFERENCE_CUT])
+    assert not np.array_equal(kept_up.depth[REFERENCE_CUT][1], alone.depth[REFERENCE_CUT][0])
+
+
+def test_a_negative_stiffness_is_stored_and_stops_the_lobes_with_a_reason(folder: MachineFolder) -> None:
+    tap = recorded(about(folder), Mode(1700.0, 0.03, 3.5e7), Mode(1950.0, 0.01, -9e7))
+    found = analyse(tap, folder.machine)
+    assert [mode.is_driving_point for mode in found.dynamics.modes] == [True, False]
+    assert not found.lobes
+    assert "not a driving point, the stiffness of the modes at 1950 Hz is negative" in found.notes[-1]
+    narrow = replace_band(folder, "[1200, 1800]")
+    assert list(analyse(tap, narrow.machine).lobes)
+    folder.commit(tap)
+    history, _ = update_history(folder)
+    assert np.isnan(history.depth[REFERENCE_CUT]).all()
+    html = render_report(folder, history, "reference", "x")
+    assert "not a driving point" in html
+
+
+def replace_band(folder: MachineFolder, band: str) -> MachineFolder:
+    folder.toml.write_text(folder.toml.read_text().replace("band_hz = [1200, 2200]", f"band_hz = {band}"))
+    return MachineFolder(folder.path)
+
+
+def test_nothing_in_the_band_and_out_of_reach_are_reasons_not_errors(folder: MachineFolder) -> None:
+    outside = analyse(recorded(about(folder), Mode(900.0, 0.03, 3.5e7)), folder.machine)
+    assert outside.dynamics.followed is None
+    assert "none with positive stiffness in [mode] band_hz 1200..2200 Hz; found are 900 Hz" in outside.notes[0]
+    wide = replace_band(folder, "[1200, 3000]")
+    beyond = analyse(recorded(about(folder), Mode(2500.0, 0.03, 3.5e7)), wide.machine)
+    assert beyond.dynamics.calibration is None
+    assert "2301.1 Hz (rigid bearings)" in beyond.notes[0]
+    assert REFERENCE_CUT in beyond.lobes
+
+
+def test_an_frf_that_cannot_be_fitted_is_stored_with_the_reason_and_blocks_nothing(folder: MachineFolder) -> None:
+    good = recorded(about(folder, 30.0), Mode(1700.0, 0.03, 3.5e7))
+    first = recorded(about(folder), Mode(1700.0, 0.03, 3.5e7))
+    folder.commit(replace(first, frf=Frf(LINES, first.frf.receptance.conj())))
+    folder.commit(good)
+    history, (conjugated, fine) = update_history(folder)
+    assert conjugated.notes[0].startswith("no modes: the phase")
+    assert fine.lobes
+    assert "natural frequency" in render_report(folder, history, "reference", "x")
+
+
+def test_a_tap_beside_the_tip_is_carried_to_it_by_the_model(folder: MachineFolder) -> None:
+    folder.toml.write_text(folder.toml.read_text().replace("position_mm = 0 ", "position_mm = 60 "))
+    beside = MachineFolder(folder.path)
+    table = beside.machine.spindle
+    assert table is not None
+    spindle = table.build()
+    (f, *_), (k, *_) = modes_at(spindle, 1, 0.06)
+    found = analyse(recorded(about(folder), Mode(float(f), 0.03, float(k))), beside.machine)
+    (tip,) = found.dynamics.at_tip
+    assert tip.stiffness == pytest.approx(modal_stiffness(spindle), rel=1e-3)
+    assert found.dynamics.followed is not None
+    assert found.dynamics.followed.stiffness == pytest.approx(k, rel=1e-3)
+
+
+def test_a_machine_without_spindle_gives_all_but_the_models_part(tmp_path: Path) -> None:
+    make_machine_folder(tmp_path / "plain", "new_machine.toml")
+    folder = MachineFolder(tmp_path / "plain")
+    folder.commit(recorded(about(folder), Mode(1700.0, 0.03, 3.5e7)))
+    folder.commit(recorded(about(folder, 30.0), Mode(1600.0, 0.03, 3.5e7)))
+    history, measurements = update_history(folder)
+    assert "no model" in measurements[0].notes[0]
+    assert REFERENCE_CUT in measurements[0].lobes
+    html = render_report(folder, history, "reference", "x")
+    assert "natural frequency" in html
+    assert "Bearing stiffness" not in html
+
+
+def test_series_are_sorted_by_time_and_told_apart(folder: MachineFolder) -> None:
+    for days, direction in ((60, "x"), (0, "x"), (30, "x"), (45, "y")):
+        folder.commit(recorded(about(folder, days, direction), Mode(1700.0 - days, 0.03, 3.5e7)))
+    history, _ = update_history(folder)
+    rows = series(history, "reference", "x")
+    assert history.columns["frequency"][rows] == pytest.approx([1700, 1670, 1640], abs=0.1)
+    with pytest.raises(ValueError, match="no tap test with tool 'T9'"):
+        render_report(folder, history, "T9", "x")
+
+
+def test_modes_of_many_hits_agree_with_the_frf_they_come_from(
+    folder: MachineFolder, tapper: Callable[..., HammeredStructure]
+) -> None:
+    live_tap(folder, 1.28e9)
+    (entry,) = folder.taps()
+    tap = folder.read(entry)
+    assert isinstance(tap.frf, Frf)
+    assert len(tap.accepted) == folder.machine.tap.hits
+    again, flags = average_good(tap.hits)
+    assert np.array_equal(again.receptance, tap.frf.receptance)
+    assert replace(tap, flags=flags).accepted == tap.accepted
+
+
+def test_standard_errors_are_those_over_the_hits(folder: MachineFolder) -> None:
+    found = live_tap(folder, 1.28e9)
+    history, _ = update_history(folder)
+    followed = found.dynamics.followed
+    assert followed is not None
+    assert followed.n_hits == folder.machine.tap.hits
+    assert followed.jackknife is not None
+    assert history.columns["stiffness_std"][0] == pytest.approx(np.sqrt(followed.jackknife[2, 2]))
+
+
+def test_a_mode_is_followed_past_a_neighbour_that_becomes_the_highest(folder: MachineFolder) -> None:
+    for month in range(4):
+        own = Mode(1700.0 - 20 * month, 0.03, 3.5e7)
+        neighbour = Mode(1900.0, 0.03, 3.9e7 - 0.4e7 * month)
+        folder.commit(recorded(about(folder, 30.0 * month), own, neighbour))
+    history, measurements = update_history(folder)
+    assert history.columns["frequency"] == pytest.approx([1700, 1680, 1660, 1640], abs=0.5)
+    assert not any("in doubt" in note for found in measurements for note in found.notes)
+    folder.history.unlink()
+    again, _ = update_history(folder)
+    assert np.array_equal(again.columns["frequency"], history.columns["frequency"])
+
+
+def test_a_jump_of_the_frequency_is_said_and_a_far_one_is_not_followed(folder: MachineFolder) -> None:
+    for days, f in ((0.0, 1500.0), (30.0, 1640.0), (60.0, 2100.0)):
+        folder.commit(recorded(about(folder, days), Mode(f, 0.03, 3.5e7)))
+    history, (_, jumped, far) = update_history(folder)
+    assert any("followed mode in doubt, now 1640.0 Hz" in note for note in jumped.notes)
+    assert "no mode is like the one followed so far, 1640.0 Hz; nearest is 2100.0 Hz" in far.notes[0]
+    assert np.isnan(history.columns["frequency"][2])
+    assert far.lobes

@@ -1,0 +1,385 @@
+"""The command line as a person meets it: results, JSON, exit codes, one sentence for every mistake."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from acquisition import TapsEmulator
+from dsm import natural_frequencies
+from lobes import read_history
+from lobewatch.cli import main
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.show.report import render_report
+from lobewatch.tap.emulated_spindle import emulated_structure, emulator
+
+
+class Said(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> dict[str, Any]:
+        parsed: dict[str, Any] = json.loads(self.out)
+        return parsed
+
+
+Run = Callable[..., Said]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    """Runs a command in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def command(*arguments: object) -> Said:
+        monkeypatch.setattr(sys, "argv", ["lobewatch", *map(str, arguments)])
+        capsys.readouterr()
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code if isinstance(end.code, int) else int(end.code is not None)
+        said = capsys.readouterr()
+        return Said(code, said.out, said.err)
+
+    return command
+
+
+@pytest.fixture
+def trial(run: Run) -> MachineFolder:
+    """A machine folder with the example spindle."""
+    assert run("init", "trial", "--example").code == 0
+    return MachineFolder("trial")
+
+
+@pytest.fixture
+def device(trial: MachineFolder) -> Iterator[TapsEmulator]:
+    """An emulated DAQ on the example spindle."""
+    table = trial.machine.spindle
+    assert table is not None
+    structure = emulated_structure(table.build(), table.damping_ratio)
+    with emulator(structure, np.random.default_rng(1), realtime=False) as emulated:
+        yield emulated
+
+
+def refused(said: Said, *words: str) -> None:
+    """Exit code 2 and one sentence with these words, no traceback, nothing on stdout."""
+    assert said.code == 2
+    assert said.err.startswith("error: ")
+    assert said.err.count("\n") == 1, said.err
+    assert said.out == ""
+    for word in words:
+        assert word in said.err
+
+
+def test_a_live_tap_finds_the_emulated_spindle(run: Run, trial: MachineFolder, device: TapsEmulator) -> None:
+    said = run("tap", "trial", "--port", device.port, "--operator", "Kim")
+    assert said.code == 0
+    assert "10 / 10  ✓ GOOD" in said.err
+    assert "followed: 1713.0" in said.out
+    assert re.search(r"bearing stiffness +(1280\.\d|1279\.\d)", said.out)
+    assert "A: slot at 12 900 rpm" in said.out
+    (entry,) = trial.taps()
+    assert trial.read(entry).circumstances.operator == "Kim"
+
+
+def test_json_of_a_live_tap(run: Run, device: TapsEmulator) -> None:
+    said = run("tap", "trial", "--port", device.port, "--json").json
+    assert said["followed"]["frequency_hz"] == pytest.approx(1713.05, abs=0.5)
+    assert 0 < said["followed"]["frequency_hz_std"] < 0.1
+    assert said["calibration"]["bearing_stiffness_n_per_m"] == pytest.approx(1.28e9, rel=0.01)
+    assert [program["stable"] for program in said["programs"]] == [True, True, True]
+
+
+def test_an_interrupted_tap_is_gone_on_with_and_new_begins_anew(
+    run: Run, trial: MachineFolder, device: TapsEmulator
+) -> None:
+    from datetime import UTC, datetime
+    from itertools import islice
+
+    from acquisition import Circumstances, TapsSource, Trigger, capture_hits, check_hit
+    from lobewatch.tap.in_progress import begin_tap
+
+    with TapsSource(device.port) as source:
+        running = begin_tap(trial, Circumstances("trial", datetime.now(UTC), "reference"))
+        source.start()
+        for hit in islice(capture_hits(source, Trigger(20.0, 6400, 512)), 4):
+            running.add(hit, check_hit(hit), "")
+    anew = run("tap", "trial", "--port", device.port, "--new")
+    assert "going on" not in anew.err
+    said = run("tap", "trial", "--port", device.port)
+    assert re.search(r"going on with the test begun .*: [34] of 10 good hits are there", said.err)
+    assert said.code == 0
+    assert running.id in {entry.id for entry in trial.taps()}
+
+
+def test_a_tap_without_a_device(run: Run, trial: MachineFolder) -> None:
+    refused(run("tap", "trial"), "no port: give --port, or port in [daq]")
+    refused(run("tap", "trial", "--port", "/dev/ttyNOPE"), "/dev/ttyNOPE cannot be opened", "No such file", "cable")
+    refused(run("tap", "trial", "--port", "x", "--direction", "z"), "direction='z'")
+    with trial.locked():
+        refused(run("tap", "trial", "--port", "x"), "another lobewatch is writing here")
+
+
+def test_a_taken_port(run: Run, trial: MachineFolder, device: TapsEmulator) -> None:
+    from acquisition import TapsSource
+
+    with TapsSource(device.port):
+        refused(run("tap", "trial", "--port", device.port), "another program uses it: close that program")
+
+
+def test_the_real_beam_hit(run: Run, beam: Path) -> None:
+    modes = run("modes", beam, "--json").json["modes"]
+    found = {round(mode["frequency_hz"]): mode for mode in modes}
+    for f, zeta, positive in ((696, 0.0047, True), (1898, 0.0031, True), (3671, 0.0019, False), (5974, 0.0044, False)):
+        assert found[f]["damping_ratio"] == pytest.approx(zeta, rel=0.15)
+        assert found[f]["driving_point"] is positive
+    assert [found[f]["frequency_hz"] for f in (696, 1898, 3671, 5974)] == pytest.approx(
+        [695.8, 1898.0, 3671, 5975], rel=2e-3
+    )
+    assert "not a driving point" in run("modes", beam).out
+
+
+def test_replay_of_the_real_beam_hit_into_a_fresh_machine(run: Run, beam: Path) -> None:
+    run("init", "plain")
+    (measurement,) = run("replay", "plain", beam, "--json").json["measurements"]
+    assert len(measurement["modes"]) >= 4
+    assert measurement["lobes"] == []
+    assert any("no model" in note for note in measurement["notes"])
+    assert any("no stability lobes: not a driving point" in note for note in measurement["notes"])
+    assert measurement["time"].startswith("2018-12-17T10:18:21")
+    again = run("replay", "plain", beam)
+    assert "stored already" in again.err
+    assert "0 of 1 file(s) stored" in again.out
+    assert len(MachineFolder("plain").taps()) == 1
+    assert run("report", "plain").code == 0
+    refused(run("lobes", "plain"), "not a driving point")
+
+
+def test_replay_refuses_what_cannot_be_trusted_and_stores_nothing(
+    run: Run, beam: Path, clipped_beam: Path, cnc_csv: Path
+) -> None:
+    run("init", "plain")
+    refused(run("replay", "plain", beam, clipped_beam), "camera.lvm", "overload (response)", "inferred")
+    refused(run("replay", "plain", cnc_csv), "no force channel", "uneven", "in doubt")
+    refused(run("replay", "plain", "nowhere.lvm"), "nowhere.lvm: No such file or directory")
+    assert MachineFolder("plain").taps() == []
+
+
+def test_replay_of_a_tap_file_with_a_date(run: Run, trial: MachineFolder, device: TapsEmulator) -> None:
+    run("tap", "trial", "--port", device.port)
+    (entry,) = trial.taps()
+    run("init", "other", "--example")
+    said = run(
+        "replay", "other", f"trial/taps/{entry.id}.h5", "--date", "2025-03-01", "--direction", "y", "--json"
+    ).json
+    (measurement,) = said["measurements"]
+    assert measurement["time"].startswith("2025-03-01T00:00:00")
+    assert measurement["direction"] == "y"
+    assert measurement["calibration"]["bearing_stiffness_n_per_m"] == pytest.approx(1.28e9, rel=0.01)
+
+
+def test_replay_believes_what_a_tap_file_says_of_itself(run: Run, trial: MachineFolder, device: TapsEmulator) -> None:
+    run("tap", "trial", "--port", device.port, "--direction", "y", "--tool", "drill", "--operator", "Ada")
+    (entry,) = trial.taps()
+    file = f"trial/taps/{entry.id}.h5"
+    assert "0 of 1 file(s) stored" in run("replay", "trial", file).out
+    run("init", "other", "--example")
+    (measurement,) = run("replay", "other", file, "--json").json["measurements"]
+    assert (measurement["direction"], measurement["tool"]) == ("y", "drill")
+    assert measurement["time"] == entry.time
+    (copy,) = MachineFolder("other").taps()
+    assert MachineFolder("other").read(copy).circumstances.operator == "Ada"
+    assert "0 of 1 file(s) stored" in run("replay", "other", file).out
+
+
+def test_lobes_and_report(run: Run, trial: MachineFolder, device: TapsEmulator) -> None:
+    refused(run("lobes", "trial"), "no tap test yet")
+    refused(run("report", "trial"), "no tap test yet")
+    run("tap", "trial", "--port", device.port)
+    run("tap", "trial", "--port", device.port)
+    said = run("lobes", "trial", "--json", "--figure", "lobes.svg").json
+    assert said["minimum_depth_mm"] == pytest.approx(min(said["depth_mm"]))
+    assert len(said["speed_rpm"]) == len(said["depth_mm"]) == 1151
+    assert Path("lobes.svg").read_text(encoding="utf-8").count("<svg") == 1
+    measured = run("lobes", "trial", "--source", "frf", "--json").json
+    assert measured["minimum_depth_mm"] == pytest.approx(said["minimum_depth_mm"], rel=0.1)
+    assert "A: slot" in run("lobes", "trial", "--cut", "A: slot at 12 900 rpm").out
+    refused(
+        run("lobes", "trial", "--cut", "Z"), "'Z' is none of the cuts with tool 'reference'", "B: slot at 8 700 rpm"
+    )
+    refused(run("lobes", "trial", "--figure", "lobes.xyz"), "lobes.xyz", ".svg, .png or .pdf")
+    assert run("report", "trial", "--out", "r.html").out == "report: r.html\n"
+    html = Path("r.html").read_text(encoding="utf-8")
+    assert html.count("<svg") == 4
+    assert "http" not in html.replace("http://www.w3.org", "").replace("https://matplotlib.org", "").replace(
+        "http://purl.org", ""
+    ).replace("http://creativecommons.org", "")
+    refused(run("report", "trial", "--tool", "T9"), "no tap test with tool 'T9'")
+
+
+def test_a_name_with_markup_is_shown_as_it_is(run: Run, trial: MachineFolder, device: TapsEmulator) -> None:
+    trial.toml.write_text(trial.toml.read_text().replace('name = "A: slot at 12 900 rpm"', 'name = "<b>[bold]&x"'))
+    assert "<b>[bold]&x" in run("tap", "trial", "--port", device.port).out
+    run("report", "trial")
+    html = Path("trial/report.html").read_text(encoding="utf-8")
+    assert "<b>[bold]" not in html
+    assert "&lt;b&gt;[bold]&amp;x" in html
+    assert callable(render_report)
+
+
+def test_calibrate(run: Run, trial: MachineFolder) -> None:
+    said = run("calibrate", "trial", "--frequency", 1550, "--frequency-std", 0.4, "--json").json
+    assert said["bearing_stiffness_n_per_m"] == pytest.approx(6.863e8, rel=1e-4)
+    assert said["bearing_stiffness_n_per_m_std"] == pytest.approx(0.4 / 1550 / said["sensitivity"] * 6.863e8, rel=1e-3)
+    assert "surrogate" in run("calibrate", "trial", "--frequency", 1550).out
+    refused(run("calibrate", "trial", "--frequency", 2500), "2301.1 Hz (rigid bearings)")
+    refused(run("calibrate", "trial", "--frequency", -1), "-1")
+    dampers = run("calibrate", "trial", "--frequency", 1713.05, "--damping-ratio", 0.03, "--json").json
+    assert dampers["bearing_damping_n_s_per_m"] > 0
+    assert "bearing damping" in run("calibrate", "trial", "--frequency", 1713.05, "--damping-ratio", 0.03).out
+    refused(run("calibrate", "trial", "--frequency", 1713.05, "--damping-ratio", 0.9), "0.9")
+    twice = ("--frequency-std", 1, "--frequency-std", 2)
+    refused(run("calibrate", "trial", "--frequency", 1550, *twice), "2 --frequency-std for 1 --frequency")
+    refused(run("calibrate", "trial", "--frequency", 1550, "--mode", 1, "--mode", 2), "2 --mode for 1 --frequency")
+    refused(run("calibrate", "trial", "--frequency", 1550, "--frequency", 1e9), "puts mode 2 at 1e+09 Hz")
+    refused(run("calibrate", "trial", "--frequency", 1e11), "needs more than 2000 elements")
+    run("init", "plain")
+    refused(run("calibrate", "plain", "--frequency", 1550), "no model: add a [spindle] table")
+
+
+def test_calibrate_groups(run: Run, trial: MachineFolder) -> None:
+    toml = trial.toml.read_text("utf-8")
+    for position, group in ((166, "front"), (203.5, "front"), (241, "front")):
+        toml = toml.replace(f"position_mm = {position} ", f'position_mm = {position}, group = "{group}" ')
+    trial.toml.write_text(toml, "utf-8")
+    drawn = trial.machine.model("reference")
+    worn = replace(
+        drawn,
+        bearings=[replace(b, stiffness=b.stiffness * (0.5 if b.group == "front" else 0.8)) for b in drawn.bearings],
+    )
+    measured = [word for f in natural_frequencies(worn, 4) for word in ("--frequency", f)]
+    said = run("calibrate", "trial", *measured, "--group", "front", "--group", "bearings", "--json").json
+    assert said["factor"] == pytest.approx([0.5, 0.8], rel=1e-6)
+    assert "stiffness front" in run("calibrate", "trial", *measured).out
+    refused(run("calibrate", "trial", *measured, "--group", "tail"), "tail", "front")
+
+
+def test_init(run: Run, trial: MachineFolder) -> None:
+    refused(run("init", "trial"), "is there already")
+    assert run("init", "new", "--json").json["machine_toml"] == str(Path("new/machine.toml"))
+    assert MachineFolder("new").machine.machine.name == "new"
+    refused(run("tap", "nowhere", "--port", "x"), "no machine.toml in it", "lobewatch init nowhere")
+
+
+def test_modes_of_bad_files_and_bands(run: Run, beam: Path, tmp_path: Path) -> None:
+    refused(run("modes", "nowhere.h5"), "nowhere.h5: No such file")
+    (tmp_path / "empty.csv").touch()
+    refused(run("modes", "empty.csv"), "the file is empty")
+    refused(run("modes", tmp_path), "directory")
+    refused(run("modes", beam, "--band", 30000, 40000), "30000..40000")
+    refused(run("modes", beam, "--band", 2000, 1000), "band")
+    assert run("modes", beam, "--band", 600, 800, "--figure", "modes.png").out.count("695.") >= 1
+    assert Path("modes.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("demo", "init", "ports", "tap", "replay", "modes", "model", "calibrate", "lobes", "check", "report"),
+        *("emulate taps", "emulate dataq"),
+    ],
+)
+def test_every_command_has_help_with_examples_and_json(run: Run, name: str) -> None:
+    said = run(*name.split(), "--help")
+    assert said.code == 0
+    assert "Examples:" in said.out
+    assert "a  in" not in said.out  # a key in brackets taken for markup
+    assert "--json" in said.out
+
+
+def test_wrong_use(run: Run) -> None:
+    for arguments in (("nonsense",), ("modes",), ("calibrate", "x"), ("demo", "--taps", "1")):
+        said = run(*arguments)
+        assert said.code == 2
+        assert "Traceback" not in said.err
+    assert run("--version").out == "lobewatch 0.1.0\n"
+
+
+def test_debug_shows_the_traceback(run: Run) -> None:
+    with pytest.raises(FileNotFoundError):
+        run("--debug", "modes", "nowhere.h5")
+
+
+def test_the_demo_finds_the_truth_of_every_tap(run: Run) -> None:
+    said = run("demo", "--json").json
+    assert len(said["taps"]) == 24
+    bounds = {"frequency_hz": 5e-4, "damping_ratio": 0.03, "stiffness_n_per_m": 0.02, "bearing_stiffness_n_per_m": 0.01}
+    for tap in said["taps"]:
+        for field, bound in bounds.items():
+            assert tap["found"][field] == pytest.approx(tap["truth"][field], rel=bound)
+    first, last = said["taps"][0], said["taps"][-1]
+    assert last["truth"]["frequency_hz"] / first["truth"]["frequency_hz"] == pytest.approx(0.9, abs=1e-6)
+    fall = {kind: last[kind]["stiffness_n_per_m"] / first[kind]["stiffness_n_per_m"] - 1 for kind in ("truth", "found")}
+    assert fall["truth"] == pytest.approx(-0.0142, abs=1e-4)
+    assert fall["found"] == pytest.approx(fall["truth"], abs=0.004)
+    columns = read_history("lobewatch-demo/history.h5").columns
+    for name, field in zip(("frequency", "damping_ratio", "stiffness", "bearing_stiffness"), bounds, strict=True):
+        truth = np.array([tap["truth"][field] for tap in said["taps"]])
+        score = (np.asarray(columns[name], float) - truth) / np.asarray(columns[f"{name}_std"], float)
+        assert 0.5 < np.sqrt(np.mean(score**2)) < 2, f"standard errors of {name} are not of the size of the errors"
+    html = Path(said["report"]).read_text(encoding="utf-8")
+    assert "2 of 3 cutting programs not stable" in html
+    verdicts = {
+        row[1][0]: re.findall(r"(not stable|stable)</td>", row[0])
+        for row in re.finditer(r"<tr><td>([ABC]):.*?</tr>", html, re.DOTALL)
+    }
+    assert verdicts == {"A": ["stable", "not stable"], "B": ["stable", "stable"], "C": ["stable", "not stable"]}
+    shown = run("demo", "--taps", 2, "--seed", 3)
+    assert "report: lobewatch-demo-2" in shown.out
+    assert "worst error: f_1" in shown.out
+    refused(run("demo", "--out", "lobewatch-demo"), "is there already")
+
+
+def test_the_emulator_command_serves_a_port_and_ends_quietly_with_ctrl_c(trial: MachineFolder, run: Run) -> None:
+    command = [sys.executable, "-m", "lobewatch.cli", "emulate", "taps", "trial", "--fast", "--seed", "4", "--json"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        served = json.loads(process.stdout.readline())
+        assert served["frequency_hz"] == pytest.approx(1713.05, abs=0.01)
+        assert run("tap", "trial", "--port", served["port"]).code == 0
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "Traceback" not in err
+    run("init", "plain")
+    refused(run("emulate", "taps", "plain"), "no model to emulate")
+
+
+def test_a_killed_tap_goes_on_at_the_same_hit(trial: MachineFolder, run: Run) -> None:
+    table = trial.machine.spindle
+    assert table is not None
+    structure = emulated_structure(table.build(), table.damping_ratio)
+    with emulator(structure, np.random.default_rng(1), realtime=True) as slow:
+        command = [sys.executable, "-m", "lobewatch.cli", "tap", "trial", "--port", slow.port]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+            assert process.stderr is not None
+            announced = [next(line for line in process.stderr if "/ 10" in line) for _ in range(3)]
+            os.kill(process.pid, signal.SIGKILL)
+        good = sum("GOOD" in line for line in announced)
+        said = run("tap", "trial", "--port", slow.port)
+    there = int(re.search(r": (\d+) of 10 good hits are there", said.err)[1])  # type: ignore[index]
+    assert there >= good > 0
+    assert said.code == 0

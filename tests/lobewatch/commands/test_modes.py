@@ -1,0 +1,127 @@
+"""`lobewatch modes`: what is printed and drawn stands where the numbers say."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.text import Annotation
+
+from acquisition import Frf, from_accelerance
+from lobewatch.cli import main
+from lobewatch.show.describe import doubt_lines, mode_lines, mode_table, picked_table
+from lobewatch.show.figures_modes import modes_figure
+from lobewatch.show.output import results
+from modal import Mode, extract, fit_modes, pick_peaks, synthesize
+
+LINES = np.arange(5.0, 4000.0, 5.0)
+MODES = [Mode(900.0, 0.02, 4e7), Mode(1722.0, 0.03, -3.5e7)]
+
+
+def noisy() -> Frf:
+    exact = synthesize(MODES, LINES).accelerance
+    noise = np.random.default_rng(0).normal(size=(2, LINES.size)) * 1e-3 * np.max(np.abs(exact))
+    return from_accelerance(LINES, exact + noise[0] + 1j * noise[1])
+
+
+def command(monkeypatch: pytest.MonkeyPatch, *args: str) -> int:
+    monkeypatch.setattr(sys, "argv", ["lobewatch", "modes", *args])
+    with pytest.raises(SystemExit) as end:
+        main()
+    return int(str(end.value.code or 0))
+
+
+def test_report_of_a_table_has_percent_correlation_and_doubts(capsys: pytest.CaptureFixture[str]) -> None:
+    covariance = np.array([[4.0, 0, 0], [0, 9e-8, -0.8 * 3e-4 * 7e5], [0, -0.8 * 3e-4 * 7e5, 4.9e11]])
+    mode = Mode(1722.0, 0.03, 3.5e7, covariance, doubts=("a reason",))
+    with results.capture() as shown:
+        results.print(mode_table([mode]))
+    assert "1722.0 ± 2.0 (0.12 %)" in shown.get()
+    assert "35.00 ± 0.70 (2 %)" in shown.get()
+    assert mode_lines([mode]) == ["correlation of the errors of zeta and K: -0.80 (1722 Hz)"]
+    assert doubt_lines([mode, Mode(900.0, 0.03, -1e7, doubts=("a reason",))]) == ["doubt at 1722, 900 Hz: a reason"]
+
+
+def test_every_negative_stiffness_is_a_swapped_sign() -> None:
+    both = [Mode(900.0, 0.02, -4e7), Mode(1722.0, 0.03, -3.5e7)]
+    assert any("every K is negative" in line for line in doubt_lines(both))
+    assert not any("every K is negative" in line for line in doubt_lines(MODES))
+
+
+def test_peak_picking_is_held_against_the_fit() -> None:
+    frf = noisy()
+    with results.capture() as shown:
+        results.print(picked_table([*pick_peaks(frf), Mode(3000.0, 0.01, 1e8)], fit_modes(frf)))
+    first, second, third = shown.get().splitlines()[1:4]
+    assert "zeta" in first
+    assert "K" in second
+    assert third.rstrip().endswith("not fitted")
+
+
+def test_figure_draws_fit_residual_poles_and_circles() -> None:
+    frf = noisy()
+    state, modes = extract(frf), fit_modes(frf)
+    figure = modes_figure(state, modes, "x")
+    top, chart, *circles = figure.axes
+    assert len(circles) == len(modes) == 2
+    measured, fitted, left = (np.asarray(line.get_ydata()) for line in top.lines[:3])
+    part = state.bands[0].lines
+    assert measured == pytest.approx(np.abs(frf.accelerance))
+    assert fitted == pytest.approx(np.abs(frf.accelerance[part]), abs=6e-3 * np.max(measured))
+    assert np.sqrt(np.mean(left**2)) == pytest.approx(np.sqrt(2) * 1e-3 * np.max(measured), rel=0.2)
+    stable = np.asarray(chart.lines[1].get_xdata())
+    assert np.any(np.abs(stable - 900) < 1)
+    points, circle = (np.asarray(line.get_xydata()) for line in circles[0].lines)
+    radius = np.pi * 900 / (2 * 0.02 * 4e7) * 1e3
+    assert np.hypot(circle[:, 0] - radius, circle[:, 1]) == pytest.approx(radius, rel=0.02)
+    assert np.hypot(points[:, 0] - radius, points[:, 1]) == pytest.approx(radius, rel=0.1)
+
+
+def test_figure_keeps_labels_of_close_modes_apart() -> None:
+    close = [Mode(1700.0, 0.01, 4e7), Mode(1704.0, 0.01, 4e7), Mode(1706.0, 0.01, 4e7)]
+    top = modes_figure(extract(noisy()), close, "x").axes[0]
+    places = [label.xy[0] for label in top.texts if isinstance(label, Annotation)]
+    assert places[0] == 1700.0
+    assert np.all(np.diff(places) >= 0.01 * (LINES[-1] - LINES[0]))
+
+
+def test_command_says_where_a_peak_may_be_cut(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    frf = noisy().in_band((1722.0, 4000.0))
+    file = tmp_path / "frf.csv"
+    table = np.stack([frf.frequency, frf.receptance.real, frf.receptance.imag], axis=1)
+    np.savetxt(file, table, header="Freq Real Imag", comments="")
+    assert command(monkeypatch, str(file)) == 0
+    assert "a peak may be cut by the edge of the lines at 1725 Hz" in capsys.readouterr().out
+    assert command(monkeypatch, str(file), "--json") == 0
+    assert "1725 Hz" in json.loads(capsys.readouterr().out)["notes"][0]
+
+
+def test_command_corrects_an_exponential_window_and_draws(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    frf = noisy()
+    table = np.stack([frf.frequency, frf.receptance.real, frf.receptance.imag], axis=1)
+    file = tmp_path / "frf.csv"
+    np.savetxt(file, table, header="Freq Real Imag", comments="")
+    assert command(monkeypatch, str(file), "--json") == 0
+    plain = json.loads(capsys.readouterr().out)["modes"][1]
+    assert plain["doubts"][0].startswith("K is negative")
+    assert plain["interval_95"][0][0] < 1722 < plain["interval_95"][0][1]
+    picture = tmp_path / "modes.png"
+    assert command(monkeypatch, str(file), "--json", "--window", "0.1", "--figure", str(picture)) == 0
+    corrected = json.loads(capsys.readouterr().out)["modes"][1]
+    added = 1 / (2 * np.pi * 1722 * 0.1)
+    assert plain["damping_ratio"] - corrected["damping_ratio"] == pytest.approx(added, rel=0.01)
+    assert picture.stat().st_size > 10_000
+    np.savetxt(file, table * [1, 1, -1], header="Freq Real Imag", comments="")
+    assert command(monkeypatch, str(file)) == 2
+    assert "--conjugate" in capsys.readouterr().err
+    assert command(monkeypatch, str(file), "--conjugate", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["modes"][1]["damping_ratio"] == pytest.approx(plain["damping_ratio"])
+    assert command(monkeypatch, str(file), "--conjugate", "--window", "-1") == 2
+    assert "time_constant=-1.0 s" in capsys.readouterr().err

@@ -1,0 +1,328 @@
+"""lobewatch ports, emulate dataq and a tap test through an emulated DATAQ device, as a person meets them."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from importlib import resources
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import serial
+
+from acquisition import (
+    DataqSource,
+    DataqTraits,
+    FileSource,
+    MeasuredRate,
+    PortInfo,
+    TapsSource,
+    list_ports,
+    no_ports_hint,
+    probe_port,
+)
+from acquisition.ports.port_hints import explain_open_error
+from acquisition.taps.protocol import Frame, MessageType, encode_frame
+from lobewatch.cli import main
+from lobewatch.commands.init import make_machine_folder
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.known_devices import use_rate
+from lobewatch.tap.emulated_spindle import dataq_emulator, emulated_structure, emulator
+from lobewatch.tap.plug import open_source
+
+CHANNELS = """driver = "dataq"
+
+[[daq.channel]]
+input = 0
+quantity = "force"
+sensitivity_mv_per_n = 2.25
+range_v = 2
+serial_number = "H-4711"
+calibration_date = 2026-01-15
+
+[[daq.channel]]
+input = 4
+quantity = "acceleration"
+sensitivity_mv_per_g = 10
+range_v = 5
+skew_us = 6.6666667
+
+"""
+
+
+class Said(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MachineFolder:
+    """The example machine with the sensors of a DATAQ device, in the working directory."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("acquisition.dataq.dialogue.QUIET", 0.05)
+    make_machine_folder(Path("trial"), "surrogate_machine.toml")
+    toml = Path("trial/machine.toml")
+    toml.write_text(toml.read_text("utf-8").replace("[daq]\n", "[daq]\n" + CHANNELS, 1), "utf-8")
+    return MachineFolder("trial")
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
+    """Runs a command."""
+
+    def command(*arguments: str) -> Said:
+        monkeypatch.setattr(sys, "argv", ["lobewatch", *arguments])
+        with pytest.raises(SystemExit) as end:
+            main()
+        said = capsys.readouterr()
+        return Said(int(end.value.code or 0), said.out, said.err)
+
+    return command
+
+
+def dataq_device(folder: MachineFolder) -> Any:
+    table = folder.machine.spindle
+    assert table is not None
+    inputs = tuple(channel.build() for channel in folder.machine.daq.channel)
+    structure = emulated_structure(table.build(), table.damping_ratio)
+    return dataq_emulator(structure, inputs, np.random.default_rng(1), realtime=False)
+
+
+def taps_device(folder: MachineFolder) -> Any:
+    table = folder.machine.spindle
+    assert table is not None
+    structure = emulated_structure(table.build(), table.damping_ratio)
+    return emulator(structure, np.random.default_rng(1), realtime=False)
+
+
+def test_a_tap_test_through_a_dataq_device_finds_the_emulated_spindle(run: Any, trial: MachineFolder) -> None:
+    with dataq_device(trial) as device:
+        with open_source(trial.machine.daq, device.port) as source:
+            assert isinstance(source, DataqSource)
+            use_rate(trial, source, MeasuredRate(source.sample_rate, 1.0, 250_000, 5.0))
+        said = run("tap", "trial", "--port", device.port)
+    assert said.code == 0, said.err
+    assert "DI-4108, 50000 Hz" in said.err
+    assert "10 / 10  ✓ GOOD" in said.err
+    assert "followed: 1713." in said.out  # the skew of a third of a scan, left in, makes it 1715
+    assert re.search(r"bearing stiffness +(1280\.|1279\.)", said.out)
+    (entry,) = trial.taps()
+    tap = trial.read(entry)
+    assert tap.circumstances.device == "DI-4108, serial number 5E0ABC12, firmware 1.35, loss detection: digital word"
+    channels = tap.hits[0].channels
+    assert channels is not None
+    hammer, accelerometer = channels
+    assert (hammer.serial_number, hammer.calibration_date) == ("H-4711", "2026-01-15")
+    assert accelerometer.full_scale == 5.0
+
+
+def test_the_driver_is_the_one_that_machine_toml_names(trial: MachineFolder, beam: Path) -> None:
+    with dataq_device(trial) as device, open_source(trial.machine.daq, device.port) as source:
+        assert isinstance(source, DataqSource)
+        assert source.loss_detection == "digital word"
+    toml = trial.toml.read_text("utf-8")
+    trial.toml.write_text(toml.replace("[[daq", "loss_detection = false\n[[daq", 1), "utf-8")
+    silent = MachineFolder("trial").machine.daq
+    with dataq_device(trial) as device, open_source(silent, device.port) as source:
+        assert isinstance(source, DataqSource)
+        assert source.loss_detection == "none"
+    trial.toml.write_text(toml.replace(CHANNELS, ""), "utf-8")
+    with open_source(trial.machine.daq, f"file:{beam}") as source:
+        assert isinstance(source, FileSource)
+        assert source.sample_rate == pytest.approx(50_000, rel=1e-3)
+    with taps_device(trial) as device, open_source(MachineFolder("trial").machine.daq, device.port) as source:
+        assert isinstance(source, TapsSource)
+
+
+def test_ports_names_the_device_that_answers(run: Any, trial: MachineFolder) -> None:
+    for device, driver, model in (
+        (dataq_device(trial), "dataq", "DI-4108"),
+        (taps_device(trial), "taps", "lobewatch emulator"),
+    ):
+        with device:
+            said = run("ports", "--port", device.port)
+            found = json.loads(run("ports", "--port", device.port, "--json").out)["ports"]
+        assert f"{driver}: {model}, serial number " in said.out
+        assert f'1 of 1 answer; next: lobewatch tap MACHINE --port {device.port}, with driver = "{driver}"' in said.out
+        assert [(one["device"], one["answer"]["model"], one["problem"]) for one in found] == [
+            (device.port, model, None)
+        ]
+
+
+def test_ports_lists_all_but_asks_only_usb_devices(
+    run: Any, trial: MachineFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with dataq_device(trial) as device:
+        listed = [
+            PortInfo("/dev/ttyS0", description="modem"),
+            PortInfo(device.port, 0x0683, 0x4108, "5E0ABC12", "DATAQ [CDC]"),
+            PortInfo("/dev/ttyNOT_THERE", 0x16C0, 0x0483, "123", "USB Serial"),
+        ]
+        monkeypatch.setattr("lobewatch.commands.ports.list_ports", lambda: listed)
+        said = run("ports")
+    lines = said.out.splitlines()
+    assert "not asked: no USB device" in lines[1]
+    assert "0683:4108" in lines[2]
+    assert "DATAQ [CDC]" in lines[2]
+    assert "firmware 1.35" in lines[2]
+    assert "16c0:0483" in lines[3]
+    assert lines[3].rstrip().endswith("cannot be opened")
+    assert lines[4].startswith("port /dev/ttyNOT_THERE cannot be opened (No such file or directory); check the cable")
+    assert lines[5].startswith("1 of 3 answer")
+
+
+def test_a_port_in_use_is_said_to_be_so(run: Any, trial: MachineFolder) -> None:
+    with dataq_device(trial) as device, open_source(trial.machine.daq, device.port):
+        said = run("ports", "--port", device.port)
+    assert "another program uses it: close that program" in said.out
+    assert "No DAQ answers." in said.out
+
+
+def test_no_port_at_all_gets_a_sentence_with_the_cure(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lobewatch.commands.ports.list_ports", list)
+    said = run("ports")
+    assert said.code == 0
+    assert said.out.startswith("No serial port on this computer: plug the DAQ in")
+    assert json.loads(run("ports", "--json").out) == {"ports": []}
+    assert "dmesg" in no_ports_hint("linux")
+    assert "Device Manager" in no_ports_hint("win32")
+    assert "cu.usbmodem" in no_ports_hint("darwin")
+
+
+@pytest.mark.parametrize(
+    ("platform", "error", "cure"),
+    [
+        ("linux", PermissionError(errno.EACCES, "Permission denied"), "sudo usermod -aG dialout $USER, then log out"),
+        ("darwin", PermissionError(errno.EACCES, "Permission denied"), "the rights of an administrator"),
+        ("win32", PermissionError(errno.EACCES, "Access is denied"), "another program uses it: close that program"),
+        (
+            "linux",
+            serial.SerialException(errno.EWOULDBLOCK, "Could not exclusively lock port"),
+            "`sudo fuser -v /dev/x`",
+        ),
+        ("linux", serial.SerialException(errno.EBUSY, "Device or resource busy"), "ModemManager lets go"),
+        ("win32", FileNotFoundError(errno.ENOENT, "No such file"), "check the cable and the port's name"),
+    ],
+)
+def test_what_is_wrong_with_a_port_is_told_with_the_cure_of_the_platform(
+    platform: str, error: Exception, cure: str
+) -> None:
+    text = explain_open_error("/dev/x", error, platform)
+    assert text.startswith("port /dev/x cannot be opened (")
+    assert cure in text
+
+
+def test_the_group_in_the_cure_is_that_of_the_port(tmp_path: Path) -> None:
+    port = tmp_path / "ttyACM0"
+    port.touch()
+    error = PermissionError(errno.EACCES, "Permission denied")
+    assert f"usermod -aG {port.group()} $USER" in explain_open_error(str(port), error, "linux")
+
+
+@pytest.mark.parametrize(
+    ("vendor", "first"),
+    [(0x0683, b"stop\r"), (0x16C0, b"\x00" + encode_frame(Frame(MessageType.HELLO)))],
+    ids=["dataq", "other"],
+)
+def test_a_strange_device_hears_one_question_only(monkeypatch: pytest.MonkeyPatch, vendor: int, first: bytes) -> None:
+    monkeypatch.setattr("acquisition.dataq.dialogue.ANSWER_TIME", 0.05)
+    monkeypatch.setattr("acquisition.dataq.dialogue.QUIET", 0.05)
+    monkeypatch.setattr(sys.modules["acquisition.devices.probe_port"], "ANSWER_TIME", 0.05)
+    master, slave = os.openpty()
+    try:
+        import tty
+
+        tty.setraw(slave)
+        assert probe_port(os.ttyname(slave), vendor) is None
+        heard = os.read(master, 4096)
+    finally:
+        os.close(master)
+        os.close(slave)
+    assert heard in (first, first + b"info 0\r")
+
+
+def test_a_device_that_the_wrong_driver_has_talked_to_is_named_all_the_same(trial: MachineFolder) -> None:
+    with taps_device(trial) as device:
+        handle = os.open(device.port, os.O_RDWR | os.O_NOCTTY)
+        os.write(handle, b"stop\rinfo 0\r")
+        found = probe_port(device.port)
+        os.close(handle)
+    assert found is not None
+    assert found.driver == "taps"
+
+
+def test_a_device_that_talks_nonsense_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Babbler:
+        port = "COM1"
+
+        def __init__(self, _port: str) -> None:
+            self.closed = False
+
+        def write(self, _data: bytes) -> None: ...
+
+        def read(self, _timeout: float) -> bytes:
+            return encode_frame(Frame(MessageType.INFO, body=b"[1, 2]"))
+
+        def close(self) -> None: ...
+
+    monkeypatch.setattr("acquisition.dataq.dialogue.QUIET", 0.01)
+    monkeypatch.setattr(sys.modules["acquisition.devices.probe_port"], "SerialLink", Babbler)
+    assert probe_port("COM1") is None
+
+
+def test_old_firmware_is_named_all_the_same(trial: MachineFolder) -> None:
+    device = dataq_device(trial)
+    device._info[2] = DataqTraits(firmware="1.20").firmware  # noqa: SLF001
+    with device:
+        found = probe_port(device.port)
+    assert found is not None
+    assert (found.driver, found.firmware) == ("dataq", "1.20")
+
+
+def test_the_ports_of_the_system_are_listed_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    from serial.tools.list_ports_common import ListPortInfo
+
+    ports = [ListPortInfo("/dev/ttyACM1"), ListPortInfo("/dev/ttyACM0")]
+    ports[0].vid, ports[0].pid, ports[0].serial_number = 0x0683, 0x4108, "5E0ABC12"
+    monkeypatch.setattr(sys.modules["acquisition.ports.list_ports"], "comports", lambda: ports)
+    assert [port.device for port in list_ports()] == ["/dev/ttyACM0", "/dev/ttyACM1"]
+    assert list_ports()[1] == PortInfo("/dev/ttyACM1", 0x0683, 0x4108, "5E0ABC12", "n/a")
+    assert list_ports()[0].vendor is None
+
+
+def test_the_emulator_command_serves_a_dataq_device(run: Any, trial: MachineFolder) -> None:
+    command = [sys.executable, "-m", "lobewatch.cli", "emulate", "dataq", "trial", "--json"]
+    path = str(Path(__file__).parents[3])
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ | {"PYTHONPATH": path}
+    ) as process:
+        assert process.stdout is not None
+        served = json.loads(process.stdout.readline())
+        assert served["frequency_hz"] == pytest.approx(1713.05, abs=0.01)
+        assert "dataq: DI-4108" in run("ports", "--port", served["port"]).out
+        process.send_signal(signal.SIGINT)
+        _, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "Traceback" not in err
+
+
+def test_the_emulator_needs_sensors(run: Any, trial: MachineFolder) -> None:
+    trial.toml.write_text(trial.toml.read_text("utf-8").replace(CHANNELS, ""), "utf-8")
+    said = run("emulate", "dataq", "trial")
+    assert said.code == 2
+    assert 'no sensors to emulate: give driver = "dataq" in [daq] and two [[daq.channel]]' in said.err
+
+
+def test_the_udev_rule_in_the_documentation_is_the_shipped_one() -> None:
+    page = (Path(__file__).parents[3] / "docs" / "devices.md").read_text("utf-8")
+    rule = resources.files("lobewatch.machine").joinpath("60-lobewatch.rules").read_text("utf-8")
+    assert f"```\n{rule}```" in page
+    assert "0683" in rule

@@ -1,0 +1,213 @@
+"""lobewatch sensors against emulated devices: what is plugged in, a hung mass, a common signal."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from acquisition import (
+    Channel,
+    DataqEmulator,
+    DataqFaults,
+    HammeredStructure,
+    Hammering,
+    MeasuredRate,
+    Structure,
+    TapsEmulator,
+    TapsSource,
+)
+from acquisition.emulation.simulated_source import Signal
+from lobewatch.cli import main
+from lobewatch.commands.init import make_machine_folder
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.known_devices import use_rate
+
+RATE = 25600.0
+MASS = 1.2
+FORCE = Channel("force", 2.25e-3, 5.0, calibration_date="2026-01-15")
+ACCELERATION = Channel("acceleration", 1.02e-3, 5.0, calibration_date="2026-01-15")
+
+DATAQ = """[daq]
+driver = "dataq"
+[[daq.channel]]
+input = 0
+quantity = "force"
+sensitivity_mv_per_n = 2.25
+range_v = 5
+[[daq.channel]]
+input = 1
+quantity = "acceleration"
+sensitivity_mv_per_g = 10
+range_v = 5
+"""
+Said = tuple[int, str, str]
+Sensors = Callable[..., Said]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> MachineFolder:
+    """A machine that was tapped before: the emulator is known, however fast it sends."""
+    make_machine_folder(tmp_path / "mill", "new_machine.toml")
+    return MachineFolder(tmp_path / "mill")
+
+
+@pytest.fixture
+def sensors(folder: MachineFolder, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Sensors:
+    """Runs the command on an emulated device: exit code, stdout, stderr."""
+    monkeypatch.setattr("lobewatch.commands.sensors.RATE_SECONDS", 1.5)
+
+    def run(
+        signal: Signal, channels: tuple[Channel, ...], *arguments: object, rate: float = RATE, realtime: bool = False
+    ) -> Said:
+        with TapsEmulator(signal, channels, rate, realtime=realtime) as device:
+            if not realtime:
+                with TapsSource(device.port) as source:
+                    use_rate(folder, source, MeasuredRate(rate, 0.1, 5, 5.0))
+            monkeypatch.setattr(
+                sys, "argv", ["lobewatch", "sensors", str(folder.path), "--port", device.port, *map(str, arguments)]
+            )
+            capsys.readouterr()
+            with pytest.raises(SystemExit) as end:
+                main()
+        said = capsys.readouterr()
+        return int(end.value.code or 0), said.out, said.err
+
+    return run
+
+
+def silence(first: int, n: int) -> NDArray[np.float64]:
+    return np.zeros((2, n))
+
+
+def hung_mass(mass: float) -> Signal:
+    """Somebody hits a free mass: accelerance 1/m above its pendulum of 1.2 Hz."""
+    pendulum = Structure(np.array([1.2]), np.array([0.3]), np.array([mass * (2 * np.pi * 1.2) ** 2]))
+    how = Hammering(interval_range=(0.3, 0.35), response_noise=0.2)
+    return HammeredStructure(pendulum, RATE, np.random.default_rng(3), how)
+
+
+class CommonNoise:
+    """White noise on both inputs (V), the second sampled later by a skew (samples); periodic, so exact."""
+
+    def __init__(self, skew: float, channels: tuple[Channel, Channel]) -> None:
+        size, random = 1 << 16, np.random.default_rng(1)
+        cycles = np.fft.rfftfreq(size)
+        spectrum = np.where((cycles > 0) & (cycles < 0.4), random.normal(size=(2, cycles.size)).T @ [1, 1j], 0.0)
+        volts = np.fft.irfft(np.stack([spectrum, spectrum * np.exp(2j * np.pi * cycles * skew)]), size)
+        volts /= np.std(volts)
+        self._signals = volts / np.array([[channel.sensitivity] for channel in channels])
+
+    def __call__(self, first_scan: int, n_scans: int) -> NDArray[np.float64]:
+        return np.take(self._signals, first_scan + np.arange(n_scans), axis=1, mode="wrap")
+
+
+def test_the_list_names_channels_rate_and_doubts(sensors: Sensors, folder: MachineFolder) -> None:
+    old = replace(FORCE, calibration_date="2020-01-15")
+    absurd = replace(ACCELERATION, sensitivity=100.0, calibration_date="")
+    code, out, err = sensors(silence, (old, absurd), rate=102400.0, realtime=True)
+    assert code == 0, err
+    assert "lobewatch emulator, serial number EMU-1" in out
+    assert re.search(r"0 +force +2\.25 mV/N +±2222 N +±5 V +16 +0 +- +2020-01-15", out)
+    assert re.search(r"1 +acceleration +9\.807e\+05 mV/g +±0\.005099 g +±5 V +16 +0 +- +-", out)
+    assert re.search(r"rate: 102400 Hz, measured 102[34]\d\d(\.\d)? ± \d+", out)
+    assert "warning: force: calibrated 2020-01-15, " in out
+    assert "warning: acceleration: a sensitivity of 100 V per m/s^2 is not believed, did you mean mV?" in out
+    assert "warning: acceleration: date of calibration not known" in out
+    assert "102400.0" in (folder.path / "daq.json").read_text()
+
+
+def test_the_interval_of_calibration_is_that_of_the_machine_file(sensors: Sensors, folder: MachineFolder) -> None:
+    text = folder.toml.read_text("utf-8")
+    folder.toml.write_text(text.replace("[daq]", "[daq]\ncalibration_interval_months = 1200"), "utf-8")
+    old = replace(FORCE, calibration_date="2000-01-15")
+    assert "warning" not in sensors(silence, (old, ACCELERATION), rate=102400.0, realtime=True)[1]
+
+
+def test_a_date_in_the_future_is_an_error(sensors: Sensors) -> None:
+    tomorrow = replace(FORCE, calibration_date="2999-01-15")
+    code, out, _ = sensors(silence, (tomorrow, ACCELERATION), "--json")
+    assert code == 2
+    said = json.loads(out)
+    assert [channel["quantity"] for channel in said["channels"]] == ["force", "acceleration"]
+    assert said["channels"][0]["full_scale_si"] == pytest.approx(2222.2, abs=0.1)
+    assert said["sample_rate_hz"] == RATE
+    assert "2999-01-15 lies in the future" in said["errors"][0]
+
+
+def test_a_device_at_half_its_rate_is_refused(
+    folder: MachineFolder, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("lobewatch.commands.sensors.RATE_SECONDS", 1.5)
+    folder.toml.write_text(folder.toml.read_text("utf-8").replace("[daq]", DATAQ), "utf-8")
+    inputs = tuple(table.build() for table in MachineFolder(folder.path).machine.daq.channel)
+    with DataqEmulator(lambda _: silence, inputs, faults=DataqFaults(halved_rate=True)) as device:
+        monkeypatch.setattr(sys, "argv", ["lobewatch", "sensors", str(folder.path), "--port", device.port])
+        with pytest.raises(SystemExit) as end:
+            main()
+    assert end.value.code == 2
+    assert "not 50000: every frequency would be" in capsys.readouterr().out
+    assert not (folder.path / "daq.json").exists()
+
+
+def test_a_hung_mass_whose_sensitivities_are_right(sensors: Sensors) -> None:
+    code, out, err = sensors(hung_mass(MASS), (FORCE, ACCELERATION), "--mass-kg", MASS)
+    assert code == 0, err
+    assert " 10 / 10  ✓ GOOD" in err
+    assert "F/(m a) = 1.000" in out or "F/(m a) = 0.999" in out
+    assert "Both sensitivities agree within 5%." in out
+    assert "To change" not in out
+
+
+def test_a_hung_mass_heavier_than_said_shows_what_to_change(sensors: Sensors) -> None:
+    """The wrong mass stands for a wrong sensitivity: F/(m a) cannot tell them apart, and the text says so."""
+    code, out, err = sensors(hung_mass(1.1 * MASS), (FORCE, ACCELERATION), "--mass-kg", MASS)
+    assert code == 0, err
+    assert "the force is read 10.0% too large" in out
+    assert "the hammer has 2.475 mV/N instead of 2.25" in out
+    factor = re.search(r"multiply sens_V_per_EU of the force channel by (\S+),", out)
+    assert factor is not None
+    assert float(factor[1]) == pytest.approx(1.1, abs=2e-3)
+    assert "is the mass the total that moves" in out
+
+
+def test_json_of_a_hung_mass(sensors: Sensors) -> None:
+    _, out, _ = sensors(hung_mass(MASS), (FORCE, ACCELERATION), "--mass-kg", MASS, "--json")
+    said = json.loads(out)
+    assert said["ratio"] == pytest.approx(1, abs=4 * said["ratio_std"])
+    assert said["hits"] == 10
+    assert said["agrees"] is True
+    assert said["force_sensitivity_v_per_n"] == pytest.approx(2.25e-3, rel=2e-3)
+
+
+@pytest.mark.parametrize("skew", [0.5, -0.25])
+def test_the_skew_of_both_inputs(sensors: Sensors, skew: float) -> None:
+    signal = CommonNoise(skew, (FORCE, ACCELERATION))
+    code, out, err = sensors(signal, (FORCE, ACCELERATION), "--skew")
+    assert code == 0, err
+    assert f"({skew:.4f} samples) after channel 0; entered is 0.000 us" in out
+    assert f"To enter: skew_s = {skew / RATE:.3e} in the device's own channel data" in out
+    said = json.loads(sensors(signal, (FORCE, ACCELERATION), "--skew", "--json")[1])
+    assert said["skew_samples"] == pytest.approx(skew, abs=5e-5)
+    assert said["skew_us"] == pytest.approx(1e6 * skew / RATE, abs=5 * said["skew_us_std"])
+
+
+def test_two_different_signals_have_no_skew(sensors: Sensors) -> None:
+    code, out, err = sensors(hung_mass(MASS), (FORCE, replace(ACCELERATION, sensitivity=1e-9)), "--skew")
+    assert (code, out) == (2, "")
+    assert "do not carry one broad-band signal" in err
+    assert "T-piece" in err
+
+
+def test_wrong_use(sensors: Sensors, folder: MachineFolder) -> None:
+    code, _, err = sensors(silence, (FORCE, ACCELERATION), "--skew", "--mass-kg", 1)
+    assert code == 2
+    assert "error: --mass-kg and --skew need different cabling" in err
+    assert "mass=-1.0 kg is not > 0" in sensors(hung_mass(MASS), (FORCE, ACCELERATION), "--mass-kg", -1)[2]

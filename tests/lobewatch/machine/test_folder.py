@@ -1,0 +1,125 @@
+"""The machine folder: what was committed is there, and damage is named."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition import Circumstances, DataError, Frf, SourceFile, TapTest, new_tap_id
+from lobewatch.commands.init import make_machine_folder
+from lobewatch.machine.folder import MachineFolder
+
+START = datetime(2026, 1, 15, 9, tzinfo=UTC)
+
+
+def tap(days: float = 0.0, source: SourceFile | None = None, **about: str) -> TapTest:
+    circumstances = replace(Circumstances("m", START + timedelta(days=days), "reference"), **about)  # type: ignore[arg-type]
+    frf = Frf(np.arange(1.0, 50.0), np.linspace(1 + 1j, 49 + 49j, 49).astype(np.complex128))
+    return TapTest(new_tap_id(circumstances), circumstances, frf, source=source)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> MachineFolder:
+    make_machine_folder(tmp_path / "m", "new_machine.toml")
+    return MachineFolder(tmp_path / "m")
+
+
+def test_commits_are_listed_by_the_time_of_the_tap_and_read_back(folder: MachineFolder) -> None:
+    late, early = tap(30), tap(0, SourceFile("a.csv", b"abc"), direction="y")
+    folder.commit(late)
+    folder.commit(early)
+    entries = folder.taps()
+    assert [entry.id for entry in entries] == [early.id, late.id]
+    assert [entry.direction for entry in entries] == ["y", "x"]
+    assert entries[0].source_sha256.startswith("ba7816bf")
+    assert folder.read(entries[0]).source == early.source
+
+
+def test_every_line_of_the_journal_names_the_one_before(folder: MachineFolder) -> None:
+    for day in range(3):
+        folder.commit(tap(day))
+    lines = [json.loads(line) for line in (folder.path / "journal.jsonl").read_text().splitlines()]
+    assert lines[0]["previous"] == ""
+    assert len({line["previous"] for line in lines}) == 3
+    assert all(line["kind"] == "tap" for line in lines)
+
+
+def test_a_torn_last_line_counts_for_nothing_and_does_not_block(folder: MachineFolder) -> None:
+    journal = folder.path / "journal.jsonl"
+    folder.commit(tap(0))
+    whole = journal.read_bytes()
+    folder.commit(tap(1))
+    for cut in range(len(whole), journal.stat().st_size, 40):
+        journal.write_bytes(journal.read_bytes()[:cut])
+        assert len(folder.taps()) == 1
+        folder.commit(tap(2))
+        assert len(folder.taps()) == 2
+
+
+def test_a_line_cut_short_by_a_full_disk_is_no_commit(folder: MachineFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    spooled = folder.spool / tap(0).id
+    committed = replace(tap(0), id=spooled.name)
+    spooled.mkdir(parents=True)
+    write = os.write
+    monkeypatch.setattr("os.write", lambda handle, line: write(handle, line[: len(line) // 2]))
+    with pytest.raises(OSError, match=r"journal\.jsonl"):
+        folder.commit(committed)
+    monkeypatch.undo()
+    assert spooled.is_dir()
+    assert folder.taps() == []
+    folder.commit(committed)
+    assert len(folder.taps()) == 1
+    assert not spooled.exists()
+
+
+def test_a_damaged_line_in_the_middle_is_told_by_its_number(folder: MachineFolder) -> None:
+    for day in range(3):
+        folder.commit(tap(day))
+    journal = folder.path / "journal.jsonl"
+    lines = journal.read_text().splitlines()
+    for damaged in (lines[1].replace("reference", "referense"), "not json", ""):
+        journal.write_text("\n".join([lines[0], damaged, lines[2], ""]))
+        with pytest.raises(DataError, match="line 2 is damaged"):
+            folder.taps()
+    journal.write_text("\n".join([lines[0], lines[2], ""]))
+    with pytest.raises(DataError, match="line 2 is damaged"):
+        folder.taps()
+
+
+def test_an_altered_or_missing_file_is_named(folder: MachineFolder) -> None:
+    folder.commit(tap())
+    (entry,) = folder.taps()
+    path = folder.path / "taps" / f"{entry.id}.h5"
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(DataError, match=f"{entry.id}.h5: altered"):
+        folder.read(entry)
+    path.unlink()
+    with pytest.raises(DataError, match=f"{entry.id}.h5: named in the journal but missing"):
+        folder.read(entry)
+
+
+def test_two_writers_are_told_apart(folder: MachineFolder) -> None:
+    refusal = pytest.raises(DataError, match="another lobewatch is writing here")
+    with folder.locked(), refusal, MachineFolder(folder.path).locked():
+        pass
+    with folder.locked():
+        pass
+
+
+def test_a_folder_without_machine_toml_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"no machine\.toml in it"):
+        MachineFolder(tmp_path)
+
+
+def test_a_machine_folder_is_not_overwritten(folder: MachineFolder) -> None:
+    with pytest.raises(DataError, match="is there already"):
+        make_machine_folder(folder.path, "new_machine.toml")
+    assert folder.machine.machine.name == "m"

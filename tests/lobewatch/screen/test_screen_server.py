@@ -1,0 +1,351 @@
+"""The screen's server: who is let in, what is sent, and that a slow page holds nobody up."""
+
+from __future__ import annotations
+
+import asyncio
+import http.client
+import json
+import socket
+import struct
+import threading
+from collections.abc import Callable, Coroutine
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import aiohttp
+import numpy as np
+import pytest
+
+from acquisition import Circumstances, DeviceError, HammeredStructure, HitFlags, TapsEmulator, TapsSource
+from lobewatch.commands.init import make_machine_folder
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.screen import ScreenServer
+from lobewatch.screen.web_thread import WebThread
+from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE
+from lobewatch.tap.session import TapSession
+from lobewatch.tap.state import Plots, Word
+
+TOKEN = "a-token-of-the-test"
+Session = Any
+"""ScriptedSession of conftest.py."""
+
+
+def ask(server: WebThread, method: str, path: str, body: str = "", **changed: str | None) -> tuple[int, Any, Any]:
+    """Status, content and headers for a request as the page makes it; headers can be changed, or left out by None."""
+    host = server.origin.removeprefix("http://")
+    headers = {"Host": host, "Origin": server.origin, "Authorization": f"Bearer {server.token}"} | changed
+    connection = http.client.HTTPConnection(host, timeout=10)
+    connection.putrequest(method, path, skip_host=True)
+    for name, value in headers.items():
+        if value is not None:
+            connection.putheader(name, value)
+    connection.putheader("Content-Length", str(len(body)))
+    connection.endheaders(body.encode())
+    answer = connection.getresponse()
+    content = answer.read()
+    connection.close()
+    is_json = answer.headers["Content-Type"].startswith("application/json")
+    return answer.status, json.loads(content) if is_json and content else content, answer.headers
+
+
+Received = Callable[[aiohttp.ClientWebSocketResponse], Coroutine[Any, Any, None]]
+
+
+def follow(server: WebThread, talk: Received, path: str = "/feed", token: str = TOKEN, **headers: str) -> None:
+    """Open the feed as the page does."""
+
+    async def run() -> None:
+        async with (
+            aiohttp.ClientSession() as client,
+            client.ws_connect(
+                server.origin + path,
+                protocols=("lobewatch", f"token.{token}"),
+                headers={"Origin": server.origin} | headers,
+                max_msg_size=0,
+            ) as feed,
+        ):
+            await talk(feed)
+
+    asyncio.run(run())
+
+
+async def next_state(feed: aiohttp.ClientWebSocketResponse) -> dict[str, Any]:
+    while True:
+        message = await feed.receive(timeout=10)
+        if message.type is aiohttp.WSMsgType.TEXT and message.data != "{}":
+            return dict(json.loads(message.data))
+        assert message.type in (aiohttp.WSMsgType.TEXT, aiohttp.WSMsgType.BINARY)
+
+
+def test_the_page_needs_no_token_and_tells_nothing(session: Session) -> None:
+    with ScreenServer(session, token=TOKEN) as server:
+        assert server.url == f"{server.origin}/#token={TOKEN}"
+        status, page, headers = ask(server, "GET", "/", Authorization=None, Origin=None)
+        assert status == 200
+        assert TOKEN not in page.decode()
+        assert session.state.title not in page.decode()
+        policy = headers["Content-Security-Policy"]
+        assert "default-src 'none'" in policy
+        assert "script-src 'self';" in policy
+        assert "unsafe" not in policy
+        assert "Access-Control-Allow-Origin" not in headers
+
+
+def test_every_token_is_another() -> None:
+    tokens = {WebThread("127.0.0.1", 0, None).token for _ in range(20)}
+    assert len(tokens) == 20
+    assert min(map(len, tokens)) >= 32
+
+
+@pytest.mark.parametrize("token", ["", "short", "has a space in it", "ä" * 20, "x#y" * 9])
+def test_a_token_that_does_not_fit_into_an_address_is_refused(session: Session, token: str) -> None:
+    with pytest.raises(ValueError, match="12 to 200 characters"):
+        ScreenServer(session, token=token)
+
+
+@pytest.mark.parametrize("given", [None, "Bearer wrong-token-wrong", "Bearer ", "", f"Bearer {TOKEN}x", "Bearer \xe4"])
+def test_without_the_token_nothing_is_altered_or_told(session: Session, given: str | None) -> None:
+    session.hit()
+    with ScreenServer(session, token=TOKEN) as server:
+        for method, path in (("POST", "/undo"), ("POST", "/stop"), ("GET", "/access"), ("GET", "/feed")):
+            status, answer, _ = ask(server, method, path, Authorization=given)
+            assert status == 401
+            assert "address that lobewatch printed" in answer["error"]
+    assert not session.undone.is_set()
+    assert not session.stopped.is_set()
+
+
+def test_with_the_token_it_is(session: Session) -> None:
+    session.hit()
+    with ScreenServer(session, token=TOKEN) as server:
+        assert ask(server, "POST", "/undo")[0] == 200
+        assert session.undone.is_set()
+        assert ask(server, "POST", "/stop")[0] == 200
+        assert session.stopped.is_set()
+
+
+@pytest.mark.parametrize("origin", [None, "null", "http://evil.example", "https://127.0.0.1", "http://localhost:1"])
+def test_another_page_may_not_alter_anything_even_with_the_token(session: Session, origin: str | None) -> None:
+    session.hit()
+    with ScreenServer(session, token=TOKEN) as server:
+        assert ask(server, "POST", "/undo", Origin=origin)[0] == 403
+        assert ask(server, "GET", "/feed", Origin=origin, Upgrade="websocket")[0] == 403
+    assert not session.undone.is_set()
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "[", ""])
+def test_a_foreign_name_that_points_here_is_refused(session: Session, host: str) -> None:
+    with ScreenServer(session, token=TOKEN) as server:
+        for path in ("/", "/access", "/static/screen.js"):
+            assert ask(server, "GET", path, Host=host, Origin=None)[0] in (400, 403)
+
+
+def test_through_a_tunnel_the_name_is_localhost(session: Session) -> None:
+    with ScreenServer(session, token=TOKEN) as server:
+        assert ask(server, "GET", "/access", Host="localhost:9000", Origin="http://localhost:9000")[0] == 200
+
+
+def test_reading_alters_nothing(session: Session) -> None:
+    session.hit()
+    with ScreenServer(session, token=TOKEN) as server:
+        for path in ("/undo", "/stop"):
+            for method in ("GET", "HEAD", "PUT", "DELETE", "OPTIONS"):
+                assert ask(server, method, path)[0] in (404, 405)
+    assert not session.undone.is_set()
+    assert not session.stopped.is_set()
+
+
+@pytest.mark.parametrize(
+    "path", ["/nothing", "/static/", "/static/../guard.py", "/static/..%2fguard.py", "/static/uPlot.LICENSE", "/%00"]
+)
+def test_what_is_not_there(session: Session, path: str) -> None:
+    with ScreenServer(session, token=TOKEN) as server:
+        status, answer, _ = ask(server, "GET", path)
+        assert status == 404
+        assert "Traceback" not in str(answer)
+
+
+def test_what_is_no_request_is_answered_with_400_and_nothing_in_the_terminal(
+    session: Session, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with ScreenServer(session, token=TOKEN) as server:
+        host, port = server.origin.removeprefix("http://").split(":")
+        for nonsense in (b"\x00\xff\x00\r\n\r\n", b"GET / HTTP/1.1\r\nBad Header\r\n\r\n"):
+            with socket.create_connection((host, int(port)), timeout=10) as raw:
+                raw.sendall(nonsense)
+                assert raw.recv(4096).split(b" ")[1] == b"400"
+    assert capfd.readouterr() == ("", "")
+
+
+def test_what_the_session_refuses_is_said_in_one_sentence(session: Session) -> None:
+    session.refusal = "there is no hit to take back"
+    with ScreenServer(session, token=TOKEN) as server:
+        status, answer, _ = ask(server, "POST", "/undo")
+    assert (status, answer) == (409, {"error": "there is no hit to take back"})
+
+
+def test_the_state_comes_with_every_change_and_the_curves_only_when_they_are_new(session: Session) -> None:
+    session.check()
+
+    async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:
+        first = await next_state(feed)
+        assert (first["kind"], first["word"], first["good"], first["wanted"]) == ("checking", "CHECKING", 0, 10)
+        assert [one["passed"] for one in first["checks"]] == [True, True, True, False]
+        session.hit(HitFlags.DOUBLE_HIT | HitFlags.TOO_SOFT, "Second peak.")
+        curves = await feed.receive(timeout=10)
+        assert curves.type is aiohttp.WSMsgType.BINARY
+        shown = await next_state(feed)
+        assert (shown["kind"], shown["word"], shown["reason"]) == ("refused", "DOUBLE HIT, TOO SOFT", "Second peak.")
+        assert shown["hits"] == [{"number": 1, "verdict": "double hit, too soft", "peak_force": 312, "undone": False}]
+        session.show(Word.TAP, levels=(float("nan"), 2.0))
+        again = await feed.receive(timeout=10)
+        assert again.type is aiohttp.WSMsgType.TEXT
+        assert json.loads(again.data)["levels"] == [None, 2.0]
+
+    with ScreenServer(session, token=TOKEN) as server:
+        follow(server, talk)
+
+
+def test_the_curves_arrive_as_they_were(session: Session) -> None:
+    session.hit()
+    plots: Plots = session.state.plots
+    found: dict[str, Any] = {}
+
+    async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:
+        data = (await feed.receive(timeout=10)).data
+        (size,) = struct.unpack_from("<I", data)
+        header = json.loads(data[4 : 4 + size])
+        assert (4 + size) % 4 == 0
+        offset = 4 + size
+        for name, count in header["curves"]:
+            found[name] = np.frombuffer(data, "<f4", count, offset)
+            offset += 4 * count
+        assert offset == len(data)
+        assert header["band"] == [4.0, 7600.0]
+
+    with ScreenServer(session, token=TOKEN) as server:
+        follow(server, talk)
+    assert plots.mean is not None
+    assert "coherence" not in found
+    np.testing.assert_allclose(found["force"], plots.force, rtol=1e-6, atol=1e-30)
+    np.testing.assert_allclose(found["mean"], plots.mean, rtol=1e-6)
+
+
+@pytest.mark.parametrize("token", ["", "wrong-token-wrong"])
+def test_no_feed_without_the_token(session: Session, token: str) -> None:
+    async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:
+        raise AssertionError("let in")
+
+    with ScreenServer(session, token=TOKEN) as server, pytest.raises(aiohttp.WSServerHandshakeError) as refused:
+        follow(server, talk, token=token)
+    assert refused.value.status == 401
+
+
+def test_a_page_that_talks_back_is_hung_up(session: Session) -> None:
+    async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:
+        await next_state(feed)
+        await feed.send_str("undo")
+        assert (await feed.receive(timeout=10)).type is aiohttp.WSMsgType.CLOSE
+
+    with ScreenServer(session, token=TOKEN) as server:
+        follow(server, talk)
+    assert not session.undone.is_set()
+
+
+def test_a_page_too_slow_misses_old_states_and_holds_nobody_up(session: Session) -> None:
+    """The slow page does not read at all while a thousand pictures of 400 kB pass; then it sees the newest soon."""
+    big = np.zeros(50_000)
+    session.hit()
+    plots = replace(session.state.plots, time=big, force=big)
+    read: list[dict[str, Any]] = []
+
+    async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:
+        await next_state(feed)
+        passed = threading.Thread(target=acquire)
+        passed.start()
+        await asyncio.to_thread(quick_page_sees_the_end)
+        while not read or read[-1]["reason"] != "999":
+            read.append(await next_state(feed))
+
+    def acquire() -> None:
+        """Nothing here waits for a page."""
+        for i in range(1000):
+            session.show(Word.WAIT, reason=str(i), plots=replace(plots))
+
+    def quick_page_sees_the_end() -> None:
+        async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:
+            while (await next_state(feed))["reason"] != "999":
+                pass
+
+        follow(server, talk)
+
+    with ScreenServer(session, token=TOKEN) as server:
+        follow(server, talk)
+    assert len(read) < 500
+
+
+def test_at_the_end_the_last_state_is_sent_and_the_feed_closed_as_such(session: Session) -> None:
+    async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:
+        await next_state(feed)
+        session.finish()
+        leaving = asyncio.create_task(asyncio.to_thread(server.__exit__, None, None, None))
+        shown = await next_state(feed)
+        assert (shown["word"], shown["outcome"]["light"]) == ("DONE", "warn")
+        assert (await feed.receive(timeout=10)).type is aiohttp.WSMsgType.CLOSE
+        assert feed.close_code == aiohttp.WSCloseCode.GOING_AWAY
+        await leaving
+
+    server = ScreenServer(session, token=TOKEN).__enter__()
+    follow(server, talk)
+
+
+def test_a_port_in_use_is_said(session: Session) -> None:
+    with ScreenServer(session) as server:
+        port = int(server.origin.rpartition(":")[2])
+        with (
+            pytest.raises(DeviceError, match=f"cannot listen on 127.0.0.1 port {port}"),
+            ScreenServer(session, port=port),
+        ):
+            pass
+
+
+@pytest.mark.parametrize("listen", ["a..b", "x" * 70, "no such name"])
+def test_an_address_that_cannot_be_is_said(session: Session, listen: str) -> None:
+    with pytest.raises(DeviceError, match=f"cannot listen on {listen} port 0"), ScreenServer(session, listen=listen):
+        pass
+
+
+def test_no_address_is_not_every_address(session: Session) -> None:
+    with pytest.raises(ValueError, match="no address to listen at"):
+        ScreenServer(session, listen="")
+
+
+@pytest.mark.parametrize("listen", ["0.0.0.0", "::", "LocalHost"])
+def test_the_address_told_is_one_that_answers(session: Session, listen: str) -> None:
+    if listen == "::" and not socket.has_dualstack_ipv6():
+        pytest.skip("no IPv6 here")
+    with ScreenServer(session, listen=listen) as server:
+        assert ask(server, "GET", "/access")[0] == 200
+
+
+def test_a_real_test_through_an_emulated_device(tmp_path: Path, tapper: Callable[..., HammeredStructure]) -> None:
+    make_machine_folder(tmp_path / "mill", "surrogate_machine.toml")
+    about = Circumstances("mill", datetime.now(UTC), "reference", "x")
+    shown: list[dict[str, Any]] = []
+
+    async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:
+        running = threading.Thread(target=session.run)
+        running.start()
+        while not shown or shown[-1]["outcome"] is None:
+            shown.append(await next_state(feed))
+        running.join()
+
+    with TapsEmulator(tapper(), CHANNELS, SAMPLE_RATE, realtime=False) as device:
+        folder = MachineFolder(tmp_path / "mill")
+        session = TapSession(folder, lambda: TapsSource(device.port), about)
+        with ScreenServer(session, token=TOKEN) as server:
+            follow(server, talk)
+    assert (shown[-1]["word"], shown[-1]["good"]) == ("DONE", 10)
+    assert "first test" in shown[-1]["outcome"]["texts"][0]

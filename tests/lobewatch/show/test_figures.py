@@ -1,0 +1,50 @@
+"""Figures: what is drawn stands where the numbers say."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+from matplotlib.collections import LineCollection
+
+from acquisition import Frf
+from lobewatch.machine.machine_file import Limits
+from lobewatch.show.figures import frf_figure, svg, trend_figure
+from lobewatch.show.figures_lobes import lobes_figure
+
+TIMES = [datetime(2026, month, 1, tzinfo=UTC) for month in (1, 2, 3)]
+
+
+def test_limits_stand_below_the_first_value() -> None:
+    figure = trend_figure(TIMES, np.array([1700.0, 1690.0, 1650.0]), np.full(3, 0.5), "f", Limits())
+    data = [np.asarray(line.get_xydata()) for line in figure.axes[0].lines]
+    levels = [points[0, 1] for points in data if points[0, 0] == 0]
+    assert levels == pytest.approx([1700 * 0.95, 1700 * 0.90])
+
+
+def test_bars_are_the_95_percent_interval() -> None:
+    figure = trend_figure(TIMES[:1], np.array([1700.0]), np.array([2.0]), "f")
+    (bars,) = figure.axes[0].collections
+    assert isinstance(bars, LineCollection)
+    ((low, high),) = [np.asarray(segment)[:, 1] for segment in bars.get_segments()]
+    assert (low, high) == pytest.approx((1700 - 3.92, 1700 + 3.92))
+
+
+def test_lobes_are_drawn_in_mm_and_programs_where_they_cut() -> None:
+    speed = np.linspace(1000.0, 2000.0, 5)
+    program = {"name": "A", "speed_rpm": 1500.0, "depth_mm": 3.0, "stable": False}
+    figure = lobes_figure(speed, {"then": np.full(5, 2e-3), "now": np.full(5, 1e-3)}, [program])
+    then, now, mark = figure.axes[0].lines
+    assert then.get_ydata() == pytest.approx(2.0)
+    assert now.get_ydata() == pytest.approx(1.0)
+    assert np.asarray(mark.get_xydata()).tolist() == [[1500.0, 3.0]]
+    assert svg(figure).startswith("<svg")
+
+
+def test_receptance_is_drawn_in_nm_per_n() -> None:
+    f = np.linspace(1.0, 100.0, 50)
+    figure = frf_figure(None, Frf(f, np.full(50, 2e-9 - 5e-9j)), (1.0, 100.0))
+    real, imaginary = (axes.lines[0].get_ydata() for axes in figure.axes)
+    assert real == pytest.approx(2.0)
+    assert imaginary == pytest.approx(-5.0)

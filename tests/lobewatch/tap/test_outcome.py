@@ -1,0 +1,145 @@
+"""What stands at the end of a tap test, and the curves of its screen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition import (
+    Channel,
+    Circumstances,
+    HammeredStructure,
+    Hit,
+    RunningMean,
+    SimulatedSource,
+    TapTest,
+    Trigger,
+    capture_hits,
+    from_accelerance,
+    new_tap_id,
+)
+from lobewatch.analysis.history import update_history
+from lobewatch.commands.init import make_machine_folder
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap.outcome import outcome_of
+from lobewatch.tap.plots import plots_of
+from lobewatch.tap.state import Outcome
+from modal import Mode, synthesize
+
+START = datetime(2026, 1, 15, 9, tzinfo=UTC)
+LINES = np.arange(4.0, 4000.0, 4.0)
+Pair = tuple[Channel, Channel]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> MachineFolder:
+    make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
+    return MachineFolder(tmp_path / "m")
+
+
+def tapped(
+    folder: MachineFolder, days: float, frequency: float, direction: str = "x", stiffness: float = 3e8
+) -> Outcome:
+    about = Circumstances("m", START + timedelta(days=days), "reference", direction)
+    frf = synthesize([Mode(frequency, 0.03, stiffness)], LINES)
+    folder.commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
+    history, measurements = update_history(folder)
+    return outcome_of(measurements[-1], history, folder.machine)
+
+
+def test_the_light_follows_the_fall_of_the_frequency(folder: MachineFolder) -> None:
+    first = tapped(folder, 0, 1720.0)
+    assert first.light == "good"
+    assert "1720" in first.texts[0]
+    assert "the first test of this tool and direction" in first.texts[0]
+    assert first.next_step.startswith("Tap direction y of the same tool within a day")
+    both = tapped(folder, 0.1, 1700.0, "y")
+    assert both.next_step == "All is well: tap again by 2026-02-14."
+    lights = [tapped(folder, 30 * month, 1720 * share).light for month, share in enumerate((0.96, 0.94, 0.89), 1)]
+    assert lights == ["good", "warn", "alarm"]
+    worn = tapped(folder, 120, 0.88 * 1720)
+    assert "-12 % against the first test" in worn.texts[0]
+    assert worn.next_step.startswith("Do not cut on")
+
+
+def test_the_fall_has_the_standard_error_of_both_frequencies(folder: MachineFolder) -> None:
+    """0.1 % each: 0.96 sqrt(2) 0.1 % = 0.14 %."""
+    tapped(folder, 0, 1720.0)
+    tapped(folder, 30, 0.96 * 1720)
+    (folder.path / "history.h5").unlink()
+    history, measurements = update_history(folder)
+    history.columns["frequency_std"][:] = 1.72
+    found = measurements[-1]
+    assert found.dynamics.followed is not None
+    mode = replace(found.dynamics.followed, covariance=np.diag([(0.96 * 1.72) ** 2, 1e-8, 1e12]))
+    told = outcome_of(replace(found, dynamics=replace(found.dynamics, followed=mode)), history, folder.machine)
+    assert "-4.00 ± 0.14 % against the first test" in told.texts[0]
+
+
+def test_a_program_that_chatters_is_named(folder: MachineFolder) -> None:
+    soft = tapped(folder, 0, 1720.0, stiffness=3e6)
+    assert soft.light == "warn"
+    assert any(text.startswith("Not stable: A: slot at 12 900 rpm") for text in soft.texts)
+    assert "lobewatch check" in soft.next_step
+
+
+def test_a_test_without_the_mode_asks_for_another(folder: MachineFolder) -> None:
+    lost = tapped(folder, 0, 900.0)
+    assert lost.light == "warn"
+    assert any("no mode to follow" in text for text in lost.texts)
+    assert lost.next_step.startswith("Tap again")
+
+
+@pytest.fixture
+def hits(tapper: Callable[..., HammeredStructure], channels: Pair) -> list[Hit]:
+    source = SimulatedSource(tapper(), channels, 25600.0, 60_000)
+    return list(capture_hits(source, Trigger(20.0, 6400, 512)))
+
+
+def test_curves_are_thinned_and_keep_every_extreme(hits: list[Hit]) -> None:
+    mean = RunningMean()
+    for hit in hits[:3]:
+        mean.add(hit)
+    plots = plots_of(hits[2], mean)
+    assert plots.time.size < 2600
+    assert plots.frequency.size < 2000
+    assert np.max(plots.force) == np.max(hits[2].force)
+    assert np.min(plots.acceleration) == np.min(hits[2].acceleration)
+    assert plots.mean is not None
+    assert mean.frf is not None
+    shown = mean.frf.frequency <= plots.frequency[-1]
+    assert np.max(plots.mean) == np.max(np.abs(mean.frf.receptance[shown]))
+    assert np.all(np.diff(plots.frequency) > 0)
+    assert plots.usable_band == mean.frf.usable_band
+    assert plots.frequency[-1] == pytest.approx(1.25 * mean.frf.usable_band[1], rel=0.01)  # type: ignore[index]
+    assert plots.force_spectrum is not None
+    assert np.max(plots.force_spectrum) == 0.0
+    assert plots.coherence is not None
+    pulse = (plots.time > -0.5e-3) & (plots.time < 1e-3)
+    assert np.count_nonzero(pulse) == np.count_nonzero((hits[2].time > -0.5e-3) & (hits[2].time < 1e-3))
+
+
+def test_what_is_not_known_yet_is_not_shown(hits: list[Hit]) -> None:
+    mean = RunningMean()
+    before = plots_of(hits[0], mean)
+    assert before.mean is None
+    assert before.last is not None
+    assert before.coherence is None
+    assert before.force_spectrum is not None
+    assert before.usable_band is not None
+    edge = np.interp(before.usable_band[1], before.frequency, before.force_spectrum)
+    assert edge == pytest.approx(-20.0, abs=2.0)
+    mean.add(hits[0])
+    mean.add(hits[1])
+    assert plots_of(hits[1], mean).coherence is None
+    silent = Hit(np.zeros(1000), np.zeros(1000), 25600.0)
+    nothing = plots_of(silent, RunningMean())
+    assert nothing.last is None
+    assert nothing.force_spectrum is None
+    assert nothing.usable_band is None
+    assert nothing.frequency.size > 0

@@ -1,0 +1,101 @@
+"""README tells the truth: its commands run and print what stands there, and no command or option is left out."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal, get_origin
+
+import pytest
+import typer
+
+import acquisition
+import dsm
+import lobes
+import modal
+from lobewatch.cli import app, main
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def commands(group: typer.core.TyperGroup, prefix: str = "") -> Iterator[tuple[str, set[str]]]:
+    """Every command with its options."""
+    for name, command in group.commands.items():
+        if isinstance(command, typer.core.TyperGroup):
+            yield from commands(command, f"{prefix}{name} ")
+        else:
+            yield f"{prefix}{name}", {option for parameter in command.params for option in parameter.opts}
+
+
+def test_every_command_and_option_stands_in_readme() -> None:
+    group = typer.main.get_command(app)
+    assert isinstance(group, typer.core.TyperGroup)
+    known = dict(commands(group))
+    assert len(known) == 15
+    for name, options in known.items():
+        assert f"lobewatch {name}" in README, name
+        for option in options:
+            assert not option.startswith("--") or f"`{option}" in README or f" {option}" in README, (name, option)
+    mentioned = set(re.findall(r"--[a-z][a-z-]+", README))
+    assert mentioned <= {"--debug", "--help"}.union(*known.values())
+    assert set(re.findall(r"`lobewatch ([a-z]+)", README)) == {name.split()[0] for name in known}
+
+
+def shown(command: str) -> str:
+    """What README shows below a command."""
+    block = re.search(rf"^\$ {re.escape(command)}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+    assert block is not None
+    return block[1]
+
+
+def test_the_modes_in_readme_are_what_the_command_prints(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setattr(sys, "argv", ["lobewatch", "modes", "tests/data/ladisk_beam/acceleration.lvm"])
+    with pytest.raises(SystemExit):
+        main()
+    printed = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
+    assert printed == shown("python3 run.py modes tests/data/ladisk_beam/acceleration.lvm").splitlines()
+
+
+def test_the_demo_in_readme_is_what_the_command_prints(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["lobewatch", "demo"])
+    with pytest.raises(SystemExit):
+        main()
+    printed = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
+    wanted = shown("python3 run.py").splitlines()
+    split = wanted.index("...")
+    assert printed[:split] == wanted[:split]
+    assert printed[-len(wanted) + split + 1 :] == wanted[split + 1 :]
+
+
+def test_pictures_and_links_are_there() -> None:
+    for page in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md")):
+        for link in re.findall(r"\]\(([^)#]+)\)", page.read_text(encoding="utf-8")):
+            assert link.startswith("https://") or (page.parent / link).exists(), (page, link)
+
+
+@pytest.mark.parametrize("package", [acquisition, modal, dsm, lobes], ids=lambda package: package.__name__)
+def test_packages_are_ours_and_their_names_are_sorted_and_documented(package: object) -> None:
+    name = package.__name__  # type: ignore[attr-defined]
+    assert Path(package.__file__).parent == ROOT / name  # type: ignore[attr-defined]
+    names = package.__all__  # type: ignore[attr-defined]
+    assert names == sorted(names, key=lambda name: (not name.isupper(), name[0].islower(), name))
+    for exported in names:
+        value = getattr(package, exported)
+        assert inspect.getdoc(value) or get_origin(value) is Literal or exported.isupper(), exported
+
+
+def test_the_changelog_knows_the_version() -> None:
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert f"## [{version}]" in changelog or "## [Unreleased]" in changelog

@@ -4,7 +4,7 @@ from lobes.aged_mode import aged_mode
 from lobes.average_angle import average_angle
 from lobes.check_program import ProgramCheck, check_program
 from lobes.coefficients import Coefficients, cutting_coefficients, tangential_and_radial
-from lobes.cut import Cut
+from lobes.cut import Cut, Direction
 from lobes.cutting_power import deepest_for_drive, mean_torque
 from lobes.depth_band import DepthBand, coefficient_range, measurement_band
 from lobes.history import SldHistory
@@ -23,6 +23,7 @@ __all__ = [
     "Coefficients",
     "Cut",
     "DepthBand",
+    "Direction",
     "Lobe",
     "Minimum",
     "Pocket",

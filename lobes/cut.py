@@ -8,6 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 Direction = Literal["up", "down"]
+"""Which way the tool turns against the feed: up (conventional) or down (climb) milling."""
 
 
 @dataclass(frozen=True)

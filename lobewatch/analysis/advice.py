@@ -24,7 +24,7 @@ from lobes import (
 from lobewatch.analysis.history import measure
 from lobewatch.analysis.pipeline import Measurement, speed_grid
 from lobewatch.analysis.prediction import predict
-from lobewatch.machine.cut_tables import Program as ProgramTable
+from lobewatch.machine.cut_tables import ProgramTable
 from lobewatch.machine.drive import drive_limit
 from lobewatch.machine.folder import MachineFolder, TapEntry
 from lobewatch.machine.machine_file import Machine

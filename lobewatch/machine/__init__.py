@@ -1,6 +1,6 @@
 """What is known of one machine: machine.toml, its folder, its journal, its devices."""
 
-from lobewatch.machine.cut_tables import CutTable, Program
+from lobewatch.machine.cut_tables import CutTable, ProgramTable
 from lobewatch.machine.daq_tables import Daq
 from lobewatch.machine.drive import drive_limit
 from lobewatch.machine.folder import MachineFolder, TapEntry
@@ -15,7 +15,7 @@ __all__ = [
     "Limits",
     "Machine",
     "MachineFolder",
-    "Program",
+    "ProgramTable",
     "SpeedRange",
     "TapEntry",
     "TapSetup",

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated
 
 from msgspec import Meta
 
-from lobes import Coefficients, tangential_and_radial
+from lobes import Coefficients, Direction, tangential_and_radial
 from lobewatch.machine.toml_table import NotNegative, Positive, PositiveOrInfinite, Table
-
-Direction = Literal["up", "down"]
 
 
 class CutTable(Table, frozen=True):
@@ -38,7 +36,7 @@ class CutTable(Table, frozen=True):
             raise ValueError("give either material or both tangential_n_per_mm2 and radial_n_per_mm2")
 
 
-class Program(CutTable, frozen=True, kw_only=True):
+class ProgramTable(CutTable, frozen=True, kw_only=True):
     """[[program]]: one cut that the shop runs."""
 
     name: Annotated[str, Meta(min_length=1)]

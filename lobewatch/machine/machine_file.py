@@ -16,7 +16,7 @@ from msgspec import Meta
 from acquisition import DataError
 from dsm import Spindle
 from lobes import Coefficients, Cut, cutting_coefficients
-from lobewatch.machine.cut_tables import CutTable, Drive, MaterialTable, Program
+from lobewatch.machine.cut_tables import CutTable, Drive, MaterialTable, ProgramTable
 from lobewatch.machine.daq_tables import ChannelTable, Daq
 from lobewatch.machine.spindle_tables import BearingTable, JointTable, MassTable, SegmentTable, SpindleTable, ToolTable
 from lobewatch.machine.toml_table import NotNegative, Positive, Table
@@ -86,7 +86,7 @@ class Machine(Table, frozen=True):
     drive: Drive = Drive()
     material: tuple[MaterialTable, ...] = ()
     reference_cut: CutTable | None = None
-    program: tuple[Program, ...] = ()
+    program: tuple[ProgramTable, ...] = ()
     spindle: SpindleTable | None = None
     tool: tuple[ToolTable, ...] = ()
 
@@ -232,7 +232,7 @@ def _suggestion(key: str) -> str:
         SpeedRange,
         Drive,
         MaterialTable,
-        Program,
+        ProgramTable,
     ]
     tables += [SpindleTable, SegmentTable, BearingTable, MassTable, JointTable, ToolTable]
     known = {field for table in tables for field in table.__struct_fields__}

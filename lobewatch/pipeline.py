@@ -4,7 +4,7 @@ recorded with its reason, and the pipeline goes on."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
@@ -115,10 +115,8 @@ def _follow(modes: Sequence[Mode], machine: Machine, notes: list[str], last: Mod
     if last is None:
         return first
     found = follow(last, _in_band(modes, machine))
-    if found.mode is None:
-        notes.append(f"no mode to follow: {found.doubt}; for a rebuilt spindle lay [mode] band_hz around its new mode")
-    elif found.doubt:
-        notes.append(found.doubt)
+    cure = "for a rebuilt spindle lay [mode] band_hz around its new mode" if found.mode is None else ""
+    notes.extend(str(replace(remark, cure=cure)) for remark in found.remarks)
     return found.mode
 
 

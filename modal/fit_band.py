@@ -46,8 +46,14 @@ class BandFit:
 
     @property
     def standard_error(self) -> Array:
-        """Standard errors of frequencies, damping ratios and flexibilities of the first FRF, shape (3, m)."""
-        return np.sqrt(np.diag(self.covariance))[: 3 * self.frequency.size].reshape(3, -1)
+        """Standard errors of frequencies, damping ratios, then flexibilities FRF by FRF, shape (2 + p, m)."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)).reshape(-1, self.frequency.size))
+
+    @property
+    def complex_residual(self) -> ComplexArray:
+        """The residual line by line, shape (p, n)."""
+        parts = self.residual.reshape(len(self.flexibility), 2, -1)
+        return np.asarray(parts[:, 0] + 1j * parts[:, 1])
 
     @property
     def mobility_peak(self) -> Array:
@@ -58,6 +64,10 @@ class BandFit:
     def sum_of_squares(self) -> float:
         """Of the weighted residuals."""
         return float(self.residual @ self.residual)
+
+    def influence_of(self, i: int) -> Array:
+        """The part of the influence that belongs to FRF i, shape (2 m + p m, 2 n)."""
+        return np.hsplit(self.influence, len(self.flexibility))[i]
 
     def receptance(self, frequency: Array) -> ComplexArray:
         """Sum of these modes alone (m/N) at these frequencies (Hz), shape (p, n)."""
@@ -84,7 +94,7 @@ def fit_band(
     problem = _problem(frequency, receptance, weight, terms)
     with np.errstate(all="ignore"):
         try:
-            return _result(_solve(problem, starts), 2 * terms)
+            return _result(_solve(problem, starts), terms)
         except np.linalg.LinAlgError:
             return None
 
@@ -101,11 +111,14 @@ def residual_terms(frequency: Array, terms: int) -> Array:
 
 
 def gain_of_a_term(fit: BandFit, frequency: Array, weight: Array, terms: int) -> float:
-    """Fall of the sum of squares, to first order, that one residual term more than these would bring to one FRF."""
+    """Fall of the sum of squares, to first order, that one residual term more than these in each FRF would bring."""
     powers = residual_terms(frequency, terms + 1)
-    old, new = (_split(weight * np.concatenate([part, 1j * part])).T for part in (powers[:-1], powers[-1:]))
+    old, new = (
+        block_diag(*(_split(w * np.concatenate([part, 1j * part])).T for w in weight))
+        for part in (powers[:-1], powers[-1:])
+    )
     q = np.linalg.qr(np.hstack([old, fit.influence.T, new]))[0]
-    part = q[:, -2:].T @ fit.residual
+    part = q[:, -new.shape[1] :].T @ fit.residual
     return float(part @ part)
 
 
@@ -229,7 +242,7 @@ def _step(state: _State, damping: float) -> tuple[Array, float]:
     return step, float(change @ change)
 
 
-def _result(state: _State | None, n_residual: int) -> BandFit | None:
+def _result(state: _State | None, terms: int) -> BandFit | None:
     if state is None:
         return None
     m = state.poles.shape[1]
@@ -239,7 +252,7 @@ def _result(state: _State | None, n_residual: int) -> BandFit | None:
     if not singular[-1] > LEAST_SINGULAR * singular[0]:
         return None
     influence = _influence(state, -(right.T / singular) @ left.T / norm[:, None])
-    freedom = jacobian.shape[0] - 2 * m - (m + n_residual) * len(state.frfs)
+    freedom = jacobian.shape[0] - 2 * m - (m + 2 * terms) * len(state.frfs)
     return BandFit(
         state.poles[0],
         state.poles[1],

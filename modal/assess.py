@@ -20,7 +20,7 @@ LEAST_COHERENCE = 0.9
 LARGEST_PHASE = np.radians(15)
 """Of the complex modal constant (rad)."""
 LARGEST_MISFIT = 2.0
-"""rms of the residual over rms of the noise ..."""
+"""rms of what the fit leaves over rms of the noise ..."""
 MISFIT_SHARE = 0.01
 """... that matters where it is more than this share of the mode's own peak."""
 BENT = 0.005
@@ -117,7 +117,7 @@ def _left_at_the_end(frequency: NDArray[np.float64], half_width: float) -> float
 def _on_its_values(band: FittedBand, i: int, mode: Mode, share: float) -> Iterator[Remark]:
     at, width = _name(mode), mode.half_power_damping
     if not mode.is_driving_point:
-        cure = "put the sensor where the hammer strikes; if it is there, swap the sign of one of them"
+        cure = "put the sensor where the hammer hits; if it is there, swap the sign of one of them"
         yield Remark("not-driving-point", at, "K is negative: sensor and hammer move against each other", cure)
     error = band.fit.standard_error[2, i] / abs(band.fit.flexibility[0, i])
     if error > LARGEST_ERROR:
@@ -137,7 +137,7 @@ def _on_its_errors(mode: Mode) -> Iterator[Remark]:
     at = _name(mode)
     if mode.coherence is not None and mode.coherence < LEAST_COHERENCE:
         text = f"coherence {mode.coherence:.2f} at its peak, below {LEAST_COHERENCE:g}: the hits disagree"
-        yield Remark("low-coherence", at, text, "strike one point in one direction")
+        yield Remark("low-coherence", at, text, "hit one point in one direction")
     if mode.jackknife is not None and np.max(mode.standard_error / mode.fit_error) > LARGEST_SCATTER:
         text = f"scatters {np.max(mode.standard_error / mode.fit_error):.1f} times more from hit to hit than in the fit"
-        yield Remark("scatter", at, text, "strike one point in one direction, equally hard")
+        yield Remark("scatter", at, text, "hit one point in one direction, equally hard")

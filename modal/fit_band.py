@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -114,7 +113,7 @@ def gain_of_a_term(fit: BandFit, frequency: Array, weight: Array, terms: int) ->
     """Fall of the sum of squares, to first order, that one residual term more than these in each FRF would bring."""
     powers = residual_terms(frequency, terms + 1)
     old, new = (
-        block_diag(*(_split(w * np.concatenate([part, 1j * part])).T for w in weight))
+        _block_diagonal([_split(w * np.concatenate([part, 1j * part])).T for w in weight])
         for part in (powers[:-1], powers[-1:])
     )
     q = np.linalg.qr(np.hstack([old, fit.influence.T, new]))[0]
@@ -213,6 +212,14 @@ def _split(values: ComplexArray) -> Array:
     return np.concatenate([values.real, values.imag], axis=-1)
 
 
+def _block_diagonal(blocks: Sequence[Array]) -> Array:
+    """Blocks of one shape, each a FRF's, on the diagonal of a matrix that is 0 elsewhere."""
+    p, (rows, columns) = len(blocks), blocks[0].shape
+    made = np.zeros((p, rows, p, columns))
+    made[np.arange(p), :, np.arange(p)] = blocks
+    return made.reshape(p * rows, p * columns)
+
+
 def _solve(problem: _Problem, starts: Array) -> _State | None:
     """Levenberg-Marquardt; None where it does not converge."""
     state, damping = problem.at(starts), 1e-4
@@ -266,6 +273,6 @@ def _result(state: _State | None, terms: int) -> BandFit | None:
 
 def _influence(state: _State, on_poles: Array) -> Array:
     """On poles in Hz and damping ratio, then on the flexibilities; on_poles: on scaled poles, shape (2 m, 2 n p)."""
-    own = block_diag(*(frf.inverse @ frf.q.T for frf in state.frfs))
+    own = _block_diagonal([frf.inverse @ frf.q.T for frf in state.frfs])
     by_poles = np.concatenate([frf.inverse @ (frf.q.T @ frf.slope) for frf in state.frfs])
     return np.concatenate([on_poles * state.scale[:, None], own - by_poles @ on_poles])

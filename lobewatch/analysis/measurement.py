@@ -4,7 +4,7 @@ recorded with its reason, and the next one goes on."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
@@ -82,11 +82,8 @@ def _follow(modes: Sequence[Mode], machine: Machine, remarks: list[Remark], last
 
 def _continued(last: Mode, candidates: Sequence[Mode], remarks: list[Remark]) -> Mode | None:
     found = follow(last, candidates)
-    if found.mode is None:
-        cure = "for a rebuilt spindle lay [mode] band_hz around its new mode"
-        remarks.append(Remark("no-mode-to-follow", "", f"no mode to follow: {found.doubt}", cure))
-    elif found.doubt:
-        remarks.append(Remark("followed-in-doubt", "", found.doubt))
+    cure = "for a rebuilt spindle lay [mode] band_hz around its new mode" if found.mode is None else ""
+    remarks += [replace(remark, cure=cure or remark.cure) for remark in found.remarks]
     return found.mode
 
 

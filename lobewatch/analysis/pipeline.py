@@ -101,7 +101,8 @@ def _dynamics(tap: TapTest, machine: Machine, notes: list[str], last: Mode | Non
         return Dynamics([], None, None, [])
     followed = _follow(modes, machine, notes, last)
     if followed is not None:
-        notes.extend(filter(None, [stiffness_doubt(followed.stiffness)]))
+        doubt = stiffness_doubt(followed.stiffness)
+        notes.extend([] if doubt is None else [str(doubt)])
     calibration = _calibrate(followed, machine, tap.circumstances.tool, notes)
     return Dynamics(modes, followed, calibration, _modes_at_tip(modes, followed, calibration, machine, notes))
 

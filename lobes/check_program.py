@@ -11,6 +11,7 @@ from lobes.nearest_speed import nearest_speed
 from lobes.program import Modes, Program, stable_at
 from lobes.speeds import check_speeds
 from lobes.stability_boundary import stability_boundary
+from lobes.stability_lobes import MethodName
 
 DEEPEST = 20.0
 """Limits are looked for up to this many times the depth of the program."""
@@ -35,8 +36,10 @@ class ProgramCheck:
     """Limit over depth, less 1; negative where unstable."""
     speed_margin: float
     """Relative distance to the nearest speed of the other state, > 0; inf where there is none."""
-    method: str
+    method: MethodName
     """How it was found."""
+    detail: str
+    """Into how many intervals the tooth period was divided."""
 
 
 def check_program(
@@ -65,4 +68,5 @@ def check_program(
         depth_margin=limit / program.depth - 1,
         speed_margin=float("inf") if nearest is None else abs(nearest / program.speed_rpm - 1),
         method=lobes.method,
+        detail=lobes.detail,
     )

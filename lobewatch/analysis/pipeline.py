@@ -4,14 +4,14 @@ recorded with its reason, and the pipeline goes on."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from acquisition import TapTest, stiffness_doubt
+from acquisition import TapTest, joined, stiffness_doubt
 from dsm import Calibration, calibrate, modal_stiffness
 from lobes import StabilityLobes, zero_order
 from lobewatch.machine.machine_file import Machine
@@ -196,7 +196,5 @@ def lobes_of(
 
 def _warnings(lobes: Mapping[str, StabilityLobes]) -> list[str]:
     """What speaks against the method, with the cuts that it concerns."""
-    cuts: dict[str, list[str]] = {}
-    for name, found in lobes.items():
-        cuts.setdefault(found.warning, []).append(name)
-    return [f"{', '.join(names)}: {warning}" for warning, names in cuts.items() if warning]
+    found = joined(replace(remark, about=name) for name, one in lobes.items() for remark in one.remarks)
+    return [str(remark) for remark in found]

@@ -85,6 +85,7 @@ def _json(one: ProgramAdvice) -> dict[str, Any]:
             "tolerable_decay": one.decay,
             "drive_limit_mm": one.drive_limit * 1e3,
             "method": found.method,
+            "method_detail": found.detail,
         }
     about = {"name": one.table.name, "speed_rpm": one.table.speed_rpm, "depth_mm": one.table.depth_mm}
     return about | {"tap_id": one.tap_id} | known | {"notes": list(one.notes)}

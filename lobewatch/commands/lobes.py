@@ -74,9 +74,9 @@ def lobes(
     if figure is not None:
         pictures.append((lobes_picture(folder, now, then, best), figure))
     if radial is not None:
-        picture, warning = radial_picture(folder.machine, now, method)
+        picture, remarks = radial_picture(folder.machine, now, method)
         pictures.append((picture, radial))
-        notes += [f"--radial: {with_option(warning)}"] if warning else []
+        notes += [f"--radial: {with_option(remark)}" for remark in remarks]
     if waterfall is not None:
         pictures.append((waterfall_picture(folder, newest, cut), waterfall))
     for picture, path in pictures:
@@ -93,11 +93,9 @@ def _say(
     as_json: bool,
 ) -> None:
     found, programs = now.lobes, program_json({now.name: now.lobes}, machine)
-    warnings = [with_option(found.warning)] if found.warning else []
-    if programs and not found.method.startswith("semi"):
-        warnings.append(
-            f"stable or not by {found.method.partition(',')[0]}, in this chart; lobewatch check has the verdict"
-        )
+    warnings = [with_option(remark) for remark in found.remarks]
+    if programs and found.method != "semi-discretisation":
+        warnings.append(f"stable or not by {found.method}, in this chart; lobewatch check has the verdict")
     notes = dict.fromkeys([*now.measurement.reasons, *warnings, *remarks])
     payload = lobes_json(now.name, found) | {
         "tap_id": now.measurement.tap_id,
@@ -115,7 +113,7 @@ def _say(
     emit(
         payload,
         as_json,
-        f"{now.name}: {found.method}, from the {now.source} of {now.measurement.tap_id}",
+        f"{now.name}: {found.stated_method}, from the {now.source} of {now.measurement.tap_id}",
         *_limit_lines(found, best),
         *shift_lines(shifts),
         *([program_table(programs)] if programs else []),
@@ -126,7 +124,7 @@ def _say(
 def _limit_lines(found: StabilityLobes, best: Sequence[Pocket]) -> list[str]:
     low = found.minimum
     if not np.isfinite(low.depth):
-        return [f"no limit in this speed range ({found.method})"]
+        return [f"no limit in this speed range ({found.stated_method})"]
     return [
         f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm, chatter at {low.chatter_frequency:.1f} Hz",
         f"best pockets up to {USEFUL * low.depth * 1e3:.1f} mm (in brackets: {POCKET_RANGE}), by depth: "

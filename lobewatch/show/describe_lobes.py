@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from acquisition import Remark
 from lobes import Pocket, PocketShift, ProgramCheck, cutting_coefficients
 from lobes.check_program import DEEPEST
 from lobes.pockets import SHARE
@@ -13,6 +14,8 @@ from lobewatch.machine.machine_file import Machine
 
 POCKET_RANGE = f"at least {100 * SHARE:.0f} % of the depth"
 """What holds between the ends of a pocket."""
+OUT_OF_RANGE = frozenset({"low-immersion", "fast-teeth", "force-cancels"})
+"""Codes of what another method is the cure of."""
 
 
 def pocket_json(pocket: Pocket) -> dict[str, float]:
@@ -44,9 +47,10 @@ def margin_text(found: ProgramCheck) -> str:
     return "-" if math.isinf(found.depth_margin) else f"{100 * found.depth_margin:+.0f} %"
 
 
-def with_option(warning: str) -> str:
-    """A warning of a method, with the option of `lobewatch lobes` for what it asks for."""
-    return warning.replace("use semi-discretisation", "use semi-discretisation (--method semi-discretisation)")
+def with_option(remark: Remark) -> str:
+    """A remark on a method, with the option of `lobewatch lobes` for what it asks for."""
+    option = " (--method semi-discretisation)" if remark.code in OUT_OF_RANGE else ""
+    return f"{remark}{option}"
 
 
 def shift_json(shift: PocketShift) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from datetime import datetime
 import numpy as np
 from matplotlib.figure import Figure
 
-from acquisition import DataError
+from acquisition import DataError, Remark
 from lobes import (
     DepthBand,
     Pocket,
@@ -67,15 +67,15 @@ def _bands(machine: Machine, now: Chart) -> tuple[DepthBand | None, DepthBand | 
 
 def _title(machine: Machine, now: Chart) -> str:
     predicted = f", {now.label}" if now.measurement.predicted else ""
-    return f"{machine.machine.name}: {now.name}\n{now.lobes.method.partition(',')[0]}{predicted}"
+    return f"{machine.machine.name}: {now.name}\n{now.lobes.method}{predicted}"
 
 
-def radial_picture(machine: Machine, now: Chart, method: Method) -> tuple[Figure, str]:
+def radial_picture(machine: Machine, now: Chart, method: Method) -> tuple[Figure, tuple[Remark, ...]]:
     """The limits over speed and radial depth, and what is wrong with the method at small ones."""
     speeds = now.lobes.speed_rpm if method is not Method.SEMI_DISCRETISATION else now.lobes.speed_rpm[::4]
     found = radial_lobes(lambda cut: chart(method, now.x, now.y, cut, speeds), now.cut, IMMERSIONS)
     diameter = now.table.tool_diameter_mm / 1e3
-    return radial_figure(found, diameter, now.cut.immersion, _title(machine, now)), found.warning
+    return radial_figure(found, diameter, now.cut.immersion, _title(machine, now)), found.remarks
 
 
 def waterfall_picture(folder: MachineFolder, newest: Measurement, cut: str) -> Figure:

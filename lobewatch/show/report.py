@@ -55,7 +55,7 @@ def _content(
         "label": machine.spindle.label if machine.spindle else "",
         "changes": _changes(history, first, last),
         "programs": [_program(one) for one in advice],
-        "program_method": next((one.check.method.partition(",")[0] for one in advice if one.check is not None), ""),
+        "program_method": next((one.check.method for one in advice if one.check is not None), ""),
         "notes": [note for note in str(columns["notes"][last]).splitlines() if note],
         "modes": _modes(history, last),
         "operator": now.circumstances.operator,
@@ -81,11 +81,11 @@ def _lobes(
     known = (bool(last.x), bool(last.y))
     then = first.lobes.get(cut) if first.tap_id != last.tap_id else None
     text = (
-        f"Limit of the {cut} by {now.method}; cuts in the shaded region chatter. "
+        f"Limit of the {cut} by {now.stated_method}; cuts in the shaded region chatter. "
         "Marks: programs with this same cut, as in the table above."
     )
     if np.isinf(now.minimum.depth):
-        text = f"The {cut} has no limit in this speed range ({now.method})."
+        text = f"The {cut} has no limit in this speed range ({now.stated_method})."
     if then is not None and (bool(first.x), bool(first.y)) != known:
         then, text = None, f"{text} The first test knows other directions than the newest: no comparison."
     depths = {f"{first.time:%Y-%m-%d}": then.depth} if then is not None else {}

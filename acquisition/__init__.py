@@ -1,7 +1,7 @@
 """From the DAQ to hits, averaged FRF and HDF5 files."""
 
 from acquisition.atomic import atomic_write
-from acquisition.channel import Block, Channel
+from acquisition.channel import Block, Channel, TapDirection, tap_direction
 from acquisition.dataq import DataqEmulator, DataqFaults, DataqInput, DataqSource, DataqTraits
 from acquisition.devices import DeviceIdentity, probe_port
 from acquisition.emulation import HammeredStructure, Hammering, SimulatedSource, Structure
@@ -78,6 +78,7 @@ __all__ = [
     "Source",
     "SourceFile",
     "Structure",
+    "TapDirection",
     "TapTest",
     "TapsEmulator",
     "TapsSource",
@@ -113,6 +114,7 @@ __all__ = [
     "recorded_as",
     "ring_down",
     "stiffness_doubt",
+    "tap_direction",
     "unit_mistake",
     "usb_identity",
     "write_hit",

@@ -7,6 +7,7 @@ import secrets
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
+from acquisition.channel import TapDirection, tap_direction
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
 
@@ -21,8 +22,8 @@ class Circumstances:
     """When (timezone-aware)."""
     tool: str = ""
     """Name of the tool or assembly."""
-    direction: str = "x"
-    """Direction at the tool tip, "x" or "y"."""
+    direction: TapDirection = "x"
+    """Direction at the tool tip."""
     operator: str = ""
     """Who held the hammer."""
     machine_toml: str = ""
@@ -32,8 +33,7 @@ class Circumstances:
 
     def __post_init__(self) -> None:
         """Refuse a direction that is none, and a time without its zone."""
-        if self.direction not in ("x", "y"):
-            raise ValueError(f'direction={self.direction!r} is neither "x" nor "y"')
+        tap_direction(self.direction)
         if self.created.tzinfo is None:
             raise ValueError(f"created={self.created} has no time zone; give one, e.g. datetime.now(UTC)")
 

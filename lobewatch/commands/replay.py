@@ -20,6 +20,7 @@ from acquisition import (
     new_tap_id,
     read_recording,
     recorded_as,
+    tap_direction,
 )
 from lobewatch.analysis.history import update_history
 from lobewatch.machine.folder import MachineFolder
@@ -68,7 +69,7 @@ def replay(
                 machine=setup.machine.name,
                 created=date.astimezone() if date else own.created,
                 tool=tool or own.tool or setup.tap.tool,
-                direction=direction or own.direction,
+                direction=tap_direction(direction or own.direction),
                 machine_toml=folder.toml.read_text("utf-8"),
             )
             fresh[digest] = _tap_test(file, about, SourceFile(file.name, content))

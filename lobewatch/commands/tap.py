@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from acquisition import Circumstances
+from acquisition import Circumstances, tap_direction
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.show.describe import measurement_json, measurement_texts
 from lobewatch.show.output import Json, emit, notes
@@ -56,7 +56,7 @@ def tap(
         setup.machine.name,
         datetime.now(UTC),
         tool or setup.tap.tool,
-        direction,
+        tap_direction(direction),
         operator,
         folder.toml.read_text("utf-8"),
     )

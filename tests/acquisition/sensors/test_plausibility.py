@@ -125,3 +125,10 @@ def test_the_date_of_calibration(calibrated: str, today: date, months: float, co
     assert (found.code if found else "") == code
     assert words in str(found or "")
     assert found is None or found.about == "force"
+
+
+@pytest.mark.parametrize("direction", ["z", "X", "xy"])
+def test_a_channel_of_no_direction_of_the_tool_tip_is_refused(direction: str) -> None:
+    with pytest.raises(ValueError, match=f"direction='{direction}' is none of x, y"):
+        replace(HAMMER, direction=direction)  # type: ignore[arg-type]
+    assert [replace(HAMMER, direction=one).direction for one in ("", "x", "y")] == ["", "x", "y"]

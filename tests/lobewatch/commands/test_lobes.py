@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id
+from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
 from lobes import (
     Cut,
     DepthBand,
@@ -69,7 +69,7 @@ def folder(tmp_path: Path) -> MachineFolder:
 
 
 def tap(
-    folder: MachineFolder, frequency: float, days: float = 0.0, direction: str = "x", stiffness: float = 3.5e7
+    folder: MachineFolder, frequency: float, days: float = 0.0, direction: TapDirection = "x", stiffness: float = 3.5e7
 ) -> None:
     when = START + timedelta(days=days)
     about = Circumstances("m", when, "reference", direction, "", folder.toml.read_text("utf-8"))

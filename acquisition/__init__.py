@@ -24,6 +24,7 @@ from acquisition.files import (
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hit import Hit, HitFlags
 from acquisition.hits import HitSearch, Trigger, capture_hits, ring_down
+from acquisition.names import check_name
 from acquisition.ports import PortInfo, find_port, list_ports, no_ports_hint, usb_identity
 from acquisition.remark import Remark, joined
 from acquisition.sensors import (
@@ -91,6 +92,7 @@ __all__ = [
     "capture_hits",
     "channel_doubts",
     "check_hit",
+    "check_name",
     "check_rate",
     "cross_spectra",
     "estimate_frf",

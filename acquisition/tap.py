@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from acquisition.channel import TapDirection, tap_direction
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
+from acquisition.names import check_name
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,13 @@ class TapTest:
 
 
 def new_tap_id(circumstances: Circumstances) -> str:
-    """An identity that sorts by time and is a file name on every system."""
+    """An identity that sorts by time and is a file name on every system.
+
+    Raises ValueError for a machine, tool or operator with control characters in its name: what is kept for good must
+    be fit to be shown.
+    """
+    for what in ("machine", "tool", "operator"):
+        check_name(getattr(circumstances, what), what)
     stamp = circumstances.created.astimezone(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
     names = (circumstances.machine, circumstances.tool, circumstances.direction)
     slugs = [re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-")[:24] for name in names]

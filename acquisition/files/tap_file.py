@@ -93,7 +93,7 @@ def _write_circumstances(file: h5py.File, about: Circumstances) -> None:
     file.attrs["created"] = about.created.isoformat()
     file.attrs["machine_toml_sha256"] = hashlib.sha256(about.machine_toml.encode()).hexdigest()
     for name in ("machine", "tool", "direction", "operator", "device"):
-        file.attrs[name] = getattr(about, name)
+        file.attrs[name] = getattr(about, name).replace("\0", "")  # HDF5 text ends there, and a device may send it
     file["machine_toml"] = about.machine_toml
 
 

@@ -15,12 +15,15 @@ from acquisition import DataError
 from lobewatch.analysis.advice import ProgramAdvice, advise
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.machine_file import SpeedRange
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.describe_lobes import limit_text, margin_text
 from lobewatch.show.output import Json, emit, notes, table
 
 
 def check(
-    machine: Annotated[Path, typer.Argument(help="Machine folder with tap tests and cutting programs.")],
+    machine: Annotated[
+        Path, typer.Argument(parser=named_folder, help="Machine folder with tap tests and cutting programs.")
+    ],
     as_json: Json = False,
 ) -> None:
     """Every cutting program against the newest tap test with its tool; exit code 1 unless all are stable.

@@ -20,6 +20,7 @@ from lobewatch.analysis.prediction import predict
 from lobewatch.machine.drive import drive_limit
 from lobewatch.machine.folder import MachineFolder, TapEntry
 from lobewatch.machine.machine_file import REFERENCE_CUT, Machine
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.describe import lobes_json, program_json, program_table
 from lobewatch.show.describe_lobes import (
     POCKET_RANGE,
@@ -40,7 +41,7 @@ USEFUL = 5.0
 
 
 def lobes(
-    machine: Annotated[Path, typer.Argument(help="Machine folder with at least one tap test.")],
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
     cut: Annotated[str, typer.Option(help=r"Name of a \[\[program]], or the reference cut.")] = REFERENCE_CUT,
     tool: Annotated[str | None, typer.Option(help="Of the newest tap test if not given; else predicted.")] = None,
     source: Annotated[Dynamics, typer.Option(help="From the modes found, or straight from the FRF.")] = Dynamics.MODES,

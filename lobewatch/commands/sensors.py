@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
+from rich.markup import escape
 from rich.table import Table
 
 from acquisition import (
@@ -30,6 +31,7 @@ from acquisition.files.units import STANDARD_GRAVITY
 from dsm import plus_minus
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import Device, checked_rate, has_clock, use_rate
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit, notes, table
 from lobewatch.tap.live_signal import LiveSignal
 from lobewatch.tap.plug import open_source
@@ -46,7 +48,7 @@ SKEW_SECONDS = 2.0
 
 
 def sensors(
-    machine: Annotated[Path, typer.Argument(help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
     port: Annotated[str, typer.Option(help="Serial port of the DAQ, or socket://HOST:PORT.")] = "",
     mass_kg: Annotated[
         float | None, typer.Option(help="Check F = m a on a hung mass: all that moves, accelerometer included (kg).")
@@ -154,7 +156,7 @@ def _channel_table(channels: tuple[Channel, ...]) -> Table:
             f"±{channel.full_scale:g} V",
             str(channel.adc_bits),
             f"{channel.skew * 1e6:.4g}",
-            channel.serial_number or "-",
+            escape(channel.serial_number or "-"),
             channel.calibration_date or "-",
         )
     return made

@@ -11,6 +11,7 @@ import typer
 
 from acquisition import Circumstances, tap_direction
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.describe import measurement_json, measurement_texts
 from lobewatch.show.output import Json, emit, notes
 from lobewatch.show.printer import TapPrinter
@@ -21,7 +22,7 @@ from lobewatch.tap.session import TapSession, TapStopped
 
 
 def tap(
-    machine: Annotated[Path, typer.Argument(help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
     port: Annotated[str, typer.Option(help="Serial port of the DAQ, socket://HOST:PORT, or file:RECORDING.")] = "",
     tool: Annotated[str, typer.Option(help=r"What is in the spindle; \[tap] tool where not given.")] = "",
     direction: Annotated[str, typer.Option(help="Direction at the tool tip, x or y.")] = "x",

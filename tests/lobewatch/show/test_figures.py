@@ -10,7 +10,7 @@ from matplotlib.collections import LineCollection
 
 from acquisition import Frf
 from lobewatch.machine.machine_file import Limits
-from lobewatch.show.figures import frf_figure, svg, trend_figure
+from lobewatch.show.figures import frf_figure, new_axes, svg, trend_figure
 from lobewatch.show.figures_lobes import lobes_figure
 
 TIMES = [datetime(2026, month, 1, tzinfo=UTC) for month in (1, 2, 3)]
@@ -48,3 +48,19 @@ def test_receptance_is_drawn_in_nm_per_n() -> None:
     real, imaginary = (axes.lines[0].get_ydata() for axes in figure.axes)
     assert real == pytest.approx(2.0)
     assert imaginary == pytest.approx(-5.0)
+
+
+@pytest.mark.parametrize("name", [r"cost $5 to $6 \frac", r"cost $5 \frac to $6", "$x$", r"a_b^c \$ $"])
+def test_no_name_is_read_as_a_formula(name: str) -> None:
+    speed = np.linspace(1000.0, 2000.0, 5)
+    program = {"name": name, "speed_rpm": 1500.0, "depth_mm": 3.0, "stable": False}
+    picture = svg(lobes_figure(speed, {name: np.full(5, 1e-3)}, [program], title=name))
+    assert picture.count(f">{name}</text>") == 3
+
+
+def test_logarithmic_axes_have_plain_numbers() -> None:
+    figure, (axes,) = new_axes(1, (4.0, 3.0))
+    axes.semilogy([1.0, 2.0], [1e-3, 100.0])
+    picture = svg(figure)
+    assert "$" not in picture
+    assert [f">{label}</text>" in picture for label in ("1e\u221203", "1e\u221201", "1", "100")] == [True] * 4

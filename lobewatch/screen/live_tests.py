@@ -6,7 +6,7 @@ import threading
 from dataclasses import replace
 from datetime import UTC, datetime
 
-from acquisition import Circumstances, DataError
+from acquisition import Circumstances, DataError, TapDirection
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.plug import Plug
 from lobewatch.tap.session import TapSession, TapStopped
@@ -16,7 +16,7 @@ from lobewatch.tap.state import TapState, Word
 class LiveTest:
     """A tap test that runs in a thread of its own from the beginning on."""
 
-    def __init__(self, folder: MachineFolder, direction: str) -> None:
+    def __init__(self, folder: MachineFolder, direction: TapDirection) -> None:
         """Begin; DataError where machine.toml names no port."""
         machine = folder.machine
         if not machine.daq.port:

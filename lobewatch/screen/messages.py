@@ -8,18 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from lobewatch.tap.state import Plots, TapState, Word
+from lobewatch.tap.state import Plots, TapState
 
 CURVES = ("time", "force", "acceleration", "frequency", "mean", "last", "coherence", "force_spectrum")
 
 
 def state_message(state: TapState) -> str:
     """All of a state but its curves, as JSON; numbers that are not finite become null."""
-    refused = state.word is Word.REFUSED and state.verdict
     return json.dumps(
         {
             "kind": state.word.name.lower().replace("_", "-"),
-            "word": state.verdict.upper() if refused else state.word.value,
+            "word": state.shown_word,
             "title": state.title,
             "device": ", ".join(filter(None, (state.device, state.resumed))),
             "reason": state.reason,

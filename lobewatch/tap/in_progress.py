@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from datetime import timedelta
 from pathlib import Path
 
 from acquisition import (
+    Channel,
     Circumstances,
     DataError,
     Hit,
@@ -52,6 +53,8 @@ class TapInProgress:
     """How many of them were there when it was gone on with."""
     trigger: Trigger | None = None
     """How its hits are recorded; None until that is chosen."""
+    baseline: Hit | None = None
+    """A record at rest; None until the self-check has run."""
 
     @property
     def good(self) -> int:
@@ -67,6 +70,21 @@ class TapInProgress:
             for i, (hit, flags, reason) in told
         )
 
+    def accept_device(self, sample_rate: float, channels: tuple[Channel, Channel], description: str) -> None:
+        """Note what the hits to come are recorded with; ValueError where those before them had another set-up."""
+        known = self.hits[-1] if self.hits else self.baseline
+        if known is not None and (known.sample_rate, known.channels) != (sample_rate, channels):
+            raise self.other_setup()
+        if not self.hits:
+            self.circumstances = replace(self.circumstances, device=description)
+
+    def other_setup(self) -> ValueError:
+        """The refusal to mix hits of two set-ups."""
+        return ValueError(
+            f"the interrupted test {self.id} was recorded with another length, sample rate or sensor; "
+            "begin anew with --new"
+        )
+
     def add(self, hit: Hit, flags: HitFlags, reason: str) -> None:
         """Keep a hit; on the disk when this returns."""
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -76,14 +94,6 @@ class TapInProgress:
         self.hits.append(hit)
         self.flags.append(flags)
         self.reasons.append(reason)
-
-    def undo(self) -> int | None:
-        """Take back the last good hit and return its index; None where there is none. It stays stored, as undone."""
-        for i in reversed(range(len(self.hits))):
-            if not self.flags[i]:
-                self.take_out(i, HitFlags.UNDONE, "")
-                return i
-        return None
 
     def take_out(self, number: int, flags: HitFlags, reason: str) -> None:
         """Refuse a good hit (by its index) afterwards; it stays stored."""

@@ -115,6 +115,8 @@ class TapState:
     """DAQ, port and rate."""
     verdict: str = ""
     """Of the last hit, e.g. "good" or "double hit, too soft"."""
+    trial: bool = False
+    """Whether the last hit was a trial hit, which does not count."""
     reason: str = ""
     """One sentence with figures: what was wrong with the last hit, or why the test stands still."""
     good: int = 0
@@ -135,3 +137,10 @@ class TapState:
     """Of the last hit and the mean."""
     outcome: Outcome | None = None
     """At the end."""
+
+    @property
+    def shown_word(self) -> str:
+        """The word as a screen shows it: the verdict in place of REFUSED."""
+        if self.word is not Word.REFUSED or not self.verdict:
+            return self.word.value
+        return f"{self.verdict}{', trial hit' if self.trial else ''}".upper()

@@ -91,10 +91,14 @@ class TapSession:
     def _begin(self) -> JudgedHits:
         """What is there of an interrupted test, or nothing yet."""
         hits = JudgedHits(begin_tap(self._folder, self._about, self._resume), self._folder.machine)
+        told = []
         if hits.tap.hits:
             begun = f"{hits.tap.circumstances.created:%Y-%m-%d %H:%M} UTC"
-            resumed = f"going on with the test begun {begun}: {hits.progress} are there"
-            self._publisher.show_hits(hits, resumed=resumed)
+            told.append(f"going on with the test begun {begun}: {hits.progress} are there")
+        if hits.tap.damaged:
+            told.append(f"damaged and set aside: {', '.join(str(path) for path in hits.tap.damaged)}")
+        if told:
+            self._publisher.show_hits(hits, resumed="; ".join(told))
         return hits
 
     def _finish(self, hits: JudgedHits) -> TapTest:

@@ -110,7 +110,8 @@ class TapState:
     title: str
     """Machine, tool and direction."""
     resumed: str = ""
-    """Where an interrupted test is gone on with: which one and how many good hits it had; empty for a new one."""
+    """Where an interrupted test is gone on with: which one, how many good hits it had, and damaged files that were set
+    aside; empty for a new one."""
     device: str = ""
     """DAQ, port and rate."""
     verdict: str = ""

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 
-from acquisition import Block, Channel, DeviceError, Event
+from acquisition import Block, Channel, DeviceError, Event, EventKind
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import checked_rate, has_clock, known_rate
-from lobewatch.tap.button import Button
 from lobewatch.tap.in_progress import TapInProgress
 from lobewatch.tap.live_signal import Device, LiveSignal, description
 from lobewatch.tap.publisher import Publisher
@@ -16,6 +15,30 @@ from lobewatch.tap.state import Word
 
 RETRY_TIME = 0.5
 """Pause between two tries to find the device again (s)."""
+BOUNCE_TIME = 0.3
+"""A press so soon after the button has moved is its bouncing (s)."""
+
+
+class Button:
+    """The button of a device, which takes the last good hit back.
+
+    Presses are told from bouncing by the clock of the device: events that wait to be read come all at once.
+    """
+
+    def __init__(self, sample_rate: float) -> None:
+        """Not pressed yet; sample_rate: of the scans that events are timed by (Hz)."""
+        self._bounce = BOUNCE_TIME * sample_rate
+        self._moved: int | None = None
+
+    def presses(self, events: deque[Event]) -> int:
+        """Take all events that wait; how often the button was pressed in them."""
+        count = 0
+        while events:
+            event = events.popleft()
+            if event.kind == EventKind.BUTTON:
+                count += event.begins and (self._moved is None or abs(event.scan - self._moved) >= self._bounce)
+                self._moved = event.scan
+        return count
 
 
 class Connection:

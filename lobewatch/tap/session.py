@@ -6,18 +6,17 @@ import time
 from collections.abc import Callable
 
 from acquisition import Circumstances, DataError, DeviceError, TapTest
-from lobewatch.analysis.pipeline import Measurement
+from lobewatch.analysis import Logbook, Measurement
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.connection import Connector
-from lobewatch.tap.finish import finish
-from lobewatch.tap.hit_loop import HitLoop
+from lobewatch.tap.hit_loop import HitLoop, TapStopped, Wishes
 from lobewatch.tap.in_progress import begin_tap
 from lobewatch.tap.judged_hits import JudgedHits
 from lobewatch.tap.live_signal import Device
+from lobewatch.tap.outcome import outcome_of
 from lobewatch.tap.phases import Phases
 from lobewatch.tap.publisher import Publisher
 from lobewatch.tap.state import TapState, Word
-from lobewatch.tap.wishes import TapStopped, Wishes
 
 __all__ = ["TapSession", "TapStopped"]
 
@@ -105,7 +104,10 @@ class TapSession:
         """Average, commit, and say what it means."""
         self._publisher.show(word=Word.DONE, reason="The result is being worked out.", levels=None)
         tap = hits.tap.finish()
-        self._measurement, outcome = finish(self._folder, tap, guided=self._guided)
+        logbook = Logbook(self._folder)
+        logbook.commit(tap)
+        self._measurement = logbook.measurement(tap.id)
+        outcome = outcome_of(logbook, self._measurement) if self._guided else None
         self._publisher.show(reason="", outcome=outcome)
         return tap
 

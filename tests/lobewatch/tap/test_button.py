@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition import Channel, Event, EventKind, HammeredStructure, HitFlags, TapsEmulator, TapsSource, TapTest
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.button import Button
+from lobewatch.tap.connection import Button
 from lobewatch.tap.session import TapSession, TapStopped
 from lobewatch.tap.state import TapState
 

@@ -13,6 +13,7 @@ from acquisition import (
     Block,
     Circumstances,
     DataError,
+    Device,
     DeviceError,
     Hit,
     HitFlags,
@@ -28,7 +29,7 @@ from lobewatch.analysis.pipeline import Measurement
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import checked_rate, has_clock, known_rate
 from lobewatch.tap.in_progress import TapInProgress, begin_tap
-from lobewatch.tap.live_signal import LEVEL_TIME, Device, LiveSignal, description, resting_rms
+from lobewatch.tap.live_signal import LEVEL_TIME, LiveSignal, description, resting_rms
 from lobewatch.tap.outcome import outcome_of
 from lobewatch.tap.plots import plots_of
 from lobewatch.tap.self_check import calibration_check, quiet_stretch, self_check
@@ -170,7 +171,7 @@ class TapSession:
             raise
         if not self._tap.hits:
             self._tap.circumstances = replace(self._tap.circumstances, device=description(self._device))
-        self._show(device=f"{self._device.info['model']}, {self._device.sample_rate:g} Hz")
+        self._show(device=f"{self._device.identity.model}, {self._device.sample_rate:g} Hz")
 
     def _measure_rate(self) -> None:
         """Against the clock, of a device that this machine does not know yet."""
@@ -216,7 +217,7 @@ class TapSession:
 
     def _tell_fault(self) -> None:
         """A pulled sensor cable or a sensor without supply, where the device reports that, and that it is mended."""
-        fault = getattr(self._device, "fault", "")
+        fault = self._device.fault
         if fault != self._fault:
             self._fault = fault
             self._show(reason=fault or "The sensor is connected again.")

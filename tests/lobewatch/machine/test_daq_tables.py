@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from acquisition import Channel, DataError, DataqInput
+from acquisition import Channel, DataError, SensorInput
 from lobewatch.machine.machine_file import parse_machine
 
 HEAD = '[machine]\nname = "mill 3"\n'
@@ -37,7 +37,7 @@ skew_us = 6.5
 
 def test_channels_are_converted_at_the_door() -> None:
     force, acceleration = (channel.build() for channel in parse_machine(HEAD + DAQ).daq.channel)
-    assert force == DataqInput(2, Channel("force", 2.25e-3, 5.0))
+    assert force == SensorInput(2, Channel("force", 2.25e-3, 5.0))
     assert acceleration.number == 3
     channel = acceleration.channel
     assert channel.sensitivity == pytest.approx(-10e-3 * 10 / 9.80665)  # V at the device per m/s^2
@@ -50,7 +50,7 @@ def test_channels_are_converted_at_the_door() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("input = 2", "input = 8", "daq channel 1 input: Expected `int` <= 7"),
+        ("input = 2", "input = 8", "daq: input=8 is none of 0 to 7"),
         ("input = 2", "input = 3", "daq: channel 2: input=3 is that of channel 1"),
         ("input = 2\n", "", "daq channel 1: Object missing required field `input`"),
         ('"force"', '"acceleration"', "daq channel 1: quantity='acceleration' needs sensitivity_mv_per_g"),
@@ -69,7 +69,11 @@ def test_channels_are_converted_at_the_door() -> None:
         ('"x"', '"z"', "daq channel 2 direction: Invalid enum value 'z'"),
         ("2026-01-15", '"last spring"', "daq channel 2 calibration_date: "),
         ("skew_us = 6.5", "skew_us = inf", "daq channel 2 skew_us: "),
-        ('driver = "dataq"', 'driver = "ni"', "daq driver: Invalid enum value 'ni'"),
+        (
+            'driver = "dataq"',
+            'driver = "ni"',
+            "daq: driver='ni' is none of taps, dataq; install the package that brings it",
+        ),
         ('driver = "dataq"', "", "daq: channel: a TAPS/1 device names its own sensors"),
         ('driver = "dataq"', "loss_detection = false", "daq: channel: a TAPS/1 device names its own sensors"),
     ],

@@ -70,7 +70,6 @@ class Simulated(SimulatedSource):
         self, signal: HammeredStructure, channels: Pair, seconds: float = 60.0, unplugged: Callable[[], bool] = bool
     ) -> None:
         super().__init__(signal, channels, RATE, round(seconds * RATE))
-        self.info = {"model": "simulation"}
         self._unplugged = unplugged
 
     def blocks(self) -> Iterator[Block]:
@@ -350,7 +349,7 @@ def test_a_device_that_comes_back_elsewhere_is_found_and_a_stranger_at_its_port_
                 ports.append(SimpleNamespace(device=second.port, vid=0x16C0, serial_number="5C2B"))
 
         monkeypatch.setattr("serial.tools.list_ports.comports", lambda **_: ports)
-        monkeypatch.setattr("lobewatch.tap.plug.TapsSource", open_taps)
+        monkeypatch.setattr("acquisition.taps.TapsSource", open_taps)
         tap = session_of(folder, Plug(folder.machine.daq, first.port).open, plug).run()
     assert opened == [first.port, second.port]
     assert len(tap.accepted) == 10

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from rich.markup import escape
@@ -14,8 +15,7 @@ from lobewatch.show.output import table
 
 def ports_json(survey: PortSurvey) -> dict[str, Any]:
     """Every port, and what is wrong with drivers."""
-    remarks = [{"code": one.code, "about": one.about, "text": one.text, "cure": one.cure} for one in survey.remarks]
-    return {"ports": [_port_json(one) for one in survey.seen], "remarks": remarks}
+    return {"ports": [_port_json(one) for one in survey.seen], "remarks": [asdict(one) for one in survey.remarks]}
 
 
 def ports_texts(survey: PortSurvey) -> list[str | Table]:
@@ -32,21 +32,13 @@ def _usb(port: PortInfo) -> str:
 
 
 def _port_json(seen: SeenPort) -> dict[str, Any]:
-    port, answer = seen.port, None
-    if seen.answer is not None:
-        who = seen.answer.identity
-        answer = {
-            "driver": seen.answer.driver,
-            "model": who.model,
-            "serial": who.serial,
-            "firmware": who.firmware,
-        }
+    port, answer = seen.port, seen.answer
     return {
         "device": port.device,
         "usb": _usb(port),
         "serial_number": port.serial_number,
         "description": port.description,
-        "answer": answer,
+        "answer": {"driver": answer.driver, **asdict(answer.identity)} if answer else None,
         "problem": seen.problem or None,
     }
 

@@ -11,6 +11,7 @@ import pytest
 from acquisition import Channel, DataError, SensorInput
 from lobewatch.machine.machine_file import parse_machine
 
+PLUGIN = Path(__file__).parents[2] / "plugins" / "dummy_device"
 HEAD = '[machine]\nname = "mill 3"\n'
 DAQ = """
 [daq]
@@ -93,6 +94,18 @@ def test_a_dataq_device_needs_its_sensors_and_a_taps_device_its_loss_detection()
         parse_machine(HEAD + '[daq]\ndriver = "dataq"\n')
     with pytest.raises(DataError, match="daq: loss_detection=false: a TAPS/1 device always numbers its scans"):
         parse_machine(HEAD + "[daq]\nloss_detection = false\n")
+
+
+def test_the_driver_of_a_package_checks_its_own_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    dummy = HEAD + '[daq]\ndriver = "dummy"\n'
+    with pytest.raises(DataError, match="daq: driver='dummy' is none of taps, dataq; install the package"):
+        parse_machine(dummy)
+    monkeypatch.syspath_prepend(PLUGIN)
+    assert parse_machine(dummy).daq.driver == "dummy"
+    with pytest.raises(DataError, match="daq: sample_rate_hz=1000 is not 25600, the only rate of a dummy device"):
+        parse_machine(dummy + "sample_rate_hz = 1000\n")
+    with pytest.raises(DataError, match=r"daq: channel: a dummy device names its own sensors: leave \[\[daq.channel"):
+        parse_machine(HEAD + DAQ.replace('"dataq"', '"dummy"'))
 
 
 @pytest.mark.parametrize("name", ["new_machine.toml", "surrogate_machine.toml"])

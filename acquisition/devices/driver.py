@@ -58,7 +58,8 @@ class Driver:
     sensors: SensorPlace | None = None
     """Where the device keeps the data of its sensors; None: it has none, [[daq.channel]] must name them."""
     vendors: frozenset[int] = frozenset()
-    """USB vendors of such devices, to which no other question is put; empty where they may be of any."""
+    """USB vendors of such devices, to which no other question is put; none where they may be of any vendor, or of one
+    whose boards others build on too."""
     emulate: Callable[[Bench], EmulatorThread] | None = None
     """A device of this kind made of software."""
     emulates_fast: bool = False

@@ -41,7 +41,7 @@ def _find(name: str) -> Driver | Remark:
     points = sorted(entry_points(group=GROUP, name=name), key=_package)
     if not points:
         text = f"driver={name!r} is none of {', '.join(driver_names())}"
-        return Remark("driver-not-known", "", text, "install the package that brings it")
+        return Remark("driver-not-known", "", text, "correct the name, or install the package that brings it")
     if len(points) > 1:
         packages = " and ".join(map(_package, points))
         return _remark(name, f"the packages {packages} both bring it", "remove one of them")

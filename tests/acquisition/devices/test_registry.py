@@ -87,7 +87,7 @@ def test_two_packages_with_one_driver_are_both_named(install: Install) -> None:
 
 
 def test_a_name_that_nobody_brings() -> None:
-    with pytest.raises(DataError, match="driver='odd' is none of taps, dataq; install the package that brings it"):
+    with pytest.raises(DataError, match="driver='odd' is none of taps, dataq; correct the name, or install"):
         find_driver("odd")
 
 

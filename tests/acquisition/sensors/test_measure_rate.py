@@ -251,11 +251,11 @@ def silence(first: int, n: int) -> NDArray[np.float64]:
 
 def test_an_emulated_device_through_a_pseudo_terminal(folder: MachineFolder) -> None:
     with TapsEmulator(silence, PAIR, 102400.0) as device, TapsSource(device.port) as source:
-        found = measure_rate(source, 1.5)
+        found = measure_rate(source, 3.0)
         assert found.rate == pytest.approx(102400, abs=5 * found.std)
         source.sample_rate = 51200.0
         with pytest.raises(DeviceError, match="not 51200: every frequency would be 50"):
-            checked_rate(folder, source, 1.5)
+            checked_rate(folder, source, 3.0)
 
 
 def test_hits_have_the_measured_rate(folder: MachineFolder, tapper: Callable[..., Any]) -> None:

@@ -9,6 +9,7 @@ import re
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,6 +18,7 @@ import pytest
 import serial
 
 from acquisition import (
+    DataError,
     DataqSource,
     DataqTraits,
     FileSource,
@@ -306,6 +308,11 @@ def test_the_emulator_command_serves_a_dataq_device(run: Any, trial: MachineFold
         _, err = process.communicate(timeout=20)
     assert process.returncode == 130
     assert "Traceback" not in err
+
+
+def test_a_driver_without_an_emulator_says_so(trial: MachineFolder) -> None:
+    with pytest.raises(DataError, match="a TAPS/1 device cannot be emulated; connect one"):
+        emulate_machine(trial, replace(find_driver("taps"), emulate=None))
 
 
 def test_the_emulator_needs_sensors(run: Any, trial: MachineFolder) -> None:

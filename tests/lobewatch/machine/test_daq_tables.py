@@ -73,7 +73,7 @@ def test_channels_are_converted_at_the_door() -> None:
         (
             'driver = "dataq"',
             'driver = "ni"',
-            "daq: driver='ni' is none of taps, dataq; install the package that brings it",
+            "daq: driver='ni' is none of taps, dataq; correct the name, or install",
         ),
         ('driver = "dataq"', "", "daq: channel: a TAPS/1 device names its own sensors"),
         ('driver = "dataq"', "loss_detection = false", "daq: channel: a TAPS/1 device names its own sensors"),
@@ -98,7 +98,7 @@ def test_a_dataq_device_needs_its_sensors_and_a_taps_device_its_loss_detection()
 
 def test_the_driver_of_a_package_checks_its_own_settings(monkeypatch: pytest.MonkeyPatch) -> None:
     dummy = HEAD + '[daq]\ndriver = "dummy"\n'
-    with pytest.raises(DataError, match="daq: driver='dummy' is none of taps, dataq; install the package"):
+    with pytest.raises(DataError, match="daq: driver='dummy' is none of taps, dataq; correct the name, or install"):
         parse_machine(dummy)
     monkeypatch.syspath_prepend(PLUGIN)
     assert parse_machine(dummy).daq.driver == "dummy"

@@ -1,7 +1,7 @@
 """From the DAQ to hits, averaged FRF and HDF5 files."""
 
 from acquisition.atomic import atomic_write
-from acquisition.channel import Block, Channel, SensorInput
+from acquisition.channel import Block, Channel, SensorInput, TapDirection, tap_direction
 from acquisition.dataq import DataqEmulator, DataqFaults, DataqSource, DataqTraits
 from acquisition.devices import (
     Answer,
@@ -24,6 +24,8 @@ from acquisition.event import Event, EventKind
 from acquisition.files import (
     STANDARD_GRAVITY,
     FileSource,
+    Format,
+    known_formats,
     read_frf,
     read_hits,
     read_recording,
@@ -36,6 +38,7 @@ from acquisition.files import (
 from acquisition.frf import Frf, from_accelerance
 from acquisition.hit import Hit, HitFlags
 from acquisition.hits import HitSearch, Trigger, capture_hits, ring_down
+from acquisition.names import check_name
 from acquisition.ports import PortInfo, find_port, list_ports, no_ports_hint, usb_identity
 from acquisition.remark import Remark, joined
 from acquisition.sensors import (
@@ -78,6 +81,7 @@ __all__ = [
     "EventKind",
     "Faults",
     "FileSource",
+    "Format",
     "Frf",
     "HammeredStructure",
     "Hammering",
@@ -98,6 +102,7 @@ __all__ = [
     "Source",
     "SourceFile",
     "Structure",
+    "TapDirection",
     "TapTest",
     "TapsEmulator",
     "TapsSource",
@@ -110,6 +115,7 @@ __all__ = [
     "capture_hits",
     "channel_doubts",
     "check_hit",
+    "check_name",
     "check_rate",
     "check_settings",
     "cross_spectra",
@@ -121,6 +127,7 @@ __all__ = [
     "from_accelerance",
     "joined",
     "judge_hit",
+    "known_formats",
     "list_ports",
     "load_drivers",
     "measure_rate",
@@ -137,6 +144,7 @@ __all__ = [
     "ring_down",
     "stiffness_doubt",
     "survey_ports",
+    "tap_direction",
     "unit_mistake",
     "usb_identity",
     "write_hit",

@@ -20,9 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.atomic import atomic_write
-from acquisition.channel import Channel
+from acquisition.channel import Channel, tap_direction
 from acquisition.errors import DataError
 from acquisition.estimation.estimate_frf import cross_spectra
+from acquisition.files.seal import is_broken, sealed
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
 from acquisition.tap import Circumstances, SourceFile, TapTest
@@ -60,13 +61,13 @@ def read_tap(path: Path | str) -> TapTest:
 
 
 def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: HitFlags) -> None:
-    """One hit of a test in progress and the verdict on it, on the disk when this returns."""
+    """One hit of a test in progress and the verdict on it, sealed; on the disk when this returns."""
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         file.attrs.update(format=FORMAT, version=VERSION)
         _write_circumstances(file, circumstances)
         _write_raw(file, [hit], [flags])
-    atomic_write(Path(path), memory.getvalue())
+    atomic_write(Path(path), sealed(memory.getvalue()))
 
 
 def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tuple[HitFlags, ...]]:
@@ -77,11 +78,12 @@ def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tup
 
 
 def _open(path: Path) -> h5py.File:
+    content = path.read_bytes()
+    if is_broken(content):
+        raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
     try:
-        file = h5py.File(io.BytesIO(path.read_bytes()), "r")
+        file = h5py.File(io.BytesIO(content), "r")
     except OSError as error:
-        if error.filename is not None:
-            raise
         raise DataError(f"{path}: no readable HDF5 file ({error}); is it cut short?") from error
     if file.attrs.get("format") != FORMAT:
         file.close()
@@ -93,15 +95,17 @@ def _write_circumstances(file: h5py.File, about: Circumstances) -> None:
     file.attrs["created"] = about.created.isoformat()
     file.attrs["machine_toml_sha256"] = hashlib.sha256(about.machine_toml.encode()).hexdigest()
     for name in ("machine", "tool", "direction", "operator", "device"):
-        file.attrs[name] = getattr(about, name)
+        file.attrs[name] = getattr(about, name).replace("\0", "")  # HDF5 text ends there, and a device may send it
     file["machine_toml"] = about.machine_toml
 
 
 def _read_circumstances(file: h5py.File) -> Circumstances:
-    named = {name: str(file.attrs[name]) for name in ("machine", "tool", "direction", "operator")}
+    named = {name: str(file.attrs[name]) for name in ("machine", "tool", "operator")}
+    direction = tap_direction(str(file.attrs["direction"]))
     created = datetime.fromisoformat(file.attrs["created"])
     device = str(file.attrs.get("device", ""))
-    return Circumstances(created=created, machine_toml=file["machine_toml"][()].decode(), device=device, **named)
+    text = file["machine_toml"][()].decode()
+    return Circumstances(created=created, direction=direction, machine_toml=text, device=device, **named)
 
 
 def _dataset(group: h5py.Group, name: str, data: Any, units: str, **options: Any) -> None:

@@ -9,12 +9,15 @@ import typer
 
 import dsm
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.describe import calibration_json, damping_json, stiffness_fit_json
 from lobewatch.show.output import Json, emit
 
 
 def calibrate(
-    machine: Annotated[Path, typer.Argument(help=r"Machine folder with a \[spindle] in its machine.toml.")],
+    machine: Annotated[
+        Path, typer.Argument(parser=named_folder, help=r"Machine folder with a \[spindle] in its machine.toml.")
+    ],
     frequency: Annotated[list[float], typer.Option(help="Measured natural frequency (Hz); may be repeated.")],
     frequency_std: Annotated[list[float] | None, typer.Option(help="Its standard error (Hz); one for each.")] = None,
     mode: Annotated[

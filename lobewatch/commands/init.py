@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 from importlib import resources
 from pathlib import Path
@@ -9,12 +10,13 @@ from typing import Annotated
 
 import typer
 
-from acquisition import DataError, atomic_write
+from acquisition import DataError, atomic_write, check_name
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit
 
 
 def init(
-    machine: Annotated[Path, typer.Argument(help="The folder to make.")],
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="The folder to make.")],
     example: Annotated[bool, typer.Option("--example", help="With the surrogate spindle and three programs.")] = False,
     as_json: Json = False,
 ) -> None:
@@ -36,12 +38,17 @@ def init(
 
 
 def make_machine_folder(folder: Path, template: str) -> Path:
-    """A machine folder from a template of sim_data, named after itself; DataError where there is one already."""
+    """A machine folder from a template of sim_data, named after itself; DataError where there is one already.
+
+    ValueError for a folder whose name holds control characters.
+    """
+    name = folder.resolve().name or "machine"  # the root of a disk has no name
+    check_name(name, "folder")
     toml = folder / "machine.toml"
     if toml.exists():
         raise DataError(f"{toml}: is there already; choose another folder or edit that file")
     folder.mkdir(parents=True, exist_ok=True)
     text = resources.files("sim_data").joinpath(template).read_text(encoding="utf-8")
-    name = folder.resolve().name.replace("\\", "").replace('"', "")
-    atomic_write(toml, text.replace("MACHINE_NAME", name).encode())
+    quoted = json.dumps(name, ensure_ascii=False)  # TOML escapes as JSON does
+    atomic_write(toml, text.replace('"MACHINE_NAME"', quoted).encode())
     return toml

@@ -17,13 +17,16 @@ from dsm import (
     static_stiffness,
 )
 from lobewatch.analysis import Logbook, first_critical_speed, model_picture, model_state
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.figures import save_figure
 from lobewatch.show.figures_model import model_figure
 from lobewatch.show.output import Json, emit, table
 
 
 def model(
-    machine: Annotated[Path, typer.Argument(help=r"Machine folder with a \[spindle] in its machine.toml.")],
+    machine: Annotated[
+        Path, typer.Argument(parser=named_folder, help=r"Machine folder with a \[spindle] in its machine.toml.")
+    ],
     tool: Annotated[str | None, typer.Option(help=r"Name of a \[\[tool]]; else the one that is tapped.")] = None,
     modes: Annotated[int, typer.Option(min=1, max=20, help="How many modes.")] = 4,
     figure: Annotated[Path | None, typer.Option(help="Draw the model to this file (.svg, .png, .pdf).")] = None,

@@ -7,11 +7,12 @@ from typing import Annotated
 
 import typer
 
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit, notes
 
 
 def sensors(
-    machine: Annotated[Path, typer.Argument(help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
     port: Annotated[str, typer.Option(help="Serial port of the DAQ, or socket://HOST:PORT.")] = "",
     mass_kg: Annotated[
         float | None, typer.Option(help="Check F = m a on a hung mass: all that moves, accelerometer included (kg).")

@@ -9,9 +9,10 @@ from typing import Annotated
 
 import typer
 
-from acquisition import Circumstances
+from acquisition import Circumstances, tap_direction
 from lobewatch.analysis import Logbook
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.measurements import measurement_json, measurement_texts, program_texts, programs_json
 from lobewatch.show.output import Json, emit, notes
 from lobewatch.show.printer import TapPrinter
@@ -22,7 +23,7 @@ from lobewatch.tap.session import TapSession, TapStopped
 
 
 def tap(
-    machine: Annotated[Path, typer.Argument(help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
     port: Annotated[str, typer.Option(help="Serial port of the DAQ, socket://HOST:PORT, or file:RECORDING.")] = "",
     tool: Annotated[str, typer.Option(help=r"What is in the spindle; \[tap] tool where not given.")] = "",
     direction: Annotated[str, typer.Option(help="Direction at the tool tip, x or y.")] = "x",
@@ -57,7 +58,7 @@ def tap(
         setup.machine.name,
         datetime.now(UTC),
         tool or setup.tap.tool,
-        direction,
+        tap_direction(direction),
         operator,
         folder.toml.read_text("utf-8"),
     )

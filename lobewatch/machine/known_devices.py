@@ -64,7 +64,8 @@ def use_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -> f
         rate = device.sample_rate
     except DeviceError as error:
         if not folder.machine.daq.accept_measured_rate:
-            raise DeviceError(f"{error} (accept_measured_rate = true in [daq] of {folder.toml})") from None
+            cure = f"{error.cure} (accept_measured_rate = true in [daq] of {folder.toml})"
+            raise DeviceError(error.text, cure) from None
         rate = measured.rate
     if measured != known_rate(folder, device):
         _remember(folder, device, measured)

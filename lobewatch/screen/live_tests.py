@@ -6,7 +6,7 @@ import threading
 from dataclasses import replace
 from datetime import UTC, datetime
 
-from acquisition import Circumstances, DataError
+from acquisition import Circumstances, DataError, TapDirection
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.plug import Plug
 from lobewatch.tap.session import TapSession, TapStopped
@@ -16,7 +16,7 @@ from lobewatch.tap.state import TapState, Word
 class LiveTest:
     """A tap test that runs in a thread of its own from the beginning on."""
 
-    def __init__(self, folder: MachineFolder, direction: str) -> None:
+    def __init__(self, folder: MachineFolder, direction: TapDirection) -> None:
         """Begin; DataError where machine.toml names no port."""
         machine = folder.machine
         if not machine.daq.port:
@@ -53,7 +53,9 @@ class LiveTest:
     def _run(self) -> None:
         try:
             self._session.run()
-        except TapStopped as stopped:
-            self._end = replace(self._session.state, word=Word.FAILED, reason=f"{stopped}: START goes on with them.")
+        except TapStopped:
+            state = self._session.state
+            reason = f"Stopped with {state.good} good hits: START goes on with them."
+            self._end = replace(state, word=Word.FAILED, reason=reason)
         except (OSError, ValueError):
             pass  # the session shows its failure itself

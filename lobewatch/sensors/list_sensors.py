@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from acquisition import Channel, Device, DeviceError, DeviceIdentity, MeasuredRate, measure_rate
+from acquisition import Channel, Device, DeviceError, DeviceIdentity, MeasuredRate, Remark, measure_rate
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import has_clock, use_rate
-from lobewatch.tap.sensor_doubts import sensor_doubts
+from lobewatch.tap.sensor_doubts import WRONG, sensor_doubts
 
 RATE_SECONDS = 5.0
 """How long the rate is measured (s)."""
@@ -29,16 +29,19 @@ class SensorList:
     """Against the clock; None where it follows none, or could not be measured."""
     replaces_nominal: bool
     """Whether the measured rate is worked with."""
-    warnings: list[str]
-    """Sensitivities and dates that are not believed."""
-    errors: list[str]
-    """What a tap test would be spoilt by."""
+    remarks: tuple[Remark, ...]
+    """Sensitivities, ranges, dates and rates that are not believed."""
+
+    @property
+    def errors(self) -> tuple[Remark, ...]:
+        """Those remarks on what is to be put right first."""
+        return tuple(remark for remark in self.remarks if remark.code in WRONG)
 
 
 def list_sensors(folder: MachineFolder, device: Device, tell: Callable[[str], None]) -> SensorList:
     """Look at a connected device; a rate that is right is kept for it. tell: what is being done, for a person."""
     today = datetime.now(UTC).date()
-    warnings, errors = sensor_doubts(device.channels, today, folder.machine.daq.calibration_interval_months)
+    remarks = sensor_doubts(device.channels, today, folder.machine.daq.calibration_interval_months)
     nominal, measured = device.sample_rate, None
     if has_clock(device):
         tell(f"measuring the rate for {RATE_SECONDS:g} s")
@@ -46,6 +49,6 @@ def list_sensors(folder: MachineFolder, device: Device, tell: Callable[[str], No
             measured = measure_rate(device, RATE_SECONDS)
             use_rate(folder, device, measured)
         except DeviceError as error:
-            errors.append(str(error))
+            remarks.append(Remark("sample-rate-wrong", "", error.text, error.cure))
     replaced = device.sample_rate != nominal
-    return SensorList(device.identity, device.channels, nominal, measured, replaced, warnings, errors)
+    return SensorList(device.identity, device.channels, nominal, measured, replaced, tuple(remarks))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
+from rich.markup import escape
 from rich.table import Table
 
 from acquisition import STANDARD_GRAVITY, Channel
-from acquisition.sensors import AGREES
 from dsm import plus_minus
 from lobewatch.sensors import MassCheck, SensorList, SkewCheck
 from lobewatch.show.output import table
@@ -23,8 +24,8 @@ def list_json(found: SensorList) -> dict[str, Any]:
         "sample_rate_hz": found.nominal_rate,
         "measured_rate_hz": measured.rate if measured else None,
         "measured_rate_hz_std": measured.std if measured else None,
-        "warnings": found.warnings,
-        "errors": found.errors,
+        "remarks": [asdict(remark) for remark in found.remarks],
+        "errors": [asdict(remark) for remark in found.errors],
     }
 
 
@@ -37,8 +38,7 @@ def list_texts(found: SensorList) -> list[str | Table]:
         f"{found.identity.model}, serial number {found.identity.serial or 'not known'}",
         _channel_table(found.channels),
         f"rate: {found.nominal_rate:g} Hz, {rate}",
-        *(f"warning: {text}" for text in found.warnings),
-        *(f"error: {text}" for text in found.errors),
+        *(f"{'error' if remark in found.errors else 'warning'}: {remark}" for remark in found.remarks),
     ]
 
 
@@ -67,7 +67,7 @@ def _channel_table(channels: tuple[Channel, ...]) -> Table:
             f"±{channel.full_scale:g} V",
             str(channel.adc_bits),
             f"{channel.skew * 1e6:.4g}",
-            channel.serial_number or "-",
+            escape(channel.serial_number or "-"),
             channel.calibration_date or "-",
         )
     return made
@@ -88,22 +88,22 @@ def mass_json(check: MassCheck) -> dict[str, Any]:
         "agrees": found.agrees,
         "force_sensitivity_v_per_n": found.force_sensitivity,
         "acceleration_sensitivity_v_per_m_s2": found.acceleration_sensitivity,
-        "texts": found.texts,
+        "remarks": [asdict(remark) for remark in found.remarks],
     }
 
 
 def mass_texts(check: MassCheck) -> list[str]:
     """The verdict, and what to change where."""
     ratio = check.calibration.ratio
-    if abs(ratio - 1) <= AGREES:
-        return [*check.calibration.texts]
+    if check.calibration.sizes_agree:
+        return [str(check.calibration)]
     if check.place is None:
         force, acceleration, place = "sensitivity_mv_per_n", "sensitivity_mv_per_g", "[[daq.channel]] of machine.toml"
     else:
         force, acceleration = f"{check.place.sensitivity} of the force channel", "that of the acceleration channel"
         place = check.place.place
     change = f"To change in {place}: multiply {force} by {ratio:.4f}, or divide {acceleration} by {ratio:.4f}."
-    return [*check.calibration.texts, change]
+    return [str(check.calibration), change]
 
 
 def skew_json(check: SkewCheck) -> dict[str, Any]:

@@ -32,6 +32,7 @@ def lobes_json(name: str, lobes: StabilityLobes) -> dict[str, Any]:
     return {
         "cut": name,
         "method": lobes.method,
+        "method_detail": lobes.detail,
         "minimum_depth_mm": low.depth * 1e3,
         "at_speed_rpm": low.speed_rpm,
         "chatter_frequency_hz": low.chatter_frequency,

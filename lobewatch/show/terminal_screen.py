@@ -16,6 +16,7 @@ from rich.panel import Panel
 from rich.text import Text
 
 from lobewatch.show.keys import Keys
+from lobewatch.show.output import Terminal
 from lobewatch.show.printer import Watched, verdict
 from lobewatch.tap.state import TapState, Word
 
@@ -53,7 +54,7 @@ class TerminalScreen:
     def __init__(self, session: Watched, console: Console | None = None) -> None:
         """Nothing is shown yet; console None: standard error."""
         self._session = session
-        self._console = console or Console(stderr=True, highlight=False, emoji=False)
+        self._console = console or Terminal(stderr=True, highlight=False, emoji=False)
         self._muted = self._ahead_of_hit = False
         self._undo_at = -math.inf
         self._keys = Keys()
@@ -138,10 +139,8 @@ def _lines(state: TapState) -> Iterator[RenderableType]:
 def _banner(state: TapState) -> RenderableType:
     """The full-width word."""
     symbol, style = LOOKS[state.word]
-    word = state.verdict.upper() if state.word is Word.REFUSED else str(state.word)
-    if state.word is Word.GOOD and state.verdict != "good":
-        word = f"{word} ({state.verdict})"
-    text = Text(f"{symbol}  {word}   {state.good} / {state.wanted}", "bold")
+    trial = " (trial hit)" if state.trial and state.word is Word.GOOD else ""
+    text = Text(f"{symbol}  {state.shown_word}{trial}   {state.good} / {state.wanted}", "bold")
     return Panel(Align.center(text), style=style, padding=(1, 1))
 
 

@@ -18,6 +18,7 @@ from acquisition import (
     HammeredStructure,
     Hit,
     HitFlags,
+    TapDirection,
     TapsEmulator,
     TapsSource,
     TapTest,
@@ -50,7 +51,7 @@ def folder(tmp_path: Path) -> MachineFolder:
     return MachineFolder(tmp_path / "m")
 
 
-def about(folder: MachineFolder, days: float = 0.0, direction: str = "x") -> Circumstances:
+def about(folder: MachineFolder, days: float = 0.0, direction: TapDirection = "x") -> Circumstances:
     return Circumstances("m", START + timedelta(days=days), "reference", direction, "", folder.toml.read_text("utf-8"))
 
 
@@ -59,7 +60,9 @@ def recorded(circumstances: Circumstances, *modes: Mode) -> TapTest:
     return TapTest(new_tap_id(circumstances), circumstances, from_accelerance(LINES, frf.accelerance))
 
 
-def live_tap(folder: MachineFolder, k: float, days: float = 0.0, direction: str = "x", seed: int = 3) -> Measurement:
+def live_tap(
+    folder: MachineFolder, k: float, days: float = 0.0, direction: TapDirection = "x", seed: int = 3
+) -> Measurement:
     table = folder.machine.spindle
     assert table is not None
     structure = emulated_structure(with_bearing_stiffness(table.build(), k), table.damping_ratio)
@@ -282,7 +285,8 @@ def test_a_machine_without_spindle_gives_all_but_the_models_part(tmp_path: Path)
 
 
 def test_series_are_sorted_by_time_and_told_apart(folder: MachineFolder) -> None:
-    for days, direction in ((60, "x"), (0, "x"), (30, "x"), (45, "y")):
+    tapped: list[tuple[float, TapDirection]] = [(60, "x"), (0, "x"), (30, "x"), (45, "y")]
+    for days, direction in tapped:
         folder.commit(recorded(about(folder, days, direction), Mode(1700.0 - days, 0.03, 3.5e7)))
     history, _ = up_to_date(folder)
     rows = history.series("reference", "x")

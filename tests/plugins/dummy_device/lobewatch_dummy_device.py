@@ -52,7 +52,7 @@ class DummySource:
         words = ask(self._link)
         if words is None:
             self._link.close()
-            raise DeviceError(f"no dummy device answers on {port}; check that it is switched on")
+            raise DeviceError(f"no dummy device answers on {port}", "check that it is switched on")
         self.identity = DeviceIdentity(*words[:3])
         self.follows_clock = words[3] == "clock"
         self.sample_rate = RATE
@@ -90,7 +90,7 @@ class DummySource:
         while self._going:
             data = self._link.read(3.0)
             if not data:
-                raise DeviceError("the dummy device has sent no samples for 3 s; switch it off and on")
+                raise DeviceError("the dummy device has sent no samples for 3 s", "switch it off and on")
             *packets, received = packets_in(received + data)
             for packet in packets:
                 _, first = HEADER.unpack_from(packet)

@@ -1,12 +1,26 @@
 """From the DAQ to hits, averaged FRF and HDF5 files."""
 
 from acquisition.atomic import atomic_write
-from acquisition.channel import Block, Channel, TapDirection, tap_direction
-from acquisition.dataq import DataqEmulator, DataqFaults, DataqInput, DataqSource, DataqTraits
-from acquisition.devices import DeviceIdentity, probe_port
-from acquisition.emulation import HammeredStructure, Hammering, SimulatedSource, Structure
+from acquisition.channel import Block, Channel, SensorInput, TapDirection, tap_direction
+from acquisition.dataq import DataqEmulator, DataqFaults, DataqSource, DataqTraits
+from acquisition.devices import (
+    Answer,
+    DeviceSettings,
+    Driver,
+    PortSurvey,
+    SeenPort,
+    SensorPlace,
+    check_settings,
+    driver_names,
+    find_driver,
+    load_drivers,
+    probe_port,
+    survey_ports,
+)
+from acquisition.emulation import Bench, EmulatorThread, HammeredStructure, Hammering, SimulatedSource, Structure
 from acquisition.errors import DataError, DeviceError
 from acquisition.estimation import RunningMean, cross_spectra, estimate_frf, force_noise
+from acquisition.event import Event, EventKind
 from acquisition.files import (
     STANDARD_GRAVITY,
     FileSource,
@@ -40,24 +54,29 @@ from acquisition.sensors import (
     stiffness_doubt,
     unit_mistake,
 )
-from acquisition.source import Source
+from acquisition.source import Device, DeviceIdentity, Source
 from acquisition.tap import Circumstances, SourceFile, TapTest, new_tap_id
-from acquisition.taps import Event, EventKind, Faults, TapsEmulator, TapsSource
+from acquisition.taps import Faults, TapsEmulator, TapsSource
 from acquisition.verdicts import Verdict, average_good, check_hit, judge_hit
 
 __all__ = [
     "STANDARD_GRAVITY",
+    "Answer",
+    "Bench",
     "Block",
     "Channel",
     "Circumstances",
     "DataError",
     "DataqEmulator",
     "DataqFaults",
-    "DataqInput",
     "DataqSource",
     "DataqTraits",
+    "Device",
     "DeviceError",
     "DeviceIdentity",
+    "DeviceSettings",
+    "Driver",
+    "EmulatorThread",
     "Event",
     "EventKind",
     "Faults",
@@ -73,8 +92,12 @@ __all__ = [
     "MeasuredRate",
     "MeasuredSkew",
     "PortInfo",
+    "PortSurvey",
     "Remark",
     "RunningMean",
+    "SeenPort",
+    "SensorInput",
+    "SensorPlace",
     "SimulatedSource",
     "Source",
     "SourceFile",
@@ -94,8 +117,11 @@ __all__ = [
     "check_hit",
     "check_name",
     "check_rate",
+    "check_settings",
     "cross_spectra",
+    "driver_names",
     "estimate_frf",
+    "find_driver",
     "find_port",
     "force_noise",
     "from_accelerance",
@@ -103,6 +129,7 @@ __all__ = [
     "judge_hit",
     "known_formats",
     "list_ports",
+    "load_drivers",
     "measure_rate",
     "measure_skew",
     "new_tap_id",
@@ -116,6 +143,7 @@ __all__ = [
     "recorded_as",
     "ring_down",
     "stiffness_doubt",
+    "survey_ports",
     "tap_direction",
     "unit_mistake",
     "usb_identity",

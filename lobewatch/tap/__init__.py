@@ -1,6 +1,6 @@
 """The live tap test: connection, hits, trial, self-check, state, outcome."""
 
-from lobewatch.tap.emulated_spindle import dataq_emulator, emulated_structure, emulator, with_bearing_stiffness
+from lobewatch.tap.emulated_spindle import emulate_machine, emulated_structure, emulator, with_bearing_stiffness
 from lobewatch.tap.live_signal import LiveSignal
 from lobewatch.tap.plug import Plug, open_source
 from lobewatch.tap.self_check import quiet_stretch
@@ -19,7 +19,7 @@ __all__ = [
     "TapStopped",
     "Trial",
     "Word",
-    "dataq_emulator",
+    "emulate_machine",
     "emulated_structure",
     "emulator",
     "open_source",

@@ -48,7 +48,6 @@ class Simulated(SimulatedSource):
         fault: Callable[[], str] = str,
     ) -> None:
         super().__init__(signal, channels, RATE, round(seconds * RATE))
-        self.info = {"model": "simulation"}
         self._unplugged, self._ended, self._fault = unplugged, ended, fault
 
     @property

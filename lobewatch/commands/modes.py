@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from acquisition import Frf, Hit, check_hit, read_frf, read_recording
-from lobewatch.show.describe import doubt_lines, mode_json, mode_lines, mode_table, picked_table
+from acquisition import Frf, Hit, Remark, check_hit, read_frf, read_recording
+from lobewatch.show.describe import mode_json, mode_lines, mode_table, picked_table, remark_lines, remarks_on_all
 from lobewatch.show.figures import save_figure
 from lobewatch.show.figures_modes import modes_figure
 from lobewatch.show.output import Json, emit
-from modal import Mode, cut_edges, extract, fit_modes, pick_peaks, remove_window
+from modal import Mode, cut_edges, extract, modes_of, pick_peaks, remove_window
 
 
 def modes(
@@ -44,14 +45,11 @@ def modes(
     frf = read_frf(file)
     frf = replace(frf, receptance=frf.receptance.conj()) if conjugate else frf
     hits = [] if conjugate else _good_hits(file)
-    found, picked = fit_modes(frf, band, hits), pick_peaks(frf, band)
-    cut = [
-        f"a peak may be cut by the edge of the lines at {edge:.0f} Hz, its mode missing: widen the band (a harder "
-        "hammer tip reaches higher)"
-        for edge in cut_edges(frf, found, band)
-    ]
+    state = extract([frf], band)
+    found, picked = modes_of(state, [hits]), pick_peaks(frf, band)
+    remarks = list(_remarks(found, cut_edges(frf, found, band)))
     if figure is not None:
-        save_figure(modes_figure(extract(frf, band), found, file.name), figure)
+        save_figure(modes_figure(state, found, file.name), figure)
     fitted = [_without(window, mode) for mode in found]
     payload = {
         "file": str(file),
@@ -59,7 +57,7 @@ def modes(
         "usable_band_hz": frf.usable_band,
         "modes": [mode_json(mode) for mode in fitted],
         "peak_picking": [mode_json(mode) for mode in picked],
-        "notes": cut,
+        "remarks": [asdict(remark) for remark in remarks],
     }
     usable = "" if frf.usable_band is None else f", usable {frf.usable_band[0]:.0f} to {frf.usable_band[1]:.0f} Hz"
     lines = f"{frf.frequency.size} lines {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
@@ -69,12 +67,20 @@ def modes(
         f"{file.name}: {frf.n_averages} hit(s) averaged, {lines}{usable}",
         mode_table(fitted),
         *mode_lines(fitted),
-        *doubt_lines(fitted),
-        *cut,
+        *remark_lines(fitted, remarks),
         "peak picking (eqs. 28, 29), for comparison:",
         picked_table(picked, found),
-        *([] if fitted else ["no mode found: is the band right, was the hit hard enough?"]),
     )
+
+
+def _remarks(found: Sequence[Mode], cut: Sequence[float]) -> Iterator[Remark]:
+    """On all modes together and on those that are missing; cut: where a peak may be cut (Hz)."""
+    yield from remarks_on_all(found)
+    for edge in cut:
+        text = "a peak may be cut by the edge of the lines, its mode missing"
+        yield Remark("mode-missing-at-edge", f"{edge:.0f} Hz", text, "widen the band (a harder tip reaches higher)")
+    if not found:
+        yield Remark("no-mode", "", "no mode found", "look whether the band is right and the hit was hard enough")
 
 
 def _good_hits(file: Path) -> list[Hit]:

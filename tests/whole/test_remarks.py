@@ -11,7 +11,10 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("acquisition", "modal", "dsm", "lobes", "lobewatch")
 CODE = r"[a-z]+(?:-[a-z]+)*"
-SHARED: dict[str, str] = {}
+SHARED = {
+    "no-mode-to-follow": "by the likeness to the last mode, and before that by band and sign: there is none either way",
+    "one-direction": "of an assembly, and of a machine whose newest assembly it is",
+}
 """Codes that several modules give, each with the reason why they mean the same."""
 
 

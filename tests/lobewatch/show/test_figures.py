@@ -9,7 +9,8 @@ import pytest
 from matplotlib.collections import LineCollection
 
 from acquisition import Frf
-from lobewatch.machine.machine_file import Limits
+from lobewatch.analysis import Verdict, Word
+from lobewatch.machine import Limits, ProgramTable
 from lobewatch.show.figures import frf_figure, new_axes, svg, trend_figure
 from lobewatch.show.figures_lobes import lobes_figure
 
@@ -31,10 +32,14 @@ def test_bars_are_the_95_percent_interval() -> None:
     assert (low, high) == pytest.approx((1700 - 3.92, 1700 + 3.92))
 
 
+def verdict(name: str) -> Verdict:
+    cut = {"teeth": 2, "radial_depth_mm": 5, "tool_diameter_mm": 10, "direction": "up", "material": "any"}
+    return Verdict(ProgramTable(name=name, speed_rpm=1500.0, depth_mm=3.0, **cut), Word.NOT_STABLE)  # type: ignore[arg-type]
+
+
 def test_lobes_are_drawn_in_mm_and_programs_where_they_cut() -> None:
     speed = np.linspace(1000.0, 2000.0, 5)
-    program = {"name": "A", "speed_rpm": 1500.0, "depth_mm": 3.0, "stable": False}
-    figure = lobes_figure(speed, {"then": np.full(5, 2e-3), "now": np.full(5, 1e-3)}, [program])
+    figure = lobes_figure(speed, {"then": np.full(5, 2e-3), "now": np.full(5, 1e-3)}, [verdict("A")])
     then, now, mark = figure.axes[0].lines
     assert then.get_ydata() == pytest.approx(2.0)
     assert now.get_ydata() == pytest.approx(1.0)
@@ -53,8 +58,7 @@ def test_receptance_is_drawn_in_nm_per_n() -> None:
 @pytest.mark.parametrize("name", [r"cost $5 to $6 \frac", r"cost $5 \frac to $6", "$x$", r"a_b^c \$ $"])
 def test_no_name_is_read_as_a_formula(name: str) -> None:
     speed = np.linspace(1000.0, 2000.0, 5)
-    program = {"name": name, "speed_rpm": 1500.0, "depth_mm": 3.0, "stable": False}
-    picture = svg(lobes_figure(speed, {name: np.full(5, 1e-3)}, [program], title=name))
+    picture = svg(lobes_figure(speed, {name: np.full(5, 1e-3)}, [verdict(name)], title=name))
     assert picture.count(f">{name}</text>") == 3
 
 

@@ -11,7 +11,6 @@ from lobes.nearest_speed import nearest_speed
 from lobes.program import Modes, Program
 from lobes.program_limit import ProgramLimit, program_limit
 from lobes.speeds import check_speeds
-from lobes.stability_lobes import MethodName
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,7 @@ class ProgramCheck:
         return self.state.limit
 
     @property
-    def method(self) -> MethodName:
+    def method(self) -> str:
         """How it was found."""
         return self.state.method
 

@@ -51,8 +51,8 @@ class DataqDialogue:
             if self.drain():
                 return
         raise DeviceError(
-            f"the device on {self._link.port} does not stop sending ({self._tries} tries); "
-            "check that this is the DAQ's port, then unplug it and plug it in again"
+            f"the device on {self._link.port} does not stop sending ({self._tries} tries)",
+            "check that this is the DAQ's port, then unplug it and plug it in again",
         )
 
     def drain(self) -> bool:
@@ -91,5 +91,5 @@ class DataqDialogue:
                     said = line or said
         tries = f"{self._tries} tries"
         if not said:
-            raise DeviceError(f"no DATAQ device answers on {self._link.port} ({command}, {tries}); {CDC_HINT}")
+            raise DeviceError(f"no DATAQ device answers on {self._link.port} ({command}, {tries})", CDC_HINT)
         raise DeviceError(f"the device on {self._link.port} does not take {command!r} ({tries}); it says {said[:60]!r}")

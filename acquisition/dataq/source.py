@@ -144,12 +144,12 @@ class DataqSource:
     def _failed(self, sends: bool) -> DeviceError:
         if sends:
             return DeviceError(
-                f"the digital inputs of the DAQ on {self._link.port} do not hold still, so that lost bytes cannot be "
-                "told: leave them unconnected, or set loss_detection = false in [daq]"
+                f"the digital inputs of the DAQ on {self._link.port} do not hold still: lost bytes cannot be told",
+                "leave them unconnected, or set loss_detection = false in [daq]",
             )
         return DeviceError(
-            f"the DAQ on {self._link.port} has sent no samples for {SILENCE:g} s; "
-            "switch it off and on and give the same command again"
+            f"the DAQ on {self._link.port} has sent no samples for {SILENCE:g} s",
+            "switch it off and on and give the same command again",
         )
 
     def _identify(self) -> DataqIdentity:
@@ -157,8 +157,8 @@ class DataqSource:
         version = firmware_of(identity.firmware)
         if version is not None and version < OLDEST_FIRMWARE:
             raise DeviceError(
-                f"the DI-{identity.model} on {self._link.port} has firmware {version:.2f}; "
-                f"{OLDEST_FIRMWARE} or newer is needed: install it with the maker's upgrade tool"
+                f"the DI-{identity.model} on {self._link.port} has firmware {version:.2f}",
+                f"{OLDEST_FIRMWARE} or newer is needed: install it with the maker's upgrade tool",
             )
         return identity
 

@@ -23,6 +23,7 @@ from acquisition.atomic import atomic_write
 from acquisition.channel import Channel, tap_direction
 from acquisition.errors import DataError
 from acquisition.estimation.estimate_frf import cross_spectra
+from acquisition.files.seal import is_broken, sealed
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
 from acquisition.tap import Circumstances, SourceFile, TapTest
@@ -60,13 +61,13 @@ def read_tap(path: Path | str) -> TapTest:
 
 
 def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: HitFlags) -> None:
-    """One hit of a test in progress and the verdict on it, on the disk when this returns."""
+    """One hit of a test in progress and the verdict on it, sealed; on the disk when this returns."""
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         file.attrs.update(format=FORMAT, version=VERSION)
         _write_circumstances(file, circumstances)
         _write_raw(file, [hit], [flags])
-    atomic_write(Path(path), memory.getvalue())
+    atomic_write(Path(path), sealed(memory.getvalue()))
 
 
 def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tuple[HitFlags, ...]]:
@@ -77,11 +78,12 @@ def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tup
 
 
 def _open(path: Path) -> h5py.File:
+    content = path.read_bytes()
+    if is_broken(content):
+        raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
     try:
-        file = h5py.File(io.BytesIO(path.read_bytes()), "r")
+        file = h5py.File(io.BytesIO(content), "r")
     except OSError as error:
-        if error.filename is not None:
-            raise
         raise DataError(f"{path}: no readable HDF5 file ({error}); is it cut short?") from error
     if file.attrs.get("format") != FORMAT:
         file.close()

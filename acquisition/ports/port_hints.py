@@ -6,6 +6,8 @@ import os
 import sys
 from pathlib import Path
 
+from acquisition.errors import DeviceError
+
 NO_PORTS = {
     "linux": "plug the DAQ in and look at the last lines of `sudo dmesg`; hand it through to a container or "
     "virtual machine",
@@ -24,8 +26,8 @@ def no_ports_hint(platform: str = sys.platform) -> str:
     )
 
 
-def explain_open_error(port: str, error: Exception, platform: str = sys.platform) -> str:
-    """One sentence with the system's words and what to do."""
+def explain_open_error(port: str, error: Exception, platform: str = sys.platform) -> DeviceError:
+    """The error to raise, with the system's words and what to do."""
     text = str(error)
     busy = "another program uses it: close that program"
     if platform == "linux" and not port.startswith("socket:"):
@@ -43,7 +45,7 @@ def explain_open_error(port: str, error: Exception, platform: str = sys.platform
     cure = next((hint for word, hint in hints.items() if word in text), "check the port's name and the cable")
     number = (error.errno or 0) if isinstance(error, OSError) else 0
     reason = os.strerror(number) if number > 0 else text  # a host that has no address comes with a negative number
-    return f"port {port} cannot be opened ({reason}); {cure}"
+    return DeviceError(f"port {port} cannot be opened ({reason})", cure)
 
 
 def _permission_hint(port: str, platform: str) -> str:

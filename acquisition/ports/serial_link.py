@@ -34,7 +34,7 @@ class SerialLink:
         try:
             self._serial = _open(port)
         except (OSError, ValueError, TermiosError) as error:
-            raise DeviceError(explain_open_error(port, error)) from error
+            raise explain_open_error(port, error) from error
         self._chunks: deque[bytes] = deque()
         self._waiting = 0
         self.overruns = 0
@@ -51,7 +51,7 @@ class SerialLink:
             self._serial.write(data)
         except serial.SerialTimeoutException as error:
             raise DeviceError(
-                f"the DAQ on {self.port} takes no commands; switch it off and on and repeat the command"
+                f"the DAQ on {self.port} takes no commands", "switch it off and on and repeat the command"
             ) from error
         except (OSError, TermiosError) as error:
             raise self._unplugged() from error
@@ -101,7 +101,7 @@ class SerialLink:
                 self._arrived.notify()
 
     def _unplugged(self) -> DeviceError:
-        return DeviceError(f"the DAQ on {self.port} was unplugged or switched off; plug it in and repeat the command")
+        return DeviceError(f"the DAQ on {self.port} was unplugged or switched off", "plug it in and repeat the command")
 
 
 class _TcpPort:

@@ -64,15 +64,17 @@ def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float
     elapsed, n_scans = (arrived[-1] - arrived[0], scans[-1] - scans[0]) if scans else (0.0, 0)
     if len(scans) < FEWEST_BLOCKS or elapsed < seconds:
         raise DeviceError(
-            f"the DAQ sent {len(scans)} blocks of samples in {elapsed:.2g} s; to measure its rate, at least "
-            f"{FEWEST_BLOCKS} over {seconds:g} s are needed: check its sample rate and the cable"
+            f"the DAQ sent {len(scans)} blocks of samples in {elapsed:.2g} s",
+            f"to measure its rate, at least {FEWEST_BLOCKS} over {seconds:g} s are needed: check its sample rate "
+            "and the cable",
         )
     period, scatter = _slope(np.array(scans, dtype=np.float64), np.array(arrived))
     std = float(np.hypot(scatter, LATENCY / np.sqrt(6) / n_scans) / period**2)
     if std > LARGEST_STD / period:
         raise DeviceError(
             f"the DAQ's rate cannot be measured: its samples arrive too unevenly ({1 / period:.6g} Hz "
-            f"± {std * period:.2%}, needed ± {LARGEST_STD:.2%}); close other programs and try again"
+            f"± {std * period:.2%}, needed ± {LARGEST_STD:.2%})",
+            "close other programs and try again",
         )
     return MeasuredRate(float(1 / period), std, n_scans, float(elapsed))
 
@@ -83,8 +85,8 @@ def check_rate(measured: MeasuredRate, nominal: float) -> None:
     if abs(measured.rate / nominal - 1) > TOLERANCE:
         raise DeviceError(
             f"the DAQ delivers {measured.rate:.2f} ± {measured.std:.2f} scans a second, not {nominal:g}: every "
-            f"frequency would be {abs(off):.1%} too {'high' if off > 0 else 'low'}; correct the DAQ's sample rate "
-            "or work with the measured one"
+            f"frequency would be {abs(off):.1%} too {'high' if off > 0 else 'low'}",
+            "correct the DAQ's sample rate or work with the measured one",
         )
 
 

@@ -141,7 +141,7 @@ class TapsSource:
         restarted = self._stream is not None and self._stream.foreign
         reason = "has begun another stream by itself" if restarted else f"has sent no samples for {SILENCE:g} s"
         return DeviceError(
-            f"the DAQ on {self._link.port} {reason}; switch it off and on and give the same command again"
+            f"the DAQ on {self._link.port} {reason}", "switch it off and on and give the same command again"
         )
 
     def _identify(self) -> tuple[dict[str, Any], tuple[Channel, ...]]:
@@ -154,8 +154,8 @@ class TapsSource:
                 raise ValueError("serial is empty; the measured sample rate is kept by it")
         except (ValueError, KeyError, TypeError) as error:
             raise DeviceError(
-                f"the DAQ on {self._link.port} describes itself wrongly ({type(error).__name__}: {error}); "
-                "its firmware must send the INFO of TAPS/1"
+                f"the DAQ on {self._link.port} describes itself wrongly ({type(error).__name__}: {error})",
+                "its firmware must send the INFO of TAPS/1",
             ) from error
         return info, channels
 
@@ -191,8 +191,8 @@ class TapsSource:
                 if frame is not None and self._answers(frame, answer):
                     return frame
         raise DeviceError(
-            f"no TAPS/1 device answers on {self._link.port} ({kind.name}, {TRIES} tries); "
-            "check that this is the DAQ's port and that it is switched on"
+            f"no TAPS/1 device answers on {self._link.port} ({kind.name}, {TRIES} tries)",
+            "check that this is the DAQ's port and that it is switched on",
         )
 
     def _next_frame(self, timeout: float) -> Frame | None:

@@ -74,9 +74,8 @@ def _follow(modes: Sequence[Mode], machine: Machine, remarks: list[Remark], last
         remarks.append(_no_mode(modes, machine))
     elif last is not None:
         mode = _continued(last, _in_band(modes, machine), remarks)
-    doubt = stiffness_doubt(mode.stiffness) if mode is not None else None
-    if doubt is not None:
-        remarks.append(doubt)
+    doubt = None if mode is None else stiffness_doubt(mode.stiffness)
+    remarks += [] if doubt is None else [doubt]
     return mode
 
 

@@ -80,7 +80,8 @@ def use_rate(folder: MachineFolder, source: Device, measured: MeasuredRate) -> f
         rate = source.sample_rate
     except DeviceError as error:
         if not folder.machine.daq.accept_measured_rate:
-            raise DeviceError(f"{error} (accept_measured_rate = true in [daq] of {folder.toml})") from None
+            cure = f"{error.cure} (accept_measured_rate = true in [daq] of {folder.toml})"
+            raise DeviceError(error.text, cure) from None
         rate = measured.rate
     if measured != known_rate(folder, source):
         _remember(folder, source, measured)

@@ -53,7 +53,9 @@ class LiveTest:
     def _run(self) -> None:
         try:
             self._session.run()
-        except TapStopped as stopped:
-            self._end = replace(self._session.state, word=Word.FAILED, reason=f"{stopped}: START goes on with them.")
+        except TapStopped:
+            state = self._session.state
+            reason = f"Stopped with {state.good} good hits: START goes on with them."
+            self._end = replace(state, word=Word.FAILED, reason=reason)
         except (OSError, ValueError):
             pass  # the session shows its failure itself

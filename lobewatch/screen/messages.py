@@ -8,24 +8,23 @@ from typing import Any
 
 import numpy as np
 
-from lobewatch.tap.state import Plots, TapState, Word
+from lobewatch.tap.state import Plots, TakenHit, TapState
 
 CURVES = ("time", "force", "acceleration", "frequency", "mean", "last", "coherence", "force_spectrum")
 
 
 def state_message(state: TapState) -> str:
     """All of a state but its curves, as JSON; numbers that are not finite become null."""
-    refused = state.word is Word.REFUSED and state.verdict
     return json.dumps(
         {
             "kind": state.word.name.lower().replace("_", "-"),
-            "word": state.verdict.upper() if refused else state.word.value,
+            "word": state.shown_word,
             "title": state.title,
             "device": ", ".join(filter(None, (state.device, state.resumed))),
             "reason": state.reason,
             "good": state.good,
             "wanted": state.wanted,
-            "hits": [_hit(hit.number, hit.flags.words, hit.peak_force, hit.undone) for hit in state.hits],
+            "hits": [_hit(hit) for hit in state.hits],
             "mean_change": _finite(state.mean_change),
             "settled": state.settled,
             "levels": [_finite(level) for level in state.levels] if state.levels else None,
@@ -55,8 +54,14 @@ def plots_message(plots: Plots) -> bytes:
     return b"".join([len(header).to_bytes(4, "little"), header, *values])
 
 
-def _hit(number: int, words: str, peak_force: float, undone: bool) -> dict[str, Any]:
-    return {"number": number, "verdict": words, "peak_force": _finite(peak_force), "undone": undone}
+def _hit(hit: TakenHit) -> dict[str, Any]:
+    return {
+        "number": hit.number,
+        "good": not hit.flags,
+        "verdict": hit.flags.words,
+        "peak_force": _finite(hit.peak_force),
+        "undone": hit.undone,
+    }
 
 
 def _finite(value: float | None) -> float | None:

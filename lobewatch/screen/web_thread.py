@@ -50,7 +50,7 @@ class WebThread:
         if self._error is not None:
             why = getattr(self._error, "strerror", None) or self._error
             raise DeviceError(
-                f"cannot listen on {self._listen} port {self._port} ({why}); choose another port or address"
+                f"cannot listen on {self._listen} port {self._port} ({why})", "choose another port or address"
             ) from self._error
         return self
 

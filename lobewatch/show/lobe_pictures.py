@@ -38,9 +38,9 @@ def save_pictures(
     if figure is not None:
         pictures.append((lobes_picture(logbook.machine, found), figure))
     if radial is not None:
-        picture, about_method = radial_picture(logbook.machine, found.now, method)
+        picture, about = radial_picture(logbook.machine, found.now, method)
         pictures.append((picture, radial))
-        remarks += [replace(remark, about="--radial") for remark in about_method]
+        remarks += [replace(remark, about="--radial") for remark in about]
     if waterfall is not None:
         pictures.append((waterfall_picture(logbook, found.now), waterfall))
     for picture, path in pictures:

@@ -70,7 +70,7 @@ class TapPrinter:
                 self._console.print(f"[bold yellow]![/] {escape(check.name)}: {escape(check.text)}")
         if state.resumed != before.resumed:
             self._console.print(state.resumed)
-        with_hit = state.word in (Word.GOOD, Word.REFUSED) and "trial hit" not in state.verdict
+        with_hit = state.word in (Word.GOOD, Word.REFUSED) and not state.trial
         told = with_hit or state.word is Word.FAILED or state.reason == before.reason
         if state.reason and not told:
             self._console.print(escape(state.reason))

@@ -116,12 +116,12 @@ def _lobes(logbook: Logbook, last: Row, programs: Sequence[Advised]) -> list[Pic
     first = logbook.first_assembly(assembly)
     depths = {} if first is None else {first.label: lobes_of(first, machine)[cut].depth}
     text = (
-        f"Limit of the {cut} by {now.stated_method}, {' and '.join(assembly.directions)} direction"
+        f"Limit of the {cut} by {now.method}, {' and '.join(assembly.directions)} direction"
         f"{'s' if len(assembly.directions) > 1 else ' alone'}; cuts in the shaded region chatter. "
         "Marks: programs with this same cut and their verdicts, as in the table above."
     )
     if np.isinf(now.minimum.depth):
-        text = f"The {cut} has no limit in this speed range ({now.stated_method})."
+        text = f"The {cut} has no limit in this speed range ({now.method})."
     cuts = machine.cuts(assembly.tool)
     marks = [one.verdict for one in programs if cuts.get(one.verdict.program.name) == cuts[cut]]
     picture = lobes_figure(now.speed_rpm, depths | {assembly.label: now.depth}, marks)

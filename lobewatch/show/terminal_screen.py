@@ -139,10 +139,8 @@ def _lines(state: TapState) -> Iterator[RenderableType]:
 def _banner(state: TapState) -> RenderableType:
     """The full-width word."""
     symbol, style = LOOKS[state.word]
-    word = state.verdict.upper() if state.word is Word.REFUSED else str(state.word)
-    if state.word is Word.GOOD and state.verdict != "good":
-        word = f"{word} ({state.verdict})"
-    text = Text(f"{symbol}  {word}   {state.good} / {state.wanted}", "bold")
+    trial = " (trial hit)" if state.trial and state.word is Word.GOOD else ""
+    text = Text(f"{symbol}  {state.shown_word}{trial}   {state.good} / {state.wanted}", "bold")
     return Panel(Align.center(text), style=style, padding=(1, 1))
 
 

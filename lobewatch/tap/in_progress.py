@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from datetime import timedelta
 from pathlib import Path
 
 from acquisition import (
+    Channel,
     Circumstances,
     DataError,
     Hit,
@@ -19,17 +20,16 @@ from acquisition import (
     estimate_frf,
     judge_hit,
     new_tap_id,
-    read_tap_hits,
     write_hit,
 )
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap.spool import SETUP, SpooledHit, spooled_hits, spooled_trigger
 from lobewatch.tap.state import TakenHit
 
 RESERVE_BYTES = 50_000_000
 """Free disk space needed before the trigger is armed."""
 RESUMABLE = timedelta(hours=12)
 """An interrupted test older than this is not gone on with."""
-SETUP = "setup.json"
 
 
 @dataclass
@@ -48,10 +48,16 @@ class TapInProgress:
     """The verdict on each; UNDONE where the operator took a good one back."""
     reasons: list[str] = field(default_factory=list)
     """What was wrong with each, in a sentence; empty where it is averaged."""
+    numbers: list[int] = field(default_factory=list)
+    """In the name of the file of each."""
     earlier: int = 0
     """How many of them were there when it was gone on with."""
     trigger: Trigger | None = None
     """How its hits are recorded; None until that is chosen."""
+    baseline: Hit | None = None
+    """A record at rest; None until the self-check has run."""
+    damaged: list[Path] = field(default_factory=list)
+    """Files of an interrupted test that could not be read, where they were set aside."""
 
     @property
     def good(self) -> int:
@@ -67,33 +73,51 @@ class TapInProgress:
             for i, (hit, flags, reason) in told
         )
 
+    def accept_device(self, sample_rate: float, channels: tuple[Channel, Channel], description: str) -> None:
+        """Note what the hits to come are recorded with; ValueError where those before them had another set-up."""
+        known = self.hits[-1] if self.hits else self.baseline
+        if known is not None and (known.sample_rate, known.channels) != (sample_rate, channels):
+            raise self.other_setup()
+        if not self.hits:
+            self.circumstances = replace(self.circumstances, device=description)
+
+    def other_setup(self) -> ValueError:
+        """The refusal to mix hits of two set-ups."""
+        return ValueError(
+            f"the interrupted test {self.id} was recorded with another length, sample rate or sensor; "
+            "begin anew with --new"
+        )
+
     def add(self, hit: Hit, flags: HitFlags, reason: str) -> None:
         """Keep a hit; on the disk when this returns."""
         self.folder.mkdir(parents=True, exist_ok=True)
         if not self.hits and self.trigger is not None:
             atomic_write(self.folder / SETUP, json.dumps(asdict(self.trigger)).encode())
-        self._write(len(self.hits), hit, flags)
-        self.hits.append(hit)
-        self.flags.append(flags)
-        self.reasons.append(reason)
+        number = max(self.numbers, default=-1) + 1
+        self._write(number, hit, flags)
+        self._append(number, hit, flags, reason)
 
-    def undo(self) -> int | None:
-        """Take back the last good hit and return its index; None where there is none. It stays stored, as undone."""
-        for i in reversed(range(len(self.hits))):
-            if not self.flags[i]:
-                self.take_out(i, HitFlags.UNDONE, "")
-                return i
-        return None
+    def add_spooled(self, spooled: SpooledHit) -> None:
+        """Go on with a hit that is on the disk already."""
+        found = judge_hit(spooled.hit)
+        self._append(spooled.number, spooled.hit, spooled.flags | found.flags, found.text or spooled.flags.cure)
+        self.earlier = len(self.hits)
 
     def take_out(self, number: int, flags: HitFlags, reason: str) -> None:
         """Refuse a good hit (by its index) afterwards; it stays stored."""
-        self._write(number, self.hits[number], flags)
+        self._write(self.numbers[number], self.hits[number], flags)
         self.flags[number], self.reasons[number] = flags, reason
 
     def finish(self) -> TapTest:
         """The averaged tap test; ValueError where no hit is good."""
         good = [hit for hit, flags in zip(self.hits, self.flags, strict=True) if not flags]
         return TapTest(self.id, self.circumstances, estimate_frf(good), tuple(self.hits), tuple(self.flags))
+
+    def _append(self, number: int, hit: Hit, flags: HitFlags, reason: str) -> None:
+        self.numbers.append(number)
+        self.hits.append(hit)
+        self.flags.append(flags)
+        self.reasons.append(reason)
 
     def _write(self, number: int, hit: Hit, flags: HitFlags) -> None:
         write_hit(self.folder / f"{number:04d}.h5", hit, self.circumstances, flags)
@@ -106,28 +130,28 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
         raise DataError(
             f"{folder.path}: {free / 1e6:.0f} MB free on this disk; a tap test needs {RESERVE_BYTES / 1e6:.0f} MB"
         )
-    spooled = sorted(folder.spool.iterdir(), reverse=True) if folder.spool.is_dir() else []
+    damaged: list[Path] = []
+    tap = _interrupted(folder, circumstances, damaged) if resume else None
+    if tap is None:
+        tap_id = new_tap_id(circumstances)
+        tap = TapInProgress(tap_id, circumstances, folder.spool / tap_id)
+    tap.damaged = damaged
+    return tap
+
+
+def _interrupted(folder: MachineFolder, circumstances: Circumstances, damaged: list[Path]) -> TapInProgress | None:
+    """The newest test of the same tool and direction that can be gone on with."""
     committed = {entry.id for entry in folder.taps()}
-    for path in spooled if resume else []:
-        files = sorted(path.glob("*.h5"))
-        if not files or path.name in committed:
+    for path in sorted(folder.spool.iterdir(), reverse=True) if folder.spool.is_dir() else []:
+        hits = spooled_hits(path, damaged)
+        first = None if path.name in committed else next(hits, None)
+        if first is None:
             continue
-        about = read_tap_hits(files[0])[1]
+        about = first.circumstances
         same = (about.tool, about.direction) == (circumstances.tool, circumstances.direction)
         if same and circumstances.created - about.created < RESUMABLE:
-            return _resumed(path, files, about)
-    tap_id = new_tap_id(circumstances)
-    return TapInProgress(tap_id, circumstances, folder.spool / tap_id)
-
-
-def _resumed(path: Path, files: list[Path], about: Circumstances) -> TapInProgress:
-    tap = TapInProgress(path.name, about, path, earlier=len(files))
-    for file in files:
-        (hit,), _, (flags,) = read_tap_hits(file)
-        tap.hits.append(hit)
-        found = judge_hit(hit)
-        tap.flags.append(flags | found.flags)
-        tap.reasons.append(found.text or flags.cure)
-    if (path / SETUP).is_file():
-        tap.trigger = Trigger(**json.loads((path / SETUP).read_text("utf-8")))
-    return tap
+            tap = TapInProgress(path.name, about, path, trigger=spooled_trigger(path, damaged))
+            for hit in (first, *hits):
+                tap.add_spooled(hit)
+            return tap
+    return None

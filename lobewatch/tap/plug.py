@@ -23,7 +23,7 @@ class Plug:
             found = find_port(*self._identity)
             if found is None:
                 number = self._identity[1]
-                raise DeviceError(f"the DAQ with the USB serial number {number} is not plugged in; plug it in")
+                raise DeviceError(f"the DAQ with the USB serial number {number} is not plugged in", "plug it in")
             self._port = found
         source = open_source(self._daq, self._port)
         self._identity = self._identity or usb_identity(self._port)

@@ -110,11 +110,14 @@ class TapState:
     title: str
     """Machine, tool and direction."""
     resumed: str = ""
-    """Where an interrupted test is gone on with: which one and how many good hits it had; empty for a new one."""
+    """Where an interrupted test is gone on with: which one, how many good hits it had, and damaged files that were set
+    aside; empty for a new one."""
     device: str = ""
     """DAQ, port and rate."""
     verdict: str = ""
     """Of the last hit, e.g. "good" or "double hit, too soft"."""
+    trial: bool = False
+    """Whether the last hit was a trial hit, which does not count."""
     reason: str = ""
     """One sentence with figures: what was wrong with the last hit, or why the test stands still."""
     good: int = 0
@@ -135,3 +138,10 @@ class TapState:
     """Of the last hit and the mean."""
     outcome: Outcome | None = None
     """At the end."""
+
+    @property
+    def shown_word(self) -> str:
+        """The word as a screen shows it: the verdict in place of REFUSED."""
+        if self.word is not Word.REFUSED or not self.verdict:
+            return self.word.value
+        return f"{self.verdict}{', trial hit' if self.trial else ''}".upper()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
+import shutil
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -76,6 +77,25 @@ def test_the_demo_in_readme_is_what_the_command_prints(
     split = wanted.index("...")
     assert printed[:split] == wanted[:split]
     assert printed[-len(wanted) + split + 1 :] == wanted[split + 1 :]
+
+
+def test_the_python_in_readme_runs(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path, beam: Path
+) -> None:
+    block = re.search(r"^```python\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+    assert block is not None
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["lobewatch", "init", "mill-3", "--example"])
+    with pytest.raises(SystemExit):
+        main()
+    shutil.copy(beam, "hit.lvm")
+    capsys.readouterr()
+    exec(block[1], {})
+    first, *programs, last = capsys.readouterr().out.splitlines()
+    assert "696 Hz" in first
+    assert [line.split(":")[0] for line in programs] == ["A", "B", "C"]
+    assert all(re.search(r" (stable|not stable) \d+\.\d\d mm$", line) for line in programs)
+    assert last.split()[0] in ("good", "warn", "alarm")
 
 
 def test_pictures_and_links_are_there() -> None:

@@ -11,9 +11,9 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("acquisition", "modal", "dsm", "lobes", "lobewatch")
 CODE = r"[a-z]+(?:-[a-z]+)*"
-SHARED = {
-    "no-mode-to-follow": "by the likeness to the last mode, and before that by band and sign: there is none either way",
-    "one-direction": "of an assembly, and of a machine whose newest assembly it is",
+SHARED: dict[str, str] = {
+    "no-mode-to-follow": "none like the last one, or none at all in the band",
+    "one-direction": "of an assembly, and of the standing that it leads to",
 }
 """Codes that several modules give, each with the reason why they mean the same."""
 

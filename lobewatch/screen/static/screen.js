@@ -104,9 +104,8 @@ function showLevels() {
 function showHits() {
   at("hits").replaceChildren(
     ...state.hits.toReversed().map((hit) => {
-      const good = hit.verdict === "good";
-      const row = element("li", "", hit.undone ? "undone" : good ? "" : "bad");
-      row.append(element("span", `${hit.number}`), element("span", hit.undone ? "" : good ? "✓" : "✗"));
+      const row = element("li", "", hit.undone ? "undone" : hit.good ? "" : "bad");
+      row.append(element("span", `${hit.number}`), element("span", hit.undone ? "" : hit.good ? "✓" : "✗"));
       row.append(element("span", hit.verdict), element("span", hit.peak_force === null ? "" : `${hit.peak_force.toFixed(0)} N`));
       return row;
     }),

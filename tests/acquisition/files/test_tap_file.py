@@ -141,6 +141,20 @@ def test_a_hit_in_progress_is_read_back_with_its_circumstances(tap: TapTest, tmp
     assert flags == (HitFlags.UNDONE,)
 
 
+@pytest.mark.parametrize("place", [0, 100, 4000, -200, -30])
+def test_an_altered_hit_in_progress_is_told_before_hdf5_sees_it(
+    tap: TapTest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: int
+) -> None:
+    path = tmp_path / "0000.h5"
+    write_hit(path, tap.hits[0], ABOUT, HitFlags.OK)
+    content = bytearray(path.read_bytes())
+    content[place] ^= 4
+    path.write_bytes(content)
+    monkeypatch.setattr(h5py, "File", None)
+    with pytest.raises(DataError, match=r"0000\.h5: altered since it was written"):
+        read_tap_hits(path)
+
+
 def test_identities_are_unique_file_names_that_sort_by_time() -> None:
     ids = {new_tap_id(ABOUT) for _ in range(50)}
     assert len(ids) > 40

@@ -174,7 +174,7 @@ def test_a_port_that_cannot_be_opened_says_why(error: Exception, cure: str, monk
 
 def test_a_host_without_an_address_is_said_in_the_words_of_the_system() -> None:
     error = socket.gaierror(-2, "Name or service not known")
-    assert "(" + str(error) + ")" in explain_open_error("socket://daq.invalid:5", error)
+    assert "(" + str(error) + ")" in explain_open_error("socket://daq.invalid:5", error).text
 
 
 def test_a_device_is_found_wherever_it_is_plugged_in(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -215,7 +215,7 @@ def test_no_port_at_all_gets_a_sentence_with_the_cure(run: Any, monkeypatch: pyt
 def test_what_is_wrong_with_a_port_is_told_with_the_cure_of_the_platform(
     platform: str, error: Exception, cure: str
 ) -> None:
-    text = explain_open_error("/dev/x", error, platform)
+    text = str(explain_open_error("/dev/x", error, platform))
     assert text.startswith("port /dev/x cannot be opened (")
     assert cure in text
 
@@ -224,7 +224,7 @@ def test_the_group_in_the_cure_is_that_of_the_port(tmp_path: Path) -> None:
     port = tmp_path / "ttyACM0"
     port.touch()
     error = PermissionError(errno.EACCES, "Permission denied")
-    assert f"usermod -aG {port.group()} $USER" in explain_open_error(str(port), error, "linux")
+    assert f"usermod -aG {port.group()} $USER" in explain_open_error(str(port), error, "linux").cure
 
 
 @pytest.mark.parametrize(

@@ -32,14 +32,15 @@ def test_bars_are_the_95_percent_interval() -> None:
     assert (low, high) == pytest.approx((1700 - 3.92, 1700 + 3.92))
 
 
-def verdict(name: str) -> Verdict:
+def chattering(name: str) -> Verdict:
     cut = {"teeth": 2, "radial_depth_mm": 5, "tool_diameter_mm": 10, "direction": "up", "material": "any"}
-    return Verdict(ProgramTable(name=name, speed_rpm=1500.0, depth_mm=3.0, **cut), Word.NOT_STABLE)  # type: ignore[arg-type]
+    program = ProgramTable(name=name, speed_rpm=1500.0, depth_mm=3.0, **cut)  # type: ignore[arg-type]
+    return Verdict(program, Word.NOT_STABLE)
 
 
 def test_lobes_are_drawn_in_mm_and_programs_where_they_cut() -> None:
     speed = np.linspace(1000.0, 2000.0, 5)
-    figure = lobes_figure(speed, {"then": np.full(5, 2e-3), "now": np.full(5, 1e-3)}, [verdict("A")])
+    figure = lobes_figure(speed, {"then": np.full(5, 2e-3), "now": np.full(5, 1e-3)}, [chattering("A")])
     then, now, mark = figure.axes[0].lines
     assert then.get_ydata() == pytest.approx(2.0)
     assert now.get_ydata() == pytest.approx(1.0)
@@ -58,7 +59,7 @@ def test_receptance_is_drawn_in_nm_per_n() -> None:
 @pytest.mark.parametrize("name", [r"cost $5 to $6 \frac", r"cost $5 \frac to $6", "$x$", r"a_b^c \$ $"])
 def test_no_name_is_read_as_a_formula(name: str) -> None:
     speed = np.linspace(1000.0, 2000.0, 5)
-    picture = svg(lobes_figure(speed, {name: np.full(5, 1e-3)}, [verdict(name)], title=name))
+    picture = svg(lobes_figure(speed, {name: np.full(5, 1e-3)}, [chattering(name)], title=name))
     assert picture.count(f">{name}</text>") == 3
 
 

@@ -68,7 +68,9 @@ def test_every_word_has_a_symbol_and_how_far_it_is(word: Word) -> None:
 
 
 def test_a_trial_hit_is_told_from_a_good_one() -> None:
-    assert "✓  GOOD (trial hit)   0 / 10" in plain(replace(STATE, word=Word.GOOD, verdict="trial hit", good=0, hits=()))
+    assert "✓  GOOD (trial hit)   0 / 10" in plain(
+        replace(STATE, word=Word.GOOD, verdict="good", trial=True, good=0, hits=())
+    )
 
 
 def test_what_was_wrong_and_how_far_the_mean_has_come() -> None:
@@ -192,6 +194,15 @@ def test_lines_for_a_log_tell_everything_once() -> None:
     assert said.count(" / 10") == 1
     assert "  1 / 10  ✗ DOUBLE HIT  Second peak 12 ms after the first (18 %): let it bounce [back].  (310 N)" in said
     assert said.count(away) == 1
+
+
+def test_what_a_trial_hit_says_is_a_line_of_its_own_as_it_is_in_no_list() -> None:
+    console = Console(file=io.StringIO(), width=200)
+    printer = TapPrinter(Session(replace(STATE, hits=())), console)
+    printer.show(replace(STATE, word=Word.REFUSED, verdict="double hit", trial=True, reason="Bounce back.", hits=()))
+    printer.show(replace(STATE, word=Word.REFUSED, verdict="too soft", reason="Hit harder.", hits=(GOOD,)))
+    said = console.file.getvalue()  # type: ignore[attr-defined]
+    assert said.splitlines() == ["Bounce back.", "  1 / 10  ✓ GOOD  (231 N)"]
 
 
 def test_a_word_ahead_of_its_hit_rings_once_and_the_next_hit_again(terminal: int) -> None:

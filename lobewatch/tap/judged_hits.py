@@ -1,0 +1,75 @@
+"""The hits of a test with the verdict on each, and the mean of the good ones."""
+
+from __future__ import annotations
+
+from acquisition import Hit, HitFlags, RunningMean, Verdict, judge_hit
+from lobewatch.machine.machine_file import Machine
+from lobewatch.tap.in_progress import TapInProgress
+
+FEWEST_FOR_MEAN = 3
+"""Hits in a mean that others are compared with."""
+
+
+class JudgedHits:
+    """The spooled hits of a test, and their mean, which always is that of the good ones."""
+
+    def __init__(self, tap: TapInProgress, machine: Machine) -> None:
+        """Go on with what is spooled."""
+        self.tap = tap
+        """The hits on the disk."""
+        self.wanted = machine.tap.hits
+        """How many good ones are needed."""
+        self.mean = RunningMean()
+        """Of the good hits."""
+        self._band = machine.mode.band_hz
+        for hit, flags in zip(tap.hits, tap.flags, strict=True):
+            if not flags:
+                self.mean.add(hit)
+
+    @property
+    def missing(self) -> int:
+        """How many good hits are still to come."""
+        return max(self.wanted - self.tap.good, 0)
+
+    @property
+    def progress(self) -> str:
+        """How far the test is."""
+        return f"{self.tap.good} of {self.wanted} good hits"
+
+    def judge(self, hit: Hit) -> Verdict:
+        """Against the mean, too, where that has enough hits to tell how far they scatter."""
+        mean = self.mean.frf if len(self.mean.hits) >= FEWEST_FOR_MEAN else None
+        return judge_hit(hit, mean, self._band)
+
+    def add(self, hit: Hit, verdict: Verdict) -> None:
+        """Keep a hit; on the disk when this returns."""
+        self.tap.add(hit, verdict.flags, verdict.text)
+        if not verdict.flags:
+            self.mean.add(hit)
+
+    def undo(self) -> int | None:
+        """Take back the last good hit and return its index; None where there is none."""
+        good = [i for i, flags in enumerate(self.tap.flags) if not flags]
+        if not good:
+            return None
+        self._take_out(good[-1], Verdict(HitFlags.UNDONE))
+        return good[-1]
+
+    def look_back(self) -> tuple[int, Verdict] | None:
+        """Judge the first hits, which had no mean to be compared with, against the mean of all others.
+
+        Takes the first of them that does not fit out of the mean, and returns its index and why.
+        """
+        if not FEWEST_FOR_MEAN < len(self.mean.hits) <= 2 * FEWEST_FOR_MEAN:
+            return None
+        for hit in self.mean.hits[:FEWEST_FOR_MEAN]:
+            verdict = judge_hit(hit, self.mean.without(hit))
+            if verdict.flags:
+                number = next(i for i, other in enumerate(self.tap.hits) if other is hit)
+                self._take_out(number, verdict)
+                return number, verdict
+        return None
+
+    def _take_out(self, number: int, verdict: Verdict) -> None:
+        self.tap.take_out(number, verdict.flags, verdict.text)
+        self.mean.remove(self.tap.hits[number])

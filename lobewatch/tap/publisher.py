@@ -1,0 +1,38 @@
+"""The one place that makes the pictures of a live test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from lobewatch.tap.judged_hits import JudgedHits
+from lobewatch.tap.state import TapState
+
+
+class Publisher:
+    """The newest picture of a test: only replaced, never changed, by the thread of the test; any thread may read it."""
+
+    def __init__(self, first: TapState, clock: Callable[[], float]) -> None:
+        """clock: seconds that never go back."""
+        self._state, self._clock, self._shown_at = first, clock, clock()
+
+    @property
+    def state(self) -> TapState:
+        """The newest picture."""
+        return self._state
+
+    @property
+    def age(self) -> float:
+        """How long it has stood (s)."""
+        return self._clock() - self._shown_at
+
+    def show(self, **changes: Any) -> None:
+        """Replace the picture by one with these fields of TapState."""
+        self._state = replace(self._state, revision=self._state.revision + 1, **changes)
+        self._shown_at = self._clock()
+
+    def show_hits(self, hits: JudgedHits, **changes: Any) -> None:
+        """The list of hits, what follows from it, and other fields with it."""
+        mean = hits.mean
+        self.show(hits=hits.tap.taken, good=hits.tap.good, mean_change=mean.change, settled=mean.settled, **changes)

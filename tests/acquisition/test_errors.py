@@ -1,0 +1,12 @@
+"""What an error of a device says."""
+
+from __future__ import annotations
+
+from acquisition import DeviceError
+
+
+def test_cause_and_cure_of_a_device_error_are_told_together_and_kept_apart() -> None:
+    error = DeviceError("the DAQ was unplugged; its lamp is out", "plug it in")
+    assert str(error) == "the DAQ was unplugged; its lamp is out; plug it in"
+    assert (error.text, error.cure) == ("the DAQ was unplugged; its lamp is out", "plug it in")
+    assert str(DeviceError("the DAQ was unplugged")) == "the DAQ was unplugged"

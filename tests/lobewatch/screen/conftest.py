@@ -1,0 +1,122 @@
+"""What several tests of the screen share: a page in a real browser."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.remote.webelement import WebElement
+from selenium.webdriver.support.ui import WebDriverWait
+
+from lobewatch.screen import ScreenServer
+
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+FLAGS = (
+    "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
+    "--disable-component-update --disable-sync --autoplay-policy=user-gesture-required"
+)
+COUNT_TONES = """
+window.tones = [];
+const made = AudioContext.prototype.createOscillator;
+AudioContext.prototype.createOscillator = function () {
+  const tone = made.call(this);
+  const start = tone.start;
+  tone.start = function (at) { window.tones.push(tone.frequency.value); return start.call(tone, at); };
+  return tone;
+};
+"""
+Session = Any
+"""ScriptedSession of tests/conftest.py."""
+
+
+class Browser:
+    """Chromium on one page."""
+
+    def __init__(self) -> None:
+        options = webdriver.ChromeOptions()
+        for flag in FLAGS.split():
+            options.add_argument(flag)
+        options.binary_location = CHROMIUM or ""
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+        self.driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+        self.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": COUNT_TONES})
+
+    def open(self, url: str, size: tuple[int, int] = (1280, 800)) -> None:
+        """A page in a window of this size, with nothing remembered."""
+        self.driver.execute_cdp_cmd(
+            "Storage.clearDataForOrigin", {"origin": url.partition("/#")[0], "storageTypes": "all"}
+        )
+        self.resize(size)
+        self.driver.get("about:blank")
+        self.log("browser")
+        self.log("performance")
+        self.driver.get(url)
+
+    def resize(self, size: tuple[int, int]) -> None:
+        metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+
+    def part(self, name: str) -> WebElement:
+        return self.driver.find_element(By.ID, name)
+
+    def wait(self, what: Callable[[], object]) -> None:
+        WebDriverWait(self.driver, 20, 0.02).until(lambda _: what())
+
+    def see(self, name: str, text: str) -> None:
+        """Wait until a part of the page shows this text."""
+        self.wait(lambda: text in self.part(name).text)
+
+    def press(self, *keys: str) -> None:
+        ActionChains(self.driver).send_keys(*keys).perform()
+
+    def ask(self, script: str) -> Any:
+        return self.driver.execute_script(f"return {script}")
+
+    def log(self, kind: str) -> list[dict[str, Any]]:
+        """New entries of a log of the browser."""
+        return list(self.driver.execute("getLog", {"type": kind})["value"])
+
+    def complaints(self) -> list[str]:
+        """Errors of the page, but for the server that is gone at the end of a test."""
+        errors = [entry["message"] for entry in self.log("browser") if entry["level"] == "SEVERE"]
+        return [error for error in errors if "ERR_CONNECTION_REFUSED" not in error]
+
+    def requested(self) -> set[str]:
+        """Where requests went to."""
+        messages = [json.loads(entry["message"])["message"] for entry in self.log("performance")]
+        sent = [
+            m["params"] for m in messages if m["method"] in ("Network.requestWillBeSent", "Network.webSocketCreated")
+        ]
+        urls = {one.get("url") or one["request"]["url"] for one in sent}
+        return {"/".join(url.replace("ws:", "http:").split("/")[:3]) for url in urls}
+
+
+@pytest.fixture(scope="module")
+def opened() -> Iterator[Browser]:
+    """A browser; skips where there is none, but not in continuous integration."""
+    if not (CHROMIUM and DRIVER) and "CI" not in os.environ:
+        pytest.skip("chromium and chromedriver are not installed")
+    browser = Browser()
+    yield browser
+    browser.driver.quit()
+
+
+@pytest.fixture
+def browser(opened: Browser) -> Iterator[Browser]:
+    """A browser whose page must not complain."""
+    yield opened
+    assert opened.complaints() == []
+
+
+@pytest.fixture
+def server(session: Session) -> Iterator[ScreenServer]:
+    with ScreenServer(session) as running:
+        yield running

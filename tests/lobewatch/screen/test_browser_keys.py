@@ -1,0 +1,135 @@
+"""Keys, buttons and sounds of the screen in a real browser."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import pytest
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+
+from acquisition import HitFlags
+from lobewatch.screen import ScreenServer
+from lobewatch.tap.state import Word
+
+Browser = Any
+"""Chromium on one page: Browser of conftest.py."""
+Session = Any
+"""ScriptedSession of tests/conftest.py."""
+
+
+@pytest.mark.parametrize("key", ["u", "U", Keys.PAGE_UP])
+def test_undo_by_key(browser: Browser, session: Session, server: ScreenServer, key: str) -> None:
+    session.hit()
+    session.hit()
+    browser.open(server.url)
+    browser.see("good", "2")
+    browser.press(key)
+    assert session.undone.wait(10)
+    browser.see("good", "1")
+    assert len(browser.driver.find_elements(By.CSS_SELECTOR, "#hits .undone")) == 1
+
+
+def test_a_key_held_down_or_with_control_undoes_nothing_more(
+    browser: Browser, session: Session, server: ScreenServer
+) -> None:
+    for _ in range(3):
+        session.hit()
+    browser.open(server.url)
+    browser.see("good", "3")
+    ActionChains(browser.driver).key_down(Keys.CONTROL).send_keys("u").key_up(Keys.CONTROL).perform()
+    for repeated in (False, True, True):
+        event = {"type": "keyDown", "key": "u", "code": "KeyU", "text": "u", "autoRepeat": repeated}
+        browser.driver.execute_cdp_cmd("Input.dispatchKeyEvent", event)
+    browser.see("good", "2")
+    session.show(Word.TAP, reason="still two")
+    browser.see("reason", "still two")
+    assert session.state.good == 2
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (820, 1180)])
+def test_undo_by_the_large_button(
+    browser: Browser, session: Session, server: ScreenServer, size: tuple[int, int]
+) -> None:
+    session.hit()
+    browser.open(server.url, size)
+    browser.see("good", "1")
+    assert browser.part("undo").size["height"] >= 60
+    browser.part("undo").click()
+    assert session.undone.wait(10)
+    browser.see("good", "0")
+    browser.wait(lambda: not browser.part("undo").is_enabled())
+
+
+def test_what_cannot_be_undone_is_said(opened: Browser, session: Session, server: ScreenServer) -> None:
+    session.hit()
+    session.refusal = "this hit is too old to take back"
+    opened.open(server.url)
+    opened.see("good", "1")
+    opened.press("u")
+    opened.see("toast", "this hit is too old to take back")
+    assert all("409" in complaint for complaint in opened.complaints())
+
+
+def test_escape_stops_only_when_pressed_twice(browser: Browser, session: Session, server: ScreenServer) -> None:
+    browser.open(server.url)
+    browser.see("text", "CHECKING")
+    browser.press(Keys.ESCAPE)
+    browser.see("stop-text", "Again to stop")
+    assert not session.stopped.is_set()
+    browser.press(Keys.ESCAPE)
+    assert session.stopped.wait(10)
+
+
+def sounded(browser: Browser, tones: list[float]) -> bool:
+    """Whether these and no other tones (Hz) were played."""
+    return bool(browser.ask("tones") == tones)
+
+
+def test_every_verdict_has_its_sound_and_m_mutes_it_for_good(
+    browser: Browser, session: Session, server: ScreenServer
+) -> None:
+    browser.open(server.url)
+    browser.see("text", "CHECKING")
+    assert browser.part("sound").text == "Sound: press any key"
+    browser.press("x")
+    browser.see("sound", "Sound on")
+    tones: list[float] = []
+    for show, word, new in (
+        (session.hit, "GOOD", [1320]),
+        (lambda: session.hit(HitFlags.TOO_SOFT), "TOO SOFT", [220, 220]),
+        (lambda: session.show(Word.NO_DEVICE), "NO DEVICE", [160]),
+        (session.finish, "DONE", [660, 880, 1320]),
+    ):
+        show()
+        tones += new
+        browser.see("text", word)
+        browser.wait(functools.partial(sounded, browser, [*tones]))
+    browser.press("m")
+    browser.see("sound", "Sound off")
+    session.hit()
+    browser.see("text", "GOOD")
+    assert browser.ask("tones") == tones
+    browser.driver.refresh()
+    browser.see("text", "GOOD")
+    assert browser.part("sound").text == "Sound off"
+    browser.part("mute").click()
+    browser.see("sound", "Sound on")
+
+
+def test_a_verdict_in_two_pictures_sounds_once_and_one_after_another_twice(
+    browser: Browser, session: Session, server: ScreenServer
+) -> None:
+    browser.open(server.url)
+    browser.see("text", "CHECKING")
+    browser.press("x")
+    session.show(Word.GOOD)
+    browser.see("text", "GOOD")
+    session.hit()
+    browser.see("good", "1")
+    assert browser.ask("tones") == [1320]
+    session.hit()
+    browser.see("good", "2")
+    assert browser.ask("tones") == [1320, 1320]

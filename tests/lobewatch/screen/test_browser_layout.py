@@ -1,0 +1,92 @@
+"""What can be seen of the screen in a real browser: sizes, contrast, curves, and by those who cannot see it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from acquisition import HitFlags
+from lobewatch.screen import ScreenServer
+from lobewatch.tap.state import Word
+
+SIZES = ((1280, 800), (1920, 1080), (820, 1180))
+ESSENTIALS = ("text", "good", "reason", "undo", "mute", "stop", "frf", "coherence", "force", "change", "taken")
+Browser = Any
+"""Chromium on one page: Browser of conftest.py."""
+Session = Any
+"""ScriptedSession of tests/conftest.py."""
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_everything_needed_is_in_sight_without_scrolling(
+    browser: Browser, session: Session, server: ScreenServer, size: tuple[int, int]
+) -> None:
+    session.check()
+    for _ in range(4):
+        session.hit()
+    session.hit(HitFlags.DOUBLE_HIT | HitFlags.OVERLOAD_RESPONSE, "Let the hammer bounce back. " * 4)
+    browser.open(server.url, size)
+    browser.see("text", "OVERLOAD (RESPONSE)")
+    assert browser.ask("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") == list(size)
+    for name in ESSENTIALS:
+        box = browser.part(name).rect
+        assert box["x"] >= 0, name
+        assert box["y"] >= 0, name
+        assert box["x"] + box["width"] <= size[0], name
+        assert box["y"] + box["height"] <= size[1], name
+        assert box["height"] >= 16, name
+    session.show(Word.TAP)
+    browser.see("text", "TAP")
+    assert browser.part("text").rect["height"] >= 0.09 * size[1]
+
+
+def test_text_has_a_contrast_of_seven_to_one(browser: Browser, session: Session, server: ScreenServer) -> None:
+    browser.open(server.url)
+    for word in Word:
+        session.show(word)
+        browser.see("text", word.value)
+        colours = browser.ask(
+            "['color', 'backgroundColor'].map((name) => getComputedStyle(document.getElementById('now'))[name])"
+        )
+        assert contrast(*colours) >= 7, (word, colours)
+
+
+def contrast(*colours: str) -> float:
+    """Of WCAG 2.2, from two CSS colours rgb(r, g, b)."""
+    lights = []
+    for colour in colours:
+        shares = [int(part) / 255 for part in colour.partition("(")[2].rstrip(")").split(",")[:3]]
+        linear = [share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4 for share in shares]
+        lights.append(0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2])
+    return (max(lights) + 0.05) / (min(lights) + 0.05)
+
+
+def test_the_word_is_told_to_those_who_cannot_see_it(browser: Browser, session: Session, server: ScreenServer) -> None:
+    browser.open(server.url)
+    browser.see("text", "CHECKING")
+    assert browser.part("word").get_attribute("aria-live") == "assertive"
+    browser.driver.execute_cdp_cmd(
+        "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-reduced-motion", "value": "reduce"}]}
+    )
+    session.hit()
+    browser.see("text", "GOOD")
+    assert browser.ask("getComputedStyle(document.getElementById('now')).animationName") == "none"
+    browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
+
+
+def test_the_curves_are_drawn(browser: Browser, session: Session, server: ScreenServer) -> None:
+    """Blue of the mean stands on its canvas after the first good hit, and not before."""
+    blue = """(() => { const canvas = document.querySelector('#frf canvas');
+    const pixels = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data;
+    let count = 0;
+    for (let i = 0; i < pixels.length; i += 4)
+      count += pixels[i] < 40 && pixels[i + 1] > 80 && pixels[i + 2] > 150 && pixels[i + 3] > 200;
+    return count; })()"""
+    browser.open(server.url)
+    session.hit(HitFlags.TOO_SOFT)
+    browser.see("text", "TOO SOFT")
+    assert browser.ask(blue) == 0
+    session.hit()
+    browser.see("text", "GOOD")
+    browser.wait(lambda: browser.ask(blue) > 200)

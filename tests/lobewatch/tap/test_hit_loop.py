@@ -1,0 +1,153 @@
+"""Hits of a live tap test: undo, looking back, verdicts before the disk, a slow disk."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquisition import (
+    Block,
+    Channel,
+    HammeredStructure,
+    Hammering,
+    HitFlags,
+    Structure,
+    TapsEmulator,
+    TapsSource,
+    estimate_frf,
+    read_hits,
+    read_tap,
+    write_hit,
+)
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap.plots import plots_of
+from lobewatch.tap.session import TapSession
+from lobewatch.tap.state import TapState, Word
+
+RATE = 25600.0
+Tapper = Callable[..., HammeredStructure]
+Pair = tuple[Channel, Channel]
+Simulate = Callable[..., Any]
+"""Makes the device of conftest.py."""
+OpenSession = Callable[..., TapSession]
+
+
+def test_undo_takes_back_the_last_good_hits_one_by_one_and_the_last_one_too(
+    folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
+) -> None:
+    asked: set[int] = set()
+
+    def watch(state: TapState) -> None:
+        for good, times in ((3, 2), (10, 1)):
+            if state.good == good and good not in asked:
+                asked.add(good)
+                for _ in range(times):
+                    session.undo()
+
+    session = session_of(folder, lambda: simulated(tapper(), channels), watch)
+    tap = session.run()
+    undone = [i for i, flags in enumerate(tap.flags, 1) if flags is HitFlags.UNDONE]
+    assert undone == [2, 3, 12]
+    assert [hit.number for hit in session.state.hits if hit.undone] == undone
+    assert len(tap.accepted) == 10
+    assert np.array_equal(tap.frf.receptance, estimate_frf(tap.accepted).receptance)
+    path = folder.path / "taps" / f"{tap.id}.h5"
+    assert read_tap(path).flags == tap.flags
+    assert len(read_hits(path)) == 10
+
+
+def test_good_is_not_said_of_a_hit_taken_back(
+    folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
+) -> None:
+    def watch(state: TapState) -> None:
+        states.append(state)
+        if state.word is Word.GOOD and state.good == len(state.hits) == 3:
+            session.undo()
+
+    states: list[TapState] = []
+    session = session_of(folder, lambda: simulated(tapper(), channels), watch)
+    session.run()
+    undone = [state for state in states if state.verdict == "undone"]
+    assert undone[0].reason == "Hit 3 was taken back."
+    assert {state.word for state in undone} <= {Word.WAIT, Word.TAP}
+
+
+def test_a_first_hit_at_another_spot_is_found_out_by_those_after_it(
+    folder: MachineFolder,
+    tapper: Tapper,
+    structure: Structure,
+    channels: Pair,
+    simulated: Simulate,
+    session_of: OpenSession,
+) -> None:
+    spot = replace(structure, stiffness=structure.stiffness * np.array([1.0, 1.5, 1.0]))
+    how = Hammering(double_hits=0.0, overloads=0.0)
+    astray = HammeredStructure(spot, RATE, np.random.default_rng(3), how)
+    devices = iter(
+        (simulated(astray, channels, unplugged=lambda: session.state.good == 1), simulated(tapper(), channels))
+    )
+    states: list[TapState] = []
+    session: TapSession = session_of(folder, lambda: next(devices), states.append)
+    tap = session.run()
+    assert tap.flags == (HitFlags.INCONSISTENT, *[HitFlags.OK] * 10)
+    told = next(state for state in states if state.verdict == "inconsistent")
+    assert (told.good, len(told.hits), told.word) == (3, 4, Word.WAIT)
+    assert re.match(r"Hit 1 does not fit the others and counts no more\. FRF \d+% away from the mean of 3", told.reason)
+    assert np.array_equal(tap.frf.receptance, estimate_frf(tap.hits[1:]).receptance)
+
+
+def test_a_verdict_does_not_wait_for_the_disk_and_counts_once_it_is_there(
+    folder: MachineFolder,
+    tapper: Tapper,
+    channels: Pair,
+    monkeypatch: pytest.MonkeyPatch,
+    simulated: Simulate,
+    session_of: OpenSession,
+) -> None:
+    shown: list[tuple[Word, str, int]] = []
+
+    def keep(*arguments: Any) -> None:
+        shown.append((session.state.word, session.state.verdict, session.state.good))
+        write_hit(*arguments)
+
+    monkeypatch.setattr("lobewatch.tap.in_progress.write_hit", keep)
+    session = session_of(folder, lambda: simulated(tapper(), channels))
+    session.run()
+    assert shown == [(Word.GOOD, "good", good) for good in range(10)]
+
+
+def test_no_scan_is_lost_to_a_slow_disk_and_slow_mathematics(
+    folder: MachineFolder, tapper: Tapper, channels: Pair, monkeypatch: pytest.MonkeyPatch, session_of: OpenSession
+) -> None:
+    folder.toml.write_text(folder.toml.read_text("utf-8").replace("hits = 10", "hits = 3"), "utf-8")
+    slowed = []
+
+    def slow(function: Callable[..., Any]) -> Callable[..., Any]:
+        def late(*arguments: Any) -> Any:
+            slowed.append(function.__name__)
+            time.sleep(0.5)
+            return function(*arguments)
+
+        return late
+
+    monkeypatch.setattr("lobewatch.tap.in_progress.write_hit", slow(write_hit))
+    monkeypatch.setattr("lobewatch.tap.hit_loop.plots_of", slow(plots_of))
+    lost: list[int] = []
+
+    class Counting(TapsSource):
+        def blocks(self) -> Iterator[Block]:
+            for block in super().blocks():
+                lost.append(block.lost_before)
+                yield block
+
+    with TapsEmulator(tapper(), channels, RATE, realtime=True) as device:
+        tap = session_of(MachineFolder(folder.path), lambda: Counting(device.port)).run()
+    assert slowed.count("write_hit") == slowed.count("plots_of") == len(tap.hits) >= 3
+    assert sum(lost) == 0
+    assert len(lost) > 3 * 0.4 * RATE / 512

@@ -1,0 +1,45 @@
+"""Trial hits in a live tap test."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+from acquisition import Channel, HammeredStructure, HitFlags
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap.session import TapSession
+from lobewatch.tap.state import TapState, Word
+
+Tapper = Callable[..., HammeredStructure]
+Pair = tuple[Channel, Channel]
+Simulate = Callable[..., Any]
+"""Makes the device of conftest.py."""
+OpenSession = Callable[..., TapSession]
+
+
+def test_trial_hits_choose_what_is_open_and_do_not_count(
+    open_folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
+) -> None:
+    states: list[TapState] = []
+    session = session_of(open_folder, lambda: simulated(tapper(), channels), states.append)
+    tap = session.run()
+    reasons = [state.reason for state in states]
+    assert any("Trial hit 1: " in reason for reason in reasons)
+    chosen = next(reason for reason in reasons if reason.startswith("Trigger at"))
+    assert re.match(r"Trigger at [12]\d N, record 0.25 s, \d\d time constants of the slowest mode\.$", chosen)
+    assert next(state for state in states if state.trial).good == 0
+    assert (session.state.checks[-1].name, session.state.checks[-1].text) == ("trial hits", chosen.removesuffix("."))
+    assert len(tap.hits) == 10
+
+
+def test_a_refused_trial_hit_says_what_is_wrong_with_it(
+    open_folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
+) -> None:
+    states: list[TapState] = []
+    double = simulated(tapper(double_hits=1.0), channels, unplugged=lambda: session.state.word is Word.REFUSED)
+    devices = iter((double, simulated(tapper(), channels)))
+    session: TapSession = session_of(open_folder, lambda: next(devices), states.append)
+    assert len(session.run().hits) == 10
+    refused = next(state for state in states if state.word is Word.REFUSED)
+    assert (refused.shown_word, refused.reason) == ("DOUBLE HIT, TRIAL HIT", HitFlags.DOUBLE_HIT.cure)

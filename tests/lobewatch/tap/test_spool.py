@@ -1,0 +1,151 @@
+"""Damaged files of an interrupted test: set aside, said once, and the test goes on with the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquisition import Channel, Circumstances, HammeredStructure, HitFlags, read_tap, read_tap_hits
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap.in_progress import TapInProgress, begin_tap
+from lobewatch.tap.session import TapSession, TapStopped
+from lobewatch.tap.state import TapState
+
+Tapper = Callable[..., HammeredStructure]
+Pair = tuple[Channel, Channel]
+Simulate = Callable[..., Any]
+OpenSession = Callable[..., TapSession]
+
+
+def flipped(content: bytes) -> bytes:
+    middle = len(content) // 2
+    return content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
+
+
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "one bit": flipped,
+    "half": lambda content: content[: len(content) // 2],
+    "empty": lambda _: b"",
+    "zeros at its end": lambda content: content[:-20_000] + bytes(20_000),
+    "another file": lambda _: b"no hit",
+}
+
+
+@pytest.fixture
+def interrupted(
+    open_folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
+) -> Path:
+    """The spool of a test that was stopped after four good hits."""
+
+    def stop(state: TapState) -> None:
+        if state.good == 4:
+            session.stop()
+
+    session: TapSession = session_of(open_folder, lambda: simulated(tapper(), channels), stop)
+    with pytest.raises(TapStopped):
+        session.run()
+    (spool,) = open_folder.spool.iterdir()
+    return spool
+
+
+@pytest.fixture
+def go_on(
+    open_folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
+) -> Callable[[], TapSession]:
+    """Makes a session that goes on with that test."""
+    return lambda: session_of(open_folder, lambda: simulated(tapper(2), channels))
+
+
+def begun_again(folder: MachineFolder) -> TapInProgress:
+    return begin_tap(folder, Circumstances("m", datetime.now(UTC), "reference"))
+
+
+def damage(path: Path, how: Callable[[bytes], bytes] = flipped) -> bytes:
+    content = how(path.read_bytes())
+    path.write_bytes(content)
+    return content
+
+
+@pytest.mark.parametrize("how", DAMAGES)
+@pytest.mark.parametrize("number", [0, 1, 3])
+def test_a_damaged_hit_is_set_aside_and_the_others_are_gone_on_with(
+    how: str, number: int, interrupted: Path, open_folder: MachineFolder
+) -> None:
+    content = damage(interrupted / f"{number:04d}.h5", DAMAGES[how])
+    tap = begun_again(open_folder)
+    (aside,) = tap.damaged
+    assert aside == open_folder.spool / f"{interrupted.name}-{number:04d}.h5.damaged"
+    assert aside.read_bytes() == content
+    assert tap.id == interrupted.name
+    assert tap.numbers == [other for other in range(4) if other != number]
+    assert begun_again(open_folder).damaged == []
+
+
+def test_it_is_said_once_kept_after_the_end_and_no_sound_hit_is_written_over(
+    interrupted: Path, open_folder: MachineFolder, go_on: Callable[[], TapSession]
+) -> None:
+    damage(interrupted / "0001.h5")
+    kept = [read_tap_hits(interrupted / f"{number:04d}.h5")[0][0].force.max() for number in (0, 2, 3)]
+    session = go_on()
+    tap = session.run()
+    said = session.state.resumed
+    assert said.count("3 of 10 good hits are there; damaged and set aside: ") == 1
+    assert said.endswith(f"{interrupted.name}-0001.h5.damaged")
+    stored = read_tap(open_folder.path / "taps" / f"{tap.id}.h5")
+    assert len(stored.hits) == 10
+    assert [hit.force.max() for hit in stored.hits[:3]] == kept
+    assert [path.suffix for path in open_folder.spool.iterdir()] == [".damaged"]
+
+
+def test_a_test_of_which_nothing_is_left_is_begun_anew_and_that_is_said(
+    interrupted: Path, open_folder: MachineFolder, go_on: Callable[[], TapSession]
+) -> None:
+    for path in interrupted.glob("*.h5"):
+        damage(path)
+    session = go_on()
+    assert session.run().id != interrupted.name
+    assert session.state.resumed.startswith("damaged and set aside: ")
+    assert session.state.resumed.count(".h5.damaged") == 4
+
+
+def test_a_damaged_set_up_is_chosen_anew(interrupted: Path, open_folder: MachineFolder) -> None:
+    damage(interrupted / "setup.json", lambda content: content[:-5])
+    tap = begun_again(open_folder)
+    assert tap.trigger is None
+    assert len(tap.hits) == 4
+    assert [path.name for path in tap.damaged] == [f"{interrupted.name}-setup.json.damaged"]
+
+
+def test_a_hit_taken_back_after_another_was_set_aside_is_that_hit(
+    interrupted: Path, open_folder: MachineFolder
+) -> None:
+    damage(interrupted / "0000.h5")
+    begun_again(open_folder).take_out(1, HitFlags.UNDONE, "")
+    again = begun_again(open_folder)
+    assert again.flags == [HitFlags.OK, HitFlags.UNDONE, HitFlags.OK]
+    assert again.numbers == [1, 2, 3]
+
+
+def test_hits_spooled_before_there_were_checksums_are_read(interrupted: Path, open_folder: MachineFolder) -> None:
+    for path in interrupted.glob("*.h5"):
+        content = path.read_bytes()
+        path.write_bytes(content[: content.rindex(b"\nlobewatch sha256 ")])
+    tap = begun_again(open_folder)
+    assert len(tap.hits) == 4
+    assert tap.damaged == []
+
+
+def test_a_disk_that_cannot_be_read_is_no_damaged_hit(
+    interrupted: Path, open_folder: MachineFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(path: Path) -> bytes:
+        raise OSError(5, "Input/output error", str(path))
+
+    monkeypatch.setattr(Path, "read_bytes", fail)
+    with pytest.raises(OSError, match="Input/output error"):
+        begun_again(open_folder)
+    assert (interrupted / "0000.h5").is_file()

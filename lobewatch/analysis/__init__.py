@@ -1,32 +1,5 @@
 """From a tap test to what it means: measurement, history, prediction, verdict."""
 
-from lobewatch.analysis.advice import ProgramAdvice, advise, unstable_programs
-from lobewatch.analysis.charts import DEEPEST, Chart, Dynamics, Method, chart
-from lobewatch.analysis.history import measure, partner, series, update_history
-from lobewatch.analysis.model_picture import ModelPicture
-from lobewatch.analysis.model_state import first_critical_speed, model_frf, model_picture, model_state
-from lobewatch.analysis.pipeline import Measurement, speed_grid
-from lobewatch.analysis.prediction import predict
+import lazy_loader
 
-__all__ = [
-    "DEEPEST",
-    "Chart",
-    "Dynamics",
-    "Measurement",
-    "Method",
-    "ModelPicture",
-    "ProgramAdvice",
-    "advise",
-    "chart",
-    "first_critical_speed",
-    "measure",
-    "model_frf",
-    "model_picture",
-    "model_state",
-    "partner",
-    "predict",
-    "series",
-    "speed_grid",
-    "unstable_programs",
-    "update_history",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,27 @@
+"""What is known of one machine: machine.toml, its folder, its journal, its devices."""
+
+from .cut_tables import CutTable, ProgramTable
+from .daq_tables import Daq
+from .drive import drive_limit
+from .folder import MachineFolder, TapEntry
+from .known_devices import Device, checked_rate, has_clock, known_rate, use_rate
+from .machine_file import REFERENCE_CUT, Limits, Machine, SpeedRange, TapSetup
+
+__all__ = [
+    "REFERENCE_CUT",
+    "CutTable",
+    "Daq",
+    "Device",
+    "Limits",
+    "Machine",
+    "MachineFolder",
+    "ProgramTable",
+    "SpeedRange",
+    "TapEntry",
+    "TapSetup",
+    "checked_rate",
+    "drive_limit",
+    "has_clock",
+    "known_rate",
+    "use_rate",
+]

@@ -17,9 +17,9 @@ from rich.table import Table
 from acquisition import Circumstances, TapsSource
 from dsm import Spindle, calibrate, natural_frequencies
 from lobewatch.analysis.pipeline import Measurement
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.commands.report import write_report
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.show.output import Json, emit, notes, table
 from lobewatch.tap.emulated_spindle import emulated_structure, emulator, with_bearing_stiffness
 from lobewatch.tap.session import TapSession

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import shlex
-from importlib import resources
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from acquisition import DataError, atomic_write
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.show.output import Json, emit
 
 
@@ -33,15 +32,3 @@ def init(
         f"made {toml}",
         f"next: fill it in, then tap with: lobewatch tap {shlex.quote(str(machine))} --port PORT",
     )
-
-
-def make_machine_folder(folder: Path, template: str) -> Path:
-    """A machine folder from a template of sim_data, named after itself; DataError where there is one already."""
-    toml = folder / "machine.toml"
-    if toml.exists():
-        raise DataError(f"{toml}: is there already; choose another folder or edit that file")
-    folder.mkdir(parents=True, exist_ok=True)
-    text = resources.files("sim_data").joinpath(template).read_text(encoding="utf-8")
-    name = folder.resolve().name.replace("\\", "").replace('"', "")
-    atomic_write(toml, text.replace("MACHINE_NAME", name).encode())
-    return toml

@@ -6,6 +6,7 @@ from .drive import drive_limit
 from .folder import MachineFolder, TapEntry
 from .known_devices import Device, checked_rate, has_clock, known_rate, use_rate
 from .machine_file import REFERENCE_CUT, Limits, Machine, SpeedRange, TapSetup
+from .new_folder import make_machine_folder
 
 __all__ = [
     "REFERENCE_CUT",
@@ -23,5 +24,6 @@ __all__ = [
     "drive_limit",
     "has_clock",
     "known_rate",
+    "make_machine_folder",
     "use_rate",
 ]

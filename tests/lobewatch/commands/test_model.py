@@ -20,9 +20,9 @@ from lobewatch.analysis.model_state import model_picture, model_state
 from lobewatch.analysis.pipeline import speed_grid
 from lobewatch.analysis.prediction import predict
 from lobewatch.cli import app
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.machine_file import REFERENCE_CUT
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.show.figures_model import model_figure
 from modal import Mode
 

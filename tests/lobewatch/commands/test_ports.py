@@ -31,9 +31,9 @@ from acquisition import (
 from acquisition.ports.port_hints import explain_open_error
 from acquisition.taps.protocol import Frame, MessageType, encode_frame
 from lobewatch.cli import main
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import use_rate
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.tap.emulated_spindle import dataq_emulator, emulated_structure, emulator
 from lobewatch.tap.plug import open_source
 

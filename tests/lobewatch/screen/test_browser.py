@@ -21,8 +21,8 @@ from selenium.webdriver.remote.webelement import WebElement
 from selenium.webdriver.support.ui import WebDriverWait
 
 from acquisition import Circumstances, HammeredStructure, HitFlags, TapsEmulator, TapsSource
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen import DashboardServer, ScreenServer
 from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE
 from lobewatch.tap.session import TapSession

@@ -19,8 +19,8 @@ import pytest
 
 from acquisition import Circumstances, DataError, TapsEmulator, TapsSource
 from lobewatch.cli import main
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen import DashboardServer
 from lobewatch.screen.dashboard import standing
 from lobewatch.tap.emulated_spindle import emulated_structure, emulator, with_bearing_stiffness

@@ -24,8 +24,8 @@ from acquisition import (
     new_tap_id,
 )
 from lobewatch.analysis.history import update_history
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.tap.outcome import outcome_of
 from lobewatch.tap.plots import plots_of
 from lobewatch.tap.state import Outcome

@@ -36,8 +36,8 @@ from acquisition import (
     read_tap,
     write_hit,
 )
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.tap.plots import plots_of
 from lobewatch.tap.plug import Plug
 from lobewatch.tap.session import TapSession, TapStopped

@@ -1,0 +1,21 @@
+"""A new machine folder. Imports nothing heavy: `lobewatch init` is quick."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+
+from acquisition.atomic import atomic_write
+from acquisition.errors import DataError
+
+
+def make_machine_folder(folder: Path, template: str) -> Path:
+    """A machine folder from a template of sim_data, named after itself; DataError where there is one already."""
+    toml = folder / "machine.toml"
+    if toml.exists():
+        raise DataError(f"{toml}: is there already; choose another folder or edit that file")
+    folder.mkdir(parents=True, exist_ok=True)
+    text = resources.files("sim_data").joinpath(template).read_text(encoding="utf-8")
+    name = folder.resolve().name.replace("\\", "").replace('"', "")
+    atomic_write(toml, text.replace("MACHINE_NAME", name).encode())
+    return toml

@@ -10,8 +10,10 @@ from lobes.depth_band import DepthBand, coefficient_range, measurement_band
 from lobes.history import SldHistory
 from lobes.history_file import read_history, write_history
 from lobes.intervals import intervals_needed
+from lobes.nearest_speed import nearest_speed
 from lobes.pockets import Pocket, PocketShift, best_pockets, pocket_shifts, pockets
 from lobes.program import Program
+from lobes.program_limit import ProgramLimit, program_limit
 from lobes.radial_lobes import RadialLobes, radial_lobes
 from lobes.spectral_radius import spectral_radius
 from lobes.stability_boundary import stability_boundary
@@ -30,6 +32,7 @@ __all__ = [
     "PocketShift",
     "Program",
     "ProgramCheck",
+    "ProgramLimit",
     "RadialLobes",
     "SldHistory",
     "StabilityLobes",
@@ -43,8 +46,10 @@ __all__ = [
     "intervals_needed",
     "mean_torque",
     "measurement_band",
+    "nearest_speed",
     "pocket_shifts",
     "pockets",
+    "program_limit",
     "radial_lobes",
     "read_history",
     "spectral_radius",

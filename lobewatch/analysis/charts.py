@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from acquisition import Frf
 from lobes import Cut, StabilityLobes, average_angle, stability_boundary, zero_order
 from lobes.tip_response import Tip
-from lobewatch.analysis.pipeline import Measurement
-from lobewatch.machine.cut_tables import CutTable
+from lobewatch.analysis.assembly import Assembly
+from lobewatch.machine import CutTable
 
 MOST_SPEEDS = 400
 """Speeds of a chart by semi-discretisation."""
@@ -37,14 +37,14 @@ class Dynamics(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """The lobes of one tap test, and what they came from."""
+    """The lobes of one cut, and what they came from."""
 
     name: str
     """Of the cut."""
     table: CutTable
     """The cut as it stands in machine.toml."""
-    measurement: Measurement
-    """The tap test, or the prediction."""
+    assembly: Assembly
+    """The tool in the spindle, as measured or predicted."""
     source: Dynamics
     """What of it was used."""
     x: Tip | None
@@ -55,17 +55,6 @@ class Chart:
     """The cut in SI units."""
     lobes: StabilityLobes
     """Its limits."""
-
-    @property
-    def directions(self) -> str:
-        """Those that the lobes know."""
-        return " and ".join(name for name, tip in (("x", self.x), ("y", self.y)) if tip is not None)
-
-    @property
-    def label(self) -> str:
-        """What a legend says."""
-        day = f"{self.measurement.time:%Y-%m-%d}"
-        return f"predicted, bearings of {day}" if self.measurement.predicted else day
 
 
 def chart(method: Method, x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: NDArray[np.float64]) -> StabilityLobes:

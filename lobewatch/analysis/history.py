@@ -1,182 +1,222 @@
-"""The history of a machine: one row a measurement, derived from its tap tests and its machine file."""
+"""The history of a machine as typed rows, one a measurement, and its columns in history.h5."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from datetime import datetime, timedelta
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from datetime import datetime
 from importlib.metadata import version
 from typing import Any
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import TapTest
+from acquisition import Remark
 from dsm import Calibration
-from lobes import SldHistory, read_history, write_history
-from lobewatch.analysis.pipeline import Measurement, analyse, speed_grid
-from lobewatch.machine.folder import MachineFolder, TapEntry
-from lobewatch.machine.machine_file import Machine
+from lobes import SldHistory, StabilityLobes
+from lobewatch.analysis.assembly import speed_grid
+from lobewatch.analysis.estimate import UNKNOWN, Estimate
+from lobewatch.analysis.measurement import Measurement
+from lobewatch.analysis.verdict import Ruling, Word
+from lobewatch.machine import Machine
 from modal import Mode
 
 MAX_MODES = 12
 """Modes kept of one measurement."""
-PAIRING = timedelta(hours=24)
-"""x and y taps of one tool within this time belong together."""
-UNITS = {
-    "frequency": "Hz",
-    "frequency_std": "Hz",
-    "stiffness": "N/m",
-    "stiffness_std": "N/m",
-    "bearing_stiffness": "N/m",
-    "bearing_stiffness_std": "N/m",
-    "static_tip_stiffness": "N/m",
-    "modal_tip_stiffness": "N/m",
-    "mode_frequency": "Hz",
-    "mode_stiffness": "N/m",
-    "program_limit": "m",
-}
-TEXTS = ("tap_id", "time", "tool", "direction", "notes")
-NUMBERS = (
-    "frequency",
-    "frequency_std",
-    "damping_ratio",
-    "damping_ratio_std",
-    "stiffness",
-    "stiffness_std",
-    "bearing_stiffness",
-    "bearing_stiffness_std",
-    "static_tip_stiffness",
-    "modal_tip_stiffness",
-)
-MODE_COLUMNS = ("mode_frequency", "mode_damping_ratio", "mode_stiffness")
+ESTIMATES = {"frequency": "Hz", "damping_ratio": "", "stiffness": "N/m", "bearing_stiffness": "N/m"}
+"""Values with a standard error and their units, by name of the field and the column."""
+MODELLED = {"static_tip_stiffness": "N/m", "modal_tip_stiffness": "N/m"}
+"""Values of the model."""
+MODE_COLUMNS = {"mode_frequency": "Hz", "mode_damping_ratio": "", "mode_stiffness": "N/m"}
 
 
-def update_history(folder: MachineFolder) -> tuple[SldHistory, list[Measurement]]:
-    """The history with every committed tap in it, on the disk, and the measurements that were new to it.
+@dataclass(frozen=True, eq=False)
+class Row:
+    """One measurement of the history: what was measured, and what was said of the programs where that was asked."""
 
-    Rows stand in order of time. What is there is kept as long as it was made by these settings and this version from
-    the oldest taps on; else all is analysed again, so that a history kept up is equal to one made again.
-    """
-    taps = folder.taps()
-    history = _read_current(folder, [entry.id for entry in taps])
-    measurements = []
-    for entry in taps[len(history) :]:
-        measurements.append(_measure(folder, entry, history))
-        history = history.append(*_row(measurements[-1], folder.machine))
-    if measurements or not folder.history.exists():
-        write_history(folder.history, history)
-    return history, measurements
+    tap_id: str
+    """Of the tap test."""
+    time: datetime
+    """When it was taken."""
+    tool: str
+    """What was in the spindle."""
+    direction: str
+    """Direction at the tool tip, "x" or "y"."""
+    frequency: Estimate = UNKNOWN
+    """Of the mode followed (Hz)."""
+    damping_ratio: Estimate = UNKNOWN
+    """Of the mode followed (-)."""
+    stiffness: Estimate = UNKNOWN
+    """Of the mode followed, where it was tapped (N/m)."""
+    bearing_stiffness: Estimate = UNKNOWN
+    """Mean of the bearings of the recalibrated model (N/m)."""
+    static_tip_stiffness: float = np.nan
+    """Of the recalibrated model (N/m)."""
+    modal_tip_stiffness: float = np.nan
+    """Of the recalibrated model (N/m)."""
+    modes: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+    """Frequency (Hz), damping ratio and stiffness (N/m) of all modes found, shape (m, 3)."""
+    remarks: tuple[Remark, ...] = ()
+    """What could not be done, and what is in doubt."""
+    depth: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    """Limiting depth by zero order over the speeds of the history (m), by name of the cut; a chart, no verdict."""
+    rulings: Mapping[str, Ruling] | None = None
+    """The word on every program with the machine as it was after this tap test; None where nobody has asked yet."""
 
-
-def measure(folder: MachineFolder, entry: TapEntry) -> Measurement:
-    """The measurement of one committed tap as the history holds it."""
-    history, _ = update_history(folder)
-    return _measure(folder, entry, history)
-
-
-def _measure(folder: MachineFolder, entry: TapEntry, history: SldHistory) -> Measurement:
-    """One tap, its partner in the other direction, and the mode that was followed before it."""
-    return analyse(folder.read(entry), folder.machine, partner(folder, entry), _last_followed(history, entry))
-
-
-def partner(folder: MachineFolder, entry: TapEntry) -> TapTest | None:
-    """The newest tap of the other direction and the same tool, at most a day before."""
-    time = datetime.fromisoformat(entry.time)
-    for other in reversed(folder.taps()):
-        age = time - datetime.fromisoformat(other.time)
-        if other.tool == entry.tool and other.direction != entry.direction and timedelta(0) <= age <= PAIRING:
-            return folder.read(other)
-    return None
-
-
-def series(history: SldHistory, tool: str, direction: str) -> NDArray[np.int64]:
-    """Rows of one tool and direction, oldest first."""
-    columns = history.columns
-    return np.flatnonzero((columns["tool"] == tool) & (columns["direction"] == direction))
+    @property
+    def mode(self) -> Mode | None:
+        """The mode followed, without its errors; None where it was not found."""
+        if not self.frequency.is_known:
+            return None
+        return Mode(self.frequency.value, self.damping_ratio.value, self.stiffness.value)
 
 
-def _last_followed(history: SldHistory, entry: TapEntry) -> Mode | None:
-    """The mode that was followed last before a tap, in its series."""
-    columns = history.columns
-    itself = np.flatnonzero(columns["tap_id"] == entry.id)
-    before = itself[0] if itself.size else len(history)
-    known = [row for row in series(history, entry.tool, entry.direction) if np.isfinite(columns["frequency"][row])]
-    rows = [row for row in known if row < before]
-    if not rows:
-        return None
-    frequency, damping, stiffness = (float(columns[name][rows[-1]]) for name in NUMBERS[:6:2])
-    return Mode(frequency, damping, stiffness)
+@dataclass(frozen=True, eq=False)
+class History:
+    """All measurements of a machine, in order of time."""
+
+    settings_hash: str
+    """Of the settings that it was made with."""
+    software: str
+    """Name and version of the program that made it."""
+    speed_rpm: NDArray[np.float64]
+    """Common speeds of the depths (rpm), shape (n,)."""
+    rows: tuple[Row, ...]
+    """One a measurement."""
+
+    def series(self, tool: str, direction: str) -> list[Row]:
+        """Rows of one tool and direction, oldest first."""
+        return [row for row in self.rows if (row.tool, row.direction) == (tool, direction)]
 
 
-def _software() -> str:
-    return f"lobewatch {version('lobewatch')}"
+def empty_history(machine: Machine) -> History:
+    """The history of a machine that was never tapped."""
+    return History(machine.settings_hash, f"lobewatch {version('lobewatch')}", speed_grid(machine), ())
 
 
-def _read_current(folder: MachineFolder, tap_ids: list[str]) -> SldHistory:
-    """The stored history where it still holds, else an empty one."""
-    empty = _empty(folder.machine)
-    if not folder.history.exists():
-        return empty
-    try:
-        stored = read_history(folder.history)
-    except ValueError:
-        return empty
-    same = stored.settings_hash == empty.settings_hash and stored.software == empty.software
-    return stored if same and list(stored.columns["tap_id"]) == tap_ids[: len(stored)] else empty
+def row_of(m: Measurement, lobes: Mapping[str, StabilityLobes], remarks: Sequence[Remark]) -> Row:
+    """A measurement as a row, with the diagrams and remarks of the assembly as it was then."""
+    modes = [(mode.frequency, mode.damping_ratio, mode.stiffness) for mode in m.modes[:MAX_MODES]]
+    frequency, damping_ratio, stiffness = _of_mode(m.followed)
+    calibration = m.calibration
+    return Row(
+        tap_id=m.tap_id,
+        time=m.time,
+        tool=m.tool,
+        direction=m.direction,
+        frequency=frequency,
+        damping_ratio=damping_ratio,
+        stiffness=stiffness,
+        bearing_stiffness=_of_bearings(calibration),
+        static_tip_stiffness=calibration.static_stiffness_after if calibration else np.nan,
+        modal_tip_stiffness=calibration.modal_stiffness_after if calibration else np.nan,
+        modes=np.array(modes, dtype=np.float64).reshape(-1, 3),
+        remarks=tuple(remarks),
+        depth={name: one.depth for name, one in lobes.items()},
+    )
 
 
-def _empty(machine: Machine) -> SldHistory:
-    speeds = speed_grid(machine)
-    programs = len(machine.program)
-    columns: dict[str, NDArray[Any]] = {name: np.empty(0, np.str_) for name in TEXTS}
-    columns |= {name: np.empty(0) for name in NUMBERS}
-    columns |= {name: np.empty((0, MAX_MODES)) for name in MODE_COLUMNS}
+def _of_mode(mode: Mode | None) -> tuple[Estimate, Estimate, Estimate]:
+    if mode is None:
+        return UNKNOWN, UNKNOWN, UNKNOWN
+    f_std, zeta_std, k_std = mode.standard_error.tolist()
+    return Estimate(mode.frequency, f_std), Estimate(mode.damping_ratio, zeta_std), Estimate(mode.stiffness, k_std)
+
+
+def _of_bearings(calibration: Calibration | None) -> Estimate:
+    if calibration is None:
+        return UNKNOWN
+    std = calibration.bearing_stiffness_std
+    return Estimate(calibration.bearing_stiffness, np.nan if std is None else std)
+
+
+def to_columns(history: History, machine: Machine) -> SldHistory:
+    """What history.h5 holds."""
+    rows, programs = history.rows, [program.name for program in machine.program]
+    columns: dict[str, Any] = {name: _texts(getattr(row, name) for row in rows) for name in ("tap_id", "tool")}
+    columns["time"] = _texts(row.time.isoformat() for row in rows)
+    columns["direction"] = _texts(row.direction for row in rows)
+    columns["notes"] = _texts("\n".join(map(str, row.remarks)) for row in rows)
+    columns["remarks"] = _texts(_as_json([asdict(one) for one in row.remarks]) for row in rows)
+    for name in ESTIMATES:
+        columns[name], columns[f"{name}_std"] = _numbers([getattr(row, name) for row in rows], 2).T
+    for name in MODELLED:
+        columns[name] = _numbers([getattr(row, name) for row in rows])
+    table = np.full((len(rows), MAX_MODES, 3), np.nan)
+    for i, row in enumerate(rows):
+        table[i, : len(row.modes)] = row.modes
+    columns |= {name: table[:, :, k] for k, name in enumerate(MODE_COLUMNS)}
     if programs:
-        columns["program_limit"] = np.empty((0, programs))
-    depth = {name: np.empty((0, speeds.size)) for name in machine.cut_names}
-    units = {name: unit for name, unit in UNITS.items() if name in columns}
-    return SldHistory(machine.settings_hash, _software(), speeds, columns, depth, units)
-
-
-def _row(m: Measurement, machine: Machine) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
-    speeds = speed_grid(machine)
-    unknown = np.full(speeds.size, np.nan)
-    columns: dict[str, Any] = {
-        "tap_id": m.tap_id,
-        "time": m.time.isoformat(),
-        "tool": m.tool,
-        "direction": m.direction,
-        "notes": "\n".join(m.notes),
-        **_mode_values(m.dynamics.followed),
-        **_calibration_values(m.dynamics.calibration),
-        **_mode_table(m.dynamics.modes),
+        columns["program_limit"] = _numbers([_limits(row, programs) for row in rows], len(programs))
+        columns["program_verdict"] = _texts(_words(row, programs) for row in rows)
+    nowhere = np.full(history.speed_rpm.size, np.nan)
+    depth = {
+        name: _numbers([row.depth.get(name, nowhere) for row in rows], history.speed_rpm.size)
+        for name in machine.cut_names
     }
-    if machine.program:
-        columns["program_limit"] = [
-            m.lobes[program.name].depth_at(program.speed_rpm) if program.name in m.lobes else np.nan
-            for program in machine.program
-        ]
-    return columns, {name: m.lobes[name].depth if name in m.lobes else unknown for name in machine.cut_names}
+    units = ESTIMATES | {f"{name}_std": unit for name, unit in ESTIMATES.items()} | MODELLED | MODE_COLUMNS
+    units = {name: unit for name, unit in (units | {"program_limit": "m"}).items() if unit and name in columns}
+    return SldHistory(history.settings_hash, history.software, history.speed_rpm, columns, depth, units)
 
 
-def _mode_values(mode: Mode | None) -> dict[str, float]:
-    values = np.full(6, np.nan)
-    if mode is not None:
-        values[::2] = mode.frequency, mode.damping_ratio, mode.stiffness
-        values[1::2] = mode.standard_error
-    return dict(zip(NUMBERS[:6], values.tolist(), strict=True))
+def from_columns(stored: SldHistory, machine: Machine) -> History:
+    """What history.h5 says. KeyError, IndexError or ValueError where it is of another make."""
+    programs = [program.name for program in machine.program]
+    rows = [_row(stored, i, programs) for i in range(len(stored))]
+    return History(stored.settings_hash, stored.software, stored.speed_rpm, tuple(rows))
 
 
-def _calibration_values(c: Calibration | None) -> dict[str, float]:
-    if c is None:
-        return dict.fromkeys(NUMBERS[6:], float("nan"))
-    std = np.nan if c.bearing_stiffness_std is None else c.bearing_stiffness_std
-    values = (c.bearing_stiffness, std, c.static_stiffness_after, c.modal_stiffness_after)
-    return dict(zip(NUMBERS[6:], values, strict=True))
+def _row(stored: SldHistory, i: int, programs: Sequence[str]) -> Row:
+    columns = stored.columns
+    number = {name: float(columns[name][i]) for name in (*ESTIMATES, *MODELLED)}
+    known = {name: Estimate(number[name], float(columns[f"{name}_std"][i])) for name in ESTIMATES}
+    text = {name: str(columns[name][i]) for name in ("tap_id", "time", "tool", "direction", "remarks")}
+    modes = np.stack([columns[name][i] for name in MODE_COLUMNS], axis=1)
+    depth = {name: values[i] for name, values in stored.depth.items()}
+    return Row(
+        tap_id=text["tap_id"],
+        time=datetime.fromisoformat(text["time"]),
+        tool=text["tool"],
+        direction=text["direction"],
+        frequency=known["frequency"],
+        damping_ratio=known["damping_ratio"],
+        stiffness=known["stiffness"],
+        bearing_stiffness=known["bearing_stiffness"],
+        static_tip_stiffness=number["static_tip_stiffness"],
+        modal_tip_stiffness=number["modal_tip_stiffness"],
+        modes=modes[np.isfinite(modes[:, 0])],
+        remarks=msgspec.json.decode(text["remarks"], type=tuple[Remark, ...]),
+        depth={name: values for name, values in depth.items() if not np.isnan(values[0])},
+        rulings=_rulings(stored, i, programs),
+    )
 
 
-def _mode_table(modes: Sequence[Mode]) -> dict[str, NDArray[np.float64]]:
-    table = np.full((3, MAX_MODES), np.nan)
-    for i, mode in enumerate(modes[:MAX_MODES]):
-        table[:, i] = mode.frequency, mode.damping_ratio, mode.stiffness
-    return dict(zip(MODE_COLUMNS, table, strict=True))
+def _texts(values: Any) -> NDArray[np.str_]:
+    return np.array(list(values), dtype=np.str_)
+
+
+def _numbers(values: Sequence[Any], *width: int) -> NDArray[np.float64]:
+    return np.array(values, dtype=np.float64).reshape(len(values), *width)
+
+
+def _as_json(value: Any) -> str:
+    return msgspec.json.encode(value).decode()
+
+
+def _limits(row: Row, programs: Sequence[str]) -> list[float]:
+    return [row.rulings[name].limit if row.rulings else np.nan for name in programs]
+
+
+def _words(row: Row, programs: Sequence[str]) -> str:
+    """One word a program, a line each; empty where nobody has asked yet."""
+    return "\n".join(row.rulings[name].word for name in programs) if row.rulings else ""
+
+
+def _rulings(stored: SldHistory, i: int, programs: Sequence[str]) -> dict[str, Ruling] | None:
+    words = str(stored.columns["program_verdict"][i]) if programs else ""
+    if not words:
+        return None
+    limits = stored.columns["program_limit"][i].tolist()
+    pairs = zip(programs, words.split("\n"), limits, strict=True)
+    return {name: Ruling(Word(word), limit) for name, word, limit in pairs}

@@ -16,11 +16,11 @@ from rich.table import Table
 
 from acquisition import Circumstances, TapsSource
 from dsm import Spindle, calibrate, natural_frequencies
-from lobewatch.analysis.pipeline import Measurement
-from lobewatch.commands.report import write_report
+from lobewatch.analysis import Logbook, Measurement
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.show.output import Json, emit, notes, table
+from lobewatch.show.report import write_report
 from lobewatch.tap.emulated_spindle import emulated_structure, emulator, with_bearing_stiffness
 from lobewatch.tap.session import TapSession
 
@@ -71,7 +71,7 @@ def demo(
     with Progress(console=notes, transient=True, disable=not notes.is_terminal) as progress:
         for date, spindle, random in progress.track(wear, total=taps, description="tap tests"):
             months.append(_tap(folder, date, spindle, random))
-    report = write_report(folder, path / "report.html")
+    report = write_report(Logbook(folder))
     fall = [months[-1].found["stiffness_n_per_m"] / months[0].found["stiffness_n_per_m"] - 1]
     fall.append(months[-1].truth["stiffness_n_per_m"] / months[0].truth["stiffness_n_per_m"] - 1)
     emit(
@@ -120,9 +120,9 @@ def _tap(folder: MachineFolder, date: datetime, spindle: Spindle, random: np.ran
 
 
 def _found(measurement: Measurement) -> dict[str, float]:
-    mode, calibration = measurement.dynamics.followed, measurement.dynamics.calibration
+    mode, calibration = measurement.followed, measurement.calibration
     if mode is None or calibration is None:
-        raise ValueError(f"tap {measurement.tap_id}: {'; '.join(measurement.notes)}")
+        raise ValueError(f"tap {measurement.tap_id}: {'; '.join(map(str, measurement.remarks))}")
     found = (mode.frequency, mode.damping_ratio, mode.stiffness, calibration.bearing_stiffness)
     return dict(zip(FIELDS, found, strict=True))
 

@@ -16,8 +16,7 @@ from dsm import (
     natural_frequencies,
     static_stiffness,
 )
-from lobewatch.analysis.model_state import first_critical_speed, model_picture, model_state
-from lobewatch.machine.folder import MachineFolder
+from lobewatch.analysis import Logbook, first_critical_speed, model_picture, model_state
 from lobewatch.show.figures import save_figure
 from lobewatch.show.figures_model import model_figure
 from lobewatch.show.output import Json, emit, table
@@ -40,13 +39,14 @@ def model(
 
       lobewatch model trial --tool "end mill 16" --modes 6 --json
     """
-    state = model_state(MachineFolder(machine), tool)
+    logbook = Logbook.open(machine)
+    state = model_state(logbook.machine, logbook.calibrated, tool)
     found = _modes(state.spindle, modes)
     critical = first_critical_speed(state.spindle)
     static = static_stiffness(state.spindle)
     rigid = float(natural_frequencies(state.spindle, 1, rigid_bearings=True)[0])
     if figure is not None:
-        save_figure(model_figure(model_picture(state, modes)), figure)
+        save_figure(model_figure(model_picture(logbook, state, modes)), figure)
     payload: dict[str, Any] = {
         "tool": state.tool,
         "bearings_from": state.origin,

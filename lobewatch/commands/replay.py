@@ -2,28 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
-from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from acquisition import (
-    Circumstances,
-    DataError,
-    Frf,
-    SourceFile,
-    TapTest,
-    average_good,
-    new_tap_id,
-    read_recording,
-    recorded_as,
-)
-from lobewatch.analysis.history import update_history
-from lobewatch.machine.folder import MachineFolder
-from lobewatch.show.describe import measurement_json, measurement_texts
 from lobewatch.show.output import Json, emit, notes
 
 
@@ -51,43 +35,18 @@ def replay(
 
       lobewatch replay mill-3 2024/*.h5 --tool "shrink-fit 20"
     """
-    folder = MachineFolder(machine)
-    setup = folder.machine
-    with folder.locked():
-        stored = {digest: entry.id for entry in folder.taps() for digest in (entry.source_sha256, entry.sha256)}
-        fresh: dict[str, TapTest] = {}
-        for file in files:
-            content = file.read_bytes()
-            digest = hashlib.sha256(content).hexdigest()
-            if digest in stored or digest in fresh:
-                notes.print(f"{file.name}: stored already as {stored.get(digest) or fresh[digest].id}", markup=False)
-                continue
-            own = recorded_as(file)
-            about = replace(
-                own,
-                machine=setup.machine.name,
-                created=date.astimezone() if date else own.created,
-                tool=tool or own.tool or setup.tap.tool,
-                direction=direction or own.direction,
-                machine_toml=folder.toml.read_text("utf-8"),
-            )
-            fresh[digest] = _tap_test(file, about, SourceFile(file.name, content))
-        for recorded in fresh.values():
-            folder.commit(recorded)
-        _, measurements = update_history(folder)
-    new = {recorded.id for recorded in fresh.values()}
-    shown = [measurement for measurement in measurements if measurement.tap_id in new]
-    texts = [text for m in shown for text in measurement_texts(m, setup)]
-    payload = {"measurements": [measurement_json(m, setup) for m in shown]}
-    emit(payload, as_json, *texts, f"{len(shown)} of {len(files)} file(s) stored in {folder.path}")
+    from lobewatch.analysis import Logbook
+    from lobewatch.show.measurements import measurement_json, measurement_texts, program_texts, programs_json
 
-
-def _tap_test(file: Path, about: Circumstances, source: SourceFile) -> TapTest:
-    recording = read_recording(file)
-    if isinstance(recording, Frf):
-        return TapTest(new_tap_id(about), about, recording, source=source)
-    try:
-        frf, flags = average_good(recording)
-    except DataError as error:
-        raise DataError(f"{file}: {error}") from error
-    return TapTest(new_tap_id(about), about, frf, tuple(recording), flags, source)
+    logbook = Logbook.open(machine)
+    stored = logbook.replay_all(files, date, tool, direction)
+    for file, tap_id in stored.known.items():
+        notes.print(f"{file.name}: stored already as {tap_id}", markup=False)
+    shown = [logbook.measurement(tap_id) for tap_id in stored.fresh]
+    texts = [text for m in shown for text in measurement_texts(m, logbook)]
+    payload = {
+        "measurements": [measurement_json(m, logbook) for m in shown],
+        "programs": programs_json(logbook.verdicts()) if shown else [],
+    }
+    last = f"{len(shown)} of {len(files)} file(s) stored in {logbook.folder.path}"
+    emit(payload, as_json, *texts, *(program_texts(logbook) if shown else []), last)

@@ -7,11 +7,7 @@ from typing import Annotated
 
 import typer
 
-from acquisition import DataError, atomic_write
-from lobewatch.analysis.history import update_history
-from lobewatch.machine.folder import MachineFolder
-from lobewatch.show.output import Json, emit
-from lobewatch.show.report import render_report
+from lobewatch.show.output import Json, emit, notes
 
 
 def report(
@@ -29,18 +25,11 @@ def report(
 
       lobewatch report trial --out spindle.html --tool reference --direction x
     """
-    folder = MachineFolder(machine)
-    path = write_report(folder, out or folder.path / "report.html", tool, direction)
+    from lobewatch.analysis import Logbook
+    from lobewatch.show.report import write_report
+
+    logbook = Logbook.open(machine)
+    path = write_report(logbook, out, tool, direction)
+    for remark in logbook.remarks:
+        notes.print(f"note: {remark}", markup=False)
     emit({"report": str(path)}, as_json, f"report: {path}")
-
-
-def write_report(folder: MachineFolder, path: Path, tool: str = "", direction: str = "") -> Path:
-    """Bring the history up to date and write the report of one series; DataError without a tap test."""
-    taps = folder.taps()
-    if not taps:
-        raise DataError(f"{folder.path}: no tap test yet; take one with lobewatch tap, or replay a recorded file")
-    with folder.locked():
-        history, _ = update_history(folder)
-    html = render_report(folder, history, tool or taps[-1].tool, direction or taps[-1].direction)
-    atomic_write(path, html.encode())
-    return path

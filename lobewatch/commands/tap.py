@@ -10,8 +10,9 @@ from typing import Annotated
 import typer
 
 from acquisition import Circumstances
+from lobewatch.analysis import Logbook
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.show.describe import measurement_json, measurement_texts
+from lobewatch.show.measurements import measurement_json, measurement_texts, program_texts, programs_json
 from lobewatch.show.output import Json, emit, notes
 from lobewatch.show.printer import TapPrinter
 from lobewatch.show.show_address import Listen, Token, show_address
@@ -74,4 +75,6 @@ def tap(
         notes.print(f"stopped with {session.state.good} good hits; the same command goes on with them")
         raise KeyboardInterrupt from stopped
     notes.print(f"saved {done.id}")
-    emit(measurement_json(session.measurement, setup), as_json, *measurement_texts(session.measurement, setup))
+    logbook, found = Logbook(folder), session.measurement
+    payload = measurement_json(found, logbook) | {"programs": programs_json(logbook.verdicts())}
+    emit(payload, as_json, *measurement_texts(found, logbook), *program_texts(logbook))

@@ -3,13 +3,14 @@
 from .cut_tables import CutTable, ProgramTable
 from .daq_tables import Daq
 from .drive import drive_limit
-from .folder import MachineFolder, TapEntry
+from .folder import BusyError, MachineFolder, TapEntry
 from .known_devices import Device, checked_rate, has_clock, known_rate, use_rate
 from .machine_file import REFERENCE_CUT, Limits, Machine, SpeedRange, TapSetup
 from .new_folder import make_machine_folder
 
 __all__ = [
     "REFERENCE_CUT",
+    "BusyError",
     "CutTable",
     "Daq",
     "Device",

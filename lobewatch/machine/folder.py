@@ -22,6 +22,10 @@ from acquisition import DataError, TapTest, read_tap, write_tap
 from lobewatch.machine.machine_file import Machine, read_machine
 
 
+class BusyError(DataError):
+    """Another program writes to the folder."""
+
+
 @dataclass(frozen=True)
 class TapEntry:
     """One committed tap test, a line of the journal."""
@@ -75,14 +79,24 @@ class MachineFolder:
         """The machine file as it was when first asked for."""
         return read_machine(self.toml)
 
+    @property
+    def mark(self) -> tuple[int, ...]:
+        """Changes with machine.toml and the journal."""
+        found = [path.stat() for path in (self.toml, self._journal) if path.exists()]
+        return tuple(number for one in found for number in (one.st_mtime_ns, one.st_size, one.st_ino))
+
+    @cached_property
+    def _lock(self) -> FileLock:
+        return FileLock(self.path / ".lock", timeout=0)
+
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep other programs from writing here; DataError where one already does."""
-        lock = FileLock(self.path / ".lock", timeout=0)
+        """Keep other programs from writing here, once or several times over; BusyError where one already does."""
+        lock = self._lock
         try:
             lock.acquire()
         except Timeout as error:
-            raise DataError(f"{self.path}: another lobewatch is writing here; wait until it is done") from error
+            raise BusyError(f"{self.path}: another lobewatch is writing here; wait until it is done") from error
         try:
             yield
         finally:

@@ -182,7 +182,7 @@ class Machine(Table, frozen=True):
         """SHA-256 of all that decides what a history holds."""
         cutting = (self.material, self.reference_cut, self.program)
         model = (self.spindle, self.tool, self.tap.tool, self.tap.position_mm)
-        settings = ("zero order", self.mode, self.speed, cutting, model)
+        settings = ("charts by zero order, verdicts by semi-discretisation", self.mode, self.speed, cutting, model)
         return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
 
 

@@ -1,54 +1,14 @@
-"""What the dashboard says of each machine: how far the frequency has fallen, and when the next tap test is due."""
+"""What the dashboard says of each machine."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from acquisition import DataError
-from lobes import SldHistory, read_history
-from lobewatch.analysis.history import series
-from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.machine_file import Machine
-
-LIGHTS = ("alarm", "warn", "unknown", "good")
-"""Worst first."""
-DAY = 86400.0
-"""s."""
-
-
-@dataclass(frozen=True)
-class Standing:
-    """One machine on the dashboard."""
-
-    key: str
-    """Name of its folder, by which requests name it."""
-    name: str
-    """Of machine.toml."""
-    light: str = "unknown"
-    """One of LIGHTS, by the limits of machine.toml; warn too where a program is not stable."""
-    fall: float | None = None
-    """Fall of the followed frequency since the first test of the same tool and direction (%)."""
-    fall_std: float | None = None
-    """Its standard error (%)."""
-    series: str = ""
-    """Tool and direction of the newest test."""
-    last_tap: str = ""
-    """Date of the newest test (ISO 8601); empty where there is none."""
-    days_left: float | None = None
-    """Until the next test is due by tap_interval_days; negative where it is overdue; None before the first test."""
-    note: str = ""
-    """What else is to be said, e.g. what is wrong with its files."""
-
-    @property
-    def rank(self) -> tuple[int, float, str]:
-        """Worst first."""
-        return LIGHTS.index(self.light), -(self.fall or 0.0), self.key
+from acquisition import DataError, joined
+from lobewatch.analysis import Light, Logbook, Standing, standing_of
+from lobewatch.machine import MachineFolder
 
 
 def find_machines(path: Path) -> dict[str, MachineFolder]:
@@ -61,63 +21,54 @@ def find_machines(path: Path) -> dict[str, MachineFolder]:
     return found
 
 
-def standing(key: str, folder: MachineFolder, now: datetime | None = None) -> Standing:
-    """Read what the disk says of a machine; nothing is written. A machine whose files are wrong says so in its note."""
-    try:
-        return _standing(key, MachineFolder(folder.path), now or datetime.now(UTC))
-    except (ValueError, OSError) as error:
-        return Standing(key, key, note=str(error))
+class Board:
+    """The standings of some machines, read again where their files have changed."""
+
+    def __init__(self, machines: dict[str, MachineFolder]) -> None:
+        """machines: by name of their folders."""
+        self._machines = machines
+        self._logbooks: dict[str, Logbook] = {}
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One a machine, worst first."""
+        standings = {key: self._standing(key) for key in self._machines}
+        lights = list(Light)
+        order = sorted(standings, key=lambda key: (lights.index(standings[key].light), -_fall(standings[key]), key))
+        return [_row(key, self._name(key), standings[key]) for key in order]
+
+    def _standing(self, key: str) -> Standing:
+        logbook = self._logbooks.get(key)
+        if logbook is None or not logbook.is_current:
+            self._logbooks[key] = logbook = Logbook(MachineFolder(self._machines[key].path))
+        return standing_of(logbook)
+
+    def _name(self, key: str) -> str:
+        try:
+            return self._logbooks[key].machine.machine.name
+        except (ValueError, OSError):
+            return key
 
 
-def _standing(key: str, folder: MachineFolder, now: datetime) -> Standing:
-    machine, taps = folder.machine, folder.taps()
-    if not taps:
-        return Standing(key, machine.machine.name, note="no tap test yet")
-    newest = taps[-1]
-    about: dict[str, Any] = {
-        "series": f"{newest.tool}, {newest.direction}",
-        "last_tap": newest.time,
-        "days_left": machine.machine.tap_interval_days
-        - (now - datetime.fromisoformat(newest.time)).total_seconds() / DAY,
+def _fall(standing: Standing) -> float:
+    worst = standing.series[0].fall.value if standing.series else 0.0
+    return worst if math.isfinite(worst) else math.inf
+
+
+def _row(key: str, name: str, standing: Standing) -> dict[str, Any]:
+    """As the page takes it; the series is the one that fell most."""
+    worst = standing.series[0] if standing.series else None
+    known = worst is not None and worst.fall.is_known
+    std = worst.fall.std if worst is not None and math.isfinite(worst.fall.std) else None
+    reasons = [f"{remark.about}: {remark.text}".removeprefix(": ") for remark in joined(standing.remarks)]
+    return {
+        "key": key,
+        "name": name,
+        "light": standing.light,
+        "fall": worst.fall.value if worst is not None and known else None,
+        "fall_std": std if known else None,
+        "series": worst.name if worst else "",
+        "last_tap": standing.last_tap.isoformat() if standing.last_tap else "",
+        "days_left": standing.days_left,
+        "note": "; ".join(reasons),
+        "next_step": standing.next_step,
     }
-    history = read_history(folder.history) if folder.history.exists() else None
-    known = history is not None and history.settings_hash == machine.settings_hash and len(history) == len(taps)
-    if history is None or not known:
-        return Standing(
-            key, machine.machine.name, note="not analysed with this machine.toml yet: open its report", **about
-        )
-    fall, std = _fall(history, newest.tool, newest.direction)
-    if fall is None:
-        return Standing(
-            key, machine.machine.name, "warn", note="the newest test does not show the mode followed", **about
-        )
-    light, note = _light(fall, history, machine)
-    return Standing(key, machine.machine.name, light, fall, std, note=note, **about)
-
-
-def _fall(history: SldHistory, tool: str, direction: str) -> tuple[float | None, float | None]:
-    """Percent, with standard error by that of both frequencies."""
-    rows = series(history, tool, direction)
-    frequency, std = (np.asarray(history.columns[name][rows]) for name in ("frequency", "frequency_std"))
-    seen = np.flatnonzero(np.isfinite(frequency))
-    if not seen.size or seen[-1] != rows.size - 1:
-        return None, None
-    first, last = seen[0], seen[-1]
-    ratio = float(frequency[last] / frequency[first])
-    if first == last:
-        return 0.0, 0.0
-    error = 100 * ratio * math.hypot(std[first] / frequency[first], std[last] / frequency[last])
-    return 100 * (1 - ratio), error if math.isfinite(error) else None
-
-
-def _light(fall: float, history: SldHistory, machine: Machine) -> tuple[str, str]:
-    limits = machine.limits
-    reached = (fall >= limits.frequency_warn_percent) + (fall >= limits.frequency_alarm_percent)
-    light = ("good", "warn", "alarm")[reached]
-    if not machine.program:
-        return light, ""
-    depth = history.columns["program_limit"][-1]
-    unstable = [one.name for one, limit in zip(machine.program, depth, strict=True) if limit * 1e3 < one.depth_mm]
-    if not unstable:
-        return light, ""
-    return min(light, "warn", key=LIGHTS.index), f"not stable: {', '.join(unstable)}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-from dataclasses import asdict
 from pathlib import Path
 from types import TracebackType
 from typing import Literal
@@ -14,9 +13,9 @@ import msgspec
 from aiohttp import web
 
 from acquisition import DataError
-from lobewatch.analysis.history import update_history
+from lobewatch.analysis import Logbook
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.screen.dashboard import find_machines, standing
+from lobewatch.screen.dashboard import Board, find_machines
 from lobewatch.screen.guard import OPEN
 from lobewatch.screen.live_tests import LiveTest
 from lobewatch.screen.pages import add_pages
@@ -47,8 +46,8 @@ class DashboardServer(WebThread):
         self._machines = find_machines(Path(path))
         self._tests: dict[str, LiveTest] = {}
         self._reports: dict[str, tuple[str, str]] = {}
-        for folder in self._machines.values():
-            _refresh(folder)
+        self._board = Board(self._machines)
+        self._board.rows()
         add_pages(self.application, {"/": "dashboard.html", "/tap/{machine}/": "screen.html"})
         add_session(self.application, "/tap/{machine}/", self._find_test)
         router = self.application.router
@@ -81,10 +80,9 @@ class DashboardServer(WebThread):
         return test
 
     async def _list(self, _: web.Request) -> web.Response:
-        found = await asyncio.to_thread(lambda: [standing(key, folder) for key, folder in self._machines.items()])
+        rows = await asyncio.to_thread(self._board.rows)
         running = {key for key, test in self._tests.items() if test.running}
-        rows = [asdict(one) | {"running": one.key in running} for one in sorted(found, key=lambda one: one.rank)]
-        return web.json_response({"machines": rows})
+        return web.json_response({"machines": [row | {"running": row["key"] in running} for row in rows]})
 
     async def _start(self, request: web.Request) -> web.Response:
         key, folder = self._find_machine(request)
@@ -111,20 +109,9 @@ class DashboardServer(WebThread):
         return web.Response(text=html, content_type="text/html", headers={"Content-Security-Policy": REPORT_POLICY})
 
 
-def _refresh(folder: MachineFolder) -> None:
-    """Bring the history up to date; a machine that cannot be read says so on the dashboard."""
-    try:
-        if folder.taps():
-            with folder.locked():
-                update_history(folder)
-    except (ValueError, OSError):
-        pass
-
-
 def _render(folder: MachineFolder) -> str:
-    taps = folder.taps()
-    if not taps:
+    logbook = Logbook(folder)
+    if not logbook.taps:
         raise DataError("no tap test yet: press START")
-    with folder.locked():
-        history, _ = update_history(folder)
-    return render_report(folder, history, taps[-1].tool, taps[-1].direction)
+    newest = logbook.newest()
+    return render_report(logbook, newest.tool, newest.direction)

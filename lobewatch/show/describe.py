@@ -1,17 +1,13 @@
-"""Modes, calibrations, programs and measurements as JSON objects and as tables for people."""
+"""Modes and calibrations as JSON objects and as tables for people."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from rich.markup import escape
 from rich.table import Table
 
 from dsm import Calibration, DampingCalibration, StiffnessFit, plus_minus
-from lobes import StabilityLobes
-from lobewatch.analysis.pipeline import Measurement
-from lobewatch.machine.machine_file import REFERENCE_CUT, Machine
 from lobewatch.show.output import table
 from modal import Mode
 
@@ -145,80 +141,3 @@ def damping_json(found: DampingCalibration) -> dict[str, Any]:
         "bearing_damping_n_s_per_m": found.bearing_damping,
         "bearing_damping_sensitivity": found.sensitivity,
     }
-
-
-def program_json(lobes: Mapping[str, StabilityLobes], machine: Machine) -> list[dict[str, Any]]:
-    """Each program of machine.toml that has lobes, against them."""
-    programs = [program for program in machine.program if program.name in lobes]
-    limits = [float(lobes[program.name].depth_at(program.speed_rpm)) for program in programs]
-    return [
-        {
-            "name": program.name,
-            "speed_rpm": program.speed_rpm,
-            "depth_mm": program.depth_mm,
-            "limit_mm": limit * 1e3,
-            "stable": program.depth_mm < limit * 1e3,
-        }
-        for program, limit in zip(programs, limits, strict=True)
-    ]
-
-
-def program_table(programs: Sequence[dict[str, Any]]) -> Table:
-    """Programs, a line each."""
-    made = table("<program", "speed (rpm)", "depth (mm)", "limit (mm)", "<verdict")
-    for entry in programs:
-        made.add_row(
-            escape(entry["name"]),
-            f"{entry['speed_rpm']:g}",
-            f"{entry['depth_mm']:g}",
-            f"{entry['limit_mm']:.2f}",
-            "stable" if entry["stable"] else "NOT STABLE",
-        )
-    return made
-
-
-def lobes_json(name: str, lobes: StabilityLobes) -> dict[str, Any]:
-    """The lowest point of a diagram."""
-    low = lobes.minimum
-    return {
-        "cut": name,
-        "method": lobes.method,
-        "minimum_depth_mm": low.depth * 1e3,
-        "at_speed_rpm": low.speed_rpm,
-        "chatter_frequency_hz": low.chatter_frequency,
-    }
-
-
-def measurement_json(m: Measurement, machine: Machine) -> dict[str, Any]:
-    """All of a measurement."""
-    calibration = m.dynamics.calibration
-    return {
-        "tap_id": m.tap_id,
-        "time": m.time.isoformat(),
-        "tool": m.tool,
-        "direction": m.direction,
-        "modes": [mode_json(mode) for mode in m.dynamics.modes],
-        "followed": mode_json(m.dynamics.followed) if m.dynamics.followed else None,
-        "calibration": calibration_json(calibration) if calibration else None,
-        "lobes": [lobes_json(name, lobes) for name, lobes in m.lobes.items()],
-        "programs": program_json(m.lobes, machine),
-        "notes": list(m.notes),
-    }
-
-
-def measurement_texts(m: Measurement, machine: Machine) -> list[str | Table]:
-    """All of a measurement, for people."""
-    texts: list[str | Table] = [f"{m.tap_id}  (tool {m.tool}, direction {m.direction})"]
-    if m.dynamics.modes:
-        texts += [mode_table(m.dynamics.modes), *doubt_lines(m.dynamics.modes)]
-    if m.dynamics.followed is not None:
-        texts.append(f"followed: {m.dynamics.followed.frequency:.2f} Hz")
-    if m.dynamics.calibration is not None:
-        texts.append(str(m.dynamics.calibration))
-    if REFERENCE_CUT in m.lobes:
-        low = m.lobes[REFERENCE_CUT].minimum
-        texts.append(f"{REFERENCE_CUT}: lowest limit {low.depth * 1e3:.2f} mm at {low.speed_rpm:.0f} rpm")
-    programs = program_json(m.lobes, machine)
-    if programs:
-        texts += [program_table(programs), "limits by zero order; lobewatch check has the verdict"]
-    return [*texts, *(f"note: {note}" for note in m.notes)]

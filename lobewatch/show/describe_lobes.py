@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from lobes import Pocket, PocketShift, ProgramCheck, cutting_coefficients
-from lobes.check_program import DEEPEST
+import numpy as np
+from rich.table import Table
+
+from acquisition import Remark, joined
+from lobes import Pocket, PocketShift, best_pockets, cutting_coefficients
 from lobes.pockets import SHARE
-from lobewatch.machine.machine_file import Machine
+from lobewatch.analysis import LobeComparison
+from lobewatch.analysis.lobe_comparison import USEFUL
+from lobewatch.machine import Machine
+from lobewatch.show.measurements import lobes_json, programs_json, remark_json, remark_lines
+from lobewatch.show.verdicts import verdict_table
 
 POCKET_RANGE = f"at least {100 * SHARE:.0f} % of the depth"
 """What holds between the ends of a pocket."""
@@ -34,19 +40,48 @@ def pocket_list(best: Sequence[Pocket]) -> str:
     return ", ".join(texts) or "none"
 
 
-def limit_text(found: ProgramCheck, depth_mm: float) -> str:
-    """The limit of a program of this depth (mm)."""
-    return f"> {DEEPEST * depth_mm:g}" if math.isinf(found.limit) else f"{found.limit * 1e3:.2f}"
+def comparison_json(found: LobeComparison, remarks: Sequence[Remark]) -> dict[str, Any]:
+    """The diagram now, its pockets, and the verdicts on the programs with this cut."""
+    lobes = found.now.lobes
+    return lobes_json(found.now.name, lobes) | {
+        "tap_id": found.now.assembly.tap_id,
+        "source": str(found.now.source),
+        "speed_rpm": lobes.speed_rpm,
+        "depth_mm": lobes.depth * 1e3,
+        "chatter_frequencies_hz": lobes.chatter_frequency,
+        "kind": lobes.kind,
+        "pockets_by_depth": [pocket_json(pocket) for pocket in best_pockets(found.pockets)],
+        "pockets_by_removal": [pocket_json(pocket) for pocket in best_pockets(found.pockets, by="removal")],
+        "pocket_shifts": [shift_json(shift) for shift in found.shifts],
+        "programs": programs_json(found.verdicts),
+        "remarks": [remark_json(remark) for remark in joined(remarks)],
+    }
 
 
-def margin_text(found: ProgramCheck) -> str:
-    """The margin of a program in depth."""
-    return "-" if math.isinf(found.depth_margin) else f"{100 * found.depth_margin:+.0f} %"
+def comparison_texts(found: LobeComparison, remarks: Sequence[Remark]) -> list[str | Table]:
+    """The same for people."""
+    now = found.now
+    texts: list[str | Table] = [
+        f"{now.name}: {now.lobes.method}, from the {now.source} of {now.assembly.tap_id}",
+        *_limit_lines(found),
+        *shift_lines(found.shifts),
+    ]
+    if found.verdicts:
+        texts += [verdict_table(found.verdicts), f"verdicts by {found.verdicts[0].method}, as lobewatch check"]
+    return [*texts, *remark_lines(remarks)]
 
 
-def with_option(warning: str) -> str:
-    """A warning of a method, with the option of `lobewatch lobes` for what it asks for."""
-    return warning.replace("use semi-discretisation", "use semi-discretisation (--method semi-discretisation)")
+def _limit_lines(found: LobeComparison) -> list[str]:
+    lobes, best = found.now.lobes, found.pockets
+    low = lobes.minimum
+    if not np.isfinite(low.depth):
+        return [f"no limit in this speed range ({lobes.method})"]
+    return [
+        f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm, chatter at {low.chatter_frequency:.1f} Hz",
+        f"best pockets up to {USEFUL * low.depth * 1e3:.1f} mm (in brackets: {POCKET_RANGE}), by depth: "
+        f"{pocket_list(best_pockets(best))}",
+        f"by removal rate: {pocket_list(best_pockets(best, by='removal'))}",
+    ]
 
 
 def shift_json(shift: PocketShift) -> dict[str, Any]:

@@ -22,6 +22,7 @@ NOW = "#0072B2"
 THEN = "#777777"
 ALARM = "#D55E00"
 GOOD = "#009E73"
+UNKNOWN = "#767676"
 STYLE: dict[Any, Any] = {
     "font.size": 10,
     "axes.grid": True,

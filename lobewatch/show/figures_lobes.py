@@ -17,13 +17,16 @@ from numpy.typing import NDArray
 
 from lobes import DepthBand, Pocket, RadialLobes
 from lobes.pockets import SHARE
-from lobewatch.show.figures import ALARM, GOOD, NOW, THEN, new_axes
+from lobewatch.analysis import Verdict, Word
+from lobewatch.show.figures import ALARM, GOOD, NOW, THEN, UNKNOWN, new_axes
 
 Floats = NDArray[np.float64]
 
 MAP = "cividis"
 """Colours of depth: dark is shallow, bright is deep, in grey too."""
 SPREAD = "#E6E6E6"
+MARKS = {Word.STABLE: (GOOD, "o"), Word.NOT_STABLE: (ALARM, "X"), Word.UNKNOWN: (UNKNOWN, "D")}
+"""Colour and mark of a program by the verdict on it."""
 LEVELS = 12
 """Steps of colour in a map."""
 BAR = "limiting depth (mm); brightest: this or more"
@@ -34,7 +37,7 @@ SHORT = 10.0
 def lobes_figure(
     speed_rpm: Floats,
     depths: Mapping[str, Floats],
-    programs: Sequence[Mapping[str, Any]] = (),
+    programs: Sequence[Verdict] = (),
     title: str = "",
     band: DepthBand | None = None,
     spread: DepthBand | None = None,
@@ -47,7 +50,7 @@ def lobes_figure(
     figure, (axes,) = new_axes(1, (8.0, 4.2))
     *earlier, now = depths.items()
     finite = now[1][np.isfinite(now[1])] * 1e3
-    top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * p["depth_mm"] for p in programs)])
+    top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * one.program.depth_mm for one in programs)])
     if spread is not None:
         _fill(axes, speed_rpm, spread, top, color=SPREAD, label="range of published coefficients", zorder=0.5)
     for label, depth in earlier:
@@ -139,14 +142,15 @@ def _draw_pocket(axes: Axes, pocket: Pocket, label: str) -> None:
     )
 
 
-def _draw_program(axes: Axes, program: Mapping[str, Any]) -> None:
-    colour, mark = (GOOD, "o") if program["stable"] else (ALARM, "X")
+def _draw_program(axes: Axes, verdict: Verdict) -> None:
+    colour, mark = MARKS[verdict.word]
     low, high = axes.get_xlim()
-    is_left = program["speed_rpm"] > low + 0.8 * (high - low)
-    axes.plot(program["speed_rpm"], program["depth_mm"], mark, color=colour, ms=9, mec="white")
+    place = (verdict.program.speed_rpm, verdict.program.depth_mm)
+    is_left = place[0] > low + 0.8 * (high - low)
+    axes.plot(*place, mark, color=colour, ms=9, mec="white")
     axes.annotate(
-        program["name"],
-        (program["speed_rpm"], program["depth_mm"]),
+        verdict.program.name,
+        place,
         xytext=(-7 if is_left else 7, 5),
         textcoords="offset points",
         ha="right" if is_left else "left",

@@ -2,41 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from datetime import datetime
+from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from acquisition import DataError
+from acquisition import DataError, Remark
 from lobes import (
     DepthBand,
-    Pocket,
     best_pockets,
     coefficient_range,
     cutting_coefficients,
     measurement_band,
     radial_lobes,
 )
-from lobewatch.analysis.charts import Chart, Dynamics, Method, chart
-from lobewatch.analysis.history import series, update_history
-from lobewatch.analysis.pipeline import Measurement
-from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.machine_file import Machine
-from lobewatch.show.describe import program_json
+from lobewatch.analysis import Chart, Dynamics, LobeComparison, Logbook, Method, chart
+from lobewatch.machine import Machine
+from lobewatch.show.figures import save_figure
 from lobewatch.show.figures_lobes import lobes_figure, radial_figure, waterfall_figure
 
 IMMERSIONS = np.linspace(0.05, 1.0, 39)
 
 
-def lobes_picture(folder: MachineFolder, now: Chart, then: Chart | None, best: Sequence[Pocket]) -> Figure:
+def save_pictures(
+    logbook: Logbook,
+    found: LobeComparison,
+    method: Method,
+    figure: Path | None,
+    radial: Path | None,
+    waterfall: Path | None,
+) -> list[Remark]:
+    """Write the pictures that have a file, all or none; returns what is to be said of them."""
+    pictures, remarks = list[tuple[Figure, Path]](), list[Remark]()
+    if figure is not None:
+        pictures.append((lobes_picture(logbook.machine, found), figure))
+    if radial is not None:
+        picture, warning = radial_picture(logbook.machine, found.now, method)
+        pictures.append((picture, radial))
+        remarks += [Remark("chart-method", "--radial", warning)] if warning else []
+    if waterfall is not None:
+        pictures.append((waterfall_picture(logbook, found.now), waterfall))
+    for picture, path in pictures:
+        save_figure(picture, path)
+    return remarks
+
+
+def lobes_picture(machine: Machine, found: LobeComparison) -> Figure:
     """The diagram now, beside the one then, with the programs of this same cut."""
-    depths = {chart.label: chart.lobes.depth for chart in (then, now) if chart is not None}
-    title = f"{_title(folder.machine, now)}, from the {now.source}"
-    cuts = folder.machine.cuts(now.measurement.tool)
-    same = program_json({name: now.lobes for name, other in cuts.items() if other == now.cut}, folder.machine)
-    band, spread = _bands(folder.machine, now)
-    return lobes_figure(now.lobes.speed_rpm, depths, same, title, band, spread, best_pockets(best))
+    now = found.now
+    depths = {one.assembly.label: one.lobes.depth for one in (found.then, now) if one is not None}
+    title = f"{_title(machine, now)}, from the {now.source}"
+    band, spread = _bands(machine, now)
+    pockets = best_pockets(found.pockets)
+    return lobes_figure(now.lobes.speed_rpm, depths, found.verdicts, title, band, spread, pockets)
 
 
 def _bands(machine: Machine, now: Chart) -> tuple[DepthBand | None, DepthBand | None]:
@@ -47,7 +65,7 @@ def _bands(machine: Machine, now: Chart) -> tuple[DepthBand | None, DepthBand | 
     if now.source is Dynamics.FRF:
         return None, None
     speeds = now.lobes.speed_rpm
-    x, y = now.measurement.x, now.measurement.y
+    x, y = now.assembly.x, now.assembly.y
     base = chart(Method.ZERO_ORDER, x, y, now.cut, speeds).depth
 
     def carried(band: DepthBand) -> DepthBand:
@@ -66,7 +84,7 @@ def _bands(machine: Machine, now: Chart) -> tuple[DepthBand | None, DepthBand | 
 
 
 def _title(machine: Machine, now: Chart) -> str:
-    predicted = f", {now.label}" if now.measurement.predicted else ""
+    predicted = f", {now.assembly.label}" if now.assembly.predicted else ""
     return f"{machine.machine.name}: {now.name}\n{now.lobes.method.partition(',')[0]}{predicted}"
 
 
@@ -78,14 +96,14 @@ def radial_picture(machine: Machine, now: Chart, method: Method) -> tuple[Figure
     return radial_figure(found, diameter, now.cut.immersion, _title(machine, now)), found.warning
 
 
-def waterfall_picture(folder: MachineFolder, newest: Measurement, cut: str) -> Figure:
-    """The limits over all tap tests of a series; DataError where it has none."""
-    with folder.locked():
-        history, _ = update_history(folder)
-    rows = series(history, newest.tool, newest.direction)
-    rows = rows[~np.isnan(history.depth[cut][rows, 0])]
-    if not rows.size:
-        raise DataError(f"--waterfall shows measured lobes; no tap test with tool {newest.tool!r} has any of {cut!r}")
-    times = [datetime.fromisoformat(text) for text in history.columns["time"][rows]]
-    title = f"{folder.machine.machine.name}: {cut}\nzero order"
-    return waterfall_figure(history.speed_rpm, times, history.depth[cut][rows], title)
+def waterfall_picture(logbook: Logbook, now: Chart) -> Figure:
+    """The limits over all tap tests of the series of the newest; DataError where there are no measured ones."""
+    cut, tool = now.name, now.assembly.tool
+    newest = None if now.assembly.predicted else logbook.measurement(now.assembly.tap_id)
+    series = [] if newest is None else logbook.history.series(tool, newest.direction)
+    rows = [row for row in series if cut in row.depth]
+    if not rows:
+        raise DataError(f"--waterfall shows measured lobes; no tap test with tool {tool!r} has any of {cut!r}")
+    title = f"{logbook.machine.machine.name}: {cut}\nzero order"
+    depth = np.stack([row.depth[cut] for row in rows])
+    return waterfall_figure(logbook.history.speed_rpm, [row.time for row in rows], depth, title)

@@ -3,128 +3,151 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import datetime
 from importlib import resources
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import jinja2
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition import Frf, TapTest
+from acquisition import DataError, Frf, atomic_write, joined
 from dsm import plus_minus
-from lobes import ProgramCheck, SldHistory
-from lobewatch.analysis.advice import ProgramAdvice, advise
-from lobewatch.analysis.history import measure, series
-from lobewatch.analysis.pipeline import Measurement
-from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.machine_file import Machine
-from lobewatch.show.describe_lobes import limit_text, margin_text
+from lobewatch.analysis import Light, Logbook, Row, Standing, change_since_first, lobes_of
+from lobewatch.machine import Machine
+from lobewatch.show.advice import Advised, advised
 from lobewatch.show.figures import frf_figure, svg, trend_figure
 from lobewatch.show.figures_lobes import lobes_figure
+from lobewatch.show.verdicts import limit_text, margin_text
+
+LIGHTS = {Light.ALARM: "✗ ALARM", Light.UNKNOWN: "? UNKNOWN", Light.WARN: "! WARNING", Light.GOOD: "✓ GOOD"}
+CHANGES = (
+    ("frequency", "natural frequency (Hz)", 1.0),
+    ("damping_ratio", "damping ratio (%)", 0.01),
+    ("stiffness", "stiffness K (N/µm)", 1e6),
+    ("bearing_stiffness", "bearing stiffness (N/µm)", 1e6),
+)
+"""Field of a row, what the table calls it, and the size of its unit."""
 
 
-def render_report(folder: MachineFolder, history: SldHistory, tool: str, direction: str) -> str:
+class Picture(NamedTuple):
+    """A section of the report."""
+
+    heading: str
+    text: str
+    """A sentence below the heading."""
+    svg: str
+
+
+def write_report(logbook: Logbook, path: Path | None = None, tool: str = "", direction: str = "") -> Path:
+    """Write the report of one series, that of the newest test where none is named; DataError without a tap test.
+
+    path None: report.html in the machine folder.
+    """
+    newest = logbook.newest()
+    html = render_report(logbook, tool or newest.tool, direction or newest.direction)
+    path = path or logbook.folder.path / "report.html"
+    try:
+        atomic_write(path, html.encode())
+    except PermissionError as error:
+        raise DataError(f"{path}: {error.strerror}; name another file with --out") from error
+    return path
+
+
+def render_report(logbook: Logbook, tool: str, direction: str) -> str:
     """HTML of one series (tool and direction); ValueError where it holds no tap test."""
-    rows = series(history, tool, direction)
-    if not rows.size:
-        raise ValueError(f"{folder.path}: no tap test with tool {tool!r} in direction {direction!r} yet")
+    rows = logbook.history.series(tool, direction)
+    if not rows:
+        raise ValueError(f"{logbook.folder.path}: no tap test with tool {tool!r} in direction {direction!r} yet")
     source = resources.files("lobewatch.show").joinpath("report.html").read_text(encoding="utf-8")
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
-    return environment.from_string(source).render(_content(folder, history, rows, tool, direction))
+    return environment.from_string(source).render(_content(logbook, rows))
 
 
-def _content(
-    folder: MachineFolder, history: SldHistory, rows: NDArray[np.int64], tool: str, direction: str
-) -> dict[str, Any]:
-    machine, columns = folder.machine, history.columns
-    first, last = int(rows[0]), int(rows[-1])
-    times = [datetime.fromisoformat(text) for text in columns["time"][rows]]
-    taps = {entry.id: entry for entry in folder.taps()}
-    now, then = (folder.read(taps[columns["tap_id"][row]]) for row in (last, first))
-    measured = [measure(folder, taps[columns["tap_id"][row]]) for row in (first, last)]
-    advice = advise(folder)
+def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
+    machine, last = logbook.machine, rows[-1]
+    entries = {entry.id: entry for entry in logbook.taps}
+    now = logbook.folder.read(entries[last.tap_id])
+    programs = [advised(logbook, verdict) for verdict in logbook.verdicts()]
+    checked = [one.verdict for one in programs if one.verdict.stable is not None]
     return {
         "name": machine.machine.name,
-        "tool": tool,
-        "direction": direction,
-        "first": times[0],
-        "last": times[-1],
-        "n_taps": rows.size,
-        "software": history.software,
+        "tool": last.tool,
+        "direction": last.direction,
+        "first": rows[0].time,
+        "last": last.time,
+        "n_taps": len(rows),
+        "software": logbook.history.software,
         "label": machine.spindle.label if machine.spindle else "",
-        "changes": _changes(history, first, last),
-        "programs": [_program(one) for one in advice],
-        "program_method": next((one.check.method.partition(",")[0] for one in advice if one.check is not None), ""),
-        "notes": [note for note in str(columns["notes"][last]).splitlines() if note],
-        "modes": _modes(history, last),
+        "standing": _standing(logbook.standing()),
+        "changes": _changes(rows),
+        "programs": [_program(one) for one in programs],
+        "program_method": checked[0].method.partition(",")[0] if checked else "",
+        "remarks": [str(remark) for remark in joined(last.remarks)],
+        "modes": _modes(last),
         "operator": now.circumstances.operator,
         "tap_id": now.id,
         "good": len(now.accepted),
         "hits": len(now.hits),
         "averages": now.frf.n_averages,
         "figures": [
-            *_lobes(machine, measured[0], measured[1], advice),
-            *_figures(machine, history, rows, times, (then, now)),
+            *_lobes(logbook, last, programs),
+            *_trends(rows, machine),
+            _response(logbook.folder.read(entries[rows[0].tap_id]).frf if len(rows) > 1 else None, now.frf, machine),
         ],
         "limits": machine.limits,
     }
 
 
-def _lobes(
-    machine: Machine, first: Measurement, last: Measurement, advice: Sequence[ProgramAdvice]
-) -> list[tuple[str, str, str]]:
+def _standing(standing: Standing) -> dict[str, Any]:
+    """The first line of the report."""
+    reasons = [f"{remark.about}: {remark.text}".removeprefix(": ") for remark in joined(standing.remarks)]
+    kind = {Light.GOOD: "ok", Light.ALARM: "bad"}.get(standing.light, "doubt")
+    return {"light": LIGHTS[standing.light], "kind": kind, "reasons": reasons, "next_step": standing.next_step}
+
+
+def _lobes(logbook: Logbook, last: Row, programs: Sequence[Advised]) -> list[Picture]:
     """The diagram of the reference cut, or else of the first program of the tool, now and then."""
-    if not last.lobes:
+    machine = logbook.machine
+    assembly = logbook.assembly(until=last.tap_id)
+    lobes = lobes_of(assembly, machine)
+    if not lobes:
         return []
-    cut, now = next(iter(last.lobes.items()))
-    known = (bool(last.x), bool(last.y))
-    then = first.lobes.get(cut) if first.tap_id != last.tap_id else None
+    cut, now = next(iter(lobes.items()))
+    first = logbook.first_assembly(assembly)
+    depths = {} if first is None else {first.label: lobes_of(first, machine)[cut].depth}
     text = (
-        f"Limit of the {cut} by {now.method}; cuts in the shaded region chatter. "
-        "Marks: programs with this same cut, as in the table above."
+        f"Limit of the {cut} by {now.method}, {' and '.join(assembly.directions)} direction"
+        f"{'s' if len(assembly.directions) > 1 else ' alone'}; cuts in the shaded region chatter. "
+        "Marks: programs with this same cut and their verdicts, as in the table above."
     )
     if np.isinf(now.minimum.depth):
         text = f"The {cut} has no limit in this speed range ({now.method})."
-    if then is not None and (bool(first.x), bool(first.y)) != known:
-        then, text = None, f"{text} The first test knows other directions than the newest: no comparison."
-    depths = {f"{first.time:%Y-%m-%d}": then.depth} if then is not None else {}
-    depths[f"{last.time:%Y-%m-%d}"] = now.depth
-    cuts = machine.cuts(last.tool)
-    marks = [
-        _program(one)
-        for one in advice
-        if one.check is not None and one.table.name in cuts and cuts[one.table.name] == cuts[cut]
-    ]
-    picture = lobes_figure(now.speed_rpm, depths, marks)
-    return [("Stability lobes, then and now" if then is not None else "Stability lobes", text, svg(picture))]
+    cuts = machine.cuts(assembly.tool)
+    marks = [one.verdict for one in programs if cuts.get(one.verdict.program.name) == cuts[cut]]
+    picture = lobes_figure(now.speed_rpm, depths | {assembly.label: now.depth}, marks)
+    return [Picture("Stability lobes, then and now" if depths else "Stability lobes", text, svg(picture))]
 
 
-def _figures(
-    machine: Machine,
-    history: SldHistory,
-    rows: NDArray[np.int64],
-    times: list[datetime],
-    taps: tuple[TapTest, TapTest],
-) -> list[tuple[str, str, str]]:
-    """Heading, sentence and picture of each figure that there is something to show in."""
-    columns = history.columns
-    figures: list[tuple[str, str, str]] = []
-    for name, label, limits, text in (
-        ("frequency", "natural frequency (Hz)", machine.limits, "Bars: 95 % interval of each tap alone."),
-        ("bearing_stiffness", "bearing stiffness (N/µm)", None, "Equivalent stiffness of each bearing in the model."),
+def _trends(rows: Sequence[Row], machine: Machine) -> list[Picture]:
+    """Values over time, where they are known."""
+    found = []
+    for name, heading, unit, scale, text in (
+        ("frequency", "Natural frequency", "Hz", 1.0, "Bars: 95 % interval of each tap alone."),
+        ("bearing_stiffness", "Bearing stiffness", "N/µm", 1e6, "Equivalent stiffness of each bearing in the model."),
     ):
-        values, stds = (np.asarray(columns[key][rows], dtype=np.float64) for key in (name, f"{name}_std"))
-        seen = np.isfinite(values)
-        if seen.any():
-            scale = 1.0 if limits else 1e6
-            at = [time for time, is_seen in zip(times, seen, strict=True) if is_seen]
-            figure = trend_figure(at, values[seen] / scale, stds[seen] / scale, label, limits)
-            figures.append((label.partition(" (")[0].capitalize(), text, svg(figure)))
-    first = taps[0].frf if rows.size > 1 else None
-    picture = frf_figure(first, taps[1].frf, _shown_band(taps[1].frf, machine))
-    figures.append(("Frequency response", "Receptance: displacement over force.", svg(picture)))
-    return figures
+        known = [(row.time, getattr(row, name)) for row in rows if getattr(row, name).is_known]
+        if known:
+            values, stds = np.array([estimate for _, estimate in known]).T / scale
+            limits = machine.limits if name == "frequency" else None
+            times = [time for time, _ in known]
+            figure = trend_figure(times, values, stds, f"{heading.lower()} ({unit})", limits)
+            found.append(Picture(heading, text, svg(figure)))
+    return found
+
+
+def _response(first: Frf | None, now: Frf, machine: Machine) -> Picture:
+    picture = frf_figure(first, now, _shown_band(now, machine))
+    return Picture("Frequency response", "Receptance: displacement over force.", svg(picture))
 
 
 def _shown_band(frf: Frf, machine: Machine) -> tuple[float, float]:
@@ -132,31 +155,26 @@ def _shown_band(frf: Frf, machine: Machine) -> tuple[float, float]:
     return max(0.6 * low, float(frf.frequency[0])), min(1.4 * high, float(frf.frequency[-1]))
 
 
-def _changes(history: SldHistory, first: int, last: int) -> list[dict[str, str]]:
-    columns = history.columns
+def _changes(rows: Sequence[Row]) -> list[dict[str, str]]:
+    """What was measured first and last, and the change by the formula of the light."""
     table = []
-    for name, label, scale in (
-        ("frequency", "natural frequency (Hz)", 1.0),
-        ("damping_ratio", "damping ratio (%)", 0.01),
-        ("stiffness", "stiffness K (N/µm)", 1e6),
-        ("bearing_stiffness", "bearing stiffness (N/µm)", 1e6),
-        ("static_tip_stiffness", "static tip stiffness, model (N/µm)", 1e6),
-        ("modal_tip_stiffness", "modal tip stiffness, model (N/µm)", 1e6),
-    ):
-        values = columns[name]
-        stds = columns.get(f"{name}_std", np.full(values.shape, np.nan))
-        if not np.isfinite(values[last]):
-            continue
-        row = {"label": label, "now": plus_minus(values[last], stds[last], scale)}
-        row["then"] = plus_minus(values[first], stds[first], scale)
-        row["change"] = f"{100 * (values[last] / values[first] - 1):+.2f} %" if np.isfinite(values[first]) else "-"
-        table.append(row)
+    for name, label, scale in CHANGES:
+        known = [getattr(row, name) for row in rows if getattr(row, name).is_known]
+        change = change_since_first(rows, name)
+        if change.is_known:
+            now, then = (plus_minus(one.value, one.std, scale) for one in (known[-1], known[0]))
+            table.append({"label": label, "then": then, "now": now, "change": f"{change.value:+.2f} %"})
+    for name, label in (("static_tip_stiffness", "static"), ("modal_tip_stiffness", "modal")):
+        values = [float(getattr(row, name)) for row in rows if np.isfinite(getattr(row, name))]
+        if values and np.isfinite(getattr(rows[-1], name)):
+            then, now = (f"{value / 1e6:.6g}" for value in (values[0], values[-1]))
+            change_text = f"{100 * (values[-1] / values[0] - 1):+.2f} %"
+            heading = f"{label} tip stiffness, model (N/µm)"
+            table.append({"label": heading, "then": then, "now": now, "change": change_text})
     return table
 
 
-def _modes(history: SldHistory, row: int) -> list[dict[str, str]]:
-    columns = history.columns
-    values = np.stack([columns[f"mode_{name}"][row] for name in ("frequency", "damping_ratio", "stiffness")], axis=1)
+def _modes(row: Row) -> list[dict[str, str]]:
     return [
         {
             "frequency": f"{frequency:.2f}",
@@ -164,38 +182,32 @@ def _modes(history: SldHistory, row: int) -> list[dict[str, str]]:
             "stiffness": f"{stiffness / 1e6:.3f}",
             "remark": "" if stiffness > 0 else "not a driving point",
         }
-        for frequency, damping, stiffness in values[np.isfinite(values[:, 0])]
+        for frequency, damping, stiffness in row.modes
     ]
 
 
-def _program(one: ProgramAdvice) -> dict[str, Any]:
+def _program(one: Advised) -> dict[str, Any]:
     """A row of the table of programs: what `lobewatch check` says."""
-    row = {"name": one.table.name, "speed_rpm": one.table.speed_rpm, "depth_mm": one.table.depth_mm}
-    found = one.check
-    if found is None:
-        return row | {
-            "stable": None,
-            "was_stable": None,
-            "limit": "-",
-            "band": "",
-            "margin": "-",
-            "remark": "; ".join(one.notes),
-        }
-    low, high = (edge * 1e3 for edge in one.limit_band)
-    return row | {
+    found = one.verdict
+    low, high = (edge * 1e3 for edge in one.advice.limit_band)
+    return {
+        "name": found.program.name,
+        "speed_rpm": found.program.speed_rpm,
+        "depth_mm": found.program.depth_mm,
         "stable": found.stable,
-        "was_stable": one.was_stable if one.measured else None,
-        "limit": limit_text(found, one.table.depth_mm),
+        "was_stable": one.was_stable if found.measured else None,
+        "limit": limit_text(found),
         "band": f"{low:.2f} to {high:.2f}" if np.isfinite(high) else "",
         "margin": margin_text(found),
-        "remark": _remark(one, found, low),
+        "remark": _remark(one),
     }
 
 
-def _remark(one: ProgramAdvice, found: ProgramCheck, low: float) -> str:
-    remarks = [] if one.measured else ["predicted"]
-    if found.stable and low <= one.table.depth_mm:
-        remarks.append("within the error of the limit")
-    if one.table.depth_mm > one.drive_limit * 1e3:
-        remarks.append(f"[drive] allows {one.drive_limit * 1e3:.2f} mm")
-    return "; ".join(remarks)
+def _remark(one: Advised) -> str:
+    found = one.verdict
+    if found.stable is None:
+        return "; ".join(remark.text for remark in found.remarks)
+    texts = [] if found.measured else ["predicted"]
+    texts += ["within the error of the limit"] if one.is_within_error else []
+    texts += [f"[drive] allows {found.drive_limit * 1e3:.2f} mm"] if found.is_beyond_drive else []
+    return "; ".join(texts)

@@ -23,8 +23,7 @@ from acquisition import (
     Verdict,
     judge_hit,
 )
-from lobewatch.analysis.history import update_history
-from lobewatch.analysis.pipeline import Measurement
+from lobewatch.analysis import Logbook, Measurement
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import checked_rate, has_clock, known_rate
 from lobewatch.tap.in_progress import TapInProgress, begin_tap
@@ -356,10 +355,10 @@ class TapSession:
         """Average, commit, and say what it means."""
         self._show(word=Word.DONE, reason="The result is being worked out.", levels=None)
         tap = self._tap.finish()
-        self._folder.commit(tap)
-        history, measurements = update_history(self._folder)
-        self._measurement = next(found for found in measurements if found.tap_id == tap.id)
-        outcome = outcome_of(self._measurement, history, self._folder.machine) if self._guided else None
+        logbook = Logbook(self._folder)
+        logbook.commit(tap)
+        self._measurement = logbook.measurement(tap.id)
+        outcome = outcome_of(logbook, self._measurement) if self._guided else None
         self._show(reason="", outcome=outcome)
         return tap
 

@@ -123,7 +123,7 @@ def test_an_unstable_program_and_the_nearest_stable_speed() -> None:
     assert found.nearest_speed is not None
     moved = replace(program, speed_rpm=found.nearest_speed)
     assert check_program(moved, [MODE], [MODE], SPEEDS).stable
-    assert 500 < found.chatter_frequency < 2500
+    assert 500 < found.state.chatter_frequency < 2500
 
 
 def test_no_stable_speed() -> None:

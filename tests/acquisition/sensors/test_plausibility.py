@@ -20,7 +20,7 @@ from acquisition import (
     stiffness_doubt,
     unit_mistake,
 )
-from lobewatch.analysis.pipeline import analyse
+from lobewatch.analysis import measure
 from lobewatch.machine.machine_file import parse_machine
 from modal import Mode, synthesize
 
@@ -96,8 +96,8 @@ def test_other_stiffnesses_are_not(stiffness: float) -> None:
 def test_a_measurement_whose_stiffness_is_not_believed_says_so(stiffness: float, noted: bool) -> None:
     machine = parse_machine(resources.files("sim_data").joinpath("new_machine.toml").read_text("utf-8"))
     frf = synthesize([Mode(1500.0, 0.03, stiffness)], np.arange(4.0, 4000.0, 4.0))
-    measurement = analyse(TapTest("t", Circumstances("mill", datetime(2026, 1, 15, tzinfo=UTC)), frf), machine)
-    assert any("check the units of both sensitivities" in note for note in measurement.notes) is noted
+    measurement = measure(TapTest("t", Circumstances("mill", datetime(2026, 1, 15, tzinfo=UTC)), frf), machine)
+    assert ("stiffness-implausible" in [remark.code for remark in measurement.remarks]) is noted
 
 
 def test_the_date_of_calibration() -> None:

@@ -15,9 +15,7 @@ from typer.testing import CliRunner
 from acquisition import Circumstances, Frf, TapTest, new_tap_id
 from dsm import modes_at, natural_frequencies, receptance
 from lobes import zero_order
-from lobewatch.analysis.advice import advise
-from lobewatch.analysis.model_state import model_picture, model_state
-from lobewatch.analysis.pipeline import speed_grid
+from lobewatch.analysis import Logbook, model_picture, model_state, speed_grid
 from lobewatch.analysis.prediction import predict
 from lobewatch.cli import app
 from lobewatch.machine.folder import MachineFolder
@@ -113,12 +111,14 @@ def test_a_tap_with_another_tool_is_calibrated_with_that_tools_model(folder: Mac
 def test_the_picture_shows_the_shaft_the_curve_and_what_was_measured(folder: MachineFolder, tool: str | None) -> None:
     folder.commit(tapped(folder, 0.6))
     folder.commit(tapped(folder, 0.5, TOOL, day=2))
-    state = model_state(folder, tool)
-    picture = model_picture(state, 4)
+    logbook = Logbook(folder)
+    state = model_state(folder.machine, logbook.calibrated, tool)
+    picture = model_picture(logbook, state, 4)
+    assert state.measurement is not None
     stiffness, frequency = picture.points
     assert np.interp(stiffness[-1], *picture.curve) == pytest.approx(frequency[-1], rel=1e-3)
     assert picture.measured_frf is not None
-    wanted = receptance(state.spindle, picture.model_frf.frequency, loss_factor=2 * damping(state.followed))
+    wanted = receptance(state.spindle, picture.model_frf.frequency, loss_factor=2 * damping(state.measurement.followed))
     assert np.max(np.abs(picture.model_frf.receptance - wanted)) < 2e-4 * np.max(np.abs(wanted))
     figure = model_figure(picture)
     shaft, curve, shapes, whirl, frf = figure.axes
@@ -153,28 +153,29 @@ def test_one_tap_predicts_the_lobes_of_every_tool(folder: MachineFolder) -> None
     modes = [Mode(f, 0.029, k) for f, k in zip(frequency, stiffness, strict=True)]
     expected = zero_order(modes, modes, folder.machine.cuts(TOOL)[REFERENCE_CUT], speed_grid(folder.machine))
     assert found["minimum_depth_mm"] == pytest.approx(expected.minimum.depth * 1e3, rel=0.02)
-    assert "predicted, not measured" in found["notes"][0]
+    assert found["remarks"][0]["code"] == "predicted"
     coupled = said("lobes", folder.path, "--tool", TOOL, "--source", "frf")
     assert coupled["minimum_depth_mm"] == pytest.approx(found["minimum_depth_mm"], rel=0.02)
     measured = said("lobes", folder.path)
     assert measured["minimum_depth_mm"] > 2 * found["minimum_depth_mm"]
-    assert not any("predicted" in note for note in measured["notes"])
+    assert "predicted" not in [remark["code"] for remark in measured["remarks"]]
 
 
 def test_check_predicts_where_a_tool_was_never_tapped(folder: MachineFolder) -> None:
     with_program(folder)
     folder = MachineFolder(folder.path)
     folder.commit(tapped(folder, 1.0))
-    (long,) = [one for one in advise(folder) if one.table.tool == TOOL]
-    assert long.check is not None
-    assert long.tap_id.startswith("prediction from ")
+    logbook = Logbook(folder)
+    (long,) = [one for one in logbook.verdicts() if one.program.tool == TOOL]
+    assert long.assembly is not None
+    assert long.assembly.tap_id.startswith("prediction from ")
     assert not long.measured
-    assert np.isnan(long.limit_band).all()
+    assert np.isnan(logbook.advice(long).limit_band).all()
     shown = CliRunner().invoke(app, ["check", str(folder.path)], catch_exceptions=False)
     assert "stable (predicted)" in shown.stdout
     assert shown.exit_code == 0
-    assert any("predicted, not measured" in note for note in long.notes)
-    assert long.check.limit == pytest.approx(0.4e-3, rel=0.5)
+    assert "predicted" in [remark.code for remark in long.remarks]
+    assert long.limit == pytest.approx(0.4e-3, rel=0.5)
 
 
 def test_predictions_need_a_model_and_a_tap(folder: MachineFolder) -> None:
@@ -189,12 +190,12 @@ def test_predictions_need_a_model_and_a_tap(folder: MachineFolder) -> None:
 
 def test_a_prediction_is_refused_before_the_first_tap(folder: MachineFolder) -> None:
     with pytest.raises(ValueError, match="no tap test has set the bearings of the model yet"):
-        predict(folder, TOOL)
+        predict(folder.machine, Logbook(folder).calibrated, TOOL)
 
 
 def test_an_unknown_tool_and_a_machine_without_a_model_are_refused(folder: MachineFolder, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="'drill' has no model; modelled are 'reference', 'long end mill'"):
-        model_state(folder, "drill")
+        model_state(folder.machine, None, "drill")
     make_machine_folder(tmp_path / "plain", "new_machine.toml")
     with pytest.raises(ValueError, match=r"no model: add a \[spindle\] table"):
-        model_state(MachineFolder(tmp_path / "plain"))
+        model_state(MachineFolder(tmp_path / "plain").machine, None)

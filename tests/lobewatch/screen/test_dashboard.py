@@ -18,11 +18,11 @@ import numpy as np
 import pytest
 
 from acquisition import Circumstances, DataError, TapsEmulator, TapsSource
+from lobewatch.analysis import Logbook
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen import DashboardServer
-from lobewatch.screen.dashboard import standing
 from lobewatch.tap.emulated_spindle import emulated_structure, emulator, with_bearing_stiffness
 from lobewatch.tap.session import TapSession
 
@@ -81,37 +81,46 @@ def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_worn_machine_says_how_far_its_frequency_has_fallen(shop: Path) -> None:
-    found = standing("b-worn", MachineFolder(shop / "b-worn"), DAY)
-    assert found.fall == pytest.approx(10.0, abs=0.01)
-    assert found.fall_std is not None
-    assert 0 < found.fall_std < 0.01
-    assert (found.light, found.series) == ("alarm", "reference, x")
+    found = Logbook.open(shop / "b-worn").standing(DAY)
+    (series,) = found.series
+    assert series.fall.value == pytest.approx(10.0, abs=0.01)
+    assert 0 < series.fall.std < 0.01
+    assert (found.light, series.name) == ("alarm", "reference, x")
     assert found.days_left == pytest.approx(-10)
-    assert "slot at 12 900 rpm" in found.note
+    assert any("slot at 12 900 rpm" in remark.about for remark in found.remarks)
+    assert "overdue" in [remark.code for remark in found.remarks]
 
 
 def test_a_machine_tapped_once_has_nothing_to_compare_with(shop: Path) -> None:
-    found = standing("a-new", MachineFolder(shop / "a-new"), DAY)
-    assert (found.light, found.fall, found.fall_std, found.note) == ("good", 0.0, 0.0, "")
+    found = Logbook.open(shop / "a-new").standing(DAY)
+    (series,) = found.series
+    assert (found.light, series.fall, series.is_first) == ("good", (0.0, 0.0), True)
     assert found.days_left == pytest.approx(20)
 
 
-def test_a_history_of_another_machine_toml_is_not_shown(tmp_path: Path) -> None:
+def test_overdue_is_never_good(shop: Path) -> None:
+    found = Logbook.open(shop / "a-new").standing(DAY + timedelta(days=21))
+    assert found.light == "warn"
+    assert found.remarks[0].code == "overdue"
+    assert "overdue by 1 days" in found.remarks[0].text
+    assert found.next_step == "Take the tap test that is due."
+
+
+def test_another_machine_toml_is_analysed_anew(tmp_path: Path) -> None:
     folder = machine(tmp_path / "mill")
     tap(folder, NEW, DAY)
-    assert standing("mill", folder, DAY).light == "good"
+    assert Logbook.open(folder.path).standing(DAY).light == "good"
     text = folder.toml.read_text("utf-8")
-    folder.toml.write_text(text.replace("band_hz = [1200, 2200]", "band_hz = [2800, 3800]"), "utf-8")
-    found = standing("mill", folder, DAY)
-    assert (found.light, found.fall) == ("unknown", None)
-    assert "not analysed" in found.note
+    folder.toml.write_text(text.replace("band_hz = [1200, 2200]", "band_hz = [3900, 3950]"), "utf-8")
+    found = Logbook.open(folder.path).standing(DAY)
+    assert (found.light, found.remarks[0].code) == ("warn", "mode-lost")
 
 
 def test_the_list_is_worst_first_and_nothing_is_listed_without_the_token(shop: Path) -> None:
     with DashboardServer(shop) as server:
         status, answer = ask(server, "GET", "/machines")
         assert [one["key"] for one in answer["machines"]] == ["b-worn", "c-untapped", "d-broken", "a-new"]
-        assert [one["light"] for one in answer["machines"]] == ["alarm", "unknown", "unknown", "good"]
+        assert [one["light"] for one in answer["machines"]] == ["alarm", "unknown", "unknown", "warn"]
         assert "machine.toml" in answer["machines"][2]["note"]
         assert status == 200
         assert ask(server, "GET", "/machines", token="wrong-token-wrong")[0] == 401

@@ -9,7 +9,8 @@ import pytest
 from matplotlib.collections import LineCollection
 
 from acquisition import Frf
-from lobewatch.machine.machine_file import Limits
+from lobewatch.analysis import Verdict, Word
+from lobewatch.machine import Limits, ProgramTable
 from lobewatch.show.figures import frf_figure, svg, trend_figure
 from lobewatch.show.figures_lobes import lobes_figure
 
@@ -33,8 +34,10 @@ def test_bars_are_the_95_percent_interval() -> None:
 
 def test_lobes_are_drawn_in_mm_and_programs_where_they_cut() -> None:
     speed = np.linspace(1000.0, 2000.0, 5)
-    program = {"name": "A", "speed_rpm": 1500.0, "depth_mm": 3.0, "stable": False}
-    figure = lobes_figure(speed, {"then": np.full(5, 2e-3), "now": np.full(5, 1e-3)}, [program])
+    cut = {"teeth": 2, "radial_depth_mm": 5, "tool_diameter_mm": 10, "direction": "up", "material": "any"}
+    program = ProgramTable(name="A", speed_rpm=1500.0, depth_mm=3.0, **cut)  # type: ignore[arg-type]
+    verdict = Verdict(program, Word.NOT_STABLE)
+    figure = lobes_figure(speed, {"then": np.full(5, 2e-3), "now": np.full(5, 1e-3)}, [verdict])
     then, now, mark = figure.axes[0].lines
     assert then.get_ydata() == pytest.approx(2.0)
     assert now.get_ydata() == pytest.approx(1.0)

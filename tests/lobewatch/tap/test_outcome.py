@@ -23,7 +23,8 @@ from acquisition import (
     from_accelerance,
     new_tap_id,
 )
-from lobewatch.analysis.history import update_history
+from lobewatch.analysis import Estimate, Logbook
+from lobewatch.analysis.standing import change_since_first
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.tap.outcome import outcome_of
@@ -48,8 +49,8 @@ def tapped(
     about = Circumstances("m", START + timedelta(days=days), "reference", direction)
     frf = synthesize([Mode(frequency, 0.03, stiffness)], LINES)
     folder.commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
-    history, measurements = update_history(folder)
-    return outcome_of(measurements[-1], history, folder.machine)
+    logbook = Logbook(folder)
+    return outcome_of(logbook, logbook.measurement(logbook.newest().id))
 
 
 def test_the_light_follows_the_fall_of_the_frequency(folder: MachineFolder) -> None:
@@ -57,7 +58,7 @@ def test_the_light_follows_the_fall_of_the_frequency(folder: MachineFolder) -> N
     assert first.light == "good"
     assert "1720" in first.texts[0]
     assert "the first test of this tool and direction" in first.texts[0]
-    assert first.next_step.startswith("Tap direction y of the same tool within a day")
+    assert first.next_step.startswith("Tap direction y of the same tool too")
     both = tapped(folder, 0.1, 1700.0, "y")
     assert both.next_step == "All is well: tap again by 2026-02-14."
     lights = [tapped(folder, 30 * month, 1720 * share).light for month, share in enumerate((0.96, 0.94, 0.89), 1)]
@@ -71,20 +72,28 @@ def test_the_fall_has_the_standard_error_of_both_frequencies(folder: MachineFold
     """0.1 % each: 0.96 sqrt(2) 0.1 % = 0.14 %."""
     tapped(folder, 0, 1720.0)
     tapped(folder, 30, 0.96 * 1720)
-    (folder.path / "history.h5").unlink()
-    history, measurements = update_history(folder)
-    history.columns["frequency_std"][:] = 1.72
-    found = measurements[-1]
-    assert found.dynamics.followed is not None
-    mode = replace(found.dynamics.followed, covariance=np.diag([(0.96 * 1.72) ** 2, 1e-8, 1e12]))
-    told = outcome_of(replace(found, dynamics=replace(found.dynamics, followed=mode)), history, folder.machine)
-    assert "-4.00 ± 0.14 % against the first test" in told.texts[0]
+    first, last = Logbook(folder).history.rows
+    first = replace(first, frequency=Estimate(first.frequency.value, 1.72))
+    last = replace(last, frequency=Estimate(last.frequency.value, 0.96 * 1.72))
+    change = change_since_first([first, last], "frequency")
+    assert change.value == pytest.approx(-4.0, abs=0.01)
+    assert change.std == pytest.approx(0.136, abs=0.001)
+
+
+def test_a_worn_direction_is_not_forgotten_when_another_one_is_tapped(folder: MachineFolder) -> None:
+    tapped(folder, 0, 1720.0)
+    tapped(folder, 30, 0.94 * 1720)
+    assert tapped(folder, 60, 0.88 * 1720).light == "alarm"
+    other = tapped(folder, 60.1, 1700.0, "y")
+    assert other.light == "alarm"
+    assert any("reference, x: frequency fallen by 12.0 %" in text for text in other.texts)
+    assert other.next_step.startswith("Do not cut on")
 
 
 def test_a_program_that_chatters_is_named(folder: MachineFolder) -> None:
     soft = tapped(folder, 0, 1720.0, stiffness=3e6)
-    assert soft.light == "warn"
-    assert any(text.startswith("Not stable: A: slot at 12 900 rpm") for text in soft.texts)
+    assert soft.light == "alarm"
+    assert any("A: slot at 12 900 rpm" in text and text.endswith(": not stable.") for text in soft.texts)
     assert "lobewatch check" in soft.next_step
 
 

@@ -28,8 +28,8 @@ from acquisition import (
 )
 from dsm import modal_stiffness, modes_at, receptance, static_stiffness
 from lobes import read_history, zero_order
-from lobewatch.analysis.history import series, update_history
-from lobewatch.analysis.pipeline import Measurement, analyse
+from lobewatch.analysis import History, Logbook, Measurement, measure
+from lobewatch.analysis.history import Row
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.machine_file import REFERENCE_CUT, parse_machine
 from lobewatch.machine.new_folder import make_machine_folder
@@ -69,6 +69,16 @@ def live_tap(folder: MachineFolder, k: float, days: float = 0.0, direction: str 
     return session.measurement
 
 
+def up_to_date(folder: MachineFolder) -> tuple[History, list[Measurement]]:
+    """The history as somebody finds it who opens the folder now, and every measurement."""
+    logbook = Logbook.open(folder.path)
+    return logbook.history, [logbook.measurement(tap.id) for tap in logbook.taps]
+
+
+def codes(found: Measurement | Row) -> list[str]:
+    return [remark.code for remark in found.remarks]
+
+
 def test_the_emulated_structure_has_the_receptance_of_the_model() -> None:
     table = parse_machine(_example()).spindle
     assert table is not None
@@ -91,19 +101,19 @@ def test_live_taps_find_what_was_emulated_and_the_history_grows(folder: MachineF
     assert table is not None
     for month, k in enumerate((1.28e9, 0.9e9)):
         found = live_tap(folder, k, 30.0 * month)
-        history, _ = update_history(folder)
+        history, _ = up_to_date(folder)
         (f, *_), (stiffness, *_) = modes_at(with_bearing_stiffness(table.build(), k), 3)
-        assert found.dynamics.followed is not None
-        assert found.dynamics.calibration is not None
-        assert found.dynamics.followed.frequency == pytest.approx(f, rel=5e-4)
-        assert found.dynamics.followed.damping_ratio == pytest.approx(table.damping_ratio, rel=0.03)
-        assert found.dynamics.followed.stiffness == pytest.approx(stiffness, rel=0.02)
-        assert found.dynamics.calibration.bearing_stiffness == pytest.approx(k, rel=0.01)
-        assert len(history) == month + 1
-    assert np.diff(history.columns["stiffness"])[0] < 0
+        assert found.followed is not None
+        assert found.calibration is not None
+        assert found.followed.frequency == pytest.approx(f, rel=5e-4)
+        assert found.followed.damping_ratio == pytest.approx(table.damping_ratio, rel=0.03)
+        assert found.followed.stiffness == pytest.approx(stiffness, rel=0.02)
+        assert found.calibration.bearing_stiffness == pytest.approx(k, rel=0.01)
+        assert len(history.rows) == month + 1
+    assert history.rows[1].stiffness.value < history.rows[0].stiffness.value
     again = read_history(folder.history)
-    assert np.array_equal(again.depth[REFERENCE_CUT], history.depth[REFERENCE_CUT])
-    followed = found.dynamics.at_tip
+    assert np.array_equal(again.depth[REFERENCE_CUT][0], history.rows[0].depth[REFERENCE_CUT])
+    followed = found.at_tip
     expected = zero_order(followed, None, folder.machine.cuts("reference")[REFERENCE_CUT], again.speed_rpm)
     assert np.array_equal(again.depth[REFERENCE_CUT][1], expected.depth)
     assert not list(folder.spool.iterdir())
@@ -112,15 +122,19 @@ def test_live_taps_find_what_was_emulated_and_the_history_grows(folder: MachineF
 def test_a_history_made_again_is_the_same_and_stale_ones_are_not_used(folder: MachineFolder) -> None:
     for month, k in enumerate((1.28e9, 1.0e9, 0.8e9)):
         live_tap(folder, k, 30.0 * month)
-    history, _ = update_history(folder)
+    history, _ = up_to_date(folder)
+    columns = read_history(folder.history).columns
     for spoil in (folder.history.unlink, lambda: folder.history.write_bytes(b"rubbish")):
         spoil()
-        again, _ = update_history(folder)
-        for name, column in history.columns.items():
-            assert np.array_equal(column, again.columns[name], equal_nan=column.dtype.kind == "f")
+        up_to_date(folder)
+        again = read_history(folder.history).columns
+        for name, column in columns.items():
+            if name not in ("program_limit", "program_verdict"):
+                assert np.array_equal(column, again[name], equal_nan=column.dtype.kind == "f")
+            assert np.array_equal(column[-1:], again[name][-1:], equal_nan=column.dtype.kind == "f")
     folder.toml.write_text(folder.toml.read_text().replace("depth_mm = 8.0", "depth_mm = 1.0"))
-    changed, measurements = update_history(MachineFolder(folder.path))
-    assert len(measurements) == 3
+    changed, _ = up_to_date(folder)
+    assert len(changed.rows) == 3
     assert changed.settings_hash != history.settings_hash
 
 
@@ -167,46 +181,49 @@ def test_a_full_disk_is_told_before_the_first_hit(folder: MachineFolder, monkeyp
         begin_tap(folder, about(folder))
 
 
-def test_x_and_y_within_a_day_make_one_two_directional_diagram(folder: MachineFolder) -> None:
+def test_the_newest_x_and_y_make_one_diagram_however_far_apart(folder: MachineFolder) -> None:
     x, y = Mode(1700.0, 0.03, 3.5e7), Mode(1600.0, 0.04, 2.5e7)
+    later = Mode(1590.0, 0.04, 2.4e7)
     folder.commit(recorded(about(folder, 0.0, "x"), x))
     folder.commit(recorded(about(folder, 0.5, "y"), y))
-    folder.commit(recorded(about(folder, 3.0, "y"), y))
-    _, (alone, both, late) = update_history(folder)
+    folder.commit(recorded(about(folder, 300.0, "y"), later))
+    alone, both, late = up_to_date(folder)[0].rows
     cut = folder.machine.cuts("reference")[REFERENCE_CUT]
-    speeds = alone.lobes[REFERENCE_CUT].speed_rpm
-    assert alone.lobes[REFERENCE_CUT].depth == pytest.approx(zero_order([x], None, cut, speeds).depth, rel=1e-3)
-    assert both.lobes[REFERENCE_CUT].depth == pytest.approx(zero_order([x], [y], cut, speeds).depth, rel=1e-3)
-    assert late.lobes[REFERENCE_CUT].depth == pytest.approx(zero_order(None, [y], cut, speeds).depth, rel=1e-3)
-    assert any("the y direction alone" in note for note in late.notes)
-    assert not both.notes
+    speeds = Logbook(folder).history.speed_rpm
+    for row, normal in ((alone, None), (both, [y]), (late, [later])):
+        assert row.depth[REFERENCE_CUT] == pytest.approx(zero_order([x], normal, cut, speeds).depth, rel=1e-3)
+    assert [codes(row) for row in (alone, both, late)] == [["one-direction"], [], ["older-direction"]]
+    assert "direction x is that of 2026-01-15, 300 days older" in str(late.remarks[0])
 
 
 def test_a_tap_recorded_earlier_and_stored_later_takes_its_place_in_time(folder: MachineFolder) -> None:
     x, y = Mode(1700.0, 0.03, 3.5e7), Mode(1600.0, 0.04, 2.5e7)
     folder.commit(recorded(about(folder, 1.0, "x"), x))
-    alone, _ = update_history(folder)
+    alone, _ = up_to_date(folder)
     folder.commit(recorded(about(folder, 0.5, "y"), y))
-    kept_up, _ = update_history(folder)
+    kept_up, _ = up_to_date(folder)
     folder.history.unlink()
-    made_again, _ = update_history(folder)
-    assert list(kept_up.columns["direction"]) == ["y", "x"]
-    assert np.array_equal(kept_up.depth[REFERENCE_CUT], made_again.depth[REFERENCE_CUT])
-    assert not np.array_equal(kept_up.depth[REFERENCE_CUT][1], alone.depth[REFERENCE_CUT][0])
+    made_again, _ = up_to_date(folder)
+    assert [row.direction for row in kept_up.rows] == ["y", "x"]
+    assert np.array_equal(kept_up.rows[1].depth[REFERENCE_CUT], made_again.rows[1].depth[REFERENCE_CUT])
+    assert not np.array_equal(kept_up.rows[1].depth[REFERENCE_CUT], alone.rows[0].depth[REFERENCE_CUT])
 
 
 def test_a_negative_stiffness_is_stored_and_stops_the_lobes_with_a_reason(folder: MachineFolder) -> None:
     tap = recorded(about(folder), Mode(1700.0, 0.03, 3.5e7), Mode(1950.0, 0.01, -9e7))
-    found = analyse(tap, folder.machine)
-    assert [mode.is_driving_point for mode in found.dynamics.modes] == [True, False]
-    assert not found.lobes
-    assert "not a driving point, the stiffness of the modes at 1950 Hz is negative" in found.notes[-1]
-    narrow = replace_band(folder, "[1200, 1800]")
-    assert list(analyse(tap, narrow.machine).lobes)
+    found = measure(tap, folder.machine)
+    assert [mode.is_driving_point for mode in found.modes] == [True, False]
+    assert not found.at_tip
+    assert codes(found)[-1] == "no-lobes-driving-point"
+    assert "not a driving point, the stiffness of the modes at 1950 Hz is negative" in found.remarks[-1].text
+    text = folder.toml.read_text()
+    assert measure(tap, replace_band(folder, "[1200, 1800]").machine).at_tip
+    folder.toml.write_text(text)
     folder.commit(tap)
-    history, _ = update_history(folder)
-    assert np.isnan(history.depth[REFERENCE_CUT]).all()
-    html = render_report(folder, history, "reference", "x")
+    history, _ = up_to_date(folder)
+    assert not history.rows[0].depth
+    assert np.isnan(read_history(folder.history).depth[REFERENCE_CUT]).all()
+    html = render_report(Logbook.open(folder.path), "reference", "x")
     assert "not a driving point" in html
 
 
@@ -216,14 +233,14 @@ def replace_band(folder: MachineFolder, band: str) -> MachineFolder:
 
 
 def test_nothing_in_the_band_and_out_of_reach_are_reasons_not_errors(folder: MachineFolder) -> None:
-    outside = analyse(recorded(about(folder), Mode(900.0, 0.03, 3.5e7)), folder.machine)
-    assert outside.dynamics.followed is None
-    assert "none with positive stiffness in [mode] band_hz 1200..2200 Hz; found are 900 Hz" in outside.notes[0]
+    outside = measure(recorded(about(folder), Mode(900.0, 0.03, 3.5e7)), folder.machine)
+    assert outside.followed is None
+    assert "none with positive stiffness in [mode] band_hz 1200..2200 Hz; found are 900 Hz" in str(outside.remarks[0])
     wide = replace_band(folder, "[1200, 3000]")
-    beyond = analyse(recorded(about(folder), Mode(2500.0, 0.03, 3.5e7)), wide.machine)
-    assert beyond.dynamics.calibration is None
-    assert "2301.1 Hz (rigid bearings)" in beyond.notes[0]
-    assert REFERENCE_CUT in beyond.lobes
+    beyond = measure(recorded(about(folder), Mode(2500.0, 0.03, 3.5e7)), wide.machine)
+    assert beyond.calibration is None
+    assert "2301.1 Hz (rigid bearings)" in str(beyond.remarks[0])
+    assert beyond.at_tip
 
 
 def test_an_frf_that_cannot_be_fitted_is_stored_with_the_reason_and_blocks_nothing(folder: MachineFolder) -> None:
@@ -231,10 +248,10 @@ def test_an_frf_that_cannot_be_fitted_is_stored_with_the_reason_and_blocks_nothi
     first = recorded(about(folder), Mode(1700.0, 0.03, 3.5e7))
     folder.commit(replace(first, frf=Frf(LINES, first.frf.receptance.conj())))
     folder.commit(good)
-    history, (conjugated, fine) = update_history(folder)
-    assert conjugated.notes[0].startswith("no modes: the phase")
-    assert fine.lobes
-    assert "natural frequency" in render_report(folder, history, "reference", "x")
+    _, (conjugated, fine) = up_to_date(folder)
+    assert codes(conjugated) == ["no-modes"]
+    assert fine.at_tip
+    assert "natural frequency" in render_report(Logbook.open(folder.path), "reference", "x")
 
 
 def test_a_tap_beside_the_tip_is_carried_to_it_by_the_model(folder: MachineFolder) -> None:
@@ -244,11 +261,11 @@ def test_a_tap_beside_the_tip_is_carried_to_it_by_the_model(folder: MachineFolde
     assert table is not None
     spindle = table.build()
     (f, *_), (k, *_) = modes_at(spindle, 1, 0.06)
-    found = analyse(recorded(about(folder), Mode(float(f), 0.03, float(k))), beside.machine)
-    (tip,) = found.dynamics.at_tip
+    found = measure(recorded(about(folder), Mode(float(f), 0.03, float(k))), beside.machine)
+    (tip,) = found.at_tip
     assert tip.stiffness == pytest.approx(modal_stiffness(spindle), rel=1e-3)
-    assert found.dynamics.followed is not None
-    assert found.dynamics.followed.stiffness == pytest.approx(k, rel=1e-3)
+    assert found.followed is not None
+    assert found.followed.stiffness == pytest.approx(k, rel=1e-3)
 
 
 def test_a_machine_without_spindle_gives_all_but_the_models_part(tmp_path: Path) -> None:
@@ -256,10 +273,10 @@ def test_a_machine_without_spindle_gives_all_but_the_models_part(tmp_path: Path)
     folder = MachineFolder(tmp_path / "plain")
     folder.commit(recorded(about(folder), Mode(1700.0, 0.03, 3.5e7)))
     folder.commit(recorded(about(folder, 30.0), Mode(1600.0, 0.03, 3.5e7)))
-    history, measurements = update_history(folder)
-    assert "no model" in measurements[0].notes[0]
-    assert REFERENCE_CUT in measurements[0].lobes
-    html = render_report(folder, history, "reference", "x")
+    history, measurements = up_to_date(folder)
+    assert "no model" in measurements[0].remarks[0].text
+    assert REFERENCE_CUT in history.rows[0].depth
+    html = render_report(Logbook.open(folder.path), "reference", "x")
     assert "natural frequency" in html
     assert "Bearing stiffness" not in html
 
@@ -267,11 +284,11 @@ def test_a_machine_without_spindle_gives_all_but_the_models_part(tmp_path: Path)
 def test_series_are_sorted_by_time_and_told_apart(folder: MachineFolder) -> None:
     for days, direction in ((60, "x"), (0, "x"), (30, "x"), (45, "y")):
         folder.commit(recorded(about(folder, days, direction), Mode(1700.0 - days, 0.03, 3.5e7)))
-    history, _ = update_history(folder)
-    rows = series(history, "reference", "x")
-    assert history.columns["frequency"][rows] == pytest.approx([1700, 1670, 1640], abs=0.1)
+    history, _ = up_to_date(folder)
+    rows = history.series("reference", "x")
+    assert [row.frequency.value for row in rows] == pytest.approx([1700, 1670, 1640], abs=0.1)
     with pytest.raises(ValueError, match="no tap test with tool 'T9'"):
-        render_report(folder, history, "T9", "x")
+        render_report(Logbook.open(folder.path), "T9", "x")
 
 
 def test_modes_of_many_hits_agree_with_the_frf_they_come_from(
@@ -289,12 +306,12 @@ def test_modes_of_many_hits_agree_with_the_frf_they_come_from(
 
 def test_standard_errors_are_those_over_the_hits(folder: MachineFolder) -> None:
     found = live_tap(folder, 1.28e9)
-    history, _ = update_history(folder)
-    followed = found.dynamics.followed
+    history, _ = up_to_date(folder)
+    followed = found.followed
     assert followed is not None
     assert followed.n_hits == folder.machine.tap.hits
     assert followed.jackknife is not None
-    assert history.columns["stiffness_std"][0] == pytest.approx(np.sqrt(followed.jackknife[2, 2]))
+    assert history.rows[0].stiffness.std == pytest.approx(np.sqrt(followed.jackknife[2, 2]))
 
 
 def test_a_mode_is_followed_past_a_neighbour_that_becomes_the_highest(folder: MachineFolder) -> None:
@@ -302,19 +319,21 @@ def test_a_mode_is_followed_past_a_neighbour_that_becomes_the_highest(folder: Ma
         own = Mode(1700.0 - 20 * month, 0.03, 3.5e7)
         neighbour = Mode(1900.0, 0.03, 3.9e7 - 0.4e7 * month)
         folder.commit(recorded(about(folder, 30.0 * month), own, neighbour))
-    history, measurements = update_history(folder)
-    assert history.columns["frequency"] == pytest.approx([1700, 1680, 1660, 1640], abs=0.5)
-    assert not any("in doubt" in note for found in measurements for note in found.notes)
+    history, measurements = up_to_date(folder)
+    assert [row.frequency.value for row in history.rows] == pytest.approx([1700, 1680, 1660, 1640], abs=0.5)
+    assert not any("followed-in-doubt" in codes(found) for found in measurements)
     folder.history.unlink()
-    again, _ = update_history(folder)
-    assert np.array_equal(again.columns["frequency"], history.columns["frequency"])
+    again, _ = up_to_date(folder)
+    assert [row.frequency for row in again.rows] == [row.frequency for row in history.rows]
 
 
 def test_a_jump_of_the_frequency_is_said_and_a_far_one_is_not_followed(folder: MachineFolder) -> None:
     for days, f in ((0.0, 1500.0), (30.0, 1640.0), (60.0, 2100.0)):
         folder.commit(recorded(about(folder, days), Mode(f, 0.03, 3.5e7)))
-    history, (_, jumped, far) = update_history(folder)
-    assert any("followed mode in doubt, now 1640.0 Hz" in note for note in jumped.notes)
-    assert "no mode is like the one followed so far, 1640.0 Hz; nearest is 2100.0 Hz" in far.notes[0]
-    assert np.isnan(history.columns["frequency"][2])
-    assert far.lobes
+    history, (_, jumped, far) = up_to_date(folder)
+    assert codes(jumped) == ["followed-in-doubt"]
+    assert "now 1640.0 Hz" in jumped.remarks[0].text
+    assert codes(far) == ["no-mode-to-follow"]
+    assert "1640.0 Hz; nearest is 2100.0 Hz" in far.remarks[0].text
+    assert not history.rows[2].frequency.is_known
+    assert far.at_tip

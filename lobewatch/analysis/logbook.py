@@ -1,0 +1,257 @@
+"""The logbook of one machine: its tap tests and all that follows from them, each worked out once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from itertools import takewhile
+from pathlib import Path
+from typing import Self
+
+from acquisition import DataError, Remark, TapTest
+from lobes import read_history, write_history
+from lobewatch.analysis.advice import Advice, advise
+from lobewatch.analysis.assembly import Assembly, assemble, lobes_of
+from lobewatch.analysis.history import History, Row, empty_history, from_columns, row_of, to_columns
+from lobewatch.analysis.measurement import Measurement, measure
+from lobewatch.analysis.order import Place, places
+from lobewatch.analysis.prediction import predict
+from lobewatch.analysis.recordings import Stored, store_recordings
+from lobewatch.analysis.standing import Standing, stand, unreadable
+from lobewatch.analysis.verdict import Verdict, unknown, verdict
+from lobewatch.machine import BusyError, Machine, MachineFolder, ProgramTable, TapEntry
+from modal import Mode
+
+
+class Logbook:
+    """One machine. Reading brings history.h5 up to date where its lock can be had, else works in memory and says so.
+
+    It holds what the disk said when it was first asked; `commit` and `replay` add to it, `is_current` tells whether
+    somebody else has.
+    """
+
+    def __init__(self, folder: MachineFolder) -> None:
+        """Nothing is read yet."""
+        self.folder = folder
+        self.remarks: list[Remark] = []
+        """What is to be said of the files themselves."""
+        self._mark = folder.mark
+        self._placed: Sequence[Place] | None = None
+        self._history: History | None = None
+        self._measurements: dict[str, Measurement] = {}
+
+    @classmethod
+    def open(cls, path: Path | str) -> Self:
+        """The logbook of a machine folder; DataError where it is none."""
+        return cls(MachineFolder(path))
+
+    @property
+    def machine(self) -> Machine:
+        """machine.toml."""
+        return self.folder.machine
+
+    @property
+    def is_current(self) -> bool:
+        """Whether journal and machine.toml are as they were when this was opened or added to."""
+        return self.folder.mark == self._mark
+
+    @property
+    def taps(self) -> Sequence[TapEntry]:
+        """The committed tap tests, oldest first by their time."""
+        return [place.entry for place in self._places]
+
+    def series(self, tool: str, direction: str) -> list[TapEntry]:
+        """Tap tests of one tool and direction, oldest first."""
+        return [tap for tap in self.taps if (tap.tool, tap.direction) == (tool, direction)]
+
+    def newest(self, tool: str | None = None) -> TapEntry:
+        """The newest tap test, of a tool where one is named; DataError where there is none."""
+        found = [tap for tap in self.taps if tool in (None, tap.tool)]
+        if not found:
+            which = "" if tool is None else f" with tool {tool!r}"
+            raise DataError(
+                f"{self.folder.path}: no tap test{which} yet; take one with lobewatch tap, or replay a recorded file"
+            )
+        return found[-1]
+
+    def commit(self, tap: TapTest) -> None:
+        """Add a tap test; saved for good when this returns."""
+        self.folder.commit(tap)
+        self._forget()
+
+    def replay(
+        self, file: Path | str, date: datetime | None = None, tool: str = "", direction: str = ""
+    ) -> Measurement:
+        """Store a recorded file as a tap test, unless it is stored already, and say what it means.
+
+        date, tool and direction are taken from the file where they are not given. DataError for a file that cannot be
+        trusted, with the reason.
+        """
+        (tap_id,) = self.replay_all([Path(file)], date, tool, direction).tap_ids
+        return self.measurement(tap_id)
+
+    def replay_all(
+        self, files: Sequence[Path], date: datetime | None = None, tool: str = "", direction: str = ""
+    ) -> Stored:
+        """Store recorded files, each once; all are read and judged before the first one is stored."""
+        with self.folder.locked():
+            stored = store_recordings(self.folder, files, date, tool, direction)
+            self._forget()
+        return stored
+
+    def measurement(self, tap_id: str) -> Measurement:
+        """What a tap test says, worked out once; KeyError for a tap test that is not in the journal."""
+        return self._measured(self._place(tap_id), self.history.rows)
+
+    @property
+    def history(self) -> History:
+        """All measurements in order of time, up to date; on the disk too where that could be written."""
+        if self._history is None:
+            self._history = self._up_to_date()
+        return self._history
+
+    def assembly(self, tool: str | None = None, until: str | None = None) -> Assembly:
+        """The newest x and y of a tool (None: of the newest tap test), as they were after the tap test `until`.
+
+        Predicted by the model where the tool was never tapped; DataError where there is no model of it.
+        """
+        if until is None and tool is not None and all(tap.tool != tool for tap in self.taps):
+            return predict(self.machine, self.calibrated, tool)
+        return self._assembled(self._place(until or self.newest(tool).id), self.history.rows)
+
+    def first_assembly(self, now: Assembly) -> Assembly | None:
+        """The earliest of the same tool that knows the same directions; None where that is itself or a prediction."""
+        seen: set[str] = set()
+        for tap in self.taps:
+            if tap.tool != now.tool or now.predicted:
+                continue
+            if tap.id == now.tap_id:
+                return None
+            seen.add(tap.direction)
+            if seen >= set(now.directions):
+                then = self.assembly(until=tap.id)
+                if then.directions == now.directions:
+                    return then
+        return None
+
+    def verdicts(self) -> list[Verdict]:
+        """One a program, from the newest tap tests of its tool; rows of the history keep word and limit."""
+        known: dict[str, Assembly | DataError] = {}
+        for tool in dict.fromkeys(table.tool for table in self.machine.program):
+            try:
+                known[tool] = self.assembly(tool)
+            except DataError as error:
+                known[tool] = error
+        return [self._judge(table, known[table.tool]) for table in self.machine.program]
+
+    def verdict_then(self, now: Verdict) -> Verdict | None:
+        """The verdict on the same program at the first tap tests of its tool in the same directions, if there are."""
+        then = None if now.assembly is None else self.first_assembly(now.assembly)
+        return None if then is None else verdict(now.program, then, self.machine)
+
+    def advice(self, found: Verdict) -> Advice:
+        """What goes beyond a verdict; it takes longer than the verdict itself."""
+        return advise(found, self.machine)
+
+    def standing(self, now: datetime | None = None) -> Standing:
+        """The light of the machine, the reasons, and one next step."""
+        return stand(self.machine, self.history, now or datetime.now(UTC))
+
+    @property
+    def calibrated(self) -> Measurement | None:
+        """The newest measurement that the bearings of the model could be found from; None where there is none."""
+        newest = next((row for row in reversed(self.history.rows) if row.bearing_stiffness.is_known), None)
+        return None if newest is None else self.measurement(newest.tap_id)
+
+    def _forget(self) -> None:
+        """What a new tap test alters."""
+        self._placed = self._history = None
+        self._mark = self.folder.mark
+
+    def _judge(self, table: ProgramTable, known: Assembly | DataError) -> Verdict:
+        if isinstance(known, Assembly):
+            return verdict(table, known, self.machine)
+        text = f"no tap test with tool {table.tool!r}, and no prediction: {known}"
+        return unknown(table, (Remark("no-tap", "", text),))
+
+    def _place(self, tap_id: str) -> Place:
+        for place in reversed(self._places):
+            if place.entry.id == tap_id:
+                return place
+        raise KeyError(tap_id)
+
+    @property
+    def _places(self) -> Sequence[Place]:
+        if self._placed is None:
+            self._placed = places(self.folder.taps())
+        return self._placed
+
+    def _up_to_date(self) -> History:
+        """The stored rows as far as they still hold, and those that are missing."""
+        history = self._stored()
+        if len(history.rows) == len(self.taps) and (not history.rows or history.rows[-1].rulings is not None):
+            return history
+        rows = list(history.rows)
+        for place in self._places[len(rows) :]:
+            assembly = self._assembled(place, rows)
+            lobes = lobes_of(assembly, self.machine)
+            rows.append(row_of(self._measurements[place.entry.id], lobes, assembly.remarks))
+        self._history = replace(history, rows=tuple(rows))
+        rulings = {found.program.name: found.ruling for found in self.verdicts()}
+        rows[-1] = replace(rows[-1], rulings=rulings)
+        history = replace(history, rows=tuple(rows))
+        self._write(history)
+        return history
+
+    def _stored(self) -> History:
+        """What history.h5 holds of the oldest taps on, made with these settings and this version; else no rows."""
+        empty = empty_history(self.machine)
+        try:
+            stored = read_history(self.folder.history)
+            if (stored.settings_hash, stored.software) != (empty.settings_hash, empty.software):
+                return empty
+            rows = from_columns(stored, self.machine).rows
+        except (ValueError, KeyError, IndexError, FileNotFoundError):
+            return empty
+        pairs = zip(rows, self.taps, strict=False)
+        same = [row for row, _ in takewhile(lambda pair: pair[0].tap_id == pair[1].id, pairs)]
+        return replace(empty, rows=tuple(same))
+
+    def _write(self, history: History) -> None:
+        """Under the lock where that can be had; else said."""
+        try:
+            with self.folder.locked():
+                write_history(self.folder.history, to_columns(history, self.machine))
+        except (BusyError, OSError) as error:
+            text = f"not brought up to date on the disk, worked out in memory: {error}"
+            self.remarks.append(Remark("history-in-memory", "history.h5", text))
+
+    def _measured(self, place: Place, rows: Sequence[Row]) -> Measurement:
+        """rows: the history before this tap test at least."""
+        tap_id = place.entry.id
+        if tap_id not in self._measurements:
+            last = self._last_followed(place, rows)
+            self._measurements[tap_id] = measure(self.folder.read(place.entry), self.machine, last)
+        return self._measurements[tap_id]
+
+    def _last_followed(self, place: Place, rows: Sequence[Row]) -> Mode | None:
+        """The mode that was followed last before a tap test, in its series."""
+        before = place.before
+        while before is not None:
+            if rows[before].mode is not None:
+                return rows[before].mode
+            before = self._places[before].before
+        return None
+
+    def _assembled(self, place: Place, rows: Sequence[Row]) -> Assembly:
+        other = None if place.other is None else self._measured(self._places[place.other], rows)
+        return assemble(self._measured(place, rows), other)
+
+
+def standing_of(logbook: Logbook, now: datetime | None = None) -> Standing:
+    """The standing of a machine; one whose files cannot be read says so."""
+    try:
+        return logbook.standing(now)
+    except (ValueError, OSError) as error:
+        return unreadable(str(error))

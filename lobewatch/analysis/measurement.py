@@ -1,0 +1,135 @@
+"""From one tap test to one measurement: modes, bearing stiffness, modes at the tool tip. A step that cannot be done is
+recorded with its reason, and the next one goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from acquisition import Remark, TapTest, stiffness_doubt
+from dsm import Calibration, calibrate, modal_stiffness
+from lobewatch.machine import Machine
+from modal import Mode, fit_modes, follow, predominant
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """What one tap test says of the spindle."""
+
+    tap_id: str
+    """Of the tap test."""
+    time: datetime
+    """When it was taken."""
+    tool: str
+    """What was in the spindle."""
+    direction: str
+    """Direction at the tool tip, "x" or "y"."""
+    modes: Sequence[Mode] = ()
+    """All modes found, as measured."""
+    followed: Mode | None = None
+    """The mode that calibration and trend follow."""
+    calibration: Calibration | None = None
+    """The model recalibrated to it."""
+    at_tip: Sequence[Mode] = ()
+    """The modes that lobes are computed from, at the tool tip; empty where there are none."""
+    remarks: tuple[Remark, ...] = ()
+    """What could not be done, and what is in doubt."""
+
+
+def measure(tap: TapTest, machine: Machine, last: Mode | None = None) -> Measurement:
+    """All that follows from one tap test; last: the mode that was followed in the test before."""
+    about, remarks = tap.circumstances, list[Remark]()
+    named = (tap.id, about.created, about.tool, about.direction)
+    with threadpool_limits(limits=1):
+        try:
+            modes = fit_modes(tap.frf, hits=tap.accepted)
+        except ValueError as error:
+            return Measurement(*named, remarks=(Remark("no-modes", "", f"no modes: {error}"),))
+        followed = _follow(modes, machine, remarks, last)
+        calibration = _calibrate(followed, machine, about.tool, remarks)
+        at_tip = _modes_at_tip(modes, followed, calibration, machine, remarks)
+    return Measurement(*named, modes, followed, calibration, at_tip, tuple(remarks))
+
+
+def _in_band(modes: Sequence[Mode], machine: Machine) -> list[Mode]:
+    low, high = machine.mode.band_hz or (0.0, np.inf)
+    return [mode for mode in modes if low <= mode.frequency <= high]
+
+
+def _no_mode(modes: Sequence[Mode], machine: Machine) -> Remark:
+    low, high = machine.mode.band_hz or (0.0, np.inf)
+    place = "" if machine.mode.band_hz is None else f" in [mode] band_hz {low:g}..{high:g} Hz"
+    found = f"found are {', '.join(f'{mode.frequency:.0f}' for mode in modes)} Hz" if modes else "none was found at all"
+    return Remark("no-mode-to-follow", "", f"no mode to follow: none with positive stiffness{place}; {found}")
+
+
+def _follow(modes: Sequence[Mode], machine: Machine, remarks: list[Remark], last: Mode | None) -> Mode | None:
+    """The mode that continues the last one, the predominant one where there is none yet."""
+    mode = predominant(modes, machine.mode.band_hz)
+    if mode is None:
+        remarks.append(_no_mode(modes, machine))
+    elif last is not None:
+        mode = _continued(last, _in_band(modes, machine), remarks)
+    doubt = stiffness_doubt(mode.stiffness) if mode is not None else ""
+    if doubt:
+        remarks.append(Remark("stiffness-implausible", "", doubt))
+    return mode
+
+
+def _continued(last: Mode, candidates: Sequence[Mode], remarks: list[Remark]) -> Mode | None:
+    found = follow(last, candidates)
+    if found.mode is None:
+        cure = "for a rebuilt spindle lay [mode] band_hz around its new mode"
+        remarks.append(Remark("no-mode-to-follow", "", f"no mode to follow: {found.doubt}", cure))
+    elif found.doubt:
+        remarks.append(Remark("followed-in-doubt", "", found.doubt))
+    return found.mode
+
+
+def _calibrate(followed: Mode | None, machine: Machine, tool: str, remarks: list[Remark]) -> Calibration | None:
+    if followed is None:
+        return None
+    std = float(followed.standard_error[0])
+    try:
+        spindle = machine.model(tool)
+        return calibrate(spindle, followed.frequency, std if np.isfinite(std) else None, machine.mode.model_mode)
+    except (ValueError, ArithmeticError) as error:
+        remarks.append(Remark("no-bearing-stiffness", "", f"no bearing stiffness: {error}"))
+        return None
+
+
+def _modes_at_tip(
+    modes: Sequence[Mode],
+    followed: Mode | None,
+    calibration: Calibration | None,
+    machine: Machine,
+    remarks: list[Remark],
+) -> list[Mode]:
+    """Modes in the band, carried to the tip by the model where the tap was elsewhere; none where K < 0."""
+    candidates = _in_band(modes, machine)
+    against = [mode for mode in candidates if not mode.is_driving_point]
+    if not any(mode.is_driving_point for mode in candidates):
+        return []
+    if against:
+        where = ", ".join(f"{mode.frequency:.0f}" for mode in against)
+        text = f"no stability lobes: not a driving point, the stiffness of the modes at {where} Hz is negative"
+        cure = "hit and measure at one point in one direction, or leave these modes out with [mode] band_hz"
+        remarks.append(Remark("no-lobes-driving-point", "", text, cure))
+        return []
+    if machine.tap.position_mm == 0:
+        return candidates
+    if calibration is None or followed is None:
+        text = "no stability lobes: the tap was not at the tool tip ([tap] position_mm), and no model is calibrated"
+        remarks.append(Remark("no-lobes-beside-tip", "", text, "tap at the tip, or add a [spindle]"))
+        return []
+    return [_carried_to_tip(followed, calibration, machine.tap.position_mm / 1e3)]
+
+
+def _carried_to_tip(mode: Mode, calibration: Calibration, position: float) -> Mode:
+    number = calibration.mode
+    ratio = modal_stiffness(calibration.spindle, number) / modal_stiffness(calibration.spindle, number, position)
+    return mode.scaled(1.0, ratio, "model to tip")

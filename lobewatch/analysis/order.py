@@ -1,0 +1,31 @@
+"""Tap tests in order of time, each with those before it that it builds on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from lobewatch.machine import TapEntry
+
+
+@dataclass(frozen=True)
+class Place:
+    """One tap test among all of a machine."""
+
+    entry: TapEntry
+    """Of the journal."""
+    before: int | None
+    """Place of the one before it of the same tool and direction."""
+    other: int | None
+    """Place of the newest one before it of the same tool in another direction."""
+
+
+def places(taps: Sequence[TapEntry]) -> list[Place]:
+    """taps: oldest first."""
+    newest: dict[tuple[str, str], int] = {}
+    found = []
+    for i, tap in enumerate(taps):
+        others = [j for (tool, direction), j in newest.items() if tool == tap.tool and direction != tap.direction]
+        found.append(Place(tap, newest.get((tap.tool, tap.direction)), max(others, default=None)))
+        newest[tap.tool, tap.direction] = i
+    return found

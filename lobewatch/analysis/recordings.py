@@ -1,0 +1,80 @@
+"""Recorded files as tap tests of a machine."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+
+from acquisition import (
+    Circumstances,
+    DataError,
+    Frf,
+    SourceFile,
+    TapTest,
+    average_good,
+    new_tap_id,
+    read_recording,
+    recorded_as,
+)
+from lobewatch.machine import MachineFolder
+
+
+@dataclass(frozen=True)
+class Stored:
+    """What came of some recorded files."""
+
+    tap_ids: Sequence[str]
+    """The tap test of each file, in the order of the files."""
+    known: Mapping[Path, str]
+    """Files that were stored already, or stand twice among those given, and their tap test."""
+    fresh: Sequence[str]
+    """The tap tests that are new."""
+
+
+def store_recordings(
+    folder: MachineFolder, files: Sequence[Path], date: datetime | None, tool: str, direction: str
+) -> Stored:
+    """Commit recorded files, each once; all are read and judged before the first one is stored."""
+    stored = {digest: tap.id for tap in folder.taps() for digest in (tap.source_sha256, tap.sha256)}
+    tap_ids, known, fresh = list[str](), dict[Path, str](), list[TapTest]()
+    for file in files:
+        content = file.read_bytes()
+        digest = hashlib.sha256(content).hexdigest()
+        if digest in stored:
+            known[file] = stored[digest]
+        else:
+            about = _circumstances(folder, file, date, tool, direction)
+            fresh.append(_tap_test(file, about, SourceFile(file.name, content)))
+            stored[digest] = fresh[-1].id
+        tap_ids.append(stored[digest])
+    for recorded in fresh:
+        folder.commit(recorded)
+    return Stored(tap_ids, known, [recorded.id for recorded in fresh])
+
+
+def _circumstances(
+    folder: MachineFolder, file: Path, date: datetime | None, tool: str, direction: str
+) -> Circumstances:
+    own, setup = recorded_as(file), folder.machine
+    return replace(
+        own,
+        machine=setup.machine.name,
+        created=date.astimezone() if date else own.created,
+        tool=tool or own.tool or setup.tap.tool,
+        direction=direction or own.direction,
+        machine_toml=folder.toml.read_text("utf-8"),
+    )
+
+
+def _tap_test(file: Path, about: Circumstances, source: SourceFile) -> TapTest:
+    recording = read_recording(file)
+    if isinstance(recording, Frf):
+        return TapTest(new_tap_id(about), about, recording, source=source)
+    try:
+        frf, flags = average_good(recording)
+    except DataError as error:
+        raise DataError(f"{file}: {error}") from error
+    return TapTest(new_tap_id(about), about, frf, tuple(recording), flags, source)

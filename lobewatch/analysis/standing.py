@@ -1,0 +1,182 @@
+"""How a machine stands: one light from all its series and all its programs, the reasons, one next step.
+
+The one place that says how far a frequency has fallen and what that calls for. Pure: rows in, records out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from enum import StrEnum
+
+from acquisition import Remark
+from lobewatch.analysis.estimate import UNKNOWN, Estimate
+from lobewatch.analysis.history import History, Row
+from lobewatch.analysis.verdict import Word
+from lobewatch.machine import Limits, Machine
+
+
+class Light(StrEnum):
+    """Worst first."""
+
+    ALARM = "alarm"
+    UNKNOWN = "unknown"
+    """Damaged, unreadable or never tapped: nothing can be said."""
+    WARN = "warn"
+    GOOD = "good"
+
+
+LIGHTS = {
+    "frequency-alarm": Light.ALARM,
+    "program-not-stable": Light.ALARM,
+    "unreadable": Light.UNKNOWN,
+    "never-tapped": Light.UNKNOWN,
+    "frequency-warn": Light.WARN,
+    "mode-lost": Light.WARN,
+    "overdue": Light.WARN,
+    "program-unknown": Light.WARN,
+    "one-direction": Light.GOOD,
+}
+"""What each reason means, in order of harm."""
+
+
+@dataclass(frozen=True)
+class SeriesStanding:
+    """One tool in one direction."""
+
+    tool: str
+    """What is in the spindle."""
+    direction: str
+    """Direction at the tool tip, "x" or "y"."""
+    time: datetime
+    """Of its newest test."""
+    first: datetime
+    """Of the test that it is compared with."""
+    fall: Estimate
+    """Fall of the followed frequency since the first test of the series (%); unknown where the newest test does not
+    show it."""
+    remarks: tuple[Remark, ...]
+    """Reasons that it gives."""
+
+    @property
+    def name(self) -> str:
+        """Tool and direction."""
+        return f"{self.tool}, {self.direction}"
+
+    @property
+    def is_first(self) -> bool:
+        """Whether there is nothing to compare with yet."""
+        return self.time == self.first
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How one machine stands."""
+
+    remarks: tuple[Remark, ...]
+    """The reasons, in order of harm."""
+    next_step: str
+    """What to do now, one sentence."""
+    series: tuple[SeriesStanding, ...] = ()
+    """The one that fell most first."""
+    last_tap: datetime | None = None
+    """When it was tapped last; None where it never was."""
+    days_left: float | None = None
+    """Until the next test is due; negative where it is overdue; None before the first test."""
+
+    @property
+    def light(self) -> Light:
+        """That of the worst reason."""
+        return LIGHTS[self.remarks[0].code] if self.remarks else Light.GOOD
+
+    def series_of(self, tool: str, direction: str) -> SeriesStanding | None:
+        """How one series stands; None where there is none."""
+        return next((one for one in self.series if (one.tool, one.direction) == (tool, direction)), None)
+
+
+def unreadable(reason: str) -> Standing:
+    """The standing of a machine whose files cannot be read."""
+    return _of([Remark("unreadable", "", reason)], "Put its files right: the sentence above says which.")
+
+
+def stand(machine: Machine, history: History, now: datetime) -> Standing:
+    """The standing at a time; the last row holds the word on every program."""
+    rows = history.rows
+    if not rows:
+        cure = "Take the first tap test: all others are compared with it."
+        return _of([Remark("never-tapped", "", "no tap test yet", cure)])
+    pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
+    series = [_series(history.series(*pair), machine.limits) for pair in pairs]
+    left = machine.machine.tap_interval_days - (now - rows[-1].time) / timedelta(days=1)
+    remarks = [remark for one in series for remark in one.remarks]
+    remarks += [*_about_programs(rows[-1]), *_about_dates(left), *_about_directions(rows)]
+    due = rows[-1].time + timedelta(days=math.floor(machine.machine.tap_interval_days))
+    series.sort(key=lambda one: -one.fall.value if one.fall.is_known else math.inf)
+    return _of(remarks, f"All is well: tap again by {due:%Y-%m-%d}.", tuple(series), rows[-1].time, left)
+
+
+def change_since_first(rows: Sequence[Row], name: str) -> Estimate:
+    """Change (%) of a value from the first row of a series that knows it to the last; unknown where that does not.
+
+    name: frequency, damping_ratio, stiffness or bearing_stiffness. The one formula for light, report and screen.
+    """
+    known: list[Estimate] = [value for row in rows if (value := getattr(row, name)).is_known]
+    if not known or not getattr(rows[-1], name).is_known:
+        return UNKNOWN
+    return known[-1].change_since(known[0]) if len(known) > 1 else Estimate(0.0, 0.0)
+
+
+def _of(remarks: Sequence[Remark], well: str = "", *others: object) -> Standing:
+    order = list(LIGHTS)
+    worst = sorted(remarks, key=lambda remark: order.index(remark.code))
+    return Standing(tuple(worst), worst[0].cure if worst and worst[0].cure else well, *others)  # type: ignore[arg-type]
+
+
+def _series(rows: Sequence[Row], limits: Limits) -> SeriesStanding:
+    change = change_since_first(rows, "frequency")
+    fall = Estimate(-change.value + 0.0, change.std)
+    known = [row for row in rows if row.frequency.is_known] or rows
+    name = f"{rows[-1].tool}, {rows[-1].direction}"
+    remarks = tuple(_about_fall(name, fall, limits))
+    return SeriesStanding(rows[-1].tool, rows[-1].direction, rows[-1].time, known[0].time, fall, remarks)
+
+
+def _about_fall(name: str, fall: Estimate, limits: Limits) -> Iterator[Remark]:
+    if not fall.is_known:
+        cure = "Tap again: the mode that is followed was not found in the newest test."
+        yield Remark("mode-lost", name, "the newest test does not show the mode followed", cure)
+    text = f"frequency fallen by {fall.value:.1f} % since the first test"
+    if fall.value >= limits.frequency_alarm_percent:
+        cure = "Do not cut on: have the bearings, the tool and its clamping looked at, then tap again."
+        yield Remark("frequency-alarm", name, f"{text} (alarm at {limits.frequency_alarm_percent:g} %)", cure)
+    elif fall.value >= limits.frequency_warn_percent:
+        cure = "Tap again to be sure; if it stays, have the bearings and the tool's clamping looked at soon."
+        yield Remark("frequency-warn", name, f"{text} (warning at {limits.frequency_warn_percent:g} %)", cure)
+
+
+def _about_programs(newest: Row) -> Iterator[Remark]:
+    words = {name: ruling.word for name, ruling in (newest.rulings or {}).items()}
+    for name, word in words.items():
+        if word is Word.NOT_STABLE:
+            cure = "Change these programs before the next part: lobewatch check names a stable speed and depth."
+            yield Remark("program-not-stable", name, "not stable", cure)
+        elif word is Word.UNKNOWN:
+            yield Remark("program-unknown", name, "not checked", "See why with lobewatch check.")
+
+
+def _about_dates(days_left: float) -> Iterator[Remark]:
+    if days_left < 0:
+        text = f"the next tap test is overdue by {math.ceil(-days_left)} days"
+        yield Remark("overdue", "", text, "Take the tap test that is due.")
+
+
+def _about_directions(rows: Sequence[Row]) -> Iterator[Remark]:
+    for tool in dict.fromkeys(row.tool for row in rows):
+        known = {row.direction for row in rows if row.tool == tool and row.frequency.is_known}
+        if len(known) == 1:
+            seen = known.pop()
+            other = "y" if seen == "x" else "x"
+            cure = f"Tap direction {other} of the same tool too: the lobes are of one direction alone."
+            yield Remark("one-direction", tool, f"tapped in direction {seen} alone", cure)

@@ -1,0 +1,81 @@
+"""A measurement as a JSON object and as text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rich.table import Table
+
+from acquisition import Remark, joined
+from lobes import StabilityLobes
+from lobewatch.analysis import Logbook, Measurement, Verdict, lobes_of
+from lobewatch.machine import REFERENCE_CUT
+from lobewatch.show.describe import calibration_json, doubt_lines, mode_json, mode_table
+from lobewatch.show.verdicts import verdict_json, verdict_table
+
+
+def remark_json(remark: Remark) -> dict[str, str]:
+    """One remark."""
+    return {"code": remark.code, "about": remark.about, "text": remark.text, "cure": remark.cure}
+
+
+def remark_lines(remarks: Sequence[Remark]) -> list[str]:
+    """A line each; those that say the same of several things once."""
+    return [f"note: {remark}" for remark in joined(remarks)]
+
+
+def lobes_json(name: str, lobes: StabilityLobes) -> dict[str, Any]:
+    """The lowest point of a diagram."""
+    low = lobes.minimum
+    return {
+        "cut": name,
+        "method": lobes.method,
+        "minimum_depth_mm": low.depth * 1e3,
+        "at_speed_rpm": low.speed_rpm,
+        "chatter_frequency_hz": low.chatter_frequency,
+    }
+
+
+def measurement_json(m: Measurement, logbook: Logbook) -> dict[str, Any]:
+    """All of a measurement, the diagrams of its tool as it was known then, and the programs as they stand now."""
+    assembly = logbook.assembly(until=m.tap_id)
+    return {
+        "tap_id": m.tap_id,
+        "time": m.time.isoformat(),
+        "tool": m.tool,
+        "direction": m.direction,
+        "modes": [mode_json(mode) for mode in m.modes],
+        "followed": mode_json(m.followed) if m.followed else None,
+        "calibration": calibration_json(m.calibration) if m.calibration else None,
+        "lobes": [lobes_json(name, lobes) for name, lobes in lobes_of(assembly, logbook.machine).items()],
+        "remarks": [remark_json(remark) for remark in assembly.remarks],
+    }
+
+
+def programs_json(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
+    """The verdict on every program."""
+    return [verdict_json(found) for found in verdicts]
+
+
+def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
+    """A measurement for people."""
+    texts: list[str | Table] = [f"{m.tap_id}  (tool {m.tool}, direction {m.direction})"]
+    if m.modes:
+        texts += [mode_table(m.modes), *doubt_lines(m.modes)]
+    if m.followed is not None:
+        texts.append(f"followed: {m.followed.frequency:.2f} Hz")
+    if m.calibration is not None:
+        texts.append(str(m.calibration))
+    assembly = logbook.assembly(until=m.tap_id)
+    lobes = lobes_of(assembly, logbook.machine).get(REFERENCE_CUT)
+    if lobes is not None:
+        low = lobes.minimum
+        texts.append(f"{REFERENCE_CUT}: lowest limit {low.depth * 1e3:.2f} mm at {low.speed_rpm:.0f} rpm")
+    return [*texts, *remark_lines(assembly.remarks)]
+
+
+def program_texts(logbook: Logbook) -> list[str | Table]:
+    """The verdict on every program, and where to ask on."""
+    verdicts = logbook.verdicts()
+    return [verdict_table(verdicts), "lobewatch check says where to go instead"] if verdicts else []

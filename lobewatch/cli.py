@@ -12,7 +12,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from lobewatch.commands import COMMANDS
-from lobewatch.show.help_page import HelpCommand, HelpGroup, page_width
+from lobewatch.commands.help_page import HelpCommand, HelpGroup, page_width
 
 
 class _Commands(Mapping[str, Any]):
@@ -24,9 +24,7 @@ class _Commands(Mapping[str, Any]):
         found = getattr(import_module(f"lobewatch.commands.{name}"), name)
         holder = typer.Typer(rich_markup_mode=None)
         if isinstance(found, typer.Typer):
-            for command in found.registered_commands:
-                command.cls = HelpCommand
-            holder.add_typer(found, name=name, cls=HelpGroup)
+            holder.add_typer(found, name=name)
         else:
             holder.command(name, cls=HelpCommand)(found)
         return typer.main.get_group(holder).commands[name]
@@ -48,7 +46,7 @@ class _Root(HelpGroup):
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002  (asked by the completion of the shell)
         return list(COMMANDS)
 
-    def summaries(self) -> Mapping[str, str]:
+    def summaries(self, ctx: Any) -> Mapping[str, str]:  # noqa: ARG002
         return COMMANDS
 
 

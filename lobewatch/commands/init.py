@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.show.output import Json, emit
 
 
@@ -22,9 +21,10 @@ def init(
     Examples:
 
       lobewatch init mill-3
-
       lobewatch init trial --example
     """
+    from lobewatch.machine.new_folder import make_machine_folder
+
     toml = make_machine_folder(machine, "surrogate_machine.toml" if example else "new_machine.toml")
     emit(
         {"machine": str(machine), "machine_toml": str(toml)},

@@ -28,11 +28,12 @@ class HelpGroup(TyperGroup):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the page."""
-        formatter.write(_page(self, ctx, formatter.width, self.summaries()))
+        formatter.write(_page(self, ctx, formatter.width, self.summaries(ctx)))
 
-    def summaries(self) -> Mapping[str, str]:
-        """What each of its commands does, one sentence each."""
-        return {name: (command.help or "").partition("\n\n")[0] for name, command in self.commands.items()}
+    def summaries(self, ctx: Any) -> Mapping[str, str]:
+        """What each of its commands does: the first paragraph of its help."""
+        commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
+        return {name: (command.help or "").partition("\n\n")[0] for name, command in commands.items() if command}
 
 
 def page_width() -> int:

@@ -24,7 +24,9 @@ class _Commands(Mapping[str, Any]):
         found = getattr(import_module(f"lobewatch.commands.{name}"), name)
         holder = typer.Typer(rich_markup_mode=None)
         if isinstance(found, typer.Typer):
-            holder.add_typer(found, name=name)
+            for command in found.registered_commands:
+                command.cls = HelpCommand
+            holder.add_typer(found, name=name, cls=HelpGroup)
         else:
             holder.command(name, cls=HelpCommand)(found)
         return typer.main.get_group(holder).commands[name]
@@ -42,6 +44,13 @@ class _Root(HelpGroup):
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
         self.commands = cast(MutableMapping[str, Any], _Commands())
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Where a command comes first, none of these options is given: what reads them takes a while to import."""
+        if args and not args[0].startswith("-"):
+            self.resolve_command(ctx, args)
+            self.params = []
+        return super().parse_args(ctx, args)
 
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002  (asked by the completion of the shell)
         return list(COMMANDS)

@@ -12,7 +12,7 @@ COMMANDS = {
     "tapped.",
     "calibrate": "Bearing stiffness for measured natural frequencies; nothing is stored.",
     "lobes": "Stability lobes of the newest tap test, drawn beside those of the first test, and the best pockets.",
-    "check": "Every cutting program against the newest tap test with its tool; exit code 1 unless all are stable.",
+    "check": "Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.",
     "report": "One HTML file with everything in it: what has changed, which programs still hold, lobes then and now.",
     "serve": "Machines in a browser, worst first; START begins a tap test on the port that machine.toml names. "
     "Ctrl-C ends it.",

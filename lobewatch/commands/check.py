@@ -26,7 +26,6 @@ def check(
     Examples:
 
       lobewatch check trial
-
       lobewatch check trial --json
     """
     from acquisition import DataError

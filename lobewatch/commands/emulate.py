@@ -18,7 +18,7 @@ from lobewatch.tap.emulated_spindle import dataq_emulator, emulated_structure, e
 emulate = typer.Typer(help="A data acquisition device made of software, on a pseudo-terminal.", no_args_is_help=True)
 
 
-Machine = Annotated[Path, typer.Argument(help=r"Machine folder with a \[spindle]: what the hammer hits.")]
+Machine = Annotated[Path, typer.Argument(help="Machine folder with a [spindle]: what the hammer hits.")]
 Tcp = Annotated[bool, typer.Option("--tcp", help="On a TCP port of this computer instead.")]
 Fast = Annotated[bool, typer.Option("--fast", help="As fast as the host reads, not in real time.")]
 Seed = Annotated[int, typer.Option(help="Of the random numbers.")]
@@ -31,8 +31,7 @@ def taps(machine: Machine, tcp: Tcp = False, fast: Fast = False, seed: Seed = 1,
     Examples:
 
       lobewatch emulate taps trial
-
-      lobewatch tap trial --port /dev/pts/3     (in another window)
+      lobewatch tap trial --port /dev/pts/3  # in another window
     """
     structure = _structure(MachineFolder(machine))
     _serve(emulator(structure, np.random.default_rng(seed), realtime=not fast, tcp=tcp), structure, machine, as_json)
@@ -40,13 +39,12 @@ def taps(machine: Machine, tcp: Tcp = False, fast: Fast = False, seed: Seed = 1,
 
 @emulate.command()
 def dataq(machine: Machine, tcp: Tcp = False, seed: Seed = 1, as_json: Json = False) -> None:
-    """A DATAQ DI-4108 with the sensors of \\[\\[daq.channel]] and somebody who taps twice a second; Ctrl-C ends it.
+    """A DATAQ DI-4108 with the sensors of [[daq.channel]] and somebody who taps twice a second; Ctrl-C ends it.
 
     Examples:
 
       lobewatch emulate dataq trial
-
-      lobewatch tap trial --port /dev/pts/3     (in another window)
+      lobewatch tap trial --port /dev/pts/3  # in another window
     """
     folder = MachineFolder(machine)
     structure = _structure(folder)

@@ -1,7 +1,7 @@
 """From the DAQ to hits, averaged FRF and HDF5 files."""
 
 from .atomic import atomic_write
-from .channel import Block, Channel
+from .channel import Block, Channel, TapDirection, tap_direction
 from .dataq import DataqEmulator, DataqFaults, DataqInput, DataqSource, DataqTraits
 from .devices import DeviceIdentity, probe_port
 from .emulation import HammeredStructure, Hammering, SimulatedSource, Structure
@@ -10,6 +10,8 @@ from .estimation import RunningMean, cross_spectra, estimate_frf, force_noise
 from .files import (
     STANDARD_GRAVITY,
     FileSource,
+    Format,
+    known_formats,
     read_frf,
     read_hits,
     read_recording,
@@ -22,6 +24,7 @@ from .files import (
 from .frf import Frf, from_accelerance
 from .hit import Hit, HitFlags
 from .hits import HitSearch, Trigger, capture_hits, ring_down
+from .names import check_name
 from .ports import PortInfo, find_port, list_ports, no_ports_hint, usb_identity
 from .remark import Remark, joined
 from .sensors import (
@@ -59,6 +62,7 @@ __all__ = [
     "EventKind",
     "Faults",
     "FileSource",
+    "Format",
     "Frf",
     "HammeredStructure",
     "Hammering",
@@ -75,6 +79,7 @@ __all__ = [
     "Source",
     "SourceFile",
     "Structure",
+    "TapDirection",
     "TapTest",
     "TapsEmulator",
     "TapsSource",
@@ -87,6 +92,7 @@ __all__ = [
     "capture_hits",
     "channel_doubts",
     "check_hit",
+    "check_name",
     "check_rate",
     "cross_spectra",
     "estimate_frf",
@@ -95,6 +101,7 @@ __all__ = [
     "from_accelerance",
     "joined",
     "judge_hit",
+    "known_formats",
     "list_ports",
     "measure_rate",
     "measure_skew",
@@ -109,6 +116,7 @@ __all__ = [
     "recorded_as",
     "ring_down",
     "stiffness_doubt",
+    "tap_direction",
     "unit_mistake",
     "usb_identity",
     "write_hit",

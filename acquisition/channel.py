@@ -9,6 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 ChannelQuantity = Literal["force", "acceleration"]
+TapDirection = Literal["x", "y"]
+"""Direction at the tool tip in which is tapped."""
+
+
+def tap_direction(text: str) -> TapDirection:
+    """A direction from its text; ValueError for what is none."""
+    known: tuple[TapDirection, ...] = get_args(TapDirection)
+    for one in known:
+        if text == one:
+            return one
+    raise ValueError(f"direction={text!r} is none of {', '.join(known)}; give one of them")
 
 
 @dataclass(frozen=True)
@@ -23,8 +34,8 @@ class Channel:
     """Voltage of the positive rail (V)."""
     adc_bits: int = 16
     """Resolution; codes run from -2^(bits-1) to 2^(bits-1) - 1."""
-    direction: str = ""
-    """Direction at the tool tip, "x" or "y"."""
+    direction: TapDirection | Literal[""] = ""
+    """Direction at the tool tip; empty where it is not fixed."""
     serial_number: str = ""
     """Of the sensor."""
     calibration_date: str = ""
@@ -36,6 +47,8 @@ class Channel:
         """Refuse what cannot be a channel."""
         if self.quantity not in get_args(ChannelQuantity):
             raise ValueError(f"quantity={self.quantity!r} is none of {', '.join(get_args(ChannelQuantity))}")
+        if self.direction:
+            tap_direction(self.direction)
         if not np.isfinite(self.sensitivity) or self.sensitivity == 0:
             raise ValueError(f"{self.quantity} sensitivity={self.sensitivity} is not a finite number other than 0")
         if not (np.isfinite(self.full_scale) and self.full_scale > 0):

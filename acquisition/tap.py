@@ -7,8 +7,10 @@ import secrets
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
+from acquisition.channel import TapDirection, tap_direction
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
+from acquisition.names import check_name
 
 
 @dataclass(frozen=True)
@@ -21,8 +23,8 @@ class Circumstances:
     """When (timezone-aware)."""
     tool: str = ""
     """Name of the tool or assembly."""
-    direction: str = "x"
-    """Direction at the tool tip, "x" or "y"."""
+    direction: TapDirection = "x"
+    """Direction at the tool tip."""
     operator: str = ""
     """Who held the hammer."""
     machine_toml: str = ""
@@ -32,8 +34,7 @@ class Circumstances:
 
     def __post_init__(self) -> None:
         """Refuse a direction that is none, and a time without its zone."""
-        if self.direction not in ("x", "y"):
-            raise ValueError(f'direction={self.direction!r} is neither "x" nor "y"')
+        tap_direction(self.direction)
         if self.created.tzinfo is None:
             raise ValueError(f"created={self.created} has no time zone; give one, e.g. datetime.now(UTC)")
 
@@ -72,7 +73,13 @@ class TapTest:
 
 
 def new_tap_id(circumstances: Circumstances) -> str:
-    """An identity that sorts by time and is a file name on every system."""
+    """An identity that sorts by time and is a file name on every system.
+
+    Raises ValueError for a machine, tool or operator with control characters in its name: what is kept for good must
+    be fit to be shown.
+    """
+    for what in ("machine", "tool", "operator"):
+        check_name(getattr(circumstances, what), what)
     stamp = circumstances.created.astimezone(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
     names = (circumstances.machine, circumstances.tool, circumstances.direction)
     slugs = [re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-")[:24] for name in names]

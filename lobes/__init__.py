@@ -17,7 +17,7 @@ from lobes.program_limit import ProgramLimit, program_limit
 from lobes.radial_lobes import RadialLobes, radial_lobes
 from lobes.spectral_radius import spectral_radius
 from lobes.stability_boundary import stability_boundary
-from lobes.stability_lobes import Lobe, Minimum, StabilityLobes
+from lobes.stability_lobes import Lobe, MethodName, Minimum, StabilityLobes
 from lobes.tolerable_decay import tolerable_decay
 from lobes.zero_order import zero_order
 
@@ -27,6 +27,7 @@ __all__ = [
     "DepthBand",
     "Direction",
     "Lobe",
+    "MethodName",
     "Minimum",
     "Pocket",
     "PocketShift",

@@ -35,4 +35,4 @@ def average_angle(x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: ArrayLike) 
     tips = tip_responses(x, y, cut.teeth * float(speed.max()) / 60)
     force = cut.specific_force * cut.teeth_in_cut
     loop = weighted_sum([(force * cut.orientation_factors[axis], tip) for axis, tip in tips])
-    return loop_limits([loop], cut, speed, "average tooth angle")
+    return loop_limits([loop], cut, speed, "average angle")

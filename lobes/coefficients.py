@@ -28,6 +28,8 @@ class Coefficients:
     """What to know before use."""
     source: str = ""
     """Where it was published."""
+    alloy: str = ""
+    """The material without temper, tool and coolant, e.g. "Al 7075"; empty where it is not known."""
 
     def __post_init__(self) -> None:
         """Refuse what is no coefficient."""
@@ -35,11 +37,6 @@ class Coefficients:
             raise ValueError(f"tangential={self.tangential} Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")
         if not (np.isfinite(self.radial) and self.radial >= 0):
             raise ValueError(f"radial={self.radial} Pa is not a finite number >= 0; 1 MPa (N/mm^2) is 1e6 Pa")
-
-    @property
-    def alloy(self) -> str:
-        """The material without temper, tool and coolant, e.g. "Al 7075"."""
-        return self.material.split(" (")[0].split("-")[0]
 
 
 @cache
@@ -55,6 +52,7 @@ def cutting_coefficients() -> tuple[Coefficients, ...]:
             radial_edge=float(row["Kre_N_per_mm"] or "nan") * 1e3,
             note=row["note"],
             source=row["source"],
+            alloy=row["alloy"],
         )
         for row in csv.DictReader(text.splitlines())
     )

@@ -7,8 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition import Remark
 from lobes.cut import Cut
-from lobes.stability_lobes import Lobe, StabilityLobes
+from lobes.stability_lobes import Lobe, MethodName, StabilityLobes
 from lobes.tip_response import TipResponse
 
 FIRST_BLOCK = 64
@@ -25,13 +26,15 @@ NEAR_SLOT = 0.95
 """... and below which it is none at fast teeth: flip lobes lie around tooth frequency = 2 f_n / (2 k + 1)."""
 FAST = 0.5
 """Tooth frequency over chatter frequency from which on the wide ones, k = 0 and 1, are met."""
+INSTEAD = "use semi-discretisation"
+"""What to do where a mean force is no picture of a cut."""
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 Rows = NDArray[np.intp]
 
 
-def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, method: str) -> StabilityLobes:
+def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, method: MethodName) -> StabilityLobes:
     """Limiting depth b at each speed (rpm) of loops b L (1 - exp(-2 pi i f_c / f_t)) = -1.
 
     The branches give L over frequency (1/m); the lowest limit of all branches counts: b = -1 / (2 Re L) where Re L < 0,
@@ -59,7 +62,7 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
             for i, branch in enumerate(branches)
             for lobe in _lobes(branch.grid, responses[i], cut, np.unique(waves[found & (setting == i)]), speed_rpm)
         ),
-        warning=_out_of_band(branches, responses)
+        remarks=_out_of_band(branches, responses)
         or _out_of_range(method, cut, _weakest(branches, responses), speed_rpm),
     )
 
@@ -74,33 +77,32 @@ def _weakest(branches: Sequence[TipResponse], responses: Sequence[Complexes]) ->
     return float(branch.grid[np.argmin(response.real)])
 
 
-def _out_of_band(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> str:
-    """Whether measured lines end before the loop is at its weakest, in words."""
+def _out_of_band(branches: Sequence[TipResponse], responses: Sequence[Complexes]) -> tuple[Remark, ...]:
+    """Whether measured lines end before the loop is at its weakest."""
     branch, response = _weakest_branch(branches, responses)
     weakest = int(np.argmin(response.real))
     if branch.grid[0] == 0 or (response.real[weakest] < 0 and 0 < weakest < branch.grid.size - 1):
-        return ""
-    return (
+        return ()
+    said = (
         f"the FRF does not reach the chatter band: between {branch.grid[0]:g} and {branch.grid[-1]:g} Hz the real part "
-        "has no lowest point; use a wider band, or record one"
+        "has no lowest point"
     )
+    return (Remark("chatter-band-missing", "", said, "use a wider band, or record one"),)
 
 
-def _out_of_range(method: str, cut: Cut, chatter: float, speed_rpm: Floats) -> str:
-    """Whether the cut is too slender, or the teeth too fast, for a mean force, in words."""
-    instead = "use semi-discretisation"
+def _out_of_range(method: MethodName, cut: Cut, chatter: float, speed_rpm: Floats) -> tuple[Remark, ...]:
+    """Whether the cut is too slender, or the teeth too fast, for a mean force."""
     if cut.immersion < LOW_IMMERSION:
-        return (
-            f"{method} knows no flip lobes: at immersion {cut.immersion:g} (below {LOW_IMMERSION}) the true limit can "
-            f"be lower; {instead}"
-        )
+        said = f"at immersion {cut.immersion:g} (below {LOW_IMMERSION}) the true limit can be lower"
+        return (Remark("low-immersion", "", f"{method} knows no flip lobes: {said}", INSTEAD),)
     fast = FAST * 60 * chatter / cut.teeth
     if cut.immersion >= NEAR_SLOT or np.max(speed_rpm) < fast:
-        return ""
-    return (
+        return ()
+    said = (
         f"{method} knows no flip lobes: above {fast:.0f} rpm, where the tooth frequency is half the chatter frequency, "
-        f"the true limit at immersion {cut.immersion:g} can be far lower; {instead}"
+        f"the true limit at immersion {cut.immersion:g} can be far lower"
     )
+    return (Remark("fast-teeth", "", said, INSTEAD),)
 
 
 def _limits(branch: TipResponse, response: Complexes, tooth_frequency: Floats) -> tuple[Floats, Floats]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from lobes.program import Modes, Program, stable_at
 from lobes.stability_boundary import stability_boundary
+from lobes.stability_lobes import MethodName
 
 DEEPEST = 20.0
 """Limits are looked for up to this many times the depth of the program."""
@@ -25,8 +26,10 @@ class ProgramLimit:
     """Frequency that is heard at the limit (Hz); nan where there is none."""
     kind: str
     """"hopf", "flip" or ""."""
-    method: str
+    method: MethodName
     """How it was found."""
+    detail: str
+    """Into how many intervals the tooth period was divided."""
 
 
 def program_limit(program: Program, x: Modes, y: Modes) -> ProgramLimit:
@@ -42,4 +45,5 @@ def program_limit(program: Program, x: Modes, y: Modes) -> ProgramLimit:
         chatter_frequency=float(lobes.chatter_frequency[0]),
         kind=str(lobes.kind[0]),
         method=lobes.method,
+        detail=lobes.detail,
     )

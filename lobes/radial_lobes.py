@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from acquisition import Remark
 from lobes.cut import Cut
-from lobes.stability_lobes import StabilityLobes
+from lobes.stability_lobes import MethodName, StabilityLobes
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,10 +23,10 @@ class RadialLobes:
     """Radial depths over cutter diameter, shape (r,)."""
     depth: NDArray[np.float64]
     """Limiting depths (m), shape (r, n); inf where there is no limit."""
-    method: str
+    method: MethodName
     """How the limits were found."""
-    warning: str
-    """What is wrong with the method at the smallest immersion; "" where nothing is."""
+    remarks: tuple[Remark, ...]
+    """What is wrong with the method at the smallest immersion."""
 
 
 def radial_lobes(limits: Callable[[Cut], StabilityLobes], cut: Cut, immersion: ArrayLike) -> RadialLobes:
@@ -44,5 +45,5 @@ def radial_lobes(limits: Callable[[Cut], StabilityLobes], cut: Cut, immersion: A
         immersion=shares,
         depth=np.stack([chart.depth for chart in charts]),
         method=charts[0].method,
-        warning=charts[int(np.argmin(shares))].warning,
+        remarks=charts[int(np.argmin(shares))].remarks,
     )

@@ -39,7 +39,7 @@ def stability_boundary(
     x is the feed, y the normal to it; None stands for a direction that is rigid or not known. `depth` is the lowest
     crossing, inf where there is none; `crossings` are all, islands too. `kind` is "flip" where the multiplier is -1
     (period two), else "hopf"; the chatter frequency is the loudest of those that the multiplier leaves. `intervals`
-    divide the tooth period; None takes `lobes.intervals_needed`, speed by speed; `method` states them.
+    divide the tooth period; None takes `lobes.intervals_needed`, speed by speed; `detail` states them.
 
     Raises ValueError for bad speeds, depths or modes.
     Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, first order.
@@ -66,7 +66,8 @@ def stability_boundary(
         chatter_frequency=chatter,
         kind=kind,
         crossings=crossings,
-        method=f"semi-discretisation, {stated} intervals a tooth period",
+        method="semi-discretisation",
+        detail=f"{stated} intervals a tooth period",
     )
 
 

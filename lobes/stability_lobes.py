@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from acquisition import Remark
 from lobes.speeds import check_speeds
+
+MethodName = Literal["average angle", "zero order", "semi-discretisation"]
+"""How stability limits are found."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +57,14 @@ class StabilityLobes:
     """"hopf" (quasi-periodic chatter), "flip" (period two) or "" (no limit), shape (n,)."""
     crossings: NDArray[np.float64]
     """Depths where stability changes, rising in each row and filled up with inf (m), shape (n, k)."""
-    method: str
+    method: MethodName
     """How the limits were found."""
     lobes: tuple[Lobe, ...] = ()
     """Lobes that set the limit at one speed at least, as far as the speeds reach; empty where a method has none."""
-    warning: str = ""
-    """Why the method or the FRF is out of its range for this cut, and what to do; "" where it is not."""
+    remarks: tuple[Remark, ...] = ()
+    """Why the method or the FRF is out of its range for this cut, and what to do."""
+    detail: str = ""
+    """What else is to be known of the method: into how many intervals the tooth period was divided."""
 
     def __post_init__(self) -> None:
         """Check shapes and values."""
@@ -76,6 +82,11 @@ class StabilityLobes:
             raise ValueError(
                 f"depth[{bad[0]}]={self.depth[bad[0]]} m is not > 0; give inf where a cut is stable at any depth"
             )
+
+    @property
+    def stated_method(self) -> str:
+        """The method with its detail, for people."""
+        return ", ".join(filter(None, (self.method, self.detail)))
 
     @property
     def minimum(self) -> Minimum:

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from acquisition import Remark
 from lobes.cut import Cut
-from lobes.loop_limits import loop_limits
+from lobes.loop_limits import INSTEAD, loop_limits
 from lobes.speeds import check_speeds
 from lobes.stability_lobes import StabilityLobes
 from lobes.tip_response import Tip, TipResponse, common_grid, tip_responses, weighted_sum
@@ -44,20 +45,21 @@ def zero_order(x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: ArrayLike) -> 
     if len(tips) == 1:
         ((axis, tip),) = tips
         lobes = loop_limits([weighted_sum([(force[axis, axis], tip)])], cut, speed, "zero order")
-        return replace(lobes, warning="; ".join(filter(None, (_cancelling(cut, axis), lobes.warning))))
+        return replace(lobes, remarks=(*_cancelling(cut, axis), *lobes.remarks))
     return loop_limits(_eigenvalues(force, [tip for _, tip in tips]), cut, speed, "zero order")
 
 
-def _cancelling(cut: Cut, axis: int) -> str:
-    """Whether most of the force in the one direction that is known cancels over a turn, in words."""
+def _cancelling(cut: Cut, axis: int) -> tuple[Remark, ...]:
+    """Whether most of the force in the one direction that is known cancels over a turn."""
     forces = interval_forces(cut, SAMPLES, np.zeros(1))[0, :, axis, axis]
     share = abs(np.mean(forces)) / np.mean(np.abs(forces))
     if share >= CANCELS:
-        return ""
-    return (
+        return ()
+    said = (
         f"zero order knows the mean force alone, and {100 * (1 - share):.0f} % of the force in {'xy'[axis]}, the one "
-        "direction known, cancels over a turn: the true limit can be far lower; use semi-discretisation"
+        "direction known, cancels over a turn: the true limit can be far lower"
     )
+    return (Remark("force-cancels", "", said, INSTEAD),)
 
 
 def _eigenvalues(force: NDArray[np.float64], tips: Sequence[TipResponse]) -> list[TipResponse]:

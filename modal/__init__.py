@@ -1,7 +1,8 @@
 """From an FRF to natural frequencies, damping ratios and stiffnesses."""
 
 from modal.cut_edges import cut_edges
-from modal.extract import Extraction, FittedBand, extract
+from modal.extract import extract
+from modal.extraction import Extraction, FittedBand
 from modal.fit_modes import fit_modes, modes_of
 from modal.fit_points import fit_points
 from modal.follow import Followed, follow

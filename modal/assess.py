@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
-from modal.extract import LEAST_TERMS, Extraction, FittedBand
+from acquisition import Remark
+from modal.extract import LARGEST_ERROR, LEAST_TERMS
+from modal.extraction import Extraction, FittedBand
 from modal.mode import Mode
 from modal.physical_poles import physical_poles
 
 LEAST_COHERENCE = 0.9
 """Mean coherence between the half-power points; below it the averaged hits disagree."""
 LARGEST_PHASE = np.radians(15)
-"""Phase of the complex modal constant."""
+"""Of the complex modal constant (rad)."""
 LARGEST_MISFIT = 2.0
-"""rms of the residual over rms of the noise ..."""
+"""rms of what the fit leaves over rms of the noise ..."""
 MISFIT_SHARE = 0.01
 """... that matters where it is more than this share of the mode's own peak."""
 BENT = 0.005
@@ -31,17 +34,17 @@ LARGEST_DIFFERENCE = 0.25
 
 
 def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
-    """Mode i of a band with its figures of quality and the doubts that follow from them."""
+    """Mode i of a band with its figures of quality and the remarks that follow from them."""
     share, misfit = _misfit(state, band, i)
     judged = replace(
         mode,
-        residue_phase=_phase(band, mode),
+        modal_constant_phase=_phase(band, mode),
         coherence=_coherence(state, mode),
         misfit=misfit,
         half_power_damping=_half_power_damping(band, mode),
     )
-    doubts = [*_about_the_place(state, band, judged), *_about_the_values(judged, share, band.height.size)]
-    return replace(judged, doubts=tuple(doubts))
+    found = chain(_on_its_place(state, band, judged), _on_its_values(band, i, judged, share), _on_its_errors(judged))
+    return replace(judged, remarks=tuple(found))
 
 
 def _phase(band: FittedBand, mode: Mode) -> float | None:
@@ -64,12 +67,12 @@ def _coherence(state: Extraction, mode: Mode) -> float | None:
 
 def _misfit(state: Extraction, band: FittedBand, i: int) -> tuple[float, float]:
     """rms of the residual as a share of the peak of the mode, and over that of the noise (from third differences)."""
-    real, imaginary = np.split(band.fit.residual, 2)
-    rms = np.sqrt(band.fit.sum_of_squares / band.fit.freedom * 2)
-    noise = np.median(np.abs(np.diff(real + 1j * imaginary, 3))) / np.sqrt(20 * np.log(2))
-    nearest = np.argmin(np.abs(state.frf.frequency - band.fit.frequency[i]) + 1e9 * (state.weight == 0))
-    peak = state.weight[nearest] * np.abs(band.fit.flexibility[0, i] / (2 * band.fit.damping_ratio[i]))
-    return float(rms / peak), float(rms / noise) if noise > 0 else 1.0
+    fit, weight = band.fit, state.weight
+    rms = np.sqrt(fit.sum_of_squares / fit.freedom * 2)
+    noise = np.median(np.abs(np.diff(fit.complex_residual, 3))) / np.sqrt(20 * np.log(2))
+    nearest = np.argmin(np.abs(state.frf.frequency - fit.frequency[i]) + 1e9 * (weight == 0), axis=1)
+    peaks = weight[np.arange(nearest.size), nearest] * np.abs(fit.flexibility[:, i] / (2 * fit.damping_ratio[i]))
+    return float(rms / np.max(peaks)), float(rms / noise) if noise > 0 else 1.0
 
 
 def _half_power_damping(band: FittedBand, mode: Mode) -> float | None:
@@ -79,20 +82,29 @@ def _half_power_damping(band: FittedBand, mode: Mode) -> float | None:
     return min(widths, key=lambda width: abs(width - mode.damping_ratio), default=None)
 
 
-def _about_the_place(state: Extraction, band: FittedBand, mode: Mode) -> Iterator[str]:
-    f, half_width = state.frf.frequency, mode.damping_ratio * mode.frequency
+def _on_its_place(state: Extraction, band: FittedBand, mode: Mode) -> Iterator[Remark]:
+    f, half_width, at = state.frf.frequency, mode.damping_ratio * mode.frequency, _name(mode)
     if min(mode.frequency - f[0], f[-1] - mode.frequency) < half_width:
-        yield f"its peak is cut by the edge of the lines, {f[0]:.0f}..{f[-1]:.0f} Hz"
+        text = f"its peak is cut by the edge of the lines, {f[0]:.0f}..{f[-1]:.0f} Hz"
+        yield Remark("cut-by-edge", at, text, "widen the band")
     left = _left_at_the_end(f, half_width)
     if left > MOST_LEFT:
-        yield f"{100 * left:.0f} % of it still rings when the record ends: record longer"
+        text = f"{100 * left:.0f} % of it still rings when the record ends"
+        yield Remark("still-ringing", at, text, "record longer")
     for other in np.delete(band.fit.frequency, np.argmin(np.abs(band.fit.frequency - mode.frequency))):
         if abs(other - mode.frequency) < 2 * half_width:
-            yield f"overlaps with the mode at {other:.1f} Hz"
+            yield Remark("overlaps", at, f"overlaps with the mode at {other:.1f} Hz")
     if band.terms > LEAST_TERMS and mode.standard_error[2] > BENT * abs(mode.stiffness):
-        yield "a far stronger mode beside the band bends the fit: zeta and K may be off by more than their errors"
+        text = "a far stronger mode beside the band bends the fit: zeta and K may be off by more than their errors"
+        yield Remark("bent-by-neighbour", at, text)
     if any(abs(suspect - mode.frequency) < half_width for suspect in band.suspects):
-        yield f"may be several modes, near {' and '.join(f'{s:.0f}' for s in band.suspects)} Hz: too noisy to tell"
+        where = " and ".join(f"{suspect:.0f}" for suspect in band.suspects)
+        text = f"may be several modes, near {where} Hz: too noisy to tell"
+        yield Remark("several-modes", at, text, "average more hits")
+
+
+def _name(mode: Mode) -> str:
+    return f"{mode.frequency:.0f} Hz"
 
 
 def _left_at_the_end(frequency: NDArray[np.float64], half_width: float) -> float:
@@ -102,18 +114,30 @@ def _left_at_the_end(frequency: NDArray[np.float64], half_width: float) -> float
     return float(np.exp(-2 * np.pi * half_width / np.mean(steps))) if even else 0.0
 
 
-def _about_the_values(mode: Mode, share: float, n_modes: int) -> Iterator[str]:
+def _on_its_values(band: FittedBand, i: int, mode: Mode, share: float) -> Iterator[Remark]:
+    at, width = _name(mode), mode.half_power_damping
     if not mode.is_driving_point:
-        yield "K is negative: not a driving point here, or hammer or sensor has its sign swapped"
-    if mode.coherence is not None and mode.coherence < LEAST_COHERENCE:
-        yield f"coherence {mode.coherence:.2f} at its peak, below {LEAST_COHERENCE:g}: the hits disagree"
-    phase, known = mode.residue_phase or 0.0, mode.standard_error[2] / abs(mode.stiffness)
+        cure = "put the sensor where the hammer hits; if it is there, swap the sign of one of them"
+        yield Remark("not-driving-point", at, "K is negative: sensor and hammer move against each other", cure)
+    error = band.fit.standard_error[2, i] / abs(band.fit.flexibility[0, i])
+    if error > LARGEST_ERROR:
+        text = f"hardly moves at the driving point: K is uncertain by {100 * error:.0f} %"
+        yield Remark("near-node", at, text, "take a driving point where it moves")
+    phase, known = mode.modal_constant_phase or 0.0, mode.standard_error[2] / abs(mode.stiffness)
     if abs(phase) > max(LARGEST_PHASE, 3 * known):
-        yield f"modal constant {np.degrees(phase):+.0f}° off real: K is that of the real mode nearest to it"
+        text = f"modal constant {np.degrees(phase):+.0f}° off real: K is that of the real mode nearest to it"
+        yield Remark("complex-mode", at, text)
     if mode.misfit is not None and mode.misfit > LARGEST_MISFIT and share > MISFIT_SHARE:
-        yield f"the fit leaves {mode.misfit:.1f} times the noise, {100 * share:.0f} % of its peak"
+        yield Remark("misfit", at, f"the fit leaves {mode.misfit:.1f} times the noise, {100 * share:.0f} % of its peak")
+    if width is not None and band.height.size == 1 and abs(width / mode.damping_ratio - 1) > LARGEST_DIFFERENCE:
+        yield Remark("half-power-width", at, f"zeta from its half-power width is {100 * width:.2g} %")
+
+
+def _on_its_errors(mode: Mode) -> Iterator[Remark]:
+    at = _name(mode)
+    if mode.coherence is not None and mode.coherence < LEAST_COHERENCE:
+        text = f"coherence {mode.coherence:.2f} at its peak, below {LEAST_COHERENCE:g}: the hits disagree"
+        yield Remark("low-coherence", at, text, "hit one point in one direction")
     if mode.jackknife is not None and np.max(mode.standard_error / mode.fit_error) > LARGEST_SCATTER:
-        yield f"scatters {np.max(mode.standard_error / mode.fit_error):.1f} times more from hit to hit than in the fit"
-    width = mode.half_power_damping
-    if width is not None and n_modes == 1 and abs(width / mode.damping_ratio - 1) > LARGEST_DIFFERENCE:
-        yield f"zeta from its half-power width is {100 * width:.2g} %"
+        text = f"scatters {np.max(mode.standard_error / mode.fit_error):.1f} times more from hit to hit than in the fit"
+        yield Remark("scatter", at, text, "hit one point in one direction, equally hard")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,15 +12,14 @@ from scipy.ndimage import median_filter
 from threadpoolctl import threadpool_limits
 
 from acquisition import Frf
+from modal.extraction import Array, ComplexArray, Extraction, FittedBand
 from modal.find_resonances import Resonance, find_resonances, resonances_beside
 from modal.fit_band import RESIDUAL_POWERS, BandFit, fit_band, gain_of_a_term
 from modal.line_weights import line_weights
 from modal.local_bands import LocalBand, local_bands
 from modal.physical_poles import physical_poles
-from modal.stabilise import StabilisationChart, stabilise
+from modal.stabilise import stabilise
 from modal.usable_lines import usable_lines
-
-Array = NDArray[np.float64]
 
 ORDERS = 10
 """Highest order of the LSCF models of a band, several times the modes that one holds."""
@@ -47,77 +47,58 @@ HIDDEN_ERROR = 1 / 6
 """Relative standard error that its damping ratio and stiffness have at most."""
 
 
-@dataclass(frozen=True, eq=False)
-class FittedBand:
-    """Some neighbouring modes that were fitted together."""
+def extract(frfs: Sequence[Frf], band: tuple[float, float] | None = None) -> Extraction:
+    """Find and fit all modes of these FRFs between band[0] and band[1] (Hz), with poles that are common to all.
 
-    lines: slice
-    """Where on the frequency axis."""
-    resonances: tuple[Resonance, ...]
-    """The peaks that the band was laid around."""
-    height: Array
-    """What the mobility of each mode is measured against, its own peak or the highest of the band (m/s/N), (m,)."""
-    fit: BandFit
-    """Their values."""
-    own: NDArray[np.complex128]
-    """What they were fitted to: the receptance without the modes of all other bands (m/N)."""
-    terms: int
-    """Complex residual terms."""
-    suspects: tuple[float, ...]
-    """Frequencies of modes that may stand here instead of those fitted, but are too uncertain (Hz)."""
-    chart: StabilisationChart
-    """LSCF poles of these lines."""
-
-
-@dataclass(frozen=True, eq=False)
-class Extraction:
-    """All that was found in one FRF."""
-
-    frf: Frf
-    """The lines that were used."""
-    weight: Array
-    """Their weights, shape (n,)."""
-    bands: tuple[FittedBand, ...]
-    """By rising frequency."""
-
-    def receptance(self, frequency: Array, without: FittedBand | None = None) -> NDArray[np.complex128]:
-        """Of all modes found but those of one band (m/N) at these frequencies (Hz), shape (n,)."""
-        parts = [band.fit.receptance(frequency)[0] for band in self.bands if band is not without]
-        return np.asarray(sum(parts, np.zeros(frequency.size, complex)))
-
-    def own(self, band: FittedBand) -> NDArray[np.complex128]:
-        """Measured receptance on the lines of a band without the modes of all others (m/N)."""
-        part = band.lines
-        return np.asarray(self.frf.receptance[part] - self.receptance(self.frf.frequency[part], without=band))
-
-    def left(self, band: FittedBand) -> NDArray[np.complex128]:
-        """Measured receptance on the lines of a band less the fit with its residual terms (m/N); 0 at stray lines."""
-        real, imaginary = np.split(band.fit.residual, 2)
-        weight = self.weight[band.lines]
-        return np.asarray((real + 1j * imaginary) / np.where(weight > 0, weight, np.inf))
-
-
-def extract(frf: Frf, band: tuple[float, float] | None = None) -> Extraction:
-    """Find and fit all modes between band[0] and band[1] (Hz). Raises ValueError as `fit_modes`."""
+    One FRF, or several on the same lines, the driving point first. Raises ValueError as `fit_points`.
+    """
     with threadpool_limits(limits=1):
-        return _extract(usable_lines(frf, band))
+        return _extract(tuple(usable_lines(frf, band) for frf in _with_common_band(frfs)))
 
 
-def _extract(lines: Frf) -> Extraction:
-    weight, resonances = line_weights(lines), find_resonances(lines)
+def _extract(lines: tuple[Frf, ...]) -> Extraction:
+    weight = np.array([line_weights(frf) for frf in lines])
+    resonances = _common([find_resonances(frf) for frf in lines])
     state = _started(lines, weight, resonances)
-    left = replace(lines, receptance=lines.receptance - state.receptance(lines.frequency))
-    more = resonances_beside(resonances, left)
+    more = _beside(state, resonances)
     state = _started(lines, weight, more) if len(more) > len(resonances) else state
     state = _swept(state, SWEEPS if len(state.bands) > 1 else 0)
     stray = _stray_lines(state)
     return _swept(replace(state, weight=np.where(stray, 0.0, weight)), 0) if np.any(stray) else state
 
 
-def _started(lines: Frf, weight: Array, resonances: list[Resonance]) -> Extraction:
+def _with_common_band(frfs: Sequence[Frf]) -> list[Frf]:
+    """All with the narrowest usable band."""
+    if not frfs:
+        raise ValueError("there is no FRF; give one or more, the driving point first")
+    if any(not np.array_equal(frf.frequency, frfs[0].frequency) for frf in frfs):
+        raise ValueError("the FRFs differ in their frequency lines; measure or export all with the same settings")
+    usable = [frf.usable_band for frf in frfs if frf.usable_band is not None]
+    common = (max(low for low, _ in usable), min(high for _, high in usable)) if usable else None
+    return [replace(frf, usable_band=common) for frf in frfs]
+
+
+def _common(found: Sequence[list[Resonance]]) -> list[Resonance]:
+    """Resonances of all FRFs by rising frequency, of two nearer to each other than a half-width the higher."""
+    common: list[Resonance] = []
+    for new in sorted(chain.from_iterable(found), key=lambda r: -r.height):
+        if all(abs(new.frequency - old.frequency) >= max(new.half_width, old.half_width) for old in common):
+            common.append(new)
+    return sorted(common, key=lambda r: r.frequency)
+
+
+def _started(lines: tuple[Frf, ...], weight: Array, resonances: list[Resonance]) -> Extraction:
     """A first fit of every band around these."""
-    found = (_first(lines, weight, local) for local in local_bands(resonances, lines.frequency))
-    return Extraction(lines, weight, tuple(band for band in found if band is not None))
+    state = Extraction(lines, weight, ())
+    found = (_first(state, local) for local in local_bands(resonances, lines[0].frequency))
+    return replace(state, bands=tuple(band for band in found if band is not None))
+
+
+def _beside(state: Extraction, known: list[Resonance]) -> list[Resonance]:
+    """Known resonances with those that stand out of what the fit of these leaves in any of the FRFs."""
+    for frf, fitted in zip(state.frfs, state.receptance(state.frf.frequency), strict=True):
+        known = resonances_beside(known, replace(frf, receptance=frf.receptance - fitted))
+    return known
 
 
 def _swept(state: Extraction, times: int) -> Extraction:
@@ -130,29 +111,31 @@ def _swept(state: Extraction, times: int) -> Extraction:
 
 
 def _stray_lines(state: Extraction) -> NDArray[np.bool_]:
-    """Lines that stand far out of the residual on both sides of them: hum, or a carrier."""
-    stray = np.zeros(state.weight.size, bool)
+    """Lines that stand far out of the residual on both sides of them: hum, or a carrier; shape (p, n)."""
+    stray = np.zeros(state.weight.shape, bool)
     for band in state.bands:
-        size = np.abs(state.left(band)) * state.weight[band.lines]
-        far = size > STRAY * np.maximum(median_filter(size, size=11), np.median(size))
-        stray[band.lines] |= far & (size > ROUNDING * np.max(np.abs(band.own) * state.weight[band.lines]))
+        weight = state.weight[:, band.lines]
+        for one, left, own in zip(stray, np.abs(state.left(band)) * weight, np.abs(band.own) * weight, strict=True):
+            far = left > STRAY * np.maximum(median_filter(left, size=11), np.median(left))
+            one[band.lines] |= far & (left > ROUNDING * np.max(own))
     return stray
 
 
-def _first(frf: Frf, weight: Array, local: LocalBand) -> FittedBand | None:
+def _first(state: Extraction, local: LocalBand) -> FittedBand | None:
     """The resonances of a band, each from the LSCF pole nearest to it, else from its own width."""
     part = local.lines
-    f, own, w = frf.frequency[part], frf.receptance[part], weight[part]
-    chart = stabilise(f, own[None], w[None], ORDERS)
+    f, weight = state.frf.frequency[part], state.weight[:, part]
+    own = np.array([frf.receptance[part] for frf in state.frfs])
+    chart = stabilise(f, own, weight, ORDERS)
     poles = physical_poles(chart)
     starts = np.array([(r.frequency, r.half_width / r.frequency) for r in local.resonances]).T
     for i, resonance in enumerate(local.resonances):
         near = np.abs(poles.frequency - resonance.frequency) < resonance.half_width
         if np.any(near):
-            best = np.argmax(np.where(near, np.abs(poles.flexibility[:, 0]) / poles.damping_ratio, 0))
+            best = np.argmax(np.where(near, poles.largest / poles.damping_ratio, 0))
             starts[:, i] = poles.frequency[best], poles.damping_ratio[best]
     height = np.array([r.height for r in local.resonances])
-    fitted = _fit(f, own, w, starts, height)
+    fitted = _fit(f, own, weight, starts, height)
     if fitted is None:
         return None
     return FittedBand(part, local.resonances, fitted[1], fitted[0], own, LEAST_TERMS, (), chart)
@@ -161,7 +144,7 @@ def _first(frf: Frf, weight: Array, local: LocalBand) -> FittedBand | None:
 def _again(state: Extraction, i: int, look_closer: bool) -> Extraction:
     """Fit band i to what the modes of all others leave; closer: also look for modes that have no peak."""
     band = state.bands[i]
-    f, own, weight = state.frf.frequency[band.lines], state.own(band), state.weight[band.lines]
+    f, own, weight = state.frf.frequency[band.lines], state.own(band), state.weight[:, band.lines]
     change = np.linalg.norm((own - band.own) * weight)
     if not look_closer and change**2 < SETTLED**2 * band.fit.sum_of_squares:
         return state
@@ -175,12 +158,12 @@ def _again(state: Extraction, i: int, look_closer: bool) -> Extraction:
     return replace(state, bands=(*state.bands[:i], new, *state.bands[i + 1 :]))
 
 
-def _with_hidden(band: FittedBand, f: Array, own: NDArray[np.complex128], weight: Array) -> FittedBand:
+def _with_hidden(band: FittedBand, f: Array, own: ComplexArray, weight: Array) -> FittedBand:
     """The band with those modes added that have no peak of their own, where the sum of squares asks for them."""
     bent = _with_terms(band, f, own, weight)
     for starts in _more_modes(band, split=bent.terms > band.terms):
         height = np.full(starts.shape[1], np.max(band.height))
-        fit = fit_band(f, own[None], weight[None], starts, band.terms)
+        fit = fit_band(f, own, weight, starts, band.terms)
         if fit is None or not _is_better(fit, band.fit, TERM_F) or not _is_likelier(fit, bent.fit):
             continue
         if _is_better(fit, band.fit, HIDDEN_F) and np.all(_are_modes(fit, f, height, HIDDEN_ERROR)):
@@ -194,7 +177,7 @@ def _more_modes(band: FittedBand, split: bool) -> Iterator[Array]:
     """Starts (2, m) for more modes than are fitted, from all high LSCF poles down; then two for the highest mode."""
     fit, poles = band.fit, physical_poles(band.chart)
     known = np.stack([fit.frequency, fit.damping_ratio])
-    size = np.pi * poles.frequency * np.abs(poles.flexibility[:, 0]) / poles.damping_ratio
+    size = np.pi * poles.frequency * poles.largest / poles.damping_ratio
     high = size > LEAST_SHARE * np.max(band.height)
     starts = np.stack([poles.frequency, poles.damping_ratio])[:, high]
     alone = [k for k in range(band.height.size) if not np.any(np.abs(starts[0] - known[0, k]) < np.prod(known[:, k]))]
@@ -208,12 +191,13 @@ def _more_modes(band: FittedBand, split: bool) -> Iterator[Array]:
         yield np.hstack([np.delete(known, i, axis=1), halves])
 
 
-def _with_terms(band: FittedBand, f: Array, own: NDArray[np.complex128], weight: Array) -> FittedBand:
+def _with_terms(band: FittedBand, f: Array, own: ComplexArray, weight: Array) -> FittedBand:
     """The band with as many residual terms as lower the sum of squares for more than by chance."""
     for terms in range(band.terms + 1, len(RESIDUAL_POWERS) + 1):
-        if gain_of_a_term(band.fit, f, weight, terms - 1) < TERM_F * band.fit.sum_of_squares / band.fit.freedom:
+        least = TERM_F * len(own) * band.fit.sum_of_squares / band.fit.freedom
+        if gain_of_a_term(band.fit, f, weight, terms - 1) < least:
             break
-        fit = fit_band(f, own[None], weight[None], np.stack([band.fit.frequency, band.fit.damping_ratio]), terms)
+        fit = fit_band(f, own, weight, np.stack([band.fit.frequency, band.fit.damping_ratio]), terms)
         if fit is None or not _is_better(fit, band.fit, TERM_F) or not np.all(_are_modes(fit, f, band.height)):
             break
         band = replace(band, fit=fit, terms=terms)
@@ -233,11 +217,11 @@ def _is_likelier(fit: BandFit, other: BandFit) -> bool:
 
 
 def _fit(
-    f: Array, own: NDArray[np.complex128], weight: Array, starts: Array, height: Array, terms: int = LEAST_TERMS
+    f: Array, own: ComplexArray, weight: Array, starts: Array, height: Array, terms: int = LEAST_TERMS
 ) -> tuple[BandFit, Array] | None:
     """Fit after the weakest of those that turn out to be no modes are taken out, one by one."""
     while height.size:
-        fit = fit_band(f, own[None], weight[None], starts, terms)
+        fit = fit_band(f, own, weight, starts, terms)
         sure = np.zeros(height.size, bool) if fit is None else _are_modes(fit, f, height)
         if fit is not None and np.all(sure):
             return fit, height
@@ -249,12 +233,13 @@ def _fit(
 def _are_modes(
     fit: BandFit, frequency: Array, height: Array, largest_error: float = LARGEST_ERROR
 ) -> NDArray[np.bool_]:
-    _, damping_error, flexibility_error = fit.standard_error
+    """Which lie in the band, are high enough, and are known well enough in one of the FRFs at least."""
+    damping_error, flexibility_error = fit.standard_error[1], fit.standard_error[2:]
     return np.asarray(
         (fit.frequency > frequency[0])
         & (fit.frequency < frequency[-1])
         & (fit.damping_ratio < 1)
         & (fit.mobility_peak > LEAST_SHARE * height)
         & (damping_error < largest_error * fit.damping_ratio)
-        & (flexibility_error < largest_error * np.abs(fit.flexibility[0]))
+        & np.any(flexibility_error < largest_error * np.abs(fit.flexibility), axis=0)
     )

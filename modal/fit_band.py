@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -46,8 +45,14 @@ class BandFit:
 
     @property
     def standard_error(self) -> Array:
-        """Standard errors of frequencies, damping ratios and flexibilities of the first FRF, shape (3, m)."""
-        return np.sqrt(np.diag(self.covariance))[: 3 * self.frequency.size].reshape(3, -1)
+        """Standard errors of frequencies, damping ratios, then flexibilities FRF by FRF, shape (2 + p, m)."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)).reshape(-1, self.frequency.size))
+
+    @property
+    def complex_residual(self) -> ComplexArray:
+        """The residual line by line, shape (p, n)."""
+        parts = self.residual.reshape(len(self.flexibility), 2, -1)
+        return np.asarray(parts[:, 0] + 1j * parts[:, 1])
 
     @property
     def mobility_peak(self) -> Array:
@@ -58,6 +63,10 @@ class BandFit:
     def sum_of_squares(self) -> float:
         """Of the weighted residuals."""
         return float(self.residual @ self.residual)
+
+    def influence_of(self, i: int) -> Array:
+        """The part of the influence that belongs to FRF i, shape (2 m + p m, 2 n)."""
+        return np.hsplit(self.influence, len(self.flexibility))[i]
 
     def receptance(self, frequency: Array) -> ComplexArray:
         """Sum of these modes alone (m/N) at these frequencies (Hz), shape (p, n)."""
@@ -84,7 +93,7 @@ def fit_band(
     problem = _problem(frequency, receptance, weight, terms)
     with np.errstate(all="ignore"):
         try:
-            return _result(_solve(problem, starts), 2 * terms)
+            return _result(_solve(problem, starts), terms)
         except np.linalg.LinAlgError:
             return None
 
@@ -101,11 +110,14 @@ def residual_terms(frequency: Array, terms: int) -> Array:
 
 
 def gain_of_a_term(fit: BandFit, frequency: Array, weight: Array, terms: int) -> float:
-    """Fall of the sum of squares, to first order, that one residual term more than these would bring to one FRF."""
+    """Fall of the sum of squares, to first order, that one residual term more than these in each FRF would bring."""
     powers = residual_terms(frequency, terms + 1)
-    old, new = (_split(weight * np.concatenate([part, 1j * part])).T for part in (powers[:-1], powers[-1:]))
+    old, new = (
+        _block_diagonal([_split(w * np.concatenate([part, 1j * part])).T for w in weight])
+        for part in (powers[:-1], powers[-1:])
+    )
     q = np.linalg.qr(np.hstack([old, fit.influence.T, new]))[0]
-    part = q[:, -2:].T @ fit.residual
+    part = q[:, -new.shape[1] :].T @ fit.residual
     return float(part @ part)
 
 
@@ -200,6 +212,14 @@ def _split(values: ComplexArray) -> Array:
     return np.concatenate([values.real, values.imag], axis=-1)
 
 
+def _block_diagonal(blocks: Sequence[Array]) -> Array:
+    """Blocks of one shape, each a FRF's, on the diagonal of a matrix that is 0 elsewhere."""
+    p, (rows, columns) = len(blocks), blocks[0].shape
+    made = np.zeros((p, rows, p, columns))
+    made[np.arange(p), :, np.arange(p)] = blocks
+    return made.reshape(p * rows, p * columns)
+
+
 def _solve(problem: _Problem, starts: Array) -> _State | None:
     """Levenberg-Marquardt; None where it does not converge."""
     state, damping = problem.at(starts), 1e-4
@@ -229,7 +249,7 @@ def _step(state: _State, damping: float) -> tuple[Array, float]:
     return step, float(change @ change)
 
 
-def _result(state: _State | None, n_residual: int) -> BandFit | None:
+def _result(state: _State | None, terms: int) -> BandFit | None:
     if state is None:
         return None
     m = state.poles.shape[1]
@@ -239,7 +259,7 @@ def _result(state: _State | None, n_residual: int) -> BandFit | None:
     if not singular[-1] > LEAST_SINGULAR * singular[0]:
         return None
     influence = _influence(state, -(right.T / singular) @ left.T / norm[:, None])
-    freedom = jacobian.shape[0] - 2 * m - (m + n_residual) * len(state.frfs)
+    freedom = jacobian.shape[0] - 2 * m - (m + 2 * terms) * len(state.frfs)
     return BandFit(
         state.poles[0],
         state.poles[1],
@@ -253,6 +273,6 @@ def _result(state: _State | None, n_residual: int) -> BandFit | None:
 
 def _influence(state: _State, on_poles: Array) -> Array:
     """On poles in Hz and damping ratio, then on the flexibilities; on_poles: on scaled poles, shape (2 m, 2 n p)."""
-    own = block_diag(*(frf.inverse @ frf.q.T for frf in state.frfs))
+    own = _block_diagonal([frf.inverse @ frf.q.T for frf in state.frfs])
     by_poles = np.concatenate([frf.inverse @ (frf.q.T @ frf.slope) for frf in state.frfs])
     return np.concatenate([on_poles * state.scale[:, None], own - by_poles @ on_poles])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from acquisition import Remark
 from modal.mac import mac
 from modal.mode import Mode
 
@@ -28,30 +29,33 @@ class Followed:
 
     mode: Mode | None
     """None where no mode is near enough."""
-    doubt: str
-    """Why it may be another mode; empty where there is none."""
+    remarks: tuple[Remark, ...]
+    """Why it may be another mode, or why there is none; empty where it is clear."""
 
 
 def follow(last: Mode, modes: Sequence[Mode]) -> Followed:
-    """Of modes (driving points) the one that is most like the last one followed, with a doubt where that is not clear.
+    """Of modes (driving points) the one that is most like the last one followed, with a remark where that is not clear.
 
     The distance is the root of the sum of squares of the changes of frequency, damping ratio and stiffness, each
     in units of a likely change, and of 1 - MAC where both modes have shapes over the same points.
     """
     near = sorted((m for m in modes if m.is_driving_point), key=lambda mode: _distance(last, mode))
     if not near or _distance(last, near[0]) > FARTHEST:
-        found = f"; nearest is {near[0].frequency:.1f} Hz" if near else ""
-        return Followed(None, f"no mode is like the one followed so far, {last.frequency:.1f} Hz{found}")
-    first = _distance(last, near[0])
+        nearest = f" (nearest is {near[0].frequency:.1f} Hz)" if near else ""
+        text = f"no mode to follow, none is like this one{nearest}"
+        return Followed(None, (Remark("no-mode-to-follow", f"{last.frequency:.0f} Hz", text),))
+    first, about = _distance(last, near[0]), f"{near[0].frequency:.0f} Hz"
     if len(near) > 1 and _distance(last, near[1]) < RIVAL * max(first, 0.5):
-        return Followed(near[0], f"{_it_is(near[0])}: {near[1].frequency:.1f} Hz is nearly as like it")
+        text = f"followed mode in doubt: {near[1].frequency:.1f} Hz is nearly as like {_values(last)}"
+        return Followed(near[0], (Remark("rival-mode", about, text),))
     if first > DOUBTFUL:
-        return Followed(near[0], f"{_it_is(near[0])}: it was {last.frequency:.1f} Hz, {last.stiffness / 1e6:.3g} N/um")
-    return Followed(near[0], "")
+        text = f"followed mode in doubt: it was {_values(last)}, now {_values(near[0])}"
+        return Followed(near[0], (Remark("large-change", about, text),))
+    return Followed(near[0], ())
 
 
-def _it_is(mode: Mode) -> str:
-    return f"followed mode in doubt, now {mode.frequency:.1f} Hz, {mode.stiffness / 1e6:.3g} N/um"
+def _values(mode: Mode) -> str:
+    return f"{mode.frequency:.1f} Hz with {mode.stiffness / 1e6:.3g} N/um"
 
 
 def _distance(a: Mode, b: Mode) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Frf, Hit, estimate_frf
-from modal.extract import Extraction, FittedBand
+from modal.extraction import Extraction, FittedBand
 
 FEWEST_HITS = 3
 """With two the interval would be 6 times wider than the error is likely to be."""
@@ -36,16 +36,16 @@ def _lines(hit: Hit, frf: Frf) -> slice:
     return part
 
 
-def jackknife(state: Extraction, band: FittedBand, without: Sequence[Frf]) -> NDArray[np.float64]:
-    """Covariance of the values of one band, (n - 1)/n times the sum of squares over the FRFs without one hit each.
+def jackknife(state: Extraction, band: FittedBand, i: int, without: Sequence[Frf]) -> NDArray[np.float64]:
+    """Covariance of the values of one band, (n - 1)/n times the sum of squares over FRF i without one hit each.
 
     Each is refitted by one Gauss-Newton step from the fit to all hits, which is exact to first order in the change;
-    shape (3 m, 3 m), frequencies, damping ratios and flexibilities. Source: Efron & Stein (1981), The jackknife
-    estimate of variance, Annals of Statistics 9, 586.
+    shape as `BandFit.covariance`. Source: Efron & Stein (1981), The jackknife estimate of variance, Annals of
+    Statistics 9, 586.
     """
     part = band.lines
-    change = np.array([one.receptance[part] for one in without]) * state.weight[part]
+    change = np.array([one.receptance[part] for one in without]) * state.weight[i, part]
     change -= change.mean(axis=0)
-    steps = np.concatenate([change.real, change.imag], axis=1) @ band.fit.influence.T
+    steps = np.concatenate([change.real, change.imag], axis=1) @ band.fit.influence_of(i).T
     n = len(without)
     return np.asarray((n - 1) / n * steps.T @ steps)

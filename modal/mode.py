@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from acquisition import Remark
+
 
 @dataclass(frozen=True, eq=False)
 class Mode:
@@ -35,8 +37,8 @@ class Mode:
     jackknife: NDArray[np.float64] | None = None
     """The same covariance from the scatter of the hits, whatever their errors, shape (3, 3); None without hits."""
     n_hits: int = 0
-    """Hits that the jackknife left out in turn."""
-    residue_phase: float | None = None
+    """Hits that the jackknife left out in turn, of the FRF with the fewest."""
+    modal_constant_phase: float | None = None
     """Phase of its modal constant as a complex number (LSCF), against the sign of K (rad): 0 for a real mode."""
     coherence: float | None = None
     """Mean coherence between the half-power points; None where it is not known."""
@@ -46,8 +48,8 @@ class Mode:
     """Damping ratio from the width of the peak at half power, for comparison; None where it has no such width."""
     shape: NDArray[np.float64] | None = None
     """Mode shape over the FRFs of `fit_points`, the largest 1 or -1 and the first > 0, shape (p,); None of one FRF."""
-    doubts: tuple[str, ...] = ()
-    """Why it may not be trusted; empty where nothing speaks against it."""
+    remarks: tuple[Remark, ...] = ()
+    """Why it may not be trusted; empty where nothing speaks against it. Their codes: docs/remarks.md."""
 
     def __post_init__(self) -> None:
         """Refuse what is no mode."""

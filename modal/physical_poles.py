@@ -22,13 +22,18 @@ class PhysicalPoles:
     damping_ratio: NDArray[np.float64]
     """Damping ratios (-), shape (m,)."""
     flexibility: NDArray[np.complex128]
-    """Modal constants 1/K (m/N) in each of p FRFs, shape (m, p)."""
+    """Modal flexibilities 1/K, complex (m/N), in each of p FRFs, shape (m, p)."""
     n_orders: NDArray[np.int64]
     """Orders that each is stable in, shape (m,)."""
 
+    @property
+    def largest(self) -> NDArray[np.float64]:
+        """Size of each flexibility in the FRF where it is largest (m/N), shape (m,)."""
+        return np.asarray(np.abs(self.flexibility).max(axis=1))
+
 
 def physical_poles(chart: StabilisationChart) -> PhysicalPoles:
-    """Chains of poles, each the same as that of the order below (by frequency, damping and modal constant).
+    """Chains of poles, each the same as that of the order below (by frequency, damping and flexibility).
 
     Of chains that share a pole the longest counts; a chain of fewer than five poles is none. A mode is the median of
     the upper half of its chain, part by part.

@@ -23,8 +23,8 @@ RIDGE = 1e-12
 """Added to the unit diagonal of the normal equations for the residues, so that coinciding poles can be solved for."""
 POLE_TOLERANCE = 0.25
 """A pole is stable where one of the order below lies within this many half-power half-widths ..."""
-RESIDUE_TOLERANCE = 0.35
-"""... with a modal constant that differs by less than this share of its own."""
+FLEXIBILITY_TOLERANCE = 0.35
+"""... with a modal flexibility that differs by less than this share of its own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class StabilisationChart:
     damping_ratio: Array
     """Damping ratio (-), shape (k,)."""
     flexibility: ComplexArray
-    """Modal constant 1/K, complex (m/N), of each of p FRFs, shape (k, p)."""
+    """Modal flexibility 1/K, complex (m/N), in each of p FRFs, shape (k, p)."""
     previous: NDArray[np.int64]
     """Place of the same pole at the order below, -1 where there is none (the pole is not stable), shape (k,)."""
 
@@ -131,7 +131,7 @@ def _same(below: _Order, here: _Order) -> NDArray[np.int64]:
     nearest = np.argmin(distance, axis=1)
     change = np.linalg.norm(here[1] - below[1][nearest], axis=1)
     same = (distance.min(axis=1) < POLE_TOLERANCE * here[0].imag) & (
-        change < RESIDUE_TOLERANCE * np.linalg.norm(here[1], axis=1)
+        change < FLEXIBILITY_TOLERANCE * np.linalg.norm(here[1], axis=1)
     )
     return np.where(same, nearest, -1)
 

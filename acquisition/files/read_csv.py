@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.errors import DataError
+from acquisition.files.format import Format
 from acquisition.files.units import FACTORS, STANDARD_GRAVITY, hit_from
 from acquisition.frf import Frf
 from acquisition.hit import Hit
@@ -131,3 +132,15 @@ def _name_and_unit(heading: str) -> tuple[str, str]:
     """Name and unit of "Force [N]", "Force (N)" or "force_N"."""
     match = re.fullmatch(r"(.+?)\s*[\[(]\s*(.+?)\s*[\])]", heading) or _SUFFIX.fullmatch(heading)
     return (match[1], match[2]) if match else (heading, "")
+
+
+def _is_text(head: bytes, _path: Path) -> bool:
+    return b"\x00" not in head
+
+
+def _read(path: Path) -> list[Hit] | Frf:
+    table = read_table(path)
+    return frf_of(path, table) if is_frf(table) else [hit_of(path, table)]
+
+
+TEXT_TABLE = Format("table", "text table with a heading", (".csv", ".txt"), _is_text, _read)

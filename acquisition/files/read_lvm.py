@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.errors import DataError
+from acquisition.files.format import Format
 from acquisition.files.units import hit_from
 from acquisition.hit import Hit
+from acquisition.tap import Circumstances
 
-MAGIC = "LabVIEW Measurement"
+MAGIC = b"LabVIEW Measurement"
 _END = "***End_of_Header***"
 
 
@@ -67,12 +69,19 @@ def _numbers(path: Path, rows: list[str], first_line: int, n: int, comma: bool) 
     return values
 
 
-def lvm_time(path: Path) -> datetime | None:
+def _is_lvm(head: bytes, _path: Path) -> bool:
+    return head.startswith(MAGIC)
+
+
+def _recorded_as(path: Path) -> Circumstances | None:
     """Date and Time of the header, in the local time zone; None where it has none that can be read."""
     with path.open(encoding="latin-1") as file:
         words = dict(line.rstrip("\n").split("\t")[:2] for line in itertools.islice(file, 12) if "\t" in line)
     try:
         clock = words["Time"].replace(",", ".").partition(".")[0]
-        return datetime.strptime(f"{words['Date']} {clock}", "%Y/%m/%d %H:%M:%S").astimezone()
+        return Circumstances("", datetime.strptime(f"{words['Date']} {clock}", "%Y/%m/%d %H:%M:%S").astimezone())
     except (KeyError, ValueError):
         return None
+
+
+LVM = Format("lvm", "LabVIEW measurement file", (".lvm",), _is_lvm, read_lvm, _recorded_as)

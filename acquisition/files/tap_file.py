@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.atomic import atomic_write
-from acquisition.channel import Channel
+from acquisition.channel import Channel, tap_direction
 from acquisition.errors import DataError
 from acquisition.estimation.estimate_frf import cross_spectra
 from acquisition.frf import Frf
@@ -93,15 +93,17 @@ def _write_circumstances(file: h5py.File, about: Circumstances) -> None:
     file.attrs["created"] = about.created.isoformat()
     file.attrs["machine_toml_sha256"] = hashlib.sha256(about.machine_toml.encode()).hexdigest()
     for name in ("machine", "tool", "direction", "operator", "device"):
-        file.attrs[name] = getattr(about, name)
+        file.attrs[name] = getattr(about, name).replace("\0", "")  # HDF5 text ends there, and a device may send it
     file["machine_toml"] = about.machine_toml
 
 
 def _read_circumstances(file: h5py.File) -> Circumstances:
-    named = {name: str(file.attrs[name]) for name in ("machine", "tool", "direction", "operator")}
+    named = {name: str(file.attrs[name]) for name in ("machine", "tool", "operator")}
+    direction = tap_direction(str(file.attrs["direction"]))
     created = datetime.fromisoformat(file.attrs["created"])
     device = str(file.attrs.get("device", ""))
-    return Circumstances(created=created, machine_toml=file["machine_toml"][()].decode(), device=device, **named)
+    text = file["machine_toml"][()].decode()
+    return Circumstances(created=created, direction=direction, machine_toml=text, device=device, **named)
 
 
 def _dataset(group: h5py.Group, name: str, data: Any, units: str, **options: Any) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from acquisition.channel import Channel
 from acquisition.estimation.estimate_frf import cross_spectra, estimate_frf
 from acquisition.hit import Hit
+from acquisition.remark import Remark
 from acquisition.sensors.plausibility import unit_mistake
 
 LOWEST = 50.0
@@ -30,7 +31,7 @@ STRAIGHT = 10.0
 
 @dataclass(frozen=True)
 class MassCalibration:
-    """F/(m a) of a known mass. `str()` is the verdict."""
+    """F/(m a) of a known mass. `str()` is the verdict in words."""
 
     ratio: float
     """|F|/(m |a|) towards low frequency, 1 where force and acceleration sensitivity agree."""
@@ -54,7 +55,12 @@ class MassCalibration:
     @property
     def agrees(self) -> bool:
         """Whether both sensitivities together are right within 5 %, signs included."""
-        return abs(self.ratio - 1) <= AGREES and not self.inverted
+        return self.sizes_agree and not self.inverted
+
+    @property
+    def sizes_agree(self) -> bool:
+        """The same without the signs."""
+        return abs(self.ratio - 1) <= AGREES
 
     @property
     def force_sensitivity(self) -> float | None:
@@ -67,43 +73,65 @@ class MassCalibration:
         return self.channels[1].sensitivity / self.ratio if self.channels else None
 
     @property
-    def texts(self) -> tuple[str, ...]:
-        """The verdict in sentences."""
-        low, high = self.band
-        said = [
-            f"F/(m a) = {self.ratio:.4f} ± {self.ratio_std:.4f} over {self.n_hits} hits on {self.mass:g} kg, "
-            f"{low:.0f} to {high:.0f} Hz, flat within {abs(self.flatness):.1%}, phase {self.phase:+.1f} deg"
-        ]
-        if abs(self.phase) > STRAIGHT:
-            said.append(
-                f"The phase of {self.phase:+.1f} deg is not that of a rigid mass: measure the skew of the "
-                "channels, hit in line with the accelerometer and the centre of the mass."
-            )
-        if self.inverted:
-            said.append("Force and acceleration have opposite signs: turn the accelerometer or negate its sensitivity.")
-        return (*said, *self._about_size())
+    def remarks(self) -> tuple[Remark, ...]:
+        """What is wrong; nothing where the mass is rigid and both sensitivities agree."""
+        found = (self._phase_remark, self._sign_remark, self._size_remark)
+        return tuple(remark for remark in (*found, *self._mistakes) if remark is not None)
 
-    def _about_size(self) -> tuple[str, ...]:
-        if abs(self.ratio - 1) <= AGREES:
-            return (f"Both sensitivities agree within {AGREES:.0%}.",)
+    @property
+    def _phase_remark(self) -> Remark | None:
+        if abs(self.phase) <= STRAIGHT:
+            return None
+        return Remark(
+            "phase-not-rigid",
+            "",
+            f"the phase of {self.phase:+.1f} deg is not that of a rigid mass",
+            "measure the skew of the channels, hit in line with the accelerometer and the centre of the mass",
+        )
+
+    @property
+    def _sign_remark(self) -> Remark | None:
+        if not self.inverted:
+            return None
+        cure = "turn the accelerometer or negate its sensitivity"
+        return Remark("opposite-signs", "", "force and acceleration have opposite signs", cure)
+
+    @property
+    def _size_remark(self) -> Remark | None:
+        if self.sizes_agree:
+            return None
         large, share = ("force", self.ratio - 1) if self.ratio > 1 else ("acceleration", 1 / self.ratio - 1)
         much = f"{share:.1%}" if share < 1 else f"{1 + share:.4g} times"
         wrong = "large" if self.ratio > 1 else "small"
-        said = [f"Against the other, the {large} is read {much} too large: every stiffness is as much too {wrong}."]
-        said.append(unit_mistake(self.ratio))
-        if self.channels is not None:
+        return Remark(
+            "sensitivities-disagree",
+            "",
+            f"against the other, the {large} is read {much} too large: every stiffness is as much too {wrong}",
+            "before you change one: is the mass the total that moves, with accelerometer and mount?",
+        )
+
+    @property
+    def _mistakes(self) -> tuple[Remark | None, ...]:
+        return () if self.sizes_agree else (unit_mistake(self.ratio),)
+
+    def __str__(self) -> str:
+        """All of it, a sentence a line."""
+        low, high = self.band
+        said = [
+            f"F/(m a) = {self.ratio:.4f} ± {self.ratio_std:.4f} over {self.n_hits} hits on {self.mass:g} kg, "
+            f"{low:.0f} to {high:.0f} Hz, flat within {abs(self.flatness):.1%}, phase {self.phase:+.1f} deg",
+            *map(str, self.remarks),
+        ]
+        if self.sizes_agree:
+            said.append(f"Both sensitivities agree within {AGREES:.0%}.")
+        elif self.channels is not None:
             old = [channel.sensitivity * 1e3 for channel in self.channels]
             said.append(
                 f"If the accelerometer is trusted, the hammer has {old[0] * self.ratio:.4g} mV/N instead of "
                 f"{old[0]:.4g}; if the hammer is trusted, the accelerometer has {old[1] / self.ratio:.4g} mV per m/s^2 "
                 f"instead of {old[1]:.4g}."
             )
-        said.append("Before you change one: is the mass the total that moves, with accelerometer and mount?")
-        return tuple(filter(None, said))
-
-    def __str__(self) -> str:
-        """All of it, a sentence a line."""
-        return "\n".join(self.texts)
+        return "\n".join(said)
 
 
 def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:

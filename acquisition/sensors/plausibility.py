@@ -1,4 +1,4 @@
-"""Sensitivities, units, dates and stiffnesses that cannot be right: a sentence each, empty where all is well."""
+"""Sensitivities, units, dates and stiffnesses that cannot be right: a remark each, none where all is well."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from datetime import date
 
 from acquisition.channel import Channel, ChannelQuantity
 from acquisition.files.units import FACTORS, STANDARD_GRAVITY
+from acquisition.remark import Remark
 
 SENSITIVITIES: Mapping[ChannelQuantity, tuple[float, float, float, str]] = {
     "force": (0.1e-3, 25e-3, 1.0, "hammers have 0.1 to 25 mV/N without gain"),
@@ -24,77 +25,84 @@ NEAR = 0.15
 DAYS_PER_MONTH = 365.25 / 12
 
 _LBF = FACTORS["lbf"][1]
-_MISTAKES: Mapping[float, str] = {
-    STANDARD_GRAVITY: "9.81: is the acceleration in g, not m/s^2? A sensitivity in V/g is divided by 9.80665.",
-    1
-    / STANDARD_GRAVITY: "1/9.81: was an acceleration sensitivity in V per m/s^2 divided by 9.80665 as if it were V/g?",
-    1 / _LBF: "1/4.45: is the force in lbf, not N? A sensitivity in V/lbf is divided by 4.44822.",
-    _LBF: "4.45: was a force sensitivity in V/N divided by 4.44822 as if it were V/lbf?",
-    1e3: "1000: is one sensitivity in mV, the other in V (force 1000 times too large or acceleration too small)?",
-    1e-3: "1/1000: is one sensitivity in mV, the other in V (force 1000 times too small or acceleration too large)?",
+_MISTAKES: Mapping[float, tuple[str, str]] = {
+    STANDARD_GRAVITY: ("9.81", "is the acceleration in g, not m/s^2? A sensitivity in V/g is divided by 9.80665"),
+    1 / STANDARD_GRAVITY: (
+        "1/9.81",
+        "was an acceleration sensitivity in V per m/s^2 divided by 9.80665 as if it were V/g?",
+    ),
+    1 / _LBF: ("1/4.45", "is the force in lbf, not N? A sensitivity in V/lbf is divided by 4.44822"),
+    _LBF: ("4.45", "was a force sensitivity in V/N divided by 4.44822 as if it were V/lbf?"),
+    1e3: ("1000", "is one sensitivity in mV, the other in V (force 1000 times too large or acceleration too small)?"),
+    1e-3: (
+        "1/1000",
+        "is one sensitivity in mV, the other in V (force 1000 times too small or acceleration too large)?",
+    ),
 }
 
 
-def unit_mistake(ratio: float) -> str:
-    """The unit mistake that explains F/(m a) of a known mass, within 15 %; empty where none does."""
-    for factor, words in _MISTAKES.items():
+def unit_mistake(ratio: float) -> Remark | None:
+    """The unit mistake that explains F/(m a) of a known mass, within 15 %; None where none does."""
+    for factor, (value, question) in _MISTAKES.items():
         if abs(ratio / factor - 1) < NEAR:
-            return f"The ratio {ratio:.4g} is near {words}"
-    return ""
+            return Remark("unit-mistake", "", f"the ratio {ratio:.4g} is near {value}", question)
+    return None
 
 
-def channel_doubts(channel: Channel) -> tuple[str, ...]:
-    """What speaks against a channel's sensitivity and range."""
+def channel_doubts(channel: Channel) -> tuple[Remark, ...]:
+    """What speaks against a channel's sensitivity and range; nothing where both are of this world."""
     low, high, unit, known = SENSITIVITIES[channel.quantity]
     per = "N" if channel.quantity == "force" else "m/s^2"
-    said = f"{channel.quantity}: a sensitivity of {channel.sensitivity:g} V per {per} is not believed"
-    doubts = [_unbelieved(abs(channel.sensitivity) * unit, low / SPREAD, high * SPREAD, said, known)]
-    said = f"{channel.quantity}: a range of ±{channel.full_scale:g} V is not believed"
-    doubts.append(_unbelieved(channel.full_scale, *FULL_SCALES, said, "converters have 0.01 to 100 V"))
-    return tuple(filter(None, doubts))
+    doubts = []
+    sensitivity = abs(channel.sensitivity) * unit
+    if not low / SPREAD <= sensitivity <= high * SPREAD:
+        said = f"a sensitivity of {channel.sensitivity:g} V per {per} is not believed ({known})"
+        doubts.append(
+            Remark("sensitivity-not-believed", channel.quantity, said, _slip(sensitivity, low / SPREAD, high * SPREAD))
+        )
+    if not FULL_SCALES[0] <= channel.full_scale <= FULL_SCALES[1]:
+        said = f"a range of ±{channel.full_scale:g} V is not believed (converters have 0.01 to 100 V)"
+        doubts.append(
+            Remark("input-range-not-believed", channel.quantity, said, _slip(channel.full_scale, *FULL_SCALES))
+        )
+    return tuple(doubts)
 
 
-def _unbelieved(value: float, low: float, high: float, said: str, known: str) -> str:
-    if low <= value <= high:
-        return ""
-    hints = {value / 1e3: ", did you mean mV?", value * 1e3: ", was it divided by 1000 twice?"}
-    hint = next((words for other, words in hints.items() if low <= other <= high), "")
-    return f"{said}{hint} ({known})"
+def _slip(value: float, low: float, high: float) -> str:
+    """The slip by 1000 that explains a value outside its bounds, as a question; empty where it does not."""
+    slips = {value / 1e3: "did you mean mV?", value * 1e3: "was it divided by 1000 twice?"}
+    return next((words for other, words in slips.items() if low <= other <= high), "")
 
 
-def stiffness_doubt(stiffness: float) -> str:
-    """Whether a modal stiffness (N/m) is outside what machine tools have."""
+def stiffness_doubt(stiffness: float) -> Remark | None:
+    """A modal stiffness (N/m) outside what machine tools have; None inside."""
     low, high = STIFFNESSES
     if low <= abs(stiffness) <= high:
-        return ""
-    return (
-        f"K = {stiffness:.3g} N/m is outside {low:g} to {high:g} N/m: check the units of both sensitivities "
-        "(g or m/s^2, mV or V, lbf or N) with a known mass"
+        return None
+    return Remark(
+        "stiffness-not-believed",
+        "",
+        f"K = {stiffness:.3g} N/m is outside {low:g} to {high:g} N/m",
+        "check the units of both sensitivities (g or m/s^2, mV or V, lbf or N) with a known mass",
     )
 
 
-def calibration_doubt(channel: Channel, today: date, interval_months: float = 12.0) -> str:
-    """Whether a sensor's calibration is not known or longer ago than the interval.
-
-    Raises ValueError for a date that is none or lies in the future.
-    """
+def calibration_doubt(channel: Channel, today: date, interval_months: float = 12.0) -> Remark | None:
+    """A sensor's calibration that is not known, longer ago than the interval, or of a day that cannot be; else None."""
     if not channel.calibration_date:
-        return f"{channel.quantity}: date of calibration not known; enter it beside the sensitivity"
+        return Remark(
+            "calibration-unknown", channel.quantity, "date of calibration not known", "enter it beside the sensitivity"
+        )
     try:
         calibrated = date.fromisoformat(channel.calibration_date[:10])
-    except ValueError as error:
-        raise ValueError(
-            f"{channel.quantity}: calibration date {channel.calibration_date!r} is no date; give YYYY-MM-DD"
-        ) from error
+    except ValueError:
+        said = f"calibration date {channel.calibration_date!r} is no date"
+        return Remark("calibration-no-date", channel.quantity, said, "give YYYY-MM-DD")
     if calibrated > today:
-        raise ValueError(
-            f"{channel.quantity}: calibration date {calibrated} lies in the future (today is {today}); correct it, or "
-            "the clock of this computer"
-        )
+        said = f"calibration date {calibrated} lies in the future (today is {today})"
+        return Remark("calibration-in-future", channel.quantity, said, "correct it, or the clock of this computer")
     months = (today - calibrated).days / DAYS_PER_MONTH
     if months <= interval_months:
-        return ""
-    return (
-        f"{channel.quantity}: calibrated {calibrated}, {months:.0f} months ago (interval {interval_months:g}); "
-        "check it with a known mass or have it calibrated"
-    )
+        return None
+    said = f"calibrated {calibrated}, {months:.0f} months ago (interval {interval_months:g})"
+    return Remark("calibration-old", channel.quantity, said, "check it with a known mass or have it calibrated")

@@ -59,7 +59,7 @@ def find_modes(
         x, shape = _prove(model, x, shape, width)
     except np.linalg.LinAlgError as exc:
         raise ArithmeticError(SPOILT) from exc
-    return Modes(model.to_frequency(x), model.position, shape[:, ::2], shape[:, 1::2])
+    return Modes(model.to_frequency(x), model.position, shape[:, ::2], shape[:, 1::2], spindle, spin or 0.0)
 
 
 def _start(

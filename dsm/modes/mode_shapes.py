@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dsm.modes.find_modes import find_modes
-from dsm.modes.interpolate import interpolate
 from dsm.modes.modes import Modes
 from dsm.spindle.spindle import SAME_PLACE, Spindle
 
@@ -19,7 +18,7 @@ def mode_shapes(spindle: Spindle, count: int, places: ArrayLike | None = None) -
     is the rotation of the cross-section. Raises ValueError for a place off the shaft, and as natural_frequencies.
     """
     modes = find_modes(spindle, count)
-    return modes if places is None else interpolate(spindle, modes, _on_shaft(spindle, places))
+    return modes if places is None else modes.at(_on_shaft(spindle, places))
 
 
 def _on_shaft(spindle: Spindle, places: ArrayLike) -> NDArray[np.float64]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
+from dsm.modes.between_nodes import between_nodes
+from dsm.spindle.spindle import SAME_PLACE, Spindle
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,10 +23,36 @@ class Modes:
     """Deflection (kg^-1/2), shape (n_modes, n_nodes)."""
     slope: NDArray[np.float64]
     """Slope of the deflection (kg^-1/2 m^-1), shape (n_modes, n_nodes)."""
+    spindle: Spindle
+    """The shaft they belong to."""
+    spin: float = 0.0
+    """Speed at which it spins (rad/s)."""
+
+    def at(self, places: NDArray[np.float64]) -> Modes:
+        """The same modes at other places on the shaft (m, shape (n,)), exact; a place next to a node has its values.
+
+        Raises ValueError for a shaft that spins: its modes have no modal mass of 1 kg.
+        """
+        if self.spin:
+            raise ValueError(
+                f"the shaft spins at {self.spin:g} rad/s; shapes and stiffness are those of a shaft at rest"
+            )
+        left = np.clip(np.searchsorted(self.position, places, side="right") - 1, 0, self.position.size - 2)
+        slack = SAME_PLACE * self.spindle.length
+        from_left, from_right = places - self.position[left], self.position[left + 1] - places
+        node = np.where(from_left <= slack, left, left + 1)
+        deflection, slope = self.deflection[:, node], self.slope[:, node]
+        inside = np.minimum(from_left, from_right) > slack
+        if np.any(inside):
+            shape = self.deflection, self.slope
+            deflection[:, inside], slope[:, inside] = between_nodes(
+                self.spindle, self.frequency, self.position, shape, places[inside], left[inside]
+            )
+        return replace(self, position=places, deflection=deflection, slope=slope)
 
     def deflection_at(self, position: float) -> NDArray[np.float64]:
-        """Deflection at the nearest of the places (m), shape (n_modes,); modes_at is exact at any place."""
-        return np.asarray(self.deflection[:, np.argmin(np.abs(self.position - position))])
+        """Deflection at a place on the shaft (m), shape (n_modes,), exact; see at."""
+        return self.at(np.array([position])).deflection[:, 0]
 
     def stiffness_at(self, position: float) -> NDArray[np.float64]:
         """Modal stiffness w^2/deflection^2 there (N/m), shape (n_modes,); inf where the mode is at rest.

@@ -4,7 +4,7 @@ from .advice import Advice, aging
 from .assembly import Assembly, lobes_of, speed_grid
 from .charts import Chart, Dynamics, Method, chart
 from .estimate import Estimate
-from .file_modes import FileModes, modes_of_file
+from .file_modes import FileModes, modes_of_file, remarks_on_all
 from .history import History, Row
 from .lobe_comparison import LobeComparison, compare_lobes
 from .logbook import Logbook, standing_of
@@ -52,6 +52,7 @@ __all__ = [
     "model_state",
     "model_summary",
     "modes_of_file",
+    "remarks_on_all",
     "speed_grid",
     "standing_of",
 ]

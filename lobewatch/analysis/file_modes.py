@@ -27,7 +27,7 @@ class FileModes:
     picked: tuple[Mode, ...]
     """By the peak picking of the paper, for comparison."""
     remarks: tuple[Remark, ...]
-    """On modes that may be missing."""
+    """On all modes together, and on those that are missing."""
 
 
 def modes_of_file(
@@ -40,8 +40,8 @@ def modes_of_file(
     """
     frf = read_frf(path)
     frf = replace(frf, receptance=frf.receptance.conj()) if conjugate else frf
-    state = extract(frf, band)
-    found = tuple(modes_of(state, [] if conjugate else _good_hits(path)))
+    state = extract([frf], band)
+    found = tuple(modes_of(state, [[] if conjugate else _good_hits(path)]))
     return FileModes(
         path=path,
         frf=frf,
@@ -61,8 +61,17 @@ def _good_hits(path: Path) -> list[Hit]:
 
 def _remarks(found: Sequence[Mode], edges: Sequence[float]) -> Iterator[Remark]:
     """edges: where a peak may be cut (Hz)."""
+    yield from remarks_on_all(found)
     for edge in edges:
         text = "a peak may be cut by the edge of the lines, its mode missing"
         yield Remark("mode-missing-at-edge", f"{edge:.0f} Hz", text, "widen the band (a harder tip reaches higher)")
     if not found:
         yield Remark("no-mode", "", "no mode found", "look whether the band is right and the hit was hard enough")
+
+
+def remarks_on_all(modes: Sequence[Mode]) -> list[Remark]:
+    """What speaks against all modes of an FRF together."""
+    if len(modes) < 2 or any(mode.is_driving_point for mode in modes):
+        return []
+    text = "every K is negative: hammer or sensor is mounted or wired the other way round"
+    return [Remark("sign-swapped", "", text, "turn it, or give its sensitivity the other sign")]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,8 +47,7 @@ def compare_lobes(logbook: Logbook, tool: str | None, cut: str, source: Dynamics
     then = None if first is None else _charted(logbook, first, cut, source, method)
     cuts = logbook.machine.cuts(assembly.tool)
     same = [one for one in logbook.verdicts() if cuts.get(one.program.name) == now.cut]
-    warning = now.lobes.warning
-    remarks = (*assembly.remarks, *([Remark("chart-method", cut, warning)] if warning else []))
+    remarks = (*assembly.remarks, *(replace(remark, about=cut) for remark in now.lobes.remarks))
     return LobeComparison(now, then, _pockets(logbook.machine, now), _shifts(then, now), same, remarks)
 
 

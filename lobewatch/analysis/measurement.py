@@ -4,7 +4,7 @@ recorded with its reason, and the next one goes on."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 import numpy as np
@@ -74,19 +74,15 @@ def _follow(modes: Sequence[Mode], machine: Machine, remarks: list[Remark], last
         remarks.append(_no_mode(modes, machine))
     elif last is not None:
         mode = _continued(last, _in_band(modes, machine), remarks)
-    doubt = stiffness_doubt(mode.stiffness) if mode is not None else ""
-    if doubt:
-        remarks.append(Remark("stiffness-implausible", "", doubt))
+    doubt = None if mode is None else stiffness_doubt(mode.stiffness)
+    remarks += [] if doubt is None else [doubt]
     return mode
 
 
 def _continued(last: Mode, candidates: Sequence[Mode], remarks: list[Remark]) -> Mode | None:
     found = follow(last, candidates)
-    if found.mode is None:
-        cure = "for a rebuilt spindle lay [mode] band_hz around its new mode"
-        remarks.append(Remark("no-mode-to-follow", "", f"no mode to follow: {found.doubt}", cure))
-    elif found.doubt:
-        remarks.append(Remark("followed-in-doubt", "", found.doubt))
+    cure = "for a rebuilt spindle lay [mode] band_hz around its new mode" if found.mode is None else ""
+    remarks += [replace(remark, cure=cure or remark.cure) for remark in found.remarks]
     return found.mode
 
 

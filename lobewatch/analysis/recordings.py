@@ -18,6 +18,7 @@ from acquisition import (
     new_tap_id,
     read_recording,
     recorded_as,
+    tap_direction,
 )
 from lobewatch.machine import MachineFolder
 
@@ -64,7 +65,7 @@ def _circumstances(
         machine=setup.machine.name,
         created=date.astimezone() if date else own.created,
         tool=tool or own.tool or setup.tap.tool,
-        direction=direction or own.direction,
+        direction=tap_direction(direction or own.direction),
         machine_toml=folder.toml.read_text("utf-8"),
     )
 

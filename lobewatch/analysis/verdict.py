@@ -52,6 +52,8 @@ class Verdict:
     """"hopf", "flip" or ""."""
     method: str = ""
     """How the limit was found."""
+    detail: str = ""
+    """Into how many intervals the tooth period was divided."""
     drive_limit: float = math.inf
     """Deepest cut that power and torque allow at its speed (m); inf where no limit is known."""
     remarks: tuple[Remark, ...] = ()
@@ -96,6 +98,7 @@ def verdict(table: ProgramTable, assembly: Assembly, machine: Machine) -> Verdic
         chatter_frequency=found.chatter_frequency,
         kind=found.kind,
         method=found.method,
+        detail=found.detail,
         drive_limit=float(drive_limit(machine, table, np.array([table.speed_rpm]))[0]),
         remarks=tuple(_remarks(table, assembly, machine)),
     )

@@ -8,11 +8,14 @@ from typing import Annotated
 
 import typer
 
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit
 
 
 def calibrate(
-    machine: Annotated[Path, typer.Argument(help="Machine folder with a [spindle] in its machine.toml.")],
+    machine: Annotated[
+        Path, typer.Argument(parser=named_folder, help="Machine folder with a [spindle] in its machine.toml.")
+    ],
     frequency: Annotated[list[float], typer.Option(help="Measured natural frequency (Hz); may be repeated.")],
     frequency_std: Annotated[list[float] | None, typer.Option(help="Its standard error (Hz); one for each.")] = None,
     mode: Annotated[

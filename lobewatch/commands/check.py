@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit, notes
 
 PATIENCE = 5.0
@@ -15,7 +16,9 @@ PATIENCE = 5.0
 
 
 def check(
-    machine: Annotated[Path, typer.Argument(help="Machine folder with tap tests and cutting programs.")],
+    machine: Annotated[
+        Path, typer.Argument(parser=named_folder, help="Machine folder with tap tests and cutting programs.")
+    ],
     as_json: Json = False,
 ) -> None:
     """Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.

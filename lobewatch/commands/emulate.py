@@ -12,13 +12,16 @@ import typer
 
 from acquisition import DataError, DataqEmulator, Structure, TapsEmulator
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, notes, results
 from lobewatch.tap.emulated_spindle import dataq_emulator, emulated_structure, emulator
 
 emulate = typer.Typer(help="A data acquisition device made of software, on a pseudo-terminal.", no_args_is_help=True)
 
 
-Machine = Annotated[Path, typer.Argument(help="Machine folder with a [spindle]: what the hammer hits.")]
+Machine = Annotated[
+    Path, typer.Argument(parser=named_folder, help="Machine folder with a [spindle]: what the hammer hits.")
+]
 Tcp = Annotated[bool, typer.Option("--tcp", help="On a TCP port of this computer instead.")]
 Fast = Annotated[bool, typer.Option("--fast", help="As fast as the host reads, not in real time.")]
 Seed = Annotated[int, typer.Option(help="Of the random numbers.")]

@@ -8,11 +8,12 @@ from typing import Annotated
 
 import typer
 
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit
 
 
 def init(
-    machine: Annotated[Path, typer.Argument(help="The folder to make.")],
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="The folder to make.")],
     example: Annotated[bool, typer.Option("--example", help="With the surrogate spindle and three programs.")] = False,
     as_json: Json = False,
 ) -> None:

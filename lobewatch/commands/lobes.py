@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit
 
 Source = Literal["modes", "frf"]
@@ -14,7 +15,7 @@ MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
 
 
 def lobes(
-    machine: Annotated[Path, typer.Argument(help="Machine folder with at least one tap test.")],
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
     cut: Annotated[str, typer.Option(help="Name of a [[program]], or the reference cut.")] = "reference cut",
     tool: Annotated[str | None, typer.Option(help="Of the newest tap test if not given; else predicted.")] = None,
     source: Annotated[Source, typer.Option(help="From the modes found, or straight from the FRF.")] = "modes",

@@ -7,11 +7,14 @@ from typing import Annotated
 
 import typer
 
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit
 
 
 def model(
-    machine: Annotated[Path, typer.Argument(help="Machine folder with a [spindle] in its machine.toml.")],
+    machine: Annotated[
+        Path, typer.Argument(parser=named_folder, help="Machine folder with a [spindle] in its machine.toml.")
+    ],
     tool: Annotated[str | None, typer.Option(help="Name of a [[tool]]; else the one that is tapped.")] = None,
     modes: Annotated[int, typer.Option(min=1, max=20, help="How many modes.")] = 4,
     figure: Annotated[Path | None, typer.Option(help="Draw the model to this file (.svg, .png, .pdf).")] = None,

@@ -8,11 +8,12 @@ from typing import Annotated
 
 import typer
 
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit, notes
 
 
 def replay(
-    machine: Annotated[Path, typer.Argument(help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
     files: Annotated[list[Path], typer.Argument(help="Recorded hits or FRFs: tap file (HDF5), LVM, CSV.")],
     tool: Annotated[
         str, typer.Option(help="What was in the spindle; from a tap file, or [tap] tool, where not given.")

@@ -7,11 +7,12 @@ from typing import Annotated
 
 import typer
 
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit, notes
 
 
 def report(
-    machine: Annotated[Path, typer.Argument(help="Machine folder with at least one tap test.")],
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
     out: Annotated[Path | None, typer.Option(help="The HTML file; MACHINE/report.html where not given.")] = None,
     tool: Annotated[str, typer.Option(help="The series of this tool; that of the newest test where not given.")] = "",
     direction: Annotated[str, typer.Option(help="x or y; that of the newest test where not given.")] = "",

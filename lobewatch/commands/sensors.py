@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
+from rich.markup import escape
 from rich.table import Table
 
 from acquisition import (
@@ -17,6 +19,7 @@ from acquisition import (
     MassCalibration,
     MeasuredRate,
     MeasuredSkew,
+    Remark,
     Source,
     calibrate_by_mass,
     capture_hits,
@@ -25,15 +28,15 @@ from acquisition import (
     measure_skew,
 )
 from acquisition.files.units import STANDARD_GRAVITY
-from acquisition.sensors.mass_calibration import AGREES
 from dsm import plus_minus
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import Device, checked_rate, has_clock, use_rate
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit, notes, table
 from lobewatch.tap.live_signal import LiveSignal
 from lobewatch.tap.plug import open_source
 from lobewatch.tap.self_check import quiet_stretch
-from lobewatch.tap.sensor_doubts import sensor_doubts
+from lobewatch.tap.sensor_doubts import WRONG, sensor_doubts
 from lobewatch.tap.trial import Trial
 
 RATE_SECONDS = 5.0
@@ -45,7 +48,7 @@ SKEW_SECONDS = 2.0
 
 
 def sensors(
-    machine: Annotated[Path, typer.Argument(help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
     port: Annotated[str, typer.Option(help="Serial port of the DAQ, or socket://HOST:PORT.")] = "",
     mass_kg: Annotated[
         float | None, typer.Option(help="Check F = m a on a hung mass: all that moves, accelerometer included (kg).")
@@ -82,9 +85,10 @@ def sensors(
 
 def _list(folder: MachineFolder, source: Source, as_json: bool) -> None:
     today = datetime.now(UTC).date()
-    warnings, errors = sensor_doubts(source.channels, today, folder.machine.daq.calibration_interval_months)
+    remarks = sensor_doubts(source.channels, today, folder.machine.daq.calibration_interval_months)
     nominal = source.sample_rate
-    measured = _rate(folder, source, errors)
+    measured = _rate(folder, source, remarks)
+    errors = [remark for remark in remarks if remark.code in WRONG]
     found = "not measured" if measured is None else f"measured {plus_minus(measured.rate, measured.std)} Hz"
     found += ", which is worked with" if source.sample_rate != nominal else ""
     name = _name(source)
@@ -95,15 +99,14 @@ def _list(folder: MachineFolder, source: Source, as_json: bool) -> None:
             "sample_rate_hz": nominal,
             "measured_rate_hz": measured.rate if measured else None,
             "measured_rate_hz_std": measured.std if measured else None,
-            "warnings": warnings,
-            "errors": errors,
+            "remarks": [asdict(remark) for remark in remarks],
+            "errors": [asdict(remark) for remark in errors],
         },
         as_json,
         f"{name['model']}, serial number {name['serial'] or 'not known'}",
         _channel_table(source.channels),
         f"rate: {nominal:g} Hz, {found}",
-        *(f"warning: {text}" for text in warnings),
-        *(f"error: {text}" for text in errors),
+        *(f"{'error' if remark in errors else 'warning'}: {remark}" for remark in remarks),
     )
     if errors:
         raise typer.Exit(2)
@@ -114,8 +117,8 @@ def _name(source: Source) -> dict[str, str]:
     return {"model": str(info.get("model", "recording")), "serial": str(info.get("serial", ""))}
 
 
-def _rate(folder: MachineFolder, source: Source, errors: list[str]) -> MeasuredRate | None:
-    """The measured rate, kept for this device where it is right; what is wrong with it goes to errors."""
+def _rate(folder: MachineFolder, source: Source, remarks: list[Remark]) -> MeasuredRate | None:
+    """The measured rate, kept for this device where it is right; what is wrong with it goes to the remarks."""
     if not has_clock(source):
         return None
     notes.print(f"measuring the rate for {RATE_SECONDS:g} s", markup=False)
@@ -124,7 +127,7 @@ def _rate(folder: MachineFolder, source: Source, errors: list[str]) -> MeasuredR
         measured = measure_rate(source, RATE_SECONDS)
         use_rate(folder, source, measured)
     except DeviceError as error:
-        errors.append(str(error))
+        remarks.append(Remark("sample-rate-wrong", "", str(error)))
     return measured
 
 
@@ -153,7 +156,7 @@ def _channel_table(channels: tuple[Channel, ...]) -> Table:
             f"±{channel.full_scale:g} V",
             str(channel.adc_bits),
             f"{channel.skew * 1e6:.4g}",
-            channel.serial_number or "-",
+            escape(channel.serial_number or "-"),
             channel.calibration_date or "-",
         )
     return made
@@ -161,7 +164,7 @@ def _channel_table(channels: tuple[Channel, ...]) -> Table:
 
 def _check_mass(folder: MachineFolder, source: Source, mass: float, as_json: bool) -> None:
     found = calibrate_by_mass(_good_hits(folder, source), mass)
-    emit(_mass_json(found), as_json, *found.texts, *_where_to_change(source, found))
+    emit(_mass_json(found), as_json, str(found), *_where_to_change(source, found))
 
 
 def _good_hits(folder: MachineFolder, source: Source) -> list[Hit]:
@@ -196,12 +199,12 @@ def _mass_json(found: MassCalibration) -> dict[str, Any]:
         "agrees": found.agrees,
         "force_sensitivity_v_per_n": found.force_sensitivity,
         "acceleration_sensitivity_v_per_m_s2": found.acceleration_sensitivity,
-        "texts": found.texts,
+        "remarks": [asdict(remark) for remark in found.remarks],
     }
 
 
 def _where_to_change(source: Source, found: MassCalibration) -> list[str]:
-    if abs(found.ratio - 1) <= AGREES:
+    if found.sizes_agree:
         return []
     if _describes_itself(source):
         force, acceleration = "sens_V_per_EU of the force channel", "that of the acceleration channel"

@@ -8,12 +8,15 @@ from typing import Annotated
 
 import typer
 
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json
 from lobewatch.show.show_address import Listen, Token, show_address
 
 
 def serve(
-    folder: Annotated[Path, typer.Argument(help="Machine folder, or a folder of machine folders.")],
+    folder: Annotated[
+        Path, typer.Argument(parser=named_folder, help="Machine folder, or a folder of machine folders.")
+    ],
     listen: Listen = "127.0.0.1",
     http_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the pages; 0: any free one.")] = 0,
     token: Token = None,

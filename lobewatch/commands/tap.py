@@ -8,12 +8,13 @@ from typing import Annotated
 
 import typer
 
+from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit, notes
 from lobewatch.show.show_address import Listen, Token, show_address
 
 
 def tap(
-    machine: Annotated[Path, typer.Argument(help="Machine folder.")],
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
     port: Annotated[str, typer.Option(help="Serial port of the DAQ, socket://HOST:PORT, or file:RECORDING.")] = "",
     tool: Annotated[str, typer.Option(help="What is in the spindle; [tap] tool where not given.")] = "",
     direction: Annotated[str, typer.Option(help="Direction at the tool tip, x or y.")] = "x",

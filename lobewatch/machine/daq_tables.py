@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from acquisition import STANDARD_GRAVITY, Channel, DataqInput
+from acquisition import STANDARD_GRAVITY, Channel, DataqInput, TapDirection
 from lobewatch.machine.toml_table import Positive, Table
 
 Sensitivity = Annotated[float, Meta(ge=-1e6, le=1e6)]
@@ -23,7 +23,7 @@ class ChannelTable(Table, frozen=True):
     sensitivity_mv_per_n: Sensitivity | None = None
     sensitivity_mv_per_g: Sensitivity | None = None
     gain: Positive = 1.0
-    direction: Literal["", "x", "y"] = ""
+    direction: TapDirection | Literal[""] = ""
     serial_number: str = ""
     calibration_date: date | None = None
     skew_us: Annotated[float, Meta(ge=-1e6, le=1e6)] = 0.0

@@ -20,6 +20,7 @@ from filelock import FileLock, Timeout
 
 from acquisition import DataError, TapTest, read_tap, write_tap
 from lobewatch.machine.machine_file import Machine, read_machine
+from lobewatch.machine.named_folder import named_folder
 
 
 class BusyError(DataError):
@@ -49,7 +50,7 @@ class MachineFolder:
 
     def __init__(self, path: Path | str) -> None:
         """DataError where this is no machine folder."""
-        self.path = Path(path)
+        self.path = named_folder(path)
         if not self.toml.is_file():
             raise DataError(
                 f"{self.path}: no machine.toml in it; make a machine folder with: lobewatch init {self.path}"

@@ -19,7 +19,7 @@ from lobes import Coefficients, Cut, cutting_coefficients
 from lobewatch.machine.cut_tables import CutTable, Drive, MaterialTable, ProgramTable
 from lobewatch.machine.daq_tables import ChannelTable, Daq
 from lobewatch.machine.spindle_tables import BearingTable, JointTable, MassTable, SegmentTable, SpindleTable, ToolTable
-from lobewatch.machine.toml_table import NotNegative, Positive, Table
+from lobewatch.machine.toml_table import NotNegative, Positive, Table, check_texts
 
 REFERENCE_CUT = "reference cut"
 
@@ -197,11 +197,15 @@ def read_machine(path: Path) -> Machine:
 def parse_machine(text: str, name: str = "machine.toml") -> Machine:
     """The machine file from its text; DataError with the place for what is wrong in it."""
     try:
-        return msgspec.convert(tomllib.loads(text), Machine)
+        tables = tomllib.loads(text)
+        check_texts(tables)
+        return msgspec.convert(tables, Machine)
     except tomllib.TOMLDecodeError as error:
         raise DataError(f"{name}: {error}{_comma_hint(text)}") from error
     except msgspec.ValidationError as error:
         raise DataError(f"{name}: {_readable(str(error))}") from error
+    except ValueError as error:
+        raise DataError(f"{name}: {error}") from error
 
 
 def _comma_hint(text: str) -> str:

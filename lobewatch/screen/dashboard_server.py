@@ -6,13 +6,12 @@ import asyncio
 import secrets
 from pathlib import Path
 from types import TracebackType
-from typing import Literal
 from urllib.parse import quote
 
 import msgspec
 from aiohttp import web
 
-from acquisition import DataError
+from acquisition import DataError, TapDirection
 from lobewatch.analysis import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.screen.dashboard import Board, find_machines
@@ -31,7 +30,7 @@ REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; f
 class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Body of the request that starts a tap test."""
 
-    direction: Literal["x", "y"]
+    direction: TapDirection
 
 
 class DashboardServer(WebThread):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from dataclasses import replace
 
-from acquisition import DataError
+from acquisition import DataError, TapDirection
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.plan_session import plan_session
 from lobewatch.tap.session import TapStopped
@@ -15,7 +15,7 @@ from lobewatch.tap.state import TapState, Word
 class LiveTest:
     """A tap test that runs in a thread of its own from the beginning on."""
 
-    def __init__(self, folder: MachineFolder, direction: str) -> None:
+    def __init__(self, folder: MachineFolder, direction: TapDirection) -> None:
         """Begin; DataError where machine.toml names no port."""
         if not folder.machine.daq.port:
             raise DataError(f"{folder.toml}: no port in [daq]; write port there, as lobewatch tap --port takes it")

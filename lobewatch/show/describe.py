@@ -8,6 +8,7 @@ from typing import Any
 
 from rich.table import Table
 
+from acquisition import Remark, joined
 from dsm import Calibration, DampingCalibration, StiffnessFit, plus_minus
 from lobewatch.analysis import FileModes, ModelCalibration, ModelSummary
 from lobewatch.show.output import table
@@ -32,11 +33,11 @@ def mode_json(mode: Mode) -> dict[str, Any]:
         "correlation": mode.correlation,
         "hits": mode.n_hits,
         "driving_point": mode.is_driving_point,
-        "residue_phase_rad": mode.residue_phase,
+        "modal_constant_phase_rad": mode.modal_constant_phase,
         "coherence": mode.coherence,
         "misfit": mode.misfit,
         "half_power_damping_ratio": mode.half_power_damping,
-        "doubts": list(mode.doubts),
+        "remarks": [asdict(remark) for remark in mode.remarks],
         "method": mode.method,
     }
 
@@ -67,16 +68,9 @@ def mode_lines(modes: Sequence[Mode]) -> list[str]:
     return lines
 
 
-def doubt_lines(modes: Sequence[Mode]) -> list[str]:
-    """What speaks against modes, a line each."""
-    where: dict[str, list[str]] = {}
-    for mode in modes:
-        for doubt in mode.doubts:
-            where.setdefault(doubt, []).append(f"{mode.frequency:.0f}")
-    lines = [f"doubt at {', '.join(at)} Hz: {doubt}" for doubt, at in where.items()]
-    if len(modes) > 1 and not any(mode.is_driving_point for mode in modes):
-        lines.append("every K is negative: hammer or sensor is mounted or wired the other way round (sign swapped)")
-    return lines
+def remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> list[str]:
+    """Remarks on single modes and further ones, a line each; what several modes have in common is one."""
+    return [str(remark) for remark in joined([*(one for mode in modes for one in mode.remarks), *remarks])]
 
 
 def picked_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
@@ -120,8 +114,7 @@ def file_modes_texts(found: FileModes) -> list[str | Table]:
         f"{found.path.name}: {frf.n_averages} hit(s) averaged, {lines}{usable}",
         mode_table(found.fitted),
         *mode_lines(found.fitted),
-        *doubt_lines(found.fitted),
-        *map(str, found.remarks),
+        *remark_lines(found.fitted, found.remarks),
         "peak picking (eqs. 28, 29), for comparison:",
         picked_table(found.picked, found.as_recorded),
     ]

@@ -19,6 +19,8 @@ from lobewatch.show.verdicts import verdict_table
 
 POCKET_RANGE = f"at least {100 * SHARE:.0f} % of the depth"
 """What holds between the ends of a pocket."""
+OUT_OF_RANGE = frozenset({"low-immersion", "fast-teeth", "force-cancels"})
+"""Codes of what another method is the cure of."""
 
 
 def pocket_json(pocket: Pocket) -> dict[str, float]:
@@ -62,7 +64,7 @@ def comparison_texts(found: LobeComparison, remarks: Sequence[Remark]) -> list[s
     """The same for people."""
     now = found.now
     texts: list[str | Table] = [
-        f"{now.name}: {now.lobes.method}, from the {now.source} of {now.assembly.tap_id}",
+        f"{now.name}: {now.lobes.stated_method}, from the {now.source} of {now.assembly.tap_id}",
         *_limit_lines(found),
         *shift_lines(found.shifts),
     ]
@@ -75,7 +77,7 @@ def _limit_lines(found: LobeComparison) -> list[str]:
     lobes, best = found.now.lobes, found.pockets
     low = lobes.minimum
     if not np.isfinite(low.depth):
-        return [f"no limit in this speed range ({lobes.method})"]
+        return [f"no limit in this speed range ({lobes.stated_method})"]
     return [
         f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm, chatter at {low.chatter_frequency:.1f} Hz",
         f"best pockets up to {USEFUL * low.depth * 1e3:.1f} mm (in brackets: {POCKET_RANGE}), by depth: "

@@ -13,10 +13,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
 
 from acquisition import Frf
 from lobewatch.machine.machine_file import Limits
+from lobewatch.show.output import printable
 
 NOW = "#0072B2"
 THEN = "#777777"
@@ -32,6 +35,7 @@ STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "svg.hashsalt": "lobewatch",
     "svg.fonttype": "none",
+    "text.parse_math": False,
 }
 
 
@@ -41,6 +45,7 @@ def save_figure(figure: Figure, path: Path) -> None:
         raise ValueError(
             f"{path}: a picture cannot end in {path.suffix!r}; name a file that ends in .svg, .png or .pdf"
         )
+    _read_nothing_as_formula(figure)
     with mpl.rc_context(STYLE):
         figure.savefig(path, dpi=150)
 
@@ -48,9 +53,23 @@ def save_figure(figure: Figure, path: Path) -> None:
 def svg(figure: Figure) -> str:
     """The picture as an <svg> element."""
     text = io.StringIO()
+    _read_nothing_as_formula(figure)
     with mpl.rc_context(STYLE):
         figure.savefig(text, format="svg", metadata={"Date": None})
     return text.getvalue()[text.getvalue().index("<svg") :]
+
+
+def _read_nothing_as_formula(figure: Figure) -> None:
+    """Texts stand as they are: a program may be called "cost $5 to $6". Logarithmic axes have plain numbers then.
+
+    Characters that no picture can hold are replaced.
+    """
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)
+        text.set_text(printable(text.get_text()))
+    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis) if axis.get_scale() == "log"):
+        axis.set_major_formatter(LogFormatter())
+        axis.set_minor_formatter(LogFormatter(labelOnlyBase=False))
 
 
 def frf_figure(then: Frf | None, now: Frf, band: tuple[float, float]) -> Figure:

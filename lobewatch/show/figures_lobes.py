@@ -100,8 +100,8 @@ def radial_figure(lobes: RadialLobes, diameter: float, present: float, title: st
     bar = figure.colorbar(mesh, ax=axes, spacing="uniform", label=BAR)
     bar.ax.invert_yaxis()
     bar.set_ticks(levels.tolist(), labels=[f"{depth:g}" for depth in depths[::-1]])
-    if lobes.warning:
-        figure.supxlabel(fill(lobes.warning, 120), fontsize=8)
+    if lobes.remarks:
+        figure.supxlabel(fill("; ".join(map(str, lobes.remarks)), 120), fontsize=8)
     axes.set(title=title, xlabel="spindle speed (rpm)", ylabel="radial depth (mm); dashed: now")
     axes.grid(visible=False)
     return figure

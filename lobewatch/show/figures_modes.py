@@ -49,7 +49,7 @@ def _draw_frf(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
     for i, band in enumerate(state.bands):
         part = f[band.lines]
         size = (2 * np.pi * part) ** 2
-        left = state.left(band)
+        left = state.left(band)[0]
         fitted = state.frf.receptance[band.lines] - left
         axes.semilogy(part, np.abs(fitted) * size, color=NOW, ls="--", label="fit in its bands" if i == 0 else None)
         axes.semilogy(part, np.abs(left) * size, color=ALARM, lw=0.6, label="measured - fit" if i == 0 else None)
@@ -73,7 +73,7 @@ def _draw_frf(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
 
 
 def _name(mode: Mode) -> str:
-    return f"{mode.frequency:.0f}" + (" ?" if mode.doubts else "")
+    return f"{mode.frequency:.0f}" + (" ?" if mode.remarks else "")
 
 
 def _apart(places: Sequence[float], least: float) -> list[float]:
@@ -94,7 +94,7 @@ def _draw_chart(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
             axes.plot(chart.frequency[which], chart.order[which], mark, **style)
     for mode in modes:
         axes.axvline(mode.frequency, color=NOW, lw=0.6)
-    axes.set(xlabel="frequency (Hz); grey: the bands fitted; ?: the report has a doubt", ylabel="order")
+    axes.set(xlabel="frequency (Hz); grey: the bands fitted; ?: has remarks", ylabel="order")
     axes.set_ylim(0, 13)
     axes.yaxis.set_major_locator(MultipleLocator(2))
     if state.bands:
@@ -115,7 +115,7 @@ def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) ->
     near = np.abs(f - mode.frequency) < reach
     fine = np.linspace(mode.frequency - reach, mode.frequency + reach, 300)
     scale = 2j * np.pi * 1e3
-    points = (mode.receptance(f) + state.left(band))[near] * f[near] * scale
+    points = (mode.receptance(f) + state.left(band)[0])[near] * f[near] * scale
     curve = mode.receptance(fine) * fine * scale
     axes.plot(points.real, points.imag, ".", color=THEN, ms=4)
     axes.plot(curve.real, curve.imag, color=NOW, lw=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -37,9 +38,9 @@ def save_pictures(
     if figure is not None:
         pictures.append((lobes_picture(logbook.machine, found), figure))
     if radial is not None:
-        picture, warning = radial_picture(logbook.machine, found.now, method)
+        picture, about = radial_picture(logbook.machine, found.now, method)
         pictures.append((picture, radial))
-        remarks += [Remark("chart-method", "--radial", warning)] if warning else []
+        remarks += [replace(remark, about="--radial") for remark in about]
     if waterfall is not None:
         pictures.append((waterfall_picture(logbook, found.now), waterfall))
     for picture, path in pictures:
@@ -85,15 +86,15 @@ def _bands(machine: Machine, now: Chart) -> tuple[DepthBand | None, DepthBand | 
 
 def _title(machine: Machine, now: Chart) -> str:
     predicted = f", {now.assembly.label}" if now.assembly.predicted else ""
-    return f"{machine.machine.name}: {now.name}\n{now.lobes.method.partition(',')[0]}{predicted}"
+    return f"{machine.machine.name}: {now.name}\n{now.lobes.method}{predicted}"
 
 
-def radial_picture(machine: Machine, now: Chart, method: Method) -> tuple[Figure, str]:
+def radial_picture(machine: Machine, now: Chart, method: Method) -> tuple[Figure, tuple[Remark, ...]]:
     """The limits over speed and radial depth, and what is wrong with the method at small ones."""
     speeds = now.lobes.speed_rpm if method is not Method.SEMI_DISCRETISATION else now.lobes.speed_rpm[::4]
     found = radial_lobes(lambda cut: chart(method, now.x, now.y, cut, speeds), now.cut, IMMERSIONS)
     diameter = now.table.tool_diameter_mm / 1e3
-    return radial_figure(found, diameter, now.cut.immersion, _title(machine, now)), found.warning
+    return radial_figure(found, diameter, now.cut.immersion, _title(machine, now)), found.remarks
 
 
 def waterfall_picture(logbook: Logbook, now: Chart) -> Figure:

@@ -9,9 +9,10 @@ from rich.table import Table
 
 from acquisition import Remark, joined
 from lobes import StabilityLobes
-from lobewatch.analysis import Logbook, Measurement, Verdict, lobes_of
+from lobewatch.analysis import Logbook, Measurement, Verdict, lobes_of, remarks_on_all
 from lobewatch.machine import REFERENCE_CUT
-from lobewatch.show.describe import calibration_json, doubt_lines, mode_json, mode_table
+from lobewatch.show.describe import calibration_json, mode_json, mode_table
+from lobewatch.show.describe import remark_lines as mode_remark_lines
 from lobewatch.show.verdicts import verdict_json, verdict_table
 
 
@@ -31,6 +32,7 @@ def lobes_json(name: str, lobes: StabilityLobes) -> dict[str, Any]:
     return {
         "cut": name,
         "method": lobes.method,
+        "method_detail": lobes.detail,
         "minimum_depth_mm": low.depth * 1e3,
         "at_speed_rpm": low.speed_rpm,
         "chatter_frequency_hz": low.chatter_frequency,
@@ -62,7 +64,7 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
     """A measurement for people."""
     texts: list[str | Table] = [f"{m.tap_id}  (tool {m.tool}, direction {m.direction})"]
     if m.modes:
-        texts += [mode_table(m.modes), *doubt_lines(m.modes)]
+        texts += [mode_table(m.modes), *mode_remark_lines(m.modes, remarks_on_all(m.modes))]
     if m.followed is not None:
         texts.append(f"followed: {m.followed.frequency:.2f} Hz")
     if m.calibration is not None:

@@ -1,27 +1,58 @@
-"""Results on stdout, as text for people or as one JSON object; progress and notes on stderr."""
+"""Results on stdout, as text for people or as one JSON object; progress and notes on stderr.
+
+Names and texts may come from anywhere: no control character of theirs reaches the terminal.
+"""
 
 from __future__ import annotations
 
 import json
 import math
+import re
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 import typer
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.highlighter import JSONHighlighter
+from rich.segment import Segment
 from rich.table import Table
+
+from acquisition.names import CONTROL
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]
 
-notes = Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
+INSTEAD = "\ufffd"
+"""What is shown for a control character."""
+
+
+class Terminal(Console):
+    """A console that texts cannot steer: of all control characters in them, only newline and tab pass."""
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterator[Segment]:
+        """What is printed, piece by piece; the pieces that rich itself steers the terminal with are marked as such."""
+        for piece in super().render(renderable, options):
+            yield piece if piece.control else piece._replace(text=printable(piece.text))
+
+
+class Cells(Table):
+    """A table whose rows cannot be broken: newline and tab do not pass either."""
+
+    def add_row(self, *cells: RenderableType | None, **options: Any) -> None:
+        """One row."""
+        super().add_row(*(CONTROL.sub(INSTEAD, cell) if isinstance(cell, str) else cell for cell in cells), **options)
+
+
+notes = Terminal(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 """Progress and remarks."""
-results = Console(highlight=False, soft_wrap=True, emoji=False, width=max(Console().width, 120))
+results = Terminal(highlight=False, soft_wrap=True, emoji=False, width=max(Console().width, 120))
 """What was asked for; wide enough for every table: a narrow terminal may break lines, but no number is cut off."""
 
 
 def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
     """One JSON object (numbers that are not finite become null), or the texts and tables."""
     if as_json:
-        results.print_json(json.dumps(_finite(payload), allow_nan=False))
+        exact = json.dumps(_finite(payload), allow_nan=False, indent=2, ensure_ascii=False)
+        results.print(JSONHighlighter()(CONTROL.sub(_escaped, exact)), no_wrap=True, soft_wrap=True)
         return
     for text in texts:
         results.print(text, markup=False) if isinstance(text, str) else results.print(text)
@@ -29,11 +60,21 @@ def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
 
 def table(*headings: str) -> Table:
     """An empty table; a heading that begins with "<" names a column of text."""
-    made = Table(box=None, pad_edge=False, header_style="bold")
+    made = Cells(box=None, pad_edge=False, header_style="bold")
     for heading in headings:
         justify: Literal["left", "right"] = "left" if heading.startswith("<") else "right"
         made.add_column(heading.removeprefix("<"), justify=justify, no_wrap=True)
     return made
+
+
+def printable(text: str) -> str:
+    """A text whose control characters are replaced, but for newline and tab."""
+    return CONTROL.sub(lambda found: found[0] if found[0] in "\n\t" else INSTEAD, text)
+
+
+def _escaped(found: re.Match[str]) -> str:
+    """As JSON writes it inside of text; a newline stands between its lines only."""
+    return found[0] if found[0] == "\n" else f"\\u{ord(found[0]):04x}"
 
 
 def _finite(value: Any) -> Any:

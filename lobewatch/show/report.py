@@ -81,7 +81,7 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
         "standing": _standing(logbook.standing()),
         "changes": _changes(rows),
         "programs": [_program(one) for one in programs],
-        "program_method": checked[0].method.partition(",")[0] if checked else "",
+        "program_method": checked[0].method if checked else "",
         "remarks": [str(remark) for remark in joined(last.remarks)],
         "modes": _modes(last),
         "operator": now.circumstances.operator,

@@ -16,6 +16,7 @@ from rich.panel import Panel
 from rich.text import Text
 
 from lobewatch.show.keys import Keys
+from lobewatch.show.output import Terminal
 from lobewatch.show.printer import Watched, verdict
 from lobewatch.tap.state import TapState, Word
 
@@ -53,7 +54,7 @@ class TerminalScreen:
     def __init__(self, session: Watched, console: Console | None = None) -> None:
         """Nothing is shown yet; console None: standard error."""
         self._session = session
-        self._console = console or Console(stderr=True, highlight=False, emoji=False)
+        self._console = console or Terminal(stderr=True, highlight=False, emoji=False)
         self._muted = self._ahead_of_hit = False
         self._undo_at = -math.inf
         self._keys = Keys()

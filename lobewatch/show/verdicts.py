@@ -33,6 +33,7 @@ def verdict_json(found: Verdict) -> dict[str, Any]:
         "kind": found.kind,
         "drive_limit_mm": found.drive_limit * 1e3,
         "method": found.method,
+        "method_detail": found.detail,
     }
 
 

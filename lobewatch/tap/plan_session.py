@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
-from acquisition import Circumstances
+from acquisition import Circumstances, tap_direction
 from lobewatch.machine import MachineFolder
 from lobewatch.tap.plug import Plug
 from lobewatch.tap.session import TapSession
@@ -28,7 +28,7 @@ def plan_session(
         machine.machine.name,
         datetime.now(UTC),
         tool or machine.tap.tool,
-        direction,
+        tap_direction(direction),
         operator,
         folder.toml.read_text("utf-8"),
     )

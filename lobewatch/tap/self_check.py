@@ -70,10 +70,8 @@ def self_check(baseline: Hit, level: float | None, free_bytes: int) -> tuple[Che
 
 def calibration_check(channels: Sequence[Channel], interval_months: float) -> Check:
     """Sensitivities and calibration dates."""
-    warnings, errors = sensor_doubts(channels, datetime.now(UTC).date(), interval_months)
-    return Check(
-        "calibration", not (warnings or errors), "; ".join([*errors, *warnings]) or "dates known and not too old"
-    )
+    doubts = sensor_doubts(channels, datetime.now(UTC).date(), interval_months)
+    return Check("calibration", not doubts, "; ".join(map(str, doubts)) or "dates known and not too old")
 
 
 def _samples(baseline: Hit) -> Check:

@@ -258,7 +258,7 @@ class TapSession:
             self._show_verdict(refused, words, refused.cure or self._trial.text)
             self._draw(hit)
         self._tap.trigger = self._trial.trigger
-        found = Check("trial hits", not self._trial.advice, self._trial.text.removesuffix("."))
+        found = Check("trial hits", not self._trial.remarks, self._trial.text.removesuffix("."))
         self._show(checks=(*self._state.checks, found))
 
     def _tap_on(self) -> None:

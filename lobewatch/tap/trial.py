@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from acquisition import Hit, HitFlags, Trigger, check_hit, ring_down
+from acquisition import Hit, HitFlags, Remark, Trigger, check_hit, ring_down
 from lobewatch.machine.machine_file import TapSetup
 
 RECORD = 0.25
@@ -68,12 +68,13 @@ class Trial:
             return f"Trial hit {len(self._hits) + 1}: it chooses trigger level and record length and does not count."
         slowest = max(ring_down(hit) for hit in self._hits)
         chosen = f"Trigger at {self.trigger.level:.3g} N, record {self._record:g} s, {_holds(self._record, slowest)}."
-        return " ".join([chosen, *self.advice])
+        return " ".join([chosen, *(f"{remark}." for remark in self.remarks)])
 
     @property
-    def advice(self) -> list[str]:
-        """A sentence for each channel that the trial hits do not fit into."""
-        return _range_advice(self._hits)
+    def remarks(self) -> tuple[Remark, ...]:
+        """One for each channel whose range the trial hits do not fit into."""
+        found = (_range_remark(self._hits, i) for i in (0, 1) if self._hits)
+        return tuple(remark for remark in found if remark is not None)
 
     def add(self, hit: Hit) -> HitFlags:
         """Take a trial hit; returns why it is no use, falsy where it is."""
@@ -117,16 +118,18 @@ def _range(hit: Hit, channel: int) -> float:
     return hit.channels[channel].full_scale / abs(hit.channels[channel].sensitivity)
 
 
-def _range_advice(hits: Sequence[Hit]) -> list[str]:
-    """A sentence for each channel that the trial hits do not fit into."""
-    advice = []
-    for i, (name, unit) in enumerate((("force", "N"), ("acceleration", "m/s^2"))):
-        peaks = [float(np.max(np.abs((hit.force, hit.acceleration)[i]))) for hit in hits]
-        share = max(peaks) / _range(hits[0], i)
-        if share < RANGE_LOW or share > RANGE_HIGH:
-            wanted = 2 * float(np.median(peaks)) if share < RANGE_LOW else 2 * max(peaks)
-            advice.append(
-                f"The hits reach {100 * share:.2g} % of the {name} range of {_range(hits[0], i):.3g} {unit}: choose a "
-                f"range or a sensor of about {wanted:.2g} {unit}{', or hit softer' if share > RANGE_HIGH else ''}."
-            )
-    return advice
+def _range_remark(hits: Sequence[Hit], channel: int) -> Remark | None:
+    name, unit = (("force", "N"), ("acceleration", "m/s^2"))[channel]
+    peaks = [float(np.max(np.abs((hit.force, hit.acceleration)[channel]))) for hit in hits]
+    full = _range(hits[0], channel)
+    share = max(peaks) / full
+    if RANGE_LOW <= share <= RANGE_HIGH:
+        return None
+    too_large = share < RANGE_LOW
+    wanted = 2 * float(np.median(peaks)) if too_large else 2 * max(peaks)
+    return Remark(
+        "range-too-large" if too_large else "range-too-small",
+        name,
+        f"the hits reach {100 * share:.2g} % of the range of {full:.3g} {unit}",
+        f"choose a range or a sensor of about {wanted:.2g} {unit}{'' if too_large else ', or hit softer'}",
+    )

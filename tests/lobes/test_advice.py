@@ -174,7 +174,7 @@ def chart(depth: list[float], speed: NDArray[np.float64] | None = None) -> Stabi
     values = np.array(depth)
     speeds = np.arange(1.0, values.size + 1) * 1000 if speed is None else speed
     return StabilityLobes(
-        speeds, values, np.full(values.shape, 800.0), np.full(values.shape, "hopf"), values[:, None], "made up"
+        speeds, values, np.full(values.shape, 800.0), np.full(values.shape, "hopf"), values[:, None], "zero order"
     )
 
 

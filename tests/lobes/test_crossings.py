@@ -77,7 +77,7 @@ def test_a_short_excursion_below_the_limit_is_seen(modes: list[Mode], speed: flo
     """A flip lobe that ends between two depths of the scan, below a limit that is a third deeper."""
     lobes = stability_boundary(modes, None, FINISHING, speed, 0.17)
     assert (lobes.depth[0], lobes.kind[0]) == (pytest.approx(lowest, rel=0.002), "flip")
-    number = int(lobes.method.split()[1])
+    number = int(lobes.detail.split()[0])
     below, above = spectral_radius(modes, None, FINISHING, speed, lobes.depth[0] * np.array([0.995, 1.005]), number)[0]
     assert below < 1 < above
 

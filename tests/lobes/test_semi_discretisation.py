@@ -196,16 +196,20 @@ def test_intervals_follow_the_fastest_mode_that_matters() -> None:
     assert intervals_needed(X, Y, CUT, 300000.0)[0] >= 40
     assert intervals_needed(X, Y, replace(CUT, immersion=0.001), 300000.0)[0] > 500
     lobes = stability_boundary(X, Y, CUT, [2000.0, 8000.0], 1e-3)
-    assert lobes.method == f"semi-discretisation, {fast} to {slow} intervals a tooth period"
+    assert lobes.method == "semi-discretisation"
+    assert lobes.detail == f"{fast} to {slow} intervals a tooth period"
+    assert lobes.stated_method == f"semi-discretisation, {fast} to {slow} intervals a tooth period"
 
 
 def test_limits_over_radial_depth() -> None:
     found = radial_lobes(lambda cut: stability_boundary(X, Y, cut, SPEEDS, 10e-3), CUT, [0.2, 0.4])
     np.testing.assert_array_equal(found.depth[1], stability_boundary(X, Y, CUT, SPEEDS, 10e-3).depth)
     np.testing.assert_array_equal(found.speed_rpm, SPEEDS)
-    assert (found.depth.shape, found.warning) == ((2, 4), "")
+    assert (found.depth.shape, found.remarks) == ((2, 4), ())
     mean = radial_lobes(lambda cut: zero_order(X, Y, cut, SPEEDS), CUT, [0.4, 0.2])
-    assert "immersion 0.2" in mean.warning
+    (remark,) = mean.remarks
+    assert remark.code == "low-immersion"
+    assert "immersion 0.2" in remark.text
 
 
 @pytest.mark.parametrize(

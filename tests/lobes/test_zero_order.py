@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition import Frf
-from lobes import Cut, average_angle, stability_boundary, zero_order
+from lobes import Cut, StabilityLobes, average_angle, stability_boundary, zero_order
 from lobes.tooth_force import mean_force
 from modal import Mode
 
@@ -110,21 +110,27 @@ def test_many_teeth_make_it_exact() -> None:
     np.testing.assert_allclose(mean.chatter_frequency, exact.chatter_frequency, rtol=1e-3)
 
 
+def codes(found: StabilityLobes) -> list[str]:
+    return [remark.code for remark in found.remarks]
+
+
 def test_low_immersion_is_warned_of() -> None:
     low = Cut(2, 0.1, "down", 6e8, 2e8)
-    assert "use semi-discretisation" in zero_order(BENCHMARK, None, low, 18000).warning
-    assert "use semi-discretisation" in average_angle(BENCHMARK, None, low, 18000).warning
-    assert zero_order(BENCHMARK, None, Cut(2, 0.25, "down", 6e8, 2e8), 13000).warning == ""
-    assert stability_boundary(BENCHMARK, None, low, 18000, 2e-3).warning == ""
+    for method in (zero_order, average_angle):
+        (remark,) = method(BENCHMARK, None, low, 18000).remarks
+        assert (remark.code, remark.cure) == ("low-immersion", "use semi-discretisation")
+    assert zero_order(BENCHMARK, None, Cut(2, 0.25, "down", 6e8, 2e8), 13000).remarks == ()
+    assert stability_boundary(BENCHMARK, None, low, 18000, 2e-3).remarks == ()
 
 
 @pytest.mark.parametrize("band", [(10.0, 590.0), (700.0, 3000.0)])
 def test_an_frf_that_does_not_reach_the_chatter_band_says_so(band: tuple[float, float]) -> None:
     for method in (zero_order, average_angle):
         short = method(frf(X).in_band(band), frf(Y).in_band(band), CUT, SPEEDS)
-        assert "does not reach the chatter band" in short.warning
-        assert f"between {band[0]:g} and {band[1]:g} Hz" in short.warning
-        assert method(frf(X), frf(Y), CUT, SPEEDS / 4).warning == ""
+        (remark,) = short.remarks
+        assert remark.code == "chatter-band-missing"
+        assert f"between {band[0]:g} and {band[1]:g} Hz" in remark.text
+        assert method(frf(X), frf(Y), CUT, SPEEDS / 4).remarks == ()
 
 
 @pytest.mark.parametrize("direction", ["up", "down"])
@@ -137,8 +143,8 @@ def test_fast_teeth_are_warned_of_where_flip_lobes_make_the_limit_lower(directio
         deepest = 6 * mean.minimum.depth
         true = stability_boundary(mode, None, cut, speeds, deepest).depth
         assert bool(np.any(np.minimum(mean.depth, deepest) > 1.1 * true)) == far_off
-        assert ("above 1" in mean.warning, "no flip lobes" in mean.warning) == (far_off, far_off)
-        assert "no flip lobes" not in zero_order(mode, None, cut, speeds / 6).warning
+        assert ("fast-teeth" in codes(mean), "above 1" in str(mean.remarks)) == (far_off, far_off)
+        assert "fast-teeth" not in codes(zero_order(mode, None, cut, speeds / 6))
 
 
 @pytest.mark.parametrize(
@@ -155,17 +161,19 @@ def test_a_force_that_cancels_in_the_one_direction_known_is_warned_of(
     found = zero_order(x, y, cut, speeds)
     true = stability_boundary(x, y, cut, speeds, 6 * found.minimum.depth)
     too_deep = np.max(np.minimum(found.depth, 6 * found.minimum.depth) / true.depth)
-    assert (f"of the force in {axis}" in found.warning) == is_warned
+    assert ("force-cancels" in codes(found)) == is_warned
+    assert (f"of the force in {axis}" in str(found.remarks)) == is_warned
     assert (too_deep > 1.2) == is_warned
-    assert "cancels" not in zero_order(modes, modes, cut, speeds).warning
+    assert "force-cancels" not in codes(zero_order(modes, modes, cut, speeds))
 
 
 def test_a_cancelling_force_is_warned_of_at_every_speed_also_where_fast_teeth_are() -> None:
     """Zero order's limit is more than 10 times the true one far below the speeds of the flip lobes."""
     modes, cut = [Mode(1722.0, 0.029, 3.2e7)], Cut(4, 0.75, "down", 7e8, 2.1e8)
-    fast = zero_order(modes, None, cut, np.linspace(4000.0, 20000.0, 20)).warning
-    assert "of the force in x" in fast
-    assert "no flip lobes: above 1" in fast
+    fast = zero_order(modes, None, cut, np.linspace(4000.0, 20000.0, 20))
+    assert codes(fast) == ["force-cancels", "fast-teeth"]
+    assert "of the force in x" in fast.remarks[0].text
+    assert "no flip lobes: above 1" in fast.remarks[1].text
     slow = zero_order(modes, None, cut, np.linspace(4000.0, 5000.0, 5))
     true = stability_boundary(modes, None, cut, slow.speed_rpm, float(np.min(slow.depth)) / 10)
     assert np.max(true.depth) < np.min(slow.depth) / 10

@@ -49,7 +49,7 @@ def test_in_noise_both_are_found_within_their_errors(ratio: float) -> None:
         assert len(found) == 2
         errors = np.array([mode.standard_error for mode in found])
         assert np.all(np.abs(values(found) - values(pair(ratio))) < 4 * errors)
-        assert all("overlaps with the mode at" in doubt for mode in found for doubt in mode.doubts)
+        assert all({remark.code for remark in mode.remarks} == {"overlaps"} for mode in found)
 
 
 def test_what_is_too_noisy_to_tell_is_said() -> None:
@@ -57,7 +57,7 @@ def test_what_is_too_noisy_to_tell_is_said() -> None:
     for seed in range(12):
         found = between(fit_modes(noisy(pair(1.02), 4e-3, seed)))
         if len(found) == 1:
-            said += any("may be several modes" in doubt for doubt in found[0].doubts)
+            said += any(remark.code == "several-modes" for remark in found[0].remarks)
         else:
             errors = np.array([mode.standard_error for mode in found])
             assert np.all(np.abs(values(found) - values(pair(1.02))) < 5 * errors)

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from acquisition import Frf
-from modal import Mode, fit_points, follow, mac, mode_indicator, synthesize
+from modal import Mode, fit_modes, fit_points, follow, mac, mode_indicator, synthesize
 
 LINES = np.arange(5.0, 4000.0, 5.0)
 SHAPES = np.array([[1.0, 0.5, -0.7], [1.0, -0.8, 0.3], [0.6, 1.0, 0.9]])
 MODES = [Mode(900.0, 0.02, 4e7), Mode(1722.0, 0.03, 3.5e7), Mode(1790.0, 0.03, 5e7)]
 
 
-def points(noise: float = 0.0, seed: int = 0) -> list[Frf]:
-    """Driving point first: the constants of a mode are shape_i shape_0 / K, K that of a shape of 1."""
-    exact = sum(np.outer(shape * shape[0], mode.receptance(LINES)) for shape, mode in zip(SHAPES, MODES, strict=True))
+def points(
+    noise: float = 0.0, seed: int = 0, shapes: NDArray[np.float64] = SHAPES, modes: Sequence[Mode] = MODES
+) -> list[Frf]:
+    """Driving point first: the flexibilities of a mode are shape_i shape_0 / K, K that of a shape of 1."""
+    exact = sum(np.outer(shape * shape[0], mode.receptance(LINES)) for shape, mode in zip(shapes, modes, strict=True))
     random = np.random.default_rng(seed).normal(size=(2, *np.shape(exact)))
     return [Frf(LINES, row) for row in exact + noise * np.max(np.abs(exact)) * (random[0] + 1j * random[1])]
 
@@ -57,6 +61,63 @@ def test_one_frf_is_allowed_and_different_lines_and_none_are_not() -> None:
         fit_points([])
     with pytest.raises(ValueError, match="differ in their frequency lines"):
         fit_points([one, Frf(LINES[1:], one.receptance[1:])])
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3])
+def test_of_one_frf_it_is_the_same_as_fit_modes(noise: float) -> None:
+    (one, *_) = points(noise)
+    found, wanted = fit_points([one]), fit_modes(one)
+    assert len(wanted) == 3
+    for mode, other in zip(found, wanted, strict=True):
+        for name, value in vars(other).items():
+            assert np.array_equal(getattr(mode, name), value), name
+
+
+def test_a_mode_without_a_peak_of_its_own_is_found() -> None:
+    """All points move alike, a third of a half-power width apart: no FRF shows two peaks."""
+    pair = [Mode(1722.0, 0.03, 3.5e7), Mode(1757.0, 0.03, 5e7)]
+    for seed in range(5):
+        found = fit_points(points(4e-4, seed, np.ones((2, 3)), pair))
+        assert len(found) == 2
+        for mode, true in zip(found, pair, strict=True):
+            assert abs(mode.frequency - true.frequency) < 4 * mode.standard_error[0]
+            assert abs(mode.stiffness - true.stiffness) < 4 * mode.standard_error[2]
+            assert mode.shape == pytest.approx([1, 1, 1], abs=0.1)
+            assert [remark.code for remark in mode.remarks] == ["overlaps"]
+
+
+def test_a_weak_mode_on_the_flank_of_a_strong_one_is_found() -> None:
+    pair = [Mode(1500.0, 0.03, 3e7), Mode(1900.0, 0.03, 1.5e9)]
+    for seed in range(5):
+        found = fit_points(points(1e-3, seed, SHAPES[:2], pair))
+        assert [mode.frequency for mode in found] == pytest.approx([1500.0, 1900.0], rel=5e-3)
+
+
+def test_a_stray_line_in_one_of_the_frfs_is_left_out() -> None:
+    clean = points(1e-3, 0, SHAPES[:1], MODES[:1])
+    hum = np.where(LINES == 905.0, 0.2 * np.max(np.abs(clean[0].receptance)), 0.0)
+    with_hum = [clean[0], replace(clean[1], receptance=clean[1].receptance + hum), clean[2]]
+    (found,), (without,) = fit_points(with_hum), fit_points(clean)
+    assert found.standard_error == pytest.approx(without.standard_error, rel=0.3)
+    assert abs(found.frequency - without.frequency) < without.standard_error[0]
+
+
+def test_what_speaks_against_a_mode_is_said() -> None:
+    clean = points(1e-3, 0, SHAPES[:1], MODES[:1])
+    (mode,) = fit_points(clean)
+    assert mode.remarks == ()
+    assert mode.misfit == pytest.approx(1.0, abs=0.25)
+    (cut,) = fit_points(clean, (300.0, 915.0))
+    assert [(remark.code, remark.about) for remark in cut.remarks] == [("cut-by-edge", f"{cut.frequency:.0f} Hz")]
+
+
+def test_a_driving_point_near_a_node_is_said() -> None:
+    still = np.array([SHAPES[0], [0.004, 1.0, -1.0]])
+    modes = [MODES[0], Mode(2600.0, 0.03, 2e5)]
+    sure, unsure = fit_points(points(5e-3, 0, still, modes))
+    assert sure.remarks == ()
+    assert [remark.code for remark in unsure.remarks] == ["near-node"]
+    assert unsure.frequency == pytest.approx(2600.0, rel=1e-3)
 
 
 def test_usable_band_is_the_narrowest() -> None:
@@ -102,19 +163,21 @@ def test_a_slow_change_is_followed_past_a_stronger_neighbour() -> None:
         aged = Mode(1700.0 * 0.996 ** (month + 1), 0.03, 3.5e7)
         found = follow(Mode(1700.0 * 0.996**month, 0.03, 3.5e7), [aged, NEIGHBOUR])
         assert found.mode is aged
-        assert not found.doubt
+        assert not found.remarks
 
 
 def test_the_neighbour_in_place_of_a_mode_that_was_not_found_is_said() -> None:
     found = follow(LAST, [NEIGHBOUR])
     assert found.mode is NEIGHBOUR
-    assert "in doubt, now 1850.0 Hz" in found.doubt
+    assert [(remark.code, remark.about) for remark in found.remarks] == [("large-change", "1850 Hz")]
 
 
 def test_two_that_are_equally_like_it_are_said() -> None:
     found = follow(LAST, [Mode(1660.0, 0.03, 3.5e7), Mode(1745.0, 0.03, 3.5e7)])
+    (remark,) = found.remarks
     assert found.mode is not None
-    assert "1660.0 Hz is nearly as like it" in found.doubt or "1745.0 Hz is nearly as like it" in found.doubt
+    assert (remark.code, remark.about) == ("rival-mode", f"{found.mode.frequency:.0f} Hz")
+    assert ("1745.0" if found.mode.frequency < 1700 else "1660.0") in remark.text
 
 
 def test_the_shape_decides_between_two() -> None:
@@ -127,5 +190,8 @@ def test_the_shape_decides_between_two() -> None:
 
 def test_nothing_near_is_no_mode() -> None:
     assert follow(LAST, []).mode is None
-    assert follow(LAST, [Mode(2600.0, 0.03, 3.5e7)]).doubt.endswith("nearest is 2600.0 Hz")
+    far = follow(LAST, [Mode(2600.0, 0.03, 3.5e7)])
+    assert far.mode is None
+    assert [(remark.code, remark.about) for remark in far.remarks] == [("no-mode-to-follow", "1700 Hz")]
+    assert "2600.0 Hz" in far.remarks[0].text
     assert follow(LAST, [replace(LAST, stiffness=-3.5e7)]).mode is None

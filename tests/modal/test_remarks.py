@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition import Frf, from_accelerance
+from acquisition import Frf, Remark, from_accelerance
 from modal import Mode, fit_modes, synthesize
 
 LINES = np.arange(5.0, 4000.0, 5.0)
@@ -22,16 +22,22 @@ def noisy(modes: list[Mode], level: float = 1e-3, hits: int = 10, seed: int = 0)
     return from_accelerance(LINES, mean, np.abs(mean) ** 2 / np.mean(np.abs(each) ** 2, axis=0), hits)
 
 
-def doubts(frf: Frf, band: tuple[float, float] | None = None) -> str:
+def remarks(mode: Mode) -> dict[str, Remark]:
+    """By code; each says which mode it is about."""
+    assert all(remark.about == f"{mode.frequency:.0f} Hz" for remark in mode.remarks)
+    return {remark.code: remark for remark in mode.remarks}
+
+
+def on_the_only_mode(frf: Frf, band: tuple[float, float] | None = None) -> dict[str, Remark]:
     (mode,) = fit_modes(frf, band)
-    return "; ".join(mode.doubts)
+    return remarks(mode)
 
 
 def test_nothing_speaks_against_a_clean_driving_point() -> None:
     for seed in range(10):
         (mode,) = fit_modes(noisy([MODE], seed=seed))
-        assert mode.doubts == ()
-        assert mode.residue_phase == pytest.approx(0.0, abs=0.05)
+        assert mode.remarks == ()
+        assert mode.modal_constant_phase == pytest.approx(0.0, abs=0.05)
         assert mode.misfit == pytest.approx(1.0, abs=0.25)
         assert mode.coherence == pytest.approx(1.0, abs=1e-3)
         assert mode.half_power_damping == pytest.approx(0.03, rel=0.1)
@@ -40,35 +46,35 @@ def test_nothing_speaks_against_a_clean_driving_point() -> None:
 @pytest.mark.parametrize("swapped", [1, -1])
 def test_a_negative_stiffness_says_so(swapped: int) -> None:
     frf = noisy([MODE])
-    said = doubts(replace(frf, receptance=swapped * frf.receptance))
-    assert ("sign swapped" in said) == (swapped < 0)
+    said = on_the_only_mode(replace(frf, receptance=swapped * frf.receptance))
+    assert set(said) == ({"not-driving-point"} if swapped < 0 else set())
 
 
 @pytest.mark.parametrize("degrees", [-40.0, 40.0])
 def test_a_complex_constant_is_measured_and_said(degrees: float) -> None:
     turned = synthesize([MODE], LINES).receptance * np.exp(1j * np.radians(degrees))
     (mode,) = fit_modes(Frf(LINES, turned))
-    assert mode.residue_phase == pytest.approx(np.radians(degrees), abs=0.05)
-    assert f"{degrees:+.0f}°"[:2] in "; ".join(mode.doubts)
-    assert "off real" in "; ".join(mode.doubts)
+    assert mode.modal_constant_phase == pytest.approx(np.radians(degrees), abs=0.05)
+    assert mode.modal_constant_phase is not None
+    assert f"{np.degrees(mode.modal_constant_phase):+.0f}°" in remarks(mode)["complex-mode"].text
 
 
 def test_low_coherence_is_said() -> None:
     frf = noisy([MODE])
     assert frf.coherence is not None
-    said = doubts(replace(frf, coherence=np.where(np.abs(LINES - 1722) < 100, 0.8, frf.coherence)))
-    assert "coherence 0.80 at its peak, below 0.9" in said
+    said = on_the_only_mode(replace(frf, coherence=np.where(np.abs(LINES - 1722) < 100, 0.8, frf.coherence)))
+    assert "0.80" in said["low-coherence"].text
 
 
 def test_an_edge_through_the_peak_is_said() -> None:
-    assert "cut by the edge of the lines, 500..1750 Hz" in doubts(noisy([MODE]), (500.0, 1750.0))
-    assert "edge" not in doubts(noisy([MODE]), (500.0, 1900.0))
+    assert "500..1750 Hz" in on_the_only_mode(noisy([MODE]), (500.0, 1750.0))["cut-by-edge"].text
+    assert "cut-by-edge" not in on_the_only_mode(noisy([MODE]), (500.0, 1900.0))
 
 
 def test_a_record_too_short_for_the_decay_is_said() -> None:
     (mode,) = fit_modes(synthesize([Mode(1722.0, 0.001, 3.5e7)], LINES))
     left = 100 * np.exp(-2 * np.pi * 0.001 * 1722.0 / 5.0)
-    assert f"{left:.0f} % of it still rings when the record ends" in "; ".join(mode.doubts)
+    assert f"{left:.0f} %" in remarks(mode)["still-ringing"].text
 
 
 def test_what_the_fit_leaves_is_said() -> None:
@@ -76,7 +82,7 @@ def test_what_the_fit_leaves_is_said() -> None:
     (mode, *_) = fit_modes(Frf(LINES, synthesize([MODE], LINES).receptance * clearly))
     assert mode.misfit is not None
     assert mode.misfit > 2
-    assert "times the noise" in "; ".join(mode.doubts)
+    assert f"{mode.misfit:.1f} times" in remarks(mode)["misfit"].text
 
 
 def test_stiffness_of_a_truncated_peak_is_right_within_its_error() -> None:

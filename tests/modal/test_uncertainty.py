@@ -12,7 +12,7 @@ from scipy.stats import norm, t
 from acquisition import Frf, Hit, Structure, estimate_frf, from_accelerance
 from lobewatch.machine.machine_file import parse_machine
 from lobewatch.tap.emulated_spindle import SAMPLE_RATE, emulated_structure
-from modal import Mode, extract, fit_modes, synthesize
+from modal import Mode, extract, fit_modes, fit_points, synthesize
 
 STRONG, WEAK = Mode(1500.0, 0.03, 3e7), Mode(1900.0, 0.03, 1.5e9)
 RECORD, PRE_TRIGGER = 6400, 512
@@ -69,6 +69,37 @@ def test_both_errors_are_in_the_result_and_the_hits_decide() -> None:
     assert mode.standard_error == pytest.approx(np.sqrt(np.diag(mode.jackknife)))
     assert mode.fit_error == pytest.approx(np.sqrt(np.diag(mode.covariance)))
     assert np.all(np.abs(values(mode) - TRUTH) < 4 * mode.standard_error)
+
+
+def test_jackknife_of_several_frfs_leaves_out_one_hit_of_one_at_a_time() -> None:
+    sets = [tap(1), tap(2, hits=6)]
+    frfs = [estimate_frf(hits) for hits in sets]
+    (mode, *_), (bare, *_) = fit_points(frfs, hits=sets), fit_points(frfs)
+    variance = np.zeros(3)
+    for i, hits in enumerate(sets):
+        without = [estimate_frf(hits[:k] + hits[k + 1 :]) for k in range(len(hits))]
+        left = np.array([values(fit_points([*frfs[:i], one, *frfs[i + 1 :]])[0]) for one in without])
+        variance += (1 - 1 / len(hits)) * np.sum((left - left.mean(axis=0)) ** 2, axis=0)
+    assert mode.n_hits == 6
+    assert mode.standard_error == pytest.approx(np.sqrt(variance), rel=0.15)
+    assert bare.jackknife is None
+    assert np.all(mode.fit_error > bare.fit_error)
+
+
+def test_two_frfs_with_hits_are_known_better_than_one() -> None:
+    sets = [tap(1), tap(2)]
+    one, two = first_mode(sets[0]), fit_points([estimate_frf(hits) for hits in sets], hits=sets)[0]
+    assert two.fit_error[0] == pytest.approx(one.fit_error[0] / np.sqrt(2), rel=0.2)
+
+
+def test_hits_of_a_single_frf_of_several_count_without_a_jackknife() -> None:
+    sets = [tap(1), tap(2)]
+    frfs = [estimate_frf(hits) for hits in sets]
+    some, none = fit_points(frfs, hits=[sets[0], []])[0], fit_points(frfs)[0]
+    assert some.jackknife is None
+    assert some.fit_error[0] > none.fit_error[0]
+    with pytest.raises(ValueError, match="hits of 1 FRFs for 2"):
+        fit_points(frfs, hits=sets[:1])
 
 
 def test_jackknife_is_that_of_refitted_frfs() -> None:
@@ -175,7 +206,7 @@ def test_95_percent_intervals_of_tap_tests_hold_the_truth(n_hits: int, hammer_no
 
 def correlation_of_neighbouring_lines(hits: list[Hit]) -> float:
     """Of what the fit of the first mode leaves, weighted."""
-    state = extract(estimate_frf(hits))
+    state = extract([estimate_frf(hits)])
     left = state.left(state.bands[0]) * state.weight[state.bands[0].lines]
     return float(np.real(np.vdot(left[:-1], left[1:])) / np.linalg.norm(left) ** 2)
 

@@ -49,7 +49,7 @@ def test_example_4_3_limits_at_five_speeds() -> None:
     lobes = average_angle([MODE], None, slot(), [3000, 4500, 6000, 7400, 9000])
     assert lobes.depth * 1e3 == pytest.approx([0.8489, 0.6032, 3.5954, 8.8163, 0.6884], abs=5e-5)
     assert list(lobes.kind) == ["hopf"] * 5
-    assert lobes.method == "average tooth angle"
+    assert lobes.method == "average angle"
 
 
 @pytest.mark.parametrize("lobe", [0, 1, 2, 3, 20])

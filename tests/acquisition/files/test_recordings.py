@@ -112,7 +112,10 @@ def write(path: Path, text: str) -> Path:
         ("time_s,force_N,acc_furlong\n" + "".join(f"{i},1,2\n" for i in range(9)), "acc_furlong"),
         ("time_s,force_N,acc_g\n0,1,2\n1,2,3\n", "2 samples; at least 8 are needed"),
         ("Freq Real Imag\n1 2 nan\n2 3 4\n", "not finite"),
-        ("\x00\x01\x02garbage", "neither HDF5 nor LVM nor a text table"),
+        (
+            "\x00\x01\x02garbage",
+            r"of no format that is known here; export it as one of these: tap file of lobewatch \(\.h5\), LabVIEW",
+        ),
     ],
 )
 def test_broken_tables_are_refused_with_file_and_place(tmp_path: Path, text: str, message: str) -> None:

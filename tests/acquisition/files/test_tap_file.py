@@ -181,7 +181,7 @@ def test_a_full_disk_leaves_the_old_file_and_no_litter(
 
 def test_a_direction_that_is_none_and_a_time_without_zone_are_refused() -> None:
     with pytest.raises(ValueError, match="direction='z'"):
-        replace(ABOUT, direction="z")
+        replace(ABOUT, direction="z")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="no time zone"):
         replace(ABOUT, created=datetime(2026, 1, 1))  # noqa: DTZ001
 

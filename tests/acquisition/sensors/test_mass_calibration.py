@@ -84,7 +84,8 @@ def test_right_sensitivities_agree(true_hits: list[Hit]) -> None:
     assert 2000 < found.band[1] < 4000
     assert found.agrees
     assert found.n_hits == 10
-    assert found.texts[-1] == "Both sensitivities agree within 5%."
+    assert found.remarks == ()
+    assert str(found).endswith("\nBoth sensitivities agree within 5%.")
 
 
 def test_a_force_sensitivity_believed_too_small_reads_the_force_too_large(true_hits: list[Hit]) -> None:
@@ -107,7 +108,9 @@ def test_an_acceleration_sensitivity_believed_too_small_reads_the_acceleration_t
 def test_a_wrong_mass_counts_like_a_wrong_sensitivity(true_hits: list[Hit]) -> None:
     plain, heavy = calibrate_by_mass(true_hits, MASS), calibrate_by_mass(true_hits, 1.25 * MASS)
     assert heavy.ratio == pytest.approx(plain.ratio / 1.25, rel=1e-9)
-    assert "with accelerometer and mount?" in heavy.texts[-1]
+    (remark,) = heavy.remarks
+    assert remark.code == "sensitivities-disagree"
+    assert "with accelerometer and mount?" in remark.cure
 
 
 @given(st.floats(0.01, 100), st.floats(0.01, 100))
@@ -129,7 +132,7 @@ def test_opposite_signs_are_said(true_hits: list[Hit]) -> None:
     assert not found.agrees
     assert found.ratio == pytest.approx(1, abs=2e-3)
     assert abs(found.phase) < 0.5
-    assert "opposite signs" in found.texts[1]
+    assert [remark.code for remark in found.remarks] == ["opposite-signs"]
 
 
 def test_the_foot_of_a_mounts_resonance_does_not_bend_the_ratio() -> None:
@@ -164,12 +167,16 @@ def test_the_standard_error_is_that_over_the_hits() -> None:
     ],
 )
 def test_unit_mistakes_are_named(true_hits: list[Hit], force: float, acceleration: float, words: str) -> None:
-    assert words in str(calibrate_by_mass(misread(true_hits, force, acceleration), MASS))
+    found = calibrate_by_mass(misread(true_hits, force, acceleration), MASS)
+    assert [remark.code for remark in found.remarks] == ["sensitivities-disagree", "unit-mistake"]
+    assert words in str(found)
 
 
 def test_a_skewed_phase_is_said(true_hits: list[Hit]) -> None:
     skewed = [replace(hit, channels=(TRUE[0], replace(TRUE[1], skew=60e-6))) for hit in true_hits]
-    assert "is not that of a rigid mass: measure the skew" in str(calibrate_by_mass(skewed, MASS))
+    (remark,) = calibrate_by_mass(skewed, MASS).remarks
+    assert remark.code == "phase-not-rigid"
+    assert "is not that of a rigid mass; measure the skew" in str(remark)
 
 
 def test_bad_calls_are_refused(true_hits: list[Hit]) -> None:

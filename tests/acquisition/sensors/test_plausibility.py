@@ -37,22 +37,26 @@ def test_real_sensors_are_believed(quantity: str, sensitivity: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("channel", "words"),
+    ("channel", "code", "words", "cure"),
     [
-        (Channel("acceleration", 100.0, 5.0), "a sensitivity of 100 V per m/s^2 is not believed, did you mean mV?"),
-        (Channel("force", 2.25, 5.0), "a sensitivity of 2.25 V per N is not believed, did you mean mV?"),
-        (Channel("force", 2.25e-6, 5.0), "2.25e-06 V per N is not believed, was it divided by 1000 twice?"),
+        (Channel("acceleration", 100.0, 5.0), "sensitivity", "100 V per m/s^2 is not believed", "did you mean mV?"),
+        (Channel("force", 2.25, 5.0), "sensitivity", "2.25 V per N is not believed", "did you mean mV?"),
+        (Channel("force", 2.25e-6, 5.0), "sensitivity", "2.25e-06 V per N", "was it divided by 1000 twice?"),
         (
             Channel("acceleration", 1e9, 5.0),
+            "sensitivity",
             "1e+09 V per m/s^2 is not believed (accelerometers have 1 to 1000 mV/g without gain)",
+            "",
         ),
-        (Channel("force", 2.25e-3, 5000.0), "a range of ±5000 V is not believed, did you mean mV?"),
+        (Channel("force", 2.25e-3, 5000.0), "input-range", "±5000 V is not believed", "did you mean mV?"),
     ],
 )
-def test_a_sensitivity_or_range_that_no_device_has_is_not_believed(channel: Channel, words: str) -> None:
+def test_a_sensitivity_or_range_that_no_device_has_is_not_believed(
+    channel: Channel, code: str, words: str, cure: str
+) -> None:
     (doubt,) = channel_doubts(channel)
-    assert words in doubt
-    assert doubt.startswith(f"{channel.quantity}: ")
+    assert (doubt.code, doubt.about, doubt.cure) == (f"{code}-not-believed", channel.quantity, cure)
+    assert words in doubt.text
 
 
 @given(st.floats(0.11, 24), st.sampled_from([1, -1]))
@@ -74,22 +78,25 @@ def test_a_believed_hammer_entered_in_millivolts_is_caught(millivolts: float, si
 )
 @given(st.floats(0.9, 1.1))
 def test_a_ratio_near_a_unit_mistake_names_it(factor: float, word: str, off: float) -> None:
-    assert word in unit_mistake(factor * off)
+    found = unit_mistake(factor * off)
+    assert found is not None
+    assert found.code == "unit-mistake"
+    assert word in found.cure
 
 
 @given(st.floats(0.3, 3.5))
 def test_a_ratio_far_from_all_names_none(ratio: float) -> None:
-    assert unit_mistake(ratio) == ""
+    assert unit_mistake(ratio) is None
 
 
 @pytest.mark.parametrize("stiffness", [1e5, 3.5e7, -3.5e7, 1e10])
 def test_stiffnesses_of_machine_tools_are_believed(stiffness: float) -> None:
-    assert stiffness_doubt(stiffness) == ""
+    assert stiffness_doubt(stiffness) is None
 
 
 @pytest.mark.parametrize("stiffness", [3.5e4, 3.5e10, -9e4])
 def test_other_stiffnesses_are_not(stiffness: float) -> None:
-    assert f"K = {stiffness:.3g} N/m is outside 100000 to 1e+10" in stiffness_doubt(stiffness)
+    assert f"K = {stiffness:.3g} N/m is outside 100000 to 1e+10" in str(stiffness_doubt(stiffness))
 
 
 @pytest.mark.parametrize(("stiffness", "noted"), [(3.5e7, False), (3.5e4, True)])
@@ -97,17 +104,31 @@ def test_a_measurement_whose_stiffness_is_not_believed_says_so(stiffness: float,
     machine = parse_machine(resources.files("sim_data").joinpath("new_machine.toml").read_text("utf-8"))
     frf = synthesize([Mode(1500.0, 0.03, stiffness)], np.arange(4.0, 4000.0, 4.0))
     measurement = measure(TapTest("t", Circumstances("mill", datetime(2026, 1, 15, tzinfo=UTC)), frf), machine)
-    assert ("stiffness-implausible" in [remark.code for remark in measurement.remarks]) is noted
+    assert ("stiffness-not-believed" in [remark.code for remark in measurement.remarks]) is noted
 
 
-def test_the_date_of_calibration() -> None:
-    assert calibration_doubt(HAMMER, TODAY) == ""
-    assert "calibrated 2026-01-15, 10 months ago (interval 6)" in calibration_doubt(HAMMER, TODAY, 6)
-    assert calibration_doubt(HAMMER, date(2027, 1, 15)) == ""
-    assert "12 months ago (interval 12)" in calibration_doubt(HAMMER, date(2027, 1, 16))
-    assert "not known" in calibration_doubt(replace(HAMMER, calibration_date=""), TODAY)
-    assert calibration_doubt(HAMMER, date(2026, 1, 15)) == ""
-    with pytest.raises(ValueError, match=r"2026-01-15 lies in the future \(today is 2026-01-14\)"):
-        calibration_doubt(HAMMER, date(2026, 1, 14))
-    with pytest.raises(ValueError, match=r"'15\.1\.26' is no date; give YYYY-MM-DD"):
-        calibration_doubt(replace(HAMMER, calibration_date="15.1.26"), TODAY)
+@pytest.mark.parametrize(
+    ("calibrated", "today", "months", "code", "words"),
+    [
+        ("2026-01-15", TODAY, 12.0, "", ""),
+        ("2026-01-15", TODAY, 6.0, "calibration-old", "calibrated 2026-01-15, 10 months ago (interval 6)"),
+        ("2026-01-15", date(2027, 1, 15), 12.0, "", ""),
+        ("2026-01-15", date(2027, 1, 16), 12.0, "calibration-old", "12 months ago (interval 12)"),
+        ("", TODAY, 12.0, "calibration-unknown", "not known; enter it"),
+        ("2026-01-15", date(2026, 1, 15), 12.0, "", ""),
+        ("2026-01-15", date(2026, 1, 14), 12.0, "calibration-in-future", "in the future (today is 2026-01-14)"),
+        ("15.1.26", TODAY, 12.0, "calibration-no-date", "'15.1.26' is no date; give YYYY-MM-DD"),
+    ],
+)
+def test_the_date_of_calibration(calibrated: str, today: date, months: float, code: str, words: str) -> None:
+    found = calibration_doubt(replace(HAMMER, calibration_date=calibrated), today, months)
+    assert (found.code if found else "") == code
+    assert words in str(found or "")
+    assert found is None or found.about == "force"
+
+
+@pytest.mark.parametrize("direction", ["z", "X", "xy"])
+def test_a_channel_of_no_direction_of_the_tool_tip_is_refused(direction: str) -> None:
+    with pytest.raises(ValueError, match=f"direction='{direction}' is none of x, y"):
+        replace(HAMMER, direction=direction)  # type: ignore[arg-type]
+    assert [replace(HAMMER, direction=one).direction for one in ("", "x", "y")] == ["", "x", "y"]

@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id
+from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
 from lobes import Program, ProgramLimit, program_limit, read_history, write_history, zero_order
 from lobewatch import Logbook
 from lobewatch.analysis import Measurement, Word, compare_lobes, measure
@@ -61,7 +61,7 @@ def add_programs(path: Path, text: str) -> None:
     toml.write_text(f"{head}{text}\n{mark}{tail}", "utf-8")
 
 
-def tap(path: Path, days: float, frequency: float, direction: str = "x", tool: str = "reference") -> None:
+def tap(path: Path, days: float, frequency: float, direction: TapDirection = "x", tool: str = "reference") -> None:
     folder = MachineFolder(path)
     about = Circumstances("m", START + timedelta(days=days), tool, direction, "", folder.toml.read_text("utf-8"))
     frf = synthesize([Mode(frequency, 0.029136, 3.48e7)], LINES)
@@ -73,7 +73,7 @@ def run(*arguments: object) -> Result:
 
 
 @pytest.fixture
-def analysed(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+def analysed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Identities of the tap tests analysed from now on."""
     found: list[str] = []
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id
+from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
 from lobes import (
     Cut,
     DepthBand,
@@ -68,7 +68,7 @@ def folder(tmp_path: Path) -> MachineFolder:
 
 
 def tap(
-    folder: MachineFolder, frequency: float, days: float = 0.0, direction: str = "x", stiffness: float = 3.5e7
+    folder: MachineFolder, frequency: float, days: float = 0.0, direction: TapDirection = "x", stiffness: float = 3.5e7
 ) -> None:
     when = START + timedelta(days=days)
     about = Circumstances("m", when, "reference", direction, "", folder.toml.read_text("utf-8"))
@@ -214,7 +214,8 @@ def test_methods_pockets_and_shifts(run: Run, folder: MachineFolder) -> None:
     )
     assert zero["minimum_depth_mm"] == pytest.approx(2 * angle["minimum_depth_mm"], rel=1e-6)
     assert zero["minimum_depth_mm"] == pytest.approx(semi["minimum_depth_mm"], rel=0.01)
-    assert semi["method"].startswith("semi-discretisation, ")
+    assert semi["method"] == "semi-discretisation"
+    assert semi["method_detail"].endswith(" intervals a tooth period")
     shifts = zero["pocket_shifts"]
     assert len(shifts) >= 3
     step = 21000 / 299

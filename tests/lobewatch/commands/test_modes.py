@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 from matplotlib.text import Annotation
 
-from acquisition import Frf, from_accelerance
+from acquisition import Frf, Remark, from_accelerance
+from lobewatch.analysis import remarks_on_all
 from lobewatch.cli import main
-from lobewatch.show.describe import doubt_lines, mode_lines, mode_table, picked_table
+from lobewatch.show.describe import mode_lines, mode_table, picked_table, remark_lines
 from lobewatch.show.figures_modes import modes_figure
 from lobewatch.show.output import results
 from modal import Mode, extract, fit_modes, pick_peaks, synthesize
@@ -34,21 +35,22 @@ def command(monkeypatch: pytest.MonkeyPatch, *args: str) -> int:
     return int(str(end.value.code or 0))
 
 
-def test_report_of_a_table_has_percent_correlation_and_doubts(capsys: pytest.CaptureFixture[str]) -> None:
+def test_report_of_a_table_has_percent_correlation_and_remarks(capsys: pytest.CaptureFixture[str]) -> None:
     covariance = np.array([[4.0, 0, 0], [0, 9e-8, -0.8 * 3e-4 * 7e5], [0, -0.8 * 3e-4 * 7e5, 4.9e11]])
-    mode = Mode(1722.0, 0.03, 3.5e7, covariance, doubts=("a reason",))
+    mode = Mode(1722.0, 0.03, 3.5e7, covariance, remarks=(Remark("a-code", "1722 Hz", "a reason", "a cure"),))
+    other = Mode(900.0, 0.03, -1e7, remarks=(Remark("a-code", "900 Hz", "a reason", "a cure"),))
     with results.capture() as shown:
         results.print(mode_table([mode]))
     assert "1722.0 ± 2.0 (0.12 %)" in shown.get()
     assert "35.00 ± 0.70 (2 %)" in shown.get()
     assert mode_lines([mode]) == ["correlation of the errors of zeta and K: -0.80 (1722 Hz)"]
-    assert doubt_lines([mode, Mode(900.0, 0.03, -1e7, doubts=("a reason",))]) == ["doubt at 1722, 900 Hz: a reason"]
+    assert remark_lines([mode, other], [Remark("whole", "", "all")]) == ["1722 Hz, 900 Hz: a reason; a cure", "all"]
 
 
 def test_every_negative_stiffness_is_a_swapped_sign() -> None:
     both = [Mode(900.0, 0.02, -4e7), Mode(1722.0, 0.03, -3.5e7)]
-    assert any("every K is negative" in line for line in doubt_lines(both))
-    assert not any("every K is negative" in line for line in doubt_lines(MODES))
+    assert [remark.code for remark in remarks_on_all(both)] == ["sign-swapped"]
+    assert remarks_on_all(MODES) == []
 
 
 def test_peak_picking_is_held_against_the_fit() -> None:
@@ -63,7 +65,7 @@ def test_peak_picking_is_held_against_the_fit() -> None:
 
 def test_figure_draws_fit_residual_poles_and_circles() -> None:
     frf = noisy()
-    state, modes = extract(frf), fit_modes(frf)
+    state, modes = extract([frf]), fit_modes(frf)
     figure = modes_figure(state, modes, "x")
     top, chart, *circles = figure.axes
     assert len(circles) == len(modes) == 2
@@ -82,7 +84,7 @@ def test_figure_draws_fit_residual_poles_and_circles() -> None:
 
 def test_figure_keeps_labels_of_close_modes_apart() -> None:
     close = [Mode(1700.0, 0.01, 4e7), Mode(1704.0, 0.01, 4e7), Mode(1706.0, 0.01, 4e7)]
-    top = modes_figure(extract(noisy()), close, "x").axes[0]
+    top = modes_figure(extract([noisy()]), close, "x").axes[0]
     places = [label.xy[0] for label in top.texts if isinstance(label, Annotation)]
     assert places[0] == 1700.0
     assert np.all(np.diff(places) >= 0.01 * (LINES[-1] - LINES[0]))
@@ -96,9 +98,11 @@ def test_command_says_where_a_peak_may_be_cut(
     table = np.stack([frf.frequency, frf.receptance.real, frf.receptance.imag], axis=1)
     np.savetxt(file, table, header="Freq Real Imag", comments="")
     assert command(monkeypatch, str(file)) == 0
-    assert "a peak may be cut by the edge of the lines at 1725 Hz" in capsys.readouterr().out
+    printed = capsys.readouterr().out
     assert command(monkeypatch, str(file), "--json") == 0
-    assert "1725 Hz" in json.loads(capsys.readouterr().out)["notes"][0]
+    remarks = json.loads(capsys.readouterr().out)["remarks"]
+    assert [(one["code"], one["about"]) for one in remarks] == [("mode-missing-at-edge", "1725 Hz"), ("no-mode", "")]
+    assert f"1725 Hz: {remarks[0]['text']}; {remarks[0]['cure']}" in printed
 
 
 def test_command_corrects_an_exponential_window_and_draws(
@@ -110,7 +114,7 @@ def test_command_corrects_an_exponential_window_and_draws(
     np.savetxt(file, table, header="Freq Real Imag", comments="")
     assert command(monkeypatch, str(file), "--json") == 0
     plain = json.loads(capsys.readouterr().out)["modes"][1]
-    assert plain["doubts"][0].startswith("K is negative")
+    assert [(remark["code"], remark["about"]) for remark in plain["remarks"]] == [("not-driving-point", "1722 Hz")]
     assert plain["interval_95"][0][0] < 1722 < plain["interval_95"][0][1]
     picture = tmp_path / "modes.png"
     assert command(monkeypatch, str(file), "--json", "--window", "0.1", "--figure", str(picture)) == 0

@@ -119,7 +119,8 @@ def test_the_list_names_channels_rate_and_doubts(sensors: Sensors, folder: Machi
     assert re.search(r"1 +acceleration +9\.807e\+05 mV/g +±0\.005099 g +±5 V +16 +0 +- +-", out)
     assert re.search(r"rate: 102400 Hz, measured 102[34]\d\d(\.\d)? ± \d+", out)
     assert "warning: force: calibrated 2020-01-15, " in out
-    assert "warning: acceleration: a sensitivity of 100 V per m/s^2 is not believed, did you mean mV?" in out
+    assert "warning: acceleration: a sensitivity of 100 V per m/s^2 is not believed (accelerometers have " in out
+    assert "without gain); did you mean mV?" in out
     assert "warning: acceleration: date of calibration not known" in out
     assert "102400.0" in (folder.path / "daq.json").read_text()
 
@@ -139,7 +140,10 @@ def test_a_date_in_the_future_is_an_error(sensors: Sensors) -> None:
     assert [channel["quantity"] for channel in said["channels"]] == ["force", "acceleration"]
     assert said["channels"][0]["full_scale_si"] == pytest.approx(2222.2, abs=0.1)
     assert said["sample_rate_hz"] == RATE
-    assert "2999-01-15 lies in the future" in said["errors"][0]
+    (error,) = said["errors"]
+    assert (error["code"], error["about"]) == ("calibration-in-future", "force")
+    assert "2999-01-15 lies in the future" in error["text"]
+    assert error in said["remarks"]
 
 
 def test_a_device_at_half_its_rate_is_refused(
@@ -153,7 +157,7 @@ def test_a_device_at_half_its_rate_is_refused(
         with pytest.raises(SystemExit) as end:
             main()
     assert end.value.code == 2
-    assert "not 50000: every frequency would be" in capsys.readouterr().out
+    assert re.search("error: the DAQ delivers .* not 50000: every frequency would be", capsys.readouterr().out)
     assert not (folder.path / "daq.json").exists()
 
 
@@ -183,7 +187,7 @@ def test_json_of_a_hung_mass(sensors: Sensors) -> None:
     said = json.loads(out)
     assert said["ratio"] == pytest.approx(1, abs=4 * said["ratio_std"])
     assert said["hits"] == 10
-    assert said["agrees"] is True
+    assert (said["agrees"], said["remarks"]) == (True, [])
     assert said["force_sensitivity_v_per_n"] == pytest.approx(2.25e-3, rel=2e-3)
 
 

@@ -125,6 +125,32 @@ def test_every_mistake_is_told_with_its_place(old: str, new: str, message: str) 
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("escaped", ["\\u001b", "\\u0000", "\\n", "\\t", "\\u007f", "\\u009b", "\\u2028"])
+@pytest.mark.parametrize(
+    ("old", "place"),
+    [
+        ('name = "MACHINE_NAME"', "machine: name='x"),
+        ('tool = "reference"', "tap: tool='x"),
+        ('name = "A: slot at 12 900 rpm"', "program 1: name='x"),
+        ('name = "long end mill"', "tool 1: name='x"),
+        ("length_mm = 26.5", "spindle: segment 1: material='x"),
+    ],
+)
+def test_control_characters_in_names_are_refused_with_their_place(old: str, place: str, escaped: str) -> None:
+    key = old.split(" ")[0].replace("length_mm", "material")
+    with pytest.raises(DataError) as caught:
+        parse_machine(EXAMPLE.replace(old, f'{key} = "x{escaped}y"', 1))
+    assert str(caught.value).startswith(f"machine.toml: {place}")
+    assert "holds the control character '\\" in str(caught.value)
+    assert str(caught.value).isprintable()
+
+
+def test_control_characters_in_a_material_are_refused() -> None:
+    material = '[[material]]\nname = "soft\\u001b"\ntangential_n_per_mm2 = 1500\nradial_n_per_mm2 = 500\n'
+    with pytest.raises(DataError, match=r"material 1: name='soft.*' holds the control character"):
+        parse_machine(f"{EXAMPLE}\n{material}")
+
+
 def test_materials_have_names_of_their_own() -> None:
     material = '[[material]]\nname = "my steel"\ntangential_n_per_mm2 = 1500\nradial_n_per_mm2 = 500\n'
     assert len(parse_machine(f"{EXAMPLE}\n{material}").material) == 1

@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection
 from acquisition import Frf
 from lobewatch.analysis import Verdict, Word
 from lobewatch.machine import Limits, ProgramTable
-from lobewatch.show.figures import frf_figure, svg, trend_figure
+from lobewatch.show.figures import frf_figure, new_axes, svg, trend_figure
 from lobewatch.show.figures_lobes import lobes_figure
 
 TIMES = [datetime(2026, month, 1, tzinfo=UTC) for month in (1, 2, 3)]
@@ -32,12 +32,15 @@ def test_bars_are_the_95_percent_interval() -> None:
     assert (low, high) == pytest.approx((1700 - 3.92, 1700 + 3.92))
 
 
+def chattering(name: str) -> Verdict:
+    cut = {"teeth": 2, "radial_depth_mm": 5, "tool_diameter_mm": 10, "direction": "up", "material": "any"}
+    program = ProgramTable(name=name, speed_rpm=1500.0, depth_mm=3.0, **cut)  # type: ignore[arg-type]
+    return Verdict(program, Word.NOT_STABLE)
+
+
 def test_lobes_are_drawn_in_mm_and_programs_where_they_cut() -> None:
     speed = np.linspace(1000.0, 2000.0, 5)
-    cut = {"teeth": 2, "radial_depth_mm": 5, "tool_diameter_mm": 10, "direction": "up", "material": "any"}
-    program = ProgramTable(name="A", speed_rpm=1500.0, depth_mm=3.0, **cut)  # type: ignore[arg-type]
-    verdict = Verdict(program, Word.NOT_STABLE)
-    figure = lobes_figure(speed, {"then": np.full(5, 2e-3), "now": np.full(5, 1e-3)}, [verdict])
+    figure = lobes_figure(speed, {"then": np.full(5, 2e-3), "now": np.full(5, 1e-3)}, [chattering("A")])
     then, now, mark = figure.axes[0].lines
     assert then.get_ydata() == pytest.approx(2.0)
     assert now.get_ydata() == pytest.approx(1.0)
@@ -51,3 +54,18 @@ def test_receptance_is_drawn_in_nm_per_n() -> None:
     real, imaginary = (axes.lines[0].get_ydata() for axes in figure.axes)
     assert real == pytest.approx(2.0)
     assert imaginary == pytest.approx(-5.0)
+
+
+@pytest.mark.parametrize("name", [r"cost $5 to $6 \frac", r"cost $5 \frac to $6", "$x$", r"a_b^c \$ $"])
+def test_no_name_is_read_as_a_formula(name: str) -> None:
+    speed = np.linspace(1000.0, 2000.0, 5)
+    picture = svg(lobes_figure(speed, {name: np.full(5, 1e-3)}, [chattering(name)], title=name))
+    assert picture.count(f">{name}</text>") == 3
+
+
+def test_logarithmic_axes_have_plain_numbers() -> None:
+    figure, (axes,) = new_axes(1, (4.0, 3.0))
+    axes.semilogy([1.0, 2.0], [1e-3, 100.0])
+    picture = svg(figure)
+    assert "$" not in picture
+    assert [f">{label}</text>" in picture for label in ("1e\u221203", "1e\u221201", "1", "100")] == [True] * 4

@@ -17,6 +17,7 @@ from acquisition import (
     Hit,
     RunningMean,
     SimulatedSource,
+    TapDirection,
     TapTest,
     Trigger,
     capture_hits,
@@ -44,7 +45,7 @@ def folder(tmp_path: Path) -> MachineFolder:
 
 
 def tapped(
-    folder: MachineFolder, days: float, frequency: float, direction: str = "x", stiffness: float = 3e8
+    folder: MachineFolder, days: float, frequency: float, direction: TapDirection = "x", stiffness: float = 3e8
 ) -> Outcome:
     about = Circumstances("m", START + timedelta(days=days), "reference", direction)
     frf = synthesize([Mode(frequency, 0.03, stiffness)], LINES)

@@ -112,17 +112,20 @@ def test_ranges_that_do_not_fit_are_told_with_the_one_that_would(channels: Pair)
     soft = Trial(TapSetup(), baseline(channels))
     for _ in range(2):
         soft.add(hit(channels, 0.03, peak=20.0))
-    assert "reach 0.9 % of the force range of 2.22e+03 N: choose a range or a sensor of about 40 N." in soft.text
+    assert [(remark.code, remark.about) for remark in soft.remarks] == [("range-too-large", "force")]
+    assert (
+        "force: the hits reach 0.9 % of the range of 2.22e+03 N; choose a range or a sensor of about 40 N." in soft.text
+    )
     hard = Trial(TapSetup(), baseline(channels))
     for _ in range(2):
         hard.add(hit(channels, 0.03, peak=2100.0))
-    assert "of the force range" in hard.text
+    assert [(remark.code, remark.about) for remark in hard.remarks] == [("range-too-small", "force")]
     assert "or hit softer" in hard.text
     coarse = (channels[0], replace(channels[1], full_scale=500.0))
     weak = Trial(TapSetup(), baseline(coarse))
     for _ in range(2):
         weak.add(hit(coarse, 0.03))
-    assert "% of the acceleration range" in weak.text
+    assert [(remark.code, remark.about) for remark in weak.remarks] == [("range-too-large", "acceleration")]
 
 
 def test_a_double_hit_is_no_trial_hit(channels: Pair) -> None:

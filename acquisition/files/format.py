@@ -1,0 +1,35 @@
+"""What makes a kind of recorded file readable: a record, not a base class."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from acquisition.frf import Frf
+from acquisition.hit import Hit
+from acquisition.tap import Circumstances
+
+
+def _says_nothing(_path: Path) -> None:
+    """Of when, where and by whom it was recorded."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """One kind of recorded file. Its functions raise DataError, with the path and the place, for a damaged one."""
+
+    name: str
+    """Short name, in lower case, of its own among all formats."""
+    title: str
+    """What people call it."""
+    extensions: tuple[str, ...]
+    """How names of such files mostly end, with the dot: for messages only, a file is told by its content."""
+    is_it: Callable[[bytes, Path], bool]
+    """Whether a file is of this kind, from its first 4096 bytes (it has at least one) and, where need be, all of it."""
+    read: Callable[[Path], list[Hit] | Frf]
+    """Its hits in SI units, at least one, or the FRF where it holds only that."""
+    recorded_as: Callable[[Path], Circumstances | None] = _says_nothing
+    """What it says of when, where and by whom it was recorded; None where it says nothing."""
+    read_frf: Callable[[Path], Frf] | None = None
+    """The FRF that it holds beside its hits; None where it is to be estimated from them."""

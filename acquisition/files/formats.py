@@ -1,0 +1,78 @@
+"""The formats that can be read: our own and those of other packages (entry points in the group "lobewatch.formats")."""
+
+from __future__ import annotations
+
+import functools
+import logging
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+
+from acquisition.errors import DataError
+from acquisition.files.format import Format
+from acquisition.files.read_csv import TEXT_TABLE
+from acquisition.files.read_lvm import LVM
+from acquisition.files.tap_recording import TAP_FILE
+
+GROUP = "lobewatch.formats"
+"""Entry points that each name one Format."""
+BUILT_IN = (TAP_FILE, LVM, TEXT_TABLE)
+"""The table last: it takes any text."""
+HEAD = 4096
+"""Bytes at the start of a file that a format is asked with."""
+
+_log = logging.getLogger(__name__)
+
+
+def known_formats() -> tuple[Format, ...]:
+    """All formats in the order in which they are asked: those of other packages, which know their own files, first."""
+    return (*_of_others()[0], *BUILT_IN)
+
+
+def format_of(path: Path) -> Format:
+    """The format of a file by its content; DataError for one that is empty or of no known format."""
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+    if not head:
+        raise DataError(f"{path}: the file is empty")
+    for one in known_formats():
+        if _is_it(one, head, path):
+            return one
+    known = ", ".join(f"{one.title} ({', '.join(one.extensions)})" for one in known_formats())
+    raise DataError(f"{path}: of no format that is known here; export it as one of these: {known}{broken_formats()}")
+
+
+def broken_formats() -> str:
+    """What is wrong with formats of other packages, to be added to the error of a file; empty where nothing is."""
+    return "".join(f"; {fault}" for fault in _of_others()[1])
+
+
+def _is_it(one: Format, head: bytes, path: Path) -> bool:
+    try:
+        return one.is_it(head, path)
+    except Exception as error:  # noqa: BLE001 - code of others may raise anything; the other formats are asked still
+        _log.warning("%s: format %r could not be asked (%s: %s)", path, one.name, type(error).__name__, error)
+        return False
+
+
+@functools.cache
+def _of_others() -> tuple[tuple[Format, ...], tuple[str, ...]]:
+    """Formats of other packages, and what is wrong with those that cannot be used."""
+    found: list[Format] = []
+    faults: list[str] = []
+    for point in sorted(entry_points(group=GROUP), key=lambda one: one.name):
+        try:
+            found.append(_loaded(point, [*BUILT_IN, *found]))
+        except Exception as error:  # noqa: BLE001 - code of others may raise anything; our own formats still work
+            package = point.dist.name if point.dist else "not known"
+            reason = f"{type(error).__name__}: {error}"
+            faults.append(f"format {point.name!r} of package {package!r} is broken ({reason}): update or remove it")
+    return tuple(found), tuple(faults)
+
+
+def _loaded(point: EntryPoint, known: list[Format]) -> Format:
+    loaded = point.load()
+    if not isinstance(loaded, Format):
+        raise TypeError(f"{point.value} is a {type(loaded).__name__}, not an acquisition.Format")
+    if loaded.name in [one.name for one in known]:
+        raise ValueError(f"a format called {loaded.name!r} is there already; give it a name of its own")
+    return loaded

@@ -1,0 +1,39 @@
+"""Our own tap files, as recordings like any other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from acquisition.files.format import Format
+from acquisition.files.tap_file import read_tap, read_tap_hits
+from acquisition.frf import Frf
+from acquisition.hit import Hit, HitFlags
+from acquisition.tap import Circumstances
+
+MAGIC = b"\x89HDF\r\n\x1a\n"
+_BEYOND_THE_SIGNALS = HitFlags.UNDONE | HitFlags.INCONSISTENT | HitFlags.NARROW_BAND
+
+
+def read_tap_recording(path: Path) -> list[Hit] | Frf:
+    """The hits of a tap file but for those that their own time signals do not speak against and that were refused all
+    the same: taken back, of another spot, of a force that does not reach far enough. The FRF where none is left."""
+    hits, _, flags = read_tap_hits(path)
+    kept = [hit for hit, flag in zip(hits, flags, strict=True) if not flag & _BEYOND_THE_SIGNALS]
+    return kept or read_tap(path).frf
+
+
+def _is_hdf5(head: bytes, _path: Path) -> bool:
+    return head.startswith(MAGIC)
+
+
+def _circumstances(path: Path) -> Circumstances:
+    return read_tap_hits(path)[1]
+
+
+def _frf(path: Path) -> Frf:
+    return read_tap(path).frf
+
+
+TAP_FILE = Format(
+    "tap-file", "tap file of lobewatch", (".h5",), _is_hdf5, read_tap_recording, _circumstances, read_frf=_frf
+)

@@ -1,0 +1,73 @@
+"""What an extraction of modes found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Frf
+from modal.find_resonances import Resonance
+from modal.fit_band import BandFit
+from modal.stabilise import StabilisationChart
+
+Array = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class FittedBand:
+    """Some neighbouring modes that were fitted together."""
+
+    lines: slice
+    """Where on the frequency axis."""
+    resonances: tuple[Resonance, ...]
+    """The peaks that the band was laid around."""
+    height: Array
+    """What the mobility of each mode is measured against, its own peak or the highest of the band (m/s/N), (m,)."""
+    fit: BandFit
+    """Their values."""
+    own: ComplexArray
+    """What they were fitted to: the receptances without the modes of all other bands (m/N), shape (p, lines)."""
+    terms: int
+    """Complex residual terms in each FRF."""
+    suspects: tuple[float, ...]
+    """Frequencies of modes that may stand here instead of those fitted, but are too uncertain (Hz)."""
+    chart: StabilisationChart
+    """LSCF poles of these lines."""
+
+
+@dataclass(frozen=True, eq=False)
+class Extraction:
+    """All that was found in one FRF, or in p of them with the same poles."""
+
+    frfs: tuple[Frf, ...]
+    """The lines that were used, the same of each; the driving point first."""
+    weight: Array
+    """Their weights, shape (p, n)."""
+    bands: tuple[FittedBand, ...]
+    """By rising frequency."""
+
+    @property
+    def frf(self) -> Frf:
+        """The driving point: the FRF that stiffnesses belong to."""
+        return self.frfs[0]
+
+    def receptance(self, frequency: Array, without: FittedBand | None = None) -> ComplexArray:
+        """Of all modes found but those of one band (m/N) at these frequencies (Hz), shape (p, n)."""
+        parts = [band.fit.receptance(frequency) for band in self.bands if band is not without]
+        return np.asarray(sum(parts, np.zeros((len(self.frfs), frequency.size), complex)))
+
+    def own(self, band: FittedBand) -> ComplexArray:
+        """Measured receptances on the lines of a band without the modes of all others (m/N), shape (p, lines)."""
+        measured = np.array([frf.receptance[band.lines] for frf in self.frfs])
+        return np.asarray(measured - self.receptance(self.frf.frequency[band.lines], without=band))
+
+    def left(self, band: FittedBand) -> ComplexArray:
+        """Measured receptances on the lines of a band less the fit with its residual terms (m/N), shape (p, lines).
+
+        0 at stray lines.
+        """
+        weight = self.weight[:, band.lines]
+        return np.asarray(band.fit.complex_residual / np.where(weight > 0, weight, np.inf))

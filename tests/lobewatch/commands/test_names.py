@@ -1,0 +1,177 @@
+"""Names that people give: shown as they are, whatever stands in them, or refused with one clear error."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id
+from lobewatch.cli import main
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
+from modal import Mode, synthesize
+
+LINES = np.arange(4.0, 4000.0, 4.0)
+FORMULA = r"cost $5 \frac to $6"
+"""To matplotlib a broken formula."""
+CLEAR = "\x1b[2J"
+"""Clears a terminal."""
+
+
+class Said(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+Run = Callable[..., Said]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    """Runs a command in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def command(*arguments: object) -> Said:
+        monkeypatch.setattr(sys, "argv", ["lobewatch", *map(str, arguments)])
+        capsys.readouterr()
+        code: Any = 0
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code or 0
+        return Said(code, *capsys.readouterr())
+
+    return command
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> MachineFolder:
+    """The example, whose machine, tool and first program have a name like a formula, and one tap test."""
+    make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
+    toml = tmp_path / "m" / "machine.toml"
+    text = toml.read_text("utf-8").replace("high_rpm = 24000", "high_rpm = 24000\nsteps = 300")
+    for old in ('"m"', '"A: slot at 12 900 rpm"'):
+        assert old in text
+        text = text.replace(old, f"'{FORMULA}'")
+    toml.write_text(text, "utf-8")
+    made = MachineFolder(tmp_path / "m")
+    about = Circumstances(FORMULA, datetime(2026, 1, 15, tzinfo=UTC), "reference", machine_toml=text)
+    frf = synthesize([Mode(1713.0, 0.029, 3.5e7)], LINES)
+    made.commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
+    return made
+
+
+def test_names_like_formulas_stand_in_report_pictures_and_tables(run: Run, folder: MachineFolder) -> None:
+    report = run("report", "m")
+    assert report.code == 0, report.err
+    html = (folder.path / "report.html").read_text("utf-8")
+    assert html.count(FORMULA) >= 3
+    assert f">{FORMULA}</text>" in html
+    for option in ("--figure", "--radial", "--waterfall"):
+        said = run("lobes", "m", option, "picture.svg")
+        assert said.code == 0, said.err
+        assert f">{FORMULA}: reference cut</text>" in Path("picture.svg").read_text("utf-8")
+    assert run("model", "m", "--figure", "model.svg").code == 0
+    assert FORMULA in run("check", "m").out
+    assert json.loads(run("check", "m", "--json").out)["programs"][0]["name"] == FORMULA
+
+
+@pytest.mark.parametrize(
+    "name",
+    ['3/8" mill', "cost $5 to $6", r"C:\mills", "Fräse ø 20, 主轴", "[/bold] mill", "a 'b' \"c\"", "ends in \\"],
+)
+def test_init_keeps_the_name_of_the_folder(run: Run, name: str) -> None:
+    place = name.replace("/", ":")
+    said = run("init", place)
+    assert said.code == 0, said.err
+    assert f"made {Path(place)}" in said.out
+    assert MachineFolder(place).machine.machine.name == place
+    assert json.loads(run("init", f"{place} 2", "--json").out)["machine"] == f"{place} 2"
+
+
+@pytest.mark.parametrize("name", [f"mill{CLEAR}", "two\nlines", "tab\tbed", "bell\x07", "csi\x9b2J", "half\udce4"])
+def test_init_refuses_a_folder_that_steers_a_terminal(run: Run, name: str) -> None:
+    said = run("init", name)
+    assert (said.code, said.out) == (2, "")
+    assert said.err.startswith("error: folder='")
+    assert "holds the control character" in said.err
+    assert said.err.isprintable() or said.err[:-1].isprintable()
+    assert list(Path.cwd().iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("init",),
+        ("init", "--example"),
+        ("sensors",),
+        ("tap", "--port", "x"),
+        ("model",),
+        ("calibrate", "--frequency", "1700"),
+        ("lobes",),
+        ("check",),
+        ("report",),
+        ("serve",),
+        ("emulate", "taps"),
+        ("emulate", "dataq"),
+        ("replay",),
+    ],
+)
+def test_an_empty_name_of_a_folder_is_refused(run: Run, folder: MachineFolder, command: tuple[str, ...]) -> None:
+    before = sorted(Path.cwd().rglob("*"))
+    said = run(*command, "", *(["x.csv"] if command == ("replay",) else []))
+    assert (said.code, said.out) == (2, "")
+    assert said.err == "error: the name of the folder is empty; give the machine folder, or . for the current one\n"
+    assert sorted(Path.cwd().rglob("*")) == before
+
+
+def test_the_current_folder_is_named_by_a_dot(run: Run, tmp_path: Path) -> None:
+    assert run("init", ".").code == 0
+    assert MachineFolder(".").machine.machine.name == tmp_path.name
+    with pytest.raises(FileNotFoundError, match="is empty"):
+        MachineFolder("")
+
+
+@pytest.mark.parametrize("character", ["\x1b", "\0", "\n", "\t", "\x7f", "\x9b", "\u2028"])
+def test_an_operator_or_tool_with_control_characters_is_not_kept(
+    run: Run, folder: MachineFolder, character: str
+) -> None:
+    recording = folder.path / "taps" / f"{folder.taps()[0].id}.h5"
+    assert run("init", "other").code == 0
+    said = run("replay", "other", recording, "--tool", f"mill{character}")
+    assert (said.code, said.out) == (2, "")
+    assert "error: tool='mill" in said.err
+    assert character not in said.err.removesuffix("\n")
+    assert MachineFolder("other").taps() == []
+    about = Circumstances("m", datetime(2026, 1, 15, tzinfo=UTC), operator=f"K{character}im")
+    with pytest.raises(ValueError, match=r"operator='K.*im' holds the control character"):
+        new_tap_id(about)
+
+
+def test_nothing_of_a_foreign_file_steers_the_terminal(run: Run, tmp_path: Path) -> None:
+    file = tmp_path / f"hit{CLEAR}.csv"
+    file.write_text(f"time_s,acc{CLEAR}\x07_g,other\n" + "".join(f"{i},1,2\n" for i in range(9)), encoding="utf-8")
+    said = run("modes", file)
+    assert said.code == 2
+    assert "hit\ufffd[2J.csv: not usable as a tap test: no force channel (columns time, acc\ufffd[2J" in said.err
+    assert not any(character in said.err for character in "\x1b\x07")
+
+
+def test_the_name_of_a_recording_is_exact_in_json_and_harmless_elsewhere(run: Run, beam: Path, tmp_path: Path) -> None:
+    file = tmp_path / f"a{CLEAR}\x9bä.lvm"
+    file.write_bytes(beam.read_bytes())
+    said = run("modes", file, "--figure", "picture.svg")
+    assert said.code == 0, said.err
+    assert "a\ufffd[2J\ufffdä.lvm: 1 hit(s)" in said.out
+    assert "\x1b" not in Path("picture.svg").read_text("utf-8")
+    exact = run("modes", file, "--json").out
+    assert json.loads(exact)["file"] == str(file)
+    assert not set("\x1b\x9b") & set(exact)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from lobewatch.commands.init import make_machine_folder
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
 
 ROOT = Path(__file__).parents[2]

@@ -28,9 +28,9 @@ from acquisition import (
     check_rate,
     measure_rate,
 )
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import checked_rate, known_rate
+from lobewatch.machine.new_folder import make_machine_folder
 
 PAIR = (Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0))
 

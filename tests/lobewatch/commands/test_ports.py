@@ -34,9 +34,9 @@ from acquisition.devices.built_in import BUILT_IN
 from acquisition.ports.port_hints import explain_open_error
 from acquisition.taps.protocol import Frame, MessageType, encode_frame
 from lobewatch.cli import main
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import use_rate
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.tap.emulated_spindle import emulate_machine
 from lobewatch.tap.plug import open_source
 

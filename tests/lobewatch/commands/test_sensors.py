@@ -26,9 +26,9 @@ from acquisition import (
 )
 from acquisition.emulation.simulated_source import Signal
 from lobewatch.cli import main
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import use_rate
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.sensors import list_sensors
 
 RATE = 25600.0

@@ -71,6 +71,16 @@ class Channel:
         return np.clip(np.rint(values / self.scale), *self.rails).astype(np.int32)
 
 
+@dataclass(frozen=True)
+class SensorInput:
+    """A sensor on a numbered input of a device that does not know what is plugged in there."""
+
+    number: int
+    """As printed beside the terminals."""
+    channel: Channel
+    """The sensor; its full scale is the range to set."""
+
+
 @dataclass(frozen=True, eq=False)
 class Block:
     """Consecutive scans as they came from a source."""

@@ -1,11 +1,17 @@
-"""What every data source offers; nothing downstream can tell one from another."""
+"""What every data source offers, and every device; nothing downstream can tell one from another."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
-from typing import Protocol
+from dataclasses import dataclass
+from types import TracebackType
+from typing import TYPE_CHECKING, Protocol, Self
 
-from acquisition.channel import Block, Channel
+from acquisition.event import Event
+
+if TYPE_CHECKING:
+    from acquisition.channel import Block, Channel
 
 
 class Source(Protocol):
@@ -31,4 +37,62 @@ class Source(Protocol):
 
     def blocks(self) -> Iterator[Block]:
         """Blocks as they arrive; DeviceError where the device goes away or falls silent."""
+        ...
+
+
+@dataclass(frozen=True)
+class DeviceIdentity:
+    """Who a device is, in its own words."""
+
+    model: str
+    """Model."""
+    serial: str = ""
+    """Serial number; empty where it has none."""
+    firmware: str = ""
+    """Version; empty where it has none."""
+
+
+class Device(Source, Protocol):
+    """A connected source that says who it is and how it fares, and can be given back. A context manager."""
+
+    sample_rate: float
+    """Scans a second (Hz); set to the measured rate where that is accepted."""
+
+    @property
+    def identity(self) -> DeviceIdentity:
+        """Who it is."""
+        ...
+
+    @property
+    def follows_clock(self) -> bool:
+        """Whether its scans follow the clock, so that their rate can be measured."""
+        ...
+
+    @property
+    def loss_detection(self) -> str:
+        """How lost scans are found, in two words; empty where none can be lost."""
+        ...
+
+    @property
+    def events(self) -> deque[Event]:
+        """What has happened at it, oldest first: take with popleft(), in any thread (IndexError: empty)."""
+        ...
+
+    @property
+    def fault(self) -> str:
+        """One sentence on what is wrong with it while that lasts; empty where all is well."""
+        ...
+
+    def close(self) -> None:
+        """Stop, and give the port back."""
+        ...
+
+    def __enter__(self) -> Self:
+        """The device itself."""
+        ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close it."""
         ...

@@ -34,8 +34,8 @@ from threadpoolctl import threadpool_limits
 from acquisition import Channel, Circumstances, Hit, TapsEmulator, TapsSource, Trigger, estimate_frf
 from acquisition.taps.protocol import Frame, FrameDecoder, MessageType, encode_data, encode_frame
 from acquisition.taps.stream import ScanStream
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen import ScreenServer
 from lobewatch.tap.session import TapSession, TapStopped
 from lobewatch.tap.state import Word

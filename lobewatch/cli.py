@@ -1,47 +1,79 @@
-"""The command line: one command a module in lobewatch/commands; errors in one sentence, exit code 2."""
+"""The command line: each command is imported when it is asked for; errors in one sentence, exit code 2."""
 
 from __future__ import annotations
 
 import io
 import os
 import sys
-from importlib.metadata import version
-from typing import Annotated
+from collections.abc import Iterator, Mapping, MutableMapping
+from importlib import import_module
+from typing import Annotated, Any, cast
 
 import typer
-from rich.markup import escape
 
-from lobewatch.commands.calibrate import calibrate
-from lobewatch.commands.check import check
-from lobewatch.commands.demo import demo
-from lobewatch.commands.emulate import emulate
-from lobewatch.commands.init import init
-from lobewatch.commands.lobes import lobes
-from lobewatch.commands.model import model
-from lobewatch.commands.modes import modes
-from lobewatch.commands.ports import ports
-from lobewatch.commands.replay import replay
-from lobewatch.commands.report import report
-from lobewatch.commands.sensors import sensors
-from lobewatch.commands.serve import serve
-from lobewatch.commands.tap import tap
-from lobewatch.show.output import notes, results
+from lobewatch.commands import COMMANDS
+from lobewatch.commands.help_page import HelpCommand, HelpGroup, page_width
+
+
+class _Commands(Mapping[str, Any]):
+    """The commands by name; a look at one imports it."""
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in COMMANDS:
+            raise KeyError(name)
+        found = getattr(import_module(f"lobewatch.commands.{name}"), name)
+        holder = typer.Typer(rich_markup_mode=None)
+        if isinstance(found, typer.Typer):
+            for command in found.registered_commands:
+                command.cls = HelpCommand
+            holder.add_typer(found, name=name, cls=HelpGroup)
+        else:
+            holder.command(name, cls=HelpCommand)(found)
+        return typer.main.get_group(holder).commands[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(COMMANDS)
+
+    def __len__(self) -> int:
+        return len(COMMANDS)
+
+
+class _Root(HelpGroup):
+    """All commands, none of them imported before it is needed."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands = cast(MutableMapping[str, Any], _Commands())
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Where a command comes first, none of these options is given: what reads them takes a while to import."""
+        if args and not args[0].startswith("-"):
+            self.resolve_command(ctx, args)
+            self.params = []
+        return super().parse_args(ctx, args)
+
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002  (asked by the completion of the shell)
+        return list(COMMANDS)
+
+    def summaries(self, ctx: Any) -> Mapping[str, str]:  # noqa: ARG002
+        return COMMANDS
+
 
 app = typer.Typer(
+    cls=_Root,
     help="Tap test in, stability lobes out: which cuts stop being safe as a spindle ages.",
     no_args_is_help=True,
-    rich_markup_mode="rich",
+    rich_markup_mode=None,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (demo, init, ports, sensors, tap, replay, modes, model, calibrate, lobes, check, report, serve):
-    app.command()(command)
-app.add_typer(emulate, name="emulate")
 
 
 def _version(wanted: bool) -> None:
     if wanted:
-        results.print(f"lobewatch {version('lobewatch')}")
+        from importlib.metadata import version
+
+        typer.echo(f"lobewatch {version('lobewatch')}")
         raise typer.Exit
 
 
@@ -61,13 +93,17 @@ def main() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a console without these characters shows "?" instead
     try:
-        app()
+        app(terminal_width=page_width())
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
     except (ValueError, OSError, ArithmeticError) as error:
         if "--debug" in sys.argv:
             raise
+        from rich.markup import escape
+
+        from lobewatch.show.output import notes
+
         notes.print("[bold red]error:[/]", escape(_sentence(error)))
         sys.exit(2)
 

@@ -2,15 +2,16 @@
 
 from acquisition.dataq.dialogue import DataqDialogue
 from acquisition.dataq.emulator import DataqEmulator, DataqFaults, DataqTraits
-from acquisition.dataq.protocol import VENDOR, DataqInput
+from acquisition.dataq.probe import probe_dataq
+from acquisition.dataq.protocol import check_inputs
 from acquisition.dataq.source import DataqSource
 
 __all__ = [
-    "VENDOR",
     "DataqDialogue",
     "DataqEmulator",
     "DataqFaults",
-    "DataqInput",
     "DataqSource",
     "DataqTraits",
+    "check_inputs",
+    "probe_dataq",
 ]

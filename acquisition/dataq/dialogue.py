@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from acquisition.dataq.protocol import REFUSALS, answer_in, encode_command, model_of, split_lines
 from acquisition.errors import DeviceError
 from acquisition.ports.serial_link import SerialLink
+from acquisition.source import DeviceIdentity
 
 ANSWER_TIME = 0.5
 """How long a command may stay without its echo before it is sent again (s)."""
@@ -35,6 +36,11 @@ class DataqIdentity:
     """As the device writes it."""
     dividend: int
     """Of the rate formula (Hz)."""
+
+    @property
+    def identity(self) -> DeviceIdentity:
+        """The same as of any device."""
+        return DeviceIdentity(f"DI-{self.model}", self.serial, self.firmware)
 
 
 class DataqDialogue:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.channel import SensorInput
 from acquisition.dataq.protocol import (
     DEC,
     DECA,
@@ -17,7 +18,6 @@ from acquisition.dataq.protocol import (
     RANGES,
     REFUSALS,
     SRATE,
-    DataqInput,
     RateSetting,
     packet_bytes,
     split_lines,
@@ -78,7 +78,7 @@ class DataqEmulator(EmulatorThread):
     def __init__(
         self,
         signal_at: Callable[[float], Signal],
-        inputs: tuple[DataqInput, ...],
+        inputs: tuple[SensorInput, ...],
         *,
         realtime: bool = True,
         tcp: bool = False,

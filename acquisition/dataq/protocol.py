@@ -8,13 +8,11 @@ Source: Data Acquisition Instrument Command Protocol, DATAQ Instruments; docs/de
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from acquisition.channel import Channel
+from acquisition.channel import SensorInput
 
-VENDOR = 0x0683
-"""USB vendor identity; the product is asked for by `info`."""
 OLDEST_FIRMWARE = 1.35
 """Binary streams of older firmware are not reliable."""
 DIGITAL_INPUTS = 8
@@ -40,21 +38,6 @@ RANGES: Mapping[str, tuple[float, ...]] = {
 
 
 @dataclass(frozen=True)
-class DataqInput:
-    """One analog input that is scanned."""
-
-    number: int
-    """As printed beside the terminal, 0 to 7."""
-    channel: Channel
-    """The sensor on it; its full scale is the range asked of the device."""
-
-    def __post_init__(self) -> None:
-        """Refuse what the device does not have."""
-        if not 0 <= self.number <= 7:
-            raise ValueError(f"input={self.number} is none of 0 to 7")
-
-
-@dataclass(frozen=True)
 class RateSetting:
     """Arguments of `srate`, `dec` and `deca`; the rate is dividend / (srate dec deca)."""
 
@@ -68,6 +51,16 @@ class RateSetting:
     def rate(self, dividend: int) -> float:
         """Scans a second (Hz) for the dividend that `info 9` names."""
         return dividend / (self.srate * self.dec * self.deca)
+
+
+def check_inputs(inputs: Sequence[SensorInput]) -> None:
+    """ValueError for inputs that the device does not have, the same one twice, or none."""
+    numbers = [one.number for one in inputs]
+    for number in numbers:
+        if not 0 <= number < DIGITAL_INPUTS:
+            raise ValueError(f"input={number} is none of 0 to {DIGITAL_INPUTS - 1}")
+    if not numbers or len(set(numbers)) < len(numbers):
+        raise ValueError(f"inputs {numbers} of a DATAQ device must be different ones, at least one")
 
 
 def choose_rate(wanted: float, dividend: int) -> RateSetting:

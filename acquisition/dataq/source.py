@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import enum
 import time
+from collections import deque
 from collections.abc import Iterator, Sequence
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 
-from acquisition.channel import Block
+from acquisition.channel import Block, SensorInput
 from acquisition.dataq.dialogue import DataqDialogue, DataqIdentity
 from acquisition.dataq.protocol import (
     DIGITAL_INPUTS,
     OLDEST_FIRMWARE,
-    DataqInput,
+    check_inputs,
     choose_packet,
     choose_rate,
     encode_command,
@@ -23,6 +24,7 @@ from acquisition.dataq.protocol import (
 )
 from acquisition.dataq.stream import Piece, ScanDecoder
 from acquisition.errors import DeviceError
+from acquisition.event import Event
 from acquisition.ports.serial_link import SerialLink
 
 SILENCE = 3.0
@@ -43,19 +45,24 @@ class DataqStatus(enum.StrEnum):
 class DataqSource:
     """Connects, asks the device who it is, configures it, and yields its scans. A context manager."""
 
+    follows_clock = True
+    """Its scans come at the rate that it names."""
+    fault = ""
+    """It tells of no faults."""
+
     def __init__(
-        self, port: str, inputs: Sequence[DataqInput], sample_rate: float | None = None, digital_word: bool = True
+        self, port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None, digital_word: bool = True
     ) -> None:
         """Open a port: a device name or socket://host:port. The rate is the nearest the device has (Hz).
 
         digital_word scans the digital inputs too, whose word shows when bytes are lost. Raises DeviceError where there
         is no port or no such device, ValueError for inputs, ranges and rates it does not have.
         """
-        numbers = [one.number for one in inputs]
-        if not numbers or len(set(numbers)) < len(numbers):
-            raise ValueError(f"inputs {numbers} of a DATAQ device must be different ones, at least one")
+        check_inputs(inputs)
         self.channels = tuple(one.channel for one in inputs)
         self.loss_detection = "digital word" if digital_word else "none"
+        self.events: deque[Event] = deque()
+        """It tells of no events."""
         self.status = DataqStatus.STOPPED
         self.overflows = 0
         self._decoder = ScanDecoder(len(inputs), digital_word)
@@ -66,7 +73,7 @@ class DataqSource:
         try:
             self._dialogue.halt()
             device = self._identify()
-            self.info: dict[str, Any] = {"model": f"DI-{device.model}", "serial": device.serial, "fw": device.firmware}
+            self.identity = device.identity
             self.sample_rate = self._configure(device, inputs, DEFAULT_RATE if sample_rate is None else sample_rate)
         except BaseException:
             self._link.close()
@@ -162,7 +169,7 @@ class DataqSource:
             )
         return identity
 
-    def _configure(self, device: DataqIdentity, inputs: Sequence[DataqInput], wanted: float) -> float:
+    def _configure(self, device: DataqIdentity, inputs: Sequence[SensorInput], wanted: float) -> float:
         """Send the set-up; the rate that results (Hz)."""
         codes = [scan_code(one.number, range_code(device.model, one.channel.full_scale)) for one in inputs]
         if self.loss_detection != "none":

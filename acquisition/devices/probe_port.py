@@ -2,71 +2,46 @@
 
 from __future__ import annotations
 
-import json
-import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from acquisition.dataq.dialogue import DataqDialogue
-from acquisition.dataq.protocol import VENDOR
+from acquisition.devices.driver import Driver
 from acquisition.errors import DeviceError
 from acquisition.ports.serial_link import SerialLink
-from acquisition.taps.protocol import Frame, FrameDecoder, MessageType, encode_frame
-
-ANSWER_TIME = 1.0
-"""How long an answer is waited for (s)."""
+from acquisition.source import DeviceIdentity
 
 
 @dataclass(frozen=True)
-class DeviceIdentity:
+class Answer:
     """Who answers."""
 
     driver: str
-    """As in [daq] of machine.toml: "taps" or "dataq"."""
-    model: str
-    """Model as the device names it."""
-    serial: str
-    """Serial number."""
-    firmware: str
-    """Version."""
+    """Name of the driver, as in [daq] of machine.toml."""
+    identity: DeviceIdentity
+    """Model, serial number and firmware."""
 
 
-def probe_port(port: str, vendor: int | None = None) -> DeviceIdentity | None:
+def probe_port(port: str, drivers: Sequence[Driver], vendor: int | None = None) -> Answer | None:
     """Who answers on a port; None where nobody known does. DeviceError where it cannot be opened.
 
     Strange devices are spared: each question is put once, and only that which the USB vendor suggests; a port without
-    one (vendor None: a pseudo-terminal, socket://) gets both.
+    one (vendor None: a pseudo-terminal, socket://) gets all.
     """
     link = SerialLink(port)
     try:
-        found = _ask_taps(link) if vendor != VENDOR else None
-        return found or (_ask_dataq(link) if vendor in (VENDOR, None) else None)
-    except DeviceError:
+        for driver in _suggested(drivers, vendor):
+            identity = driver.probe(link)
+            if identity is not None:
+                return Answer(driver.name, identity)
+    except DeviceError:  # unplugged while it was asked
         return None
     finally:
         link.close()
-
-
-def _ask_taps(link: SerialLink) -> DeviceIdentity | None:
-    decoder = FrameDecoder()
-    link.write(b"\x00" + encode_frame(Frame(MessageType.HELLO)))  # ends what another program has left half said
-    deadline = time.monotonic() + ANSWER_TIME
-    while (left := deadline - time.monotonic()) > 0:
-        for frame in decoder.feed(link.read(left)):
-            if frame.type == MessageType.INFO:
-                return _taps_identity(frame.body)
     return None
 
 
-def _taps_identity(body: bytes) -> DeviceIdentity | None:
-    try:
-        info = json.loads(body)
-        return DeviceIdentity("taps", *(str(info.get(key, "")) for key in ("model", "serial", "fw")))
-    except (ValueError, AttributeError):
-        return None
-
-
-def _ask_dataq(link: SerialLink) -> DeviceIdentity | None:
-    dialogue = DataqDialogue(link, tries=1)
-    dialogue.halt()
-    found = dialogue.identify()
-    return DeviceIdentity("dataq", f"DI-{found.model}", found.serial, found.firmware)
+def _suggested(drivers: Sequence[Driver], vendor: int | None) -> list[Driver]:
+    if vendor is None:
+        return list(drivers)
+    of_this_vendor = [driver for driver in drivers if vendor in driver.vendors]
+    return of_this_vendor or [driver for driver in drivers if not driver.vendors]

@@ -1,13 +1,18 @@
-"""A source without a device: a signal function, quantised, for unit tests."""
+"""A device without a cable: a signal function, quantised, for unit tests."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator
+from types import TracebackType
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.channel import Block, Channel
+from acquisition.event import Event
+from acquisition.source import DeviceIdentity
 
 Signal = Callable[[int, int], NDArray[np.float64]]
 """(first_scan, n_scans) -> values in N and m/s^2, shape (n_channels, n_scans)."""
@@ -21,6 +26,10 @@ def quantise(signal: NDArray[np.float64], channels: tuple[Channel, ...]) -> NDAr
 class SimulatedSource:
     """Scans of a signal function, as fast as they are asked for."""
 
+    identity = DeviceIdentity("simulation")
+    follows_clock = False
+    loss_detection = ""
+
     def __init__(
         self,
         signal: Signal,
@@ -32,7 +41,24 @@ class SimulatedSource:
         """A stream of n_scans scans, cut into blocks."""
         self.channels = channels
         self.sample_rate = sample_rate
+        self.events: deque[Event] = deque()
+        """Put in what shall happen."""
         self._signal, self._n_scans, self._block = signal, n_scans, block
+
+    def __enter__(self) -> Self:
+        """The source."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End it."""
+        self.close()
+
+    @property
+    def fault(self) -> str:
+        """Nothing is ever wrong."""
+        return ""
 
     def start(self) -> None:
         """Nothing to prepare."""
@@ -40,6 +66,10 @@ class SimulatedSource:
     def stop(self) -> None:
         """End at the next block."""
         self._n_scans = 0
+
+    def close(self) -> None:
+        """End at the next block."""
+        self.stop()
 
     def blocks(self) -> Iterator[Block]:
         """The blocks."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -13,9 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.channel import Block, Channel, ChannelQuantity
+from acquisition.event import Event
 from acquisition.files.read_recording import read_hits
 from acquisition.hit import Hit
 from acquisition.hits.pulse import samples_before
+from acquisition.source import DeviceIdentity
 
 PAUSE = 1.0
 """Quiet before, between and after the hits (s)."""
@@ -34,6 +37,10 @@ class FileSource:
     The quiet is the recording's own: the noise before a pulse, over and over.
     """
 
+    follows_clock = False
+    loss_detection = ""
+    fault = ""
+
     def __init__(self, path: Path | str, realtime: bool = True) -> None:
         """Read a file that `read_hits` can read; realtime=False hands it over as fast as it is asked for.
 
@@ -45,7 +52,8 @@ class FileSource:
             _channel("acceleration", hits),
         )
         self.sample_rate = hits[0].sample_rate
-        self.info = {"model": f"replay of {Path(path).name}"}
+        self.identity = DeviceIdentity(f"replay of {Path(path).name}")
+        self.events: deque[Event] = deque()
         self._hits, self._realtime = hits, realtime
         self._stopped = threading.Event()
 

@@ -50,7 +50,7 @@ def _is_it(one: Format, head: bytes, path: Path) -> bool:
     try:
         return one.is_it(head, path)
     except Exception as error:  # noqa: BLE001 - code of others may raise anything; the other formats are asked still
-        _log.warning("%s: format %r could not be asked (%s: %s)", path, one.name, type(error).__name__, error)
+        _log.warning("%r: format %r could not be asked (%r)", str(path), one.name, error)
         return False
 
 

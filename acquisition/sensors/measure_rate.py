@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import theilslopes
 
 from acquisition.errors import DeviceError
 from acquisition.source import Source
@@ -105,7 +104,7 @@ def _slope(scans: NDArray[np.float64], arrived: NDArray[np.float64]) -> tuple[fl
 
 def _robust_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float, float]:
     """Least-squares slope and standard error without the points that lie far above the others."""
-    rough = y - theilslopes(y, x)[0] * x
+    rough = y - _median_slope(x, y) * x
     above = rough - np.median(rough)
     spread = 1.4826 * np.median(np.abs(above))
     keep = above <= 4 * spread + 1e-9
@@ -116,3 +115,9 @@ def _robust_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[float
     alike = float(np.clip(residual[1:] @ residual[:-1] / energy, 0.0, 0.9)) if energy > 0 else 0.0
     variance = energy / (x.size - 2) / float(x @ x) * (1 + alike) / (1 - alike)
     return slope, float(np.sqrt(variance))
+
+
+def _median_slope(x: NDArray[np.float64], y: NDArray[np.float64]) -> float:
+    """Median of the slopes of all pairs of points (Theil and Sen); x rises."""
+    first, second = np.triu_indices(x.size, 1)
+    return float(np.median((y[second] - y[first]) / (x[second] - x[first])))

@@ -1,14 +1,12 @@
 """TAPS/1, the open frame for data acquisition boards: protocol, events, stream, source and emulator."""
 
 from acquisition.taps.emulator import TapsEmulator
-from acquisition.taps.event import Event, EventKind
 from acquisition.taps.faults import Faults
+from acquisition.taps.probe import probe_taps
 from acquisition.taps.protocol import Frame, FrameDecoder, MessageType, encode_frame
 from acquisition.taps.source import TapsSource
 
 __all__ = [
-    "Event",
-    "EventKind",
     "Faults",
     "Frame",
     "FrameDecoder",
@@ -16,4 +14,5 @@ __all__ = [
     "TapsEmulator",
     "TapsSource",
     "encode_frame",
+    "probe_taps",
 ]

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import json
-import os
 import struct
-import threading
 import time
 from collections import deque
 from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from acquisition.channel import Channel
 from acquisition.emulation.simulated_source import Signal, quantise
-from acquisition.emulation.wire import PtyWire, TcpWire, Wire
-from acquisition.taps.event import Event, EventKind
+from acquisition.emulation.thread import EmulatorThread
+from acquisition.event import Event, EventKind
+from acquisition.taps.event import encode_event
 from acquisition.taps.faults import NOISE, Faults
 from acquisition.taps.protocol import (
     LOST_BEFORE,
@@ -35,7 +33,7 @@ STATUS_INTERVAL = 0.5
 """Time between STATUS frames (s)."""
 
 
-class TapsEmulator:
+class TapsEmulator(EmulatorThread):
     """Serves one signal function as a DAQ; a context manager whose `port` can be opened like a real one."""
 
     def __init__(
@@ -53,47 +51,26 @@ class TapsEmulator:
 
         link: a name that always leads to the pseudo-terminal, also after replug(), as /dev/serial/by-id does.
         """
+        super().__init__(tcp, link)
         self._signal, self._channels, self._rate = signal, channels, sample_rate
         self._realtime, self._faults = realtime, faults or Faults()
-        self._tcp, self._link = tcp or os.name == "nt", link
-        self.port = ""
-        """What the host opens."""
         self._clock = 0
         self._restarted = False
         self._pressed: deque[Event] = deque()
         self._standing: dict[tuple[int, int | None], Event] = {}
-        self._plug_in()
+        self._power_on()
 
-    def _plug_in(self) -> None:
-        """Power on."""
-        self._wire: Wire = TcpWire(int(self.port.rpartition(":")[2] or 0)) if self._tcp else PtyWire(self._link)
-        self.port = self._wire.port
+    def _power_on(self) -> None:
         self._decoder = FrameDecoder()
         self._seq = self._session = self._frames = self._infos = 0
         self._scan = self._sent = self._overruns = self._peak = 0
         self._streaming = self._lost = False
         self._n_scans, self._started, self._status_due = 0, 0.0, 0.0
         self._per_frame, self._bits = 512, SAMPLE_BITS[0]
-        self._stopping = False
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._serve, name="TAPS emulator", daemon=True)
-
-    def __enter__(self) -> Self:
-        """Start serving."""
-        self._serve_on()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """Hang up."""
-        self.unplug()
-
-    def unplug(self) -> None:
-        """Pull the cable: the host's port fails, whatever it was doing."""
-        self._stopping = True
-        self._thread.join(timeout=5.0)
-        self._wire.close()
+        if self._faults.noise_at_start:
+            self.wire.pending += NOISE
+        if self._faults.start_streaming:
+            self._start(0)
 
     def replug(self) -> None:
         """Plug it in again: powered on anew, nothing configured; the signal goes on where it was.
@@ -103,50 +80,33 @@ class TapsEmulator:
         """
         self.unplug()
         self._faults = replace(self._faults, unplug_after=None)
-        self._plug_in()
-        self._serve_on()
+        self.plug_in()
+        self._power_on()
+        self.serve()
 
     def send_event(self, event: Event) -> None:
         """A button is pressed or a cable pulled, now; its scan is filled in here. A fault is told again at START."""
         self._pressed.append(event)
 
-    def wait(self) -> None:
-        """Serve until interrupted or unplugged."""
-        while not self._ended.wait(timeout=0.2):  # an interrupted Thread.join takes the thread for ended
-            pass
+    def serve_once(self) -> bool:
+        """See EmulatorThread."""
+        for frame in self._decoder.feed(self.wire.exchange(0.0 if self._streaming and self._has_room() else 0.05)):
+            self._answer(frame)
+        while self._pressed:
+            self._tell(self._pressed.popleft())
+        if self._streaming:
+            self._stream()
+        if self._faults.unplug_after is None or self._scan < self._faults.unplug_after:
+            return True
+        self._end_within_a_frame()
+        return False
 
-    def _serve_on(self) -> None:
-        if self._faults.noise_at_start:
-            self._wire.pending += NOISE
-        if self._faults.start_streaming:
-            self._start(0)
-        self._thread.start()
-
-    def _serve(self) -> None:
-        try:
-            self._answer_and_stream()
-        finally:
-            self._ended.set()
-
-    def _answer_and_stream(self) -> None:
-        while not self._stopping:
-            for frame in self._decoder.feed(self._wire.exchange(0.0 if self._streaming and self._has_room() else 0.05)):
-                self._answer(frame)
-            while self._pressed:
-                self._tell(self._pressed.popleft())
-            if self._streaming:
-                self._stream()
-            if self._faults.unplug_after is not None and self._scan >= self._faults.unplug_after:
-                self._hang_up_in_a_frame()
-                return
-
-    def _hang_up_in_a_frame(self) -> None:
-        del self._wire.pending[-self._per_frame :]
+    def _end_within_a_frame(self) -> None:
+        del self.wire.pending[-self._per_frame :]
         for _ in range(20):
-            if not self._wire.pending:
+            if not self.wire.pending:
                 break
-            self._wire.exchange(0.05)
-        self._wire.close()
+            self.wire.exchange(0.05)
 
     def _send(self, kind: MessageType, body: bytes = b"", flags: int = 0) -> None:
         encoded = encode_frame(Frame(kind, self._seq, body, self._session, flags))
@@ -157,12 +117,12 @@ class TapsEmulator:
         elif kind == MessageType.INFO:
             self._infos += 1
             encoded = encoded[: len(encoded) // 2] if self._infos <= self._faults.cut_infos else encoded
-        self._wire.pending += encoded
+        self.wire.pending += encoded
 
     def _tell(self, event: Event) -> None:
         if event.kind != EventKind.BUTTON:
             self._standing[event.kind, event.channel] = event
-        self._send(MessageType.EVENT, replace(event, scan=self._scan).encode())
+        self._send(MessageType.EVENT, encode_event(replace(event, scan=self._scan)))
 
     def _answer(self, frame: Frame) -> None:
         about = frame.seq.to_bytes(4, "little")
@@ -249,7 +209,7 @@ class TapsEmulator:
 
     def _has_room(self) -> bool:
         """Whether the device's buffer takes another frame; when not in real time, little is sent ahead of the host."""
-        return len(self._wire.pending) <= self._buffer_bytes()
+        return len(self.wire.pending) <= self._buffer_bytes()
 
     def _buffer_bytes(self) -> int:
         scan_bytes = self._bits // 8 * len(self._channels)
@@ -266,7 +226,7 @@ class TapsEmulator:
             self._send(MessageType.DATA, body, LOST_BEFORE if self._lost else 0)
             self._sent += self._per_frame
             self._lost = False
-            self._peak = max(self._peak, min(100 * len(self._wire.pending) // self._buffer_bytes(), 100))
+            self._peak = max(self._peak, min(100 * len(self.wire.pending) // self._buffer_bytes(), 100))
         self._scan += self._per_frame
         if self._n_scans and self._scan >= self._n_scans:
             self._streaming = False

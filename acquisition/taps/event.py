@@ -1,29 +1,19 @@
-"""EVENT frames of TAPS/1: a button pressed, a cable pulled, a sensor without its supply."""
+"""EVENT frames of TAPS/1: their bodies, and what has been told by them so far."""
 
 from __future__ import annotations
 
-import enum
 import struct
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from acquisition.channel import Channel
+from acquisition.event import Event, EventKind
 from acquisition.taps.protocol import Frame
 
 KEPT = 256
 """Events kept for one who does not take them."""
 _BODY = struct.Struct("<BBBQ")
 _NO_CHANNEL = 0xFF
-
-
-class EventKind(enum.IntEnum):
-    """First byte of the body."""
-
-    BUTTON = 1
-    CABLE = 2
-    SENSOR_BIAS = 3
-
 
 _FAULTS = {
     EventKind.CABLE: "the cable of the {} sensor is broken or not plugged in: check it at both ends",
@@ -32,28 +22,16 @@ _FAULTS = {
 }
 
 
-@dataclass(frozen=True)
-class Event:
-    """Body of an EVENT frame."""
+def encode_event(event: Event) -> bytes:
+    """The body of an EVENT frame."""
+    channel = _NO_CHANNEL if event.channel is None else event.channel
+    return _BODY.pack(event.kind, channel, event.begins, event.scan)
 
-    kind: int
-    """An EventKind; unknown ones are passed on."""
-    begins: bool = True
-    """Pressed, or a fault has come; False: released, or the fault has gone."""
-    channel: int | None = None
-    """Whose cable or sensor; None for none."""
-    scan: int = 0
-    """When: scans taken since START."""
 
-    def encode(self) -> bytes:
-        """The body."""
-        return _BODY.pack(self.kind, _NO_CHANNEL if self.channel is None else self.channel, self.begins, self.scan)
-
-    @classmethod
-    def decode(cls, body: bytes) -> Event:
-        """The event in a body; struct.error for one of the wrong length."""
-        kind, channel, begins, scan = _BODY.unpack(body)
-        return cls(kind, bool(begins), None if channel == _NO_CHANNEL else channel, scan)
+def decode_event(body: bytes) -> Event:
+    """The event in a body; struct.error for one of the wrong length."""
+    kind, channel, begins, scan = _BODY.unpack(body)
+    return Event(kind, bool(begins), None if channel == _NO_CHANNEL else channel, scan)
 
 
 class EventLog:
@@ -71,7 +49,7 @@ class EventLog:
             return
         self._last = frame.session, frame.seq
         try:
-            event = Event.decode(frame.body)
+            event = decode_event(frame.body)
         except struct.error:
             return
         self.new.append(event)

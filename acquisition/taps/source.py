@@ -13,8 +13,10 @@ from typing import Any, Self
 
 from acquisition.channel import Block, Channel
 from acquisition.errors import DeviceError
+from acquisition.event import Event
 from acquisition.ports.serial_link import SerialLink
-from acquisition.taps.event import Event, EventLog
+from acquisition.taps.event import EventLog
+from acquisition.taps.probe import identity_in
 from acquisition.taps.protocol import (
     FRAME_OVERHEAD,
     MAX_FRAME,
@@ -61,7 +63,9 @@ class TapsSource:
         """What the device has last reported of itself (every 0.5 s of a stream)."""
         try:
             self._command(MessageType.STOP)
-            self.info, self.channels = self._identify()
+            self._info, self.channels = self._identify()
+            self.identity = identity_in(self._info)
+            self.follows_clock = self._info.get("clock_ppm", 0) is not None
             self.sample_rate = self._configure(sample_rate)
         except BaseException:
             self._link.close()
@@ -85,7 +89,7 @@ class TapsSource:
     @property
     def fault(self) -> str:
         """One sentence on a pulled cable or a sensor without supply while that lasts; empty where all is well."""
-        numbers = (entry["i"] for entry in self.info["channels"])
+        numbers = (entry["i"] for entry in self._info["channels"])
         return self._events.fault(dict(zip(numbers, self.channels, strict=True)))
 
     @property
@@ -149,9 +153,10 @@ class TapsSource:
         try:
             info = json.loads(body)
             channels = _channels(info)
-            info["model"], info["fs_choices"] = str(info["model"]), _rates(info["fs_choices"])
-            if not info["serial"]:
-                raise ValueError("serial is empty; the measured sample rate is kept by it")
+            info["fs_choices"] = _rates(info["fs_choices"])
+            for key in ("model", "serial"):
+                if not info[key]:
+                    raise ValueError(f"{key} is empty; the measured sample rate is kept by it")
         except (ValueError, KeyError, TypeError) as error:
             raise DeviceError(
                 f"the DAQ on {self._link.port} describes itself wrongly ({type(error).__name__}: {error})",
@@ -160,13 +165,13 @@ class TapsSource:
         return info, channels
 
     def _configure(self, sample_rate: float | None) -> float:
-        choices = self.info["fs_choices"]
+        choices = self._info["fs_choices"]
         rate = max(choices) if sample_rate is None else sample_rate
         if rate not in choices:
             listed = ", ".join(f"{choice:g}" for choice in choices)
             raise ValueError(f"sample rate {rate:g} Hz is none of this device's: {listed} Hz")
-        form = next(form for form, bits in enumerate(SAMPLE_BITS) if self.info["adc_bits"] <= bits)
-        channels = [entry["i"] for entry in self.info["channels"]]
+        form = next(form for form, bits in enumerate(SAMPLE_BITS) if self._info["adc_bits"] <= bits)
+        channels = [entry["i"] for entry in self._info["channels"]]
         fit = (MAX_FRAME - FRAME_OVERHEAD) * 8 // (len(channels) * SAMPLE_BITS[form])
         wish = {
             "fs": rate,

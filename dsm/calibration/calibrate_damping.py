@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from dsm.calibration.bearing_eigenproblem import calibrated_bearings
 from dsm.calibration.plus_minus import plus_minus
@@ -194,14 +194,14 @@ def _reach(dampers: _Dampers, start: _Point, target: float) -> _Point:
             own,
         )
     low, high = _bracket(dampers, start, target)
-    amount = brentq(
+    amount = _zero(
         lambda value: dampers.go(low, value).mode.damping_ratio - target,
         low.amount,
         high.amount,
         xtol=1e-15 * high.amount,
         rtol=1e-13,
     )
-    return dampers.go(low, float(amount))
+    return dampers.go(low, amount)
 
 
 def _bracket(dampers: _Dampers, low: _Point, target: float) -> tuple[_Point, _Point]:
@@ -236,5 +236,10 @@ def _step(low: _Point, target: float) -> float:
 
 def _highest(dampers: _Dampers, low: _Point, high: _Point) -> _Point:
     """The point with the largest damping ratio between one where it rises and one where it falls."""
-    amount = brentq(lambda value: dampers.go(low, value).slope, low.amount, high.amount, rtol=1e-10)
-    return dampers.go(low, float(amount))
+    return dampers.go(low, _zero(lambda value: dampers.go(low, value).slope, low.amount, high.amount, rtol=1e-10))
+
+
+def _zero(function: Callable[[float], float], low: float, high: float, **tolerances: float) -> float:
+    from scipy.optimize import brentq  # takes longer to import than all of dsm
+
+    return float(brentq(function, low, high, **tolerances))

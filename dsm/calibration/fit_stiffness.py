@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from dsm.calibration.calibration import UnreachableFrequencyError
 from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
@@ -167,7 +167,7 @@ def _fits(state: _State, measured: _Measured) -> bool:
     spare = measured.frequency.size - state.log_factor.size
     if measured.std is None or spare == 0:
         return float(np.max(np.abs(state.residual * measured.scale / measured.frequency))) < UNLIKELY
-    return float(chi2.sf(state.cost, spare)) > UNLIKELY
+    return float(chdtrc(spare, state.cost)) > UNLIKELY
 
 
 def _minimize(spindle: Spindle, names: tuple[str, ...], measured: _Measured, start: _Float) -> tuple[_State, bool]:

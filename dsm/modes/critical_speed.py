@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-from scipy.optimize import brentq
-
 from dsm.modes.find_modes import find_modes
 from dsm.spindle.spindle import Spindle, require_support
 
@@ -23,6 +21,8 @@ def critical_speed(spindle: Spindle, mode: int = 1) -> float:
     Raises ValueError for a mode below 1 and for a shaft that is not held, ArithmeticError where there is none up to
     32 times the frequency at rest.
     """
+    from scipy.optimize import brentq  # takes longer to import than all of dsm
+
     if mode < 1:
         raise ValueError(f"mode={mode} is not at least 1, the lowest")
     require_support(spindle)

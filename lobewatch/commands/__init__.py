@@ -1,1 +1,21 @@
 """The commands of the command line, one a module."""
+
+COMMANDS = {
+    "demo": "A simulated spindle ages over 24 monthly tap tests; ends with its report.",
+    "init": "Make a machine folder with a commented machine.toml to fill in.",
+    "ports": "Serial ports, and which DAQ answers there.",
+    "sensors": "Hammer, accelerometer and DAQ: what they are, and whether they are right.",
+    "tap": "The live tap test: hit until ten hits are good, then see what has changed.",
+    "replay": "Recorded files through the same pipeline as a live test; each is stored once.",
+    "modes": "Natural frequency, damping ratio and stiffness from one recorded file.",
+    "model": "The spindle model: modes, stiffness, critical speed; with another tool in it, predicted before it is "
+    "tapped.",
+    "calibrate": "Bearing stiffness for measured natural frequencies; nothing is stored.",
+    "lobes": "Stability lobes of the newest tap test, drawn beside those of the first test, and the best pockets.",
+    "check": "Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.",
+    "report": "One HTML file with everything in it: what has changed, which programs still hold, lobes then and now.",
+    "serve": "Machines in a browser, worst first; START begins a tap test on the port that machine.toml names. "
+    "Ctrl-C ends it.",
+    "emulate": "A data acquisition device made of software, on a pseudo-terminal.",
+}
+"""What each command does, the first line of its help: the list of all is shown without importing any of them."""

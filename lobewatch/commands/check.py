@@ -29,7 +29,6 @@ def check(
     Examples:
 
       lobewatch check trial
-
       lobewatch check trial --json
     """
     from acquisition import DataError

@@ -1,86 +1,80 @@
-"""lobewatch emulate."""
+"""lobewatch emulate: a command for every driver that can be emulated."""
 
 from __future__ import annotations
 
 import json
 import shlex
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
-from acquisition import DataError, DataqEmulator, Structure, TapsEmulator
-from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, notes, results
-from lobewatch.tap.emulated_spindle import dataq_emulator, emulated_structure, emulator
 
 emulate = typer.Typer(help="A data acquisition device made of software, on a pseudo-terminal.", no_args_is_help=True)
 
-
 Machine = Annotated[
-    Path, typer.Argument(parser=named_folder, help=r"Machine folder with a \[spindle]: what the hammer hits.")
+    Path, typer.Argument(parser=named_folder, help="Machine folder with a spindle in its machine.toml: what is hit.")
 ]
 Tcp = Annotated[bool, typer.Option("--tcp", help="On a TCP port of this computer instead.")]
 Fast = Annotated[bool, typer.Option("--fast", help="As fast as the host reads, not in real time.")]
 Seed = Annotated[int, typer.Option(help="Of the random numbers.")]
 
 
-@emulate.command()
-def taps(machine: Machine, tcp: Tcp = False, fast: Fast = False, seed: Seed = 1, as_json: Json = False) -> None:
-    """A TAPS/1 device with somebody who taps twice a second; Ctrl-C ends it.
+def _add_commands() -> None:
+    from acquisition.devices import driver_names, find_driver
+    from acquisition.errors import DataError
 
-    Examples:
-
-      lobewatch emulate taps trial
-
-      lobewatch tap trial --port /dev/pts/3     (in another window)
-    """
-    structure = _structure(MachineFolder(machine))
-    _serve(emulator(structure, np.random.default_rng(seed), realtime=not fast, tcp=tcp), structure, machine, as_json)
-
-
-@emulate.command()
-def dataq(machine: Machine, tcp: Tcp = False, seed: Seed = 1, as_json: Json = False) -> None:
-    """A DATAQ DI-4108 with the sensors of \\[\\[daq.channel]] and somebody who taps twice a second; Ctrl-C ends it.
-
-    Examples:
-
-      lobewatch emulate dataq trial
-
-      lobewatch tap trial --port /dev/pts/3     (in another window)
-    """
-    folder = MachineFolder(machine)
-    structure = _structure(folder)
-    inputs = tuple(channel.build() for channel in folder.machine.daq.channel)
-    if not inputs:
-        raise DataError(
-            f'{folder.toml}: no sensors to emulate: give driver = "dataq" in [daq] and two [[daq.channel]] '
-            "(docs/devices.md shows them)"
-        )
-    random = np.random.default_rng(seed)
-    _serve(dataq_emulator(structure, inputs, random, realtime=True, tcp=tcp), structure, machine, as_json)
+    for name in driver_names():
+        try:
+            driver = find_driver(name)
+        except DataError as error:  # said here, and again by the command
+            emulate.command(name, help=f"{error}.")(_in_real_time(name))
+            continue
+        if driver.emulate is not None:
+            run = _with_fast(name) if driver.emulates_fast else _in_real_time(name)
+            emulate.command(name, help=_help(name, driver.title))(run)
 
 
-def _structure(folder: MachineFolder) -> Structure:
-    spindle = folder.machine.spindle
-    if spindle is None:
-        raise DataError(f"{folder.toml}: no model to emulate: add a [spindle] table (or use lobewatch init --example)")
-    return emulated_structure(spindle.build(), spindle.damping_ratio, folder.machine.tap.position_mm / 1e3)
+def _with_fast(name: str) -> Callable[..., None]:
+    def run(machine: Machine, tcp: Tcp = False, fast: Fast = False, seed: Seed = 1, as_json: Json = False) -> None:
+        _serve(name, machine, tcp, fast, seed, as_json)
+
+    return run
 
 
-def _serve(device: TapsEmulator | DataqEmulator, structure: Structure, machine: Path, as_json: bool) -> None:
+def _in_real_time(name: str) -> Callable[..., None]:
+    def run(machine: Machine, tcp: Tcp = False, seed: Seed = 1, as_json: Json = False) -> None:
+        _serve(name, machine, tcp, False, seed, as_json)
+
+    return run
+
+
+def _help(name: str, title: str) -> str:
+    return (
+        f"{title[:1].upper()}{title[1:]} with somebody who taps twice a second; Ctrl-C ends it.\n\nExamples:\n\n"
+        f"  lobewatch emulate {name} trial\n\n  lobewatch tap trial --port /dev/pts/3     (in another window)"
+    )
+
+
+def _serve(name: str, machine: Path, tcp: bool, fast: bool, seed: int, as_json: bool) -> None:
     """Say where it is, and serve until Ctrl-C."""
-    with device:
-        first = {"frequency_hz": structure.frequency[0], "stiffness_n_per_m": structure.stiffness[0]}
-        if as_json:
-            results.print(json.dumps({"port": device.port, **first}), markup=False)
-        else:
-            results.print(f"port {device.port}", markup=False)
+    from acquisition.devices import find_driver
+    from lobewatch.machine.folder import MachineFolder
+    from lobewatch.tap.emulated_spindle import emulate_machine
+
+    emulated = emulate_machine(MachineFolder(machine), find_driver(name), seed, realtime=not fast, tcp=tcp)
+    with emulated.device as device:
+        truth = {"frequency_hz": emulated.frequency, "stiffness_n_per_m": emulated.stiffness}
+        results.print(json.dumps({"port": device.port, **truth}) if as_json else f"port {device.port}", markup=False)
         results.file.flush()
-        notes.print(f"the truth: f_1 {first['frequency_hz']:.2f} Hz, K {first['stiffness_n_per_m'] / 1e6:.3f} N/um")
+        notes.print(f"the truth: f_1 {emulated.frequency:.2f} Hz, K {emulated.stiffness / 1e6:.3f} N/um")
         notes.print(
             f"tap with: lobewatch tap {shlex.quote(str(machine))} --port {device.port}   (Ctrl-C ends the emulator)"
         )
         device.wait()
+
+
+_add_commands()

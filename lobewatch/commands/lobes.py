@@ -16,7 +16,7 @@ MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
 
 def lobes(
     machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
-    cut: Annotated[str, typer.Option(help=r"Name of a \[\[program]], or the reference cut.")] = "reference cut",
+    cut: Annotated[str, typer.Option(help="Name of a [[program]], or the reference cut.")] = "reference cut",
     tool: Annotated[str | None, typer.Option(help="Of the newest tap test if not given; else predicted.")] = None,
     source: Annotated[Source, typer.Option(help="From the modes found, or straight from the FRF.")] = "modes",
     method: Annotated[MethodName, typer.Option(help="How the limits of the chart are found.")] = "zero-order",
@@ -34,7 +34,6 @@ def lobes(
     Examples:
 
       lobewatch lobes trial --figure lobes.png
-
       lobewatch lobes trial --cut "bracket, slot" --method semi-discretisation --radial radial.png
     """
     from lobewatch.analysis import Dynamics, Logbook, Method, compare_lobes

@@ -16,7 +16,7 @@ def replay(
     machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
     files: Annotated[list[Path], typer.Argument(help="Recorded hits or FRFs: tap file (HDF5), LVM, CSV.")],
     tool: Annotated[
-        str, typer.Option(help=r"What was in the spindle; from a tap file, or \[tap] tool, where not given.")
+        str, typer.Option(help="What was in the spindle; from a tap file, or [tap] tool, where not given.")
     ] = "",
     direction: Annotated[
         str, typer.Option(help="Direction at the tool tip, x or y; from a tap file, or x, where not given.")
@@ -33,7 +33,6 @@ def replay(
     Examples:
 
       lobewatch replay mill-3 acceleration.lvm
-
       lobewatch replay mill-3 2024/*.h5 --tool "shrink-fit 20"
     """
     from lobewatch.analysis import Logbook

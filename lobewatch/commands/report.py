@@ -23,7 +23,6 @@ def report(
     Examples:
 
       lobewatch report trial
-
       lobewatch report trial --out spindle.html --tool reference --direction x
     """
     from lobewatch.analysis import Logbook

@@ -27,10 +27,9 @@ def serve(
     Examples:
 
       lobewatch serve mills
-
       lobewatch serve mills --listen 0.0.0.0 --http-port 8080
     """
-    from lobewatch.screen import DashboardServer  # brings aiohttp, which most commands do not need
+    from lobewatch.screen import DashboardServer
 
     with DashboardServer(folder, listen=listen, port=http_port, token=token) as server:
         show_address(server.url, as_json)

@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 import contextlib
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from acquisition import Circumstances, tap_direction
-from lobewatch.analysis import Logbook
-from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.measurements import measurement_json, measurement_texts, program_texts, programs_json
 from lobewatch.show.output import Json, emit, notes
-from lobewatch.show.printer import TapPrinter
 from lobewatch.show.show_address import Listen, Token, show_address
-from lobewatch.show.terminal_screen import TerminalScreen
-from lobewatch.tap.plug import Plug
-from lobewatch.tap.session import TapSession, TapStopped
 
 
 def tap(
     machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
     port: Annotated[str, typer.Option(help="Serial port of the DAQ, socket://HOST:PORT, or file:RECORDING.")] = "",
-    tool: Annotated[str, typer.Option(help=r"What is in the spindle; \[tap] tool where not given.")] = "",
+    tool: Annotated[str, typer.Option(help="What is in the spindle; [tap] tool where not given.")] = "",
     direction: Annotated[str, typer.Option(help="Direction at the tool tip, x or y.")] = "x",
     operator: Annotated[str, typer.Option(help="Who holds the hammer.")] = "",
     new: Annotated[bool, typer.Option("--new", help="Begin anew, do not go on with an interrupted test.")] = False,
@@ -37,39 +28,31 @@ def tap(
     """The live tap test: hit until ten hits are good, then see what has changed.
 
     Keys: u or Page Up takes the last good hit back, q stops, m mutes. Every hit is on the disk before it is counted.
-    After a crash the same command goes on at the same hit; an unplugged cable is waited for.
+    After a crash the same command goes on at the same hit; an unplugged cable is waited for. --screen --listen 0.0.0.0
+    can be watched on a tablet; --port file:RECORDING takes recorded hits as if they were made now.
 
     Examples:
 
       lobewatch tap mill-3 --port /dev/ttyACM0
-
       lobewatch tap mill-3 --port COM3 --direction y --operator Kim
-
-      lobewatch tap mill-3 --screen --listen 0.0.0.0     (watched on a tablet)
-
-      lobewatch tap trial --port file:taps/ID.h5     (recorded hits as if they were made now)
+      lobewatch tap mill-3 --screen --listen 0.0.0.0
+      lobewatch tap trial --port file:taps/ID.h5
     """
+    from lobewatch.analysis import Logbook
+    from lobewatch.machine import MachineFolder
+    from lobewatch.show.measurements import measurement_json, measurement_texts, program_texts, programs_json
+    from lobewatch.show.printer import TapPrinter
+    from lobewatch.show.terminal_screen import TerminalScreen
+    from lobewatch.tap import TapStopped, plan_session
+
     folder = MachineFolder(machine)
-    setup = folder.machine
-    port = port or setup.daq.port
-    if not port:
-        raise ValueError(f"no port: give --port, or port in [daq] of {folder.toml}")
-    about = Circumstances(
-        setup.machine.name,
-        datetime.now(UTC),
-        tool or setup.tap.tool,
-        tap_direction(direction),
-        operator,
-        folder.toml.read_text("utf-8"),
-    )
-    session = TapSession(folder, Plug(setup.daq, port).open, about, resume=not new)
+    session = plan_session(folder, port=port, tool=tool, direction=direction, operator=operator, resume=not new)
     try:
         with contextlib.ExitStack() as screens:
             if screen:
-                from lobewatch.screen import ScreenServer  # brings aiohttp, which most commands do not need
+                from lobewatch.screen import ScreenServer  # brings aiohttp, which most tap tests do not need
 
-                server = screens.enter_context(ScreenServer(session, listen=listen, token=token))
-                show_address(server.url)
+                show_address(screens.enter_context(ScreenServer(session, listen=listen, token=token)).url)
             screens.enter_context(TerminalScreen(session) if notes.is_terminal else TapPrinter(session, notes))
             done = session.run()
     except (TapStopped, KeyboardInterrupt) as stopped:

@@ -7,7 +7,15 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from acquisition import STANDARD_GRAVITY, Channel, DataqInput, TapDirection
+from acquisition import (
+    STANDARD_GRAVITY,
+    Channel,
+    DeviceSettings,
+    SensorInput,
+    TapDirection,
+    check_settings,
+    find_driver,
+)
 from lobewatch.machine.toml_table import Positive, Table
 
 Sensitivity = Annotated[float, Meta(ge=-1e6, le=1e6)]
@@ -17,7 +25,7 @@ Sensitivity = Annotated[float, Meta(ge=-1e6, le=1e6)]
 class ChannelTable(Table, frozen=True):
     """[[daq.channel]]: a sensor on an input of a device that does not describe its sensors."""
 
-    input: Annotated[int, Meta(ge=0, le=7)]
+    input: Annotated[int, Meta(ge=0)]
     quantity: Literal["force", "acceleration"]
     range_v: Positive
     sensitivity_mv_per_n: Sensitivity | None = None
@@ -39,7 +47,7 @@ class ChannelTable(Table, frozen=True):
         if value == 0:
             raise ValueError(f"{key}=0 is not the sensitivity of any sensor; take it from its calibration sheet")
 
-    def build(self) -> DataqInput:
+    def build(self) -> SensorInput:
         """The input in SI units: volts at the device per N or per m/s^2."""
         if self.sensitivity_mv_per_n is not None:
             sensitivity = self.sensitivity_mv_per_n / 1e3
@@ -54,14 +62,14 @@ class ChannelTable(Table, frozen=True):
             calibration_date=self.calibration_date.isoformat() if self.calibration_date else "",
             skew=self.skew_us / 1e6,
         )
-        return DataqInput(self.input, channel)
+        return SensorInput(self.input, channel)
 
 
 class Daq(Table, frozen=True):
     """[daq]: the port is remembered here by hand, never written by the program."""
 
     port: str = ""
-    driver: Literal["taps", "dataq"] = "taps"
+    driver: str = "taps"
     sample_rate_hz: Positive | None = None
     loss_detection: bool = True
     accept_measured_rate: bool = False
@@ -69,22 +77,11 @@ class Daq(Table, frozen=True):
     channel: tuple[ChannelTable, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse channels that no driver asks for, and sets of them that make no tap test."""
-        if self.driver == "taps":
-            if self.channel:
-                raise ValueError(
-                    'channel: a TAPS/1 device names its own sensors: leave [[daq.channel]] out, or driver = "dataq"'
-                )
-            if not self.loss_detection:
-                raise ValueError("loss_detection=false: a TAPS/1 device always numbers its scans; leave the key out")
-            return
-        quantities = sorted(channel.quantity for channel in self.channel)
-        if quantities != ["acceleration", "force"]:
-            listed = ", ".join(quantities) or "nothing"
-            raise ValueError(
-                f'driver = "dataq" needs two [[daq.channel]], one of force and one of acceleration; here are {listed}'
-            )
-        if self.channel[0].input == self.channel[1].input:
-            raise ValueError(
-                f"channel 2: input={self.channel[1].input} is that of channel 1; each sensor needs its own"
-            )
+        """Refuse a driver that is not known, and what it does not take."""
+        check_settings(find_driver(self.driver), self.settings)
+
+    @property
+    def settings(self) -> DeviceSettings:
+        """What is asked of the device, in SI units."""
+        inputs = tuple(channel.build() for channel in self.channel)
+        return DeviceSettings(self.sample_rate_hz, inputs, self.loss_detection)

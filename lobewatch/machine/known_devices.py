@@ -5,22 +5,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime
-from typing import Any, Protocol, TypeGuard, runtime_checkable
 
 import msgspec
 
-from acquisition import DataError, DeviceError, MeasuredRate, Source, atomic_write, check_rate, measure_rate
+from acquisition import DataError, Device, DeviceError, MeasuredRate, atomic_write, check_rate, measure_rate
 from lobewatch.machine.folder import MachineFolder
-
-
-@runtime_checkable
-class Device(Source, Protocol):
-    """A source that says who it is."""
-
-    info: dict[str, Any]
-    """With "model" and "serial"."""
-    sample_rate: float
-    """Scans a second (Hz); set to the measured rate where that is accepted."""
 
 
 class KnownDevice(msgspec.Struct, frozen=True):
@@ -38,62 +27,57 @@ class KnownDevice(msgspec.Struct, frozen=True):
 
 
 def checked_rate(
-    folder: MachineFolder, source: Source, seconds: float = 5.0, clock: Callable[[], float] = time.monotonic
+    folder: MachineFolder, device: Device, seconds: float = 5.0, clock: Callable[[], float] = time.monotonic
 ) -> float:
-    """The rate of a connected source that is not started (Hz), measured where this machine does not know it yet.
+    """The rate of a connected device that is not started (Hz), measured where this machine does not know it yet.
 
-    Call it once after every connect, before source.start(), with the folder locked. The first time, for a model,
-    serial number and nominal rate that are not in daq.json, it starts the source, listens for `seconds` and stops it
-    again; later it returns at once (`known_rate` tells beforehand which). Within 0.2 % of source.sample_rate nothing
+    Call it once after every connect, before device.start(), with the folder locked. The first time, for a model,
+    serial number and nominal rate that are not in daq.json, it starts the device, listens for `seconds` and stops it
+    again; later it returns at once (`known_rate` tells beforehand which). Within 0.2 % of device.sample_rate nothing
     changes and that rate is returned. Further off: DeviceError, one sentence with the measured rate; or, with
-    accept_measured_rate = true in [daq], source.sample_rate is set to the measured rate and that is returned, so that
-    every Hit of capture_hits(source, ...) has it: make the Trigger from the returned rate. A refused rate is not kept
-    and is measured again the next time.
-
-    A source without an identity (no `info`, no model or serial number in it) is not a device: its rate is returned
-    unchecked. So is that of a source whose info has clock_ppm = None: it says that its scans do not follow the clock.
+    accept_measured_rate = true in [daq], device.sample_rate is set to the measured rate and that is returned, so that
+    every Hit of capture_hits(device, ...) has it: make the Trigger from the returned rate. A refused rate is not kept
+    and is measured again the next time. The rate of a device whose scans do not follow the clock is not checked.
     """
-    if not has_clock(source):
-        return source.sample_rate
-    return use_rate(folder, source, known_rate(folder, source) or measure_rate(source, seconds, clock))
+    if not has_clock(device):
+        return device.sample_rate
+    return use_rate(folder, device, known_rate(folder, device) or measure_rate(device, seconds, clock))
 
 
-def has_clock(source: Source) -> TypeGuard[Device]:
-    """Whether a source is a device with an identity, whose scans follow the clock."""
-    if not isinstance(source, Device) or not (source.info.get("model") and source.info.get("serial")):
-        return False
-    return source.info.get("clock_ppm", 0) is not None
+def has_clock(device: Device) -> bool:
+    """Whether the scans of a device follow the clock, and it says who it is: its rate is kept by that."""
+    return device.follows_clock and bool(device.identity.model and device.identity.serial)
 
 
-def known_rate(folder: MachineFolder, source: Device) -> MeasuredRate | None:
+def known_rate(folder: MachineFolder, device: Device) -> MeasuredRate | None:
     """What was measured of this device at this nominal rate; None where it is not known."""
-    for device in _read(folder):
-        if _same(device, source):
-            return MeasuredRate(device.measured_rate_hz, device.measured_rate_hz_std, device.n_scans, device.seconds)
+    for known in _read(folder):
+        if _same(known, device):
+            return MeasuredRate(known.measured_rate_hz, known.measured_rate_hz_std, known.n_scans, known.seconds)
     return None
 
 
-def use_rate(folder: MachineFolder, source: Device, measured: MeasuredRate) -> float:
+def use_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -> float:
     """Check a measured rate, accept it where [daq] says so, keep it in daq.json, and return the rate to use (Hz)."""
     try:
-        check_rate(measured, source.sample_rate)
-        rate = source.sample_rate
+        check_rate(measured, device.sample_rate)
+        rate = device.sample_rate
     except DeviceError as error:
         if not folder.machine.daq.accept_measured_rate:
             cure = f"{error.cure} (accept_measured_rate = true in [daq] of {folder.toml})"
             raise DeviceError(error.text, cure) from None
         rate = measured.rate
-    if measured != known_rate(folder, source):
-        _remember(folder, source, measured)
-    source.sample_rate = rate
+    if measured != known_rate(folder, device):
+        _remember(folder, device, measured)
+    device.sample_rate = rate
     return rate
 
 
-def _same(device: KnownDevice, source: Device) -> bool:
+def _same(known: KnownDevice, device: Device) -> bool:
     """The nominal rate may have been replaced by the measured one already."""
-    identity = (str(source.info["model"]), str(source.info["serial"]))
-    rates = (device.nominal_rate_hz, device.measured_rate_hz)
-    return (device.model, device.serial) == identity and source.sample_rate in rates
+    rates = (known.nominal_rate_hz, known.measured_rate_hz)
+    identity = device.identity
+    return (known.model, known.serial) == (identity.model, identity.serial) and device.sample_rate in rates
 
 
 def _read(folder: MachineFolder) -> list[KnownDevice]:
@@ -106,13 +90,13 @@ def _read(folder: MachineFolder) -> list[KnownDevice]:
         raise DataError(f"{path}: {error}; delete this file, the DAQ's rate is then measured anew") from error
 
 
-def _remember(folder: MachineFolder, source: Device, measured: MeasuredRate) -> None:
-    others = [device for device in _read(folder) if not _same(device, source)]
+def _remember(folder: MachineFolder, device: Device, measured: MeasuredRate) -> None:
+    others = [known for known in _read(folder) if not _same(known, device)]
     now = datetime.now(UTC).isoformat(timespec="seconds")
     new = KnownDevice(
-        str(source.info["model"]),
-        str(source.info["serial"]),
-        source.sample_rate,
+        device.identity.model,
+        device.identity.serial,
+        device.sample_rate,
         measured.rate,
         measured.std,
         measured.n_scans,

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import threading
 from dataclasses import replace
-from datetime import UTC, datetime
 
-from acquisition import Circumstances, DataError, TapDirection
+from acquisition import DataError, TapDirection
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.plug import Plug
-from lobewatch.tap.session import TapSession, TapStopped
+from lobewatch.tap.plan_session import plan_session
+from lobewatch.tap.session import TapStopped
 from lobewatch.tap.state import TapState, Word
 
 
@@ -18,12 +17,9 @@ class LiveTest:
 
     def __init__(self, folder: MachineFolder, direction: TapDirection) -> None:
         """Begin; DataError where machine.toml names no port."""
-        machine = folder.machine
-        if not machine.daq.port:
+        if not folder.machine.daq.port:
             raise DataError(f"{folder.toml}: no port in [daq]; write port there, as lobewatch tap --port takes it")
-        text = folder.toml.read_text("utf-8")
-        about = Circumstances(machine.machine.name, datetime.now(UTC), machine.tap.tool, direction, "", text)
-        self._session = TapSession(folder, Plug(machine.daq, machine.daq.port).open, about)
+        self._session = plan_session(folder, direction=direction)
         self._end: TapState | None = None
         self._thread = threading.Thread(target=self._run, name="tap test", daemon=True)
         self._thread.start()

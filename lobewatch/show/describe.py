@@ -1,4 +1,4 @@
-"""Modes and calibrations as JSON objects and as tables for people."""
+"""Modes, calibrations and models as JSON objects and as text for people."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from rich.table import Table
 
 from acquisition import Remark, joined
 from dsm import Calibration, DampingCalibration, StiffnessFit, plus_minus
+from lobewatch.analysis import FileModes, ModelCalibration, ModelSummary
 from lobewatch.show.output import table
 from modal import Mode
 
@@ -67,14 +68,6 @@ def mode_lines(modes: Sequence[Mode]) -> list[str]:
     return lines
 
 
-def remarks_on_all(modes: Sequence[Mode]) -> list[Remark]:
-    """What speaks against all modes of an FRF together."""
-    if len(modes) < 2 or any(mode.is_driving_point for mode in modes):
-        return []
-    text = "every K is negative: hammer or sensor is mounted or wired the other way round"
-    return [Remark("sign-swapped", "", text, "turn it, or give its sensitivity the other sign")]
-
-
 def remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> list[str]:
     """Remarks on single modes and further ones, a line each; what several modes have in common is one."""
     return [str(remark) for remark in joined([*(one for mode in modes for one in mode.remarks), *remarks])]
@@ -98,6 +91,33 @@ def picked_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
 def _difference(mode: Mode, fit: Mode) -> str:
     zeta, k = mode.damping_ratio / fit.damping_ratio - 1, mode.stiffness / fit.stiffness - 1
     return f"f_n {mode.frequency - fit.frequency:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
+
+
+def file_modes_json(found: FileModes) -> dict[str, Any]:
+    """The modes of one file."""
+    return {
+        "file": str(found.path),
+        "n_averages": found.frf.n_averages,
+        "usable_band_hz": found.frf.usable_band,
+        "modes": [mode_json(mode) for mode in found.fitted],
+        "peak_picking": [mode_json(mode) for mode in found.picked],
+        "remarks": [asdict(remark) for remark in found.remarks],
+    }
+
+
+def file_modes_texts(found: FileModes) -> list[str | Table]:
+    """The modes of one file, for people."""
+    frf = found.frf
+    usable = "" if frf.usable_band is None else f", usable {frf.usable_band[0]:.0f} to {frf.usable_band[1]:.0f} Hz"
+    lines = f"{frf.frequency.size} lines {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
+    return [
+        f"{found.path.name}: {frf.n_averages} hit(s) averaged, {lines}{usable}",
+        mode_table(found.fitted),
+        *mode_lines(found.fitted),
+        *remark_lines(found.fitted, found.remarks),
+        "peak picking (eqs. 28, 29), for comparison:",
+        picked_table(found.picked, found.as_recorded),
+    ]
 
 
 def calibration_json(calibration: Calibration) -> dict[str, Any]:
@@ -144,3 +164,59 @@ def damping_json(found: DampingCalibration) -> dict[str, Any]:
         "bearing_damping_n_s_per_m": found.bearing_damping,
         "bearing_damping_sensitivity": found.sensitivity,
     }
+
+
+def model_calibration_json(found: ModelCalibration) -> dict[str, Any]:
+    """What makes a model fit."""
+    stiffness = found.stiffness
+    payload = calibration_json(stiffness) if isinstance(stiffness, Calibration) else stiffness_fit_json(stiffness)
+    return payload if found.dampers is None else payload | damping_json(found.dampers)
+
+
+def model_calibration_texts(found: ModelCalibration) -> list[str]:
+    """What makes a model fit, for people."""
+    label = [f"model: {found.label}"] if found.label else []
+    dampers = [] if found.dampers is None else [str(found.dampers)]
+    return [*label, str(found.stiffness), *dampers]
+
+
+def model_json(found: ModelSummary) -> dict[str, Any]:
+    """A model."""
+    spindle = found.state.spindle
+    return {
+        "tool": found.state.tool,
+        "bearings_from": found.state.origin,
+        "theory": spindle.theory,
+        "length_mm": spindle.length * 1e3,
+        "mass_kg": spindle.mass,
+        "modes": [
+            {
+                "frequency_hz": mode.frequency,
+                "modal_tip_stiffness_n_per_m": mode.tip_stiffness,
+                "bearing_energy_share": mode.bearing_share,
+                "segment_energy_share": mode.segment_share,
+                "joint_energy_share": mode.joint_share,
+            }
+            for mode in found.modes
+        ],
+        "static_tip_stiffness_n_per_m": found.static_stiffness,
+        "critical_speed_rpm": found.critical_speed,
+        "first_frequency_with_rigid_bearings_hz": found.rigid_frequency,
+    }
+
+
+def model_texts(found: ModelSummary) -> list[str | Table]:
+    """A model for people."""
+    spindle, critical = found.state.spindle, found.critical_speed
+    made = table("mode", "f (Hz)", "K at the tip (N/um)", "energy in bearings (%)", "shaft (%)", "joints (%)")
+    for number, mode in enumerate(found.modes, 1):
+        shares = (f"{100 * share:.1f}" for share in (mode.bearing_share, mode.segment_share, mode.joint_share))
+        made.add_row(str(number), f"{mode.frequency:.2f}", f"{mode.tip_stiffness / 1e6:.4g}", *shares)
+    return [
+        f"{found.state.title}: {spindle.theory}, {spindle.length * 1e3:.1f} mm, {spindle.mass:.2f} kg",
+        f"bearings of {found.state.origin}",
+        made,
+        f"static stiffness at the tip  {found.static_stiffness / 1e6:.3f} N/um",
+        f"critical speed               {'none' if critical is None else f'{critical:.0f} rpm'}",
+        f"with rigid bearings          {found.rigid_frequency:.1f} Hz in mode 1",
+    ]

@@ -19,8 +19,6 @@ from lobewatch.show.verdicts import verdict_table
 
 POCKET_RANGE = f"at least {100 * SHARE:.0f} % of the depth"
 """What holds between the ends of a pocket."""
-OUT_OF_RANGE = frozenset({"low-immersion", "fast-teeth", "force-cancels"})
-"""Codes of what another method is the cure of."""
 
 
 def pocket_json(pocket: Pocket) -> dict[str, float]:

@@ -9,9 +9,9 @@ from rich.table import Table
 
 from acquisition import Remark, joined
 from lobes import StabilityLobes
-from lobewatch.analysis import Logbook, Measurement, Verdict, lobes_of
+from lobewatch.analysis import Logbook, Measurement, Verdict, lobes_of, remarks_on_all
 from lobewatch.machine import REFERENCE_CUT
-from lobewatch.show.describe import calibration_json, mode_json, mode_table, remarks_on_all
+from lobewatch.show.describe import calibration_json, mode_json, mode_table
 from lobewatch.show.describe import remark_lines as mode_remark_lines
 from lobewatch.show.verdicts import verdict_json, verdict_table
 

@@ -1,7 +1,9 @@
 """The live tap test: connection, hits, trial, self-check, state, outcome."""
 
-from lobewatch.tap.emulated_spindle import dataq_emulator, emulated_structure, emulator, with_bearing_stiffness
+from lobewatch.tap.demo import DemoTap, SpindleState, age_spindle
+from lobewatch.tap.emulated_spindle import emulate_machine, emulated_structure, emulator, with_bearing_stiffness
 from lobewatch.tap.live_signal import LiveSignal
+from lobewatch.tap.plan_session import plan_session
 from lobewatch.tap.plug import Plug, open_source
 from lobewatch.tap.self_check import quiet_stretch
 from lobewatch.tap.sensor_doubts import sensor_doubts
@@ -10,19 +12,23 @@ from lobewatch.tap.state import Plots, TakenHit, TapState, Word
 from lobewatch.tap.trial import Trial
 
 __all__ = [
+    "DemoTap",
     "LiveSignal",
     "Plots",
     "Plug",
+    "SpindleState",
     "TakenHit",
     "TapSession",
     "TapState",
     "TapStopped",
     "Trial",
     "Word",
-    "dataq_emulator",
+    "age_spindle",
+    "emulate_machine",
     "emulated_structure",
     "emulator",
     "open_source",
+    "plan_session",
     "quiet_stretch",
     "sensor_doubts",
     "with_bearing_stiffness",

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 
-from acquisition import Block, Channel, DeviceError, Event, EventKind
+from acquisition import Block, Channel, Device, DeviceError, Event, EventKind
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import checked_rate, has_clock, known_rate
 from lobewatch.tap.in_progress import TapInProgress
-from lobewatch.tap.live_signal import Device, LiveSignal, description
+from lobewatch.tap.live_signal import LiveSignal, description
 from lobewatch.tap.publisher import Publisher
 from lobewatch.tap.state import Word
 
@@ -49,7 +49,6 @@ class Connection:
         self._device = device
         self.signal = LiveSignal(device)
         """Its newest samples."""
-        self._events: deque[Event] = getattr(device, "events", deque())
         self._button = Button(device.sample_rate)
         self._fault = ""
 
@@ -66,7 +65,7 @@ class Connection:
     def start(self) -> None:
         """Begin the stream; what the button did before counts for nothing."""
         self._device.start()
-        self._events.clear()
+        self._device.events.clear()
 
     def blocks(self) -> Iterator[Block]:
         """What the device sends from now on."""
@@ -76,11 +75,11 @@ class Connection:
 
     def presses(self) -> int:
         """How often its button was pressed since this was last asked for."""
-        return self._button.presses(self._events)
+        return self._button.presses(self._device.events)
 
     def news(self) -> str:
         """That a sensor cable was pulled or a supply is missing, or that it is mended, where it tells that; once."""
-        before, self._fault = self._fault, getattr(self._device, "fault", "")
+        before, self._fault = self._fault, self._device.fault
         if self._fault == before:
             return ""
         return self._fault or "The sensor is connected again."
@@ -117,7 +116,7 @@ class Connector:
         except BaseException:
             device.close()
             raise
-        self._publisher.show(device=f"{device.info['model']}, {device.sample_rate:g} Hz")
+        self._publisher.show(device=f"{device.identity.model}, {device.sample_rate:g} Hz")
         return connection
 
     def reconnect(self, error: DeviceError, tap: TapInProgress, serve: Callable[[], None]) -> Connection:

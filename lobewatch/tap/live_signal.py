@@ -3,38 +3,23 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Mapping
-from typing import Any, Protocol
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Block, Hit, Source
+from acquisition import Block, Device, Hit, Source
 from acquisition.hits.capture_hits import input_channels
 
 LEVEL_TIME = 0.05
 """Length of the live levels (s)."""
 
 
-class Device(Source, Protocol):
-    """A connected source that can be given back."""
-
-    @property
-    def info(self) -> Mapping[str, Any]:
-        """What it says of itself, with its "model"."""
-        ...
-
-    def close(self) -> None:
-        """Stop, and give the port back."""
-        ...
-
-
 def description(device: Device) -> str:
     """Model, serial number, firmware, and how it finds lost scans, as far as it says."""
-    told = {"serial number": device.info.get("serial"), "firmware": device.info.get("fw")}
-    found = getattr(device, "loss_detection", None)
-    parts = [f"{name} {value}" for name, value in told.items() if value]
-    return ", ".join([str(device.info["model"]), *parts, *([f"loss detection: {found}"] if found else [])])
+    who = device.identity
+    told = {"serial number ": who.serial, "firmware ": who.firmware, "loss detection: ": device.loss_detection}
+    return ", ".join([who.model, *(name + value for name, value in told.items() if value)])
 
 
 class LiveSignal:

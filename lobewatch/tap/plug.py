@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from acquisition import DataqSource, DeviceError, FileSource, TapsSource, find_port, usb_identity
+from acquisition import Device, DeviceError, FileSource, SensorPlace, find_driver, find_port, usb_identity
 from lobewatch.machine.daq_tables import Daq
+
+REPLAY = "file:"
+"""What a port begins with that is no port but a recording, whatever the driver."""
 
 
 class Plug:
@@ -17,7 +20,7 @@ class Plug:
         self._daq, self._port = daq, port
         self._identity: tuple[int, str] | None = None
 
-    def open(self) -> TapsSource | DataqSource | FileSource:
+    def open(self) -> Device:
         """See open_source; DeviceError, too, while the USB device is nowhere: no other one at its port is touched."""
         if self._identity is not None and usb_identity(self._port) != self._identity:
             found = find_port(*self._identity)
@@ -30,14 +33,16 @@ class Plug:
         return source
 
 
-def open_source(daq: Daq, port: str) -> TapsSource | DataqSource | FileSource:
-    """A connected source on a port, as [daq] sets it up, or the hits of a recording, "file:PATH".
+def open_source(daq: Daq, port: str) -> Device:
+    """A connected device on a port, as [daq] sets it up, or the hits of a recording, "file:PATH".
 
     Raises DeviceError where no device is there, DataError for a file without hits.
     """
-    if port.startswith("file:"):
-        return FileSource(port.removeprefix("file:"))
-    if daq.driver == "dataq":
-        inputs = [channel.build() for channel in daq.channel]
-        return DataqSource(port, inputs, daq.sample_rate_hz, digital_word=daq.loss_detection)
-    return TapsSource(port, daq.sample_rate_hz)
+    if port.startswith(REPLAY):
+        return FileSource(port.removeprefix(REPLAY))
+    return find_driver(daq.driver).open(port, daq.settings)
+
+
+def sensor_place(daq: Daq, port: str) -> SensorPlace | None:
+    """Where the device on a port keeps the data of its sensors; None where machine.toml does."""
+    return None if port.startswith(REPLAY) else find_driver(daq.driver).sensors

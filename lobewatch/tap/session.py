@@ -5,14 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from acquisition import Circumstances, DataError, DeviceError, TapTest
+from acquisition import Circumstances, DataError, Device, DeviceError, TapTest
 from lobewatch.analysis import Logbook, Measurement
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.connection import Connector
 from lobewatch.tap.hit_loop import HitLoop, TapStopped, Wishes
 from lobewatch.tap.in_progress import begin_tap
 from lobewatch.tap.judged_hits import JudgedHits
-from lobewatch.tap.live_signal import Device
 from lobewatch.tap.outcome import outcome_of
 from lobewatch.tap.phases import Phases
 from lobewatch.tap.publisher import Publisher

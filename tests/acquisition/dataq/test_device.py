@@ -17,13 +17,13 @@ from acquisition import (
     Channel,
     DataqEmulator,
     DataqFaults,
-    DataqInput,
     DataqSource,
     DataqTraits,
     DeviceError,
     HammeredStructure,
     Hammering,
     HitFlags,
+    SensorInput,
     SimulatedSource,
     Structure,
     Trigger,
@@ -38,8 +38,8 @@ RATE = 25_000.0
 HELD = -(-HELD_BACK // 6)
 TRIGGER = Trigger(level=20.0, n_samples=6250, pre_trigger=500)
 INPUTS = (
-    DataqInput(0, Channel("force", 2.25e-3, 2.0)),
-    DataqInput(5, Channel("acceleration", 1.02e-3, 5.0)),
+    SensorInput(0, Channel("force", 2.25e-3, 2.0)),
+    SensorInput(5, Channel("acceleration", 1.02e-3, 5.0)),
 )
 SignalAt = Callable[[float], Signal]
 Make = Callable[..., DataqEmulator]
@@ -108,7 +108,7 @@ def test_scans_arrive_unchanged_and_complete(
         emulated(tcp, trailing_nul=trailing_nul, echoes_stop=echoes_stop) as device,
         DataqSource(device.port, INPUTS, RATE) as source,
     ):
-        assert source.info["model"] == "DI-4108"
+        assert source.identity.model == "DI-4108"
         assert source.sample_rate == RATE
         assert source.loss_detection == "digital word"
         for _ in range(2):
@@ -291,7 +291,7 @@ def test_inputs_that_are_scanned_lag_by_a_part_of_a_scan(structure: Structure) -
     def ramp(rate: float) -> Signal:
         return lambda first, n: np.tile((first + np.arange(n)) / rate, (2, 1))
 
-    inputs = tuple(DataqInput(number, Channel("force", 1.0, 10.0)) for number in (0, 5))
+    inputs = tuple(SensorInput(number, Channel("force", 1.0, 10.0)) for number in (0, 5))
     with (
         DataqEmulator(ramp, inputs, realtime=False, traits=DataqTraits(scanned=True)) as device,
         DataqSource(device.port, inputs, 1000.0) as source,
@@ -304,15 +304,18 @@ def test_inputs_that_are_scanned_lag_by_a_part_of_a_scan(structure: Structure) -
 @pytest.mark.parametrize("firmware", ["87", "1.36", "2A0", "beta"])
 def test_firmware_is_read_in_every_form_it_may_have(emulated: Make, firmware: str) -> None:
     with emulated(firmware=firmware) as device, DataqSource(device.port, INPUTS, RATE) as source:
-        assert source.info["fw"] == firmware
+        assert source.identity.firmware == firmware
 
 
 def test_every_model_takes_the_set_up(signal_at: SignalAt) -> None:
     for model, volts in (("1120", 2.0), ("2108", 10.0), ("2108P", 2.5), ("4208", 100.0), ("4718B", 5.0)):
-        inputs = (DataqInput(2, Channel("force", 2.25e-3, volts)), DataqInput(7, Channel("acceleration", 1e-3, volts)))
+        inputs = (
+            SensorInput(2, Channel("force", 2.25e-3, volts)),
+            SensorInput(7, Channel("acceleration", 1e-3, volts)),
+        )
         device = DataqEmulator(signal_at, inputs, realtime=False, traits=DataqTraits(model=model))
         with device, DataqSource(device.port, inputs) as source:
-            assert source.info["model"] == f"DI-{model}"
+            assert source.identity.model == f"DI-{model}"
             source.start()
             assert take(source, 100)[0].first_scan == 0
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from acquisition import Channel, DataqInput, DataqSource, DeviceError
+from acquisition import Channel, DataqSource, DeviceError, DeviceIdentity, SensorInput
 from acquisition.dataq.protocol import (
     RateSetting,
     choose_packet,
@@ -17,8 +19,8 @@ from acquisition.dataq.protocol import (
 
 Pair = tuple[bytes, bytes]
 INPUTS = (
-    DataqInput(0, Channel("force", 2.25e-3, 5.0)),
-    DataqInput(3, Channel("acceleration", 1.02e-3, 0.5)),
+    SensorInput(0, Channel("force", 2.25e-3, 5.0)),
+    SensorInput(3, Channel("acceleration", 1.02e-3, 0.5)),
 )
 IDENTITY: list[Pair] = [
     (b"stop\r", b"stop\r"),
@@ -83,7 +85,7 @@ def connect(script: list[Pair], sample_rate: float | None = None, digital_word: 
 
 def test_the_connect_sequence_byte_for_byte() -> None:
     source = connect(IDENTITY + SET_UP)
-    assert source.info == {"model": "DI-4108", "serial": "5E0ABC12", "fw": "1.36"}
+    assert source.identity == DeviceIdentity("DI-4108", "5E0ABC12", "1.36")
     assert source.sample_rate == 50_000.0
     assert source.loss_detection == "digital word"
     assert [channel.quantity for channel in source.channels] == ["force", "acceleration"]
@@ -107,7 +109,7 @@ def test_a_low_rate_is_decimated_and_sent_in_small_packets() -> None:
 def test_echoes_may_end_with_cr_nul_and_come_late_or_hidden_in_rubbish() -> None:
     script = [(sent, received.replace(b"\r", b"\r\0")) for sent, received in IDENTITY + SET_UP]
     script[2] = (b"info 1\r", b"\x13\xff\0\0half a scan\r\0info 1 4108\r\0")
-    assert connect(script).info["model"] == "DI-4108"
+    assert connect(script).identity.model == "DI-4108"
     assert not ScriptedLink.received  # nothing is left that would be taken for the first byte of the stream
 
 
@@ -208,6 +210,6 @@ def test_small_facts_of_the_protocol() -> None:
     assert [range_code("4108", volts) for volts in (10, 5, 2, 1, 0.5, 0.2)] == [0, 1, 2, 3, 4, 5]
     assert [range_code("1120", volts) for volts in (100, 50, 20, 10, 5, 2)] == [0, 1, 2, 3, 4, 5]
     with pytest.raises(ValueError, match="input=8 is none of 0 to 7"):
-        DataqInput(8, INPUTS[0].channel)
+        DataqSource("COM9", (replace(INPUTS[0], number=8),))
     with pytest.raises(ValueError, match=r"inputs \[0, 0\] of a DATAQ device must be different"):
         DataqSource("COM9", (INPUTS[0], INPUTS[0]))

@@ -16,6 +16,7 @@ from acquisition import (
     Channel,
     Circumstances,
     DataError,
+    DeviceIdentity,
     FileSource,
     HammeredStructure,
     HitFlags,
@@ -76,6 +77,12 @@ def test_the_real_beam_hit_comes_out_with_its_frf(beam: Path) -> None:
     same_cut = replace(old, force=old.force[start:][:50_000], acceleration=old.acceleration[start:][:50_000])
     ours, theirs = estimate_frf([hit]), estimate_frf([replace(same_cut, pre_trigger=20)])
     assert ours.in_band((100, 6000)).receptance == pytest.approx(theirs.in_band((100, 6000)).receptance, rel=1e-3)
+
+
+def test_a_recording_is_a_device_without_a_clock(beam: Path) -> None:
+    source = FileSource(beam)
+    assert source.identity == DeviceIdentity("replay of acceleration.lvm")
+    assert (source.follows_clock, source.loss_detection, source.fault, list(source.events)) == (False, "", "", [])
 
 
 def test_a_clipped_recording_is_clipped_again(clipped_beam: Path) -> None:

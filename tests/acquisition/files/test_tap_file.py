@@ -217,3 +217,9 @@ def test_a_file_from_before_the_device_was_kept_is_read(tap: TapTest, tmp_path: 
     with h5py.File(tmp_path / "tap.h5", "a") as file:
         del file.attrs["device"]
     assert read_tap(tmp_path / "tap.h5").circumstances.device == ""
+
+
+def test_a_device_that_sends_a_zero_character_is_kept(tap: TapTest, tmp_path: Path) -> None:
+    about = replace(ABOUT, device="DI\0-4108\x1b")
+    write_tap(tmp_path / "tap.h5", replace(tap, circumstances=about))
+    assert read_tap(tmp_path / "tap.h5").circumstances.device == "DI-4108\x1b"

@@ -18,7 +18,9 @@ from acquisition import (
     Channel,
     DataError,
     DeviceError,
+    DeviceIdentity,
     MeasuredRate,
+    SimulatedSource,
     TapsEmulator,
     TapsSource,
     Trigger,
@@ -26,27 +28,29 @@ from acquisition import (
     check_rate,
     measure_rate,
 )
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import checked_rate, known_rate
+from lobewatch.machine.new_folder import make_machine_folder
 
 PAIR = (Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0))
 
 
-class Stream:
-    """A device whose blocks arrive at given times; `clock` tells the time of the block that was handed over last."""
+BOARD = DeviceIdentity("DI-2108", "5F1", "1.40")
 
-    channels = PAIR
+
+class Stream(SimulatedSource):
+    """A device whose blocks arrive at given times; `clock` tells the time of the block that was handed over last."""
 
     def __init__(
         self,
         arrival: NDArray[np.float64],
         nominal: float = 25600.0,
         per_block: int = 512,
-        info: dict[str, Any] | None = None,
+        identity: DeviceIdentity = BOARD,
+        follows_clock: bool = True,
     ) -> None:
-        self.info = info if info is not None else {"model": "DI-2108", "serial": "5F1", "fw": "1.40"}
-        self.sample_rate = nominal
+        super().__init__(silence, PAIR, nominal, 0)
+        self.identity, self.follows_clock = identity, follows_clock
         self._arrival, self._per_block = arrival, per_block
         self._now = 0.0
         self.starts = 0
@@ -56,9 +60,6 @@ class Stream:
 
     def start(self) -> None:
         self.starts += 1
-
-    def stop(self) -> None:
-        pass
 
     def blocks(self) -> Iterator[Block]:
         for i, arrival in enumerate(self._arrival):
@@ -187,7 +188,7 @@ def test_a_device_is_measured_once(folder: MachineFolder) -> None:
 def test_another_serial_number_and_another_rate_are_measured_too(folder: MachineFolder) -> None:
     check(folder, Stream(even(25600.0)))
     for other in (
-        Stream(even(25600.0), info={"model": "DI-2108", "serial": "5F2"}),
+        Stream(even(25600.0), identity=DeviceIdentity("DI-2108", "5F2")),
         Stream(even(51200.0), nominal=51200.0),
     ):
         check(folder, other)
@@ -227,8 +228,11 @@ def test_the_measured_rate_is_worked_with_where_the_machine_file_says_so(folder:
 
 
 def test_what_does_not_follow_the_clock_is_not_measured(folder: MachineFolder) -> None:
-    for info in ({}, {"model": "x"}, {"model": "x", "serial": "1", "clock_ppm": None}):
-        simulated = Stream(even(9.0), info=info)
+    for simulated in (
+        Stream(even(9.0), identity=DeviceIdentity("")),
+        Stream(even(9.0), identity=DeviceIdentity("x")),
+        Stream(even(9.0), identity=DeviceIdentity("x", "1"), follows_clock=False),
+    ):
         assert check(folder, simulated) == 25600.0
         assert simulated.starts == 0
     assert not (folder.path / "daq.json").exists()
@@ -247,11 +251,11 @@ def silence(first: int, n: int) -> NDArray[np.float64]:
 
 def test_an_emulated_device_through_a_pseudo_terminal(folder: MachineFolder) -> None:
     with TapsEmulator(silence, PAIR, 102400.0) as device, TapsSource(device.port) as source:
-        found = measure_rate(source, 1.5)
+        found = measure_rate(source, 3.0)
         assert found.rate == pytest.approx(102400, abs=5 * found.std)
         source.sample_rate = 51200.0
         with pytest.raises(DeviceError, match="not 51200: every frequency would be 50"):
-            checked_rate(folder, source, 1.5)
+            checked_rate(folder, source, 3.0)
 
 
 def test_hits_have_the_measured_rate(folder: MachineFolder, tapper: Callable[..., Any]) -> None:
@@ -259,8 +263,8 @@ def test_hits_have_the_measured_rate(folder: MachineFolder, tapper: Callable[...
         TapsEmulator(tapper(), PAIR, 25600.0, realtime=False) as device,
         TapsSource(device.port) as source,
     ):
-        source.info["clock_ppm"] = 0
-        halved = Stream(even(12800.0), info=source.info)
+        source.follows_clock = True
+        halved = Stream(even(12800.0), identity=source.identity)
         check(accepting(folder), halved)
         rate = checked_rate(MachineFolder(folder.path), source)
         source.start()

@@ -31,9 +31,9 @@ from dsm import modal_stiffness, modes_at, receptance, static_stiffness
 from lobes import read_history, zero_order
 from lobewatch.analysis import History, Logbook, Measurement, measure
 from lobewatch.analysis.history import Row
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.machine_file import REFERENCE_CUT, parse_machine
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.show.report import render_report
 from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE, emulated_structure, emulator, with_bearing_stiffness
 from lobewatch.tap.in_progress import begin_tap

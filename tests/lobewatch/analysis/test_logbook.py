@@ -22,8 +22,8 @@ from lobewatch import Logbook
 from lobewatch.analysis import Measurement, Word, compare_lobes, measure
 from lobewatch.analysis.charts import Dynamics, Method
 from lobewatch.cli import app
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine import Machine, MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen.dashboard import Board
 from lobewatch.show.report import render_report
 from lobewatch.tap.outcome import outcome_of

@@ -25,9 +25,9 @@ from lobes import (
 )
 from lobewatch.analysis import Logbook, aging, lobes_of
 from lobewatch.cli import main
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.machine_file import parse_machine
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.show.figures_lobes import lobes_figure, radial_figure, waterfall_figure
 from modal import Mode, synthesize
 

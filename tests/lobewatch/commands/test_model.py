@@ -18,9 +18,9 @@ from lobes import zero_order
 from lobewatch.analysis import Logbook, model_picture, model_state, speed_grid
 from lobewatch.analysis.prediction import predict
 from lobewatch.cli import app
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.machine_file import REFERENCE_CUT
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.show.figures_model import model_figure
 from modal import Mode
 

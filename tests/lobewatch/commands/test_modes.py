@@ -11,8 +11,9 @@ import pytest
 from matplotlib.text import Annotation
 
 from acquisition import Frf, Remark, from_accelerance
+from lobewatch.analysis import remarks_on_all
 from lobewatch.cli import main
-from lobewatch.show.describe import mode_lines, mode_table, picked_table, remark_lines, remarks_on_all
+from lobewatch.show.describe import mode_lines, mode_table, picked_table, remark_lines
 from lobewatch.show.figures_modes import modes_figure
 from lobewatch.show.output import results
 from modal import Mode, extract, fit_modes, pick_peaks, synthesize

@@ -14,8 +14,8 @@ import pytest
 
 from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id
 from lobewatch.cli import main
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 from modal import Mode, synthesize
 
 LINES = np.arange(4.0, 4000.0, 4.0)

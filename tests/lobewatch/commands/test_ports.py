@@ -9,32 +9,35 @@ import re
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
 import pytest
 import serial
 
 from acquisition import (
+    DataError,
     DataqSource,
     DataqTraits,
     FileSource,
     MeasuredRate,
     PortInfo,
     TapsSource,
+    find_driver,
     list_ports,
     no_ports_hint,
     probe_port,
 )
+from acquisition.devices.built_in import BUILT_IN
 from acquisition.ports.port_hints import explain_open_error
 from acquisition.taps.protocol import Frame, MessageType, encode_frame
 from lobewatch.cli import main
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import use_rate
-from lobewatch.tap.emulated_spindle import dataq_emulator, emulated_structure, emulator
+from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.tap.emulated_spindle import emulate_machine
 from lobewatch.tap.plug import open_source
 
 CHANNELS = """driver = "dataq"
@@ -89,18 +92,11 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
 
 
 def dataq_device(folder: MachineFolder) -> Any:
-    table = folder.machine.spindle
-    assert table is not None
-    inputs = tuple(channel.build() for channel in folder.machine.daq.channel)
-    structure = emulated_structure(table.build(), table.damping_ratio)
-    return dataq_emulator(structure, inputs, np.random.default_rng(1), realtime=False)
+    return emulate_machine(folder, find_driver("dataq"), realtime=False).device
 
 
 def taps_device(folder: MachineFolder) -> Any:
-    table = folder.machine.spindle
-    assert table is not None
-    structure = emulated_structure(table.build(), table.damping_ratio)
-    return emulator(structure, np.random.default_rng(1), realtime=False)
+    return emulate_machine(folder, find_driver("taps"), realtime=False).device
 
 
 def test_a_tap_test_through_a_dataq_device_finds_the_emulated_spindle(run: Any, trial: MachineFolder) -> None:
@@ -166,7 +162,7 @@ def test_ports_lists_all_but_asks_only_usb_devices(
             PortInfo(device.port, 0x0683, 0x4108, "5E0ABC12", "DATAQ [CDC]"),
             PortInfo("/dev/ttyNOT_THERE", 0x16C0, 0x0483, "123", "USB Serial"),
         ]
-        monkeypatch.setattr("lobewatch.commands.ports.list_ports", lambda: listed)
+        monkeypatch.setattr(sys.modules["acquisition.devices.survey_ports"], "list_ports", lambda: listed)
         said = run("ports")
     lines = said.out.splitlines()
     assert "not asked: no USB device" in lines[1]
@@ -187,11 +183,11 @@ def test_a_port_in_use_is_said_to_be_so(run: Any, trial: MachineFolder) -> None:
 
 
 def test_no_port_at_all_gets_a_sentence_with_the_cure(run: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("lobewatch.commands.ports.list_ports", list)
+    monkeypatch.setattr(sys.modules["acquisition.devices.survey_ports"], "list_ports", list)
     said = run("ports")
     assert said.code == 0
     assert said.out.startswith("No serial port on this computer: plug the DAQ in")
-    assert json.loads(run("ports", "--json").out) == {"ports": []}
+    assert json.loads(run("ports", "--json").out) == {"ports": [], "remarks": []}
     assert "dmesg" in no_ports_hint("linux")
     assert "Device Manager" in no_ports_hint("win32")
     assert "cu.usbmodem" in no_ports_hint("darwin")
@@ -235,13 +231,13 @@ def test_the_group_in_the_cure_is_that_of_the_port(tmp_path: Path) -> None:
 def test_a_strange_device_hears_one_question_only(monkeypatch: pytest.MonkeyPatch, vendor: int, first: bytes) -> None:
     monkeypatch.setattr("acquisition.dataq.dialogue.ANSWER_TIME", 0.05)
     monkeypatch.setattr("acquisition.dataq.dialogue.QUIET", 0.05)
-    monkeypatch.setattr(sys.modules["acquisition.devices.probe_port"], "ANSWER_TIME", 0.05)
+    monkeypatch.setattr("acquisition.taps.probe.ANSWER_TIME", 0.05)
     master, slave = os.openpty()
     try:
         import tty
 
         tty.setraw(slave)
-        assert probe_port(os.ttyname(slave), vendor) is None
+        assert probe_port(os.ttyname(slave), BUILT_IN, vendor) is None
         heard = os.read(master, 4096)
     finally:
         os.close(master)
@@ -253,7 +249,7 @@ def test_a_device_that_the_wrong_driver_has_talked_to_is_named_all_the_same(tria
     with taps_device(trial) as device:
         handle = os.open(device.port, os.O_RDWR | os.O_NOCTTY)
         os.write(handle, b"stop\rinfo 0\r")
-        found = probe_port(device.port)
+        found = probe_port(device.port, BUILT_IN)
         os.close(handle)
     assert found is not None
     assert found.driver == "taps"
@@ -275,16 +271,16 @@ def test_a_device_that_talks_nonsense_is_no_answer(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr("acquisition.dataq.dialogue.QUIET", 0.01)
     monkeypatch.setattr(sys.modules["acquisition.devices.probe_port"], "SerialLink", Babbler)
-    assert probe_port("COM1") is None
+    assert probe_port("COM1", BUILT_IN) is None
 
 
 def test_old_firmware_is_named_all_the_same(trial: MachineFolder) -> None:
     device = dataq_device(trial)
     device._info[2] = DataqTraits(firmware="1.20").firmware  # noqa: SLF001
     with device:
-        found = probe_port(device.port)
+        found = probe_port(device.port, BUILT_IN)
     assert found is not None
-    assert (found.driver, found.firmware) == ("dataq", "1.20")
+    assert (found.driver, found.identity.firmware) == ("dataq", "1.20")
 
 
 def test_the_ports_of_the_system_are_listed_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -312,6 +308,11 @@ def test_the_emulator_command_serves_a_dataq_device(run: Any, trial: MachineFold
         _, err = process.communicate(timeout=20)
     assert process.returncode == 130
     assert "Traceback" not in err
+
+
+def test_a_driver_without_an_emulator_says_so(trial: MachineFolder) -> None:
+    with pytest.raises(DataError, match="a TAPS/1 device cannot be emulated; connect one"):
+        emulate_machine(trial, replace(find_driver("taps"), emulate=None))
 
 
 def test_the_emulator_needs_sensors(run: Any, trial: MachineFolder) -> None:

@@ -26,9 +26,10 @@ from acquisition import (
 )
 from acquisition.emulation.simulated_source import Signal
 from lobewatch.cli import main
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import use_rate
+from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.sensors import list_sensors
 
 RATE = 25600.0
 MASS = 1.2
@@ -62,7 +63,7 @@ def folder(tmp_path: Path) -> MachineFolder:
 @pytest.fixture
 def sensors(folder: MachineFolder, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Sensors:
     """Runs the command on an emulated device: exit code, stdout, stderr."""
-    monkeypatch.setattr("lobewatch.commands.sensors.RATE_SECONDS", 1.5)
+    monkeypatch.setattr(sys.modules[list_sensors.__module__], "RATE_SECONDS", 3.0)
 
     def run(
         signal: Signal, channels: tuple[Channel, ...], *arguments: object, rate: float = RATE, realtime: bool = False
@@ -149,7 +150,7 @@ def test_a_date_in_the_future_is_an_error(sensors: Sensors) -> None:
 def test_a_device_at_half_its_rate_is_refused(
     folder: MachineFolder, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("lobewatch.commands.sensors.RATE_SECONDS", 1.5)
+    monkeypatch.setattr(sys.modules[list_sensors.__module__], "RATE_SECONDS", 3.0)
     folder.toml.write_text(folder.toml.read_text("utf-8").replace("[daq]", DATAQ), "utf-8")
     inputs = tuple(table.build() for table in MachineFolder(folder.path).machine.daq.channel)
     with DataqEmulator(lambda _: silence, inputs, faults=DataqFaults(halved_rate=True)) as device:

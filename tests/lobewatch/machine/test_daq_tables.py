@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from acquisition import Channel, DataError, DataqInput
+from acquisition import Channel, DataError, SensorInput
 from lobewatch.machine.machine_file import parse_machine
 
+PLUGIN = Path(__file__).parents[2] / "plugins" / "dummy_device"
 HEAD = '[machine]\nname = "mill 3"\n'
 DAQ = """
 [daq]
@@ -37,7 +38,7 @@ skew_us = 6.5
 
 def test_channels_are_converted_at_the_door() -> None:
     force, acceleration = (channel.build() for channel in parse_machine(HEAD + DAQ).daq.channel)
-    assert force == DataqInput(2, Channel("force", 2.25e-3, 5.0))
+    assert force == SensorInput(2, Channel("force", 2.25e-3, 5.0))
     assert acceleration.number == 3
     channel = acceleration.channel
     assert channel.sensitivity == pytest.approx(-10e-3 * 10 / 9.80665)  # V at the device per m/s^2
@@ -50,7 +51,7 @@ def test_channels_are_converted_at_the_door() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("input = 2", "input = 8", "daq channel 1 input: Expected `int` <= 7"),
+        ("input = 2", "input = 8", "daq: input=8 is none of 0 to 7"),
         ("input = 2", "input = 3", "daq: channel 2: input=3 is that of channel 1"),
         ("input = 2\n", "", "daq channel 1: Object missing required field `input`"),
         ('"force"', '"acceleration"', "daq channel 1: quantity='acceleration' needs sensitivity_mv_per_g"),
@@ -69,7 +70,11 @@ def test_channels_are_converted_at_the_door() -> None:
         ('"x"', '"z"', "daq channel 2 direction: Invalid enum value 'z'"),
         ("2026-01-15", '"last spring"', "daq channel 2 calibration_date: "),
         ("skew_us = 6.5", "skew_us = inf", "daq channel 2 skew_us: "),
-        ('driver = "dataq"', 'driver = "ni"', "daq driver: Invalid enum value 'ni'"),
+        (
+            'driver = "dataq"',
+            'driver = "ni"',
+            "daq: driver='ni' is none of taps, dataq; correct the name, or install",
+        ),
         ('driver = "dataq"', "", "daq: channel: a TAPS/1 device names its own sensors"),
         ('driver = "dataq"', "loss_detection = false", "daq: channel: a TAPS/1 device names its own sensors"),
     ],
@@ -89,6 +94,18 @@ def test_a_dataq_device_needs_its_sensors_and_a_taps_device_its_loss_detection()
         parse_machine(HEAD + '[daq]\ndriver = "dataq"\n')
     with pytest.raises(DataError, match="daq: loss_detection=false: a TAPS/1 device always numbers its scans"):
         parse_machine(HEAD + "[daq]\nloss_detection = false\n")
+
+
+def test_the_driver_of_a_package_checks_its_own_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    dummy = HEAD + '[daq]\ndriver = "dummy"\n'
+    with pytest.raises(DataError, match="daq: driver='dummy' is none of taps, dataq; correct the name, or install"):
+        parse_machine(dummy)
+    monkeypatch.syspath_prepend(PLUGIN)
+    assert parse_machine(dummy).daq.driver == "dummy"
+    with pytest.raises(DataError, match="daq: sample_rate_hz=1000 is not 25600, the only rate of a dummy device"):
+        parse_machine(dummy + "sample_rate_hz = 1000\n")
+    with pytest.raises(DataError, match=r"daq: channel: a dummy device names its own sensors: leave \[\[daq.channel"):
+        parse_machine(HEAD + DAQ.replace('"dataq"', '"dummy"'))
 
 
 @pytest.mark.parametrize("name", ["new_machine.toml", "surrogate_machine.toml"])

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from acquisition import Circumstances, DataError, Frf, SourceFile, TapTest, new_tap_id
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
 

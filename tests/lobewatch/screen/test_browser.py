@@ -12,8 +12,8 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
 from acquisition import Circumstances, HammeredStructure, HitFlags, TapsEmulator, TapsSource
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen import DashboardServer, ScreenServer
 from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE
 from lobewatch.tap.session import TapSession

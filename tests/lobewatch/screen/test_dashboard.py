@@ -20,8 +20,8 @@ import pytest
 from acquisition import Circumstances, DataError, TapsEmulator, TapsSource
 from lobewatch.analysis import Logbook
 from lobewatch.cli import main
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen import DashboardServer
 from lobewatch.tap.emulated_spindle import emulated_structure, emulator, with_bearing_stiffness
 from lobewatch.tap.session import TapSession

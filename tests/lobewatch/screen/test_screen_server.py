@@ -19,8 +19,8 @@ import numpy as np
 import pytest
 
 from acquisition import Circumstances, DeviceError, HammeredStructure, HitFlags, TapsEmulator, TapsSource
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen import ScreenServer
 from lobewatch.screen.web_thread import WebThread
 from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE

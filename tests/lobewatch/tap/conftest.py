@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from acquisition import Block, Channel, Circumstances, DeviceError, HammeredStructure, SimulatedSource
-from lobewatch.commands.init import make_machine_folder
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState
@@ -48,7 +48,6 @@ class Simulated(SimulatedSource):
         fault: Callable[[], str] = str,
     ) -> None:
         super().__init__(signal, channels, RATE, round(seconds * RATE))
-        self.info = {"model": "simulation"}
         self._unplugged, self._ended, self._fault = unplugged, ended, fault
 
     @property

@@ -26,8 +26,8 @@ from acquisition import (
 )
 from lobewatch.analysis import Estimate, Logbook
 from lobewatch.analysis.standing import change_since_first
-from lobewatch.commands.init import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.tap.outcome import outcome_of
 from lobewatch.tap.plots import plots_of
 from lobewatch.tap.state import Outcome

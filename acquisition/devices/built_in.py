@@ -1,0 +1,87 @@
+"""The drivers that lobewatch brings with it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from acquisition.devices.driver import DeviceSettings, Driver, SensorPlace
+
+if TYPE_CHECKING:
+    from acquisition.emulation import Bench, EmulatorThread
+    from acquisition.ports import SerialLink
+    from acquisition.source import Device, DeviceIdentity
+
+
+def _open_taps(port: str, settings: DeviceSettings) -> Device:
+    from acquisition.taps import TapsSource
+
+    return TapsSource(port, settings.sample_rate)
+
+
+def _probe_taps(link: SerialLink) -> DeviceIdentity | None:
+    from acquisition.taps import probe_taps
+
+    return probe_taps(link)
+
+
+def _check_taps(settings: DeviceSettings) -> None:
+    if not settings.loss_detection:
+        raise ValueError("loss_detection=false: a TAPS/1 device always numbers its scans; leave the key out")
+
+
+def _emulate_taps(bench: Bench) -> EmulatorThread:
+    from acquisition.taps import TapsEmulator
+
+    channels = tuple(one.channel for one in bench.inputs)
+    signal = bench.signal_at(bench.sample_rate)
+    return TapsEmulator(signal, channels, bench.sample_rate, realtime=bench.realtime, tcp=bench.tcp)
+
+
+def _open_dataq(port: str, settings: DeviceSettings) -> Device:
+    from acquisition.dataq import DataqSource
+
+    return DataqSource(port, settings.inputs, settings.sample_rate, digital_word=settings.loss_detection)
+
+
+def _probe_dataq(link: SerialLink) -> DeviceIdentity | None:
+    from acquisition.dataq import probe_dataq
+
+    return probe_dataq(link)
+
+
+def _check_dataq(settings: DeviceSettings) -> None:
+    from acquisition.dataq import check_inputs
+
+    check_inputs(settings.inputs)
+
+
+def _emulate_dataq(bench: Bench) -> EmulatorThread:
+    """Where a skew is given for an input, the device converts its inputs one after the other."""
+    from acquisition.dataq import DataqEmulator, DataqTraits
+
+    traits = DataqTraits(scanned=any(one.channel.skew for one in bench.inputs))
+    return DataqEmulator(bench.signal_at, bench.inputs, realtime=bench.realtime, tcp=bench.tcp, traits=traits)
+
+
+BUILT_IN = (
+    Driver(
+        "taps",
+        "a TAPS/1 device",
+        _open_taps,
+        _probe_taps,
+        _check_taps,
+        SensorPlace("the device's own channel data (INFO)", "sens_V_per_EU", "skew_s"),
+        emulate=_emulate_taps,
+        emulates_fast=True,
+    ),
+    Driver(
+        "dataq",
+        "a DATAQ DI-x108 device",
+        _open_dataq,
+        _probe_dataq,
+        _check_dataq,
+        vendors=frozenset({0x0683}),
+        emulate=_emulate_dataq,
+    ),
+)
+"""In the order in which they are asked for."""

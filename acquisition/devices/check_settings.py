@@ -1,0 +1,30 @@
+"""Whether settings fit a driver."""
+
+from __future__ import annotations
+
+from acquisition.devices.driver import DeviceSettings, Driver
+
+
+def check_settings(driver: Driver, settings: DeviceSettings) -> None:
+    """ValueError for sensors that are not asked for or make no tap test, and for what the driver itself refuses."""
+    if driver.sensors is None:
+        _check_sensors(driver, settings)
+    elif settings.inputs:
+        raise ValueError(
+            f"channel: {driver.title} names its own sensors: leave [[daq.channel]] out, or name another driver "
+            '("dataq" takes them)'
+        )
+    driver.check(settings)
+
+
+def _check_sensors(driver: Driver, settings: DeviceSettings) -> None:
+    quantities = sorted(one.channel.quantity for one in settings.inputs)
+    if quantities != ["acceleration", "force"]:
+        listed = ", ".join(quantities) or "nothing"
+        raise ValueError(
+            f'driver = "{driver.name}" needs two [[daq.channel]], one of force and one of acceleration; '
+            f"here are {listed}"
+        )
+    first, second = settings.inputs
+    if first.number == second.number:
+        raise ValueError(f"channel 2: input={second.number} is that of channel 1; each sensor needs its own")

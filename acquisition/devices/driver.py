@@ -1,0 +1,66 @@
+"""What is known of one kind of device: how it is opened, recognised and emulated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from acquisition.channel import SensorInput
+    from acquisition.emulation import Bench, EmulatorThread
+    from acquisition.ports import SerialLink
+    from acquisition.source import Device, DeviceIdentity
+
+
+@dataclass(frozen=True)
+class DeviceSettings:
+    """What is asked of a device: [daq] of machine.toml, in SI units."""
+
+    sample_rate: float | None = None
+    """Scans a second (Hz); None leaves it to the driver."""
+    inputs: tuple[SensorInput, ...] = ()
+    """The sensors of a device that does not describe them itself."""
+    loss_detection: bool = True
+    """Whether lost scans are to be found."""
+
+
+@dataclass(frozen=True)
+class SensorPlace:
+    """Where a device keeps the data of its sensors, in the words by which a person finds them there."""
+
+    place: str
+    """The place, e.g. "the device's own channel data (INFO)"."""
+    sensitivity: str
+    """Name of a sensitivity there."""
+    skew: str
+    """Name of a skew (s) there."""
+
+
+def anything_goes(settings: DeviceSettings) -> None:
+    """Take all settings."""
+
+
+@dataclass(frozen=True)
+class Driver:
+    """One kind of device. Its functions import what they need when they are called: a list of drivers costs nothing."""
+
+    name: str
+    """As in [daq] driver of machine.toml and in `lobewatch emulate NAME`."""
+    title: str
+    """A device of this kind, e.g. "a TAPS/1 device"."""
+    open: Callable[[str, DeviceSettings], Device]
+    """A connected device on a port; DeviceError where none is there, ValueError for settings that it does not have."""
+    probe: Callable[[SerialLink], DeviceIdentity | None]
+    """Who answers on an open link, asked once; None where no device of this kind does."""
+    check: Callable[[DeviceSettings], None] = anything_goes
+    """ValueError for settings that no device of this kind has; its sensors are checked already."""
+    sensors: SensorPlace | None = None
+    """Where the device keeps the data of its sensors; None: it has none, [[daq.channel]] must name them."""
+    vendors: frozenset[int] = frozenset()
+    """USB vendors of such devices, to which no other question is put; none where they may be of any vendor, or of one
+    whose boards others build on too."""
+    emulate: Callable[[Bench], EmulatorThread] | None = None
+    """A device of this kind made of software."""
+    emulates_fast: bool = False
+    """Whether the emulated device can tell the host that its scans do not follow the clock."""

@@ -1,0 +1,56 @@
+"""The serial ports of this computer, and which device answers on each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from acquisition.devices.driver import Driver
+from acquisition.devices.probe_port import Answer, probe_port
+from acquisition.devices.registry import load_drivers
+from acquisition.errors import DeviceError
+from acquisition.ports.list_ports import PortInfo, list_ports
+from acquisition.remark import Remark
+
+
+@dataclass(frozen=True)
+class SeenPort:
+    """A port and what came of asking there."""
+
+    port: PortInfo
+    """What the system knows of it."""
+    answer: Answer | None = None
+    """Who answers; None for nobody."""
+    text: str = ""
+    """Why nobody does, in a few words."""
+    problem: str = ""
+    """Why it could not be asked, a sentence with the cure."""
+
+
+@dataclass(frozen=True)
+class PortSurvey:
+    """All ports that were looked at."""
+
+    seen: tuple[SeenPort, ...]
+    """One each."""
+    remarks: tuple[Remark, ...] = ()
+    """On drivers that cannot be loaded."""
+
+
+def survey_ports(only: str = "") -> PortSurvey:
+    """Ask on every USB port, or only on this one, whatever it is, also where it is not listed."""
+    drivers, remarks = load_drivers()
+    known = list_ports()
+    if only:
+        known = [one for one in known if one.device == only] or [PortInfo(only)]
+    return PortSurvey(tuple(_ask(one, drivers, named=bool(only)) for one in known), remarks)
+
+
+def _ask(port: PortInfo, drivers: Sequence[Driver], named: bool) -> SeenPort:
+    if port.vendor is None and not named:
+        return SeenPort(port, text="not asked: no USB device")
+    try:
+        answer = probe_port(port.device, drivers, port.vendor)
+    except DeviceError as error:
+        return SeenPort(port, text="cannot be opened", problem=str(error))
+    return SeenPort(port, answer, "" if answer else "no answer")

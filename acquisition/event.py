@@ -1,0 +1,28 @@
+"""What happens at a device: a button pressed, a cable pulled, a sensor without its supply."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+
+
+class EventKind(enum.IntEnum):
+    """What has happened."""
+
+    BUTTON = 1
+    CABLE = 2
+    SENSOR_BIAS = 3
+
+
+@dataclass(frozen=True)
+class Event:
+    """One thing that a device has told."""
+
+    kind: int
+    """An EventKind; unknown ones are passed on."""
+    begins: bool = True
+    """Pressed, or a fault has come; False: released, or the fault has gone."""
+    channel: int | None = None
+    """Whose cable or sensor; None for none."""
+    scan: int = 0
+    """When: scans taken since the start of the stream."""

@@ -1,0 +1,5 @@
+"""What programs use of lobewatch."""
+
+from .analysis import Logbook
+
+__all__ = ["Logbook"]

@@ -1,0 +1,86 @@
+"""Help pages in plain text that fit any terminal; examples stay whole, so that they can be copied."""
+
+from __future__ import annotations
+
+import shutil
+import textwrap
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any
+
+from typer.core import TyperCommand, TyperGroup
+
+WIDEST = 100
+"""Characters a line; longer ones are hard to read."""
+LONGEST_NAME = 30
+"""Characters of the first column of a list, less on a narrow terminal."""
+
+
+class HelpCommand(TyperCommand):
+    """A command with such a page."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the page."""
+        formatter.write(_page(self, ctx, formatter.width, {}))
+
+
+class HelpGroup(TyperGroup):
+    """A group of commands with such a page."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the page."""
+        formatter.write(_page(self, ctx, formatter.width, self.summaries(ctx)))
+
+    def summaries(self, ctx: Any) -> Mapping[str, str]:
+        """What each of its commands does: the first paragraph of its help."""
+        commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
+        return {name: (command.help or "").partition("\n\n")[0] for name, command in commands.items() if command}
+
+
+def page_width() -> int:
+    """Characters a line, here and now."""
+    return min(shutil.get_terminal_size().columns, WIDEST)
+
+
+def _page(command: TyperCommand | TyperGroup, ctx: Any, width: int, commands: Mapping[str, str]) -> str:
+    rows: dict[str, list[tuple[str, str]]] = {"argument": [], "option": []}
+    for parameter in command.get_params(ctx):
+        record = parameter.get_help_record(ctx)
+        if record is not None:
+            rows[parameter.param_type_name].append(record)
+    usage = " ".join(["Usage:", ctx.command_path, *command.collect_usage_pieces(ctx)])
+    lines = [*_wrapped(usage, width, subsequent_indent="  "), *_prose(command.help or "", width)]
+    for title, listed in (("Arguments", rows["argument"]), ("Options", rows["option"]), ("Commands", commands.items())):
+        if listed:
+            lines += ["", f"{title}:", *_list(listed, width)]
+    return "\n".join(lines) + "\n"
+
+
+def _prose(text: str, width: int) -> Iterator[str]:
+    """Paragraphs, wrapped; those that are indented (examples) as they are."""
+    for paragraph in text.split("\n\n"):
+        yield ""
+        yield from paragraph.splitlines() if paragraph.startswith(" ") else _wrapped(paragraph, width)
+
+
+def _list(rows: Collection[tuple[str, str]], width: int) -> Iterator[str]:
+    """Names and texts side by side; a name that is too long for its column above its text."""
+    longest = min(LONGEST_NAME, width // 3)
+    column = 4 + max((len(name) for name, _ in rows if len(name) <= longest), default=longest)
+    for name, text in rows:
+        texts = _wrapped(text, width - column) or [""]
+        if len(name) <= longest:
+            yield f"  {name:{column - 2}}{texts.pop(0)}".rstrip()
+        else:
+            yield from (f"  {line.replace('| ', '|')}" for line in _wrapped(name.replace("|", "| "), width - 2))
+        yield from (" " * column + line for line in texts)
+
+
+def _wrapped(text: str, width: int, subsequent_indent: str = "") -> list[str]:
+    """Lines broken at spaces only: the name of an option stays whole."""
+    return textwrap.wrap(
+        " ".join(text.split()),
+        width,
+        subsequent_indent=subsequent_indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )

@@ -1,0 +1,29 @@
+"""What is known of one machine: machine.toml, its folder, its journal, its devices."""
+
+from .cut_tables import CutTable, ProgramTable
+from .daq_tables import Daq
+from .drive import drive_limit
+from .folder import BusyError, MachineFolder, TapEntry
+from .known_devices import checked_rate, has_clock, known_rate, use_rate
+from .machine_file import REFERENCE_CUT, Limits, Machine, SpeedRange, TapSetup
+from .new_folder import make_machine_folder
+
+__all__ = [
+    "REFERENCE_CUT",
+    "BusyError",
+    "CutTable",
+    "Daq",
+    "Limits",
+    "Machine",
+    "MachineFolder",
+    "ProgramTable",
+    "SpeedRange",
+    "TapEntry",
+    "TapSetup",
+    "checked_rate",
+    "drive_limit",
+    "has_clock",
+    "known_rate",
+    "make_machine_folder",
+    "use_rate",
+]

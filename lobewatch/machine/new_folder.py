@@ -1,0 +1,28 @@
+"""A new machine folder. Imports nothing heavy: `lobewatch init` is quick."""
+
+from __future__ import annotations
+
+import json
+from importlib import resources
+from pathlib import Path
+
+from acquisition.atomic import atomic_write
+from acquisition.errors import DataError
+from acquisition.names import check_name
+
+
+def make_machine_folder(folder: Path, template: str) -> Path:
+    """A machine folder from a template of sim_data, named after itself; DataError where there is one already.
+
+    ValueError for a folder whose name holds control characters.
+    """
+    name = folder.resolve().name or "machine"  # the root of a disk has no name
+    check_name(name, "folder")
+    toml = folder / "machine.toml"
+    if toml.exists():
+        raise DataError(f"{toml}: is there already; choose another folder or edit that file")
+    folder.mkdir(parents=True, exist_ok=True)
+    text = resources.files("sim_data").joinpath(template).read_text(encoding="utf-8")
+    quoted = json.dumps(name, ensure_ascii=False)  # TOML escapes as JSON does
+    atomic_write(toml, text.replace('"MACHINE_NAME"', quoted).encode())
+    return toml

@@ -1,0 +1,54 @@
+"""What is plugged in, what is not believed of it, and its sample rate against the clock of this computer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from acquisition import Channel, Device, DeviceError, DeviceIdentity, MeasuredRate, Remark, measure_rate
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.known_devices import has_clock, use_rate
+from lobewatch.tap.sensor_doubts import WRONG, sensor_doubts
+
+RATE_SECONDS = 5.0
+"""How long the rate is measured (s)."""
+
+
+@dataclass(frozen=True)
+class SensorList:
+    """A device, its channels, and what is wrong with them."""
+
+    identity: DeviceIdentity
+    """The device."""
+    channels: tuple[Channel, ...]
+    """Its sensors."""
+    nominal_rate: float
+    """The rate that it names (Hz)."""
+    measured_rate: MeasuredRate | None
+    """Against the clock; None where it follows none, or could not be measured."""
+    replaces_nominal: bool
+    """Whether the measured rate is worked with."""
+    remarks: tuple[Remark, ...]
+    """Sensitivities, ranges, dates and rates that are not believed."""
+
+    @property
+    def errors(self) -> tuple[Remark, ...]:
+        """Those remarks on what is to be put right first."""
+        return tuple(remark for remark in self.remarks if remark.code in WRONG)
+
+
+def list_sensors(folder: MachineFolder, device: Device, tell: Callable[[str], None]) -> SensorList:
+    """Look at a connected device; a rate that is right is kept for it. tell: what is being done, for a person."""
+    today = datetime.now(UTC).date()
+    remarks = sensor_doubts(device.channels, today, folder.machine.daq.calibration_interval_months)
+    nominal, measured = device.sample_rate, None
+    if has_clock(device):
+        tell(f"measuring the rate for {RATE_SECONDS:g} s")
+        try:
+            measured = measure_rate(device, RATE_SECONDS)
+            use_rate(folder, device, measured)
+        except DeviceError as error:
+            remarks.append(Remark("sample-rate-wrong", "", error.text, error.cure))
+    replaced = device.sample_rate != nominal
+    return SensorList(device.identity, device.channels, nominal, measured, replaced, tuple(remarks))

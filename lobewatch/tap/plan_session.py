@@ -1,0 +1,35 @@
+"""A live tap test as machine.toml describes it."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+from acquisition import Circumstances, tap_direction
+from lobewatch.machine import MachineFolder
+from lobewatch.tap.plug import Plug
+from lobewatch.tap.session import TapSession
+
+
+def plan_session(
+    folder: MachineFolder,
+    *,
+    port: str = "",
+    tool: str = "",
+    direction: str = "x",
+    operator: str = "",
+    resume: bool = True,
+) -> TapSession:
+    """A session of today; what is left empty is taken from machine.toml. ValueError where that names no port either."""
+    machine = folder.machine
+    port = port or machine.daq.port
+    if not port:
+        raise ValueError(f"no port: give --port, or port in [daq] of {folder.toml}")
+    about = Circumstances(
+        machine.machine.name,
+        datetime.now(UTC),
+        tool or machine.tap.tool,
+        tap_direction(direction),
+        operator,
+        folder.toml.read_text("utf-8"),
+    )
+    return TapSession(folder, Plug(machine.daq, port).open, about, resume=resume)

@@ -1,0 +1,137 @@
+"""Drivers of other packages: found, refused with the name of their package, asked only where the vendor fits."""
+
+from __future__ import annotations
+
+import os
+import tty
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from acquisition import (
+    DataError,
+    DeviceIdentity,
+    DeviceSettings,
+    Driver,
+    driver_names,
+    find_driver,
+    load_drivers,
+    probe_port,
+)
+from acquisition.devices.built_in import BUILT_IN
+from acquisition.ports import SerialLink
+
+PLUGINS = Path(__file__).parents[2] / "plugins"
+Install = Callable[[str, str], None]
+
+
+@pytest.fixture
+def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
+    """Puts a package with a driver `odd` on the path: its name, and what the entry point leads to."""
+
+    def put(package: str, target: str) -> None:
+        folder = tmp_path / package
+        metadata = folder / f"{package}-1.0.dist-info"
+        metadata.mkdir(parents=True)
+        (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n", "utf-8")
+        (metadata / "entry_points.txt").write_text(f"[lobewatch.drivers]\nodd = {target}\n", "utf-8")
+        monkeypatch.syspath_prepend(folder)
+
+    return put
+
+
+def test_ours_come_first_and_a_package_adds_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert driver_names() == ("taps", "dataq")
+    monkeypatch.syspath_prepend(PLUGINS / "dummy_device")
+    assert driver_names() == ("taps", "dataq", "dummy")
+    dummy = find_driver("dummy")
+    assert (dummy.name, dummy.title) == ("dummy", "a dummy device")
+    assert load_drivers() == ((*BUILT_IN, dummy), ())
+
+
+@pytest.mark.parametrize(
+    ("target", "message"),
+    [
+        ("no_such_module:DRIVER", "cannot be loaded (ModuleNotFoundError: No module named 'no_such_module')"),
+        ("acquisition.devices.built_in:NOTHING", "cannot be loaded (AttributeError: "),
+        ("acquisition.devices.registry:GROUP", "of the package bad is no acquisition.Driver"),
+        ("acquisition.devices.built_in:BUILT_IN.__class__", "of the package bad is no acquisition.Driver"),
+    ],
+)
+def test_what_is_no_driver_is_refused_with_the_name_of_its_package(install: Install, target: str, message: str) -> None:
+    install("bad", target)
+    with pytest.raises(DataError) as caught:
+        find_driver("odd")
+    assert str(caught.value).startswith("driver 'odd': ")
+    assert message in str(caught.value)
+    assert str(caught.value).endswith("; update or remove that package")
+    drivers, (remark,) = load_drivers()
+    assert drivers == BUILT_IN
+    assert (remark.code, str(remark)) == ("driver-not-loaded", str(caught.value))
+
+
+def test_a_driver_under_another_name_is_refused(install: Install, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(PLUGINS / "dummy_device")
+    install("liar", "lobewatch_dummy_device:DRIVER")
+    with pytest.raises(DataError, match="driver 'odd': the package liar calls it 'dummy' elsewhere"):
+        find_driver("odd")
+
+
+def test_two_packages_with_one_driver_are_both_named(install: Install) -> None:
+    install("first", "a:b")
+    install("second", "c:d")
+    with pytest.raises(DataError, match="the packages first and second both bring it; remove one of them"):
+        find_driver("odd")
+
+
+def test_a_name_that_nobody_brings() -> None:
+    with pytest.raises(DataError, match="driver='odd' is none of taps, dataq; correct the name, or install"):
+        find_driver("odd")
+
+
+@pytest.fixture
+def port() -> Iterator[str]:
+    """A pseudo-terminal at which nobody answers."""
+    ends = os.openpty()
+    tty.setraw(ends[1])
+    yield os.ttyname(ends[1])
+    for end in ends:
+        os.close(end)
+
+
+@pytest.mark.parametrize(
+    ("vendor", "asked"),
+    [(None, ["any", "one", "other"]), (0x1111, ["one"]), (0x2222, ["one", "other"]), (0x3333, ["any"])],
+)
+def test_only_drivers_that_fit_the_vendor_are_asked(port: str, vendor: int | None, asked: list[str]) -> None:
+    heard: list[str] = []
+
+    def driver(name: str, *vendors: int) -> Driver:
+        def probe(_link: SerialLink) -> DeviceIdentity | None:
+            heard.append(name)
+            return None
+
+        return replace(BUILT_IN[0], name=name, probe=probe, vendors=frozenset(vendors))
+
+    drivers = driver("any"), driver("one", 0x1111, 0x2222), driver("other", 0x2222)
+    assert probe_port(port, drivers, vendor) is None
+    assert heard == asked
+
+
+def test_the_first_answer_counts(port: str) -> None:
+    who = DeviceIdentity("X", "1", "2")
+
+    def driver(name: str, identity: DeviceIdentity | None) -> Driver:
+        return replace(BUILT_IN[0], name=name, probe=lambda _: identity)
+
+    drivers = driver("silent", None), driver("answering", who), driver("later", DeviceIdentity("Y"))
+    found = probe_port(port, drivers)
+    assert found is not None
+    assert (found.driver, found.identity) == ("answering", who)
+
+
+def test_a_driver_takes_all_settings_unless_it_says_otherwise() -> None:
+    driver = Driver("x", "a thing", BUILT_IN[0].open, BUILT_IN[0].probe)
+    driver.check(DeviceSettings(1.0, (), loss_detection=False))

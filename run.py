@@ -19,12 +19,13 @@ ROOT = os.path.dirname(os.path.abspath(__file__))
 VENV = os.path.join(ROOT, ".venv")
 SCRIPTS = os.path.join(VENV, "Scripts" if os.name == "nt" else "bin")
 PYTHON = os.path.join(SCRIPTS, "python.exe" if os.name == "nt" else "python")
+LOCKS = {"": "requirements.lock", "[dev]": "requirements-dev.lock"}
 
 
 def stamp(extras):
     """Digest of all that decides what the environment holds."""
     digest = hashlib.sha256((sys.version + sys.executable + ROOT).encode())
-    for name in ("pyproject.toml", "run.py"):
+    for name in ("pyproject.toml", "run.py", LOCKS[extras]):
         with open(os.path.join(ROOT, name), "rb") as file:
             digest.update(file.read())
     return digest.hexdigest() + extras
@@ -40,7 +41,7 @@ def installer():
 
 
 def make_environment(extras):
-    """Make .venv and install lobewatch in it, unless it is there already; extras is "" or "[dev]"."""
+    """Make .venv with the locked packages and lobewatch in it, unless it is there; extras is "" or "[dev]"."""
     if os.path.realpath(sys.prefix) == os.path.realpath(VENV):
         return  # started by the environment itself, which cannot make itself anew
     marker = os.path.join(VENV, "lobewatch-stamp")
@@ -59,7 +60,12 @@ def make_environment(extras):
 
     sys.stderr.write("Setting up %s (once; a minute or two) ...\n" % VENV)
     venv.create(VENV, with_pip=False, clear=True)
-    for packages in (["--upgrade", "pip"], ["--editable", ROOT + extras]):
+    locked = ["--require-hashes", "-r", os.path.join(ROOT, LOCKS[extras])]
+    steps = [["--upgrade", "pip"], ["--no-deps", "--editable", ROOT]]
+    if subprocess.call(command + locked):
+        sys.stderr.write("The locked packages do not fit here (see above): taking what pyproject.toml allows.\n")
+        steps[1] = ["--editable", ROOT + extras]
+    for packages in steps:
         status = subprocess.call(command + packages)
         if status:
             sys.exit("lobewatch could not install its packages (see above); check the network and start again.")

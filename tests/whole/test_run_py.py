@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 @pytest.fixture
 def run_py(tmp_path: Path) -> ModuleType:
     """A copy of run.py in a folder of its own."""
-    for name in ("run.py", "pyproject.toml"):
+    for name in ("run.py", "pyproject.toml", "requirements.lock", "requirements-dev.lock"):
         shutil.copy(ROOT / name, tmp_path)
     spec = importlib.util.spec_from_file_location("run_py", tmp_path / "run.py")
     assert spec is not None
@@ -69,7 +69,7 @@ def test_uv_serves_where_there_is_no_pip(run_py: ModuleType, monkeypatch: pytest
     assert run_py.installer()[:3] == ["/bin/uv", "pip", "install"]
 
 
-@pytest.mark.parametrize(("made_for", "asked", "calls"), [("", "", 0), ("[dev]", "", 0), ("", "[dev]", 2)])
+@pytest.mark.parametrize(("made_for", "asked", "calls"), [("", "", 0), ("[dev]", "", 0), ("", "[dev]", 3)])
 def test_an_environment_that_holds_all_is_not_made_again(
     run_py: ModuleType, monkeypatch: pytest.MonkeyPatch, made_for: str, asked: str, calls: int
 ) -> None:
@@ -82,11 +82,41 @@ def test_an_environment_that_holds_all_is_not_made_again(
     assert len(made) == calls
 
 
-def test_a_changed_pyproject_makes_it_again(run_py: ModuleType) -> None:
-    before = run_py.stamp("")
-    with (Path(run_py.ROOT) / "pyproject.toml").open("a") as file:
+@pytest.mark.parametrize(
+    ("name", "extras"), [("pyproject.toml", ""), ("requirements.lock", ""), ("requirements-dev.lock", "[dev]")]
+)
+def test_a_changed_pyproject_or_lock_makes_it_again(run_py: ModuleType, name: str, extras: str) -> None:
+    before = run_py.stamp(extras)
+    with (Path(run_py.ROOT) / name).open("a") as file:
         file.write("# changed\n")
-    assert run_py.stamp("") != before
+    assert run_py.stamp(extras) != before
+
+
+def test_what_is_installed_is_what_is_locked(run_py: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[list[str]] = []
+    monkeypatch.setattr(run_py, "installer", lambda: ["install"])
+    monkeypatch.setattr("venv.create", lambda *_, **__: Path(run_py.VENV).mkdir())
+    monkeypatch.setattr(run_py.subprocess, "call", recording(made, 0))
+    run_py.make_environment("[dev]")
+    assert made[0] == ["install", "--require-hashes", "-r", str(Path(run_py.ROOT) / "requirements-dev.lock")]
+    assert made[2] == ["install", "--no-deps", "--editable", run_py.ROOT]
+
+
+def test_a_lock_that_does_not_fit_gives_way_to_what_pyproject_allows(
+    run_py: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made: list[list[str]] = []
+
+    def call(command: list[str]) -> int:
+        made.append(command)
+        return int("--require-hashes" in command)
+
+    monkeypatch.setattr(run_py, "installer", lambda: ["install"])
+    monkeypatch.setattr("venv.create", lambda *_, **__: Path(run_py.VENV).mkdir())
+    monkeypatch.setattr(run_py.subprocess, "call", call)
+    run_py.make_environment("[dev]")
+    assert made[-1] == ["install", "--editable", f"{run_py.ROOT}[dev]"]
+    assert "taking what pyproject.toml allows" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

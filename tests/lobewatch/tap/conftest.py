@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from acquisition import Block, Channel, Circumstances, DeviceError, HammeredStructure, SimulatedSource
-from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState
 

@@ -55,7 +55,7 @@ def _in_real_time(name: str) -> Callable[..., None]:
 def _help(name: str, title: str) -> str:
     return (
         f"{title[:1].upper()}{title[1:]} with somebody who taps twice a second; Ctrl-C ends it.\n\nExamples:\n\n"
-        f"  lobewatch emulate {name} trial\n\n  lobewatch tap trial --port /dev/pts/3     (in another window)"
+        f"  lobewatch emulate {name} trial\n  lobewatch tap trial --port /dev/pts/3  # in another window"
     )
 
 

@@ -162,10 +162,10 @@ class Logbook:
             self.remarks += store_history(self.folder, self._history)
         return found
 
-    def verdict_then(self, now: Verdict) -> Verdict | None:
-        """The verdict on the same program at the first tap tests of its tool in the same directions, if there are."""
+    def ruling_then(self, now: Verdict) -> Ruling | None:
+        """Word and limit of a program at the first tap tests of its tool in the same directions; None without them."""
         then = None if now.assembly is None else self.first_assembly(now.assembly)
-        return None if then is None else verdict(now.program, then, self.machine)
+        return None if then is None else self.rulings(then.tap_id)[now.program.name]
 
     def advice(self, found: Verdict) -> Advice:
         """What goes beyond a verdict; it takes longer than the verdict itself."""

@@ -43,7 +43,7 @@ class Advised:
 
 def advised(logbook: Logbook, verdict: Verdict) -> Advised:
     """All that is said of one program."""
-    then = logbook.verdict_then(verdict)
+    then = logbook.ruling_then(verdict)
     return Advised(verdict, logbook.advice(verdict), None if then is None else then.stable)
 
 

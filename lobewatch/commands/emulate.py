@@ -72,7 +72,8 @@ def _serve(name: str, machine: Path, tcp: bool, fast: bool, seed: int, as_json: 
         results.file.flush()
         notes.print(f"the truth: f_1 {emulated.frequency:.2f} Hz, K {emulated.stiffness / 1e6:.3f} N/um")
         notes.print(
-            f"tap with: lobewatch tap {shlex.quote(str(machine))} --port {device.port}   (Ctrl-C ends the emulator)"
+            f"tap with: lobewatch tap {shlex.quote(str(machine))} --port {device.port}   (Ctrl-C ends the emulator)",
+            markup=False,
         )
         device.wait()
 

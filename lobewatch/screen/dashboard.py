@@ -63,7 +63,7 @@ def _row(key: str, name: str, standing: Standing) -> dict[str, Any]:
     known = worst is not None and worst.fall.is_known
     std = worst.fall.std if worst is not None and math.isfinite(worst.fall.std) else None
     others = joined(remark for remark in standing.remarks if remark.code not in SHOWN_APART)
-    reasons = [f"{remark.about}: {remark.text}".removeprefix(": ") for remark in others]
+    reasons = [remark.finding for remark in others]
     return {
         "key": key,
         "name": name,

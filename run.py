@@ -61,7 +61,11 @@ def make_environment(extras):
     sys.stderr.write("Setting up %s (once; a minute or two) ...\n" % VENV)
     venv.create(VENV, with_pip=False, clear=True)
     locked = ["--require-hashes", "-r", os.path.join(ROOT, LOCKS[extras])]
-    for packages in (["--upgrade", "pip"], locked, ["--no-deps", "--editable", ROOT]):
+    steps = [["--upgrade", "pip"], ["--no-deps", "--editable", ROOT]]
+    if subprocess.call(command + locked):
+        sys.stderr.write("The locked packages do not fit here (see above): taking what pyproject.toml allows.\n")
+        steps[1] = ["--editable", ROOT + extras]
+    for packages in steps:
         status = subprocess.call(command + packages)
         if status:
             sys.exit("lobewatch could not install its packages (see above); check the network and start again.")

@@ -21,7 +21,12 @@ class Remark:
 
     def __str__(self) -> str:
         """One sentence."""
-        return ": ".join(filter(None, (self.about, self.text))) + (f"; {self.cure}" if self.cure else "")
+        return self.finding + (f"; {self.cure}" if self.cure else "")
+
+    @property
+    def finding(self) -> str:
+        """The same without the cure."""
+        return ": ".join(filter(None, (self.about, self.text)))
 
 
 def joined(remarks: Iterable[Remark]) -> list[Remark]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 
 from acquisition.devices.built_in import BUILT_IN
 from acquisition.devices.driver import Driver
 from acquisition.errors import DataError
+from acquisition.plugin import load_plugin, not_loaded, package_of
 from acquisition.remark import Remark
 
 GROUP = "lobewatch.drivers"
@@ -38,33 +39,11 @@ def _find(name: str) -> Driver | Remark:
     for driver in BUILT_IN:
         if driver.name == name:
             return driver
-    points = sorted(entry_points(group=GROUP, name=name), key=_package)
+    points = sorted(entry_points(group=GROUP, name=name), key=package_of)
     if not points:
         text = f"driver={name!r} is none of {', '.join(driver_names())}"
         return Remark("driver-not-known", "", text, "correct the name, or install the package that brings it")
     if len(points) > 1:
-        packages = " and ".join(map(_package, points))
-        return _remark(name, f"the packages {packages} both bring it", "remove one of them")
-    return _load(points[0])
-
-
-def _load(point: EntryPoint) -> Driver | Remark:
-    cure = "update or remove that package"
-    try:
-        loaded = point.load()
-    except Exception as error:  # noqa: BLE001  (a foreign package may fail in any way; ours go on)
-        reason = f"the package {_package(point)} cannot be loaded ({type(error).__name__}: {error})"
-        return _remark(point.name, reason, cure)
-    if not isinstance(loaded, Driver):
-        return _remark(point.name, f"{point.value} of the package {_package(point)} is no acquisition.Driver", cure)
-    if loaded.name != point.name:
-        return _remark(point.name, f"the package {_package(point)} calls it {loaded.name!r} elsewhere", cure)
-    return loaded
-
-
-def _remark(name: str, text: str, cure: str) -> Remark:
-    return Remark("driver-not-loaded", f"driver {name!r}", text, cure)
-
-
-def _package(point: EntryPoint) -> str:
-    return point.dist.name if point.dist else point.module
+        packages = " and ".join(map(package_of, points))
+        return not_loaded(Driver, points[0], f"the packages {packages} both bring it", "remove one of them")
+    return load_plugin(points[0], Driver)

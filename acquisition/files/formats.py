@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import logging
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from pathlib import Path
 
 from acquisition.errors import DataError
@@ -12,6 +12,8 @@ from acquisition.files.format import Format
 from acquisition.files.read_csv import TEXT_TABLE
 from acquisition.files.read_lvm import LVM
 from acquisition.files.tap_recording import TAP_FILE
+from acquisition.plugin import load_plugin, not_loaded, package_of
+from acquisition.remark import Remark
 
 GROUP = "lobewatch.formats"
 """Entry points that each name one Format."""
@@ -55,24 +57,17 @@ def _is_it(one: Format, head: bytes, path: Path) -> bool:
 
 
 @functools.cache
-def _of_others() -> tuple[tuple[Format, ...], tuple[str, ...]]:
-    """Formats of other packages, and what is wrong with those that cannot be used."""
-    found: list[Format] = []
-    faults: list[str] = []
+def _of_others() -> tuple[tuple[Format, ...], tuple[Remark, ...]]:
+    """Formats of other packages, and a remark on each that cannot be used."""
+    found: dict[str, Format] = {}
+    remarks: list[Remark] = []
+    taken = {one.name for one in BUILT_IN}
     for point in sorted(entry_points(group=GROUP), key=lambda one: one.name):
-        try:
-            found.append(_loaded(point, [*BUILT_IN, *found]))
-        except Exception as error:  # noqa: BLE001 - code of others may raise anything; our own formats still work
-            package = point.dist.name if point.dist else "not known"
-            reason = f"{type(error).__name__}: {error}"
-            faults.append(f"format {point.name!r} of package {package!r} is broken ({reason}): update or remove it")
-    return tuple(found), tuple(faults)
-
-
-def _loaded(point: EntryPoint, known: list[Format]) -> Format:
-    loaded = point.load()
-    if not isinstance(loaded, Format):
-        raise TypeError(f"{point.value} is a {type(loaded).__name__}, not an acquisition.Format")
-    if loaded.name in [one.name for one in known]:
-        raise ValueError(f"a format called {loaded.name!r} is there already; give it a name of its own")
-    return loaded
+        one = load_plugin(point, Format)
+        if isinstance(one, Format) and one.name not in taken | found.keys():
+            found[one.name] = one
+        elif isinstance(one, Format):
+            remarks.append(not_loaded(Format, point, f"{package_of(point)} is not the only one to bring it"))
+        else:
+            remarks.append(one)
+    return tuple(found.values()), tuple(remarks)

@@ -214,7 +214,9 @@ def _words(row: Row, programs: Sequence[str]) -> str:
 
 
 def _rulings(stored: SldHistory, i: int, programs: Sequence[str]) -> dict[str, Ruling] | None:
-    words = str(stored.columns["program_verdict"][i]) if programs else ""
+    if not programs:
+        return {}
+    words = str(stored.columns["program_verdict"][i])
     if not words:
         return None
     limits = stored.columns["program_limit"][i].tolist()

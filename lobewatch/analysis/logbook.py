@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
-from itertools import takewhile
 from pathlib import Path
 from typing import Self
 
 from acquisition import DataError, Remark, TapTest
-from lobes import read_history, write_history
 from lobewatch.analysis.advice import Advice, advise
 from lobewatch.analysis.assembly import Assembly, assemble, lobes_of
-from lobewatch.analysis.history import History, Row, empty_history, from_columns, row_of, to_columns
+from lobewatch.analysis.history import History, Row, row_of
+from lobewatch.analysis.history_cache import store_history, stored_history
 from lobewatch.analysis.measurement import Measurement, measure
 from lobewatch.analysis.order import Place, places
 from lobewatch.analysis.prediction import predict
 from lobewatch.analysis.recordings import Stored, store_recordings
 from lobewatch.analysis.standing import Standing, stand, unreadable
-from lobewatch.analysis.verdict import Verdict, unknown, verdict
-from lobewatch.machine import BusyError, Machine, MachineFolder, ProgramTable, TapEntry
+from lobewatch.analysis.verdict import Ruling, Verdict, unknown, verdict
+from lobewatch.machine import Machine, MachineFolder, ProgramTable, TapEntry
 from modal import Mode
 
 
@@ -109,16 +108,23 @@ class Logbook:
         """All measurements in order of time, up to date; on the disk too where that could be written."""
         if self._history is None:
             self._history = self._up_to_date()
+            if self._history.rows:
+                self.rulings(self._history.rows[-1].tap_id)
         return self._history
 
     def assembly(self, tool: str | None = None, until: str | None = None) -> Assembly:
         """The newest x and y of a tool (None: of the newest tap test), as they were after the tap test `until`.
 
-        Predicted by the model where the tool was never tapped; DataError where there is no model of it.
+        Predicted by the model where the tool was not tapped by then; DataError where there is no model of it.
         """
-        if until is None and tool is not None and all(tap.tool != tool for tap in self.taps):
-            return predict(self.machine, self.calibrated, tool)
-        return self._assembled(self._place(until or self.newest(tool).id), self.history.rows)
+        known = self._places if until is None else self._places[: self._place(until).number + 1]
+        if not known:
+            self.newest(tool)
+        tool = known[-1].entry.tool if tool is None else tool
+        newest = next((place for place in reversed(known) if place.entry.tool == tool), None)
+        if newest is None:
+            return predict(self.machine, self._calibrated(len(known)), tool)
+        return self._assembled(newest, self.history.rows)
 
     def first_assembly(self, now: Assembly) -> Assembly | None:
         """The earliest of the same tool that knows the same directions; None where that is itself or a prediction."""
@@ -135,20 +141,31 @@ class Logbook:
                     return then
         return None
 
-    def verdicts(self) -> list[Verdict]:
-        """One a program, from the newest tap tests of its tool; rows of the history keep word and limit."""
+    def verdicts(self, until: str | None = None) -> list[Verdict]:
+        """One a program, from the newest tap tests of its tool, as they were after the tap test `until`."""
         known: dict[str, Assembly | DataError] = {}
         for tool in dict.fromkeys(table.tool for table in self.machine.program):
             try:
-                known[tool] = self.assembly(tool)
+                known[tool] = self.assembly(tool, until)
             except DataError as error:
                 known[tool] = error
         return [self._judge(table, known[table.tool]) for table in self.machine.program]
 
-    def verdict_then(self, now: Verdict) -> Verdict | None:
-        """The verdict on the same program at the first tap tests of its tool in the same directions, if there are."""
+    def rulings(self, tap_id: str) -> Mapping[str, Ruling]:
+        """Word and limit of every program as they were after a tap test; the history keeps them once asked for."""
+        number, rows = self._place(tap_id).number, list(self.history.rows)
+        found = rows[number].rulings
+        if found is None:
+            found = {one.program.name: one.ruling for one in self.verdicts(tap_id)}
+            rows[number] = replace(rows[number], rulings=found)
+            self._history = replace(self.history, rows=tuple(rows))
+            self.remarks += store_history(self.folder, self._history)
+        return found
+
+    def ruling_then(self, now: Verdict) -> Ruling | None:
+        """Word and limit of a program at the first tap tests of its tool in the same directions; None without them."""
         then = None if now.assembly is None else self.first_assembly(now.assembly)
-        return None if then is None else verdict(now.program, then, self.machine)
+        return None if then is None else self.rulings(then.tap_id)[now.program.name]
 
     def advice(self, found: Verdict) -> Advice:
         """What goes beyond a verdict; it takes longer than the verdict itself."""
@@ -161,12 +178,18 @@ class Logbook:
     @property
     def calibrated(self) -> Measurement | None:
         """The newest measurement that the bearings of the model could be found from; None where there is none."""
-        newest = next((row for row in reversed(self.history.rows) if row.bearing_stiffness.is_known), None)
+        return self._calibrated(len(self.taps))
+
+    def _calibrated(self, count: int) -> Measurement | None:
+        """The same of the first tap tests alone."""
+        rows = reversed(self.history.rows[:count])
+        newest = next((row for row in rows if row.bearing_stiffness.is_known), None)
         return None if newest is None else self.measurement(newest.tap_id)
 
     def _forget(self) -> None:
         """What a new tap test alters."""
         self._placed = self._history = None
+        self._measurements = {}
         self._mark = self.folder.mark
 
     def _judge(self, table: ProgramTable, known: Assembly | DataError) -> Verdict:
@@ -189,43 +212,12 @@ class Logbook:
 
     def _up_to_date(self) -> History:
         """The stored rows as far as they still hold, and those that are missing."""
-        history = self._stored()
-        if len(history.rows) == len(self.taps) and (not history.rows or history.rows[-1].rulings is not None):
-            return history
+        history = stored_history(self.folder, self.taps)
         rows = list(history.rows)
         for place in self._places[len(rows) :]:
             assembly = self._assembled(place, rows)
-            lobes = lobes_of(assembly, self.machine)
-            rows.append(row_of(self._measurements[place.entry.id], lobes, assembly.remarks))
-        self._history = replace(history, rows=tuple(rows))
-        rulings = {found.program.name: found.ruling for found in self.verdicts()}
-        rows[-1] = replace(rows[-1], rulings=rulings)
-        history = replace(history, rows=tuple(rows))
-        self._write(history)
-        return history
-
-    def _stored(self) -> History:
-        """What history.h5 holds of the oldest taps on, made with these settings and this version; else no rows."""
-        empty = empty_history(self.machine)
-        try:
-            stored = read_history(self.folder.history)
-            if (stored.settings_hash, stored.software) != (empty.settings_hash, empty.software):
-                return empty
-            rows = from_columns(stored, self.machine).rows
-        except (ValueError, KeyError, IndexError, FileNotFoundError):
-            return empty
-        pairs = zip(rows, self.taps, strict=False)
-        same = [row for row, _ in takewhile(lambda pair: pair[0].tap_id == pair[1].id, pairs)]
-        return replace(empty, rows=tuple(same))
-
-    def _write(self, history: History) -> None:
-        """Under the lock where that can be had; else said."""
-        try:
-            with self.folder.locked():
-                write_history(self.folder.history, to_columns(history, self.machine))
-        except (BusyError, OSError) as error:
-            text = f"not brought up to date on the disk, worked out in memory: {error}"
-            self.remarks.append(Remark("history-in-memory", "history.h5", text))
+            rows.append(row_of(self._measured(place, rows), lobes_of(assembly, self.machine), assembly.remarks))
+        return replace(history, rows=tuple(rows))
 
     def _measured(self, place: Place, rows: Sequence[Row]) -> Measurement:
         """rows: the history before this tap test at least."""

@@ -12,6 +12,8 @@ from lobewatch.machine import TapEntry
 class Place:
     """One tap test among all of a machine."""
 
+    number: int
+    """From 0, the oldest."""
     entry: TapEntry
     """Of the journal."""
     before: int | None
@@ -26,6 +28,6 @@ def places(taps: Sequence[TapEntry]) -> list[Place]:
     found = []
     for i, tap in enumerate(taps):
         others = [j for (tool, direction), j in newest.items() if tool == tap.tool and direction != tap.direction]
-        found.append(Place(tap, newest.get((tap.tool, tap.direction)), max(others, default=None)))
+        found.append(Place(i, tap, newest.get((tap.tool, tap.direction)), max(others, default=None)))
         newest[tap.tool, tap.direction] = i
     return found

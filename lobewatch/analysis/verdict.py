@@ -33,6 +33,11 @@ class Ruling(NamedTuple):
     limit: float
     """Deepest stable depth at the program's speed (m); NaN where it is not known."""
 
+    @property
+    def stable(self) -> bool | None:
+        """None where it is unknown."""
+        return None if self.word is Word.UNKNOWN else self.word is Word.STABLE
+
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
@@ -62,7 +67,7 @@ class Verdict:
     @property
     def stable(self) -> bool | None:
         """None where it is unknown."""
-        return None if self.word is Word.UNKNOWN else self.word is Word.STABLE
+        return self.ruling.stable
 
     @property
     def measured(self) -> bool:

@@ -55,7 +55,7 @@ def _in_real_time(name: str) -> Callable[..., None]:
 def _help(name: str, title: str) -> str:
     return (
         f"{title[:1].upper()}{title[1:]} with somebody who taps twice a second; Ctrl-C ends it.\n\nExamples:\n\n"
-        f"  lobewatch emulate {name} trial\n\n  lobewatch tap trial --port /dev/pts/3     (in another window)"
+        f"  lobewatch emulate {name} trial\n  lobewatch tap trial --port /dev/pts/3  # in another window"
     )
 
 
@@ -72,7 +72,8 @@ def _serve(name: str, machine: Path, tcp: bool, fast: bool, seed: int, as_json: 
         results.file.flush()
         notes.print(f"the truth: f_1 {emulated.frequency:.2f} Hz, K {emulated.stiffness / 1e6:.3f} N/um")
         notes.print(
-            f"tap with: lobewatch tap {shlex.quote(str(machine))} --port {device.port}   (Ctrl-C ends the emulator)"
+            f"tap with: lobewatch tap {shlex.quote(str(machine))} --port {device.port}   (Ctrl-C ends the emulator)",
+            markup=False,
         )
         device.wait()
 

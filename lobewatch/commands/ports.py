@@ -20,7 +20,6 @@ def ports(
     Examples:
 
       lobewatch ports
-
       lobewatch ports --port /dev/pts/3
     """
     from acquisition.devices import survey_ports

@@ -27,9 +27,7 @@ def sensors(
     Examples:
 
       lobewatch sensors mill-3 --port /dev/ttyACM0
-
       lobewatch sensors mill-3 --mass-kg 1.052
-
       lobewatch sensors mill-3 --skew
     """
     from lobewatch.machine.folder import MachineFolder

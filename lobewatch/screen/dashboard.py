@@ -10,6 +10,9 @@ from acquisition import DataError, joined
 from lobewatch.analysis import Light, Logbook, Standing, standing_of
 from lobewatch.machine import MachineFolder
 
+SHOWN_APART = ("frequency-alarm", "frequency-warn", "overdue")
+"""Reasons that the page shows as the fall and the date."""
+
 
 def find_machines(path: Path) -> dict[str, MachineFolder]:
     """The machine at this path, or all in this folder, by name of their folders; DataError where there is none."""
@@ -59,7 +62,8 @@ def _row(key: str, name: str, standing: Standing) -> dict[str, Any]:
     worst = standing.series[0] if standing.series else None
     known = worst is not None and worst.fall.is_known
     std = worst.fall.std if worst is not None and math.isfinite(worst.fall.std) else None
-    reasons = [f"{remark.about}: {remark.text}".removeprefix(": ") for remark in joined(standing.remarks)]
+    others = joined(remark for remark in standing.remarks if remark.code not in SHOWN_APART)
+    reasons = [remark.finding for remark in others]
     return {
         "key": key,
         "name": name,

@@ -43,7 +43,7 @@ class Advised:
 
 def advised(logbook: Logbook, verdict: Verdict) -> Advised:
     """All that is said of one program."""
-    then = logbook.verdict_then(verdict)
+    then = logbook.ruling_then(verdict)
     return Advised(verdict, logbook.advice(verdict), None if then is None else then.stable)
 
 
@@ -66,10 +66,8 @@ def advised_table(programs: Sequence[Advised]) -> Table:
     """Programs, a line each."""
     made = table("<program", "speed (rpm)", "depth (mm)", "limit (mm), 95 %", "margin", "decay left", "<verdict")
     for one in programs:
-        again = " any more" if one.was_stable else ""
-        words = verdict_text(one.verdict, again)
-        if one.is_within_error and not one.verdict.is_beyond_drive:
-            words = words.replace("stable", "stable, within the error", 1)
+        behind = " any more" if one.was_stable and not one.verdict.stable else ""
+        words = verdict_text(one.verdict, ", within the error" if one.is_within_error else behind)
         margin = margin_text(one.verdict)
         made.add_row(*program_cells(one.verdict), _limit(one), margin, decay_text(one.advice), words)
     return made

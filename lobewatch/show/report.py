@@ -100,7 +100,7 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
 
 def _standing(standing: Standing) -> dict[str, Any]:
     """The first line of the report."""
-    reasons = [f"{remark.about}: {remark.text}".removeprefix(": ") for remark in joined(standing.remarks)]
+    reasons = [remark.finding for remark in joined(standing.remarks)]
     kind = {Light.GOOD: "ok", Light.ALARM: "bad"}.get(standing.light, "doubt")
     return {"light": LIGHTS[standing.light], "kind": kind, "reasons": reasons, "next_step": standing.next_step}
 

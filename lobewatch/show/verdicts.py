@@ -63,11 +63,11 @@ def margin_text(found: Verdict) -> str:
     return f"{100 * found.depth_margin:+.0f} %" if math.isfinite(found.depth_margin) else "-"
 
 
-def verdict_text(found: Verdict, again: str = "") -> str:
-    """The word, with what must be said in the same breath; again: what to add to "not stable"."""
-    beyond = found.is_beyond_drive and found.word is not Word.UNKNOWN
-    words = [WORDS[found.word] + (again if found.word is Word.NOT_STABLE else "")]
-    if beyond:
+def verdict_text(found: Verdict, behind: str = "") -> str:
+    """The word, with what must be said in the same breath; behind: what to add to the word."""
+    if found.word is Word.UNKNOWN:
+        return WORDS[found.word]
+    words = [WORDS[found.word] + behind]
+    if found.is_beyond_drive:
         words = ["beyond the drive"] if found.stable else [*words, "beyond the drive"]
-    predicted = " (predicted)" if found.word is not Word.UNKNOWN and not found.measured else ""
-    return ", ".join(words) + predicted
+    return ", ".join(words) + ("" if found.measured else " (predicted)")

@@ -13,7 +13,7 @@ def outcome_of(logbook: Logbook, found: Measurement) -> Outcome:
     standing = logbook.standing(found.time)
     series = standing.series_of(found.tool, found.direction)
     told = [*found.remarks, *joined(standing.remarks), *logbook.remarks]
-    texts = [*_values(found, series), *(f"{remark.about}: {remark.text}.".removeprefix(": ") for remark in told)]
+    texts = [*_values(found, series), *(f"{remark.finding}." for remark in told)]
     return Outcome(standing.light, texts, standing.next_step)
 
 

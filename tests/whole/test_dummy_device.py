@@ -104,7 +104,7 @@ def test_a_package_that_cannot_be_loaded_is_named_and_disables_nothing(trial: Pa
     assert listed.returncode == 0, listed.stderr
     assert json.loads(listed.stdout)["remarks"] == [
         {
-            "code": "driver-not-loaded",
+            "code": "package-not-loaded",
             "about": "driver 'broken'",
             "text": reason,
             "cure": "update or remove that package",

@@ -98,8 +98,25 @@ def test_what_is_installed_is_what_is_locked(run_py: ModuleType, monkeypatch: py
     monkeypatch.setattr("venv.create", lambda *_, **__: Path(run_py.VENV).mkdir())
     monkeypatch.setattr(run_py.subprocess, "call", recording(made, 0))
     run_py.make_environment("[dev]")
-    assert made[1] == ["install", "--require-hashes", "-r", str(Path(run_py.ROOT) / "requirements-dev.lock")]
+    assert made[0] == ["install", "--require-hashes", "-r", str(Path(run_py.ROOT) / "requirements-dev.lock")]
     assert made[2] == ["install", "--no-deps", "--editable", run_py.ROOT]
+
+
+def test_a_lock_that_does_not_fit_gives_way_to_what_pyproject_allows(
+    run_py: ModuleType, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made: list[list[str]] = []
+
+    def call(command: list[str]) -> int:
+        made.append(command)
+        return int("--require-hashes" in command)
+
+    monkeypatch.setattr(run_py, "installer", lambda: ["install"])
+    monkeypatch.setattr("venv.create", lambda *_, **__: Path(run_py.VENV).mkdir())
+    monkeypatch.setattr(run_py.subprocess, "call", call)
+    run_py.make_environment("[dev]")
+    assert made[-1] == ["install", "--editable", f"{run_py.ROOT}[dev]"]
+    assert "taking what pyproject.toml allows" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

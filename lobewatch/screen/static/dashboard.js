@@ -41,7 +41,8 @@ function row(machine) {
   part("light").textContent = WORDS[machine.light];
   part("name").textContent = machine.name;
   part("fall").textContent = fallText(machine);
-  part("note").textContent = [machine.note, machine.next_step].filter(Boolean).join(" → ");
+  part("note").textContent = machine.note;
+  part("next").textContent = machine.next_step;
   const [last, due] = dueText(machine);
   part("dates").append(last, document.createElement("br"), Object.assign(document.createElement("span"), { textContent: due, className: machine.days_left < 0 ? "overdue" : "" }));
   part("report").disabled = !machine.last_tap;

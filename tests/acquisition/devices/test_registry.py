@@ -69,7 +69,7 @@ def test_what_is_no_driver_is_refused_with_the_name_of_its_package(install: Inst
     assert str(caught.value).endswith("; update or remove that package")
     drivers, (remark,) = load_drivers()
     assert drivers == BUILT_IN
-    assert (remark.code, str(remark)) == ("driver-not-loaded", str(caught.value))
+    assert (remark.code, str(remark)) == ("package-not-loaded", str(caught.value))
 
 
 def test_a_driver_under_another_name_is_refused(install: Install, monkeypatch: pytest.MonkeyPatch) -> None:

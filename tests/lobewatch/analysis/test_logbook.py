@@ -221,6 +221,28 @@ def test_only_the_newest_row_pays_for_its_verdicts(path: Path, monkeypatch: pyte
     assert not asked
 
 
+def test_older_rows_are_judged_on_demand_and_kept(path: Path) -> None:
+    tap(path, 0, 1713.0)
+    tap(path, 30, 1620.0)
+    tap(path, 60, 1541.74)
+    logbook = Logbook.open(path)
+    first, _, last = (entry.id for entry in logbook.taps)
+    assert [ruling.word for ruling in logbook.rulings(first).values()] == [Word.STABLE] * 3
+    assert [ruling.word for ruling in logbook.rulings(last).values()].count(Word.NOT_STABLE) == 2
+    kept = [row.rulings is not None for row in Logbook.open(path).history.rows]
+    assert kept == [True, False, True]
+
+
+def test_reading_again_writes_nothing_with_or_without_programs(path: Path, tmp_path: Path) -> None:
+    make_machine_folder(tmp_path / "plain", "new_machine.toml")
+    for folder in (path, tmp_path / "plain"):
+        tap(folder, 0, 1713.0)
+        Logbook.open(folder).standing()
+        before = (folder / "history.h5").stat().st_ino
+        Logbook.open(folder).standing()
+        assert (folder / "history.h5").stat().st_ino == before
+
+
 def test_rows_are_kept_up_to_the_first_that_differs(path: Path, analysed: list[str]) -> None:
     for day in (0, 10, 20):
         tap(path, day, 1713.0 - day)

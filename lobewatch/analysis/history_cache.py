@@ -1,0 +1,37 @@
+"""history.h5: what it still holds, and its place on the disk."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import takewhile
+
+from acquisition import Remark
+from lobes import read_history, write_history
+from lobewatch.analysis.history import History, empty_history, from_columns, to_columns
+from lobewatch.machine import BusyError, MachineFolder, TapEntry
+
+
+def stored_history(folder: MachineFolder, taps: Sequence[TapEntry]) -> History:
+    """The stored rows of the oldest taps on, as far as they were made with these settings and this version."""
+    empty = empty_history(folder.machine)
+    try:
+        stored = read_history(folder.history)
+        if (stored.settings_hash, stored.software) != (empty.settings_hash, empty.software):
+            return empty
+        rows = from_columns(stored, folder.machine).rows
+    except (ValueError, KeyError, IndexError, FileNotFoundError):
+        return empty
+    pairs = zip(rows, taps, strict=False)
+    return replace(empty, rows=tuple(row for row, _ in takewhile(lambda pair: pair[0].tap_id == pair[1].id, pairs)))
+
+
+def store_history(folder: MachineFolder, history: History) -> list[Remark]:
+    """Write it under the lock where that can be had at once; else say so."""
+    try:
+        with folder.locked():
+            write_history(folder.history, to_columns(history, folder.machine))
+    except (BusyError, OSError) as error:
+        text = f"not brought up to date on the disk, worked out in memory: {error}"
+        return [Remark("history-in-memory", "history.h5", text)]
+    return []

@@ -13,9 +13,6 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 PACKAGES = ("acquisition", "modal", "dsm", "lobes", "lobewatch", "sim_data")
-LARGE = {"modal", "lobes", "lobewatch/commands"}
-"""Folders with a method or a command a file."""
-MOST_FILES = 20
 CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
 
 
@@ -37,13 +34,6 @@ def test_the_rooms_are_those_of_the_tree_in_the_words_of_their_docstrings() -> N
 def test_every_folder_of_modules_is_a_room() -> None:
     folders = {file.parent for package in PACKAGES for file in (ROOT / package).rglob("*.py")}
     assert {f"{folder.relative_to(ROOT).as_posix()}/" for folder in folders} == rooms().keys()
-
-
-def test_no_folder_is_too_large() -> None:
-    files = [file for name in (*PACKAGES, "tests", "bench") for file in (ROOT / name).rglob("*.py")]
-    folders = {file.parent.relative_to(ROOT).as_posix() for file in files} - LARGE
-    sizes = {folder: len(list((ROOT / folder).glob("*.py"))) for folder in folders}
-    assert {folder: size for folder, size in sizes.items() if size > MOST_FILES} == {}
 
 
 @pytest.mark.parametrize("contract", [one for one in CONTRACTS if one["type"] == "layers"], ids=lambda one: one["name"])

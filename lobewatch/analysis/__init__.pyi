@@ -1,22 +1,23 @@
 """From a tap test to what it means: measurement, history, prediction, verdict, standing."""
 
 from .advice import Advice, aging
-from .assembly import Assembly, lobes_of, speed_grid
+from .assembly import ABOUT_DIRECTIONS, Assembly, lobes_of, speed_grid
 from .charts import Chart, Dynamics, Method, chart
 from .estimate import Estimate
 from .file_modes import FileModes, modes_of_file, remarks_on_all
 from .history import History, Row
 from .lobe_comparison import LobeComparison, compare_lobes
-from .logbook import Logbook, standing_of
+from .logbook import Logbook
 from .measurement import Measurement, measure
 from .model_calibration import ModelCalibration, calibrate_model
 from .model_picture import ModelPicture, model_picture
 from .model_state import ModelState, first_critical_speed, model_frf, model_state
 from .model_summary import ModelMode, ModelSummary, model_summary
-from .standing import Light, SeriesStanding, Standing, change_since_first
+from .standing import Light, SeriesStanding, Standing, change_since_first, unreadable
 from .verdict import Verdict, Word
 
 __all__ = [
+    "ABOUT_DIRECTIONS",
     "Advice",
     "Assembly",
     "Chart",
@@ -54,5 +55,5 @@ __all__ = [
     "modes_of_file",
     "remarks_on_all",
     "speed_grid",
-    "standing_of",
+    "unreadable",
 ]

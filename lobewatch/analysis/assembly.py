@@ -18,6 +18,8 @@ from modal import Mode
 
 Modes = Sequence[Mode] | None
 """Of one direction at the tool tip; None where they are not known."""
+ABOUT_DIRECTIONS = ("one-direction", "older-direction")
+"""Codes of the remarks on what is known in x and y."""
 TOGETHER = timedelta(hours=24)
 """Taps in x and y further apart than this are called so."""
 
@@ -81,8 +83,9 @@ def _about_directions(newest: Measurement, other: Measurement | None) -> tuple[R
         text = f"modes in the {known[0].direction} direction alone"
         return (Remark("one-direction", newest.tool, text, f"tap direction {missing} of the same tool too"),)
     if other is not None and newest.time - other.time > TOGETHER:
-        days = (newest.time - other.time) / timedelta(days=1)
-        text = f"direction {other.direction} is that of {other.time:%Y-%m-%d}, {days:.0f} days older"
+        days = round((newest.time - other.time) / timedelta(days=1))
+        older = f"{days} day{'s' if days > 1 else ''} older"
+        text = f"direction {other.direction} is that of {other.time:%Y-%m-%d}, {older}"
         return (Remark("older-direction", newest.tool, text, f"tap direction {other.direction} again"),)
     return ()
 

@@ -40,8 +40,12 @@ class LobeComparison:
 
 
 def compare_lobes(logbook: Logbook, tool: str | None, cut: str, source: Dynamics, method: Method) -> LobeComparison:
-    """tool None: that of the newest tap test. DataError with the reason where there are no lobes."""
-    assembly = logbook.assembly(tool)
+    """tool None: that of the program, of the newest tap test for the reference cut.
+
+    DataError with the reason where there are no lobes.
+    """
+    own = next((program.tool for program in logbook.machine.program if program.name == cut), None)
+    assembly = logbook.assembly(own if tool is None else tool)
     now = _charted(logbook, assembly, cut, source, method)
     first = logbook.first_assembly(assembly)
     then = None if first is None else _charted(logbook, first, cut, source, method)

@@ -17,10 +17,14 @@ from lobewatch.analysis.measurement import Measurement, measure
 from lobewatch.analysis.order import Place, places
 from lobewatch.analysis.prediction import predict
 from lobewatch.analysis.recordings import Stored, store_recordings
-from lobewatch.analysis.standing import Standing, stand, unreadable
+from lobewatch.analysis.standing import Standing, stand
 from lobewatch.analysis.verdict import Ruling, Verdict, unknown, verdict
 from lobewatch.machine import Machine, MachineFolder, ProgramTable, TapEntry
 from modal import Mode
+
+
+class NotTappedError(DataError):
+    """A tool was neither tapped nor can it be predicted."""
 
 
 class Logbook:
@@ -122,9 +126,13 @@ class Logbook:
             self.newest(tool)
         tool = known[-1].entry.tool if tool is None else tool
         newest = next((place for place in reversed(known) if place.entry.tool == tool), None)
-        if newest is None:
-            return predict(self.machine, self._calibrated(len(known)), tool)
-        return self._assembled(newest, self.history.rows)
+        if newest is not None:
+            return self._assembled(newest, self.history.rows)
+        calibrated = self._calibrated(len(known))
+        try:
+            return predict(self.machine, calibrated, tool)
+        except DataError as error:
+            raise NotTappedError(f"no tap test with tool {tool!r}, and no prediction: {error}") from error
 
     def first_assembly(self, now: Assembly) -> Assembly | None:
         """The earliest of the same tool that knows the same directions; None where that is itself or a prediction."""
@@ -143,11 +151,11 @@ class Logbook:
 
     def verdicts(self, until: str | None = None) -> list[Verdict]:
         """One a program, from the newest tap tests of its tool, as they were after the tap test `until`."""
-        known: dict[str, Assembly | DataError] = {}
+        known: dict[str, Assembly | NotTappedError] = {}
         for tool in dict.fromkeys(table.tool for table in self.machine.program):
             try:
                 known[tool] = self.assembly(tool, until)
-            except DataError as error:
+            except NotTappedError as error:
                 known[tool] = error
         return [self._judge(table, known[table.tool]) for table in self.machine.program]
 
@@ -159,7 +167,8 @@ class Logbook:
             found = {one.program.name: one.ruling for one in self.verdicts(tap_id)}
             rows[number] = replace(rows[number], rulings=found)
             self._history = replace(self.history, rows=tuple(rows))
-            self.remarks += store_history(self.folder, self._history)
+            said = store_history(self.folder, self._history)
+            self.remarks += [remark for remark in said if remark not in self.remarks]
         return found
 
     def ruling_then(self, now: Verdict) -> Ruling | None:
@@ -192,11 +201,10 @@ class Logbook:
         self._measurements = {}
         self._mark = self.folder.mark
 
-    def _judge(self, table: ProgramTable, known: Assembly | DataError) -> Verdict:
+    def _judge(self, table: ProgramTable, known: Assembly | NotTappedError) -> Verdict:
         if isinstance(known, Assembly):
             return verdict(table, known, self.machine)
-        text = f"no tap test with tool {table.tool!r}, and no prediction: {known}"
-        return unknown(table, (Remark("no-tap", "", text),))
+        return unknown(table, (Remark("no-tap", "", str(known)),))
 
     def _place(self, tap_id: str) -> Place:
         for place in reversed(self._places):
@@ -239,11 +247,3 @@ class Logbook:
     def _assembled(self, place: Place, rows: Sequence[Row]) -> Assembly:
         other = None if place.other is None else self._measured(self._places[place.other], rows)
         return assemble(self._measured(place, rows), other)
-
-
-def standing_of(logbook: Logbook, now: datetime | None = None) -> Standing:
-    """The standing of a machine; one whose files cannot be read says so."""
-    try:
-        return logbook.standing(now)
-    except (ValueError, OSError) as error:
-        return unreadable(str(error))

@@ -55,8 +55,7 @@ class SeriesStanding:
     first: datetime
     """Of the test that it is compared with."""
     fall: Estimate
-    """Fall of the followed frequency since the first test of the series (%); unknown where the newest test does not
-    show it."""
+    """Fall of the followed frequency from the first test of the series to the last that shows it (%)."""
     remarks: tuple[Remark, ...]
     """Reasons that it gives."""
 
@@ -135,18 +134,21 @@ def _of(remarks: Sequence[Remark], well: str = "", *others: object) -> Standing:
 
 
 def _series(rows: Sequence[Row], limits: Limits) -> SeriesStanding:
-    change = change_since_first(rows, "frequency")
-    fall = Estimate(-change.value + 0.0, change.std)
     known = [row for row in rows if row.frequency.is_known] or rows
+    change = change_since_first(known, "frequency")
+    fall = Estimate(-change.value + 0.0, change.std)
     name = f"{rows[-1].tool}, {rows[-1].direction}"
-    remarks = tuple(_about_fall(name, fall, limits))
+    remarks = (*_about_loss(name, rows[-1]), *_about_fall(name, fall, limits))
     return SeriesStanding(rows[-1].tool, rows[-1].direction, rows[-1].time, known[0].time, fall, remarks)
 
 
-def _about_fall(name: str, fall: Estimate, limits: Limits) -> Iterator[Remark]:
-    if not fall.is_known:
+def _about_loss(name: str, newest: Row) -> Iterator[Remark]:
+    if not newest.frequency.is_known:
         cure = "Tap again: the mode that is followed was not found in the newest test."
         yield Remark("mode-lost", name, "the newest test does not show the mode followed", cure)
+
+
+def _about_fall(name: str, fall: Estimate, limits: Limits) -> Iterator[Remark]:
     text = f"frequency fallen by {fall.value:.1f} % since the first test"
     if fall.value >= limits.frequency_alarm_percent:
         cure = "Do not cut on: have the bearings, the tool and its clamping looked at, then tap again."
@@ -168,7 +170,8 @@ def _about_programs(newest: Row) -> Iterator[Remark]:
 
 def _about_dates(days_left: float) -> Iterator[Remark]:
     if days_left < 0:
-        text = f"the next tap test is overdue by {math.ceil(-days_left)} days"
+        days = math.ceil(-days_left)
+        text = f"the next tap test is overdue by {days} day{'s' if days > 1 else ''}"
         yield Remark("overdue", "", text, "Take the tap test that is due.")
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from acquisition import Remark
 from lobes import Program, program_limit
-from lobewatch.analysis.assembly import Assembly
+from lobewatch.analysis.assembly import ABOUT_DIRECTIONS, Assembly
 from lobewatch.machine import Machine, ProgramTable, drive_limit
 
 
@@ -122,7 +122,7 @@ def as_program(table: ProgramTable, machine: Machine) -> Program:
 
 
 def _remarks(table: ProgramTable, assembly: Assembly, machine: Machine) -> Iterator[Remark]:
-    about_modes = ("one-direction", "older-direction", "predicted")
+    about_modes = (*ABOUT_DIRECTIONS, "predicted")
     yield from (remark for remark in assembly.remarks if remark.code in about_modes)
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and table.feed_per_tooth_mm is None:
         yield Remark("drive-ignored", table.name, "[drive] does not count: feed_per_tooth_mm is missing")

@@ -17,7 +17,9 @@ MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
 def lobes(
     machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
     cut: Annotated[str, typer.Option(help="Name of a [[program]], or the reference cut.")] = "reference cut",
-    tool: Annotated[str | None, typer.Option(help="Of the newest tap test if not given; else predicted.")] = None,
+    tool: Annotated[
+        str | None, typer.Option(help="If not given: that of the program, else that was tapped last.")
+    ] = None,
     source: Annotated[Source, typer.Option(help="From the modes found, or straight from the FRF.")] = "modes",
     method: Annotated[MethodName, typer.Option(help="How the limits of the chart are found.")] = "zero-order",
     figure: Annotated[Path | None, typer.Option(help="Draw the diagram to this file (.svg, .png, .pdf).")] = None,

@@ -31,6 +31,7 @@ def model(
     """
     from lobewatch.analysis import Logbook, model_picture, model_state, model_summary
     from lobewatch.show.describe import model_json, model_texts
+    from lobewatch.show.measurements import remark_lines
 
     logbook = Logbook.open(machine)
     state = model_state(logbook.machine, logbook.calibrated, tool)
@@ -40,4 +41,4 @@ def model(
 
         save_figure(model_figure(model_picture(logbook, state, modes)), figure)
     found = model_summary(state, modes)
-    emit(model_json(found), as_json, *model_texts(found))
+    emit(model_json(found), as_json, *model_texts(found), *remark_lines(logbook.remarks))

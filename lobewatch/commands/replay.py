@@ -47,6 +47,7 @@ def replay(
     payload = {
         "measurements": [measurement_json(m, logbook) for m in shown],
         "programs": programs_json(logbook.verdicts()) if shown else [],
+        "known": {str(file): tap_id for file, tap_id in stored.known.items()},
     }
     last = f"{len(shown)} of {len(files)} file(s) stored in {logbook.folder.path}"
     emit(payload, as_json, *texts, *(program_texts(logbook) if shown else []), last)

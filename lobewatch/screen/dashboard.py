@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import threading
 from pathlib import Path
 from typing import Any
 
 from acquisition import DataError, joined
-from lobewatch.analysis import Light, Logbook, Standing, standing_of
+from lobewatch.analysis import Light, Logbook, Standing, unreadable
 from lobewatch.machine import MachineFolder
 
 SHOWN_APART = ("frequency-alarm", "frequency-warn", "overdue")
@@ -31,24 +32,29 @@ class Board:
         """machines: by name of their folders."""
         self._machines = machines
         self._logbooks: dict[str, Logbook] = {}
+        self._lock = threading.Lock()
 
     def rows(self) -> list[dict[str, Any]]:
-        """One a machine, worst first."""
-        standings = {key: self._standing(key) for key in self._machines}
+        """One a machine, worst first; who asks meanwhile waits."""
+        with self._lock:
+            standings = {key: self._standing(key) for key in self._machines}
         lights = list(Light)
         order = sorted(standings, key=lambda key: (lights.index(standings[key].light), -_fall(standings[key]), key))
         return [_row(key, self._name(key), standings[key]) for key in order]
 
     def _standing(self, key: str) -> Standing:
         logbook = self._logbooks.get(key)
-        if logbook is None or not logbook.is_current:
-            self._logbooks[key] = logbook = Logbook(MachineFolder(self._machines[key].path))
-        return standing_of(logbook)
+        try:
+            if logbook is None or not logbook.is_current:
+                self._logbooks[key] = logbook = Logbook(MachineFolder(self._machines[key].path))
+            return logbook.standing()
+        except (ValueError, OSError) as error:
+            return unreadable(str(error))
 
     def _name(self, key: str) -> str:
         try:
             return self._logbooks[key].machine.machine.name
-        except (ValueError, OSError):
+        except (KeyError, ValueError, OSError):
             return key
 
 

@@ -96,7 +96,7 @@ def advised_lines(one: Advised, speeds: SpeedRange) -> Iterator[str]:
         word = "period-two chatter" if found.kind == "flip" else "chatter"
         yield (
             f"{name}: {word} near {found.chatter_frequency:.0f} Hz; at this speed cut no deeper than "
-            f"{found.limit * 1e3:.2f} mm, or {_elsewhere(one, speeds)}"
+            f"{_settable(found.limit)} mm, or {_elsewhere(one, speeds)}"
         )
     elif advice.nearest_speed is not None and advice.speed_margin(speed) < NEAR:
         yield (
@@ -104,7 +104,7 @@ def advised_lines(one: Advised, speeds: SpeedRange) -> Iterator[str]:
             f"{advice.nearest_speed:.0f} rpm"
         )
     if found.stable is not None and found.is_beyond_drive:
-        yield f"{name}: [drive] allows no more than {found.drive_limit * 1e3:.2f} mm at this speed"
+        yield f"{name}: [drive] allows no more than {_settable(found.drive_limit)} mm at this speed"
 
 
 def _elsewhere(one: Advised, speeds: SpeedRange) -> str:
@@ -113,4 +113,10 @@ def _elsewhere(one: Advised, speeds: SpeedRange) -> str:
         return (
             f"choose another tool: no stable speed{drive} at this depth in {speeds.low_rpm:g}..{speeds.high_rpm:g} rpm"
         )
-    return f"run this depth at {one.advice.nearest_speed:.0f} rpm, the nearest stable speed"
+    away = math.ceil if one.advice.nearest_speed > one.verdict.program.speed_rpm else math.floor
+    return f"run this depth at {away(one.advice.nearest_speed)} rpm, the nearest stable speed"
+
+
+def _settable(depth: float) -> str:
+    """The deepest cut (mm) of two decimals that is not deeper (m)."""
+    return f"{math.floor(depth * 1e5) / 100:.2f}"

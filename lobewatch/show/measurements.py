@@ -78,6 +78,9 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
 
 
 def program_texts(logbook: Logbook) -> list[str | Table]:
-    """The verdict on every program, and where to ask on."""
+    """The verdict on every program, where to ask on, and what is to be said of the files."""
     verdicts = logbook.verdicts()
-    return [verdict_table(verdicts), "lobewatch check says where to go instead"] if verdicts else []
+    texts: list[str | Table] = [verdict_table(verdicts)] if verdicts else []
+    if any(found.stable is False for found in verdicts):
+        texts.append("lobewatch check says where to go instead")
+    return [*texts, *remark_lines(logbook.remarks)]

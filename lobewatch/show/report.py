@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import jinja2
 import numpy as np
 
-from acquisition import DataError, Frf, atomic_write, joined
+from acquisition import DataError, Frf, Remark, atomic_write, joined
 from dsm import plus_minus
-from lobewatch.analysis import Light, Logbook, Row, Standing, change_since_first, lobes_of
+from lobewatch.analysis import ABOUT_DIRECTIONS, Assembly, Light, Logbook, Row, Standing, change_since_first, lobes_of
 from lobewatch.machine import Machine
 from lobewatch.show.advice import Advised, advised
 from lobewatch.show.figures import frf_figure, svg, trend_figure
@@ -67,6 +67,7 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
     machine, last = logbook.machine, rows[-1]
     entries = {entry.id: entry for entry in logbook.taps}
     now = logbook.folder.read(entries[last.tap_id])
+    assembly = logbook.assembly(last.tool)
     programs = [advised(logbook, verdict) for verdict in logbook.verdicts()]
     checked = [one.verdict for one in programs if one.verdict.stable is not None]
     return {
@@ -82,7 +83,7 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
         "changes": _changes(rows),
         "programs": [_program(one) for one in programs],
         "program_method": checked[0].method if checked else "",
-        "remarks": [str(remark) for remark in joined(last.remarks)],
+        "remarks": [str(remark) for remark in _remarks(last, assembly)],
         "modes": _modes(last),
         "operator": now.circumstances.operator,
         "tap_id": now.id,
@@ -90,7 +91,7 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
         "hits": len(now.hits),
         "averages": now.frf.n_averages,
         "figures": [
-            *_lobes(logbook, last, programs),
+            *_lobes(logbook, assembly, programs),
             *_trends(rows, machine),
             _response(logbook.folder.read(entries[rows[0].tap_id]).frf if len(rows) > 1 else None, now.frf, machine),
         ],
@@ -105,10 +106,15 @@ def _standing(standing: Standing) -> dict[str, Any]:
     return {"light": LIGHTS[standing.light], "kind": kind, "reasons": reasons, "next_step": standing.next_step}
 
 
-def _lobes(logbook: Logbook, last: Row, programs: Sequence[Advised]) -> list[Picture]:
+def _remarks(last: Row, assembly: Assembly) -> list[Remark]:
+    """Of the newest test of the series, and of x and y of its tool as they are known now."""
+    own = [remark for remark in last.remarks if remark.code not in ABOUT_DIRECTIONS]
+    return joined([*own, *(remark for remark in assembly.remarks if remark.code in ABOUT_DIRECTIONS)])
+
+
+def _lobes(logbook: Logbook, assembly: Assembly, programs: Sequence[Advised]) -> list[Picture]:
     """The diagram of the reference cut, or else of the first program of the tool, now and then."""
     machine = logbook.machine
-    assembly = logbook.assembly(until=last.tap_id)
     lobes = lobes_of(assembly, machine)
     if not lobes:
         return []
@@ -195,7 +201,7 @@ def _program(one: Advised) -> dict[str, Any]:
         "speed_rpm": found.program.speed_rpm,
         "depth_mm": found.program.depth_mm,
         "stable": found.stable,
-        "was_stable": one.was_stable if found.measured else None,
+        "was_stable": one.was_stable,
         "limit": limit_text(found),
         "band": f"{low:.2f} to {high:.2f}" if np.isfinite(high) else "",
         "margin": margin_text(found),

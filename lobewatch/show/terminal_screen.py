@@ -45,6 +45,7 @@ LIGHTS: Mapping[str, tuple[str, str]] = {
     "good": ("✓", "black on #2bb48d"),
     "warn": ("!", "black on #f0e442"),
     "alarm": ("✗", "black on #ee8238"),
+    "unknown": ("?", "black on #dddddd"),
 }
 
 

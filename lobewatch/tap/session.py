@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import time
 from collections.abc import Callable
 
@@ -18,6 +19,8 @@ from lobewatch.tap.publisher import Publisher
 from lobewatch.tap.state import TapState, Word
 
 __all__ = ["TapSession", "TapStopped"]
+
+NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
 
 
 class TapSession:
@@ -105,8 +108,11 @@ class TapSession:
         tap = hits.tap.finish()
         logbook = Logbook(self._folder)
         logbook.commit(tap)
-        self._measurement = logbook.measurement(tap.id)
-        outcome = outcome_of(logbook, self._measurement) if self._guided else None
+        try:
+            self._measurement = logbook.measurement(tap.id)
+            outcome = outcome_of(logbook, self._measurement) if self._guided else None
+        except (ArithmeticError, KeyError, OSError, ValueError) as error:
+            raise DataError(f"saved {tap.id}, but what it means cannot be worked out: {error}") from error
         self._publisher.show(reason="", outcome=outcome)
         return tap
 
@@ -118,5 +124,6 @@ def _told(error: Exception) -> Exception:
         return error
     kept = "the hits so far are kept: the same command goes on with them"
     if isinstance(error, OSError):
-        return DataError(f"{error.filename}: {error.strerror or error}; make room or put the disk right, {kept}")
+        cure = "you may not write there" if error.errno in NOT_ALLOWED else f"make room or put the disk right, {kept}"
+        return DataError(f"{error.filename or 'the disk'}: {error.strerror or error}; {cure}")
     return RuntimeError(f"lobewatch itself has failed ({type(error).__name__}: {error}); {kept}")

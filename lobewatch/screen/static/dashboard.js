@@ -19,7 +19,7 @@ function fallText({ fall, fall_std: std, series }) {
 
 function dueText({ last_tap: last, days_left: left }) {
   if (!last) return ["", ""];
-  const days = Math.abs(Math.round(left));
+  const days = left < 0 ? Math.ceil(-left) : Math.round(left);
   const many = `${days} day${days === 1 ? "" : "s"}`;
   return [`last tap test ${last.slice(0, 10)}`, left < 0 ? `overdue by ${many}` : `next due in ${many}`];
 }

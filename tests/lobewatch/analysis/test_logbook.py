@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import os
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -16,7 +17,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
+from acquisition import Circumstances, DataError, TapDirection, TapTest, from_accelerance, new_tap_id
 from lobes import Program, ProgramLimit, program_limit, read_history, write_history, zero_order
 from lobewatch import Logbook
 from lobewatch.analysis import Measurement, Word, compare_lobes, measure
@@ -285,3 +286,65 @@ def test_somebody_elses_tap_is_noticed(path: Path) -> None:
     mine = Logbook.open(path)
     mine.commit(logbook.folder.read(mine.newest()))
     assert mine.is_current
+
+
+def damage(path: Path, tap_id: str) -> None:
+    with (path / "taps" / f"{tap_id}.h5").open("ab") as file:
+        file.write(b"x")
+
+
+def test_a_damaged_tap_is_called_so_and_no_wrong_word_is_kept(path: Path) -> None:
+    tap(path, 0, 1713.0)
+    tap(path, 30, 1541.74)
+    logbook = Logbook.open(path)
+    expected = [found.word for found in logbook.verdicts()]
+    sound = (path / "taps" / f"{logbook.taps[1].id}.h5").read_bytes()
+    (path / "history.h5").unlink()
+    damage(path, logbook.taps[1].id)
+    with pytest.raises(DataError, match="altered since it was written"):
+        Logbook.open(path).verdicts()
+    (row,) = Board({"m": MachineFolder(path)}).rows()
+    assert (row["light"], "altered since it was written" in row["note"]) == ("unknown", True)
+    (path / "taps" / f"{logbook.taps[1].id}.h5").write_bytes(sound)
+    assert [ruling.word for ruling in Logbook.open(path).rulings(logbook.taps[1].id).values()] == expected
+
+
+def test_a_machine_that_disappears_does_not_hide_the_others(path: Path, tmp_path: Path) -> None:
+    make_machine_folder(tmp_path / "n", "surrogate_machine.toml")
+    tap(path, 0, 1713.0)
+    board = Board({name: MachineFolder(tmp_path / name) for name in ("m", "n")})
+    (tmp_path / "n" / "machine.toml").unlink()
+    assert {row["key"]: row["light"] for row in board.rows()} == {"n": "unknown", "m": "warn"}
+
+
+def test_a_lost_mode_does_not_hide_an_alarm(path: Path) -> None:
+    for days, frequency in ((0, 1713.0), (30, 1620.0), (60, 1520.0), (90, 900.0)):
+        tap(path, days, frequency)
+    standing = Logbook.open(path).standing(START + timedelta(days=91))
+    assert standing.light == "alarm"
+    assert {"frequency-alarm", "mode-lost"} <= {remark.code for remark in standing.remarks}
+
+
+def test_the_report_of_an_older_series_stands_on_what_is_known_now(path: Path) -> None:
+    tap(path, 0, 1713.0)
+    tap(path, 1, 1690.0, "y")
+    tap(path, 2, 1650.0, tool="another")
+    html = render_report(Logbook.open(path), "reference", "x")
+    assert "x and y directions" in html
+    assert "modes in the x direction alone" not in html
+
+
+def test_a_recommended_depth_is_stable_when_it_is_entered(path: Path) -> None:
+    tap(path, 0, 1541.74)
+    depth = re.search(r"A: .* cut no deeper than (\d+\.\d\d) mm", run("check", path).stdout)
+    assert depth is not None
+    toml = path / "machine.toml"
+    toml.write_text(toml.read_text("utf-8").replace("depth_mm = 6.0", f"depth_mm = {depth[1]}"), "utf-8")
+    assert Logbook.open(path).verdicts()[0].word is Word.STABLE
+
+
+def test_a_program_is_charted_with_its_own_tool(path: Path) -> None:
+    tap(path, 0, 1713.0)
+    tap(path, 1, 1650.0, tool="another")
+    said = json.loads(run("lobes", path, "--cut", "A: slot at 12 900 rpm", "--json").stdout)
+    assert [program["name"][0] for program in said["programs"]] == ["A", "B", "C"]

@@ -102,7 +102,7 @@ def test_overdue_is_never_good(shop: Path) -> None:
     found = Logbook.open(shop / "a-new").standing(DAY + timedelta(days=21))
     assert found.light == "warn"
     assert found.remarks[0].code == "overdue"
-    assert "overdue by 1 days" in found.remarks[0].text
+    assert "overdue by 1 day" in found.remarks[0].text
     assert found.next_step == "Take the tap test that is due."
 
 

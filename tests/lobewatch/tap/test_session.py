@@ -55,6 +55,25 @@ def test_the_words_of_a_test_and_its_result(
     assert states[-1].mean_change is not None
 
 
+def test_a_saved_test_is_called_saved_whatever_is_wrong_with_the_others(
+    folder: MachineFolder,
+    tapper: Tapper,
+    channels: Pair,
+    monkeypatch: pytest.MonkeyPatch,
+    simulated: Simulate,
+    session_of: OpenSession,
+) -> None:
+    def damaged(*_: object) -> None:
+        raise DataError("taps/older.h5: altered since it was written")
+
+    monkeypatch.setattr("lobewatch.tap.session.Logbook.measurement", damaged)
+    session = session_of(folder, lambda: simulated(tapper(), channels))
+    with pytest.raises(DataError, match=r"saved \S+, but what it means cannot be worked out: taps/older.h5"):
+        session.run()
+    assert len(folder.taps()) == 1
+    assert session.state.word is Word.FAILED
+
+
 @pytest.mark.parametrize(
     ("failure", "told"),
     [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -149,15 +149,16 @@ class Logbook:
                     return then
         return None
 
-    def verdicts(self, until: str | None = None) -> list[Verdict]:
-        """One a program, from the newest tap tests of its tool, as they were after the tap test `until`."""
+    def verdicts(self, until: str | None = None, names: Collection[str] | None = None) -> list[Verdict]:
+        """One a program (of these names), from the newest tap tests of its tool as they were after the test `until`."""
+        tables = [table for table in self.machine.program if names is None or table.name in names]
         known: dict[str, Assembly | NotTappedError] = {}
-        for tool in dict.fromkeys(table.tool for table in self.machine.program):
+        for tool in dict.fromkeys(table.tool for table in tables):
             try:
                 known[tool] = self.assembly(tool, until)
             except NotTappedError as error:
                 known[tool] = error
-        return [self._judge(table, known[table.tool]) for table in self.machine.program]
+        return [self._judge(table, known[table.tool]) for table in tables]
 
     def rulings(self, tap_id: str) -> Mapping[str, Ruling]:
         """Word and limit of every program as they were after a tap test; the history keeps them once asked for."""

@@ -16,11 +16,14 @@ import pytest
 
 from acquisition import HammeredStructure, Structure, Trigger, capture_hits
 from acquisition.emulation import SimulatedSource
+from lobewatch.commands import COMMANDS
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.tap.emulated_spindle import CHANNELS
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+ROOMS = {"show/", "screen/", "commands/", "analysis/", "sensors/", "tap/"}
+"""Named without their package."""
 
 
 @pytest.fixture
@@ -83,3 +86,11 @@ def test_the_format_is_read(environment: dict[str, str], structure: Structure, t
     assert min(abs(np.array(found) - 1722)) < 5
     file.write_text("ACME TAP\n25600\n1 x\n", "utf-8")
     assert run(environment, "modes", file).returncode == 2
+
+
+def test_every_file_and_command_that_is_named_is_there() -> None:
+    text = re.sub(r"^```.*?^```", "", PAGE, flags=re.MULTILINE | re.DOTALL)
+    files = {place for place in re.findall(r"`([\w.*/-]*/[\w.*/-]*)`", text) if "NAME" not in place} - ROOMS
+    assert {"acquisition/devices/driver.py", ".ci/lock", "lobewatch/show/report.html"} <= files
+    assert {place for place in files if not list(ROOT.glob(place.rstrip("/")))} == set()
+    assert set(re.findall(r"^\$ lobewatch ([a-z]+)", PAGE, re.MULTILINE)) <= COMMANDS.keys()

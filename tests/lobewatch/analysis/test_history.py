@@ -38,7 +38,7 @@ def test_rows_are_read_back_as_they_were_worked_out(tmp_path: Path) -> None:
         assert row.rulings is not None
         assert expected.rulings is not None
         assert [one.word for one in row.rulings.values()] == [one.word for one in expected.rulings.values()]
-        limits = [[one.limit for one in rulings.values()] for rulings in (row.rulings, expected.rulings)]
-        np.testing.assert_array_equal(*limits)
+        limits, wanted = ([one.limit for one in rulings.values()] for rulings in (row.rulings, expected.rulings))
+        np.testing.assert_array_equal(limits, wanted)
     assert read[0].frequency.is_known
     assert not read[1].frequency.is_known

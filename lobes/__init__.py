@@ -9,7 +9,6 @@ from lobes.cutting_power import deepest_for_drive, mean_torque
 from lobes.depth_band import DepthBand, coefficient_range, measurement_band
 from lobes.history import SldHistory
 from lobes.history_file import read_history, write_history
-from lobes.intervals import intervals_needed
 from lobes.nearest_speed import nearest_speed
 from lobes.pockets import Pocket, PocketShift, best_pockets, pocket_shifts, pockets
 from lobes.program import Program
@@ -44,7 +43,6 @@ __all__ = [
     "coefficient_range",
     "cutting_coefficients",
     "deepest_for_drive",
-    "intervals_needed",
     "mean_torque",
     "measurement_band",
     "nearest_speed",

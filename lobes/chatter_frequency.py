@@ -60,7 +60,7 @@ def _nearest_to_mean_force(
 
 def _force_harmonics(system: MillingSystem, cut: Cut) -> NDArray[np.complex128]:
     """Harmonics H_(k-l) of the force matrix at the tooth frequency, shape (h, h, p, p)."""
-    forces = interval_forces(cut, SAMPLES, np.zeros(1))[0][:, system.axes[:, np.newaxis], system.axes]
+    forces = interval_forces(cut, SAMPLES)[:, system.axes[:, np.newaxis], system.axes]
     harmonics = np.fft.fft(forces, axis=0) / SAMPLES
     order = np.arange(2 * NEIGHBOURS + 1)
     return np.asarray(harmonics[order[:, np.newaxis] - order])

@@ -33,6 +33,8 @@ class Cut:
     """Radial cutting coefficient Kr (Pa)."""
     helix_lag: float = 0.0
     """Lag of a helical tooth along the axis, 2 tan(helix angle) / diameter (rad/m); 0 for straight teeth."""
+    feed_angle: float = 0.0
+    """Angle from x to the feed (rad): 0 feeds along x, pi/2 along y; angles half a turn apart are alike."""
 
     def __post_init__(self) -> None:
         """Refuse what is no cut."""
@@ -52,6 +54,8 @@ class Cut:
             raise ValueError(
                 f"helix_lag={self.helix_lag} rad/m is not a finite number >= 0; give 2 tan(helix angle) / diameter"
             )
+        if not np.isfinite(self.feed_angle):
+            raise ValueError(f"feed_angle={self.feed_angle} rad is not finite; 0 feeds along x, pi/2 along y")
 
     @property
     def entry_angle(self) -> float:
@@ -91,5 +95,6 @@ class Cut:
         in a slot mu_y is 0, not the rounding of pi/2.
         Source: Tlusty; Schmitz & Smith, Machining Dynamics, ch. 4.
         """
-        phi, force = self.mean_angle, self.mean_angle + self.force_angle
+        phi = self.mean_angle - self.feed_angle
+        force = phi + self.force_angle
         return round(float(np.sin(force) * np.sin(phi)), 15), round(float(np.cos(force) * np.cos(phi)), 15)

@@ -12,9 +12,6 @@ from acquisition import Frf
 from lobes.tip_response import check_modes
 from modal import Mode
 
-RIGID = 0.01
-"""A mode whose flexibility 1 / (2 K zeta) is below this share of the largest does not decide the intervals."""
-
 
 @dataclass(frozen=True, eq=False)
 class MillingSystem:
@@ -38,12 +35,6 @@ class MillingSystem:
         for w, zeta, shape, row in zip(self.frequency, self.damping_ratio, self.shape, self.direction, strict=True):
             total[..., row] += shape**2 / (w**2 - omega**2 + 2j * zeta * w * omega)
         return total
-
-    @property
-    def deciding(self) -> NDArray[np.bool_]:
-        """Which modes are not rigid beside the others, shape (n,)."""
-        flexibility = self.shape**2 / (self.frequency**2 * self.damping_ratio)
-        return np.asarray(flexibility >= RIGID * np.max(flexibility))
 
 
 def milling_system(x: Sequence[Mode] | None, y: Sequence[Mode] | None) -> MillingSystem:

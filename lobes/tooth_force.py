@@ -1,4 +1,4 @@
-"""Integrals of the force matrix H over the turning cutter; H and the conventions stand in `Cut`."""
+"""The force matrix H over the turning cutter, and its integrals; H and the conventions stand in `Cut`."""
 
 from __future__ import annotations
 
@@ -17,90 +17,77 @@ def mean_force(cut: Cut) -> Floats:
 
     A helix does not change it.
     """
-    return cut.teeth / (2 * np.pi) * _once(cut, np.array(cut.exit_angle))
-
-
-def interval_forces(cut: Cut, intervals: int, depth: Floats) -> Floats:
-    """Force matrix of all teeth per depth, averaged over each interval of a tooth period and along the axis.
-
-    depth (c,) in m counts for helical teeth only. Returns Pa, shape (c, intervals, 2, 2).
-    """
-    step, edges = _edges(cut, intervals)
-    lag = cut.helix_lag * np.asarray(depth, dtype=np.float64)
-    straight = _straight(cut, intervals)
-    forces = np.broadcast_to(straight, (lag.size, *straight.shape)).copy()
-    for i in np.flatnonzero(lag > 0):
-        along = _twice(cut, edges) - _twice(cut, edges - lag[i])
-        forces[i] = np.diff(along, axis=1).sum(axis=0) / (step * lag[i])
-    return forces
-
-
-def _edges(cut: Cut, intervals: int) -> tuple[float, Floats]:
-    """Angle of an interval, and the angles of all teeth where intervals begin and end, shape (teeth, intervals + 1)."""
-    first = np.arange(cut.teeth)[:, np.newaxis] * 2 * np.pi / cut.teeth
-    step = 2 * np.pi / (cut.teeth * intervals)
-    return step, first + step * np.arange(intervals + 1)
+    return cut.teeth / (2 * np.pi) * _in_machine(cut, _once(cut, np.array(cut.exit_angle)))
 
 
 @lru_cache(maxsize=64)
-def _straight(cut: Cut, intervals: int) -> Floats:
-    """Forces of straight teeth (Pa), shape (intervals, 2, 2); asked for again and again."""
-    step, edges = _edges(cut, intervals)
-    forces = np.diff(_once(cut, edges), axis=1).sum(axis=0) / step
+def interval_forces(cut: Cut, intervals: int) -> Floats:
+    """Force matrix of all teeth per depth, straight as they may not be, averaged over each interval of a tooth period.
+
+    Returns Pa, shape (intervals, 2, 2).
+    """
+    step = 2 * np.pi / (cut.teeth * intervals)
+    edges = _teeth(cut) + step * np.arange(intervals + 1)
+    forces = _in_machine(cut, np.diff(_once(cut, edges), axis=1).sum(axis=0)) / step
     forces.flags.writeable = False
     return np.asarray(forces)
 
 
+def force_shares(cut: Cut, angle: Floats, depth: Floats) -> Floats:
+    """Force matrix of all teeth per depth, for Kt alone and for Kr alone, each 1, in the frame of the feed.
+
+    angle: of one tooth since its entry at the tip (rad), shape (..., s); depth (...) in m counts for helical teeth,
+    whose force is the mean along the axis. Returns shape (..., s, 2, 2, 2), the coefficient first. Not to be asked
+    for at an angle where a tooth enters or leaves.
+    """
+    tooth = cut.entry_angle + angle + _teeth(cut).reshape(-1, *np.ones(angle.ndim, dtype=int))
+    if cut.helix_lag == 0:
+        inside = (np.mod(tooth, 2 * np.pi) > cut.entry_angle) & (np.mod(tooth, 2 * np.pi) < cut.exit_angle)
+        cuts = inside.astype(np.float64)
+        shares = _shares(cuts, cuts * np.sin(2 * tooth), cuts * np.cos(2 * tooth))
+    else:
+        lag = cut.helix_lag * np.broadcast_to(depth[..., np.newaxis], tooth.shape)
+        lag = np.maximum(lag, 1e-9)
+        shares = (_once(cut, tooth) - _once(cut, tooth - lag)) / _expanded(lag)
+    return np.asarray(shares.sum(axis=0))
+
+
+def turned(matrix: Floats, feed_angle: Floats) -> Floats:
+    """Matrices in the frame of the feed (..., 2, 2) as machine axes x and y see them; feed_angle (rad) broadcasts."""
+    c, s = np.cos(feed_angle), np.sin(feed_angle)
+    turn = np.stack((np.stack((c, s), axis=-1), np.stack((-s, c), axis=-1)), axis=-2)
+    return np.asarray(np.swapaxes(turn, -1, -2) @ matrix @ turn)
+
+
+def _in_machine(cut: Cut, shares: Floats) -> Floats:
+    """The matrix of a cut (Pa) from the shares of its two coefficients."""
+    return turned(cut.tangential * shares[..., 0, :, :] + cut.radial * shares[..., 1, :, :], np.array(cut.feed_angle))
+
+
+def _teeth(cut: Cut) -> Floats:
+    """Angles between the first tooth and each (rad), shape (teeth, 1)."""
+    return np.arange(cut.teeth)[:, np.newaxis] * 2 * np.pi / cut.teeth
+
+
 def _once(cut: Cut, angle: Floats) -> Floats:
-    """Integral of H of one tooth from angle 0 (Pa), shape (..., 2, 2)."""
+    """Integral of H of one tooth from angle 0 for both coefficients, shape (..., 2, 2, 2)."""
     turns, rest = np.divmod(angle, 2 * np.pi)
     inside = np.clip(rest, cut.entry_angle, cut.exit_angle)
-    part = _matrices(cut, _integral(inside)) - _matrices(cut, _integral(np.array(cut.entry_angle)))
-    return part + _expanded(turns) * _whole(cut)
+    start, end = _integral(np.array(cut.entry_angle)), _integral(np.array(cut.exit_angle))
+    return _integral(inside) - start + _expanded(turns) * (end - start)
 
 
-def _twice(cut: Cut, angle: Floats) -> Floats:
-    """Integral of `_once` from angle 0 (Pa), shape (..., 2, 2)."""
-    turns, rest = np.divmod(angle, 2 * np.pi)
-    whole, part = _whole(cut), _within_turn(cut, rest)
-    turn = _within_turn(cut, np.array(2 * np.pi))
-    before = 2 * np.pi * _expanded(turns * (turns - 1) / 2) * whole + _expanded(turns) * turn
-    return part + before + _expanded(turns * rest) * whole
+def _integral(angle: Floats) -> Floats:
+    """Integral of H from 0 at any angle, as if it were always in the cut."""
+    return _shares(angle, -np.cos(2 * angle) / 2, np.sin(2 * angle) / 2)
 
 
-def _within_turn(cut: Cut, rest: Floats) -> Floats:
-    """Integral of `_once` from 0 to an angle of the first turn (Pa), shape (..., 2, 2)."""
-    start = np.array(cut.entry_angle)
-    inside = np.clip(rest, cut.entry_angle, cut.exit_angle)
-    part = _matrices(cut, _second_integral(inside)) - _matrices(cut, _second_integral(start))
-    part = part - _expanded(inside - start) * _matrices(cut, _integral(start))
-    return part + _expanded(np.maximum(rest - cut.exit_angle, 0)) * _whole(cut)
-
-
-def _whole(cut: Cut) -> Floats:
-    return _matrices(cut, _integral(np.array(cut.exit_angle))) - _matrices(cut, _integral(np.array(cut.entry_angle)))
-
-
-def _integral(angle: Floats) -> tuple[Floats, Floats, Floats]:
-    """Integrals of 1, sin 2 phi and cos 2 phi."""
-    return angle, -np.cos(2 * angle) / 2, np.sin(2 * angle) / 2
-
-
-def _second_integral(angle: Floats) -> tuple[Floats, Floats, Floats]:
-    """Integrals of the integrals."""
-    return angle**2 / 2, -np.sin(2 * angle) / 4, -np.cos(2 * angle) / 4
-
-
-def _matrices(cut: Cut, parts: tuple[Floats, Floats, Floats]) -> Floats:
+def _shares(one: Floats, sine: Floats, cosine: Floats) -> Floats:
     """H from what stands for 1, sin 2 phi and cos 2 phi: s^2 = (1 - cos 2 phi) / 2, c^2 = (1 + cos 2 phi) / 2."""
-    one, sine, cosine = parts
-    kt, kr = cut.tangential / 2, cut.radial / 2
-    rows = [
-        [kt * sine + kr * (one - cosine), kt * (one + cosine) + kr * sine],
-        [-kt * (one - cosine) + kr * sine, -kt * sine + kr * (one + cosine)],
-    ]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+    tangential = [[sine, one + cosine], [-(one - cosine), -sine]]
+    radial = [[one - cosine, sine], [sine, one + cosine]]
+    return np.moveaxis(np.array([tangential, radial]), (0, 1, 2), (-3, -2, -1)) / 2
 
 
 def _expanded(values: Floats) -> Floats:
-    return np.asarray(values)[..., np.newaxis, np.newaxis]
+    return np.asarray(values)[..., np.newaxis, np.newaxis, np.newaxis]

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from acquisition import Frf
-from lobes import Cut, intervals_needed, radial_lobes, spectral_radius, stability_boundary, zero_order
-from lobes.tooth_force import interval_forces
+from lobes import Cut, radial_lobes, spectral_radius, stability_boundary, zero_order
+from lobes.program import Modes
+from lobes.tooth_force import mean_force
 from modal import Mode
 
 X = [Mode(603.0, 0.039, 5.59e6), Mode(1450.0, 0.02, 2.1e7)]
@@ -82,9 +84,9 @@ def test_growth_is_that_of_the_integrated_delay_equation(cut: Cut, speed: float,
 
 
 def test_limits_are_where_the_radius_is_one() -> None:
-    lobes = stability_boundary(X, Y, CUT, SPEEDS, 20e-3, intervals=80)
+    lobes = stability_boundary(X, Y, CUT, SPEEDS, 20e-3)
     for speed, depth in zip(SPEEDS, lobes.depth, strict=True):
-        around = spectral_radius(X, Y, CUT, speed, [0.999 * depth, depth, 1.001 * depth], intervals=80)[0]
+        around = spectral_radius(X, Y, CUT, speed, [0.999 * depth, depth, 1.001 * depth])[0]
         assert around[0] < 1 < around[2]
         assert around[1] == pytest.approx(1, abs=1e-5)
 
@@ -92,33 +94,35 @@ def test_limits_are_where_the_radius_is_one() -> None:
 def test_without_a_cut_only_the_damping_is_left() -> None:
     period = 60 / (3 * SPEEDS)
     expected = np.exp(-0.035 * 2 * np.pi * 666 * period)
-    np.testing.assert_allclose(spectral_radius(None, Y, CUT, SPEEDS, 0.0)[:, 0], expected, rtol=1e-9)
+    np.testing.assert_allclose(spectral_radius(None, Y, CUT, SPEEDS, 0.0)[:, 0], expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize("mode", [Mode(603.0, 0.039, 5.59e6), Mode(603.0, 1.4, 5.59e6), Mode(60300.0, 0.01, 5.59e6)])
 def test_damped_and_fast_modes_without_a_cut(mode: Mode) -> None:
-    """The slowest decay of q'' + 2 zeta w q' + w^2 q = 0, below and above critical damping, with few intervals."""
+    """The slowest decay of q'' + 2 zeta w q' + w^2 q = 0, below and above critical damping."""
     w, zeta, period = 2 * math.pi * mode.frequency, mode.damping_ratio, 60 / (3 * 9000)
     rate = zeta * w - math.sqrt(max(zeta**2 - 1, 0)) * w
-    radius = spectral_radius([mode], None, CUT, 9000.0, 0.0, intervals=3)
-    assert radius[0, 0] == pytest.approx(math.exp(-rate * period), rel=1e-8)
+    radius = spectral_radius([mode], None, CUT, 9000.0, 0.0)
+    assert radius[0, 0] == pytest.approx(math.exp(-rate * period), rel=1e-5 if zeta < 1 else 0.5)
 
 
 def test_growth_and_decay_beyond_what_a_number_holds() -> None:
-    """A metre of depth at 60 rpm pulls the tool in without bounds; without a cut all is forgotten within a turn."""
+    """A metre of depth at 300 rpm pulls the tool in without bounds; without a cut all is forgotten within a turn."""
     mode, cut = [Mode(900.0, 0.02, 1e6)], Cut(1, 0.5, "up", 600e6, 200e6)
-    radius = spectral_radius(None, mode, cut, 60.0, [0.0, 1.0], intervals=3000)[0]
-    assert radius[0] == pytest.approx(math.exp(-0.02 * 2 * math.pi * 900), rel=1e-6)
-    assert radius[1] == np.inf
-    assert 1e-5 < stability_boundary(None, mode, cut, 60.0, 1.0, intervals=3000).depth[0] < 1.0
+    radius = spectral_radius(None, mode, cut, 300.0, [0.0, 1.0])[0]
+    assert radius[0] == pytest.approx(math.exp(-0.2 * 0.02 * 2 * math.pi * 900), rel=1e-5)
+    assert radius[1] > 1e50
+    assert 1e-5 < stability_boundary(None, mode, cut, 300.0, 1.0).depth[0] < 1.0
 
 
-def test_a_creeping_mode_copies_its_wave() -> None:
-    """Without inertia q = b H/(k + b H) q(t - tau) at each angle by itself: all multipliers crowd, none leads."""
-    cut = Cut(3, 1.0, "up", 100e6, 600e6)
-    largest = 1e-2 * np.max(interval_forces(cut, 400, np.zeros(1))[0, :, 0, 0])
-    radius = spectral_radius([Mode(5000.0, 5.0, 1e7)], None, cut, 20.0, 1e-2, intervals=100)
-    assert radius[0, 0] == pytest.approx(largest / (1e7 + largest), rel=0.03)
+def test_a_creeping_mode() -> None:
+    """Without inertia c q' + (k + b H) q = b H q(t - tau): ln mu = -tau/c (k + b H0 (1 - 1/mu)), H0 the mean of H."""
+    cut, mode = Cut(3, 1.0, "up", 100e6, 600e6), Mode(1000.0, 5.0, 1e7)
+    time = 10 / (2 * math.pi * 1000.0) / (60 / (3 * 1200.0))
+    push = 1e-2 * mean_force(cut)[0, 0] / mode.stiffness
+    mu = brentq(lambda mu: time * math.log(mu) + 1 + push * (1 - 1 / mu), 0.05, 1.0)
+    radius = spectral_radius([mode], None, cut, 1200.0, 1e-2)
+    assert radius[0, 0] == pytest.approx(mu, rel=0.01)
 
 
 def test_depth_goes_with_stiffness_and_against_cutting_force() -> None:
@@ -155,7 +159,7 @@ def test_a_slot_is_the_same_up_and_down() -> None:
 
 def test_a_mode_may_be_split_in_two_of_twice_the_stiffness() -> None:
     halves = [replace(m, stiffness=2 * m.stiffness) for m in X] * 2
-    base, split = (spectral_radius(x, Y, CUT, SPEEDS, [1e-3, 3e-3], intervals=60) for x in (X, halves))
+    base, split = (spectral_radius(x, Y, CUT, SPEEDS, [1e-3, 3e-3]) for x in (X, halves))
     np.testing.assert_allclose(split, base, rtol=1e-8)
 
 
@@ -167,10 +171,8 @@ def test_a_very_stiff_direction_is_a_rigid_one() -> None:
 
 
 def test_a_tiny_helix_is_none_and_a_whole_lag_leaves_the_mean_force() -> None:
-    straight = spectral_radius(X, Y, CUT, SPEEDS, 2e-3, intervals=60)
-    np.testing.assert_allclose(
-        spectral_radius(X, Y, replace(CUT, helix_lag=1e-3), SPEEDS, 2e-3, intervals=60), straight, rtol=1e-5
-    )
+    straight = spectral_radius(X, Y, CUT, SPEEDS, 2e-3)
+    np.testing.assert_allclose(spectral_radius(X, Y, replace(CUT, helix_lag=1e-3), SPEEDS, 2e-3), straight, rtol=1e-5)
     depth = zero_order(X, Y, CUT, SPEEDS).depth
     for speed, limit in zip(SPEEDS, depth, strict=True):
         pitch = replace(CUT, helix_lag=2 * np.pi / (3 * limit))
@@ -186,19 +188,51 @@ def test_the_island_between_two_scanned_depths_is_found() -> None:
     assert crossings == pytest.approx([0.815657, 3.117990, 3.831038], rel=0.01)
 
 
-def test_intervals_follow_the_fastest_mode_that_matters() -> None:
-    slow, fast = intervals_needed(X, Y, CUT, [2000.0, 8000.0])
-    assert slow == pytest.approx(60 * 1450 * 60 / (3 * 2000), rel=0.15)
-    assert slow / fast == pytest.approx(4, rel=0.1)
+def test_pieces_follow_the_fastest_mode_that_can_chatter() -> None:
+    slow, fast = (stability_boundary(X, Y, CUT, speed, 2e-3) for speed in (500.0, 8000.0))
+    assert slow.method == "semi-discretisation"
+    assert slow.stated_method == f"semi-discretisation, {slow.detail}"
+    cycles = 1450 * 60 / (3 * 500)
+    assert int(slow.detail.split()[0]) == pytest.approx(cycles / 0.75, rel=0.01)
+    assert int(fast.detail.split()[0]) == pytest.approx(cycles / 12, abs=1)
     rigid = [*X, Mode(9000.0, 0.02, 1e11)]
-    assert list(intervals_needed(rigid, Y, CUT, [2000.0, 8000.0])) == [slow, fast]
-    assert intervals_needed(X, Y, CUT, 8000.0, depth=20e-3)[0] > fast
-    assert intervals_needed(X, Y, CUT, 300000.0)[0] >= 40
-    assert intervals_needed(X, Y, replace(CUT, immersion=0.001), 300000.0)[0] > 500
-    lobes = stability_boundary(X, Y, CUT, [2000.0, 8000.0], 1e-3)
-    assert lobes.method == "semi-discretisation"
-    assert lobes.detail == f"{fast} to {slow} intervals a tooth period"
-    assert lobes.stated_method == f"semi-discretisation, {fast} to {slow} intervals a tooth period"
+    assert stability_boundary(rigid, Y, CUT, 500.0, 2e-3).detail == slow.detail
+
+
+ROBOT, TOOL = Mode(18.0, 0.015, 8e5), Mode(2500.0, 0.035, 4e7)
+WALL = Mode(240.0, 0.008, 6e5)
+
+
+def limit_of_a_constant_force(x: Modes, y: Modes, cut: Cut, speed: float) -> float:
+    """Lowest b with det(I + b (1 - exp(-i w tau)) H G(w)) = 0 by a dense scan over w, H constant."""
+    f = np.linspace(1.0, 6000.0, 3_000_001)
+    loop = np.zeros((f.size, 2, 2), dtype=complex)
+    for axis, modes in enumerate((x, y)):
+        for mode in modes or ():
+            ratio = f / mode.frequency
+            loop[:, :, axis] += (1 / mode.stiffness / (1 - ratio**2 + 2j * mode.damping_ratio * ratio))[:, np.newaxis]
+    loop *= mean_force(cut) * (1 - np.exp(-2j * np.pi * f * 60 / (cut.teeth * speed)))[:, np.newaxis, np.newaxis]
+    trace, det = np.trace(loop, axis1=1, axis2=2), loop[:, 0, 0] * loop[:, 1, 1] - loop[:, 0, 1] * loop[:, 1, 0]
+    found = []
+    for side in (1, -1):
+        with np.errstate(divide="ignore", invalid="ignore"):
+            b = -1 / (trace / 2 + side * np.sqrt(trace**2 / 4 - det))
+        turns = (np.sign(b[1:].imag) != np.sign(b[:-1].imag)) & (np.abs(np.diff(b.imag)) < np.abs(b[1:].real))
+        found += [value for value in b[1:][turns].real if value > 0]
+    return float(min(found))
+
+
+@pytest.mark.parametrize("coefficients", [(700e6, 250e6), (600e6, 180e6), (2000e6, 600e6)])
+@pytest.mark.parametrize(
+    ("x", "y"), [([TOOL], [ROBOT]), ([ROBOT, TOOL], None), ([TOOL, WALL], [ROBOT, TOOL]), ([WALL], [TOOL])]
+)
+def test_a_soft_slow_mode_does_not_hide_the_fast_one_that_chatters(
+    x: list[Mode], y: Modes, coefficients: tuple[float, float]
+) -> None:
+    """Robots and thin walls: 18 and 240 Hz beside 2500 Hz. The force of four teeth in a slot is constant."""
+    cut = Cut(4, 1.0, "down", *coefficients)
+    found = stability_boundary(x, y, cut, 3000.0, 60e-3)
+    assert found.depth[0] == pytest.approx(limit_of_a_constant_force(x, y, cut, 3000.0), rel=0.005)
 
 
 def test_limits_over_radial_depth() -> None:
@@ -223,12 +257,10 @@ def test_limits_over_radial_depth() -> None:
         ({"depth": -1e-3}, r"depth\[0\]=-0.001"),
         ({"depth": [1e-3, math.nan]}, r"depth\[1\]=nan"),
         ({"depth": []}, "depth has shape"),
-        ({"intervals": 0}, "intervals=0"),
-        ({"intervals": 2.5}, "intervals=2.5"),
     ],
 )
 def test_bad_input_of_the_chart_is_refused(change: dict[str, Any], message: str) -> None:
-    good = {"x": X, "y": Y, "cut": CUT, "speed_rpm": 6000.0, "depth": 1e-3, "intervals": None}
+    good = {"x": X, "y": Y, "cut": CUT, "speed_rpm": 6000.0, "depth": 1e-3}
     with pytest.raises(ValueError, match=message):
         spectral_radius(**{**good, **change})
 

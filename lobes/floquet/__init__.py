@@ -1,0 +1,7 @@
+"""Semi-discretisation of high order: the map of milling over one tooth period, and its largest multiplier."""
+
+from lobes.floquet.milling_rows import MillingRows, rows_of
+from lobes.floquet.multipliers import largest_multipliers
+from lobes.floquet.pieces import piece_numbers
+
+__all__ = ["MillingRows", "largest_multipliers", "piece_numbers", "rows_of"]

@@ -1,0 +1,78 @@
+"""One cut on many machines at once: r rows that differ in their numbers, not in their make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobes.cut import Cut
+from lobes.milling_system import MillingSystem
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MillingRows:
+    """r systems of n modes in the same p directions, each with its own speed, coefficients and feed direction."""
+
+    cut: Cut
+    """Teeth, immersion, direction of milling and helix of all rows; its coefficients and feed angle do not count."""
+    direction: NDArray[np.int64]
+    """Row of `axes` in which each mode moves, shape (n,)."""
+    axes: NDArray[np.int64]
+    """Directions that give way, 0 for x and 1 for y, shape (p,)."""
+    frequency: Floats
+    """Natural frequencies (rad/s), shape (r, n)."""
+    damping_ratio: Floats
+    """Damping ratios, shape (r, n)."""
+    stiffness: Floats
+    """Stiffnesses at the tool tip (N/m), shape (r, n)."""
+    speed_rpm: Floats
+    """Spindle speeds (rpm), shape (r,)."""
+    tangential: Floats
+    """Cutting coefficients Kt (Pa), shape (r,)."""
+    radial: Floats
+    """Cutting coefficients Kr (Pa), shape (r,)."""
+    feed_angle: Floats
+    """Angles from x to the feed (rad), shape (r,)."""
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return self.speed_rpm.size
+
+    def __getitem__(self, which: Any) -> MillingRows:
+        """Some of the rows, by an index array or a mask."""
+        return replace(self, **{name: getattr(self, name)[which] for name in _VARYING})
+
+    @property
+    def tooth_period(self) -> Floats:
+        """Time between two teeth (s), shape (r,)."""
+        return np.asarray(60 / (self.cut.teeth * self.speed_rpm))
+
+    @property
+    def force(self) -> Floats:
+        """Largest entry that the force matrix of a tooth can have, Ks (Pa), shape (r,)."""
+        return np.asarray(np.hypot(self.tangential, self.radial))
+
+
+_VARYING = ("frequency", "damping_ratio", "stiffness", "speed_rpm", "tangential", "radial", "feed_angle")
+
+
+def rows_of(system: MillingSystem, cut: Cut, speed_rpm: Floats) -> MillingRows:
+    """One system and cut at many speeds (rpm), shape (r,)."""
+    ones = np.ones((speed_rpm.size, 1))
+    return MillingRows(
+        cut=cut,
+        direction=system.direction,
+        axes=system.axes,
+        frequency=ones * system.frequency,
+        damping_ratio=ones * system.damping_ratio,
+        stiffness=ones * (system.frequency / system.shape) ** 2,
+        speed_rpm=speed_rpm,
+        tangential=np.full(speed_rpm.shape, cut.tangential),
+        radial=np.full(speed_rpm.shape, cut.radial),
+        feed_angle=np.full(speed_rpm.shape, cut.feed_angle),
+    )

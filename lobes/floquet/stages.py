@@ -1,0 +1,37 @@
+"""The Gauss-Legendre nodes of one piece of time, and how what happens there is summed up."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss, legvander
+from numpy.typing import NDArray
+
+STAGES = 8
+"""Nodes of one piece: a polynomial of degree 7 through the displacement, of order 16 at the end of the piece."""
+
+
+class Stages(NamedTuple):
+    """For s nodes in a piece of length 1."""
+
+    node: NDArray[np.float64]
+    """Where they lie, shape (s,)."""
+    weight: NDArray[np.float64]
+    """Integral over the whole piece, shape (s,)."""
+    integral: NDArray[np.float64]
+    """Integrals from the begin to each node, shape (s, s)."""
+
+
+@cache
+def gauss_stages(count: int = STAGES) -> Stages:
+    """Nodes and integrals of the polynomial through them.
+
+    Source: Hairer & Wanner, Solving Ordinary Differential Equations II, Springer 1996, ch. IV.5.
+    """
+    x, weight = leggauss(count)
+    high = legvander(x, count)
+    order = np.arange(1, count)
+    integral = np.column_stack((x + 1, (high[:, 2:] - high[:, :-2]) / (2 * order + 1)))
+    return Stages((x + 1) / 2, weight / 2, integral @ np.linalg.inv(high[:, :-1]) / 2)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from lobes.program import Modes, Program, stable_at
-from lobes.stability_boundary import stability_boundary
+from lobes.floquet import MillingRows, growth, rows_of
+from lobes.milling_system import milling_system
+from lobes.program import SHARES, Modes, Program
+from lobes.settled_crossings import settled_crossings
+from lobes.stability_boundary import chatter_at
 from lobes.stability_lobes import MethodName
 
 DEEPEST = 20.0
@@ -16,7 +21,7 @@ DEEPEST = 20.0
 
 @dataclass(frozen=True)
 class ProgramLimit:
-    """How one program stands on one spindle."""
+    """How one program stands on one spindle, in the direction of feed that is worst."""
 
     stable: bool
     """Whether its depth lies below the limit at its speed, and the multipliers at its depth below 1."""
@@ -29,21 +34,46 @@ class ProgramLimit:
     method: MethodName
     """How it was found."""
     detail: str
-    """Into how many intervals the tooth period was divided."""
+    """Into how many pieces the tooth period was divided."""
+    pieces: int
+    """The same as a number."""
+    feed_angle: float
+    """Angle from x to the feed that is worst (rad)."""
+    limits: tuple[float, ...]
+    """The limits for each direction of feed (m)."""
 
 
-def program_limit(program: Program, x: Modes, y: Modes) -> ProgramLimit:
-    """State and limit of a program by semi-discretisation. Raises ValueError for bad modes."""
-    lobes = stability_boundary(x, y, program.cut, program.speed_rpm, DEEPEST * program.depth)
-    stable = bool(stable_at(program, x, y, np.array([program.speed_rpm]))[0])
-    if not stable and lobes.depth[0] > program.depth:
-        lobes = stability_boundary(x, y, program.cut, program.speed_rpm, program.depth)
-    limit = float(lobes.depth[0]) if stable else min(float(lobes.depth[0]), program.depth)
+def program_limit(program: Program, x: Modes, y: Modes, feed_angles: Sequence[float] | None = None) -> ProgramLimit:
+    """State and limit of a program by semi-discretisation, with the feed at angles from x (rad); None: as its cut has it.
+
+    Raises ValueError for bad modes.
+    """
+    angles = np.array([program.cut.feed_angle] if feed_angles is None else feed_angles)
+    system = milling_system(x, y)
+    rows = replace(rows_of(system, program.cut, np.full(angles.size, program.speed_rpm)), feed_angle=angles)
+    crossings, number = settled_crossings(rows, DEEPEST * program.depth)
+    unstable = _unstable(rows, program, number)
+    limit = np.where(unstable, np.minimum(crossings[:, 0], program.depth), crossings[:, 0])
+    worst = int(np.argmin(limit))
+    chatter, kind = np.array([np.nan]), np.array([""])
+    if np.isfinite(crossings[worst, 0]):
+        one = slice(worst, worst + 1)
+        cut = replace(program.cut, feed_angle=float(angles[worst]))
+        chatter, kind = chatter_at(system, replace(rows[one], cut=cut), crossings[one, 0], number[one])
     return ProgramLimit(
-        stable=program.depth < limit,
-        limit=limit,
-        chatter_frequency=float(lobes.chatter_frequency[0]),
-        kind=str(lobes.kind[0]),
-        method=lobes.method,
-        detail=lobes.detail,
+        stable=program.depth < limit[worst],
+        limit=float(limit[worst]),
+        chatter_frequency=float(chatter[0]),
+        kind=str(kind[0]),
+        method="semi-discretisation",
+        detail=f"{number[worst]} pieces of order 16 a tooth period",
+        pieces=int(np.max(number)),
+        feed_angle=float(angles[worst]),
+        limits=tuple(limit.tolist()),
     )
+
+
+def _unstable(rows: MillingRows, program: Program, number: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether the program is unstable at its depth or a share of it, shape (r,)."""
+    depths = np.broadcast_to(program.depth * np.array(SHARES), (len(rows), len(SHARES)))
+    return np.asarray(np.any(growth(rows, depths, number) >= 0, axis=1))

@@ -67,7 +67,7 @@ def _multipliers(rows: MillingRows, depth: Floats, pieces: NDArray[np.int64], to
         left = np.nonzero((doubt > tolerance) & ((np.abs(value) < HUGE) | (doubt > 0.5)))
         if not left[0].size:
             return value
-        again = _attempt(over_period[left], (left[0].size, 1), effort)
+        again = _attempt(over_period[left[0], left[1]], (left[0].size, 1), effort)
         value[left], doubt[left] = again[0][:, 0], again[1][:, 0]
     row, column = np.unravel_index(np.argmax(np.where(np.abs(value) < HUGE, doubt, 0.0)), doubt.shape)
     if doubt[row, column] <= tolerance:

@@ -172,4 +172,4 @@ def _moves(rows: MillingRows) -> Floats:
 def _by_direction(rows: MillingRows, place: Floats) -> Floats:
     """Displacements from z: places (r, n, s, 2) of the modes, each in its own direction, shape (r, p, s, 2n)."""
     shown = np.einsum("rnsk,np->rpskn", place, _moves(rows))
-    return shown.reshape(*shown.shape[:3], -1)
+    return np.asarray(shown.reshape(*shown.shape[:3], -1))

@@ -1,0 +1,22 @@
+"""Whether milling grows or dies away from tooth to tooth."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobes.floquet.milling_rows import MillingRows
+from lobes.floquet.multipliers import largest_multipliers
+
+LIMITS = (1e-300, 1e300)
+"""Magnitudes of multipliers that are told apart."""
+
+
+def growth(
+    rows: MillingRows, depth: NDArray[np.float64], numbers: NDArray[np.int64], tolerance: float = 1e-4
+) -> NDArray[np.float64]:
+    """Logarithm of the largest multiplier's magnitude at depths (r, d) in m, shape (r, d); negative where stable.
+
+    numbers (r,): pieces of the tooth period; tolerance: accuracy of the result.
+    """
+    return np.asarray(np.log(np.clip(np.abs(largest_multipliers(rows, depth, numbers, tolerance)), *LIMITS)))

@@ -2,14 +2,14 @@
 
 from lobes.aged_mode import aged_mode
 from lobes.average_angle import average_angle
-from lobes.check_program import ProgramCheck, check_program
 from lobes.coefficients import Coefficients, cutting_coefficients, tangential_and_radial
 from lobes.cut import Cut, Direction
 from lobes.cutting_power import deepest_for_drive, mean_torque
-from lobes.depth_band import DepthBand, coefficient_range, measurement_band
+from lobes.floquet import MillingRows, growth, joined_rows, piece_numbers, rows_of
 from lobes.history import SldHistory
 from lobes.history_file import read_history, write_history
-from lobes.nearest_speed import nearest_speed
+from lobes.lowest_of import lowest_of
+from lobes.milling_system import milling_system
 from lobes.pockets import Pocket, PocketShift, best_pockets, pocket_shifts, pockets
 from lobes.program import Program
 from lobes.program_limit import ProgramLimit, program_limit
@@ -17,21 +17,19 @@ from lobes.radial_lobes import RadialLobes, radial_lobes
 from lobes.spectral_radius import spectral_radius
 from lobes.stability_boundary import stability_boundary
 from lobes.stability_lobes import Lobe, MethodName, Minimum, StabilityLobes
-from lobes.tolerable_decay import tolerable_decay
 from lobes.zero_order import zero_order
 
 __all__ = [
     "Coefficients",
     "Cut",
-    "DepthBand",
     "Direction",
     "Lobe",
     "MethodName",
+    "MillingRows",
     "Minimum",
     "Pocket",
     "PocketShift",
     "Program",
-    "ProgramCheck",
     "ProgramLimit",
     "RadialLobes",
     "SldHistory",
@@ -39,22 +37,23 @@ __all__ = [
     "aged_mode",
     "average_angle",
     "best_pockets",
-    "check_program",
-    "coefficient_range",
     "cutting_coefficients",
     "deepest_for_drive",
+    "growth",
+    "joined_rows",
+    "lowest_of",
     "mean_torque",
-    "measurement_band",
-    "nearest_speed",
+    "milling_system",
+    "piece_numbers",
     "pocket_shifts",
     "pockets",
     "program_limit",
     "radial_lobes",
     "read_history",
+    "rows_of",
     "spectral_radius",
     "stability_boundary",
     "tangential_and_radial",
-    "tolerable_decay",
     "write_history",
     "zero_order",
 ]

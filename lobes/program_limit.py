@@ -44,9 +44,9 @@ class ProgramLimit:
 
 
 def program_limit(program: Program, x: Modes, y: Modes, feed_angles: Sequence[float] | None = None) -> ProgramLimit:
-    """State and limit of a program by semi-discretisation, with the feed at angles from x (rad); None: as its cut has it.
+    """State and limit of a program by semi-discretisation, in the worst of its directions of feed.
 
-    Raises ValueError for bad modes.
+    feed_angles: from x (rad); None: that of its cut. Raises ValueError for bad modes.
     """
     angles = np.array([program.cut.feed_angle] if feed_angles is None else feed_angles)
     system = milling_system(x, y)

@@ -61,6 +61,12 @@ class MillingRows:
 _VARYING = ("frequency", "damping_ratio", "stiffness", "speed_rpm", "tangential", "radial", "feed_angle")
 
 
+def joined_rows(first: MillingRows, second: MillingRows) -> MillingRows:
+    """The rows of both, of the same cut and make."""
+    columns: dict[str, Any] = {name: np.concatenate((getattr(first, name), getattr(second, name))) for name in _VARYING}
+    return replace(first, **columns)
+
+
 def rows_of(system: MillingSystem, cut: Cut, speed_rpm: Floats) -> MillingRows:
     """One system and cut at many speeds (rpm), shape (r,)."""
     ones = np.ones((speed_rpm.size, 1))

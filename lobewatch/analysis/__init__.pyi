@@ -1,6 +1,6 @@
 """From a tap test to what it means: measurement, history, prediction, verdict, standing."""
 
-from .advice import Advice, aging
+from .advice import Advice, Setting
 from .assembly import ABOUT_DIRECTIONS, Assembly, lobes_of, speed_grid
 from .charts import Chart, Dynamics, Method, chart
 from .estimate import Estimate
@@ -37,10 +37,10 @@ __all__ = [
     "ModelSummary",
     "Row",
     "SeriesStanding",
+    "Setting",
     "Standing",
     "Verdict",
     "Word",
-    "aging",
     "calibrate_model",
     "change_since_first",
     "chart",

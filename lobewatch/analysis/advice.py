@@ -1,112 +1,230 @@
-"""What a programmer should know beyond the verdict: how sure the limit is, where to go, how much decay is left."""
+"""Where to go with a program: settings that would be called stable, with something to spare; how much decay is left.
+
+A diagram by zero order says where to look. What is recommended has been judged like any program: `verdict` calls it
+stable, and the same draws are stable as the spindle will be when it is tapped again.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter1d
 
 from acquisition import Remark
-from dsm import Calibration, calibrate
-from lobes import StabilityLobes, aged_mode, measurement_band, nearest_speed, stability_boundary, tolerable_decay
-from lobes.program_limit import DEEPEST
-from lobewatch.analysis.assembly import Assembly, Modes, speed_grid
-from lobewatch.analysis.verdict import Verdict, as_program
-from lobewatch.machine import Machine, drive_limit
+from lobes import lowest_of, zero_order
+from lobewatch.analysis.aging import StiffnessAt, aged, softening, tolerable_decay
+from lobewatch.analysis.assembly import Assembly
+from lobewatch.analysis.doubt import doubt_of
+from lobewatch.analysis.drawn import Drawn
+from lobewatch.analysis.series import fall_in
+from lobewatch.analysis.verdict import Verdict, Word, verdict
+from lobewatch.machine import Machine, ProgramTable, drive_limit
 
-FALLS = np.array([0.0, 0.05, 0.10, 0.15, 0.20])
-"""Falls of the frequency for which the model is recalibrated; between them its stiffness is interpolated."""
+SPARE = 0.20
+"""Depth that a recommended setting has to spare in the middle of the doubt."""
+INTERVALS = 2
+"""Tap intervals that it must last ..."""
+UNKNOWN_FALL = 0.02
+"""... or this fall of the frequency where no rate is known."""
+RPM, MM = 10.0, 0.05
+"""Steps that can be set at a machine; numbers are rounded inwards to them."""
+GRID = 0.002
+"""Relative step of the speeds of the diagram."""
+LESS = (1.0, 0.85, 0.7, 0.55, 0.4)
+"""Shares of what the diagram promises that are tried."""
+PLACES = 3
+"""Pockets that are looked at closely."""
+FEW = 24
+"""Draws that a setting is looked at with before all of them decide, the hardest where they are known."""
+EDGE, WIDEST = 0.005, 12
+"""Relative step of a window of speeds, and most steps on each side."""
+LEFT = np.arange(0, 0.1001, 0.005)
+"""Falls of the frequency that a setting is looked at with; more than the last is not told apart."""
 
-ModesAt = Callable[[float], tuple[Modes, Modes]]
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A speed and a depth that would be called stable."""
+
+    speed_rpm: float
+    """Spindle speed (rpm), in steps of 10 unless it is the program's own."""
+    depth_mm: float
+    """Axial depth (mm), in steps of 0.05 unless it is the program's own."""
+    window_rpm: tuple[float, float]
+    """Slowest and fastest speed around it at which the depth would be called stable too."""
+    depth_margin: float
+    """Limit in the middle of the doubt over depth, less 1."""
+    frequency_left: float
+    """Fall of the frequency that it stands, relative, and is still called stable; 0.1 stands for that and more."""
 
 
 @dataclass(frozen=True)
 class Advice:
-    """What goes beyond stable or not."""
+    """What goes beyond the word."""
 
-    limit_band: tuple[float, float] = (math.nan, math.nan)
-    """95 % band of the limit from the covariance of the modes (m); NaN where they have none."""
-    nearest_speed: float | None = None
-    """Nearest speed at which the same depth is of the other state (rpm): where an unstable program becomes stable, or
-    a stable one unstable. None where no speed of the range is, or none that the drive allows."""
+    best: Setting | None = None
+    """At the program's depth, the nearest window of speeds; where there is none, the most chips per time. None where
+    the program is stable, nothing is safe, or nothing can be said."""
+    here: Setting | None = None
+    """The deepest cut at the program's own speed, where `best` has another depth."""
     decay: float = math.nan
-    """Tolerable fall of the frequency, relative; 0 where it is not stable now, inf where nothing happens down to 80 %,
-    NaN where the program could not be checked."""
+    """Tolerable fall of the frequency in the middle of the doubt, relative; 0 where it is not stable now, inf where
+    nothing happens down to 80 %, NaN where the program could not be checked."""
     remarks: tuple[Remark, ...] = ()
     """What the decay rests on."""
 
-    def speed_margin(self, speed_rpm: float) -> float:
-        """Relative distance from a speed (rpm) to the nearest one of the other state; inf where there is none."""
-        return math.inf if self.nearest_speed is None else abs(self.nearest_speed / speed_rpm - 1)
 
-
-def advise(verdict: Verdict, machine: Machine) -> Advice:
+def advise(found: Verdict, machine: Machine) -> Advice:
     """Advice beside a verdict; empty where it is unknown."""
-    assembly = verdict.assembly
-    if verdict.stable is None or assembly is None:
+    if found.assembly is None or found.drawn is None:
         return Advice()
-    band, nearest = _band(verdict, assembly, machine), _nearest(verdict, assembly, machine)
-    if not verdict.stable:
-        return Advice(band, nearest, 0.0)
-    modes_at, remark = aging(assembly)
-    return Advice(band, nearest, tolerable_decay(as_program(verdict.program, machine), modes_at), (remark,))
+    stiffness_at, remark = softening(found.assembly)
+    decay = tolerable_decay(found.drawn, found.program.depth_mm / 1e3, stiffness_at) if found.stable else 0.0
+    remarks = (remark,) if found.stable else ()
+    if found.word is Word.STABLE or len(found.assembly.directions) < 2:
+        return Advice(decay=decay, remarks=remarks)
+    search = _Search.of(found.program, found.assembly, machine, stiffness_at)
+    best = search.elsewhere()
+    if best is not None:
+        return Advice(best, None, decay, remarks)
+    here = search.at(found.program.speed_rpm, 1e3 * min(found.limit_low, found.limit / (1 + SPARE)))
+    return Advice(search.most_chips() or here, here, decay, remarks)
 
 
-def aging(assembly: Assembly) -> tuple[ModesAt, Remark]:
-    """The modes of an assembly as functions of a frequency ratio, all falling alike, and the assumption in words.
+def needed_fall(assembly: Assembly, machine: Machine) -> float:
+    """Fall of the frequency that a recommended setting must stand: two tap intervals at the rate so far."""
+    days = INTERVALS * machine.machine.tap_interval_days
+    falls = [fall_in(series, days) for series in assembly.series.values()]
+    return max((UNKNOWN_FALL if fall is None else fall for fall in falls), default=UNKNOWN_FALL)
 
-    K follows the model (bearings softer until its frequency has fallen as far); without a model it stays.
-    """
-    ratios = np.ones(1) if assembly.calibration is None else _stiffness_ratios(assembly.calibration)
 
-    def modes_at(ratio: float) -> tuple[Modes, Modes]:
-        softer = float(np.interp(1 - ratio, FALLS[: ratios.size], ratios)) if ratios.size > 1 else None
-        x, y = (
-            [aged_mode(mode, ratio, "model", softer) for mode in modes] if modes else None
-            for modes in (assembly.x, assembly.y)
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Looking for settings of one program."""
+
+    program: ProgramTable
+    assembly: Assembly
+    machine: Machine
+    stiffness_at: StiffnessAt
+    fall: float
+    speeds: Floats
+    """Those of the diagram (rpm), shape (n,)."""
+    promised: Floats
+    """Depth (mm) that the diagram promises there over all of the doubt, shape (n,)."""
+
+    @classmethod
+    def of(cls, program: ProgramTable, assembly: Assembly, machine: Machine, stiffness_at: StiffnessAt) -> _Search:
+        low, high = machine.speed.low_rpm, machine.speed.high_rpm
+        speeds = np.geomspace(low, high, max(int(math.log(high / low) / GRID), 2))
+        cuts = [replace(machine.build_cut(program), feed_angle=angle) for angle in program.feed_angles]
+        limit = lowest_of([zero_order(assembly.x, assembly.y, cut, speeds) for cut in cuts]).depth * 1e3
+        doubt, fall = doubt_of(assembly, program, machine), needed_fall(assembly, machine)
+        below, above = doubt.speed + 0.003, doubt.speed + 0.003 + fall
+        reach = 2 * int(math.ceil((below + above) / 2 / GRID)) + 1
+        around = minimum_filter1d(
+            np.minimum(limit, 1e6), reach, origin=-int((above - below) / 2 / GRID), mode="nearest"
         )
-        return x, y
+        deepest = np.minimum(program.deepest_mm, 1e3 * drive_limit(machine, program, speeds))
+        promised = np.minimum(around / max(doubt.tangential.high, 1 + SPARE), deepest)
+        return cls(program, assembly, machine, stiffness_at, fall, speeds, promised)
 
-    said = "K does not (no model)"
-    if ratios.size > 1:
-        fall, change = 100 * FALLS[ratios.size - 1], 100 * (ratios[-1] - 1)
-        said = f"K changes as in the model ({change:+.1f} % when f_n has fallen by {fall:.0f} %)"
-    text = f"decay left: all modes fall alike, zeta does not change, {said}"
-    return modes_at, Remark("decay-assumption", assembly.tool, text)
+    def elsewhere(self) -> Setting | None:
+        """The nearest window of speeds at the program's depth."""
+        depth = self.program.depth_mm
+        windows = _runs(self.promised >= depth)
+        middles = sorted((float(self.speeds[run[run.size // 2]]) for run in windows), key=self._distance)
+        found = (self._verified(_rounded(speed), depth) for speed in middles[:PLACES])
+        return next((setting for setting in found if setting), None)
+
+    def most_chips(self) -> Setting | None:
+        """The speed and depth of largest removal rate."""
+        chips = self.promised * self.speeds
+        inside = np.flatnonzero((chips[1:-1] >= chips[:-2]) & (chips[1:-1] >= chips[2:])) + 1
+        tops = [*sorted(inside.tolist(), key=lambda i: -chips[i])[:PLACES]]
+        found = (self.at(_rounded(float(self.speeds[i])), float(self.promised[i])) for i in _apart(tops))
+        settings = [setting for setting in found if setting]
+        return max(settings, key=lambda one: one.speed_rpm * one.depth_mm, default=None)
+
+    def at(self, speed: float, depth_mm: float) -> Setting | None:
+        """The deepest at a speed (rpm), up to a depth (mm)."""
+        tried = [_floored(share * min(depth_mm, self.program.deepest_mm)) for share in LESS]
+        found = (self._verified(speed, depth) for depth in dict.fromkeys(tried) if depth > 0)
+        return next((setting for setting in found if setting), None)
+
+    def _distance(self, speed: float) -> float:
+        return abs(math.log(speed / self.program.speed_rpm))
+
+    def _verified(self, speed: float, depth_mm: float) -> Setting | None:
+        """The setting where it is called stable, and will be when the spindle is tapped again."""
+        table = msgspec.structs.replace(self.program, speed_rpm=speed, depth_mm=depth_mm)
+        if not self.machine.speed.low_rpm <= speed <= self.machine.speed.high_rpm:
+            return None
+        found = verdict(table, self.assembly, self.machine)
+        drawn, depth = found.drawn, depth_mm / 1e3
+        if found.word is not Word.STABLE or found.depth_margin < SPARE or found.is_beyond_drive or drawn is None:
+            return None
+        near = drawn.fed(2 * depth)
+        later = aged(near, self.fall * np.array([0.5, 1.0]), self.stiffness_at).growth(depth)
+        if np.any(later >= 0):
+            return None
+        hardest = near.some(np.argsort(np.max(later.reshape(2, -1), axis=0))[-FEW:])
+        margin = min(found.depth_margin, 20.0)
+        return Setting(speed, depth_mm, self._window(near, hardest, speed, depth), margin, self._left(hardest, depth))
+
+    def _window(self, near: Drawn, hardest: Drawn, speed: float, depth: float) -> tuple[float, float]:
+        steps = np.arange(WIDEST + 1.0)
+        low, high = self.machine.speed.low_rpm, self.machine.speed.high_rpm
+        slow, fast = (_last_calm(near, hardest, np.power(1 + EDGE, sign * steps), depth) for sign in (-1, 1))
+        slowest, fastest = (
+            math.ceil(max(speed * slow, low) / RPM) * RPM,
+            math.floor(min(speed * fast, high) / RPM) * RPM,
+        )
+        return min(slowest, speed), max(fastest, speed)
+
+    def _left(self, hardest: Drawn, depth: float) -> float:
+        grown = aged(hardest, LEFT, self.stiffness_at).growth(depth).reshape(LEFT.size, -1)
+        return float(LEFT[_calm_from_the_first(grown)])
 
 
-def _stiffness_ratios(calibration: Calibration) -> NDArray[np.float64]:
-    """Modal stiffness at the tip for each of FALLS over that for none, as far as softer bearings can bring about."""
-    stiffness: list[float] = []
-    for fall in FALLS:
-        try:
-            softer = calibrate(calibration.spindle, calibration.frequency * (1 - fall), mode=calibration.mode)
-            stiffness.append(softer.modal_stiffness_after)
-        except (ValueError, ArithmeticError):
-            break
-    return np.array(stiffness or [1.0]) / (stiffness or [1.0])[0]
+def _last_calm(near: Drawn, hardest: Drawn, ratio: Floats, depth: float) -> float:
+    """The last of these speeds, over the present one, up to which all draws are stable."""
+    last = _calm_from_the_first(hardest.swept(ratio).growth(depth).reshape(ratio.size, -1))
+    while last > 0 and np.any(near.at(speed=float(ratio[last])).growth(depth) >= 0):
+        last -= 1
+    return float(ratio[last])
 
 
-def _nearest(verdict: Verdict, assembly: Assembly, machine: Machine) -> float | None:
-    program, speeds = as_program(verdict.program, machine), speed_grid(machine)
-    if not verdict.stable:
-        speeds = speeds[drive_limit(machine, verdict.program, speeds) >= program.depth]
-    return nearest_speed(program, assembly.x, assembly.y, speeds, not verdict.stable) if speeds.size else None
+def _calm_from_the_first(grown: Floats) -> int:
+    """Row up to which all of growth (k, draws) is negative from the first on."""
+    calm = np.all(grown < 0, axis=1)
+    return calm.size - 1 if np.all(calm) else max(int(np.argmin(calm)) - 1, 0)
 
 
-def _band(verdict: Verdict, assembly: Assembly, machine: Machine) -> tuple[float, float]:
-    if not np.isfinite(verdict.limit):
-        return verdict.limit, verdict.limit
-    x, y = assembly.x, assembly.y
-    if all(mode.best_covariance is None for mode in (*(x or ()), *(y or ()))):
-        return math.nan, math.nan
-    program = as_program(verdict.program, machine)
+def _runs(wanted: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
+    """Places without a gap between them."""
+    places = np.flatnonzero(wanted)
+    return [run for run in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if run.size]
 
-    def limits(x: Modes, y: Modes) -> StabilityLobes:
-        return stability_boundary(x, y, program.cut, program.speed_rpm, DEEPEST * program.depth)
 
-    band = measurement_band(limits, x, y)
-    return float(band.low[0]), float(band.high[0])
+def _apart(places: Sequence[int]) -> Iterator[int]:
+    """Those that are not next to an earlier one."""
+    taken: list[int] = []
+    for place in places:
+        if all(abs(place - other) * GRID > 0.02 for other in taken):
+            taken.append(place)
+            yield place
+
+
+def _rounded(speed: float) -> float:
+    return round(speed / RPM) * RPM
+
+
+def _floored(depth_mm: float) -> float:
+    return round(math.floor(depth_mm / MM + 1e-9) * MM, 6)

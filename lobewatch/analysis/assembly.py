@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from acquisition import Remark
 from dsm import Calibration
-from lobes import StabilityLobes, zero_order
+from lobes import StabilityLobes, lowest_of, zero_order
 from lobewatch.analysis.measurement import Measurement
+from lobewatch.analysis.series import Point, Scatter, frequency_at, scatter_of
 from lobewatch.machine import Machine
 from modal import Mode
 
 Modes = Sequence[Mode] | None
-"""Of one direction at the tool tip; None where they are not known."""
+"""Of one direction at the tool tip; None where neither direction is known."""
 ABOUT_DIRECTIONS = ("one-direction", "older-direction")
 """Codes of the remarks on what is known in x and y."""
 TOGETHER = timedelta(hours=24)
@@ -35,9 +36,11 @@ class Assembly:
     tap_id: str
     """Of the same, or where the prediction comes from."""
     x: Modes
-    """At the tool tip in the feed direction."""
+    """At the tool tip in x of the machine; like y where x was not tapped."""
     y: Modes
-    """The same normal to the feed."""
+    """The same in y."""
+    directions: tuple[str, ...]
+    """Those that are known; what is not is taken like the other one, never as rigid."""
     calibration: Calibration | None
     """The model with the newest bearings."""
     taps: Mapping[str, str]
@@ -46,48 +49,72 @@ class Assembly:
     """Whether all of it comes from the model, for a tool that was never tapped."""
     remarks: tuple[Remark, ...]
     """What is not known, and what is in doubt."""
-
-    @property
-    def directions(self) -> tuple[str, ...]:
-        """Those that are known."""
-        return tuple(name for name, modes in (("x", self.x), ("y", self.y)) if modes)
+    series: Mapping[str, Sequence[Point]] = field(default_factory=dict)
+    """Tap tests of the same tool up to then, by direction; empty where it is predicted."""
 
     @property
     def label(self) -> str:
         """What a legend says."""
         return f"predicted, bearings of {self.time:%Y-%m-%d}" if self.predicted else f"{self.time:%Y-%m-%d}"
 
+    def scatter(self, direction: str) -> Scatter | None:
+        """From tap test to tap test; None where there are too few."""
+        return scatter_of(self.series.get(direction, ()))
 
-def assemble(newest: Measurement, other: Measurement | None) -> Assembly:
-    """From the newest tap test of a tool and the newest one in the other direction, however old, where there is one."""
+
+def assemble(newest: Measurement, other: Measurement | None, series: Mapping[str, Sequence[Point]]) -> Assembly:
+    """From the newest tap test of a tool and the newest one in the other direction, however old, where there is one.
+
+    series: tap tests of both directions up to the newest. The frequencies of an older direction are moved by as much as
+    those of the newest one have changed since.
+    """
     seen = [newest, *([other] if other is not None else [])]
-    modes: dict[str, Modes] = {one.direction: one.at_tip or None for one in seen}
+    modes: dict[str, Modes] = {one.direction: one.at_tip for one in seen if one.at_tip}
+    moved = None if other is None else _change_since(other.time, series.get(newest.direction, ()))
+    if other is not None and moved is not None and newest.time - other.time > TOGETHER:
+        modes |= {other.direction: [mode.scaled(moved, 1.0, "moved with the other direction") for mode in other.at_tip]}
+    directions = tuple(name for name in ("x", "y") if modes.get(name))
     calibration = next((one.calibration for one in seen if one.calibration is not None), None)
     return Assembly(
         tool=newest.tool,
         time=newest.time,
         tap_id=newest.tap_id,
-        x=modes.get("x"),
-        y=modes.get("y"),
+        x=modes.get("x") or modes.get("y"),
+        y=modes.get("y") or modes.get("x"),
+        directions=directions,
         calibration=calibration,
         taps={one.direction: one.tap_id for one in seen},
         predicted=False,
-        remarks=(*newest.remarks, *_about_directions(newest, other)),
+        remarks=(*newest.remarks, *_about_directions(newest, other, directions, moved)),
+        series=series,
     )
 
 
-def _about_directions(newest: Measurement, other: Measurement | None) -> tuple[Remark, ...]:
-    known = [one for one in (newest, other) if one is not None and one.at_tip]
-    if len(known) == 1:
-        missing = "y" if known[0].direction == "x" else "x"
-        text = f"modes in the {known[0].direction} direction alone"
-        return (Remark("one-direction", newest.tool, text, f"tap direction {missing} of the same tool too"),)
-    if other is not None and newest.time - other.time > TOGETHER:
-        days = round((newest.time - other.time) / timedelta(days=1))
-        older = f"{days} day{'s' if days > 1 else ''} older"
-        text = f"direction {other.direction} is that of {other.time:%Y-%m-%d}, {older}"
-        return (Remark("older-direction", newest.tool, text, f"tap direction {other.direction} again"),)
-    return ()
+def untapped(tool: str, known: str) -> Remark:
+    """That one direction alone is known."""
+    missing = "y" if known == "x" else "x"
+    text = f"modes in the {known} direction alone, {missing} taken like {known}"
+    return Remark("one-direction", tool, text, f"tap direction {missing} of the same tool too")
+
+
+def _change_since(time: datetime, series: Sequence[Point]) -> float | None:
+    """Frequency of the newest test of a series over that at a time."""
+    then = frequency_at(series, time)
+    return None if then is None else series[-1].frequency / then
+
+
+def _about_directions(
+    newest: Measurement, other: Measurement | None, directions: Sequence[str], moved: float | None
+) -> tuple[Remark, ...]:
+    if len(directions) == 1:
+        return (untapped(newest.tool, directions[0]),)
+    if other is None or newest.time - other.time <= TOGETHER:
+        return ()
+    days = round((newest.time - other.time) / timedelta(days=1))
+    text = f"direction {other.direction} is that of {other.time:%Y-%m-%d}, {days} day{'s' if days > 1 else ''} older"
+    if moved is not None:
+        text += f", its f_n moved by {100 * (moved - 1):+.1f} % as that of {newest.direction} since"
+    return (Remark("older-direction", newest.tool, text, f"tap direction {other.direction} again"),)
 
 
 def speed_grid(machine: Machine) -> NDArray[np.float64]:
@@ -98,9 +125,12 @@ def speed_grid(machine: Machine) -> NDArray[np.float64]:
 def lobes_of(assembly: Assembly, machine: Machine) -> dict[str, StabilityLobes]:
     """Diagrams by zero order, by name of the cut: the reference cut and every program of the tool. A chart, no verdict.
 
-    Empty where no modes are known.
+    Each shows the lower one of its directions of feed. Empty where no modes are known.
     """
     if not assembly.directions:
         return {}
     speeds = speed_grid(machine)
-    return {name: zero_order(assembly.x, assembly.y, cut, speeds) for name, cut in machine.cuts(assembly.tool).items()}
+    return {
+        name: lowest_of([zero_order(assembly.x, assembly.y, cut, speeds) for cut in cuts])
+        for name, cuts in machine.cuts(assembly.tool).items()
+    }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Frf
-from lobes import Cut, StabilityLobes, average_angle, stability_boundary, zero_order
+from lobes import Cut, StabilityLobes, average_angle, lowest_of, stability_boundary, zero_order
 from lobes.tip_response import Tip
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.machine import CutTable
@@ -51,14 +52,20 @@ class Chart:
     """Dynamics at the tool tip in the feed direction; None where they are not known."""
     y: Tip | None
     """The same normal to the feed."""
-    cut: Cut
-    """The cut in SI units."""
+    cuts: tuple[Cut, ...]
+    """The cut in SI units, one a direction of feed."""
     lobes: StabilityLobes
     """Its limits."""
 
 
-def chart(method: Method, x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: NDArray[np.float64]) -> StabilityLobes:
-    """The lobes of a cut over speeds (rpm), fewer of them by semi-discretisation, which needs modes."""
+def chart(
+    method: Method, x: Tip | None, y: Tip | None, cuts: Sequence[Cut], speed_rpm: NDArray[np.float64]
+) -> StabilityLobes:
+    """The lowest lobes of a cut in its directions of feed over speeds (rpm), fewer of them by semi-discretisation."""
+    return lowest_of([_chart(method, x, y, cut, speed_rpm) for cut in cuts])
+
+
+def _chart(method: Method, x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: NDArray[np.float64]) -> StabilityLobes:
     if method is Method.AVERAGE_ANGLE:
         return average_angle(x, y, cut, speed_rpm)
     mean = zero_order(x, y, cut, speed_rpm)

@@ -50,7 +50,7 @@ def compare_lobes(logbook: Logbook, tool: str | None, cut: str, source: Dynamics
     first = logbook.first_assembly(assembly)
     then = None if first is None else _charted(logbook, first, cut, source, method)
     cuts = logbook.machine.cuts(assembly.tool)
-    same = logbook.verdicts(names=[name for name, other in cuts.items() if other == now.cut])
+    same = logbook.verdicts(names=[name for name, other in cuts.items() if other == now.cuts])
     remarks = (*assembly.remarks, *(replace(remark, about=cut) for remark in now.lobes.remarks))
     return LobeComparison(now, then, _pockets(logbook.machine, now), _shifts(then, now), same, remarks)
 

@@ -10,21 +10,17 @@ from typing import Self
 
 from acquisition import DataError, Remark, TapTest
 from lobewatch.analysis.advice import Advice, advise
-from lobewatch.analysis.assembly import Assembly, assemble, lobes_of
+from lobewatch.analysis.assembling import NotTappedError, predicted, tapped
+from lobewatch.analysis.assembly import Assembly, lobes_of
 from lobewatch.analysis.history import History, Row, row_of
 from lobewatch.analysis.history_cache import store_history, stored_history
 from lobewatch.analysis.measurement import Measurement, measure
 from lobewatch.analysis.order import Place, places
-from lobewatch.analysis.prediction import predict
 from lobewatch.analysis.recordings import Stored, store_recordings
 from lobewatch.analysis.standing import Standing, stand
 from lobewatch.analysis.verdict import Ruling, Verdict, unknown, verdict
 from lobewatch.machine import Machine, MachineFolder, ProgramTable, TapEntry
 from modal import Mode
-
-
-class NotTappedError(DataError):
-    """A tool was neither tapped nor can it be predicted."""
 
 
 class Logbook:
@@ -128,11 +124,8 @@ class Logbook:
         newest = next((place for place in reversed(known) if place.entry.tool == tool), None)
         if newest is not None:
             return self._assembled(newest, self.history.rows)
-        calibrated = self._calibrated(len(known))
-        try:
-            return predict(self.machine, calibrated, tool)
-        except DataError as error:
-            raise NotTappedError(f"no tap test with tool {tool!r}, and no prediction: {error}") from error
+        rows = self.history.rows
+        return predicted(self.machine, known, rows, lambda place: self._measured(place, rows), tool)
 
     def first_assembly(self, now: Assembly) -> Assembly | None:
         """The earliest of the same tool that knows the same directions; None where that is itself or a prediction."""
@@ -188,12 +181,7 @@ class Logbook:
     @property
     def calibrated(self) -> Measurement | None:
         """The newest measurement that the bearings of the model could be found from; None where there is none."""
-        return self._calibrated(len(self.taps))
-
-    def _calibrated(self, count: int) -> Measurement | None:
-        """The same of the first tap tests alone."""
-        rows = reversed(self.history.rows[:count])
-        newest = next((row for row in rows if row.bearing_stiffness.is_known), None)
+        newest = next((row for row in reversed(self.history.rows) if row.bearing_stiffness.is_known), None)
         return None if newest is None else self.measurement(newest.tap_id)
 
     def _forget(self) -> None:
@@ -246,5 +234,4 @@ class Logbook:
         return None
 
     def _assembled(self, place: Place, rows: Sequence[Row]) -> Assembly:
-        other = None if place.other is None else self._measured(self._places[place.other], rows)
-        return assemble(self._measured(place, rows), other)
+        return tapped(place, self._places, rows, lambda one: self._measured(one, rows))

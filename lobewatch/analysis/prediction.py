@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from acquisition import DataError, Remark
-from dsm import calibrate, modes_at
-from lobewatch.analysis.assembly import Assembly
+from dsm import Calibration, calibrate, modes_at
+from lobewatch.analysis.assembly import Assembly, Modes, untapped
 from lobewatch.analysis.measurement import Measurement
 from lobewatch.analysis.model_state import model_state
 from lobewatch.machine import Machine
@@ -18,32 +20,47 @@ AT_REST = 50.0
 """A mode so many times stiffer at the tip than the softest one does not move a limit by more than a few percent."""
 
 
-def predict(machine: Machine, newest: Measurement | None, tool: str) -> Assembly:
-    """A tool as the model with the bearings of the newest calibrated measurement has it, both directions alike.
+def predict(machine: Machine, newest: Sequence[Measurement], tool: str) -> Assembly:
+    """A tool as the model has it, in each direction with the bearings of the newest calibrated measurement of it.
 
-    The shaft is round and its bearings are as stiff in all directions, whatever direction was tapped; the damping ratio
-    is that of the measured mode. No standard errors: the error of the model itself is not known. DataError where there
-    is no model of the tool, or no tap test that the bearings could be found from.
+    newest: those measurements, the newest of all first. The damping ratio is that of the mode followed. DataError where
+    there is no model of the tool, or no tap test that the bearings could be found from.
     """
-    state = model_state(machine, newest, tool)
-    if newest is None or newest.followed is None:
+    if not newest:
+        model_state(machine, None, tool)
         raise DataError(f"tool {tool!r} was never tapped, and no tap test has set the bearings of the model yet")
-    frequency, stiffness = modes_at(state.spindle, MODES)
-    softest = int(np.argmin(stiffness))
-    modes = [
-        Mode(f, newest.followed.damping_ratio, k, method=f"model, bearings of {newest.tap_id}")
-        for f, k in zip(frequency.tolist(), stiffness.tolist(), strict=True)
-        if k < AT_REST * stiffness[softest]
-    ]
-    text = f"predicted, not measured: model with the bearings of {newest.tap_id}, x and y alike"
+    found = {one.direction: _in_direction(machine, one, tool) for one in newest}
+    modes: dict[str, Modes] = {direction: seen for direction, (seen, _) in found.items()}
+    ids = " and ".join(one.tap_id for one in newest)
+    remark = Remark("predicted", f"tool {tool!r}", f"predicted by the model with the bearings of {ids}", "tap it")
+    known = tuple(name for name in ("x", "y") if name in modes)
     return Assembly(
         tool=tool,
-        time=newest.time,
-        tap_id=f"prediction from {newest.tap_id}",
-        x=modes,
-        y=modes,
-        calibration=calibrate(state.spindle, float(frequency[softest]), mode=softest + 1),
+        time=newest[0].time,
+        tap_id=f"prediction from {newest[0].tap_id}",
+        x=modes.get("x") or modes.get("y"),
+        y=modes.get("y") or modes.get("x"),
+        directions=known,
+        calibration=found[newest[0].direction][1],
         taps={},
         predicted=True,
-        remarks=(Remark("predicted", f"tool {tool!r}", text, "tap it to be sure"),),
+        remarks=(remark, *([untapped(tool, known[0])] if len(known) == 1 else [])),
     )
+
+
+def _in_direction(machine: Machine, one: Measurement, tool: str) -> tuple[list[Mode], Calibration]:
+    """The modes that the model shows in the band that was looked at, moved along with the softest one."""
+    state, followed = model_state(machine, one, tool), one.followed
+    if followed is None:
+        raise DataError(f"{one.tap_id}: no mode is followed")
+    frequency, stiffness = modes_at(state.spindle, MODES)
+    softest = int(np.argmin(stiffness))
+    seen = stiffness < AT_REST * stiffness[softest]
+    if machine.mode.band_hz is not None:
+        low, high = (edge / followed.frequency * frequency[softest] for edge in machine.mode.band_hz)
+        seen &= (frequency >= low) & (frequency <= high)
+    modes = [
+        Mode(f, followed.damping_ratio, k, method=f"model, bearings of {one.tap_id}")
+        for f, k in zip(frequency[seen].tolist(), stiffness[seen].tolist(), strict=True)
+    ]
+    return modes, calibrate(state.spindle, float(frequency[softest]), mode=softest + 1)

@@ -1,4 +1,4 @@
-"""The verdict on a cutting program: the one place that says whether it is stable, and how far."""
+"""The verdict on a cutting program: the one place that says whether it is stable, how surely, and how far."""
 
 from __future__ import annotations
 
@@ -13,14 +13,27 @@ import numpy as np
 from acquisition import Remark
 from lobes import Program, program_limit
 from lobewatch.analysis.assembly import ABOUT_DIRECTIONS, Assembly
+from lobewatch.analysis.doubt import doubt_of
+from lobewatch.analysis.drawn import DRAWS, Drawn, draw, middle_row, turning
+from lobewatch.analysis.drawn_limits import drawn_limits
+from lobewatch.analysis.settling import decisive, settles
 from lobewatch.machine import Machine, ProgramTable, drive_limit
+
+QUANTILES = (0.01, 0.99)
+"""Of the limit over the doubt."""
+SURELY = 1.15
+"""A direction of feed is looked at unless its limit, were it as doubtful as the lowest, left this much to spare."""
 
 
 class Word(StrEnum):
     """What is said of a program."""
 
     STABLE = "stable"
+    """At most 1 % of the doubt chatters, at 95 % confidence."""
+    DOUBTFUL = "doubtful"
+    """Stable in the middle, but more of the doubt may chatter; a remark says what decides and what would settle it."""
     NOT_STABLE = "not stable"
+    """It chatters in the middle of the doubt."""
     UNKNOWN = "unknown"
     """It could not be checked; a remark says why."""
 
@@ -31,17 +44,17 @@ class Ruling(NamedTuple):
     word: Word
     """See Word."""
     limit: float
-    """Deepest stable depth at the program's speed (m); NaN where it is not known."""
+    """Deepest stable depth at the program's speed in the middle of the doubt (m); NaN where it is not known."""
 
     @property
     def stable(self) -> bool | None:
-        """None where it is unknown."""
-        return None if self.word is Word.UNKNOWN else self.word is Word.STABLE
+        """In the middle of the doubt; None where it is unknown."""
+        return None if self.word is Word.UNKNOWN else self.word is not Word.NOT_STABLE
 
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """Whether a program is stable with a tool in the spindle as it is known at some time."""
+    """Whether a program is stable with a tool in the spindle as it is known at some time, at rest."""
 
     program: ProgramTable
     """As it stands in machine.toml."""
@@ -50,23 +63,36 @@ class Verdict:
     assembly: Assembly | None = None
     """What it was checked with; None where there is nothing to check with."""
     limit: float = math.nan
-    """Deepest stable depth at its speed (m); inf where there is none up to 20 times its own, NaN where unknown."""
+    """Deepest stable depth at its speed in the middle of the doubt, in the worst direction of feed (m); inf where there
+    is none up to 20 times its own, NaN where unknown."""
+    limit_low: float = math.nan
+    """1 % quantile of the limit over the doubt (m)."""
+    limit_high: float = math.nan
+    """99 % quantile (m)."""
+    chance_turning: float = math.nan
+    """Chance of chatter with the spindle turning, under plausible differences between rest and cut."""
+    decided_by: str = ""
+    """Cause of the doubt that decides (`Doubt.causes`); empty unless it is doubtful."""
     chatter_frequency: float = math.nan
     """Frequency that is heard at the limit (Hz); NaN where there is none."""
     kind: str = ""
     """"hopf", "flip" or ""."""
+    feed_angle: float = math.nan
+    """Direction of feed that is worst, as an angle from x (rad)."""
     method: str = ""
     """How the limit was found."""
     detail: str = ""
-    """Into how many intervals the tooth period was divided."""
+    """How finely."""
     drive_limit: float = math.inf
     """Deepest cut that power and torque allow at its speed (m); inf where no limit is known."""
+    drawn: Drawn | None = None
+    """The spindles that it was judged on; None where it is unknown."""
     remarks: tuple[Remark, ...] = ()
-    """What it rests on, and why it is unknown."""
+    """What it rests on, what would settle it, and why it is unknown."""
 
     @property
     def stable(self) -> bool | None:
-        """None where it is unknown."""
+        """In the middle of the doubt; None where it is unknown."""
         return self.ruling.stable
 
     @property
@@ -76,7 +102,7 @@ class Verdict:
 
     @property
     def depth_margin(self) -> float:
-        """Limit over depth, less 1; negative where it is not stable."""
+        """Limit in the middle over depth, less 1; negative where it is not stable."""
         return self.limit / (self.program.depth_mm / 1e3) - 1
 
     @property
@@ -91,22 +117,46 @@ class Verdict:
 
 
 def verdict(table: ProgramTable, assembly: Assembly, machine: Machine) -> Verdict:
-    """Judge a program by semi-discretisation; charts by other methods decide nothing."""
+    """Judge a program by semi-discretisation over its doubt; charts by other methods decide nothing."""
     if not assembly.directions:
         return unknown(table, assembly.remarks, assembly)
-    found = program_limit(as_program(table, machine), assembly.x, assembly.y)
+    program = as_program(table, machine)
+    found = program_limit(program, assembly.x, assembly.y, table.feed_angles)
+    drawn = draw(program, found, table.feed_angles, assembly, doubt_of(assembly, table, machine))
+    limits = drawn_limits(drawn, program.depth)[1:]
+    low, high = np.quantile(limits, QUANTILES, method="closest_observation")
+    near = drawn.fed(SURELY * program.depth * found.limit / low if np.isfinite(found.limit) else 0.0)
+    chatters = (near.growth(program.depth)[1:, 0] >= 0) | (limits <= program.depth)
+    word, cause = _word(found.stable, chatters, assembly), ""
+    remarks = [*_remarks(table, assembly, machine)]
+    if word is Word.DOUBTFUL:
+        cause = decisive(drawn, chatters, middle_row(program, assembly), program.depth)
+        remarks.append(settles(cause, table, found.limit / program.depth * program.cut.tangential, assembly))
     return Verdict(
         program=table,
-        word=Word.STABLE if found.stable else Word.NOT_STABLE,
+        word=word,
         assembly=assembly,
         limit=found.limit,
+        limit_low=min(float(low), found.limit),
+        limit_high=max(float(high), found.limit),
+        chance_turning=float(np.mean(turning(drawn.fed(0.0)).growth(program.depth)[1:] >= 0)),
+        decided_by=cause,
         chatter_frequency=found.chatter_frequency,
         kind=found.kind,
+        feed_angle=found.feed_angle,
         method=found.method,
-        detail=found.detail,
+        detail=f"{found.detail}, {DRAWS} draws from the doubt",
         drive_limit=float(drive_limit(machine, table, np.array([table.speed_rpm]))[0]),
-        remarks=tuple(_remarks(table, assembly, machine)),
+        drawn=drawn,
+        remarks=tuple(remarks),
     )
+
+
+def _word(stable: bool, chatters: np.ndarray[tuple[int], np.dtype[np.bool_]], assembly: Assembly) -> Word:
+    if not stable:
+        return Word.NOT_STABLE
+    sure = not np.any(chatters) and len(assembly.directions) == 2
+    return Word.STABLE if sure else Word.DOUBTFUL
 
 
 def unknown(table: ProgramTable, why: tuple[Remark, ...], assembly: Assembly | None = None) -> Verdict:

@@ -2,6 +2,7 @@
 
 from .cut_tables import CutTable, ProgramTable
 from .daq_tables import Daq
+from .doubt_table import DoubtTable
 from .drive import drive_limit
 from .folder import BusyError, MachineFolder, TapEntry
 from .known_devices import checked_rate, has_clock, known_rate, use_rate
@@ -13,6 +14,7 @@ __all__ = [
     "BusyError",
     "CutTable",
     "Daq",
+    "DoubtTable",
     "Limits",
     "Machine",
     "MachineFolder",

@@ -10,6 +10,11 @@ from msgspec import Meta
 from lobes import Coefficients, Direction, tangential_and_radial
 from lobewatch.machine.toml_table import NotNegative, Positive, PositiveOrInfinite, Table
 
+FEED_ANGLES = {"x": 0.0, "y": math.pi / 2}
+"""Angles from x to the feed (rad), by axis of the machine."""
+BETWEEN = 0.5
+"""Radial depth over diameter below which a cut in both directions is worst at angles between x and y."""
+
 
 class CutTable(Table, frozen=True):
     """[reference_cut], and what it shares with a program."""
@@ -23,6 +28,17 @@ class CutTable(Table, frozen=True):
     radial_n_per_mm2: NotNegative | None = None
     helix_deg: Annotated[float, Meta(ge=0, lt=90)] = 0.0
     feed_per_tooth_mm: Positive | None = None
+    flute_length_mm: Positive | None = None
+
+    @property
+    def feeds(self) -> tuple[str, ...]:
+        """Axes of the machine that it is fed along."""
+        return tuple(FEED_ANGLES)
+
+    @property
+    def deepest_mm(self) -> float:
+        """How deep the tool can cut; where the length of its flutes is not known, one diameter."""
+        return self.tool_diameter_mm if self.flute_length_mm is None else self.flute_length_mm
 
     def __post_init__(self) -> None:
         """Refuse a cut wider than the tool, and coefficients that are missing or stand twice."""
@@ -43,6 +59,33 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
     tool: str = "reference"
     speed_rpm: Positive
     depth_mm: Positive
+    feed: str = "both"
+
+    def __post_init__(self) -> None:
+        """Refuse a feed that is none, and a cut deeper than the flutes."""
+        super().__post_init__()
+        if self.feed not in (*FEED_ANGLES, "both"):
+            raise ValueError(f'feed={self.feed!r} is no direction; give "x", "y" or "both"')
+        if self.flute_length_mm is not None and self.depth_mm > self.flute_length_mm:
+            raise ValueError(f"depth_mm={self.depth_mm:g} is deeper than flute_length_mm={self.flute_length_mm:g}")
+
+    @property
+    def deepest_mm(self) -> float:
+        """How deep the tool can cut; where the length of its flutes is not known, one diameter or what it cuts now."""
+        return max(super().deepest_mm, self.depth_mm)
+
+    @property
+    def feeds(self) -> tuple[str, ...]:
+        """Axes of the machine that it is fed along."""
+        return super().feeds if self.feed == "both" else (self.feed,)
+
+    @property
+    def feed_angles(self) -> tuple[float, ...]:
+        """Directions of feed in which it is judged, as angles from x (rad): half a turn apart they are alike."""
+        if self.feed != "both":
+            return (FEED_ANGLES[self.feed],)
+        number = 2 if self.radial_depth_mm / self.tool_diameter_mm >= BETWEEN else 12
+        return tuple(i * math.pi / number for i in range(number))
 
 
 class MaterialTable(Table, frozen=True):

@@ -7,6 +7,7 @@ import hashlib
 import math
 import re
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -16,8 +17,9 @@ from msgspec import Meta
 from acquisition import DataError
 from dsm import Spindle
 from lobes import Coefficients, Cut, cutting_coefficients
-from lobewatch.machine.cut_tables import CutTable, Drive, MaterialTable, ProgramTable
+from lobewatch.machine.cut_tables import FEED_ANGLES, CutTable, Drive, MaterialTable, ProgramTable
 from lobewatch.machine.daq_tables import ChannelTable, Daq
+from lobewatch.machine.doubt_table import DoubtTable
 from lobewatch.machine.spindle_tables import BearingTable, JointTable, MassTable, SegmentTable, SpindleTable, ToolTable
 from lobewatch.machine.toml_table import NotNegative, Positive, Table, check_texts
 
@@ -84,6 +86,7 @@ class Machine(Table, frozen=True):
     limits: Limits = Limits()
     speed: SpeedRange = SpeedRange()
     drive: Drive = Drive()
+    doubt: DoubtTable = DoubtTable()
     material: tuple[MaterialTable, ...] = ()
     reference_cut: CutTable | None = None
     program: tuple[ProgramTable, ...] = ()
@@ -167,10 +170,14 @@ class Machine(Table, frozen=True):
         known = ", ".join(repr(known) for known in [self.tap.tool, *(tool.name for tool in self.tool)])
         raise DataError(f"tool {name!r} has no model; modelled are {known}: add a [[tool]] table")
 
-    def cuts(self, tool: str) -> dict[str, Cut]:
-        """The reference cut and the programs that run with a tool, by name."""
-        reference = {REFERENCE_CUT: self.build_cut(self.reference_cut)} if self.reference_cut else {}
-        return reference | {program.name: self.build_cut(program) for program in self.program if program.tool == tool}
+    def cuts(self, tool: str) -> dict[str, tuple[Cut, ...]]:
+        """The reference cut and the programs that run with a tool, by name, fed along x, y or both."""
+        tables = {REFERENCE_CUT: self.reference_cut} if self.reference_cut else {}
+        tables |= {program.name: program for program in self.program if program.tool == tool}
+        return {
+            name: tuple(replace(self.build_cut(table), feed_angle=FEED_ANGLES[feed]) for feed in table.feeds)
+            for name, table in tables.items()
+        }
 
     @property
     def cut_names(self) -> list[str]:
@@ -182,7 +189,14 @@ class Machine(Table, frozen=True):
         """SHA-256 of all that decides what a history holds."""
         cutting = (self.material, self.reference_cut, self.program)
         model = (self.spindle, self.tool, self.tap.tool, self.tap.position_mm)
-        settings = ("charts by zero order, verdicts by semi-discretisation", self.mode, self.speed, cutting, model)
+        settings = (
+            "charts by zero order, four words over the doubt",
+            self.mode,
+            self.speed,
+            self.doubt,
+            cutting,
+            model,
+        )
         return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
 
 
@@ -225,20 +239,8 @@ def _readable(message: str) -> str:
 
 
 def _suggestion(key: str) -> str:
-    tables = [
-        Machine,
-        Identity,
-        TapSetup,
-        Daq,
-        ChannelTable,
-        ModeChoice,
-        Limits,
-        SpeedRange,
-        Drive,
-        MaterialTable,
-        ProgramTable,
-    ]
-    tables += [SpindleTable, SegmentTable, BearingTable, MassTable, JointTable, ToolTable]
+    tables = [Machine, Identity, TapSetup, Daq, ChannelTable, ModeChoice, Limits, SpeedRange, Drive, DoubtTable]
+    tables += [MaterialTable, ProgramTable, SpindleTable, SegmentTable, BearingTable, MassTable, JointTable, ToolTable]
     known = {field for table in tables for field in table.__struct_fields__}
     near = difflib.get_close_matches(key, known, n=1)
     return f"; is {near[0]!r} meant?" if near else ""

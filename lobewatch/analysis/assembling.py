@@ -1,0 +1,52 @@
+"""Which measurements make up a tool in the spindle after a tap test: the newest of both directions, or a prediction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from acquisition import DataError
+from lobewatch.analysis.assembly import Assembly, assemble
+from lobewatch.analysis.history import Row
+from lobewatch.analysis.measurement import Measurement
+from lobewatch.analysis.order import Place
+from lobewatch.analysis.prediction import predict
+from lobewatch.analysis.series import Point
+from lobewatch.machine import Machine
+from modal import Mode
+
+Measured = Callable[[Place], Measurement]
+
+
+class NotTappedError(DataError):
+    """A tool was neither tapped nor can it be predicted."""
+
+
+def tapped(place: Place, places: Sequence[Place], rows: Sequence[Row], measured: Measured) -> Assembly:
+    """The assembly after a tap test; rows: the history before it at least."""
+    newest, other = measured(place), None if place.other is None else measured(places[place.other])
+    points: dict[str, list[Point]] = {"x": [], "y": []}
+    for row in rows[: place.number]:
+        if row.tool == newest.tool and row.mode is not None:
+            points.setdefault(row.direction, []).append(_point(row, row.mode))
+    if newest.followed is not None:
+        points.setdefault(newest.direction, []).append(_point(newest, newest.followed))
+    return assemble(newest, other, points)
+
+
+def predicted(
+    machine: Machine, places: Sequence[Place], rows: Sequence[Row], measured: Measured, tool: str
+) -> Assembly:
+    """A tool that was not tapped in these places; NotTappedError where it cannot be predicted."""
+    newest: dict[str, Measurement] = {}
+    for place in reversed(places):
+        row = rows[place.number]
+        if row.bearing_stiffness.is_known and row.direction not in newest:
+            newest[row.direction] = measured(place)
+    try:
+        return predict(machine, list(newest.values()), tool)
+    except DataError as error:
+        raise NotTappedError(f"no tap test with tool {tool!r}, and no prediction: {error}") from error
+
+
+def _point(one: Row | Measurement, mode: Mode) -> Point:
+    return Point(one.time, mode.frequency, mode.damping_ratio, mode.stiffness)

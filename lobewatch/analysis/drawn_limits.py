@@ -1,0 +1,65 @@
+"""The deepest stable depth of each draw, well enough for quantiles."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobes.program_limit import DEEPEST
+from lobewatch.analysis.drawn import Drawn
+
+TRIED = np.array([0.4, 0.65, 0.85, 1.0, 1.2, 1.6])
+"""Shares of the limit in the middle, for its own cutting coefficient, at which each draw is looked at."""
+EXTREMES = 6
+"""So many of the lowest and highest limits are then refined."""
+STEPS = 3
+"""Of that refinement."""
+ALIKE = 1.15
+"""Directions of feed whose limit is at most so many times the lowest one count ..."""
+MOST = 3
+"""... the lowest of them."""
+
+Floats = NDArray[np.float64]
+
+
+def drawn_limits(drawn: Drawn, depth: float) -> Floats:
+    """Deepest stable depth of each draw (m), shape (draws,); inf beyond what is looked at.
+
+    Of the other draws than the lowest and highest it is the first change between the depths that are looked at,
+    linearly interpolated. depth: that of the program (m).
+    """
+    limit = float(drawn.limits[0])
+    near = drawn.fed(ALIKE * limit, MOST)
+    if np.isfinite(limit):
+        softer = drawn.rows.tangential[0] / drawn.rows.tangential
+        tried = softer[:, np.newaxis] * limit * TRIED
+    else:
+        tried = np.tile(DEEPEST * depth * np.array([0.05, 0.2, 0.5, 1.0]), (len(drawn.rows), 1))
+    low, high, at_low, at_high = _brackets(tried, near.growth(tried))
+    found = _between(low, high, at_low, at_high)
+    order = np.argsort(found)
+    ends = np.unique(np.concatenate((order[:EXTREMES], order[-EXTREMES:])))
+    ends = ends[np.isfinite(found[ends])]
+    for _ in range(STEPS if ends.size else 0):
+        value = near.some(ends).growth(found[ends, np.newaxis])[:, 0]
+        above = value >= 0
+        low[ends], at_low[ends] = np.where(above, low[ends], found[ends]), np.where(above, at_low[ends], value)
+        high[ends], at_high[ends] = np.where(above, found[ends], high[ends]), np.where(above, value, at_high[ends])
+        found[ends] = _between(low[ends], high[ends], at_low[ends], at_high[ends])
+    return found
+
+
+def _brackets(tried: Floats, grown: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Depths on both sides of the first change to growth in each row, and growth there; inf where there is none."""
+    depth = np.pad(tried, ((0, 0), (1, 1)))
+    depth[:, -1] = np.inf
+    value = np.pad(grown, ((0, 0), (1, 1)), constant_values=1.0)
+    value[:, 0] = -np.abs(grown[:, 0])
+    first, row = np.argmax(value >= 0, axis=1), np.arange(len(value))
+    return depth[row, first - 1], depth[row, first], value[row, first - 1], value[row, first]
+
+
+def _between(low: Floats, high: Floats, at_low: Floats, at_high: Floats) -> Floats:
+    """Where growth is zero on a line."""
+    share = -at_low / (at_high - at_low)
+    return np.where(np.isfinite(high), low + share * (np.where(np.isfinite(high), high, low) - low), np.inf)

@@ -1,0 +1,71 @@
+"""What the tap tests of one tool and direction say together: their scatter, and how fast the frequency falls."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime, timedelta
+from typing import NamedTuple
+
+import numpy as np
+from scipy.stats import t
+
+ENOUGH = 8
+"""Tap tests from which on a series tells its own scatter."""
+RECENT = 12
+"""Tap tests that the rate of the fall is taken from, at most; three at least."""
+
+
+class Point(NamedTuple):
+    """The mode followed in one tap test."""
+
+    time: datetime
+    """When."""
+    frequency: float
+    """Natural frequency (Hz)."""
+    damping_ratio: float
+    """Damping ratio (-)."""
+    stiffness: float
+    """Stiffness (N/m)."""
+
+
+class Scatter(NamedTuple):
+    """How far one tap test is from the next, relative; half-widths that 95 % stay within."""
+
+    frequency: float
+    """Of the natural frequency."""
+    damping_ratio: float
+    """Of the damping ratio."""
+    stiffness: float
+    """Of the stiffness."""
+
+
+def scatter_of(series: Sequence[Point]) -> Scatter | None:
+    """From the steps between neighbours, so that a slow fall does not count; None below 8 tap tests."""
+    if len(series) < ENOUGH:
+        return None
+    steps = np.diff(np.log([point[1:] for point in series]), axis=0)
+    width = np.std(steps, axis=0, ddof=1) / np.sqrt(2) * t.ppf(0.975, len(steps) - 1)
+    return Scatter(*width.tolist())
+
+
+def fall_in(series: Sequence[Point], days: float) -> float | None:
+    """Relative fall of the frequency within so many days at the rate of the last tests; None where it is not known.
+
+    A rise counts as none.
+    """
+    recent = series[-RECENT:]
+    if len(recent) < 3:
+        return None
+    at = np.array([(point.time - recent[0].time) / timedelta(days=1) for point in recent])
+    if np.ptp(at) == 0:
+        return None
+    slope = np.polyfit(at - at.mean(), np.log([point.frequency for point in recent]), 1)[0]
+    return float(max(-slope * days, 0.0))
+
+
+def frequency_at(series: Sequence[Point], time: datetime) -> float | None:
+    """Natural frequency (Hz) at a time, linear between the tests before and after; None before the first."""
+    if not series or time < series[0].time:
+        return None
+    at = [point.time.timestamp() for point in series]
+    return float(np.interp(time.timestamp(), at, [point.frequency for point in series]))

@@ -19,7 +19,6 @@ from acquisition import Remark
 from lobes import lowest_of, zero_order
 from lobewatch.analysis.aging import StiffnessAt, aged, softening, tolerable_decay
 from lobewatch.analysis.assembly import Assembly
-from lobewatch.analysis.doubt import doubt_of
 from lobewatch.analysis.drawn import Drawn
 from lobewatch.analysis.series import fall_in
 from lobewatch.analysis.verdict import Verdict, Word, verdict
@@ -35,6 +34,8 @@ RPM, MM = 10.0, 0.05
 """Steps that can be set at a machine; numbers are rounded inwards to them."""
 GRID = 0.002
 """Relative step of the speeds of the diagram."""
+BESIDE = 0.003
+"""Relative distance of the frequency that the diagram counts on beside speed and fall."""
 LESS = (1.0, 0.85, 0.7, 0.55, 0.4)
 """Shares of what the diagram promises that are tried."""
 PLACES = 3
@@ -90,7 +91,7 @@ def advise(found: Verdict, machine: Machine) -> Advice:
     remarks = (remark,) if found.stable else ()
     if found.word is Word.STABLE or len(found.assembly.directions) < 2:
         return Advice(decay=decay, remarks=remarks)
-    search = _Search.of(found.program, found.assembly, machine, stiffness_at)
+    search = _Search.of(found, found.drawn, found.assembly, machine)
     best = search.elsewhere()
     if best is not None:
         return Advice(best, None, decay, remarks)
@@ -110,6 +111,8 @@ class _Search:
     """Looking for settings of one program."""
 
     program: ProgramTable
+    few: Drawn
+    """The first of its draws, in the worst directions of feed."""
     assembly: Assembly
     machine: Machine
     stiffness_at: StiffnessAt
@@ -120,20 +123,18 @@ class _Search:
     """Depth (mm) that the diagram promises there over all of the doubt, shape (n,)."""
 
     @classmethod
-    def of(cls, program: ProgramTable, assembly: Assembly, machine: Machine, stiffness_at: StiffnessAt) -> _Search:
+    def of(cls, found: Verdict, drawn: Drawn, assembly: Assembly, machine: Machine) -> _Search:
+        program, fall = found.program, needed_fall(assembly, machine)
         low, high = machine.speed.low_rpm, machine.speed.high_rpm
         speeds = np.geomspace(low, high, max(int(math.log(high / low) / GRID), 2))
-        cuts = [replace(machine.build_cut(program), feed_angle=angle) for angle in program.feed_angles]
+        cuts = [replace(machine.build_cut(program), feed_angle=angle) for angle in drawn.angles.tolist()]
         limit = lowest_of([zero_order(assembly.x, assembly.y, cut, speeds) for cut in cuts]).depth * 1e3
-        doubt, fall = doubt_of(assembly, program, machine), needed_fall(assembly, machine)
-        below, above = doubt.speed + 0.003, doubt.speed + 0.003 + fall
-        reach = 2 * int(math.ceil((below + above) / 2 / GRID)) + 1
-        around = minimum_filter1d(
-            np.minimum(limit, 1e6), reach, origin=-int((above - below) / 2 / GRID), mode="nearest"
-        )
+        steps, ahead = math.ceil((drawn.doubt.speed + BESIDE + fall / 2) / GRID), round(fall / 2 / GRID)
+        around = minimum_filter1d(np.minimum(limit, 1e6), 2 * steps + 1, origin=-ahead, mode="nearest")
         deepest = np.minimum(program.deepest_mm, 1e3 * drive_limit(machine, program, speeds))
-        promised = np.minimum(around / max(doubt.tangential.high, 1 + SPARE), deepest)
-        return cls(program, assembly, machine, stiffness_at, fall, speeds, promised)
+        promised = np.minimum(around / max(drawn.doubt.tangential.high, 1 + SPARE), deepest)
+        few = drawn.some(np.arange(FEW + 1)).fed(math.inf, 2)
+        return cls(program, few, assembly, machine, softening(assembly)[0], fall, speeds, promised)
 
     def elsewhere(self) -> Setting | None:
         """The nearest window of speeds at the program's depth."""
@@ -166,6 +167,9 @@ class _Search:
         table = msgspec.structs.replace(self.program, speed_rpm=speed, depth_mm=depth_mm)
         if not self.machine.speed.low_rpm <= speed <= self.machine.speed.high_rpm:
             return None
+        early = aged(self.few.at(speed / self.program.speed_rpm), self.fall * np.array([0.0, 1.0]), self.stiffness_at)
+        if np.any(early.growth(depth_mm / 1e3) >= 0):
+            return None
         found = verdict(table, self.assembly, self.machine)
         drawn, depth = found.drawn, depth_mm / 1e3
         if found.word is not Word.STABLE or found.depth_margin < SPARE or found.is_beyond_drive or drawn is None:
@@ -182,11 +186,8 @@ class _Search:
         steps = np.arange(WIDEST + 1.0)
         low, high = self.machine.speed.low_rpm, self.machine.speed.high_rpm
         slow, fast = (_last_calm(near, hardest, np.power(1 + EDGE, sign * steps), depth) for sign in (-1, 1))
-        slowest, fastest = (
-            math.ceil(max(speed * slow, low) / RPM) * RPM,
-            math.floor(min(speed * fast, high) / RPM) * RPM,
-        )
-        return min(slowest, speed), max(fastest, speed)
+        slowest, fastest = max(speed * slow, low) / RPM, min(speed * fast, high) / RPM
+        return min(math.ceil(slowest) * RPM, speed), max(math.floor(fastest) * RPM, speed)
 
     def _left(self, hardest: Drawn, depth: float) -> float:
         grown = aged(hardest, LEFT, self.stiffness_at).growth(depth).reshape(LEFT.size, -1)

@@ -7,7 +7,7 @@ stable, and the same draws are stable as the spindle will be when it is tapped a
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import msgspec
@@ -36,10 +36,14 @@ GRID = 0.002
 """Relative step of the speeds of the diagram."""
 BESIDE = 0.003
 """Relative distance of the frequency that the diagram counts on beside speed and fall."""
-LESS = (1.0, 0.85, 0.7, 0.55, 0.4)
-"""Shares of what the diagram promises that are tried."""
-PLACES = 3
+DEPTHS = np.geomspace(0.15, 1.0, 16)
+"""Shares of what the diagram promises that are looked at with a few draws ..."""
+LESS = (0.95, 0.88, 0.8)
+"""... and shares of what they leave that are judged."""
+PLACES = 4
 """Pockets that are looked at closely."""
+LATER = np.array([0.0, 0.5, 1.0])
+"""Shares of the fall that a setting must stand at which it is looked at."""
 FEW = 24
 """Draws that a setting is looked at with before all of them decide, the hardest where they are known."""
 EDGE, WIDEST = 0.005, 12
@@ -95,7 +99,7 @@ def advise(found: Verdict, machine: Machine) -> Advice:
     best = search.elsewhere()
     if best is not None:
         return Advice(best, None, decay, remarks)
-    here = search.at(found.program.speed_rpm, 1e3 * min(found.limit_low, found.limit / (1 + SPARE)))
+    here = search.here(1e3 * min(found.limit_low, found.limit / (1 + SPARE)))
     return Advice(search.most_chips() or here, here, decay, remarks)
 
 
@@ -148,16 +152,30 @@ class _Search:
         """The speed and depth of largest removal rate."""
         chips = self.promised * self.speeds
         inside = np.flatnonzero((chips[1:-1] >= chips[:-2]) & (chips[1:-1] >= chips[2:])) + 1
-        tops = [*sorted(inside.tolist(), key=lambda i: -chips[i])[:PLACES]]
-        found = (self.at(_rounded(float(self.speeds[i])), float(self.promised[i])) for i in _apart(tops))
-        settings = [setting for setting in found if setting]
-        return max(settings, key=lambda one: one.speed_rpm * one.depth_mm, default=None)
-
-    def at(self, speed: float, depth_mm: float) -> Setting | None:
-        """The deepest at a speed (rpm), up to a depth (mm)."""
-        tried = [_floored(share * min(depth_mm, self.program.deepest_mm)) for share in LESS]
-        found = (self._verified(speed, depth) for depth in dict.fromkeys(tried) if depth > 0)
+        tops = _apart(sorted(inside.tolist(), key=lambda i: -chips[i]))[:PLACES]
+        places = [(speed := _rounded(float(self.speeds[i])), self._calm_depth(speed, self.promised[i])) for i in tops]
+        places.sort(key=lambda place: -place[0] * place[1])
+        found = (self._deepest(*place) for place in places)
         return next((setting for setting in found if setting), None)
+
+    def here(self, depth_mm: float) -> Setting | None:
+        """The deepest at the program's own speed, up to a depth (mm)."""
+        speed = self.program.speed_rpm
+        return self._deepest(speed, self._calm_depth(speed, min(depth_mm, self.program.deepest_mm)))
+
+    def _deepest(self, speed: float, depth_mm: float) -> Setting | None:
+        found = (self._verified(speed, depth) for share in LESS if (depth := _floored(share * depth_mm)) > 0)
+        return next((setting for setting in found if setting), None)
+
+    def _calm_depth(self, speed: float, depth_mm: float) -> float:
+        """The deepest up to a depth (mm) at which, and below which, a few draws are stable now and later."""
+        depths = depth_mm * DEPTHS
+        calm = np.all(self._early(speed).growth(depths / 1e3) < 0, axis=0)
+        return float(depths[calm.size - 1 if np.all(calm) else np.argmin(calm) - 1]) if calm[0] else 0.0
+
+    def _early(self, speed: float) -> Drawn:
+        """A few draws at a speed (rpm), now, half-way to the next tap tests and then."""
+        return aged(self.few.at(speed / self.program.speed_rpm), self.fall * LATER, self.stiffness_at)
 
     def _distance(self, speed: float) -> float:
         return abs(math.log(speed / self.program.speed_rpm))
@@ -167,18 +185,17 @@ class _Search:
         table = msgspec.structs.replace(self.program, speed_rpm=speed, depth_mm=depth_mm)
         if not self.machine.speed.low_rpm <= speed <= self.machine.speed.high_rpm:
             return None
-        early = aged(self.few.at(speed / self.program.speed_rpm), self.fall * np.array([0.0, 1.0]), self.stiffness_at)
-        if np.any(early.growth(depth_mm / 1e3) >= 0):
+        if np.any(self._early(speed).growth(depth_mm / 1e3) >= 0):
             return None
         found = verdict(table, self.assembly, self.machine)
         drawn, depth = found.drawn, depth_mm / 1e3
         if found.word is not Word.STABLE or found.depth_margin < SPARE or found.is_beyond_drive or drawn is None:
             return None
         near = drawn.fed(2 * depth)
-        later = aged(near, self.fall * np.array([0.5, 1.0]), self.stiffness_at).growth(depth)
+        later = aged(near, self.fall * LATER[1:], self.stiffness_at).growth(depth)
         if np.any(later >= 0):
             return None
-        hardest = near.some(np.argsort(np.max(later.reshape(2, -1), axis=0))[-FEW:])
+        hardest = near.some(np.argsort(np.max(later.reshape(LATER.size - 1, -1), axis=0))[-FEW:])
         margin = min(found.depth_margin, 20.0)
         return Setting(speed, depth_mm, self._window(near, hardest, speed, depth), margin, self._left(hardest, depth))
 
@@ -214,13 +231,13 @@ def _runs(wanted: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
     return [run for run in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if run.size]
 
 
-def _apart(places: Sequence[int]) -> Iterator[int]:
+def _apart(places: Sequence[int]) -> list[int]:
     """Those that are not next to an earlier one."""
     taken: list[int] = []
     for place in places:
         if all(abs(place - other) * GRID > 0.02 for other in taken):
             taken.append(place)
-            yield place
+    return taken
 
 
 def _rounded(speed: float) -> float:

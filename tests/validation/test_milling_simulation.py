@@ -193,10 +193,10 @@ def test_nothing_of_lobes_is_used(name: str) -> None:
 
 
 def limit_and_growth(one: RandomMilling) -> tuple[float, Floats]:
-    """Limit of a program fed along its first axis (m), and growth at 0.9 and 1.1 of it, according to `lobes`."""
+    """Limit by `lobes` of a program fed along its first axis (m, 0.1 at most), and growth at 0.9 and 1.1 of it."""
     along, normal = ([Mode(*mode) for mode in modes] for modes in one.modes("y" if one.feed == "y" else "x"))
     cut = Cut(one.teeth, one.immersion, one.direction, one.tangential, one.radial, one.helix_lag)
-    limit = program_limit(Program(cut, one.speed_rpm, 5e-3), along, normal).limit
+    limit = min(0.1, program_limit(Program(cut, one.speed_rpm, 5e-3), along, normal).limit)
     return limit, np.log(spectral_radius(along, normal, cut, one.speed_rpm, [0.9 * limit, 1.1 * limit])[0])
 
 
@@ -207,14 +207,15 @@ def compare(seed: int, number: int) -> None:
     limits, growth = zip(*map(limit_and_growth, drawn), strict=True)
     pairs = zip(drawn, limits, strict=True)
     judged = judge([one.case(share * b, one.feed_angles[0]) for one, b in pairs for share in (0.9, 1.1)])
-    assert judged.chatters[::2].tolist() == [False] * number
-    assert judged.growth == pytest.approx(np.ravel(growth), rel=0.02, abs=1.5e-3)
+    assert not np.any(judged.chatters[::2])
+    assert judged.chatters.tolist() == (np.ravel(growth) > 0).tolist()
+    assert judged.growth == pytest.approx(np.ravel(growth), rel=0.02, abs=3e-3)
 
 
 def test_random_programs_are_judged_as_by_semi_discretisation() -> None:
-    compare(seed=1, number=20)
+    compare(seed=1, number=16)
 
 
 @pytest.mark.long
 def test_many_random_programs_are_judged_as_by_semi_discretisation() -> None:
-    compare(seed=2, number=300)
+    compare(seed=2, number=200)

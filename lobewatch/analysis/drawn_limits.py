@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from lobes.program_limit import DEEPEST
 from lobewatch.analysis.drawn import Drawn
 
-TRIED = np.array([0.4, 0.65, 0.85, 1.0, 1.2, 1.6])
+TRIED = np.array([0.5, 0.75, 0.92, 1.08, 1.4])
 """Shares of the limit in the middle, for its own cutting coefficient, at which each draw is looked at."""
 EXTREMES = 6
 """So many of the lowest and highest limits are then refined."""

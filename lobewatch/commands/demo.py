@@ -37,7 +37,7 @@ def demo(
     from lobewatch.machine import MachineFolder, make_machine_folder
     from lobewatch.show.describe_demo import demo_json, demo_texts
     from lobewatch.show.report import write_report
-    from lobewatch.tap import age_spindle
+    from lobewatch.tap.demo import age_spindle, compare_with_truth
 
     if not 0 <= scatter <= 5:
         raise ValueError(f"--scatter {scatter:g} is not between 0 and 5 %")
@@ -46,8 +46,11 @@ def demo(
     folder = MachineFolder(path)
     with Progress(console=notes, transient=True, disable=not notes.is_terminal) as progress:
         tests = age_spindle(folder, taps, seed, scatter / 100)
-        found = list(progress.track(tests, total=2 * taps, description="tap tests"))
-    report = write_report(Logbook(folder))
+        taken = list(progress.track(tests, total=2 * taps, description="tap tests"))
+        progress.add_task("history", total=None)
+        logbook = Logbook(folder)
+        found = compare_with_truth(logbook, taken)
+        report = write_report(logbook)
     emit(demo_json(found, report), as_json, *demo_texts(found, scatter / 100, report))
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Iterable, Iterator
 from dataclasses import astuple, dataclass
 from datetime import UTC, datetime
 
@@ -11,10 +12,16 @@ from threadpoolctl import threadpool_limits
 
 from acquisition import Circumstances, DataError, Structure, TapDirection
 from dsm import Spindle, calibrate, natural_frequencies
-from lobewatch.analysis import Measurement
+from lobewatch.analysis import Logbook, Measurement
 from lobewatch.machine import MachineFolder
+from lobewatch.tap.connection import Connector
 from lobewatch.tap.emulated_spindle import device_in_step, emulated_structure, with_bearing_stiffness
-from lobewatch.tap.session import TapSession
+from lobewatch.tap.hit_loop import HitLoop, Wishes
+from lobewatch.tap.in_progress import begin_tap
+from lobewatch.tap.judged_hits import JudgedHits
+from lobewatch.tap.phases import Phases
+from lobewatch.tap.publisher import Publisher
+from lobewatch.tap.state import TapState, Word
 
 FALL = 0.10
 """Fall of the first natural frequency over the demo."""
@@ -55,6 +62,16 @@ class PlannedTap:
 
 
 @dataclass(frozen=True)
+class TakenTap:
+    """One tap test of the demo, committed."""
+
+    plan: PlannedTap
+    """What was emulated."""
+    id: str
+    """In the journal."""
+
+
+@dataclass(frozen=True)
 class DemoTap:
     """One tap test of the demo."""
 
@@ -80,12 +97,20 @@ def plan_taps(folder: MachineFolder, months: int, random: np.random.Generator, s
     return plans
 
 
-def age_spindle(folder: MachineFolder, months: int, seed: int, scatter: float) -> Iterator[DemoTap]:
+def age_spindle(folder: MachineFolder, months: int, seed: int, scatter: float) -> Iterator[TakenTap]:
     """Take the tap tests of `plan_taps`, each through a real serial port (a pseudo-terminal)."""
     random = np.random.default_rng(seed)
     plans = plan_taps(folder, months, random, scatter)
     for plan, hammering in zip(plans, random.spawn(len(plans)), strict=True):
-        yield DemoTap(plan, _tap(folder, plan, hammering))
+        yield TakenTap(plan, _take(folder, plan, hammering))
+
+
+def compare_with_truth(logbook: Logbook, taken: Iterable[TakenTap]) -> list[DemoTap]:
+    """What all these tests say, beside what was emulated; DataError where one does not show the mode followed.
+
+    The history is worked out once, after the last test, and not anew after every one with a word on every program.
+    """
+    return [DemoTap(tap.plan, _found(logbook.measurement(tap.id))) for tap in taken]
 
 
 def _worn(folder: MachineFolder, months: int) -> list[Spindle]:
@@ -106,13 +131,17 @@ def _plan(folder: MachineFolder, date: datetime, direction: TapDirection, spindl
     return PlannedTap(date, direction, structure, SpindleState(*map(float, truth)))
 
 
-def _tap(folder: MachineFolder, plan: PlannedTap, random: np.random.Generator) -> SpindleState:
+def _take(folder: MachineFolder, plan: PlannedTap, random: np.random.Generator) -> str:
+    """Take and commit one tap test as a session without a person does; its id."""
     machine, toml = folder.machine, folder.toml.read_text("utf-8")
     about = Circumstances(machine.machine.name, plan.date, machine.tap.tool, plan.direction, "the demo", toml)
-    with device_in_step(plan.structure, random) as open_device, threadpool_limits(limits=1):
-        session = TapSession(folder, open_device, about, resume=False, guided=False)
-        session.run()
-    return _found(session.measurement)
+    publisher = Publisher(TapState(0, Word.CHECKING, "", wanted=machine.tap.hits), time.monotonic)
+    with device_in_step(plan.structure, random) as open_device, threadpool_limits(limits=1), folder.locked():
+        hits = JudgedHits(begin_tap(folder, about, resume=False), machine)
+        loop = HitLoop(hits, publisher, Wishes(), guided=False)
+        Phases(folder, hits, loop, publisher, guided=False).run(Connector(folder, open_device, publisher, time.sleep))
+        folder.commit(hits.tap.finish())
+    return hits.tap.id
 
 
 def _found(measurement: Measurement) -> SpindleState:

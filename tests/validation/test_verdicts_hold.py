@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 from random_milling import random_case
@@ -11,6 +13,15 @@ from lobes import growth, piece_numbers
 from lobewatch.analysis.doubt import doubt_of
 from lobewatch.analysis.drawn import middle_row
 from lobewatch.analysis.verdict import Word, as_program, verdict
+
+
+def say(text: str) -> None:
+    """Seen with pytest -rP or -s."""
+    sys.stdout.write(f"{text}\n")
+
+
+def share(number: int, of: int) -> str:
+    return f"{number} of {of} (95 %: at most {upper_limit(number, of):.2%})"
 
 
 def test_a_few_programs_called_stable_and_settings_recommended_do_not_chatter() -> None:
@@ -26,11 +37,8 @@ def test_a_few_programs_called_stable_and_settings_recommended_do_not_chatter() 
 def test_at_most_1_percent_of_what_is_called_stable_or_recommended_chatters() -> None:
     found = study(count=200, seed=1, truths=4)
     stable, recommended = chattering(found.stable), chattering(found.recommended)
-    print(
-        f"\n{found.stable_programs} programs stable, {stable} of {len(found.stable)} truths chatter (95 %: at most "
-        f"{upper_limit(stable, len(found.stable)):.2%}); {found.settings} settings, {recommended} of "
-        f"{len(found.recommended)} (at most {upper_limit(recommended, len(found.recommended)):.2%}), {found.refused} refused"
-    )
+    say(f"{found.stable_programs} programs called stable: {share(stable, len(found.stable))} of their truths chatter")
+    say(f"{found.settings} settings, {found.refused} refused: {share(recommended, len(found.recommended))} chatter")
     assert min(len(found.stable), len(found.recommended)) >= 300
     assert upper_limit(stable, len(found.stable)) <= 0.01
     assert upper_limit(recommended, len(found.recommended)) <= 0.01
@@ -66,6 +74,6 @@ def test_what_is_stable_in_all_of_the_doubt_with_5_percent_to_spare_is_called_st
         turned = [drawn.fed_at(angle) for angle in table.feed_angles]
         if all(np.all(growth(rows, depths, piece_numbers(rows, 1.05 * cut.depth)) < 0) for rows in turned):
             called.append(verdict(table, known, MACHINE).word is Word.STABLE)
-    print(f"\n{sum(called)} of {len(called)} called stable")
+    say(f"{share(sum(called), len(called))} called stable")
     assert len(called) >= 30
     assert np.mean(called) >= 0.95

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 
 import numpy as np
-from milling_simulation import Case, judge
+from milling_simulation import Case, Modes, judge
 from random_milling import RandomMilling, random_case
 from scipy.stats import beta
 
@@ -86,8 +86,11 @@ def drawn_truths(milling: RandomMilling, table: ProgramTable, count: int, rng: n
     return made
 
 
-def _moved(modes: tuple[tuple[float, float, float], ...], rng: np.random.Generator) -> tuple[tuple[float, ...], ...]:
-    return tuple(tuple(np.array(mode) * (1 + np.array([0.003, 0.1, 0.03]) * rng.uniform(-1, 1, 3))) for mode in modes)
+def _moved(modes: Modes, rng: np.random.Generator) -> Modes:
+    def moved(value: float, width: float) -> float:
+        return value * (1 + width * rng.uniform(-1, 1))
+
+    return tuple((moved(f, 0.003), moved(zeta, 0.1), moved(k, 0.03)) for f, zeta, k in modes)
 
 
 def chattering(truths: list[Case]) -> int:

@@ -37,7 +37,7 @@ def advise(found: Verdict, machine: Machine) -> Advice:
     remarks = (remark,) if found.stable else ()
     if found.word is Word.STABLE or len(found.assembly.directions) < 2:
         return Advice(decay=decay, remarks=remarks)
-    search = SettingSearch.of(found, found.drawn, found.assembly, machine)
+    search = SettingSearch.of(found.program, found.drawn, found.assembly, machine)
     best = search.elsewhere()
     if best is not None:
         return Advice(best, None, decay, remarks)

@@ -20,7 +20,7 @@ from lobewatch.analysis.aging import StiffnessAt, aged, softening
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.drawn import Drawn
 from lobewatch.analysis.series import fall_in
-from lobewatch.analysis.verdict import Verdict, Word, verdict
+from lobewatch.analysis.verdict import Word, verdict
 from lobewatch.machine import Machine, ProgramTable, drive_limit
 
 SPARE = 0.20
@@ -93,9 +93,9 @@ class SettingSearch:
     """Depth (mm) that the diagram promises there over all of the doubt, shape (n,)."""
 
     @classmethod
-    def of(cls, found: Verdict, drawn: Drawn, assembly: Assembly, machine: Machine) -> SettingSearch:
-        """The search around a verdict; drawn: the spindles that it was judged on."""
-        program, fall = found.program, needed_fall(assembly, machine)
+    def of(cls, program: ProgramTable, drawn: Drawn, assembly: Assembly, machine: Machine) -> SettingSearch:
+        """The search around a program that was drawn."""
+        fall = needed_fall(assembly, machine)
         low, high = machine.speed.low_rpm, machine.speed.high_rpm
         speeds = np.geomspace(low, high, max(int(math.log(high / low) / GRID), 2))
         cuts = [replace(machine.build_cut(program), feed_angle=angle) for angle in drawn.angles.tolist()]
@@ -117,13 +117,33 @@ class SettingSearch:
 
     def most_chips(self) -> Setting | None:
         """The speed and depth of largest removal rate."""
+        found = (self._deepest(*place) for place in self._places())
+        return next((setting for setting in found if setting), None)
+
+    def pockets(self, count: int) -> list[Setting]:
+        """The settings of largest removal rate, none inside the window of another, each in the middle of its window."""
+        found: list[Setting] = []
+        for speed, depth_mm in self._places():
+            inside = (low <= speed <= high for low, high in (one.window_rpm for one in found))
+            setting = None if any(inside) else self._deepest(self._middle(speed, LESS[0] * depth_mm), depth_mm)
+            found += [setting] if setting else []
+            if len(found) == count:
+                break
+        return found
+
+    def _middle(self, speed: float, depth_mm: float) -> float:
+        """The middle of the speeds around one at which the diagram promises a depth (mm), now and after the fall."""
+        near = int(np.argmin(np.abs(self.speeds - speed)))
+        run = next((run for run in _runs(self.promised >= depth_mm) if run[0] <= near <= run[-1]), None)
+        return speed if run is None else _rounded(float(self.speeds[[run[0], run[-1]]].mean()))
+
+    def _places(self) -> list[tuple[float, float]]:
+        """Speeds (rpm) and depths (mm) at which a few draws are stable, the largest removal rate first."""
         chips = self.promised * self.speeds
         inside = np.flatnonzero((chips[1:-1] >= chips[:-2]) & (chips[1:-1] >= chips[2:])) + 1
         tops = _apart(sorted(inside.tolist(), key=lambda i: -chips[i]))[:PLACES]
         places = [(speed := _rounded(float(self.speeds[i])), self._calm_depth(speed, self.promised[i])) for i in tops]
-        places.sort(key=lambda place: -place[0] * place[1])
-        found = (self._deepest(*place) for place in places)
-        return next((setting for setting in found if setting), None)
+        return sorted(places, key=lambda place: -place[0] * place[1])
 
     def here(self, depth_mm: float) -> Setting | None:
         """The deepest at the program's own speed, up to a depth (mm)."""

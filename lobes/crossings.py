@@ -16,7 +16,7 @@ ROUNDS = 6
 """Halvings of a step that may hide a pair of crossings."""
 DOUBT = 0.5
 """It may where growth, as steep as in a step beside it, goes this share of the way to zero and back."""
-SURE = 1e-3
+SURE = 1e-4
 """Accuracy of growth that is enough for its sign, unless it is smaller than that."""
 ACCURACY = 1e-6
 """Relative accuracy of a crossing."""

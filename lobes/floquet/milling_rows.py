@@ -47,6 +47,10 @@ class MillingRows:
         """Some of the rows, by an index array or a mask."""
         return replace(self, **{name: getattr(self, name)[which] for name in _VARYING})
 
+    def fed_at(self, angle: float) -> MillingRows:
+        """All rows with the feed at an angle from x (rad)."""
+        return replace(self, feed_angle=np.full(len(self), angle))
+
     @property
     def tooth_period(self) -> Floats:
         """Time between two teeth (s), shape (r,)."""

@@ -152,16 +152,21 @@ class _Response:
         """The maps (r, d, k, m, m) of k pieces with forces -force (d - w) at their nodes, force (r, d, k, s, p, p)."""
         *cases, s, p, _ = force.shape
         size, states = p * s, self.ends.shape[-1]
-        loop = np.einsum("rpij,rdkjpq->rdkpiqj", self.gives, force).reshape(*cases, size, size)
-        push = np.einsum("rzpj,rdkjpq->rdkzqj", self.pushes, force).reshape(*cases, states, size)
-        alone = np.broadcast_to(-np.eye(size), (cases[0], size, size))
-        given = np.concatenate((self.shows.reshape(-1, size, states), alone), axis=-1)[:, np.newaxis, np.newaxis]
-        apart = np.linalg.solve(loop + np.eye(size), np.broadcast_to(given, (*cases, *given.shape[-2:])))
-        made = np.concatenate((-push @ apart, apart), axis=-2)
+        each = np.moveaxis(force, -3, -1)
+        loop = self.gives[:, np.newaxis, np.newaxis, :, :, np.newaxis] * each[..., np.newaxis, :, :]
+        loop = loop.reshape(*cases, size, size)
+        i = np.arange(size)
+        loop[..., i, i] += 1
+        push = (self.pushes[:, np.newaxis, np.newaxis, :, :, np.newaxis] * each[..., np.newaxis, :, :, :]).sum(-3)
+        push = push.reshape(*cases, states, size)
+        inverse = np.linalg.inv(loop)
+        made = np.empty((*cases, states + size, states + size))
+        made[..., states:, :states] = inverse @ self.shows.reshape(-1, 1, 1, size, states)
+        made[..., states:, states:] = -inverse
+        made[..., :states, :] = -push @ made[..., states:, :]
         made[..., :states, :states] += self.ends[:, np.newaxis, np.newaxis]
-        i = states + np.arange(size)
-        made[..., i, i] += 1
-        return np.asarray(made)
+        made[..., states + i, states + i] += 1
+        return made
 
 
 def _moves(rows: MillingRows) -> Floats:

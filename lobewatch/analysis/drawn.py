@@ -43,8 +43,7 @@ class Drawn:
         rows, wanted = self.rows, np.atleast_2d(depth)
         depths = np.broadcast_to(wanted, (len(rows), wanted.shape[1]))
         number = self.finer * piece_numbers(rows, float(np.max(depths)))
-        turned = (replace(rows, feed_angle=np.full(len(rows), angle)) for angle in self.angles)
-        return np.asarray(np.max([growth(one, depths, number) for one in turned], axis=0))
+        return np.asarray(np.max([growth(rows.fed_at(angle), depths, number) for angle in self.angles], axis=0))
 
     def some(self, which: NDArray[np.intp]) -> Drawn:
         """Some of the draws."""

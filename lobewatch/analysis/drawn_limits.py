@@ -8,10 +8,14 @@ from numpy.typing import NDArray
 from lobes.program_limit import DEEPEST
 from lobewatch.analysis.drawn import Drawn
 
-TRIED = np.array([0.4, 0.65, 0.85, 1.0, 1.2, 1.6])
-"""Shares of the limit in the middle, for its own cutting coefficient, at which each draw is looked at."""
-EXTREMES = 6
-"""So many of the lowest and highest limits are then refined."""
+TRIED = np.array([0.75, 1.0, 1.4])
+"""Shares of the limit in the middle, for its own cutting coefficient, at which each draw is looked at ..."""
+BEYOND = np.array([2.0, 3.0])
+"""... and those that are stable at all of them too."""
+FREE = np.array([0.05, 0.2, 0.5, 1.0])
+"""Shares of the deepest of interest where there is no limit in the middle."""
+EXTREMES = 9
+"""So many of the lowest and highest limits are then refined, in all directions of feed that count."""
 STEPS = 3
 """Of that refinement."""
 ALIKE = 1.15
@@ -28,14 +32,16 @@ def drawn_limits(drawn: Drawn, depth: float) -> Floats:
     Of the other draws than the lowest and highest it is the first change between the depths that are looked at,
     linearly interpolated. depth: that of the program (m).
     """
-    limit = float(drawn.limits[0])
+    limit, worst = float(drawn.limits[0]), drawn.fed(0.0)
     near = drawn.fed(ALIKE * limit, MOST)
-    if np.isfinite(limit):
-        softer = drawn.rows.tangential[0] / drawn.rows.tangential
-        tried = softer[:, np.newaxis] * limit * TRIED
-    else:
-        tried = np.tile(DEEPEST * depth * np.array([0.05, 0.2, 0.5, 1.0]), (len(drawn.rows), 1))
-    low, high, at_low, at_high = _brackets(tried, near.growth(tried))
+    own = (drawn.rows.tangential[0] / drawn.rows.tangential)[:, np.newaxis]
+    tried = own * limit * TRIED if np.isfinite(limit) else np.tile(DEEPEST * depth * FREE, (len(own), 1))
+    low, high, at_low, at_high = _brackets(tried, worst.growth(tried))
+    open_ones = np.flatnonzero(np.isinf(high)) if np.isfinite(limit) else np.empty(0, dtype=np.intp)
+    if open_ones.size:
+        further = np.hstack((low[open_ones, np.newaxis], own[open_ones] * limit * BEYOND))
+        known = _brackets(further, worst.some(open_ones).growth(further))
+        low[open_ones], high[open_ones], at_low[open_ones], at_high[open_ones] = known
     found = _between(low, high, at_low, at_high)
     order = np.argsort(found)
     ends = np.unique(np.concatenate((order[:EXTREMES], order[-EXTREMES:])))

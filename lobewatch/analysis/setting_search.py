@@ -19,6 +19,7 @@ from lobes import lowest_of, zero_order
 from lobewatch.analysis.aging import StiffnessAt, aged, softening
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.drawn import Drawn
+from lobewatch.analysis.drawn_limits import ALIKE
 from lobewatch.analysis.series import fall_in
 from lobewatch.analysis.verdict import Word, verdict
 from lobewatch.machine import Machine, ProgramTable, drive_limit
@@ -35,7 +36,7 @@ GRID = 0.002
 """Relative step of the speeds of the diagram."""
 BESIDE = 0.003
 """Relative distance of the frequency that the diagram counts on beside speed and fall."""
-DEPTHS = np.geomspace(0.15, 1.0, 16)
+DEPTHS = np.geomspace(0.2, 1.0, 9)
 """Shares of what the diagram promises that are looked at with a few draws ..."""
 LESS = (0.95, 0.88, 0.8)
 """... and shares of what they leave that are judged."""
@@ -45,9 +46,9 @@ LATER = np.array([0.0, 0.5, 1.0])
 """Shares of the fall that a setting must stand at which it is looked at."""
 FEW = 24
 """Draws that a setting is looked at with before all of them decide, the hardest where they are known."""
-EDGE, WIDEST = 0.005, 12
+EDGE, WIDEST = 0.006, 8
 """Relative step of a window of speeds, and most steps on each side."""
-LEFT = np.arange(0, 0.1001, 0.005)
+LEFT = np.arange(0, 0.1001, 0.01)
 """Falls of the frequency that a setting is looked at with; more than the last is not told apart."""
 
 Floats = NDArray[np.float64]
@@ -81,8 +82,8 @@ class SettingSearch:
     """Looking for settings of one program."""
 
     program: ProgramTable
-    few: Drawn
-    """The first of its draws, in the worst directions of feed."""
+    drawn: Drawn
+    """Its draws, in the worst directions of feed."""
     assembly: Assembly
     machine: Machine
     stiffness_at: StiffnessAt
@@ -104,8 +105,8 @@ class SettingSearch:
         around = minimum_filter1d(np.minimum(limit, 1e6), 2 * steps + 1, origin=-ahead, mode="nearest")
         deepest = np.minimum(program.deepest_mm, 1e3 * drive_limit(machine, program, speeds))
         promised = np.minimum(around / max(drawn.doubt.tangential.high, 1 + SPARE), deepest)
-        few = drawn.some(np.arange(FEW + 1)).fed(math.inf, 2)
-        return cls(program, few, assembly, machine, softening(assembly)[0], fall, speeds, promised)
+        worst = drawn.fed(ALIKE * float(drawn.limits[0]), 2)
+        return cls(program, worst, assembly, machine, softening(assembly)[0], fall, speeds, promised)
 
     def elsewhere(self) -> Setting | None:
         """The nearest window of speeds at the program's depth."""
@@ -157,12 +158,20 @@ class SettingSearch:
     def _calm_depth(self, speed: float, depth_mm: float) -> float:
         """The deepest up to a depth (mm) at which, and below which, a few draws are stable now and later."""
         depths = depth_mm * DEPTHS
-        calm = np.all(self._early(speed).growth(depths / 1e3) < 0, axis=0)
+        calm = np.all(self._early(speed, FEW // 2).growth(depths / 1e3) < 0, axis=0)
         return float(depths[calm.size - 1 if np.all(calm) else np.argmin(calm) - 1]) if calm[0] else 0.0
 
-    def _early(self, speed: float) -> Drawn:
-        """A few draws at a speed (rpm), now, half-way to the next tap tests and then."""
-        return aged(self.few.at(speed / self.program.speed_rpm), self.fall * LATER, self.stiffness_at)
+    def _early(self, speed: float, number: int = FEW) -> Drawn:
+        """So many draws at a speed (rpm), now and when the spindle is tapped again."""
+        few = self.drawn.some(np.arange(number)).at(speed / self.program.speed_rpm)
+        return aged(few, self.fall * LATER[[0, -1]], self.stiffness_at)
+
+    def _lasts(self, speed: float, depth: float) -> bool:
+        """Whether a depth (m) at a speed (rpm) is stable when the spindle is tapped again: a few draws, then all."""
+        if np.any(self._early(speed).growth(depth) >= 0):
+            return False
+        then = aged(self.drawn.at(speed / self.program.speed_rpm), self.fall * LATER[-1:], self.stiffness_at)
+        return bool(np.all(then.growth(depth) < 0))
 
     def _distance(self, speed: float) -> float:
         return abs(math.log(speed / self.program.speed_rpm))
@@ -172,7 +181,7 @@ class SettingSearch:
         table = msgspec.structs.replace(self.program, speed_rpm=speed, depth_mm=depth_mm)
         if not self.machine.speed.low_rpm <= speed <= self.machine.speed.high_rpm:
             return None
-        if np.any(self._early(speed).growth(depth_mm / 1e3) >= 0):
+        if not self._lasts(speed, depth_mm / 1e3):
             return None
         found = verdict(table, self.assembly, self.machine)
         drawn, depth = found.drawn, depth_mm / 1e3
@@ -202,7 +211,7 @@ def _last_calm(near: Drawn, hardest: Drawn, ratio: Floats, depth: float) -> floa
     """The last of these speeds, over the present one, up to which all draws are stable."""
     last = _calm_from_the_first(hardest.swept(ratio).growth(depth).reshape(ratio.size, -1))
     while last > 0 and np.any(near.at(speed=float(ratio[last])).growth(depth) >= 0):
-        last -= 1
+        last //= 2
     return float(ratio[last])
 
 

@@ -22,42 +22,47 @@ COLUMNS = (("f_1 Hz", 1.0, 2), ("zeta %", 0.01, 3), ("K N/um", 1e6, 3), ("k_b N/
 
 def demo_json(taps: Sequence[DemoTap], report: Path) -> dict[str, Any]:
     """All tap tests."""
-    entries = [{"date": tap.date.isoformat(), "truth": _json(tap.truth), "found": _json(tap.found)} for tap in taps]
-    return {"taps": entries, "report": str(report)}
+    return {"taps": [_entry(tap) for tap in taps], "report": str(report)}
+
+
+def _entry(tap: DemoTap) -> dict[str, Any]:
+    about = {"date": tap.plan.date.isoformat(), "direction": tap.plan.direction}
+    return about | {"truth": _json(tap.plan.truth), "found": _json(tap.found)}
 
 
 def _json(state: SpindleState) -> dict[str, float]:
     return dict(zip(KEYS, astuple(state), strict=True))
 
 
-def demo_texts(taps: Sequence[DemoTap], report: Path) -> list[str | Table]:
-    """All tap tests for people, with the worst errors."""
-    first, last = taps[0], taps[-1]
+def demo_texts(taps: Sequence[DemoTap], scatter: float, report: Path) -> list[str | Table]:
+    """All tap tests for people, with the worst errors; scatter of f_1 from test to test as a share of it (-)."""
+    in_x = [tap for tap in taps if tap.plan.direction == "x"]
+    first, last = in_x[0], in_x[-1]
     found = last.found.relative_to(first.found).stiffness
-    true = last.truth.relative_to(first.truth).stiffness
+    true = last.plan.truth.relative_to(first.plan.truth).stiffness
     return [
         "Emulated, and found beside it (f_1 natural frequency, zeta damping ratio, K stiffness at the tool tip,",
-        "k_b stiffness of each bearing):",
+        f"k_b stiffness of each bearing); before each test the tool is remounted: f_1 scatters by {100 * scatter:g} %.",
         _table(taps),
         "worst error: " + ", ".join(_worst(taps)),
-        f"K over the whole demo: {100 * found:+.2f} % found, {100 * true:+.2f} % true",
+        f"K over the whole demo, in x: {100 * found:+.2f} % found, {100 * true:+.2f} % true",
         f"report: {report}",
     ]
 
 
 def _table(taps: Sequence[DemoTap]) -> Table:
-    made = table("<month", *(word for heading, _, _ in COLUMNS for word in (heading, "found")))
+    made = table("<test", *(word for heading, _, _ in COLUMNS for word in (heading, "found")))
     for tap in taps:
-        pairs = zip(astuple(tap.truth), astuple(tap.found), strict=True)
+        pairs = zip(astuple(tap.plan.truth), astuple(tap.found), strict=True)
         cells = [
             f"{value / scale:.{digits}f}"
             for pair, (_, scale, digits) in zip(pairs, COLUMNS, strict=True)
             for value in pair
         ]
-        made.add_row(f"{tap.date:%Y-%m}", *cells)
+        made.add_row(f"{tap.plan.date:%Y-%m} {tap.plan.direction}", *cells)
     return made
 
 
 def _worst(taps: Sequence[DemoTap]) -> list[str]:
-    errors = zip(*(astuple(tap.found.relative_to(tap.truth)) for tap in taps), strict=True)
+    errors = zip(*(astuple(tap.found.relative_to(tap.plan.truth)) for tap in taps), strict=True)
     return [f"{name} {100 * max(map(abs, values)):.2g} %" for name, values in zip(NAMES, errors, strict=True)]

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition import (
     Bench,
+    Block,
     Channel,
     DataError,
     Driver,
@@ -17,6 +22,7 @@ from acquisition import (
     SensorInput,
     Structure,
     TapsEmulator,
+    TapsSource,
 )
 from dsm import Spindle, modes_at, static_stiffness
 from lobewatch.machine.folder import MachineFolder
@@ -30,6 +36,10 @@ CHANNELS = (
     Channel("acceleration", sensitivity=1.02e-3, full_scale=5.0, calibration_date="2026-01-15"),
 )
 """A 2.2 kN hammer and a 500 g accelerometer on a 16-bit converter."""
+AHEAD = 25
+"""Blocks (0.5 s) that a device in step with its host may send before they are asked for."""
+PATIENCE = 0.2
+"""How long it waits for a host that asks for no more (s); then it sends a block all the same."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +74,40 @@ def emulator(structure: Structure, random: np.random.Generator, *, realtime: boo
     """Somebody taps this structure, again and again, on a TAPS/1 device."""
     signal = HammeredStructure(structure, SAMPLE_RATE, random, Hammering())
     return TapsEmulator(signal, CHANNELS, SAMPLE_RATE, realtime=realtime, tcp=tcp)
+
+
+@contextmanager
+def device_in_step(structure: Structure, random: np.random.Generator) -> Iterator[Callable[[], TapsSource]]:
+    """Somebody taps this structure on a TAPS/1 device that runs hardly ahead of its host; yields what opens it.
+
+    The reader of a port takes all that comes while a hit is judged, and most of it would be thrown away: samples that
+    nobody asks for are not worked out.
+    """
+    hammered, room = HammeredStructure(structure, SAMPLE_RATE, random, Hammering()), threading.Semaphore(AHEAD)
+
+    def signal(first_scan: int, n_scans: int) -> NDArray[np.float64]:
+        room.acquire(timeout=PATIENCE)
+        return hammered(first_scan, n_scans)
+
+    with TapsEmulator(signal, CHANNELS, SAMPLE_RATE, realtime=False) as device:
+        yield lambda: _SourceInStep(device.port, room)
+
+
+class _SourceInStep(TapsSource):
+    """Makes room for another block whenever one is asked for."""
+
+    def __init__(self, port: str, room: threading.Semaphore) -> None:
+        super().__init__(port)
+        self._room = room
+
+    def blocks(self) -> Iterator[Block]:
+        for block in super().blocks():
+            self._room.release()
+            yield block
+
+    def close(self) -> None:
+        super().close()
+        self._room.release()
 
 
 def emulate_machine(

@@ -1,0 +1,79 @@
+"""Whether `stable` means stable, and whether it is said where it could be: docs/long-tests.md has the last figures."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from random_milling import random_case
+from verdict_study import MACHINE, assembly, chattering, limit_mm, program, study, upper_limit
+
+from lobes import growth, piece_numbers
+from lobewatch.analysis.doubt import doubt_of
+from lobewatch.analysis.drawn import middle_row
+from lobewatch.analysis.verdict import Word, as_program, verdict
+
+
+def say(text: str) -> None:
+    """Seen with pytest -rP or -s."""
+    sys.stdout.write(f"{text}\n")
+
+
+def share(number: int, of: int) -> str:
+    return f"{number} of {of} (95 %: at most {upper_limit(number, of):.2%})"
+
+
+def test_a_few_programs_called_stable_and_settings_recommended_do_not_chatter() -> None:
+    found = study(count=4, seed=2, truths=3)
+    assert found.stable
+    assert found.recommended
+    assert found.refused == 0
+    assert chattering(found.stable + found.recommended) == 0
+
+
+@pytest.mark.long
+@pytest.mark.timeout(14400)
+def test_at_most_1_percent_of_what_is_called_stable_or_recommended_chatters() -> None:
+    found = study(count=200, seed=1, truths=4)
+    stable, recommended = chattering(found.stable), chattering(found.recommended)
+    say(f"{found.stable_programs} programs called stable: {share(stable, len(found.stable))} of their truths chatter")
+    say(f"{found.settings} settings, {found.refused} refused: {share(recommended, len(found.recommended))} chatter")
+    assert min(len(found.stable), len(found.recommended)) >= 300
+    assert upper_limit(stable, len(found.stable)) <= 0.01
+    assert upper_limit(recommended, len(found.recommended)) <= 0.01
+    assert found.refused == 0
+
+
+@pytest.mark.parametrize("count", [5, pytest.param(200, marks=[pytest.mark.long, pytest.mark.timeout(7200)])])
+def test_a_machine_tapped_in_one_direction_is_never_called_stable(count: int) -> None:
+    words = []
+    for rng in np.random.default_rng(3).spawn(count):
+        milling = random_case(rng)
+        limit = limit_mm(milling)
+        depth = 0.1 * limit if np.isfinite(limit) else 1.0
+        words.append(verdict(program(milling, depth), assembly(milling, ("x",)), MACHINE).word)
+    assert Word.STABLE not in words
+    assert Word.DOUBTFUL in words
+
+
+@pytest.mark.long
+@pytest.mark.timeout(7200)
+def test_what_is_stable_in_all_of_the_doubt_with_5_percent_to_spare_is_called_stable() -> None:
+    """2000 draws at 1.05 times the depth, by other random numbers."""
+    called = []
+    for rng in np.random.default_rng(4).spawn(120):
+        milling = random_case(rng)
+        limit = limit_mm(milling)
+        if not np.isfinite(limit):
+            continue
+        table = program(milling, limit * rng.uniform(0.4, 0.85))
+        known, cut = assembly(milling), as_program(table, MACHINE)
+        drawn = doubt_of(known, table, MACHINE).draw(middle_row(cut, known), 2000, seed=99)
+        depths = np.full((2000, 1), 1.05 * cut.depth)
+        turned = [drawn.fed_at(angle) for angle in table.feed_angles]
+        if all(np.all(growth(rows, depths, piece_numbers(rows, 1.05 * cut.depth)) < 0) for rows in turned):
+            called.append(verdict(table, known, MACHINE).word is Word.STABLE)
+    say(f"{share(sum(called), len(called))} called stable")
+    assert len(called) >= 30
+    assert np.mean(called) >= 0.95

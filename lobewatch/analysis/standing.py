@@ -37,6 +37,7 @@ LIGHTS = {
     "mode-lost": Light.WARN,
     "overdue": Light.WARN,
     "program-unknown": Light.WARN,
+    "program-doubtful": Light.WARN,
     "one-direction": Light.GOOD,
 }
 """What each reason means, in order of harm."""
@@ -110,7 +111,7 @@ def stand(machine: Machine, history: History, now: datetime) -> Standing:
     series = [_series(history.series(*pair), machine.limits) for pair in pairs]
     left = machine.machine.tap_interval_days - (now - rows[-1].time) / timedelta(days=1)
     remarks = [remark for one in series for remark in one.remarks]
-    remarks += [*_about_programs(rows[-1]), *_about_dates(left), *_about_directions(rows)]
+    remarks += [*_about_programs(rows, machine), *_about_dates(left), *_about_directions(rows)]
     due = rows[-1].time + timedelta(days=math.floor(machine.machine.tap_interval_days))
     series.sort(key=lambda one: -one.fall.value if one.fall.is_known else math.inf)
     return _of(remarks, f"All is well: tap again by {due:%Y-%m-%d}.", tuple(series), rows[-1].time, left)
@@ -158,14 +159,20 @@ def _about_fall(name: str, fall: Estimate, limits: Limits) -> Iterator[Remark]:
         yield Remark("frequency-warn", name, f"{text} (warning at {limits.frequency_warn_percent:g} %)", cure)
 
 
-def _about_programs(newest: Row) -> Iterator[Remark]:
-    words = {name: ruling.word for name, ruling in (newest.rulings or {}).items()}
-    for name, word in words.items():
-        if word is Word.NOT_STABLE:
-            cure = "Change these programs before the next part: lobewatch check names a stable speed and depth."
-            yield Remark("program-not-stable", name, "not stable", cure)
-        elif word is Word.UNKNOWN:
-            yield Remark("program-unknown", name, "not checked", "See why with lobewatch check.")
+def _about_programs(rows: Sequence[Row], machine: Machine) -> Iterator[Remark]:
+    to_tap = {remark.about: remark.cure for remark in _about_directions(rows)}
+    tools = {program.name: program.tool for program in machine.program}
+    for name, ruling in (rows[-1].rulings or {}).items():
+        tap = to_tap.get(tools[name])
+        if ruling.word is Word.NOT_STABLE:
+            cure = "Change these programs before the next part: lobewatch check names a safe speed and depth."
+            cure = f"Do not run these programs. {tap}" if tap else cure
+            yield Remark("program-not-stable", name, ruling.word.value, cure)
+        elif ruling.word is Word.UNKNOWN:
+            yield Remark("program-unknown", name, ruling.word.value, "See why with lobewatch check.")
+        elif ruling.word is Word.DOUBTFUL:
+            cure = tap or "See with lobewatch check what would settle it, and where to go until then."
+            yield Remark("program-doubtful", name, ruling.word.value, cure)
 
 
 def _about_dates(days_left: float) -> Iterator[Remark]:
@@ -181,5 +188,5 @@ def _about_directions(rows: Sequence[Row]) -> Iterator[Remark]:
         if len(known) == 1:
             seen = known.pop()
             other = "y" if seen == "x" else "x"
-            cure = f"Tap direction {other} of the same tool too: the lobes are of one direction alone."
+            cure = f"Tap direction {other} of the same tool too: no program is sure with one direction alone."
             yield Remark("one-direction", tool, f"tapped in direction {seen} alone", cure)

@@ -23,8 +23,8 @@ def check(
 ) -> None:
     """Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.
 
-    By semi-discretisation. A program that could not be checked does not count as stable. The decay column says how far
-    f_n may fall before the program chatters.
+    By semi-discretisation, over all that is not known: stable, doubtful, not stable or unknown. Says for each that is
+    not stable what decides and where to go. f_n left: how far f_n may fall before the program chatters.
 
     Examples:
 
@@ -33,8 +33,10 @@ def check(
     """
     from acquisition import DataError
     from lobewatch.analysis import Logbook
-    from lobewatch.show.advice import Advised, advised, advised_json, advised_lines, advised_table
+    from lobewatch.show.advice import Advised, advised, advised_json, advised_lines, advised_table, counts, summary
     from lobewatch.show.measurements import remark_lines
+    from lobewatch.show.programs.doubts import reading_lines
+    from lobewatch.show.verdicts import is_safe
 
     logbook = Logbook.open(machine)
     if not logbook.machine.program:
@@ -47,16 +49,14 @@ def check(
             notes.print(f"{len(programs)} of {count} programs are checked; the others take a while too")
             told = True
         programs.append(advised(logbook, verdict))
-    unstable = sum(one.verdict.stable is False for one in programs)
-    missing = sum(one.verdict.stable is None for one in programs)
     emit(
-        {"programs": [advised_json(one) for one in programs], "unstable": unstable, "not_checked": missing},
+        {"programs": [advised_json(one) for one in programs], **counts(programs)},
         as_json,
         advised_table(programs),
         *(line for one in programs for line in advised_lines(one, logbook.machine.speed)),
-        *remark_lines([*logbook.remarks, *(remark for one in programs for remark in one.remarks)]),
-        f"{unstable} of {len(programs) - missing} programs not stable"
-        + (f", {missing} of {len(programs)} not checked" if missing else ""),
+        *reading_lines([one.verdict for one in programs], logbook.machine),
+        *remark_lines([*logbook.remarks, *(remark for one in programs for remark in one.notes)]),
+        summary(programs),
     )
-    if unstable or missing:
+    if not all(is_safe(one.verdict) for one in programs):
         raise typer.Exit(1)

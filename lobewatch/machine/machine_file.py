@@ -5,11 +5,10 @@ from __future__ import annotations
 import difflib
 import hashlib
 import math
-import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta
@@ -20,6 +19,7 @@ from lobes import Coefficients, Cut, cutting_coefficients
 from lobewatch.machine.cut_tables import FEED_ANGLES, CutTable, Drive, MaterialTable, ProgramTable
 from lobewatch.machine.daq_tables import ChannelTable, Daq
 from lobewatch.machine.doubt_table import DoubtTable
+from lobewatch.machine.messages import comma_hint, readable
 from lobewatch.machine.spindle_tables import BearingTable, JointTable, MassTable, SegmentTable, SpindleTable, ToolTable
 from lobewatch.machine.toml_table import NotNegative, Positive, Table, check_texts
 
@@ -210,37 +210,20 @@ def read_machine(path: Path) -> Machine:
 
 def parse_machine(text: str, name: str = "machine.toml") -> Machine:
     """The machine file from its text; DataError with the place for what is wrong in it."""
+    tables: dict[str, Any] = {}
     try:
         tables = tomllib.loads(text)
         check_texts(tables)
         return msgspec.convert(tables, Machine)
     except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{name}: {error}{_comma_hint(text)}") from error
+        raise DataError(f"{name}: {error}{comma_hint(text)}") from error
     except msgspec.ValidationError as error:
-        raise DataError(f"{name}: {_readable(str(error))}") from error
+        raise DataError(f"{name}: {readable(str(error), tables, _known_keys())}") from error
     except ValueError as error:
         raise DataError(f"{name}: {error}") from error
 
 
-def _comma_hint(text: str) -> str:
-    """A decimal comma is the usual cause."""
-    match = re.search(r"=\s*(-?\d+),(\d+)\s*(#|\n|,|\})", text)
-    return f"; write {match[1]}.{match[2]} with a point" if match else ""
-
-
-def _readable(message: str) -> str:
-    """The message of msgspec with its place first and a known key for a mistyped one."""
-    text, _, place = message.partition(" - at `$")
-    where = re.sub(r"\.?(\w+?)s?\[(\d+)\]", lambda m: f" {m[1]} {int(m[2]) + 1}", place.rstrip("`")).strip(" .")
-    unknown = re.search(r"unknown field `(\w+)`", text)
-    if unknown:
-        text = f"unknown key {unknown[1]!r}{_suggestion(unknown[1])}"
-    return f"{where.replace('.', ' ')}: {text}" if where else text
-
-
-def _suggestion(key: str) -> str:
+def _known_keys() -> set[str]:
     tables = [Machine, Identity, TapSetup, Daq, ChannelTable, ModeChoice, Limits, SpeedRange, Drive, DoubtTable]
     tables += [MaterialTable, ProgramTable, SpindleTable, SegmentTable, BearingTable, MassTable, JointTable, ToolTable]
-    known = {field for table in tables for field in table.__struct_fields__}
-    near = difflib.get_close_matches(key, known, n=1)
-    return f"; is {near[0]!r} meant?" if near else ""
+    return {field for table in tables for field in table.__struct_fields__}

@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
 from rich.table import Table
 
 from acquisition import Remark
-from lobewatch.analysis import Advice, Logbook, Verdict
+from lobewatch.analysis import Advice, Assembly, Logbook, Setting, Verdict, Word
+from lobewatch.analysis.verdict import Ruling
 from lobewatch.machine import SpeedRange
-from lobewatch.show.output import table
-from lobewatch.show.verdicts import limit_text, margin_text, program_cells, verdict_json, verdict_text
+from lobewatch.show.programs.settings import rpm, setting_json, spare
+from lobewatch.show.verdicts import verdict_json, verdict_table
 
-NEAR = 0.03
-"""Relative distance in speed from the other state that is told of a stable program."""
+IN_LINES = ("doubt-decides", "not-checked")
+"""Remarks that the lines of a program hold already."""
+ALIKE = 1.02
+"""Directions of feed whose limits differ by less are not told apart."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +32,8 @@ class Advised:
     """The word and the limit."""
     advice: Advice
     """Where to go, and how much decay is left."""
-    was_stable: bool | None
-    """Whether it was stable at the first tap tests of the same tool and directions; None without earlier ones."""
+    then: Ruling | None
+    """At the first tap tests of the same tool and directions; None without earlier ones."""
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
@@ -36,51 +41,40 @@ class Advised:
         return (*self.verdict.remarks, *self.advice.remarks)
 
     @property
-    def is_within_error(self) -> bool:
-        """Whether a stable program lies above the lower edge of the band of its limit."""
-        return bool(self.verdict.stable) and self.advice.limit_band[0] * 1e3 <= self.verdict.program.depth_mm
+    def notes(self) -> tuple[Remark, ...]:
+        """The remarks that are said apart from its lines."""
+        return tuple(remark for remark in self.remarks if remark.code not in IN_LINES)
+
+    @property
+    def is_no_longer_stable(self) -> bool:
+        """Whether it chatters now, and did not at first."""
+        return self.verdict.stable is False and self.then is not None and bool(self.then.stable)
 
 
 def advised(logbook: Logbook, verdict: Verdict) -> Advised:
     """All that is said of one program."""
-    then = logbook.ruling_then(verdict)
-    return Advised(verdict, logbook.advice(verdict), None if then is None else then.stable)
+    return Advised(verdict, logbook.advice(verdict), logbook.ruling_then(verdict))
 
 
 def advised_json(one: Advised) -> dict[str, Any]:
     """One program."""
-    advice, speed = one.advice, one.verdict.program.speed_rpm
-    low, high = advice.limit_band
     return verdict_json(one.verdict) | {
-        "was_stable_at_first": one.was_stable,
-        "limit_low_mm": low * 1e3,
-        "limit_high_mm": high * 1e3,
-        "nearest_speed_rpm": advice.nearest_speed,
-        "speed_margin": advice.speed_margin(speed),
-        "tolerable_decay": advice.decay,
-        "remarks": [vars(remark) for remark in one.remarks],
+        "was_stable_at_first": None if one.then is None else one.then.stable,
+        "verdict_at_first": None if one.then is None else one.then.word,
+        "advice": setting_json(one.advice.best),
+        "advice_here": setting_json(one.advice.here),
+        "tolerable_decay": one.advice.decay,
+        "remarks": [asdict(remark) for remark in one.remarks],
     }
 
 
 def advised_table(programs: Sequence[Advised]) -> Table:
     """Programs, a line each."""
-    made = table("<program", "speed (rpm)", "depth (mm)", "limit (mm), 95 %", "margin", "decay left", "<verdict")
-    for one in programs:
-        behind = " any more" if one.was_stable and not one.verdict.stable else ""
-        words = verdict_text(one.verdict, ", within the error" if one.is_within_error else behind)
-        margin = margin_text(one.verdict)
-        made.add_row(*program_cells(one.verdict), _limit(one), margin, decay_text(one.advice), words)
-    return made
-
-
-def _limit(one: Advised) -> str:
-    low, high = (edge * 1e3 for edge in one.advice.limit_band)
-    limit = limit_text(one.verdict)
-    return f"{limit} ({low:.2f}..{high:.2f})" if one.verdict.measured and math.isfinite(low + high) else limit
+    return verdict_table([one.verdict for one in programs], [decay_text(one.advice) for one in programs])
 
 
 def decay_text(advice: Advice) -> str:
-    """How far the frequency may fall."""
+    """How far the frequency may fall in the middle of the doubt."""
     if math.isnan(advice.decay):
         return "-"
     if advice.decay == 0:
@@ -88,35 +82,92 @@ def decay_text(advice: Advice) -> str:
     return "> 20 %" if math.isinf(advice.decay) else f"{100 * advice.decay:.1f} %"
 
 
+def counts(programs: Sequence[Advised]) -> dict[str, int]:
+    """How many there are of each that may not be run."""
+    words = Counter(one.verdict.word for one in programs)
+    return {
+        "unstable": words[Word.NOT_STABLE],
+        "doubtful": words[Word.DOUBTFUL],
+        "not_checked": words[Word.UNKNOWN],
+        "beyond_drive": sum(one.verdict.is_beyond_drive for one in programs),
+    }
+
+
+def summary(programs: Sequence[Advised]) -> str:
+    """How many there are of each word."""
+    words = Counter(one.verdict.word for one in programs)
+    said = [f"{words[word]} {word}" for word in Word if words[word]]
+    beyond = counts(programs)["beyond_drive"]
+    said += [f"{beyond} beyond the drive"] if beyond else []
+    return f"{len(programs)} program{'s' if len(programs) > 1 else ''}: {', '.join(said)}"
+
+
 def advised_lines(one: Advised, speeds: SpeedRange) -> Iterator[str]:
-    """What to do, a line for each thing that is called for."""
-    found, advice = one.verdict, one.advice
-    name, speed = found.program.name, found.program.speed_rpm
-    if found.stable is False:
-        word = "period-two chatter" if found.kind == "flip" else "chatter"
-        yield (
-            f"{name}: {word} near {found.chatter_frequency:.0f} Hz; at this speed cut no deeper than "
-            f"{_settable(found.limit)} mm, or {_elsewhere(one, speeds)}"
-        )
-    elif advice.nearest_speed is not None and advice.speed_margin(speed) < NEAR:
-        yield (
-            f"{name}: only {100 * advice.speed_margin(speed):.1f} % of speed from chatter, which begins at "
-            f"{advice.nearest_speed:.0f} rpm"
-        )
-    if found.stable is not None and found.is_beyond_drive:
-        yield f"{name}: [drive] allows no more than {_settable(found.drive_limit)} mm at this speed"
+    """What is wrong and what to do, a line for each thing that is called for."""
+    found = one.verdict
+    name = found.program.name
+    if found.word is Word.UNKNOWN:
+        yield from (str(remark) for remark in found.remarks if remark.code == "not-checked")
+    elif found.word is Word.NOT_STABLE:
+        yield f"{name}: {_chatter(one)}; {_elsewhere(one, speeds)}"
+    elif found.word is Word.DOUBTFUL:
+        settles = [remark for remark in found.remarks if remark.code == "doubt-decides"]
+        said = [f"{remark.text}; to settle it: {remark.cure}" for remark in settles]
+        yield f"{name}: {'; '.join([*said, *_or_elsewhere(one, speeds)])}"
+    if found.is_beyond_drive:
+        yield f"{name}: [drive] allows no more than {_floored(found.drive_limit)} mm at this speed"
+
+
+def _chatter(one: Advised) -> str:
+    found = one.verdict
+    word = "period-two chatter" if found.kind == "flip" else "chatter"
+    where = f" near {found.chatter_frequency:.0f} Hz" if math.isfinite(found.chatter_frequency) else ""
+    said = f"{word}{where}{_worst_feed(found)}"
+    return f"stable at first, no longer: {said}" if one.is_no_longer_stable else said
+
+
+def _worst_feed(found: Verdict) -> str:
+    """The direction of feed that is worst, where it matters."""
+    limits = np.ones(1) if found.drawn is None else found.drawn.limits
+    if np.max(limits) <= ALIKE * np.min(limits):
+        return ""
+    degrees = round(math.degrees(found.feed_angle))
+    return f", worst fed along {({0: 'x', 90: 'y'}).get(degrees, f'{degrees} degrees from x')}"
+
+
+def _or_elsewhere(one: Advised, speeds: SpeedRange) -> Iterator[str]:
+    """What to do until it is settled; tapping what was not tapped comes first."""
+    if one.verdict.assembly is not None and len(one.verdict.assembly.directions) == 2:
+        yield f"until then {_elsewhere(one, speeds)}"
 
 
 def _elsewhere(one: Advised, speeds: SpeedRange) -> str:
-    if one.advice.nearest_speed is None:
-        drive = " that [drive] allows" if math.isfinite(one.verdict.drive_limit) else ""
-        return (
-            f"choose another tool: no stable speed{drive} at this depth in {speeds.low_rpm:g}..{speeds.high_rpm:g} rpm"
-        )
-    away = math.ceil if one.advice.nearest_speed > one.verdict.program.speed_rpm else math.floor
-    return f"run this depth at {away(one.advice.nearest_speed)} rpm, the nearest stable speed"
+    """Where to go."""
+    program, best, here = one.verdict.program, one.advice.best, one.advice.here
+    known = one.verdict.assembly
+    if known is not None and len(known.directions) == 1:
+        return f"tap direction {_missing(known)} too: only then can a safe speed be named"
+    reach = f"in {rpm(speeds.low_rpm)} to {rpm(speeds.high_rpm)} rpm"
+    if best is None:
+        return f"no safe speed {reach}; choose another tool"
+    if best.depth_mm == program.depth_mm:
+        return f"run this depth at {rpm(best.speed_rpm)} rpm {spare(best)}"
+    said = [f"no safe speed for this depth {reach}"]
+    said += (
+        [] if _same(best, here) else [f"most chips: {best.depth_mm:g} mm at {rpm(best.speed_rpm)} rpm {spare(best)}"]
+    )
+    said += [] if here is None else [f"at {rpm(here.speed_rpm)} rpm no deeper than {here.depth_mm:g} mm {spare(here)}"]
+    return "; ".join(said)
 
 
-def _settable(depth: float) -> str:
+def _same(best: Setting, here: Setting | None) -> bool:
+    return here is not None and (best.speed_rpm, best.depth_mm) == (here.speed_rpm, here.depth_mm)
+
+
+def _missing(known: Assembly) -> str:
+    return "y" if known.directions[0] == "x" else "x"
+
+
+def _floored(depth: float) -> str:
     """The deepest cut (mm) of two decimals that is not deeper (m)."""
     return f"{math.floor(depth * 1e5) / 100:.2f}"

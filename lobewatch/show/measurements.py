@@ -13,7 +13,8 @@ from lobewatch.analysis import Logbook, Measurement, Verdict, lobes_of, remarks_
 from lobewatch.machine import REFERENCE_CUT
 from lobewatch.show.describe import calibration_json, mode_json, mode_table
 from lobewatch.show.describe import remark_lines as mode_remark_lines
-from lobewatch.show.verdicts import verdict_json, verdict_table
+from lobewatch.show.programs.doubts import reading_lines
+from lobewatch.show.verdicts import is_safe, verdict_json, verdict_table
 
 
 def remark_json(remark: Remark) -> dict[str, str]:
@@ -80,7 +81,9 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
 def program_texts(logbook: Logbook) -> list[str | Table]:
     """The verdict on every program, where to ask on, and what is to be said of the files."""
     verdicts = logbook.verdicts()
-    texts: list[str | Table] = [verdict_table(verdicts)] if verdicts else []
-    if any(found.stable is False for found in verdicts):
-        texts.append("lobewatch check says where to go instead")
+    if not verdicts:
+        return [*remark_lines(logbook.remarks)]
+    texts: list[str | Table] = [verdict_table(verdicts), *reading_lines(verdicts, logbook.machine)]
+    if not all(map(is_safe, verdicts)):
+        texts.append("lobewatch check says what would settle it, and where to go instead")
     return [*texts, *remark_lines(logbook.remarks)]

@@ -8,14 +8,16 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal
 
 import typer
+from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.highlighter import JSONHighlighter
 from rich.segment import Segment
 from rich.table import Table
+from rich.text import Text
 
 from acquisition.names import CONTROL
 
@@ -41,7 +43,18 @@ class Cells(Table):
         """One row."""
         super().add_row(*(CONTROL.sub(INSTEAD, cell) if isinstance(cell, str) else cell for cell in cells), **options)
 
+    @property
+    def least_width(self) -> int:
+        """Characters a line, so that columns that cannot be broken are whole and the others hold a word; 0: any."""
+        breaking = sum(not column.no_wrap for column in self.columns)
+        wholes = (_widest([column.header, *column.cells]) for column in self.columns if column.no_wrap)
+        return sum(wholes) + breaking * SHORTEST + GAP * (len(self.columns) - 1) if breaking else 0
 
+
+SHORTEST = 10
+"""Characters that a column that can be broken has at least."""
+GAP = 2
+"""Between columns."""
 notes = Terminal(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 """Progress and remarks."""
 results = Terminal(highlight=False, soft_wrap=True, emoji=False, width=max(Console().width, 120))
@@ -55,16 +68,23 @@ def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
         results.print(JSONHighlighter()(CONTROL.sub(_escaped, exact)), no_wrap=True, soft_wrap=True)
         return
     for text in texts:
-        results.print(text, markup=False) if isinstance(text, str) else results.print(text)
+        least = text.least_width if isinstance(text, Cells) else 0
+        results.print(text, markup=not isinstance(text, str), width=max(Console().width, least) if least else None)
 
 
 def table(*headings: str) -> Table:
-    """An empty table; a heading that begins with "<" names a column of text."""
+    """An empty table; a heading that begins with "<" names a column of text, with "~" one that may be broken."""
     made = Cells(box=None, pad_edge=False, header_style="bold")
     for heading in headings:
-        justify: Literal["left", "right"] = "left" if heading.startswith("<") else "right"
-        made.add_column(heading.removeprefix("<"), justify=justify, no_wrap=True)
+        breaks = heading.startswith("~")
+        justify: Literal["left", "right"] = "left" if breaks or heading.startswith("<") else "right"
+        made.add_column(heading.lstrip("<~"), justify=justify, no_wrap=not breaks, overflow="fold")
     return made
+
+
+def _widest(cells: Iterable[RenderableType]) -> int:
+    texts = (Text.from_markup(cell).plain for cell in cells if isinstance(cell, str))
+    return max(cell_len(line) for text in texts for line in text.split("\n"))
 
 
 def printable(text: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
@@ -12,12 +13,23 @@ import numpy as np
 
 from acquisition import DataError, Frf, Remark, atomic_write, joined
 from dsm import plus_minus
-from lobewatch.analysis import ABOUT_DIRECTIONS, Assembly, Light, Logbook, Row, Standing, change_since_first, lobes_of
+from lobewatch.analysis import (
+    ABOUT_DIRECTIONS,
+    Assembly,
+    Light,
+    Logbook,
+    Row,
+    Standing,
+    Word,
+    change_since_first,
+    lobes_of,
+)
 from lobewatch.machine import Machine
-from lobewatch.show.advice import Advised, advised
+from lobewatch.show.advice import Advised, advised, advised_lines, decay_text
 from lobewatch.show.figures import frf_figure, svg, trend_figure
 from lobewatch.show.figures_lobes import lobes_figure
-from lobewatch.show.verdicts import limit_text, margin_text
+from lobewatch.show.programs.doubts import reading_lines
+from lobewatch.show.verdicts import WORDS, band_text, limit_text, margin_text, turning_text, verdict_text
 
 LIGHTS = {Light.ALARM: "✗ ALARM", Light.UNKNOWN: "? UNKNOWN", Light.WARN: "! WARNING", Light.GOOD: "✓ GOOD"}
 CHANGES = (
@@ -69,7 +81,7 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
     now = logbook.folder.read(entries[last.tap_id])
     assembly = logbook.assembly(last.tool)
     programs = [advised(logbook, verdict) for verdict in logbook.verdicts()]
-    checked = [one.verdict for one in programs if one.verdict.stable is not None]
+    checked = [one.verdict for one in programs if one.verdict.word is not Word.UNKNOWN]
     return {
         "name": machine.machine.name,
         "tool": last.tool,
@@ -82,7 +94,9 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
         "standing": _standing(logbook.standing()),
         "changes": _changes(rows),
         "programs": [_program(one) for one in programs],
+        "program_lines": [_whole(line) for one in programs for line in advised_lines(one, machine.speed)],
         "program_method": checked[0].method if checked else "",
+        "program_doubt": [*map(_whole, reading_lines(checked, machine))],
         "remarks": [str(remark) for remark in _remarks(last, assembly)],
         "modes": _modes(last),
         "operator": now.circumstances.operator,
@@ -195,25 +209,24 @@ def _modes(row: Row) -> list[dict[str, str]]:
 def _program(one: Advised) -> dict[str, Any]:
     """A row of the table of programs: what `lobewatch check` says."""
     found = one.verdict
-    low, high = (edge * 1e3 for edge in one.advice.limit_band)
     return {
         "name": found.program.name,
         "speed_rpm": found.program.speed_rpm,
         "depth_mm": found.program.depth_mm,
-        "stable": found.stable,
-        "was_stable": one.was_stable,
         "limit": limit_text(found),
-        "band": f"{low:.2f} to {high:.2f}" if np.isfinite(high) else "",
+        "band": band_text(found).replace("..", " to "),
         "margin": margin_text(found),
-        "remark": _remark(one),
+        "turning": turning_text(found),
+        "left": decay_text(one.advice),
+        "then": None if one.then is None else _looks(one.then.word, one.then.word.value),
+        "now": _looks(found.word, verdict_text(found)),
     }
 
 
-def _remark(one: Advised) -> str:
-    found = one.verdict
-    if found.stable is None:
-        return "; ".join(remark.text for remark in found.remarks)
-    texts = [] if found.measured else ["predicted"]
-    texts += ["within the error of the limit"] if one.is_within_error else []
-    texts += [f"[drive] allows {found.drive_limit * 1e3:.2f} mm"] if found.is_beyond_drive else []
-    return "; ".join(texts)
+def _looks(word: Word, text: str) -> dict[str, str]:
+    return {"kind": WORDS[word].kind, "text": f"{WORDS[word].symbol} {text}"}
+
+
+def _whole(text: str) -> str:
+    """No line ends within a number, or between it and its unit."""
+    return re.sub(r"(?<=\d) (?=\d{3}\b|%|mm\b|rpm\b|Hz\b)", "\N{NO-BREAK SPACE}", text)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -17,6 +16,7 @@ from lobewatch.analysis.setting_search import LEFT
 from lobewatch.machine import Machine
 from lobewatch.show.measurements import lobes_json, programs_json, remark_json, remark_lines
 from lobewatch.show.output import table
+from lobewatch.show.programs.settings import setting_json
 from lobewatch.show.verdicts import verdict_table
 
 
@@ -30,7 +30,7 @@ def comparison_json(found: LobeComparison, remarks: Sequence[Remark]) -> dict[st
         "depth_mm": lobes.depth * 1e3,
         "chatter_frequencies_hz": lobes.chatter_frequency,
         "kind": lobes.kind,
-        "pockets": [asdict(pocket) for pocket in found.pockets],
+        "pockets": [setting_json(pocket) for pocket in found.pockets],
         "pocket_shifts": [shift_json(shift) for shift in found.shifts],
         "programs": programs_json(found.verdicts),
         "remarks": [remark_json(remark) for remark in joined(remarks)],

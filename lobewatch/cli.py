@@ -88,7 +88,7 @@ def _options(
 
 
 def main() -> None:
-    """Run; exit codes: 0 fine, 1 not every program is stable (check), 2 wrong use, bad file or no device, 130 Ctrl-C."""
+    """Run; exit codes: 0 fine, 1 not all is stable (check), 2 wrong use, bad file or no device, 130 Ctrl-C."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a console without these characters shows "?" instead

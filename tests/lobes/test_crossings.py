@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from lobes import (
     Cut,
     Program,
-    check_program,
+    program_limit,
     spectral_radius,
     stability_boundary,
     zero_order,
@@ -94,32 +93,7 @@ def test_two_hundred_cuts_around_flip_lobes() -> None:
 def test_a_check_agrees_with_the_multipliers(speed: float) -> None:
     program = Program(FINISHING, speed, 24e-3)
     radius = spectral_radius(SPINDLE, None, FINISHING, speed, program.depth)[0, 0]
-    found = check_program(program, SPINDLE, None, np.linspace(3000, 24000, 1151))
+    found = program_limit(program, SPINDLE, None)
     assert radius > 1
     assert not found.stable
-    assert found.depth_margin <= 0
-    assert found.nearest_speed is not None
-    moved = replace(program, speed_rpm=found.nearest_speed)
-    assert check_program(moved, SPINDLE, None, np.array([speed])).stable
-
-
-def test_a_program_is_sent_where_the_drive_allows_its_depth() -> None:
-    program, speeds = Program(FINISHING, 15410.0, 24e-3), np.linspace(3000, 24000, 1151)
-    freely = check_program(program, SPINDLE, None, speeds).nearest_speed
-    slow = np.where(speeds < 15000, 30e-3, 20e-3)
-    driven = check_program(program, SPINDLE, None, speeds, slow).nearest_speed
-    assert freely is not None
-    assert driven is not None
-    assert driven < 15000 < freely
-    assert check_program(program, SPINDLE, None, speeds, 20e-3).nearest_speed is None
-
-
-def test_the_nearest_speed_is_that_of_looking_at_all() -> None:
-    speeds = np.linspace(3000, 24000, 401)
-    for speed, depth in ((6500.0, 20e-3), (12900.0, 40e-3), (12900.0, 10e-3), (20000.0, 15e-3)):
-        program = Program(replace(FINISHING, immersion=0.5), speed, depth)
-        found = check_program(program, SPINDLE, None, speeds)
-        states = stability_boundary(SPINDLE, None, program.cut, speeds, depth).depth == np.inf
-        others = speeds[states != found.stable]
-        expected = others[np.argmin(np.abs(others - speed))] if others.size else None
-        assert found.nearest_speed == expected
+    assert found.limit <= program.depth

@@ -52,7 +52,7 @@ EFFORTS = ((8, 10), (12, 16), (0, M + 2))
 """Power steps and Arnoldi vectors of the batched form; what an attempt leaves in doubt goes on to the next."""
 TOLERANCE = 1e-10
 BLOCK = 1000
-"""Points at once with m = 40, fewer with more: their vectors stay in the cache."""
+"""Points at once: their vectors stay in the cache."""
 TERMS = 14
 """Terms of the series of cosine and sine, up to 2 rad in an interval."""
 
@@ -99,7 +99,7 @@ def batched(speeds: Floats, depths: Floats, m: int) -> Floats:
         left = np.flatnonzero(doubt > TOLERANCE)
         if not left.size:
             break
-        for rows in np.array_split(left, -(-left.size * m // (BLOCK * M))):
+        for rows in np.array_split(left, -(-left.size // BLOCK)):
             radius[rows], doubt[rows] = _largest(_hessenberg(*_steps(h[rows], pull[:, rows]), *effort))
     return radius.reshape(speeds.size, depths.size)
 

@@ -215,7 +215,7 @@ def test_methods_pockets_and_shifts(run: Run, folder: MachineFolder) -> None:
     assert zero["minimum_depth_mm"] == pytest.approx(2 * angle["minimum_depth_mm"], rel=1e-6)
     assert zero["minimum_depth_mm"] == pytest.approx(semi["minimum_depth_mm"], rel=0.01)
     assert semi["method"] == "semi-discretisation"
-    assert semi["method_detail"].endswith(" intervals a tooth period")
+    assert semi["method_detail"].endswith(" pieces of order 16 a tooth period")
     shifts = zero["pocket_shifts"]
     assert len(shifts) >= 3
     step = 21000 / 299

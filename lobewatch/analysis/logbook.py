@@ -39,6 +39,7 @@ class Logbook:
         self._placed: Sequence[Place] | None = None
         self._history: History | None = None
         self._measurements: dict[str, Measurement] = {}
+        self._verdicts: dict[str | None, dict[str, Verdict]] = {}
 
     @classmethod
     def open(cls, path: Path | str) -> Self:
@@ -145,13 +146,13 @@ class Logbook:
     def verdicts(self, until: str | None = None, names: Collection[str] | None = None) -> list[Verdict]:
         """One a program (of these names), from the newest tap tests of its tool as they were after the test `until`."""
         tables = [table for table in self.machine.program if names is None or table.name in names]
-        known: dict[str, Assembly | NotTappedError] = {}
-        for tool in dict.fromkeys(table.tool for table in tables):
-            try:
-                known[tool] = self.assembly(tool, until)
-            except NotTappedError as error:
-                known[tool] = error
-        return [self._judge(table, known[table.tool]) for table in tables]
+        rows = self.history.rows
+        until = rows[-1].tap_id if until is None and rows else until
+        judged = self._verdicts.setdefault(until, {})
+        missing = [table for table in tables if table.name not in judged]
+        known = {tool: self._known(tool, until) for tool in dict.fromkeys(table.tool for table in missing)}
+        judged |= {table.name: self._judge(table, known[table.tool]) for table in missing}
+        return [judged[table.name] for table in tables]
 
     def rulings(self, tap_id: str) -> Mapping[str, Ruling]:
         """Word and limit of every program as they were after a tap test; the history keeps them once asked for."""
@@ -187,8 +188,14 @@ class Logbook:
     def _forget(self) -> None:
         """What a new tap test alters."""
         self._placed = self._history = None
-        self._measurements = {}
+        self._measurements, self._verdicts = {}, {}
         self._mark = self.folder.mark
+
+    def _known(self, tool: str, until: str | None) -> Assembly | NotTappedError:
+        try:
+            return self.assembly(tool, until)
+        except NotTappedError as error:
+            return error
 
     def _judge(self, table: ProgramTable, known: Assembly | NotTappedError) -> Verdict:
         if isinstance(known, Assembly):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,7 +63,6 @@ def verdict_json(found: Verdict) -> dict[str, Any]:
         "doubt": doubt_json(found),
         "method": found.method,
         "method_detail": found.detail,
-        "remarks": [asdict(remark) for remark in found.remarks],
     }
 
 

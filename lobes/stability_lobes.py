@@ -64,7 +64,7 @@ class StabilityLobes:
     remarks: tuple[Remark, ...] = ()
     """Why the method or the FRF is out of its range for this cut, and what to do."""
     detail: str = ""
-    """What else is to be known of the method: into how many intervals the tooth period was divided."""
+    """What else is to be known of the method: into how many pieces the tooth period was divided."""
 
     def __post_init__(self) -> None:
         """Check shapes and values."""

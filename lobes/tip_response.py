@@ -18,7 +18,7 @@ Tip = Frf | Sequence[Mode]
 MODE_STEP = 0.02
 """Spacing of the grid: in half-power half-widths near a mode, relative to the distance from it further away."""
 FAR = 100
-"""Modes are followed up to this many times the highest natural frequency ..."""
+"""Modes are followed up to this many times the highest natural frequency of both directions ..."""
 FAR_TEETH = 2
 """... and this many tooth frequencies: with in-phase modes, the deciding crossing comes within the first two."""
 STEPS_PER_LINE = 4
@@ -42,20 +42,6 @@ class TipResponse:
         return self.receptance(self.grid) if self.known is None else self.known
 
 
-def tip_response(tip: Tip, direction: str, tooth_frequency: float) -> TipResponse:
-    """Receptance of one direction, for lobes up to a tooth frequency (Hz).
-
-    An FRF counts inside its usable band, between its lines by a cubic spline. With two lines in zeta f_n straight
-    lines would cut up to 3 % off the extreme real part, the spline changes it by up to 0.4 %; with one line in
-    zeta f_n neither will do (11 % and 8 %): record longer. Raises ValueError for no modes and for a mode that is
-    not of a driving point; `direction` names the culprit.
-    """
-    if isinstance(tip, Frf):
-        return _from_frf(tip.in_band(tip.usable_band))
-    check_modes(tip, direction)
-    return _from_modes(tip, tooth_frequency)
-
-
 def check_modes(modes: Sequence[Mode], direction: str) -> None:
     """Refuse an empty list of modes, and modes that are not of a driving point."""
     if not modes:
@@ -69,15 +55,24 @@ def check_modes(modes: Sequence[Mode], direction: str) -> None:
 
 
 def tip_responses(x: Tip | None, y: Tip | None, tooth_frequency: float) -> list[tuple[int, TipResponse]]:
-    """Axis (0 for x, 1 for y) and receptance of each direction that is not None; ValueError where both are."""
-    given = [
-        (axis, tip_response(tip, name, tooth_frequency))
-        for axis, name, tip in ((0, "x", x), (1, "y", y))
-        if tip is not None
-    ]
+    """Axis (0 for x, 1 for y) and receptance of each direction that is not None, for tooth frequencies (Hz) up to one.
+
+    Modes are known up to one frequency in both directions, an FRF inside its usable band, between its lines by a cubic
+    spline. With two lines in zeta f_n straight lines would cut up to 3 % off the extreme real part, the spline changes
+    it by up to 0.4 %; with one line in zeta f_n neither will do (11 % and 8 %): record longer. Raises ValueError where
+    both are None, for no modes and for a mode that is not of a driving point.
+    """
+    given = [(axis, name, tip) for axis, name, tip in ((0, "x", x), (1, "y", y)) if tip is not None]
     if not given:
         raise ValueError("x and y are both None; give the modes or the FRF of one direction at least")
-    return given
+    for _, name, tip in given:
+        if not isinstance(tip, Frf):
+            check_modes(tip, name)
+    highest = max(_highest(tip) for _, _, tip in given) + FAR_TEETH * tooth_frequency
+    return [
+        (axis, _from_frf(tip.in_band(tip.usable_band)) if isinstance(tip, Frf) else _from_modes(tip, highest))
+        for axis, _, tip in given
+    ]
 
 
 def common_grid(tips: Sequence[TipResponse]) -> NDArray[np.float64]:
@@ -113,8 +108,12 @@ def _from_frf(frf: Frf) -> TipResponse:
     return TipResponse(np.interp(steps, lines, frf.frequency), CubicSpline(frf.frequency, frf.receptance))
 
 
-def _from_modes(modes: Sequence[Mode], tooth_frequency: float) -> TipResponse:
-    highest = FAR * max(mode.frequency for mode in modes) + FAR_TEETH * tooth_frequency
+def _highest(tip: Tip) -> float:
+    """Frequency (Hz) above which a direction has nothing to say."""
+    return float(tip.frequency[-1]) if isinstance(tip, Frf) else FAR * max(mode.frequency for mode in tip)
+
+
+def _from_modes(modes: Sequence[Mode], highest: float) -> TipResponse:
     grid = np.unique(np.concatenate([[0.0, highest], *(_around(mode, highest) for mode in modes)]))
 
     def receptance(frequency: NDArray[np.float64]) -> NDArray[np.complex128]:

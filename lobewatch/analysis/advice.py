@@ -1,74 +1,15 @@
-"""Where to go with a program: settings that would be called stable, with something to spare; how much decay is left.
-
-A diagram by zero order says where to look. What is recommended has been judged like any program: `verdict` calls it
-stable, and the same draws are stable as the spindle will be when it is tapped again.
-"""
+"""Where to go with a program: settings that would be called stable, with something to spare; how much decay is left."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-
-import msgspec
-import numpy as np
-from numpy.typing import NDArray
-from scipy.ndimage import minimum_filter1d
+from dataclasses import dataclass
 
 from acquisition import Remark
-from lobes import lowest_of, zero_order
-from lobewatch.analysis.aging import StiffnessAt, aged, softening, tolerable_decay
-from lobewatch.analysis.assembly import Assembly
-from lobewatch.analysis.drawn import Drawn
-from lobewatch.analysis.drawn_limits import ALIKE
-from lobewatch.analysis.series import fall_in
-from lobewatch.analysis.verdict import Verdict, Word, verdict
-from lobewatch.machine import Machine, ProgramTable, drive_limit
-
-SPARE = 0.20
-"""Depth that a recommended setting has to spare in the middle of the doubt."""
-INTERVALS = 2
-"""Tap intervals that it must last ..."""
-UNKNOWN_FALL = 0.02
-"""... or this fall of the frequency where no rate is known."""
-RPM, MM = 10.0, 0.05
-"""Steps that can be set at a machine; numbers are rounded inwards to them."""
-GRID = 0.002
-"""Relative step of the speeds of the diagram."""
-BESIDE = 0.003
-"""Relative distance of the frequency that the diagram counts on beside speed and fall."""
-DEPTHS = np.geomspace(0.2, 1.0, 9)
-"""Shares of what the diagram promises that are looked at with a few draws ..."""
-LESS = (0.95, 0.88, 0.8)
-"""... and shares of what they leave that are judged."""
-PLACES = 4
-"""Pockets that are looked at closely."""
-LATER = np.array([0.0, 0.5, 1.0])
-"""Shares of the fall that a setting must stand at which it is looked at."""
-FEW = 24
-"""Draws that a setting is looked at with before all of them decide, the hardest where they are known."""
-EDGE, WIDEST = 0.006, 8
-"""Relative step of a window of speeds, and most steps on each side."""
-LEFT = np.arange(0, 0.1001, 0.01)
-"""Falls of the frequency that a setting is looked at with; more than the last is not told apart."""
-
-Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Setting:
-    """A speed and a depth that would be called stable."""
-
-    speed_rpm: float
-    """Spindle speed (rpm), in steps of 10 unless it is the program's own."""
-    depth_mm: float
-    """Axial depth (mm), in steps of 0.05 unless it is the program's own."""
-    window_rpm: tuple[float, float]
-    """Slowest and fastest speed around it at which the depth would be called stable too."""
-    depth_margin: float
-    """Limit in the middle of the doubt over depth, less 1."""
-    frequency_left: float
-    """Fall of the frequency that it stands, relative, and is still called stable; 0.1 stands for that and more."""
+from lobewatch.analysis.aging import softening, tolerable_decay
+from lobewatch.analysis.setting_search import SPARE, Setting, SettingSearch
+from lobewatch.analysis.verdict import Verdict, Word
+from lobewatch.machine import Machine
 
 
 @dataclass(frozen=True)
@@ -96,162 +37,9 @@ def advise(found: Verdict, machine: Machine) -> Advice:
     remarks = (remark,) if found.stable else ()
     if found.word is Word.STABLE or len(found.assembly.directions) < 2:
         return Advice(decay=decay, remarks=remarks)
-    search = _Search.of(found, found.drawn, found.assembly, machine)
+    search = SettingSearch.of(found.program, found.drawn, found.assembly, machine)
     best = search.elsewhere()
     if best is not None:
         return Advice(best, None, decay, remarks)
     here = search.here(1e3 * min(found.limit_low, found.limit / (1 + SPARE)))
     return Advice(search.most_chips() or here, here, decay, remarks)
-
-
-def needed_fall(assembly: Assembly, machine: Machine) -> float:
-    """Fall of the frequency that a recommended setting must stand: two tap intervals at the rate so far."""
-    days = INTERVALS * machine.machine.tap_interval_days
-    falls = [fall_in(series, days) for series in assembly.series.values()]
-    return max((UNKNOWN_FALL if fall is None else fall for fall in falls), default=UNKNOWN_FALL)
-
-
-@dataclass(frozen=True, eq=False)
-class _Search:
-    """Looking for settings of one program."""
-
-    program: ProgramTable
-    drawn: Drawn
-    """Its draws, in the worst directions of feed."""
-    assembly: Assembly
-    machine: Machine
-    stiffness_at: StiffnessAt
-    fall: float
-    speeds: Floats
-    """Those of the diagram (rpm), shape (n,)."""
-    promised: Floats
-    """Depth (mm) that the diagram promises there over all of the doubt, shape (n,)."""
-
-    @classmethod
-    def of(cls, found: Verdict, drawn: Drawn, assembly: Assembly, machine: Machine) -> _Search:
-        program, fall = found.program, needed_fall(assembly, machine)
-        low, high = machine.speed.low_rpm, machine.speed.high_rpm
-        speeds = np.geomspace(low, high, max(int(math.log(high / low) / GRID), 2))
-        cuts = [replace(machine.build_cut(program), feed_angle=angle) for angle in drawn.angles.tolist()]
-        limit = lowest_of([zero_order(assembly.x, assembly.y, cut, speeds) for cut in cuts]).depth * 1e3
-        steps, ahead = math.ceil((drawn.doubt.speed + BESIDE + fall / 2) / GRID), round(fall / 2 / GRID)
-        around = minimum_filter1d(np.minimum(limit, 1e6), 2 * steps + 1, origin=-ahead, mode="nearest")
-        deepest = np.minimum(program.deepest_mm, 1e3 * drive_limit(machine, program, speeds))
-        promised = np.minimum(around / max(drawn.doubt.tangential.high, 1 + SPARE), deepest)
-        worst = drawn.fed(ALIKE * float(drawn.limits[0]), 2)
-        return cls(program, worst, assembly, machine, softening(assembly)[0], fall, speeds, promised)
-
-    def elsewhere(self) -> Setting | None:
-        """The nearest window of speeds at the program's depth."""
-        depth = self.program.depth_mm
-        windows = _runs(self.promised >= depth)
-        middles = sorted((float(self.speeds[run[run.size // 2]]) for run in windows), key=self._distance)
-        found = (self._verified(_rounded(speed), depth) for speed in middles[:PLACES])
-        return next((setting for setting in found if setting), None)
-
-    def most_chips(self) -> Setting | None:
-        """The speed and depth of largest removal rate."""
-        chips = self.promised * self.speeds
-        inside = np.flatnonzero((chips[1:-1] >= chips[:-2]) & (chips[1:-1] >= chips[2:])) + 1
-        tops = _apart(sorted(inside.tolist(), key=lambda i: -chips[i]))[:PLACES]
-        places = [(speed := _rounded(float(self.speeds[i])), self._calm_depth(speed, self.promised[i])) for i in tops]
-        places.sort(key=lambda place: -place[0] * place[1])
-        found = (self._deepest(*place) for place in places)
-        return next((setting for setting in found if setting), None)
-
-    def here(self, depth_mm: float) -> Setting | None:
-        """The deepest at the program's own speed, up to a depth (mm)."""
-        speed = self.program.speed_rpm
-        return self._deepest(speed, self._calm_depth(speed, min(depth_mm, self.program.deepest_mm)))
-
-    def _deepest(self, speed: float, depth_mm: float) -> Setting | None:
-        found = (self._verified(speed, depth) for share in LESS if (depth := _floored(share * depth_mm)) > 0)
-        return next((setting for setting in found if setting), None)
-
-    def _calm_depth(self, speed: float, depth_mm: float) -> float:
-        """The deepest up to a depth (mm) at which, and below which, a few draws are stable now and later."""
-        depths = depth_mm * DEPTHS
-        calm = np.all(self._early(speed, FEW // 2).growth(depths / 1e3) < 0, axis=0)
-        return float(depths[calm.size - 1 if np.all(calm) else np.argmin(calm) - 1]) if calm[0] else 0.0
-
-    def _early(self, speed: float, number: int = FEW) -> Drawn:
-        """So many draws at a speed (rpm), now and when the spindle is tapped again."""
-        few = self.drawn.some(np.arange(number)).at(speed / self.program.speed_rpm)
-        return aged(few, self.fall * LATER[[0, -1]], self.stiffness_at)
-
-    def _lasts(self, speed: float, depth: float) -> bool:
-        """Whether a depth (m) at a speed (rpm) is stable when the spindle is tapped again: for a few draws, then all."""
-        if np.any(self._early(speed).growth(depth) >= 0):
-            return False
-        then = aged(self.drawn.at(speed / self.program.speed_rpm), self.fall * LATER[-1:], self.stiffness_at)
-        return bool(np.all(then.growth(depth) < 0))
-
-    def _distance(self, speed: float) -> float:
-        return abs(math.log(speed / self.program.speed_rpm))
-
-    def _verified(self, speed: float, depth_mm: float) -> Setting | None:
-        """The setting where it is called stable, and will be when the spindle is tapped again."""
-        table = msgspec.structs.replace(self.program, speed_rpm=speed, depth_mm=depth_mm)
-        if not self.machine.speed.low_rpm <= speed <= self.machine.speed.high_rpm:
-            return None
-        if not self._lasts(speed, depth_mm / 1e3):
-            return None
-        found = verdict(table, self.assembly, self.machine)
-        drawn, depth = found.drawn, depth_mm / 1e3
-        if found.word is not Word.STABLE or found.depth_margin < SPARE or found.is_beyond_drive or drawn is None:
-            return None
-        near = drawn.fed(2 * depth)
-        later = aged(near, self.fall * LATER[1:], self.stiffness_at).growth(depth)
-        if np.any(later >= 0):
-            return None
-        hardest = near.some(np.argsort(np.max(later.reshape(LATER.size - 1, -1), axis=0))[-FEW:])
-        margin = min(found.depth_margin, 20.0)
-        return Setting(speed, depth_mm, self._window(near, hardest, speed, depth), margin, self._left(hardest, depth))
-
-    def _window(self, near: Drawn, hardest: Drawn, speed: float, depth: float) -> tuple[float, float]:
-        steps = np.arange(WIDEST + 1.0)
-        low, high = self.machine.speed.low_rpm, self.machine.speed.high_rpm
-        slow, fast = (_last_calm(near, hardest, np.power(1 + EDGE, sign * steps), depth) for sign in (-1, 1))
-        slowest, fastest = max(speed * slow, low) / RPM, min(speed * fast, high) / RPM
-        return min(math.ceil(slowest) * RPM, speed), max(math.floor(fastest) * RPM, speed)
-
-    def _left(self, hardest: Drawn, depth: float) -> float:
-        grown = aged(hardest, LEFT, self.stiffness_at).growth(depth).reshape(LEFT.size, -1)
-        return float(LEFT[_calm_from_the_first(grown)])
-
-
-def _last_calm(near: Drawn, hardest: Drawn, ratio: Floats, depth: float) -> float:
-    """The last of these speeds, over the present one, up to which all draws are stable."""
-    last = _calm_from_the_first(hardest.swept(ratio).growth(depth).reshape(ratio.size, -1))
-    while last > 0 and np.any(near.at(speed=float(ratio[last])).growth(depth) >= 0):
-        last //= 2
-    return float(ratio[last])
-
-
-def _calm_from_the_first(grown: Floats) -> int:
-    """Row up to which all of growth (k, draws) is negative from the first on."""
-    calm = np.all(grown < 0, axis=1)
-    return calm.size - 1 if np.all(calm) else max(int(np.argmin(calm)) - 1, 0)
-
-
-def _runs(wanted: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
-    """Places without a gap between them."""
-    places = np.flatnonzero(wanted)
-    return [run for run in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if run.size]
-
-
-def _apart(places: Sequence[int]) -> list[int]:
-    """Those that are not next to an earlier one."""
-    taken: list[int] = []
-    for place in places:
-        if all(abs(place - other) * GRID > 0.02 for other in taken):
-            taken.append(place)
-    return taken
-
-
-def _rounded(speed: float) -> float:
-    return round(speed / RPM) * RPM
-
-
-def _floored(depth_mm: float) -> float:
-    return round(math.floor(depth_mm / MM + 1e-9) * MM, 6)

@@ -13,7 +13,7 @@ from acquisition import Frf
 from lobes import Cut, StabilityLobes, average_angle, lowest_of, stability_boundary, zero_order
 from lobes.tip_response import Tip
 from lobewatch.analysis.assembly import Assembly
-from lobewatch.machine import CutTable
+from lobewatch.machine import REFERENCE_CUT, CutTable, Machine
 
 MOST_SPEEDS = 400
 """Speeds of a chart by semi-discretisation."""
@@ -56,6 +56,16 @@ class Chart:
     """The cut in SI units, one a direction of feed."""
     lobes: StabilityLobes
     """Its limits."""
+
+
+def cut_table(machine: Machine, name: str) -> CutTable:
+    """The reference cut or a program by its name; KeyError for one that is not there."""
+    for table in machine.program:
+        if table.name == name:
+            return table
+    if name != REFERENCE_CUT or machine.reference_cut is None:
+        raise KeyError(name)
+    return machine.reference_cut
 
 
 def chart(

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit
+from lobewatch.show.output import Json, emit, notes
 
 Source = Literal["modes", "frf"]
 MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
@@ -28,10 +28,10 @@ def lobes(
     materials: Annotated[bool, typer.Option("--materials", help="List the known cutting coefficients.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Stability lobes of the newest tap test, drawn beside those of the first test, and the best pockets.
+    """Stability lobes of the newest tap tests, drawn beside those of the first, and the pockets that are safe.
 
-    A --tool that was never tapped is predicted by the model with the bearings of the newest tap test. The verdicts on
-    programs are those of lobewatch check, whatever the method of the chart.
+    A --tool that was never tapped is predicted by the model with the bearings of the newest tap test. Whatever the
+    method of the chart, verdicts on programs are those of lobewatch check, and it would call each pocket stable.
 
     Examples:
 
@@ -46,6 +46,7 @@ def lobes(
     if materials:
         emit({"materials": materials_json(logbook.machine)}, as_json, *material_lines(logbook.machine))
         return
+    notes.print("looking for speeds and depths that are safe; this takes some seconds")
     found = compare_lobes(logbook, tool, cut, Dynamics(source), Method(method))
     remarks = [
         *logbook.remarks,

@@ -9,35 +9,15 @@ import numpy as np
 from rich.table import Table
 
 from acquisition import Remark, joined
-from lobes import Pocket, PocketShift, best_pockets, cutting_coefficients
-from lobes.pockets import SHARE
-from lobewatch.analysis import LobeComparison
-from lobewatch.analysis.lobe_comparison import USEFUL
+from lobes import Pocket, PocketShift, cutting_coefficients
+from lobewatch.analysis import LobeComparison, Setting
+from lobewatch.analysis.lobe_comparison import NO_POCKET
+from lobewatch.analysis.setting_search import LEFT
 from lobewatch.machine import Machine
 from lobewatch.show.measurements import lobes_json, programs_json, remark_json, remark_lines
+from lobewatch.show.output import table
+from lobewatch.show.programs.settings import setting_json
 from lobewatch.show.verdicts import verdict_table
-
-POCKET_RANGE = f"at least {100 * SHARE:.0f} % of the depth"
-"""What holds between the ends of a pocket."""
-
-
-def pocket_json(pocket: Pocket) -> dict[str, float]:
-    """One pocket."""
-    return {
-        "speed_rpm": pocket.speed_rpm,
-        "depth_mm": pocket.depth * 1e3,
-        "from_rpm": pocket.from_rpm,
-        "to_rpm": pocket.to_rpm,
-    }
-
-
-def pocket_list(best: Sequence[Pocket]) -> str:
-    """Pockets in one line, in brackets the speeds at which POCKET_RANGE holds."""
-    texts = (
-        f"{pocket.depth * 1e3:.2f} mm at {pocket.speed_rpm:.0f} ({pocket.from_rpm:.0f}..{pocket.to_rpm:.0f}) rpm"
-        for pocket in best
-    )
-    return ", ".join(texts) or "none"
 
 
 def comparison_json(found: LobeComparison, remarks: Sequence[Remark]) -> dict[str, Any]:
@@ -50,8 +30,7 @@ def comparison_json(found: LobeComparison, remarks: Sequence[Remark]) -> dict[st
         "depth_mm": lobes.depth * 1e3,
         "chatter_frequencies_hz": lobes.chatter_frequency,
         "kind": lobes.kind,
-        "pockets_by_depth": [pocket_json(pocket) for pocket in best_pockets(found.pockets)],
-        "pockets_by_removal": [pocket_json(pocket) for pocket in best_pockets(found.pockets, by="removal")],
+        "pockets": [setting_json(pocket) for pocket in found.pockets],
         "pocket_shifts": [shift_json(shift) for shift in found.shifts],
         "programs": programs_json(found.verdicts),
         "remarks": [remark_json(remark) for remark in joined(remarks)],
@@ -63,44 +42,58 @@ def comparison_texts(found: LobeComparison, remarks: Sequence[Remark]) -> list[s
     now = found.now
     texts: list[str | Table] = [
         f"{now.name}: {now.lobes.stated_method}, from the {now.source} of {now.assembly.tap_id}",
-        *_limit_lines(found),
+        _limit_line(found),
         *shift_lines(found.shifts),
     ]
+    if found.pockets:
+        texts += ["safe now and until the next tap tests, the largest removal rate first:", pocket_table(found.pockets)]
+    texts += [str(remark) for remark in remarks if remark.code == NO_POCKET]
     if found.verdicts:
         texts += [verdict_table(found.verdicts), f"verdicts by {found.verdicts[0].method}, as lobewatch check"]
-    return [*texts, *remark_lines(remarks)]
+    return [*texts, *remark_lines([remark for remark in remarks if remark.code != NO_POCKET])]
 
 
-def _limit_lines(found: LobeComparison) -> list[str]:
-    lobes, best = found.now.lobes, found.pockets
-    low = lobes.minimum
+def _limit_line(found: LobeComparison) -> str:
+    lobes, low = found.now.lobes, found.now.lobes.minimum
     if not np.isfinite(low.depth):
-        return [f"no limit in this speed range ({lobes.stated_method})"]
-    return [
-        f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm, chatter at {low.chatter_frequency:.1f} Hz",
-        f"best pockets up to {USEFUL * low.depth * 1e3:.1f} mm (in brackets: {POCKET_RANGE}), by depth: "
-        f"{pocket_list(best_pockets(best))}",
-        f"by removal rate: {pocket_list(best_pockets(best, by='removal'))}",
-    ]
+        return f"no limit in this speed range ({lobes.stated_method})"
+    return (
+        f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm, chatter at {low.chatter_frequency:.1f} Hz"
+    )
+
+
+def pocket_table(pockets: Sequence[Setting]) -> Table:
+    """Settings that can be recommended, a line each."""
+    made = table("pocket: speed (rpm)", "window (rpm)", "depth (mm)", "depth to spare", "f_n may fall by")
+    for one in pockets:
+        low, high = one.window_rpm
+        left = f"{'> ' if one.frequency_left >= LEFT[-1] else ''}{100 * one.frequency_left:.1f} %"
+        spare = f"{100 * one.depth_margin:+.0f} %"
+        made.add_row(f"{one.speed_rpm:.0f}", f"{low:.0f}..{high:.0f}", f"{one.depth_mm:.2f}", spare, left)
+    return made
 
 
 def shift_json(shift: PocketShift) -> dict[str, Any]:
-    """A pocket then and now."""
+    """A pocket of the diagram then and now."""
     return {
-        "then": pocket_json(shift.then),
-        "now": pocket_json(shift.now),
+        "then": _tip_json(shift.then),
+        "now": _tip_json(shift.now),
         "speed_change": shift.speed_change,
         "depth_change": shift.depth_change,
     }
+
+
+def _tip_json(tip: Pocket) -> dict[str, float]:
+    return {"speed_rpm": tip.speed_rpm, "depth_mm": tip.depth * 1e3, "from_rpm": tip.from_rpm, "to_rpm": tip.to_rpm}
 
 
 def shift_lines(shifts: Sequence[PocketShift]) -> Iterator[str]:
     """The three fastest pockets that moved, a line each."""
     for shift in sorted(shifts, key=lambda one: one.then.speed_rpm, reverse=True)[:3]:
         yield (
-            f"pocket moved from {shift.then.speed_rpm:.0f} to {shift.now.speed_rpm:.0f} rpm "
-            f"({100 * shift.speed_change:+.1f} %), {shift.then.depth * 1e3:.2f} to {shift.now.depth * 1e3:.2f} mm "
-            f"({100 * shift.depth_change:+.1f} %)"
+            f"pocket of the diagram moved from {shift.then.speed_rpm:.0f} to {shift.now.speed_rpm:.0f} rpm "
+            f"({100 * shift.speed_change:+.1f} %), its tip from {shift.then.depth * 1e3:.2f} to "
+            f"{shift.now.depth * 1e3:.2f} mm ({100 * shift.depth_change:+.1f} %)"
         )
 
 

@@ -5,28 +5,37 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from datetime import datetime
 from textwrap import fill
-from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.dates import AutoDateLocator, DateFormatter, date2num
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from lobes import DepthBand, Pocket, RadialLobes
-from lobes.pockets import SHARE
-from lobewatch.analysis import Verdict, Word
+from lobes import RadialLobes
+from lobewatch.analysis import Setting, Verdict, Word
+from lobewatch.analysis.limit_band import LimitBand
 from lobewatch.show.figures import ALARM, GOOD, NOW, THEN, UNKNOWN, new_axes
+from lobewatch.show.labels import Labels
 
 Floats = NDArray[np.float64]
 
 MAP = "cividis"
 """Colours of depth: dark is shallow, bright is deep, in grey too."""
-SPREAD = "#E6E6E6"
-MARKS = {Word.STABLE: (GOOD, "o"), Word.NOT_STABLE: (ALARM, "X"), Word.UNKNOWN: (UNKNOWN, "D")}
+BAND = "what is not known of spindle and cut moves the limit within this band"
+WINDOW = "safe speeds and depths"
+DOUBT = "#B58900"
+MARKS = {
+    Word.STABLE: (GOOD, "o"),
+    Word.DOUBTFUL: (DOUBT, "^"),
+    Word.NOT_STABLE: (ALARM, "X"),
+    Word.UNKNOWN: (UNKNOWN, "D"),
+}
 """Colour and mark of a program by the verdict on it."""
+SAFE = "#00664A"
 LEVELS = 12
 """Steps of colour in a map."""
 BAR = "limiting depth (mm); brightest: this or more"
@@ -39,33 +48,34 @@ def lobes_figure(
     depths: Mapping[str, Floats],
     programs: Sequence[Verdict] = (),
     title: str = "",
-    band: DepthBand | None = None,
-    spread: DepthBand | None = None,
-    pockets: Sequence[Pocket] = (),
+    band: LimitBand | None = None,
+    pockets: Sequence[Setting] = (),
 ) -> Figure:
-    """Stability lobe diagram: the last of `depths` (m, by label) is now, those before it are earlier ones.
+    """Stability lobe diagram: the last of `depths` (m, by label) is now, those before it are first tap tests.
 
-    band is the 95 % band of the measurement, spread the range of the published cutting coefficients.
+    band: how far the doubt moves the line of now; pockets: settings that are recommended.
     """
-    figure, (axes,) = new_axes(1, (8.0, 4.2))
+    figure, (axes,) = new_axes(1, (8.0, 4.6))
     *earlier, now = depths.items()
     finite = now[1][np.isfinite(now[1])] * 1e3
-    top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * one.program.depth_mm for one in programs)])
-    if spread is not None:
-        _fill(axes, speed_rpm, spread, top, color=SPREAD, label="range of published coefficients", zorder=0.5)
-    for label, depth in earlier:
-        axes.plot(speed_rpm, depth * 1e3, color=THEN, ls="--", lw=1.2, label=label)
-    axes.plot(speed_rpm, now[1] * 1e3, color=NOW, lw=1.6, label=now[0])
+    wanted = [*(1.3 * one.program.depth_mm for one in programs), *(1.3 * one.depth_mm for one in pockets)]
+    top = max([5 * float(finite.min()) if finite.size else 1.0, *wanted])
+    low, high = (now[1], now[1]) if band is None else (band.low, band.high)
+    low, high = (np.minimum(edge * 1e3, 2 * top) for edge in (low, high))
+    axes.fill_between(speed_rpm, high, 2 * top, color=NOW, alpha=0.10, lw=0)
     if band is not None:
-        _fill(axes, speed_rpm, band, top, color=NOW, alpha=0.35, label="95 % band of the tap")
-    axes.fill_between(speed_rpm, np.minimum(now[1] * 1e3, top), top, color=NOW, alpha=0.10, lw=0)
+        axes.fill_between(speed_rpm, low, high, color=NOW, alpha=0.35, lw=0, label=BAND)
+    axes.plot(speed_rpm, now[1] * 1e3, color=NOW, lw=1.6, label=now[0])
+    for label, depth in earlier:
+        axes.plot(speed_rpm, depth * 1e3, color=THEN, ls="--", lw=1.2, label=f"{label}, first tap tests")
     axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
+    labels = Labels(axes)
     for i, pocket in enumerate(pockets):
-        _draw_pocket(axes, pocket, f"pocket, at least {100 * SHARE:.0f} % as deep" if i == 0 else "")
+        _draw_pocket(axes, pocket, labels, WINDOW if i == 0 else "")
     for program in programs:
-        _draw_program(axes, program)
+        _draw_program(axes, program, labels)
     axes.set(xlabel="spindle speed (rpm)", ylabel="limiting depth (mm)")
-    figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+    figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9)
     return figure
 
 
@@ -120,40 +130,17 @@ def _top(depth: Floats) -> float:
     return min(6 * float(finite.min()), float(finite.max())) if finite.size else 1.0
 
 
-def _fill(axes: Axes, speed_rpm: Floats, band: DepthBand, top: float, **style: Any) -> None:
-    """A band between its edges, cut off above the picture."""
-    low, high = (np.minimum(edge * 1e3, 2 * top) for edge in band)
-    axes.fill_between(speed_rpm, low, high, lw=0, **style)
+def _draw_pocket(axes: Axes, pocket: Setting, labels: Labels, label: str) -> None:
+    """A box as wide as the window and as high as the depth, with the numbers to set."""
+    low, high = pocket.window_rpm
+    box = Rectangle((low, 0), high - low, pocket.depth_mm, fc="white", ec=SAFE, lw=1.2, hatch="////", label=label)
+    axes.add_patch(box)
+    text = f"{pocket.speed_rpm:.0f} rpm\n{pocket.depth_mm:.2f} mm"
+    labels.add(text, (pocket.speed_rpm, pocket.depth_mm), SAFE, ("above",))
 
 
-def _draw_pocket(axes: Axes, pocket: Pocket, label: str) -> None:
-    """A line at the speed of a pocket, with the speed at its foot, and a bar as wide as the pocket."""
-    axes.axvline(pocket.speed_rpm, color=NOW, ls=":", lw=1)
-    ends, depth = (pocket.from_rpm, pocket.to_rpm), SHARE * pocket.depth * 1e3
-    axes.plot(ends, (depth, depth), color=NOW, lw=1, marker="|", ms=7, label=label)
-    axes.annotate(
-        f"{pocket.speed_rpm:.0f} rpm",
-        (pocket.speed_rpm, 0.02),
-        xycoords=("data", "axes fraction"),
-        fontsize=8,
-        ha="center",
-        color=NOW,
-        bbox={"color": "white", "alpha": 0.8, "pad": 1, "lw": 0},
-    )
-
-
-def _draw_program(axes: Axes, verdict: Verdict) -> None:
+def _draw_program(axes: Axes, verdict: Verdict, labels: Labels) -> None:
     colour, mark = MARKS[verdict.word]
-    low, high = axes.get_xlim()
     place = (verdict.program.speed_rpm, verdict.program.depth_mm)
-    is_left = place[0] > low + 0.8 * (high - low)
     axes.plot(*place, mark, color=colour, ms=9, mec="white")
-    axes.annotate(
-        verdict.program.name,
-        place,
-        xytext=(-7 if is_left else 7, 5),
-        textcoords="offset points",
-        ha="right" if is_left else "left",
-        fontsize=9,
-        bbox={"color": "white", "alpha": 0.7, "pad": 1, "lw": 0},
-    )
+    labels.add(f"{verdict.program.name}\n{verdict.word}", place)

@@ -9,15 +9,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from acquisition import DataError, Remark
-from lobes import (
-    DepthBand,
-    best_pockets,
-    coefficient_range,
-    cutting_coefficients,
-    measurement_band,
-    radial_lobes,
-)
-from lobewatch.analysis import Chart, Dynamics, LobeComparison, Logbook, Method, chart
+from lobes import Cut, StabilityLobes, radial_lobes
+from lobewatch.analysis import Chart, LobeComparison, Logbook, Method, chart
+from lobewatch.analysis.limit_band import limit_band
 from lobewatch.machine import Machine
 from lobewatch.show.figures import save_figure
 from lobewatch.show.figures_lobes import lobes_figure, radial_figure, waterfall_figure
@@ -49,39 +43,12 @@ def save_pictures(
 
 
 def lobes_picture(machine: Machine, found: LobeComparison) -> Figure:
-    """The diagram now, beside the one then, with the programs of this same cut."""
+    """The diagram now in its doubt, beside the one then, with safe settings and the programs of this same cut."""
     now = found.now
     depths = {one.assembly.label: one.lobes.depth for one in (found.then, now) if one is not None}
     title = f"{_title(machine, now)}, from the {now.source}"
-    band, spread = _bands(machine, now)
-    pockets = best_pockets(found.pockets)
-    return lobes_figure(now.lobes.speed_rpm, depths, found.verdicts, title, band, spread, pockets)
-
-
-def _bands(machine: Machine, now: Chart) -> tuple[DepthBand | None, DepthBand | None]:
-    """Band of the measurement and range of the coefficients, each from zero order and carried over as ratios.
-
-    None where modes have no standard errors, and where there are not two publications of one alloy.
-    """
-    if now.source is Dynamics.FRF:
-        return None, None
-    speeds = now.lobes.speed_rpm
-    x, y = now.assembly.x, now.assembly.y
-    base = chart(Method.ZERO_ORDER, x, y, now.cut, speeds).depth
-
-    def carried(band: DepthBand) -> DepthBand:
-        known = np.isfinite(base)
-        low, high = (np.where(known, edge / np.where(known, base, 1.0), 1.0) for edge in band)
-        return DepthBand(now.lobes.depth * low, now.lobes.depth * high)
-
-    measured = spread = None
-    if any(mode.best_covariance is not None for mode in (*(x or ()), *(y or ()))):
-        measured = carried(measurement_band(lambda x, y: chart(Method.ZERO_ORDER, x, y, now.cut, speeds), x, y))
-    used, known = machine.coefficients(now.table), cutting_coefficients()
-    published = [one for one in known if any(used is other for other in known) and one.alloy == used.alloy]
-    if len(published) >= 2:
-        spread = carried(coefficient_range(lambda cut: chart(Method.ZERO_ORDER, x, y, cut, speeds), now.cut, published))
-    return measured, spread
+    band = limit_band(now.lobes, now.name, now.assembly, machine)
+    return lobes_figure(now.lobes.speed_rpm, depths, found.verdicts, title, band, found.pockets)
 
 
 def _title(machine: Machine, now: Chart) -> str:
@@ -92,9 +59,14 @@ def _title(machine: Machine, now: Chart) -> str:
 def radial_picture(machine: Machine, now: Chart, method: Method) -> tuple[Figure, tuple[Remark, ...]]:
     """The limits over speed and radial depth, and what is wrong with the method at small ones."""
     speeds = now.lobes.speed_rpm if method is not Method.SEMI_DISCRETISATION else now.lobes.speed_rpm[::4]
-    found = radial_lobes(lambda cut: chart(method, now.x, now.y, cut, speeds), now.cut, IMMERSIONS)
+
+    def limits(cut: Cut) -> StabilityLobes:
+        cuts = [replace(other, immersion=cut.immersion) for other in now.cuts]
+        return chart(method, now.x, now.y, cuts, speeds)
+
+    found = radial_lobes(limits, now.cuts[0], IMMERSIONS)
     diameter = now.table.tool_diameter_mm / 1e3
-    return radial_figure(found, diameter, now.cut.immersion, _title(machine, now)), found.remarks
+    return radial_figure(found, diameter, now.cuts[0].immersion, _title(machine, now)), found.remarks
 
 
 def waterfall_picture(logbook: Logbook, now: Chart) -> Figure:

@@ -24,6 +24,7 @@ from lobewatch.analysis import (
     change_since_first,
     lobes_of,
 )
+from lobewatch.analysis.limit_band import limit_band
 from lobewatch.machine import Machine
 from lobewatch.show.advice import Advised, advised, advised_lines, decay_text
 from lobewatch.show.figures import frf_figure, svg, trend_figure
@@ -137,14 +138,17 @@ def _lobes(logbook: Logbook, assembly: Assembly, programs: Sequence[Advised]) ->
     depths = {} if first is None else {first.label: lobes_of(first, machine)[cut].depth}
     text = (
         f"Limit of the {cut} by {now.method}, {' and '.join(assembly.directions)} direction"
-        f"{'s' if len(assembly.directions) > 1 else ' alone'}; cuts in the shaded region chatter. "
-        "Marks: programs with this same cut and their verdicts, as in the table above."
+        f"{'s' if len(assembly.directions) > 1 else ' alone'}; cuts above the band chatter. Marks: programs with this "
+        "same cut and their verdicts; boxes: settings recommended instead, as in the table above."
     )
     if np.isinf(now.minimum.depth):
         text = f"The {cut} has no limit in this speed range ({now.method})."
     cuts = machine.cuts(assembly.tool)
-    marks = [one.verdict for one in programs if cuts.get(one.verdict.program.name) == cuts[cut]]
-    picture = lobes_figure(now.speed_rpm, depths | {assembly.label: now.depth}, marks)
+    same = [one for one in programs if cuts.get(one.verdict.program.name) == cuts[cut]]
+    advice = dict.fromkeys(setting for one in same for setting in (one.advice.best, one.advice.here) if setting)
+    band = limit_band(now, cut, assembly, machine)
+    marks = [one.verdict for one in same]
+    picture = lobes_figure(now.speed_rpm, depths | {assembly.label: now.depth}, marks, "", band, list(advice))
     return [Picture("Stability lobes, then and now" if depths else "Stability lobes", text, svg(picture))]
 
 

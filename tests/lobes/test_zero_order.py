@@ -7,6 +7,7 @@ immersion up-milling with the modes of Weck, Altintas & Budak: frequency_domain_
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
@@ -76,6 +77,67 @@ def test_the_loop_closes_at_the_limit(immersion: float, direction: str, speed: f
     receptance = np.diag([X[0].receptance(f)[0], Y[0].receptance(f)[0]])
     loop = found.depth[0] * (1 - np.exp(-120j * np.pi * f[0] / (3 * speed))) * mean_force(cut) @ receptance
     assert abs(np.linalg.det(np.eye(2) + loop)) < 1e-6
+
+
+TOOL, COLUMN = [Mode(2500.0, 0.035, 4e7)], [Mode(18.0, 0.015, 8e5)]
+FOUR_TEETH = Cut(4, 1.0, "down", 600e6, 180e6)
+"""Its force does not vary as it turns, so zero order is exact."""
+
+
+def lowest_in_a_dense_scan(x: list[Mode], y: list[Mode], cut: Cut, speed: float) -> float:
+    """Lowest depth b > 0 with det(I + b (1 - exp(-2 pi i f/f_t)) H0 G(f)) = 1 + b trace + b^2 det = 0.
+
+    Real and imaginary part have a common root b where their resultant is zero; its changes of sign are looked for.
+    """
+    tooth_frequency = cut.teeth * speed / 60
+    top = 4 * (max(mode.frequency for mode in (*x, *y)) + tooth_frequency)
+    near = np.sinh(np.linspace(-12, 12, 24001))
+    parts = [mode.frequency * (1 + mode.damping_ratio * near) for mode in (*x, *y)]
+    f = np.unique(np.concatenate([np.arange(0.0, top, tooth_frequency / 400), *parts]))
+    f = f[(f > 0) & (f < top)]
+    gx, gy = (np.sum([mode.receptance(f) for mode in modes], axis=0) for modes in (x, y))
+    force, waves = mean_force(cut), 1 - np.exp(-2j * np.pi * f / tooth_frequency)
+    trace = waves * (force[0, 0] * gx + force[1, 1] * gy)
+    det = waves**2 * np.linalg.det(force) * gx * gy
+    resultant = det.imag**2 - trace.imag * det.imag * trace.real + trace.imag**2 * det.real
+    step = np.flatnonzero(resultant[1:] * resultant[:-1] < 0)
+    share = resultant[step] / (resultant[step] - resultant[step + 1])
+    t, d = (values[step] + share * np.diff(values)[step] for values in (trace, det))
+    loops = (t + np.array([[1], [-1]]) * np.sqrt(t**2 - 4 * d)) / 2
+    real = np.where(np.abs(np.angle(loops[0] ** 2)) < np.abs(np.angle(loops[1] ** 2)), loops[0], loops[1]).real
+    return float(np.min(-1 / real[real < 0], initial=np.inf))
+
+
+def random_mode(random: np.random.Generator) -> Mode:
+    frequency, stiffness = np.exp(random.uniform(np.log([15.0, 5e5]), np.log([5000.0, 2e8])))
+    return Mode(float(frequency), random.uniform(0.008, 0.06), float(stiffness))
+
+
+def test_the_lowest_limit_is_found_where_the_modes_of_x_and_y_lie_far_apart() -> None:
+    random = np.random.default_rng(7)
+    for _ in range(60):
+        x, y = ([random_mode(random) for _ in range(random.integers(1, 3))] for _ in range(2))
+        cut = Cut(4, 1.0, "down", 6e8, random.uniform(6e7, 4e8))
+        speed = float(np.exp(random.uniform(np.log(800), np.log(20000))))
+        limit = zero_order(x, y, cut, speed).depth[0]
+        assert limit == pytest.approx(lowest_in_a_dense_scan(x, y, cut, speed), rel=2e-3), (x, y, cut, speed)
+
+
+@pytest.mark.parametrize("measured", [False, True])
+def test_a_fast_tool_on_a_slow_column(measured: bool) -> None:
+    found = zero_order(frf(TOOL) if measured else TOOL, COLUMN, FOUR_TEETH, 3000.0)
+    exact = stability_boundary(TOOL, COLUMN, FOUR_TEETH, 3000.0, 0.05)
+    assert found.depth == pytest.approx(exact.depth, rel=1e-4)
+    assert found.depth[0] == pytest.approx(lowest_in_a_dense_scan(TOOL, COLUMN, FOUR_TEETH, 3000.0), rel=1e-4)
+    assert found.chatter_frequency == pytest.approx(exact.chatter_frequency, rel=1e-4)
+
+
+@pytest.mark.parametrize("method", [zero_order, average_angle])
+def test_a_slow_direction_that_hardly_gives_way_changes_nothing(method: Callable[..., StabilityLobes]) -> None:
+    stiff = [Mode(3.0, 0.015, 1e14)]
+    alone, beside = method(TOOL, None, CUT, SPEEDS), method(TOOL, stiff, CUT, SPEEDS)
+    np.testing.assert_allclose(beside.depth, alone.depth, rtol=1e-4)
+    np.testing.assert_allclose(beside.chatter_frequency, alone.chatter_frequency, rtol=1e-4)
 
 
 def test_a_slot_is_unchanged_when_x_and_y_are_exchanged() -> None:

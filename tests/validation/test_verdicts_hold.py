@@ -25,7 +25,7 @@ def share(number: int, of: int) -> str:
 
 
 def test_a_few_programs_called_stable_and_settings_recommended_do_not_chatter() -> None:
-    found = study(count=4, seed=2, truths=3)
+    found = study(count=12, seed=2, truths=4, most_modes=3)
     assert found.stable
     assert found.recommended
     assert found.refused == 0
@@ -45,7 +45,7 @@ def test_at_most_1_percent_of_what_is_called_stable_or_recommended_chatters() ->
     assert found.refused == 0
 
 
-@pytest.mark.parametrize("count", [5, pytest.param(200, marks=[pytest.mark.long, pytest.mark.timeout(7200)])])
+@pytest.mark.parametrize("count", [2, pytest.param(200, marks=[pytest.mark.long, pytest.mark.timeout(7200)])])
 def test_a_machine_tapped_in_one_direction_is_never_called_stable(count: int) -> None:
     words = []
     for rng in np.random.default_rng(3).spawn(count):

@@ -41,12 +41,15 @@ class Study:
     """Recommended settings that are not called stable when entered."""
 
 
-def study(count: int, seed: int, truths: int) -> Study:
-    """`count` machines, each with a program of 30 to 80 % of its limit and one of 105 to 300 %."""
+def study(count: int, seed: int, truths: int, most_modes: int = 12) -> Study:
+    """`count` machines, each with a program of 30 to 80 % of its limit and one of 105 to 300 %.
+
+    Machines of more modes than most_modes are passed over.
+    """
     found = Study()
     for rng in np.random.default_rng(seed).spawn(count):
         milling = random_case(rng)
-        limit = limit_mm(milling)
+        limit = limit_mm(milling) if len(milling.x + milling.y) <= most_modes else math.inf
         if not math.isfinite(limit):
             continue
         below, above = (program(milling, limit * rng.uniform(*share)) for share in ((0.3, 0.8), (1.05, 3.0)))

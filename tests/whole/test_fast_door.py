@@ -10,7 +10,7 @@ import pytest
 
 from lobewatch.commands import COMMANDS
 
-HEAVY = {"numpy", "scipy", "matplotlib", "numba", "aiohttp", "h5py", "jinja2"}
+HEAVY = {"numpy", "scipy", "matplotlib", "aiohttp", "h5py", "jinja2"}
 COMMAND_LINE = """
 import sys
 sys.argv[0] = "lobewatch"

@@ -346,5 +346,5 @@ def test_a_recommended_depth_is_stable_when_it_is_entered(path: Path) -> None:
 def test_a_program_is_charted_with_its_own_tool(path: Path) -> None:
     tap(path, 0, 1713.0)
     tap(path, 1, 1650.0, tool="another")
-    said = json.loads(run("lobes", path, "--cut", "A: slot at 12 900 rpm", "--json").stdout)
+    said = json.loads(run("lobes", path, "--cut", "A: slot at 12 600 rpm", "--json").stdout)
     assert [program["name"][0] for program in said["programs"]] == ["A", "B", "C"]

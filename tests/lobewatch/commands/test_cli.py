@@ -90,7 +90,7 @@ def test_a_live_tap_finds_the_emulated_spindle(run: Run, trial: MachineFolder, d
     assert "10 / 10  ✓ GOOD" in said.err
     assert "followed: 1713.0" in said.out
     assert re.search(r"bearing stiffness +(1280\.\d|1279\.\d)", said.out)
-    assert "A: slot at 12 900 rpm" in said.out
+    assert "A: slot at 12 600 rpm" in said.out
     (entry,) = trial.taps()
     assert trial.read(entry).circumstances.operator == "Kim"
 
@@ -217,9 +217,9 @@ def test_lobes_and_report(run: Run, trial: MachineFolder, device: TapsEmulator) 
     assert Path("lobes.svg").read_text(encoding="utf-8").count("<svg") == 1
     measured = run("lobes", "trial", "--source", "frf", "--json").json
     assert measured["minimum_depth_mm"] == pytest.approx(said["minimum_depth_mm"], rel=0.1)
-    assert "A: slot" in run("lobes", "trial", "--cut", "A: slot at 12 900 rpm").out
+    assert "A: slot" in run("lobes", "trial", "--cut", "A: slot at 12 600 rpm").out
     refused(
-        run("lobes", "trial", "--cut", "Z"), "'Z' is none of the cuts with tool 'reference'", "B: slot at 8 700 rpm"
+        run("lobes", "trial", "--cut", "Z"), "'Z' is none of the cuts with tool 'reference'", "B: slot at 6 200 rpm"
     )
     refused(run("lobes", "trial", "--figure", "lobes.xyz"), "lobes.xyz", ".svg, .png or .pdf")
     assert run("report", "trial", "--out", "r.html").out == "report: r.html\n"
@@ -232,7 +232,7 @@ def test_lobes_and_report(run: Run, trial: MachineFolder, device: TapsEmulator) 
 
 
 def test_a_name_with_markup_is_shown_as_it_is(run: Run, trial: MachineFolder, device: TapsEmulator) -> None:
-    trial.toml.write_text(trial.toml.read_text().replace('name = "A: slot at 12 900 rpm"', 'name = "<b>[bold]&x"'))
+    trial.toml.write_text(trial.toml.read_text().replace('name = "A: slot at 12 600 rpm"', 'name = "<b>[bold]&x"'))
     assert "<b>[bold]&x" in run("tap", "trial", "--port", device.port).out
     run("report", "trial")
     html = Path("trial/report.html").read_text(encoding="utf-8")

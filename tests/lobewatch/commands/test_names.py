@@ -58,7 +58,7 @@ def folder(tmp_path: Path) -> MachineFolder:
     make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
     toml = tmp_path / "m" / "machine.toml"
     text = toml.read_text("utf-8").replace("high_rpm = 24000", "high_rpm = 24000\nsteps = 300")
-    for old in ('"m"', '"A: slot at 12 900 rpm"'):
+    for old in ('"m"', '"A: slot at 12 600 rpm"'):
         assert old in text
         text = text.replace(old, f"'{FORMULA}'")
     toml.write_text(text, "utf-8")

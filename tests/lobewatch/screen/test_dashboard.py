@@ -87,7 +87,7 @@ def test_a_worn_machine_says_how_far_its_frequency_has_fallen(shop: Path) -> Non
     assert 0 < series.fall.std < 0.01
     assert (found.light, series.name) == ("alarm", "reference, x")
     assert found.days_left == pytest.approx(-10)
-    assert any("slot at 12 900 rpm" in remark.about for remark in found.remarks)
+    assert any("slot at 12 600 rpm" in remark.about for remark in found.remarks)
     assert "overdue" in [remark.code for remark in found.remarks]
 
 

@@ -94,7 +94,7 @@ def test_a_worn_direction_is_not_forgotten_when_another_one_is_tapped(folder: Ma
 def test_a_program_that_chatters_is_named(folder: MachineFolder) -> None:
     soft = tapped(folder, 0, 1720.0, stiffness=3e6)
     assert soft.light == "alarm"
-    assert any("A: slot at 12 900 rpm" in text and text.endswith(": not stable.") for text in soft.texts)
+    assert any("A: slot at 12 600 rpm" in text and text.endswith(": not stable.") for text in soft.texts)
     assert "lobewatch check" in soft.next_step
 
 

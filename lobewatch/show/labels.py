@@ -1,0 +1,90 @@
+"""Words beside places in a picture that do not cover one another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+from matplotlib.axes import Axes
+
+Side = Literal["right", "left", "above", "below"]
+SIDES: dict[Side, tuple[float, float]] = {"right": (1, 0), "left": (-1, 0), "above": (0, 1), "below": (0, -1)}
+SIZE = 8.5
+"""Of the letters (points)."""
+WIDE, HIGH = 0.62, 1.35
+"""A letter and a line, at most, over the size."""
+AWAY = 9.0
+"""From a place to its words (points)."""
+PAPER = {"color": "white", "alpha": 0.75, "pad": 1, "lw": 0}
+"""Behind words that stand on lines."""
+
+
+class _Box(NamedTuple):
+    """In points of the axes."""
+
+    left: float
+    low: float
+    right: float
+    high: float
+
+    def overlap(self, other: _Box) -> float:
+        """Area in common."""
+        wide = min(self.right, other.right) - max(self.left, other.left)
+        high = min(self.high, other.high) - max(self.low, other.low)
+        return wide * high if wide > 0 and high > 0 else 0.0
+
+
+class Labels:
+    """Those of one picture, whose limits are set already."""
+
+    def __init__(self, axes: Axes) -> None:
+        """None yet."""
+        self._axes = axes
+        self._taken: list[_Box] = []
+
+    def add(
+        self, text: str, place: tuple[float, float], colour: str = "black", sides: Sequence[Side] = tuple(SIDES)
+    ) -> None:
+        """Put words to that side of a place where they cover least of what is there, the first of several."""
+        boxes = {side: self._box(text, place, side) for side in sides}
+        best = min(boxes, key=lambda side: self._covered(boxes[side]))
+        self._taken.append(boxes[best])
+        right, up = SIDES[best]
+        self._axes.annotate(
+            text,
+            place,
+            xytext=(AWAY * right, AWAY / 2 * up),
+            textcoords="offset points",
+            fontsize=SIZE,
+            color=colour,
+            ha={1: "left", -1: "right"}.get(int(right), "center"),
+            va={1: "bottom", -1: "top"}.get(int(up), "center"),
+            bbox=PAPER,
+        )
+
+    def _box(self, text: str, place: tuple[float, float], side: Side) -> _Box:
+        lines, (right, up) = text.split("\n"), SIDES[side]
+        wide, high = WIDE * SIZE * max(map(len, lines)), HIGH * SIZE * len(lines)
+        x, y = self._points(place)
+        middle = x + right * (AWAY + wide / 2), y + up * (AWAY / 2 + high / 2)
+        return _Box(middle[0] - wide / 2, middle[1] - high / 2, middle[0] + wide / 2, middle[1] + high / 2)
+
+    def _covered(self, box: _Box) -> float:
+        """Area of other words, and area outside of the axes."""
+        inside = box.overlap(_Box(0, 0, *self._size))
+        outside = (box.right - box.left) * (box.high - box.low) - inside
+        return outside + sum(box.overlap(other) for other in self._taken)
+
+    def _points(self, place: tuple[float, float]) -> tuple[float, float]:
+        shares = (
+            (value - low) / (high - low)
+            for value, (low, high) in zip(place, (self._axes.get_xlim(), self._axes.get_ylim()), strict=True)
+        )
+        x, y = (share * size for share, size in zip(shares, self._size, strict=True))
+        return x, y
+
+    @property
+    def _size(self) -> tuple[float, float]:
+        box = self._axes.get_window_extent()
+        points = 72 / self._axes.figure.dpi
+        return box.width * points, box.height * points

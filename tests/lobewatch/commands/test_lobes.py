@@ -1,4 +1,4 @@
-"""`lobewatch lobes`: methods, pictures, materials."""
+"""`lobewatch check` and `lobewatch lobes`: verdicts, advice, methods, pictures, materials."""
 
 from __future__ import annotations
 
@@ -17,10 +17,13 @@ from lobes import (
     Cut,
     DepthBand,
     Pocket,
+    Program,
+    check_program,
     radial_lobes,
     stability_boundary,
+    tolerable_decay,
 )
-from lobewatch.analysis import Logbook, lobes_of
+from lobewatch.analysis import Logbook, aging, lobes_of
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.machine_file import parse_machine
@@ -78,6 +81,128 @@ def edit(folder: MachineFolder, old: str, new: str) -> MachineFolder:
     assert old in text
     folder.toml.write_text(text.replace(old, new), "utf-8")
     return MachineFolder(folder.path)
+
+
+def test_a_new_spindle_passes_and_an_aged_one_does_not(run: Run, folder: MachineFolder) -> None:
+    tap(folder, 1713.0)
+    good = run("check", "m")
+    assert (good.code, good.out.splitlines()[-1]) == (0, "0 of 3 programs not stable")
+    tap(folder, 1713.0 * 0.9, days=700)
+    said = run("check", "m")
+    assert said.code == 1
+    assert said.out.splitlines()[-1] == "2 of 3 programs not stable"
+    assert said.out.count("NOT STABLE any more") == 2
+    assert "A: slot at 12 600 rpm: chatter near 15" in said.out
+    assert "the nearest stable speed" in said.out
+    assert "modes in the x direction alone" in said.out
+
+
+def test_the_numbers_of_check_are_those_of_lobes(run: Run, folder: MachineFolder) -> None:
+    tap(folder, 1713.0)
+    tap(folder, 1690.0, days=0.2, direction="y")
+    said = json.loads(run("check", "m", "--json").out)
+    newest = Logbook(folder).assembly()
+    assert newest.x is not None
+    assert newest.y is not None
+    assert newest.x[0].frequency == pytest.approx(1713, abs=0.1)
+    for entry, table in zip(said["programs"], folder.machine.program, strict=True):
+        program = Program(folder.machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
+        found = check_program(program, newest.x, newest.y, np.array([table.speed_rpm]))
+        assert entry["limit_mm"] == pytest.approx(found.limit * 1e3, rel=1e-6)
+        assert entry["stable"] == found.stable
+        assert entry["depth_margin"] == pytest.approx(entry["limit_mm"] / entry["depth_mm"] - 1)
+        assert entry["limit_low_mm"] <= entry["limit_mm"] <= entry["limit_high_mm"]
+
+
+def test_decay_left_follows_the_model_or_keeps_k(folder: MachineFolder) -> None:
+    tap(folder, 1713.0)
+    newest = Logbook(folder).assembly()
+    modes_at, said = aging(newest)
+    assert "K changes as in the model" in said.text
+    x, y = modes_at(0.9)
+    assert x is not None
+    assert y is None
+    assert newest.x is not None
+    assert x[0].frequency == pytest.approx(0.9 * newest.x[0].frequency)
+    assert x[0].stiffness / newest.x[0].stiffness == pytest.approx(0.986, abs=0.002)
+    logbook = Logbook(folder)
+    first = logbook.verdicts()[0]
+    program = Program(folder.machine.build_cut(first.program), 12600.0, 6e-3)
+    assert logbook.advice(first).decay == pytest.approx(tolerable_decay(program, modes_at))
+    assert 0.01 < logbook.advice(first).decay < 0.1
+    bare = folder.toml.read_text("utf-8").partition("# The spindle of the example")[0]
+    folder.toml.write_text(bare, "utf-8")
+    without = Logbook.open(folder.path).assembly()
+    modes_at, said = aging(without)
+    assert "K does not (no model)" in said.text
+    aged = modes_at(0.9)[0]
+    assert aged is not None
+    assert without.x is not None
+    assert aged[0].stiffness == without.x[0].stiffness
+
+
+def test_the_drive_and_missing_taps_are_told(run: Run, folder: MachineFolder) -> None:
+    edit(folder, "speed_rpm = 12600", "feed_per_tooth_mm = 0.1\nspeed_rpm = 12600")
+    edit(folder, "[speed]", "[drive]\npower_kw = 5\n\n[speed]")
+    edit(folder, 'name = "B: slot at 6 200 rpm"\ntool = "reference"', 'name = "B: slot at 6 200 rpm"\ntool = "T7"')
+    tap(folder, 1713.0)
+    said = run("check", "m")
+    assert "A: slot at 12 600 rpm: [drive] allows no more than" in said.out
+    assert "not checked: no tap test with tool 'T7'" in said.out
+    assert said.code == 1
+    assert said.out.splitlines()[-1] == "0 of 2 programs not stable, 1 of 3 not checked"
+    assert "note: C: slot at 16 000 rpm: [drive] does not count: feed_per_tooth_mm is missing" in said.out
+    power = 4 * 0.02 / (4 * np.pi) * 2 * 1400e6 * 1e-4 * 2 * np.pi * 12600 / 60
+    assert f"{np.floor(5000 / power * 1e5) / 100:.2f} mm" in said.out
+
+
+def test_programs_that_cannot_be_checked_are_no_success(run: Run, folder: MachineFolder) -> None:
+    edit(folder, 'tool = "reference"\nteeth', 'tool = "T7"\nteeth')
+    tap(folder, 1713.0)
+    said = run("check", "m", "--json")
+    assert (said.code, json.loads(said.out)["not_checked"], json.loads(said.out)["unstable"]) == (1, 3, 0)
+
+
+def test_any_more_is_said_of_the_same_directions_only(run: Run, folder: MachineFolder) -> None:
+    tap(folder, 1713.0)
+    tap(folder, 1713.0 * 0.9, days=700)
+    assert run("check", "m").out.count("NOT STABLE any more") == 2
+    tap(folder, 1713.0 * 0.9, days=700.1, direction="y")
+    tap(folder, 1713.0 * 0.9, days=700.2)
+    said = run("check", "m").out
+    assert ("NOT STABLE" in said, "any more" in said) == (True, False)
+
+
+def test_beyond_the_drive_and_notes_of_single_programs(run: Run, folder: MachineFolder) -> None:
+    edit(folder, "speed_rpm = 12600", "feed_per_tooth_mm = 0.1\nspeed_rpm = 12600")
+    edit(folder, "[speed]", "[drive]\npower_kw = 0.5\n\n[speed]")
+    edit(folder, "depth_mm = 8.0", "depth_mm = 80.0")
+    tap(folder, 1713.0)
+    said = run("check", "m")
+    (row,) = (line for line in said.out.splitlines() if line.startswith("A: slot at 12 600 rpm  "))
+    assert row.endswith("beyond the drive")
+    assert "note: reference: decay left" in said.out
+    assert "note: reference: modes in the x direction alone" in said.out
+
+
+def test_a_long_check_says_how_far_it_is(run: Run, folder: MachineFolder, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("lobewatch.commands.check.PATIENCE", -1.0)
+    tap(folder, 1713.0)
+    assert run("check", "m").err.count("0 of 3 programs are checked") == 1
+
+
+def test_no_stable_speed_is_said(run: Run, folder: MachineFolder) -> None:
+    edit(folder, "depth_mm = 6.0", "depth_mm = 900.0")
+    tap(folder, 1713.0)
+    assert "no stable speed at this depth in 3000..24000 rpm" in run("check", "m").out
+
+
+def test_check_without_anything_to_check_is_refused(run: Run, folder: MachineFolder) -> None:
+    said = run("check", "m")
+    assert (said.code, "no tap test yet" in said.err) == (2, True)
+    make_machine_folder(Path("plain"), "new_machine.toml")
+    said = run("check", "plain")
+    assert (said.code, "no [[program]] to check" in said.err) == (2, True)
 
 
 def test_methods_pockets_and_shifts(run: Run, folder: MachineFolder) -> None:
@@ -212,6 +337,41 @@ def test_pockets_are_compared_where_both_tops_are_known(run: Run, folder: Machin
         top = float(first.depth_at(shift["then"]["speed_rpm"]))
         assert shift["then"]["depth_mm"] == pytest.approx(top * 1e3)
         assert shift["depth_change"] == pytest.approx(1.2 / 3.5 - 1, abs=0.05)
+
+
+def test_the_report_says_what_check_says(run: Run, folder: MachineFolder) -> None:
+    text = folder.toml.read_text("utf-8")
+    cut = text.partition('name = "A: slot at 12 600 rpm"')[2]
+    cut = cut[: cut.index("[[program]]")].replace("radial_depth_mm = 20", "radial_depth_mm = 10")
+    added = ""
+    for name, tool, speed, depth in (
+        ("H", "reference", 23500, 50),
+        ("P", "long end mill", 12600, 0.2),
+        ("U", "T9", 9e3, 1),
+    ):
+        own = cut.replace('"reference"', f'"{tool}"').replace("speed_rpm = 12600", f"speed_rpm = {speed}")
+        added += f'[[program]]\nname = "{name}"' + own.replace("depth_mm = 6.0", f"depth_mm = {depth}")
+    head, tail = text[: text.index("[[program]]")], text[text.index("# The spindle of the example") :]
+    folder.toml.write_text(f"{head}{added}\n{tail}", "utf-8")
+    folder = MachineFolder(folder.path)
+    tap(folder, 1541.7)
+    said = {entry["name"]: entry for entry in json.loads(run("check", "m", "--json").out)["programs"]}
+    zero = lobes_of(Logbook(folder).assembly(), folder.machine)["H"].depth_at(23500) * 1e3
+    assert said["H"]["limit_mm"] < 50 < zero
+    run("report", "m")
+    html = Path("m/report.html").read_text("utf-8")
+    rows = {row.partition("<")[0]: row.partition("</tr>")[0] for row in html.split("<tr><td>")}
+    for name in "HP":
+        assert f"<td>{said[name]['limit_mm']:.2f}" in rows[name]
+        assert ("✗ not stable" in rows[name]) == (not said[name]["stable"])
+    assert "predicted" in rows["P"]
+    assert "predicted" not in rows["H"]
+    assert "not checked: no tap test with tool &#39;T9&#39;" in rows["U"]
+    assert "not stable" in html[: html.index("<table>")]
+    assert "U: not checked" in html
+    assert "average tooth angle" not in html
+    assert "by semi-discretisation" in html
+    assert "Limit of the reference cut by zero order" in html
 
 
 def test_a_predicted_diagram_says_so_and_is_no_waterfall(run: Run, folder: MachineFolder) -> None:

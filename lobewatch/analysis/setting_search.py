@@ -8,21 +8,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import islice
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import minimum_filter1d
 
-from lobes import lowest_of, zero_order
 from lobewatch.analysis.aging import StiffnessAt, aged, softening
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.drawn import Drawn
 from lobewatch.analysis.drawn_limits import ALIKE
+from lobewatch.analysis.promise import Promise
 from lobewatch.analysis.series import fall_in
 from lobewatch.analysis.verdict import Word, verdict
-from lobewatch.machine import Machine, ProgramTable, drive_limit
+from lobewatch.machine import Machine, ProgramTable
 
 SPARE = 0.20
 """Depth that a recommended setting has to spare in the middle of the doubt."""
@@ -32,10 +32,6 @@ UNKNOWN_FALL = 0.02
 """... or this fall of the frequency where no rate is known."""
 RPM, MM = 10.0, 0.05
 """Steps that can be set at a machine; numbers are rounded inwards to them."""
-GRID = 0.002
-"""Relative step of the speeds of the diagram."""
-BESIDE = 0.003
-"""Relative distance of the frequency that the diagram counts on beside speed and fall."""
 DEPTHS = np.geomspace(0.2, 1.0, 9)
 """Shares of what the diagram promises that are looked at with a few draws ..."""
 LESS = (0.95, 0.88, 0.8)
@@ -88,62 +84,42 @@ class SettingSearch:
     machine: Machine
     stiffness_at: StiffnessAt
     fall: float
-    speeds: Floats
-    """Those of the diagram (rpm), shape (n,)."""
-    promised: Floats
-    """Depth (mm) that the diagram promises there over all of the doubt, shape (n,)."""
+    promise: Promise
+    """Where to look."""
 
     @classmethod
     def of(cls, program: ProgramTable, drawn: Drawn, assembly: Assembly, machine: Machine) -> SettingSearch:
         """The search around a program that was drawn."""
         fall = needed_fall(assembly, machine)
-        low, high = machine.speed.low_rpm, machine.speed.high_rpm
-        speeds = np.geomspace(low, high, max(int(math.log(high / low) / GRID), 2))
-        cuts = [replace(machine.build_cut(program), feed_angle=angle) for angle in drawn.angles.tolist()]
-        limit = lowest_of([zero_order(assembly.x, assembly.y, cut, speeds) for cut in cuts]).depth * 1e3
-        steps, ahead = math.ceil((drawn.doubt.speed + BESIDE + fall / 2) / GRID), round(fall / 2 / GRID)
-        around = minimum_filter1d(np.minimum(limit, 1e6), 2 * steps + 1, origin=-ahead, mode="nearest")
-        deepest = np.minimum(program.deepest_mm, 1e3 * drive_limit(machine, program, speeds))
-        promised = np.minimum(around / max(drawn.doubt.tangential.high, 1 + SPARE), deepest)
+        promise = Promise.of(program, drawn, assembly, machine, fall, SPARE)
         worst = drawn.fed(ALIKE * float(drawn.limits[0]), 2)
-        return cls(program, worst, assembly, machine, softening(assembly)[0], fall, speeds, promised)
+        return cls(program, worst, assembly, machine, softening(assembly)[0], fall, promise)
 
     def elsewhere(self) -> Setting | None:
         """The nearest window of speeds at the program's depth."""
         depth = self.program.depth_mm
-        windows = _runs(self.promised >= depth)
-        middles = sorted((float(self.speeds[run[run.size // 2]]) for run in windows), key=self._distance)
+        middles = sorted(self.promise.middles(depth), key=self._distance)
         found = (self._verified(_rounded(speed), depth) for speed in middles[:PLACES])
         return next((setting for setting in found if setting), None)
 
     def most_chips(self) -> Setting | None:
         """The speed and depth of largest removal rate."""
-        found = (self._deepest(*place) for place in self._places())
+        found = (self._deepest(*place) for place in self._calm(self.promise.tops()))
         return next((setting for setting in found if setting), None)
 
     def pockets(self, count: int) -> list[Setting]:
-        """The settings of largest removal rate, none inside the window of another, each in the middle of its window."""
-        found: list[Setting] = []
-        for speed, depth_mm in self._places():
-            inside = (low <= speed <= high for low, high in (one.window_rpm for one in found))
-            setting = None if any(inside) else self._deepest(self._middle(speed, LESS[0] * depth_mm), depth_mm)
-            found += [setting] if setting else []
-            if len(found) == count:
-                break
-        return found
+        """The settings of largest removal rate, one a pocket.
 
-    def _middle(self, speed: float, depth_mm: float) -> float:
-        """The middle of the speeds around one at which the diagram promises a depth (mm), now and after the fall."""
-        near = int(np.argmin(np.abs(self.speeds - speed)))
-        run = next((run for run in _runs(self.promised >= depth_mm) if run[0] <= near <= run[-1]), None)
-        return speed if run is None else _rounded(float(self.speeds[[run[0], run[-1]]].mean()))
+        Each in the middle of the speeds that are promised to be safe now and after the fall.
+        """
+        places = self._calm(self.promise.pockets())
+        found = (self._deepest(_rounded(self.promise.middle(*place)), place[1]) for place in places)
+        return list(islice((setting for setting in found if setting), count))
 
-    def _places(self) -> list[tuple[float, float]]:
-        """Speeds (rpm) and depths (mm) at which a few draws are stable, the largest removal rate first."""
-        chips = self.promised * self.speeds
-        inside = np.flatnonzero((chips[1:-1] >= chips[:-2]) & (chips[1:-1] >= chips[2:])) + 1
-        tops = _apart(sorted(inside.tolist(), key=lambda i: -chips[i]))[:PLACES]
-        places = [(speed := _rounded(float(self.speeds[i])), self._calm_depth(speed, self.promised[i])) for i in tops]
+    def _calm(self, tops: Sequence[int]) -> list[tuple[float, float]]:
+        """Speeds (rpm) and depths (mm) there at which a few draws are stable, the largest removal rate first."""
+        promised = [(_rounded(float(self.promise.speeds[i])), self.promise.depths[i]) for i in tops[:PLACES]]
+        places = [(speed, self._calm_depth(speed, depth_mm)) for speed, depth_mm in promised]
         return sorted(places, key=lambda place: -place[0] * place[1])
 
     def here(self, depth_mm: float) -> Setting | None:
@@ -219,21 +195,6 @@ def _calm_from_the_first(grown: Floats) -> int:
     """Row up to which all of growth (k, draws) is negative from the first on."""
     calm = np.all(grown < 0, axis=1)
     return calm.size - 1 if np.all(calm) else max(int(np.argmin(calm)) - 1, 0)
-
-
-def _runs(wanted: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
-    """Places without a gap between them."""
-    places = np.flatnonzero(wanted)
-    return [run for run in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if run.size]
-
-
-def _apart(places: Sequence[int]) -> list[int]:
-    """Those that are not next to an earlier one."""
-    taken: list[int] = []
-    for place in places:
-        if all(abs(place - other) * GRID > 0.02 for other in taken):
-            taken.append(place)
-    return taken
 
 
 def _rounded(speed: float) -> float:

@@ -19,7 +19,7 @@ from lobes import RadialLobes
 from lobewatch.analysis import Setting, Verdict, Word
 from lobewatch.analysis.limit_band import LimitBand
 from lobewatch.show.figures import ALARM, GOOD, NOW, THEN, UNKNOWN, new_axes
-from lobewatch.show.labels import Labels
+from lobewatch.show.programs.labels import Labels
 
 Floats = NDArray[np.float64]
 

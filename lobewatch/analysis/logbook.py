@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import Self
 
 from acquisition import DataError, Remark, TapTest
-from lobewatch.analysis.advice import Advice, advise
 from lobewatch.analysis.assembling import NotTappedError, predicted, tapped
 from lobewatch.analysis.assembly import Assembly, lobes_of
 from lobewatch.analysis.history import History, Row, row_of
 from lobewatch.analysis.history_cache import store_history, stored_history
 from lobewatch.analysis.measurement import Measurement, measure
 from lobewatch.analysis.order import Place, places
+from lobewatch.analysis.programs.advice import Advice, advise
+from lobewatch.analysis.programs.verdict import Ruling, Verdict, unknown, verdict
 from lobewatch.analysis.recordings import Stored, store_recordings
 from lobewatch.analysis.standing import Standing, stand
-from lobewatch.analysis.verdict import Ruling, Verdict, unknown, verdict
 from lobewatch.machine import Machine, MachineFolder, ProgramTable, TapEntry
 from modal import Mode
 

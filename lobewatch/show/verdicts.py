@@ -12,7 +12,7 @@ from rich.table import Table
 
 from lobes.program_limit import DEEPEST
 from lobewatch.analysis import Verdict, Word
-from lobewatch.analysis.drawn_limits import TRIED
+from lobewatch.analysis.programs.drawn_limits import TRIED
 from lobewatch.show.output import table
 from lobewatch.show.programs.doubts import doubt_json
 

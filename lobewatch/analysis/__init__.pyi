@@ -1,6 +1,5 @@
 """From a tap test to what it means: measurement, history, prediction, verdict, standing."""
 
-from .advice import Advice
 from .assembly import ABOUT_DIRECTIONS, Assembly, lobes_of, speed_grid
 from .charts import Chart, Dynamics, Method, chart
 from .estimate import Estimate
@@ -13,9 +12,8 @@ from .model_calibration import ModelCalibration, calibrate_model
 from .model_picture import ModelPicture, model_picture
 from .model_state import ModelState, first_critical_speed, model_frf, model_state
 from .model_summary import ModelMode, ModelSummary, model_summary
-from .setting_search import Setting
+from .programs import Advice, Setting, Verdict, Word
 from .standing import Light, SeriesStanding, Standing, change_since_first, unreadable
-from .verdict import Verdict, Word
 
 __all__ = [
     "ABOUT_DIRECTIONS",

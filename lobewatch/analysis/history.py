@@ -18,7 +18,7 @@ from lobes import SldHistory, StabilityLobes
 from lobewatch.analysis.assembly import speed_grid
 from lobewatch.analysis.estimate import UNKNOWN, Estimate
 from lobewatch.analysis.measurement import Measurement
-from lobewatch.analysis.verdict import Ruling, Word
+from lobewatch.analysis.programs.verdict import Ruling, Word
 from lobewatch.machine import Machine
 from modal import Mode
 

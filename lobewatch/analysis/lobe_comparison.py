@@ -14,9 +14,9 @@ from lobewatch.analysis.assembly import Assembly, speed_grid
 from lobewatch.analysis.charts import DEEPEST, Chart, Dynamics, Method, chart, cut_table
 from lobewatch.analysis.logbook import Logbook
 from lobewatch.analysis.model_state import model_frf, model_state
-from lobewatch.analysis.robust_pockets import robust_pockets
-from lobewatch.analysis.setting_search import Setting
-from lobewatch.analysis.verdict import Verdict
+from lobewatch.analysis.programs.robust_pockets import robust_pockets
+from lobewatch.analysis.programs.setting_search import Setting
+from lobewatch.analysis.programs.verdict import Verdict
 from lobewatch.machine import Machine
 
 NO_POCKET = "no-safe-pocket"

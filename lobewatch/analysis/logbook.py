@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import Self
 
 from acquisition import DataError, Remark, TapTest
-from lobewatch.analysis.advice import Advice, advise
 from lobewatch.analysis.assembling import NotTappedError, predicted, tapped
 from lobewatch.analysis.assembly import Assembly, lobes_of
 from lobewatch.analysis.history import History, Row, row_of
 from lobewatch.analysis.history_cache import store_history, stored_history
 from lobewatch.analysis.measurement import Measurement, measure
 from lobewatch.analysis.order import Place, places
+from lobewatch.analysis.programs.advice import Advice, advise
+from lobewatch.analysis.programs.verdict import Ruling, Verdict, unknown, verdict
 from lobewatch.analysis.recordings import Stored, store_recordings
 from lobewatch.analysis.standing import Standing, stand
-from lobewatch.analysis.verdict import Ruling, Verdict, unknown, verdict
 from lobewatch.machine import Machine, MachineFolder, ProgramTable, TapEntry
 from modal import Mode
 
@@ -39,6 +39,7 @@ class Logbook:
         self._placed: Sequence[Place] | None = None
         self._history: History | None = None
         self._measurements: dict[str, Measurement] = {}
+        self._verdicts: dict[str | None, dict[str, Verdict]] = {}
 
     @classmethod
     def open(cls, path: Path | str) -> Self:
@@ -145,13 +146,13 @@ class Logbook:
     def verdicts(self, until: str | None = None, names: Collection[str] | None = None) -> list[Verdict]:
         """One a program (of these names), from the newest tap tests of its tool as they were after the test `until`."""
         tables = [table for table in self.machine.program if names is None or table.name in names]
-        known: dict[str, Assembly | NotTappedError] = {}
-        for tool in dict.fromkeys(table.tool for table in tables):
-            try:
-                known[tool] = self.assembly(tool, until)
-            except NotTappedError as error:
-                known[tool] = error
-        return [self._judge(table, known[table.tool]) for table in tables]
+        rows = self.history.rows
+        until = rows[-1].tap_id if until is None and rows else until
+        judged = self._verdicts.setdefault(until, {})
+        missing = [table for table in tables if table.name not in judged]
+        known = {tool: self._known(tool, until) for tool in dict.fromkeys(table.tool for table in missing)}
+        judged |= {table.name: self._judge(table, known[table.tool]) for table in missing}
+        return [judged[table.name] for table in tables]
 
     def rulings(self, tap_id: str) -> Mapping[str, Ruling]:
         """Word and limit of every program as they were after a tap test; the history keeps them once asked for."""
@@ -187,8 +188,14 @@ class Logbook:
     def _forget(self) -> None:
         """What a new tap test alters."""
         self._placed = self._history = None
-        self._measurements = {}
+        self._measurements, self._verdicts = {}, {}
         self._mark = self.folder.mark
+
+    def _known(self, tool: str, until: str | None) -> Assembly | NotTappedError:
+        try:
+            return self.assembly(tool, until)
+        except NotTappedError as error:
+            return error
 
     def _judge(self, table: ProgramTable, known: Assembly | NotTappedError) -> Verdict:
         if isinstance(known, Assembly):

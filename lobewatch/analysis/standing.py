@@ -14,7 +14,7 @@ from enum import StrEnum
 from acquisition import Remark
 from lobewatch.analysis.estimate import UNKNOWN, Estimate
 from lobewatch.analysis.history import History, Row
-from lobewatch.analysis.verdict import Word
+from lobewatch.analysis.programs.verdict import Word
 from lobewatch.machine import Limits, Machine
 
 

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from acquisition import Remark
 from lobewatch.analysis import Advice, Assembly, Logbook, Setting, Verdict, Word
-from lobewatch.analysis.verdict import Ruling
+from lobewatch.analysis.programs.verdict import Ruling
 from lobewatch.machine import SpeedRange
 from lobewatch.show.programs.settings import rpm, setting_json, spare
 from lobewatch.show.verdicts import verdict_json, verdict_table

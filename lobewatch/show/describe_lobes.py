@@ -13,7 +13,7 @@ from acquisition import Remark, joined
 from lobes import Pocket, PocketShift, cutting_coefficients
 from lobewatch.analysis import LobeComparison, Setting
 from lobewatch.analysis.lobe_comparison import NO_POCKET
-from lobewatch.analysis.setting_search import LEFT
+from lobewatch.analysis.programs.setting_search import LEFT
 from lobewatch.machine import Machine
 from lobewatch.show.measurements import lobes_json, programs_json, remark_json, remark_lines
 from lobewatch.show.output import table

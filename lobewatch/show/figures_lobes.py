@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from lobes import RadialLobes
 from lobewatch.analysis import Setting, Verdict, Word
-from lobewatch.analysis.limit_band import LimitBand
+from lobewatch.analysis.programs.limit_band import LimitBand
 from lobewatch.show.figures import ALARM, GOOD, NOW, THEN, UNKNOWN, new_axes
 from lobewatch.show.programs.labels import Labels
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from acquisition import DataError, Remark
 from lobes import Cut, StabilityLobes, radial_lobes
 from lobewatch.analysis import Chart, LobeComparison, Logbook, Method, chart
-from lobewatch.analysis.limit_band import limit_band
+from lobewatch.analysis.programs.limit_band import limit_band
 from lobewatch.machine import Machine
 from lobewatch.show.figures import save_figure
 from lobewatch.show.figures_lobes import lobes_figure, radial_figure, waterfall_figure

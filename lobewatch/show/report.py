@@ -24,7 +24,7 @@ from lobewatch.analysis import (
     change_since_first,
     lobes_of,
 )
-from lobewatch.analysis.limit_band import limit_band
+from lobewatch.analysis.programs.limit_band import limit_band
 from lobewatch.machine import Machine
 from lobewatch.show.advice import Advised, advised, advised_lines, decay_text
 from lobewatch.show.figures import frf_figure, svg, trend_figure

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from rich.table import Table
 
 from lobes.program_limit import DEEPEST
 from lobewatch.analysis import Verdict, Word
-from lobewatch.analysis.drawn_limits import TRIED
+from lobewatch.analysis.programs.drawn_limits import TRIED
 from lobewatch.show.output import table
 from lobewatch.show.programs.doubts import doubt_json
 
@@ -64,7 +63,6 @@ def verdict_json(found: Verdict) -> dict[str, Any]:
         "doubt": doubt_json(found),
         "method": found.method,
         "method_detail": found.detail,
-        "remarks": [asdict(remark) for remark in found.remarks],
     }
 
 

@@ -10,9 +10,9 @@ from random_milling import random_case
 from verdict_study import MACHINE, assembly, chattering, limit_mm, program, study, upper_limit
 
 from lobes import growth, piece_numbers
-from lobewatch.analysis.doubt import doubt_of
-from lobewatch.analysis.drawn import middle_row
-from lobewatch.analysis.verdict import Word, as_program, verdict
+from lobewatch.analysis.programs.doubt import doubt_of
+from lobewatch.analysis.programs.drawn import middle_row
+from lobewatch.analysis.programs.verdict import Word, as_program, verdict
 
 
 def say(text: str) -> None:

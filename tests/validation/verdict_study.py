@@ -17,9 +17,9 @@ from random_milling import RandomMilling, random_case
 from scipy.stats import beta
 
 from lobes import program_limit
-from lobewatch.analysis.advice import advise
 from lobewatch.analysis.assembly import Assembly
-from lobewatch.analysis.verdict import Word, as_program, verdict
+from lobewatch.analysis.programs.advice import advise
+from lobewatch.analysis.programs.verdict import Word, as_program, verdict
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.machine_file import parse_machine
 from modal import Mode

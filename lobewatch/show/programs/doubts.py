@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobewatch.analysis import Assembly, Verdict
-from lobewatch.analysis.doubt import Doubt, Span
+from lobewatch.analysis.programs.doubt import Doubt, Span
 from lobewatch.analysis.series import ENOUGH
 from lobewatch.machine import DoubtTable, Machine
 

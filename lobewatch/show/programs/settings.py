@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from lobewatch.analysis import Setting
-from lobewatch.analysis.setting_search import LEFT
+from lobewatch.analysis.programs.setting_search import LEFT
 
 
 def setting_json(setting: Setting | None) -> dict[str, Any] | None:

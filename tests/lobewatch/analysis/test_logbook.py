@@ -211,7 +211,7 @@ def test_only_the_newest_row_pays_for_its_verdicts(path: Path, monkeypatch: pyte
         asked.append(program)
         return program_limit(program, *modes)
 
-    monkeypatch.setattr("lobewatch.analysis.verdict.program_limit", counting)
+    monkeypatch.setattr("lobewatch.analysis.programs.verdict.program_limit", counting)
     for day in range(6):
         tap(path, day, 1713.0 - day)
     rows = Logbook.open(path).history.rows

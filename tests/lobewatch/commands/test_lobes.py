@@ -28,8 +28,8 @@ from lobewatch.analysis import (
     lobes_of,
     speed_grid,
 )
-from lobewatch.analysis.limit_band import LimitBand, limit_band
-from lobewatch.analysis.robust_pockets import robust_pockets
+from lobewatch.analysis.programs.limit_band import LimitBand, limit_band
+from lobewatch.analysis.programs.robust_pockets import robust_pockets
 from lobewatch.cli import main
 from lobewatch.machine import ProgramTable, drive_limit
 from lobewatch.machine.folder import MachineFolder

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from lobes import MillingRows, Program, ProgramLimit, growth, joined_rows, milling_system, piece_numbers, rows_of
 from lobes.program_limit import DEEPEST
 from lobewatch.analysis.assembly import Assembly
-from lobewatch.analysis.doubt import Doubt
+from lobewatch.analysis.programs.doubt import Doubt
 
 DRAWS = 300
 """As many stable ones say, with 95 % confidence, that no more than 1 % of the doubt chatters."""

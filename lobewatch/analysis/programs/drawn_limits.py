@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes.program_limit import DEEPEST
-from lobewatch.analysis.drawn import Drawn
+from lobewatch.analysis.programs.drawn import Drawn
 
 TRIED = np.array([0.75, 1.0, 1.4])
 """Shares of the limit in the middle, for its own cutting coefficient, at which each draw is looked at ..."""

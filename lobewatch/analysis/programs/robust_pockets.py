@@ -9,10 +9,10 @@ import msgspec
 
 from lobes import program_limit, zero_order
 from lobewatch.analysis.assembly import Assembly, speed_grid
-from lobewatch.analysis.doubt import doubt_of
-from lobewatch.analysis.drawn import draw
-from lobewatch.analysis.setting_search import MM, Setting, SettingSearch
-from lobewatch.analysis.verdict import as_program
+from lobewatch.analysis.programs.doubt import doubt_of
+from lobewatch.analysis.programs.drawn import draw
+from lobewatch.analysis.programs.setting_search import MM, Setting, SettingSearch
+from lobewatch.analysis.programs.verdict import as_program
 from lobewatch.machine import REFERENCE_CUT, CutTable, Machine, ProgramTable
 
 SHARE = 0.5

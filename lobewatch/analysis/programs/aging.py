@@ -12,7 +12,7 @@ from acquisition import Remark
 from dsm import Calibration, calibrate
 from lobes.program import SHARES
 from lobewatch.analysis.assembly import Assembly
-from lobewatch.analysis.drawn import Drawn
+from lobewatch.analysis.programs.drawn import Drawn
 
 FALLS = np.array([0.0, 0.05, 0.10, 0.15, 0.20])
 """Falls of the frequency for which the model is recalibrated; between them its stiffness is interpolated."""

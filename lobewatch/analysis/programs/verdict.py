@@ -13,10 +13,10 @@ import numpy as np
 from acquisition import Remark
 from lobes import Program, program_limit
 from lobewatch.analysis.assembly import ABOUT_DIRECTIONS, Assembly
-from lobewatch.analysis.doubt import doubt_of
-from lobewatch.analysis.drawn import DRAWS, Drawn, draw, middle_row, turning
-from lobewatch.analysis.drawn_limits import drawn_limits
-from lobewatch.analysis.settling import decisive, settles
+from lobewatch.analysis.programs.doubt import doubt_of
+from lobewatch.analysis.programs.drawn import DRAWS, Drawn, draw, middle_row, turning
+from lobewatch.analysis.programs.drawn_limits import drawn_limits
+from lobewatch.analysis.programs.settling import decisive, settles
 from lobewatch.machine import Machine, ProgramTable, drive_limit
 
 QUANTILES = (0.01, 0.99)

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 from acquisition import Remark
-from lobewatch.analysis.aging import softening, tolerable_decay
-from lobewatch.analysis.setting_search import SPARE, Setting, SettingSearch
-from lobewatch.analysis.verdict import Verdict, Word
+from lobewatch.analysis.programs.aging import softening, tolerable_decay
+from lobewatch.analysis.programs.setting_search import SPARE, Setting, SettingSearch
+from lobewatch.analysis.programs.verdict import Verdict, Word
 from lobewatch.machine import Machine
 
 

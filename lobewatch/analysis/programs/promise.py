@@ -12,7 +12,7 @@ from scipy.ndimage import minimum_filter1d
 
 from lobes import lowest_of, zero_order
 from lobewatch.analysis.assembly import Assembly
-from lobewatch.analysis.drawn import Drawn
+from lobewatch.analysis.programs.drawn import Drawn
 from lobewatch.machine import Machine, ProgramTable, drive_limit
 
 GRID = 0.002

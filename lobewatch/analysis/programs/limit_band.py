@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from lobes import Cut, MillingRows, Program, StabilityLobes, lowest_of, zero_order
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.charts import cut_table
-from lobewatch.analysis.doubt import doubt_of
-from lobewatch.analysis.drawn import middle_row
-from lobewatch.analysis.verdict import QUANTILES
+from lobewatch.analysis.programs.doubt import doubt_of
+from lobewatch.analysis.programs.drawn import middle_row
+from lobewatch.analysis.programs.verdict import QUANTILES
 from lobewatch.machine import Machine
 from modal import Mode
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from acquisition import Remark
 from lobes import MillingRows
 from lobewatch.analysis.assembly import Assembly
-from lobewatch.analysis.drawn import DRAWS, Drawn
+from lobewatch.analysis.programs.drawn import DRAWS, Drawn
 from lobewatch.machine import ProgramTable
 
 LOOKED_AT = 60

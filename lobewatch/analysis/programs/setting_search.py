@@ -15,13 +15,13 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.analysis.aging import StiffnessAt, aged, softening
 from lobewatch.analysis.assembly import Assembly
-from lobewatch.analysis.drawn import Drawn
-from lobewatch.analysis.drawn_limits import ALIKE
-from lobewatch.analysis.promise import Promise
+from lobewatch.analysis.programs.aging import StiffnessAt, aged, softening
+from lobewatch.analysis.programs.drawn import Drawn
+from lobewatch.analysis.programs.drawn_limits import ALIKE
+from lobewatch.analysis.programs.promise import Promise
+from lobewatch.analysis.programs.verdict import Word, verdict
 from lobewatch.analysis.series import fall_in
-from lobewatch.analysis.verdict import Word, verdict
 from lobewatch.machine import Machine, ProgramTable
 
 SPARE = 0.20

@@ -1,0 +1,432 @@
+"""`lobewatch check`: four words, their doubt, settings that are safe, exit codes."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from lobes import Program, program_limit
+from lobewatch.analysis import Advice, Setting
+from lobewatch.cli import main
+from lobewatch.machine.new_folder import make_machine_folder
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+
+
+class Said(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> dict[str, Any]:
+        parsed: dict[str, Any] = json.loads(self.out)
+        return parsed
+
+    @property
+    def programs(self) -> dict[str, dict[str, Any]]:
+        return {one["name"]: one for one in self.json["programs"]}
+
+    @property
+    def last(self) -> str:
+        return self.out.splitlines()[-1]
+
+    def line(self, name: str) -> str:
+        """What is said of a program below the table."""
+        (found,) = (line for line in self.out.splitlines() if line.startswith(f"{name}: "))
+        return found
+
+
+Check = Callable[..., Said]
+
+
+@pytest.fixture
+def check(shop: Shop, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Check:
+    """Runs `lobewatch check` on the shop, or on another folder."""
+
+    def command(*options: str, folder: Path | None = None) -> Said:
+        monkeypatch.setattr(sys, "argv", ["lobewatch", "check", str(folder or shop.path), *options])
+        capsys.readouterr()
+        code: Any = 0
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code or 0
+        return Said(code, *capsys.readouterr())
+
+    return command
+
+
+@pytest.fixture
+def no_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Takes the search for settings out of tests that are not about it."""
+    monkeypatch.setattr("lobewatch.analysis.logbook.advise", lambda *_: Advice())
+
+
+def advised_to(monkeypatch: pytest.MonkeyPatch, best: Setting | None, here: Setting | None) -> None:
+    monkeypatch.setattr("lobewatch.analysis.logbook.advise", lambda *_: Advice(best, here))
+
+
+def test_a_new_spindle_passes_and_an_aged_one_does_not(shop: Shop, check: Check) -> None:
+    shop.tap_both()
+    good = check()
+    assert (good.code, good.last) == (0, "3 programs: 3 stable")
+    assert "lobewatch" not in good.out
+    shop.tap_both(700, 0.9)
+    said = check()
+    assert (said.code, said.last) == (1, "3 programs: 1 stable, 2 not stable")
+    assert said.line("A").startswith("A: stable at first, no longer: chatter near 15")
+    assert not re.search(r"^B: ", said.out, re.MULTILINE)
+
+
+def test_one_direction_is_never_enough_to_be_called_stable(shop: Shop, check: Check, no_search: None) -> None:
+    shop.run(("A", 12900, 0.05), ("B", 8700, 0.4))
+    shop.tap(0, 1713.0)
+    said = check("--json")
+    assert said.code == 1
+    assert {one["verdict"] for one in said.json["programs"]} == {"doubtful"}
+    assert {one["decided_by"] for one in said.json["programs"]} == {"untapped"}
+    assert {one["stable"] for one in said.json["programs"]} == {True}
+    assert check().line("A") == "A: direction y was not tapped; to settle it: tap y"
+    shop.tap(0.1, 1690.0, "y", tool="another")
+    assert (check("--json").programs["A"]["verdict"], check().line("A").endswith("tap y")) == ("doubtful", True)
+    shop.tap(0.2, 1690.0, "y")
+    both = check("--json")
+    assert (both.code, {one["verdict"] for one in both.json["programs"]}) == (0, {"stable"})
+
+
+def test_without_the_other_direction_nothing_is_recommended(shop: Shop, check: Check) -> None:
+    shop.run(("A", 12900, 6))
+    shop.tap(0, 1713.0, "y")
+    said = check("--json")
+    assert (said.programs["A"]["verdict"], said.programs["A"]["advice"]) == ("not stable", None)
+    assert check().line("A").endswith("tap direction x too: only then can a safe speed be named")
+
+
+def test_the_object_of_a_program(shop: Shop, check: Check) -> None:
+    shop.run(("A", 12900, 6))
+    shop.tap_both()
+    said = check("--json")
+    counts = {key: value for key, value in said.json.items() if key != "programs"}
+    assert counts == {"unstable": 1, "doubtful": 0, "not_checked": 0, "beyond_drive": 0}
+    found = said.programs["A"]
+    assert found.keys() >= {
+        *("name", "speed_rpm", "depth_mm", "feed", "tap_id", "stable", "verdict", "verdict_at_first"),
+        *("limit_mm", "limit_low_mm", "limit_high_mm", "depth_margin", "chance_turning", "decided_by", "cuts"),
+        *(
+            "advice",
+            "advice_here",
+            "tolerable_decay",
+            "was_stable_at_first",
+            "chatter_frequency_hz",
+            "kind",
+            "measured",
+        ),
+        *("worst_feed_deg", "drive_limit_mm", "doubt", "method", "method_detail", "remarks"),
+    }
+    assert not found.keys() & {"nearest_speed_rpm", "speed_margin", "limit_band"}
+    assert (found["stable"], found["verdict"], found["cuts"], found["decided_by"]) == (False, "not stable", 0, None)
+    for advice in (found["advice"], found["advice_here"]):
+        assert advice.keys() == {"speed_rpm", "depth_mm", "window_rpm", "depth_margin", "frequency_left"}
+        low, high = advice["window_rpm"]
+        assert low <= advice["speed_rpm"] <= high
+        assert advice["depth_margin"] >= 0.2
+    assert found["advice_here"]["speed_rpm"] == 12900
+    assert found["drive_limit_mm"] is None
+    assert found["doubt"]["clamping"] == {"frequency": [0.003] * 2, "damping_ratio": [0.1] * 2, "stiffness": [0.03] * 2}
+    assert (found["doubt"]["speed"], found["doubt"]["coefficients"]["tangential"]) == (0.01, pytest.approx([-0.2, 0.2]))
+
+
+def test_the_numbers_are_those_of_the_limit_in_the_worst_feed(shop: Shop, check: Check, no_search: None) -> None:
+    shop.tap_both()
+    machine, newest = shop.folder.machine, shop.logbook.assembly()
+    for entry, table in zip(check("--json").json["programs"], machine.program, strict=True):
+        program = Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
+        found = program_limit(program, newest.x, newest.y, table.feed_angles)
+        assert entry["limit_mm"] == pytest.approx(found.limit * 1e3, rel=1e-6)
+        assert entry["stable"] == found.stable
+        assert entry["worst_feed_deg"] == pytest.approx(np.degrees(found.feed_angle))
+        assert entry["depth_margin"] == pytest.approx(entry["limit_mm"] / entry["depth_mm"] - 1)
+        assert 0.6 * entry["limit_mm"] < entry["limit_low_mm"] < entry["limit_mm"] < entry["limit_high_mm"]
+        assert 0 <= entry["chance_turning"] <= 1
+
+
+def test_every_recommended_setting_is_stable_when_it_is_entered(shop: Shop, check: Check) -> None:
+    shop.run(("A", 12900, 6), ("B", 8700, 3))
+    shop.tap_both()
+    said = check("--json").json["programs"]
+    settings = [one[key] for one in said for key in ("advice", "advice_here") if one[key] is not None]
+    assert len(settings) >= 2
+    places = [(speed, one["depth_mm"]) for one in settings for speed in (one["speed_rpm"], *one["window_rpm"])]
+    shop.run(*((f"P{i}", speed, depth) for i, (speed, depth) in enumerate(places)))
+    entered = check("--json")
+    assert entered.code == 0
+    assert {one["verdict"] for one in entered.json["programs"]} == {"stable"}
+    for one, setting in zip(entered.json["programs"][::3], settings, strict=True):
+        assert one["depth_margin"] == pytest.approx(setting["depth_margin"], rel=1e-6)
+        assert one["depth_margin"] >= 0.2
+        assert one["speed_rpm"] % 10 == 0
+        assert round(one["depth_mm"] / 0.05, 6).is_integer()
+
+
+BEST = Setting(23670.0, 6.0, (23320.0, 24000.0), 0.559, 0.1)
+FEWER = Setting(12640.0, 2.55, (12510.0, 12880.0), 0.508, 0.025)
+HERE = Setting(12900.0, 1.95, (12160.0, 13150.0), 1.02, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("best", "here", "words"),
+    [
+        (
+            BEST,
+            None,
+            "run this depth at 23 670 rpm "
+            "(23 320 to 24 000 rpm is safe; 55 % of depth to spare; f_n may fall by 10 % or more)",
+        ),
+        (
+            FEWER,
+            HERE,
+            "no safe speed for this depth in 3 000 to 24 000 rpm; most chips: 2.55 mm at 12 640 rpm "
+            "(12 510 to 12 880 rpm is safe; 50 % of depth to spare; f_n may fall by 2.5 %); at 12 900 rpm no "
+            "deeper than 1.95 mm (12 160 to 13 150 rpm is safe; 102 % of depth to spare; f_n may fall by less than 1 %)",
+        ),
+        (
+            HERE,
+            HERE,
+            "no safe speed for this depth in 3 000 to 24 000 rpm; at 12 900 rpm no deeper than 1.95 mm "
+            "(12 160 to 13 150 rpm is safe; 102 % of depth to spare; f_n may fall by less than 1 %)",
+        ),
+        (None, None, "no safe speed in 3 000 to 24 000 rpm; choose another tool"),
+    ],
+)
+def test_advice_in_words(
+    shop: Shop,
+    check: Check,
+    monkeypatch: pytest.MonkeyPatch,
+    best: Setting | None,
+    here: Setting | None,
+    words: str,
+) -> None:
+    shop.run(("A", 12900, 6), ("D", 12900, 3))
+    shop.tap_both()
+    advised_to(monkeypatch, best, here)
+    said = check()
+    assert re.fullmatch(r"A: chatter near 16\d\d Hz; " + re.escape(words), said.line("A"))
+    if best is not BEST:
+        assert said.line("D").endswith(f"; until then {words}")
+
+
+def test_a_doubtful_program_says_what_decides_and_what_would_settle_it(
+    shop: Shop, check: Check, no_search: None
+) -> None:
+    shop.run(("A", 12900, 3))
+    shop.tap_both()
+    said = check("--json").programs["A"]
+    assert (said["verdict"], said["stable"], said["decided_by"]) == ("doubtful", True, "coefficients")
+    assert [one["code"] for one in said["remarks"]] == ["doubt-decides"]
+    text = check()
+    words = r"A: the cutting coefficients decide: chatters above Kt (\d+) N/mm2; to settle it: measure them"
+    decided = re.match(words, text.line("A"))
+    assert decided is not None
+    assert float(decided[1]) == pytest.approx(1400 * said["limit_mm"] / 3, abs=1)
+    assert text.out.count("coefficients decide") == 1
+    assert text.last == "1 program: 1 doubtful"
+    shop.edit("[speed]", "[doubt]\ncoefficients_percent = 1\nspeed_percent = 0.1\ndamping_percent = 1\n\n[speed]")
+    settled = check("--json")
+    assert (settled.code, settled.programs["A"]["verdict"]) == (0, "stable")
+
+
+def test_the_doubt_is_told_with_its_sources_and_once(shop: Shop, check: Check, no_search: None) -> None:
+    shop.tap_both()
+    default = "f_n ±0.3 %, zeta ±10 %, K ±3 % from tap to tap (default until 8 tests)"
+    said = check().out
+    assert f"doubt: {default}; speed ±1 %; Kt and Kr/Kt ±20 % (docs/lobes.md)\n" in said
+    assert said.count("The words hold for the spindle as tapped, at rest") == 1
+    assert said.count("turning: chance of chatter") == 1
+    shop.edit("[speed]", "[doubt]\nfrequency_percent = 0.5\nspeed_percent = 2\ncoefficients_percent = 7\n\n[speed]")
+    given = "f_n ±0.5 %, zeta ±10 %, K ±3 % from tap to tap (default until 8 tests, machine.toml)"
+    said = check().out
+    assert f"doubt: {given}; speed ±2 % (machine.toml); Kt and Kr/Kt ±7 % (machine.toml) (docs/lobes.md)\n" in said
+
+
+def test_other_doubts_are_told_by_program(shop: Shop, check: Check, no_search: None) -> None:
+    slot = (
+        "teeth = 4\ntool_diameter_mm = 20\nradial_depth_mm = 20\ndirection = 'down'\nspeed_rpm = 9000\ndepth_mm = 0.2\n"
+    )
+    own = "tangential_n_per_mm2 = 1400\nradial_n_per_mm2 = 500\n"
+    shop.put(
+        f"[[program]]\nname = 'Al'\nmaterial = 'Al 7075 (HSS; dry)'\n{slot}"
+        f"[[program]]\nname = 'long'\ntool = 'long end mill'\n{own}{slot}"
+    )
+    shop.tap(0, 1713.0)
+    said = check().out
+    assert re.search(
+        r"^doubt of Al: .*; f_n ±5 %, K ±30 % in y, not tapped; .*; Kt .*\(published for Al 7075\)", said, re.MULTILINE
+    )
+    predicted = "f_n ±3 %, zeta ±30 %, K ±15 % by the prediction; f_n ±5 %, K ±30 % in y, not tapped; speed ±1 %"
+    assert f"doubt of long: {predicted}" in said
+    assert check("--json").programs["long"]["doubt"]["prediction"]["damping_ratio"] == [0.3] * 2
+    assert "tool 'long end mill': predicted by the model" in said
+
+
+def test_a_series_of_eight_tells_its_own_scatter(shop: Shop, check: Check, no_search: None) -> None:
+    shop.run(("A", 12900, 1))
+    for day in range(8):
+        wobble = 1 + 3e-4 * (-1) ** day
+        shop.tap(day, 1713.0 * wobble)
+        shop.tap(day + 0.1, 1690.0 / wobble, "y")
+        if day == 6:
+            before = check("--json").programs["A"]
+    now = check("--json").programs["A"]
+    assert (before["doubt"]["clamping"]["frequency"], before["doubt"]["clamping"]["damping_ratio"][0]) == (
+        [0.003] * 2,
+        0.1,
+    )
+    steps = np.diff(np.log(1 + 3e-4 * (-1.0) ** np.arange(8)))
+    expected = np.std(steps, ddof=1) / np.sqrt(2) * 2.4469
+    assert now["doubt"]["clamping"]["frequency"] == pytest.approx([expected] * 2, rel=0.01)
+    assert now["doubt"]["clamping"]["damping_ratio"][0] < 0.01
+    assert now["limit_high_mm"] - now["limit_low_mm"] < before["limit_high_mm"] - before["limit_low_mm"]
+    assert "from tap to tap (scatter of 8 tests)" in check().out
+
+
+def test_the_drive_and_missing_taps_are_told(shop: Shop, check: Check, no_search: None) -> None:
+    shop.run(("A", 12900, 1.5), ("B", 8700, 0.4), ("C", 6500, 1.0))
+    shop.edit("speed_rpm = 12900", "feed_per_tooth_mm = 0.1\nspeed_rpm = 12900")
+    shop.edit("[speed]", "[drive]\npower_kw = 0.5\n\n[speed]")
+    shop.edit('name = "B"\ntool = "reference"', 'name = "B"\ntool = "T7"')
+    shop.tap_both()
+    said = check()
+    assert (said.code, said.last) == (1, "3 programs: 2 stable, 1 unknown, 1 beyond the drive")
+    power = 4 * 0.02 / (4 * np.pi) * 2 * 1400e6 * 1e-4 * 2 * np.pi * 12900 / 60
+    assert said.line("A") == f"A: [drive] allows no more than {np.floor(500 / power * 1e5) / 100:.2f} mm at this speed"
+    assert re.search(r"^A .* stable, beyond", said.out, re.MULTILINE)
+    assert "B: not checked: no tap test with tool 'T7'" in said.line("B")
+    assert "note: C: [drive] does not count: feed_per_tooth_mm is missing" in said.out
+    found = check("--json")
+    assert (found.json["not_checked"], found.json["beyond_drive"], found.programs["A"]["stable"]) == (1, 1, True)
+    unknown = found.programs["B"]
+    assert {key for key, value in unknown.items() if value is None} >= {
+        *(
+            "stable",
+            "limit_mm",
+            "limit_low_mm",
+            "limit_high_mm",
+            "chance_turning",
+            "decided_by",
+            "advice",
+            "advice_here",
+        ),
+        *("doubt", "chatter_frequency_hz", "worst_feed_deg", "tolerable_decay", "depth_margin"),
+    }
+
+
+def test_stable_beyond_the_drive_is_no_success(shop: Shop, check: Check) -> None:
+    shop.run(("A", 12900, 1.5), more="feed_per_tooth_mm = 0.1")
+    shop.edit("[speed]", "[drive]\npower_kw = 0.5\n\n[speed]")
+    shop.tap_both()
+    said = check("--json")
+    assert (said.code, said.programs["A"]["verdict"]) == (1, "stable")
+
+
+def test_a_band_without_modes_leaves_programs_unknown(shop: Shop, check: Check) -> None:
+    shop.tap_both()
+    shop.edit("band_hz = [1200, 2200]", "band_hz = [2000, 2200]")
+    said = check()
+    assert (said.code, said.last) == (1, "3 programs: 3 unknown")
+    reason = "no mode to follow: none with positive stiffness in [mode] band_hz 2000..2200 Hz; found are 1690 Hz"
+    assert said.line("A").startswith(f"A: not checked: {reason}")
+    assert "doubt:" not in said.out
+    assert {one["verdict"] for one in check("--json").json["programs"]} == {"unknown"}
+
+
+def test_the_feed_of_a_program_counts(shop: Shop, check: Check, no_search: None) -> None:
+    limits, worst = {}, {}
+    shop.tap(0, 1713.0, stiffness=3e7)
+    shop.tap(0.1, 1400.0, "y", stiffness=9e7)
+    for feed in ("x", "y", "both"):
+        half = f'feed = "{feed}"'
+        shop.run(("A", 12900, 1), more=half)
+        shop.edit(
+            'radial_depth_mm = 20\ndirection = "down"\ntangential_n_per_mm2 = 1400\nradial_n_per_mm2 = 500\nspeed',
+            ('radial_depth_mm = 12\ndirection = "down"\ntangential_n_per_mm2 = 1400\nradial_n_per_mm2 = 500\nspeed'),
+        )
+        found = check("--json").programs["A"]
+        limits[feed], worst[feed] = found["limit_mm"], found["worst_feed_deg"]
+        assert found["feed"] == feed
+    assert limits["both"] == pytest.approx(min(limits["x"], limits["y"]))
+    assert (worst["x"], worst["y"]) == (0, pytest.approx(90))
+    assert worst["both"] == pytest.approx(worst[min("xy", key=lambda axis: limits[axis])])
+    assert abs(limits["x"] / limits["y"] - 1) > 0.05
+
+
+SPEEDS = "high_rpm = 24000\nsteps = 200\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (SPEEDS, "[doubt]\nspeed_percent = -3\n", "doubt speed_percent: Expected `float` >= 0.0, not -3"),
+        (SPEEDS, "[doubt]\nspeed_percent = 120\n", "doubt speed_percent: Expected `float` <= 100.0, not 120"),
+        (SPEEDS, "[doubt]\ndamping_percent = nan\n", "doubt damping_percent: Expected `float` >= 0.0, not nan"),
+        (SPEEDS, "[doubt]\nspeed_percnt = 1\n", "doubt: unknown key 'speed_percnt'; is 'speed_percent' meant?"),
+        ("depth_mm = 0.4", 'feed = "z"\ndepth_mm = 0.4', 'program 2: feed=\'z\' is no direction; give "x", "y" or'),
+        (
+            "depth_mm = 0.4",
+            "flute_length_mm = 0\ndepth_mm = 1",
+            "program 2 flute_length_mm: Expected `float` > 0.0, not",
+        ),
+        (
+            "depth_mm = 0.4",
+            "flute_length_mm = 1\ndepth_mm = 2",
+            "program 2: depth_mm=2 is deeper than flute_length_mm",
+        ),
+        ("speed_rpm = 12900", "speed_rpm = 25000", "program 1: speed_rpm=25000 is outside [speed] 3000..24000 rpm"),
+    ],
+)
+def test_bad_input_is_one_sentence_with_place_and_value(
+    shop: Shop, check: Check, old: str, new: str, message: str
+) -> None:
+    shop.edit(old, new)
+    said = check()
+    assert said.code == 2
+    assert said.err.startswith("error: ")
+    assert message in said.err
+    assert "Traceback" not in said.err
+
+
+def test_no_longer_is_said_of_the_same_directions_only(shop: Shop, check: Check, no_search: None) -> None:
+    shop.tap_both()
+    shop.tap(700, 1713.0 * 0.9)
+    shop.tap(700.1, 1690.0 * 0.9, "y")
+    assert check().out.count("stable at first, no longer") == 2
+    shop.run(("A", 12900, 1.5), tool="another")
+    shop.tap(0, 1713.0, tool="another")
+    shop.tap(700, 1713.0 * 0.9, tool="another")
+    shop.tap(700.1, 1690.0 * 0.9, "y", tool="another")
+    said = check()
+    assert (said.last, "no longer" in said.out) == ("1 program: 1 not stable", False)
+
+
+def test_a_long_check_says_how_far_it_is(
+    shop: Shop, check: Check, no_search: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lobewatch.commands.check.PATIENCE", -1.0)
+    shop.tap(0, 1713.0)
+    assert check().err.count("0 of 3 programs are checked") == 1
+
+
+def test_check_without_anything_to_check_is_refused(check: Check, tmp_path: Path) -> None:
+    said = check()
+    assert (said.code, "no tap test yet" in said.err) == (2, True)
+    make_machine_folder(tmp_path / "plain", "new_machine.toml")
+    said = check(folder=tmp_path / "plain")
+    assert (said.code, "no [[program]] to check" in said.err) == (2, True)

@@ -1,0 +1,106 @@
+"""What several tests of the application share."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
+from lobewatch.analysis import Logbook
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
+from modal import Mode, synthesize
+
+START = datetime(2026, 1, 15, 9, tzinfo=UTC)
+LINES = np.arange(4.0, 4000.0, 4.0)
+SLOT = """
+[[program]]
+name = "{name}"
+tool = "{tool}"
+teeth = 4
+tool_diameter_mm = 20
+radial_depth_mm = 20
+direction = "down"
+tangential_n_per_mm2 = 1400
+radial_n_per_mm2 = 500
+speed_rpm = {speed:g}
+depth_mm = {depth:g}
+{more}
+"""
+
+
+class Shop:
+    """The example machine in a folder "m", tapped by whoever likes."""
+
+    start = START
+
+    def __init__(self, path: Path) -> None:
+        """New: without a tap test, with the programs of the example."""
+        make_machine_folder(path, "surrogate_machine.toml")
+        self.path = path
+
+    @property
+    def folder(self) -> MachineFolder:
+        """As it is now."""
+        return MachineFolder(self.path)
+
+    @property
+    def logbook(self) -> Logbook:
+        """As it is now."""
+        return Logbook.open(self.path)
+
+    def edit(self, old: str, new: str) -> None:
+        """Replace all of a text in machine.toml."""
+        toml = self.path / "machine.toml"
+        text = toml.read_text("utf-8")
+        assert old in text
+        toml.write_text(text.replace(old, new), "utf-8")
+
+    def run(self, *programs: tuple[str, float, float], tool: str = "reference", more: str = "") -> None:
+        """Run these slots (name, rpm, mm) and no others."""
+        slots = (SLOT.format(name=n, tool=tool, speed=speed, depth=depth, more=more) for n, speed, depth in programs)
+        self.put("".join(slots))
+
+    def put(self, programs: str) -> None:
+        """Write other programs in place of those that are there."""
+        text = (self.path / "machine.toml").read_text("utf-8")
+        end = text.index("# The spindle of the example")
+        self.edit(text[text.index("[[program]]") : end], f"{programs.strip()}\n\n")
+
+    def run_safe_slots(self) -> None:
+        """All stable with x at 1713 Hz and y at 1690 Hz; A and C chatter when both have fallen by 10 %."""
+        self.run(("A", 12900, 1.5), ("B", 8700, 0.4), ("C", 6500, 1.0))
+
+    def tap(
+        self,
+        days: float,
+        frequency: float,
+        direction: TapDirection = "x",
+        *,
+        tool: str = "reference",
+        stiffness: float = 3.5e7,
+        damping_ratio: float = 0.029136,
+    ) -> str:
+        """A tap test without noise, so many days after the start; its identity."""
+        when = START + timedelta(days=days)
+        about = Circumstances("m", when, tool, direction, "", (self.path / "machine.toml").read_text("utf-8"))
+        frf = synthesize([Mode(frequency, damping_ratio, stiffness)], LINES)
+        self.folder.commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
+        return new_tap_id(about)
+
+    def tap_both(self, days: float = 0.0, share: float = 1.0) -> None:
+        """Both directions; share: of the frequency of the new spindle."""
+        self.tap(days, 1713.0 * share)
+        self.tap(days + 0.1, 1690.0 * share, "y")
+
+
+@pytest.fixture
+def shop(tmp_path: Path) -> Shop:
+    """A machine that runs the safe slots, not tapped yet."""
+    found = Shop(tmp_path / "m")
+    found.edit("high_rpm = 24000", "high_rpm = 24000\nsteps = 200")
+    found.run_safe_slots()
+    return found

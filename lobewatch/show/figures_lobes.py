@@ -135,6 +135,7 @@ def _draw_pocket(axes: Axes, pocket: Setting, labels: Labels, label: str) -> Non
     low, high = pocket.window_rpm
     box = Rectangle((low, 0), high - low, pocket.depth_mm, fc="white", ec=SAFE, lw=1.2, hatch="////", label=label)
     axes.add_patch(box)
+    labels.keep_free((low, 0.0), (high, pocket.depth_mm))
     text = f"{pocket.speed_rpm:.0f} rpm\n{pocket.depth_mm:.2f} mm"
     labels.add(text, (pocket.speed_rpm, pocket.depth_mm), SAFE, ("above",))
 

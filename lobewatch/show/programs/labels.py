@@ -62,6 +62,10 @@ class Labels:
             bbox=PAPER,
         )
 
+    def keep_free(self, low: tuple[float, float], high: tuple[float, float]) -> None:
+        """No words between two corners, where there is a choice."""
+        self._taken.append(_Box(*self._points(low), *self._points(high)))
+
     def _box(self, text: str, place: tuple[float, float], side: Side) -> _Box:
         lines, (right, up) = text.split("\n"), SIDES[side]
         wide, high = WIDE * SIZE * max(map(len, lines)), HIGH * SIZE * len(lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -67,8 +68,8 @@ def pocket_table(pockets: Sequence[Setting]) -> Table:
     made = table("pocket: speed (rpm)", "window (rpm)", "depth (mm)", "depth to spare", "f_n may fall by")
     for one in pockets:
         low, high = one.window_rpm
-        left = f"{'> ' if one.frequency_left >= LEFT[-1] else ''}{100 * one.frequency_left:.1f} %"
-        spare = f"{100 * one.depth_margin:+.0f} %"
+        left = f"{100 * one.frequency_left:.0f} %{' or more' if one.frequency_left >= LEFT[-1] else ''}"
+        spare = f"{math.floor(100 * one.depth_margin + 1e-6)} %"
         made.add_row(f"{one.speed_rpm:.0f}", f"{low:.0f}..{high:.0f}", f"{one.depth_mm:.2f}", spare, left)
     return made
 

@@ -35,13 +35,16 @@ from lobewatch.machine import ProgramTable, drive_limit
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.machine_file import parse_machine
 from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.show.figures import new_axes
+from lobewatch.show.describe_lobes import comparison_json, comparison_texts
+from lobewatch.show.figures import new_axes, svg
 from lobewatch.show.figures_lobes import BAND, lobes_figure, radial_figure, waterfall_figure
+from lobewatch.show.lobe_pictures import lobes_picture
 from lobewatch.show.programs.labels import Labels
 from modal import Mode, synthesize
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
 LINES = np.arange(4.0, 4000.0, 4.0)
+MODEL = "# The spindle of the example"
 
 
 class Said(NamedTuple):
@@ -72,7 +75,11 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp
 
 @pytest.fixture
 def folder(tmp_path: Path) -> MachineFolder:
+    """The example with the first of its programs alone."""
     make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
+    toml = tmp_path / "m" / "machine.toml"
+    head, first, *_, last = toml.read_text("utf-8").split("[[program]]")
+    toml.write_text(f"{head}[[program]]{first}{last[last.index(MODEL) :]}", "utf-8")
     return edit(MachineFolder(tmp_path / "m"), "high_rpm = 24000", "high_rpm = 24000\nsteps = 300")
 
 
@@ -119,7 +126,7 @@ def with_pockets(folder: MachineFolder, found: Sequence[dict[str, Any]]) -> Mach
     text = folder.toml.read_text("utf-8")
     head, _, rest = text.partition("[[program]]")
     cut = head.partition("[reference_cut]\n")[2]
-    tail = rest[rest.index("# The spindle of the example") :]
+    tail = rest[rest.index(MODEL) :]
     programs = "".join(
         f'[[program]]\nname = "{i}"\nspeed_rpm = {one["speed_rpm"]}\ndepth_mm = {one["depth_mm"]}\n{cut}\n'
         for i, one in enumerate(found)
@@ -171,17 +178,20 @@ def test_pockets_stay_within_flutes_and_drive(folder: MachineFolder) -> None:
     assert min(allowed) < 2.0 < max(allowed)
 
 
-def test_pockets_are_printed_with_their_windows(run: Run, folder: MachineFolder) -> None:
+def test_pockets_are_printed_and_drawn_as_they_are(folder: MachineFolder) -> None:
     tap(folder, 1541.7)
     tap(folder, 1560.0, days=0.2, direction="y")
-    found = json.loads(run("lobes", "m", "--json").out)["pockets"]
-    lines = run("lobes", "m", "--figure", "l.svg").out.splitlines()
-    drawn = Path("l.svg").read_text("utf-8")
-    for one in found:
+    found = compare_lobes(Logbook(folder), None, "reference cut", Dynamics.MODES, Method.ZERO_ORDER)
+    said, texts = comparison_json(found, []), comparison_texts(found, [])
+    table, *_ = (text for text in texts if not isinstance(text, str))
+    printed = list(zip(*(column.cells for column in table.columns), strict=True))
+    drawn = svg(lobes_picture(folder.machine, found))
+    assert len(found.pockets) == len(printed) == 3
+    for one, cells in zip(said["pockets"], printed, strict=True):
         low, high = one["window_rpm"]
-        row = f"{one['speed_rpm']:.0f}  {low:.0f}..{high:.0f}"
-        (line,) = (line for line in lines if line.strip().startswith(row))
-        assert f"{one['depth_mm']:.2f}" in line
+        assert cells[:3] == (f"{one['speed_rpm']:.0f}", f"{low:.0f}..{high:.0f}", f"{one['depth_mm']:.2f}")
+        assert 0 <= 100 * one["depth_margin"] - float(str(cells[3]).rstrip(" %")) < 1
+        assert f"{one['speed_rpm']:.0f} rpm</text>" in drawn
         assert f"{one['depth_mm']:.2f} mm</text>" in drawn
     assert BAND in drawn
 
@@ -207,7 +217,7 @@ def test_a_direction_that_was_not_tapped_is_not_rigid(run: Run, folder: MachineF
 
 
 def test_no_safe_speed_is_said(run: Run, folder: MachineFolder) -> None:
-    edit(folder, "tangential_n_per_mm2 = 1400\n", "tangential_n_per_mm2 = 140000\n")
+    edit(folder, "tangential_n_per_mm2 = 1400\n", "tangential_n_per_mm2 = 1400000\n")
     tap(folder, 1541.7)
     tap(folder, 1560.0, days=0.2, direction="y")
     said = run("lobes", "m").out
@@ -229,7 +239,7 @@ frequency_percent = 0
 damping_percent = 0
 stiffness_percent = 0
 speed_percent = 0
-coefficients_percent = %d
+coefficients_percent = 0
 
 [speed] """
 
@@ -237,15 +247,13 @@ coefficients_percent = %d
 def test_the_band_is_as_wide_as_the_doubt(folder: MachineFolder) -> None:
     tap(folder, 1713.0)
     tap(folder, 1690.0, days=0.2, direction="y")
-    widths = [relative_width(edit(folder, "[speed] ", SURE % 0))]
-    for share in (10, 20):
-        widths.append(
-            relative_width(edit(folder, f"coefficients_percent = {share - 10}", f"coefficients_percent = {share}"))
-        )
+    edit(folder, "[speed] ", SURE)
+    steps = [("= 0\n\n", "= 0\n\n"), ("= 0\n\n", "= 10\n\n"), ("= 10\n\n", "= 20\n\n")]
+    widths = [relative_width(edit(folder, *(f"coefficients_percent {side}" for side in step))) for step in steps]
     assert np.max(widths[0]) < 0.01
     slow = slice(0, 30)
     for width, share in zip(widths[1:], (0.1, 0.2), strict=True):
-        least, most = 1 / (1 + share), 1 / (1 - share)
+        least, most = 1.0 / (1 + share), 1.0 / (1 - share)
         assert np.median(width[slow]) == pytest.approx(most - least, rel=0.25)
         assert np.all(width < 2 * (most - least))
     published = edit(folder, "tangential_n_per_mm2 = 1400\nradial_n_per_mm2 = 500", 'material = "Al 7075 (HSS; dry)"')
@@ -332,11 +340,12 @@ def test_a_cut_without_limit_is_said_to_have_none(run: Run, folder: MachineFolde
 
 def test_the_verdicts_are_those_of_check_whatever_the_chart(run: Run, folder: MachineFolder) -> None:
     tap(folder, 1713.0)
-    program = ("lobes", "m", "--cut", "A: slot at 12 900 rpm", "--json", "--method")
+    program = ("lobes", "m", "--cut", "A: slot at 12 600 rpm", "--json", "--method")
     said = [json.loads(run(*program, method).out)["programs"] for method in ("zero-order", "semi-discretisation")]
     assert said[0] == said[1]
     checked = {one["name"]: one for one in json.loads(run("check", "m", "--json").out)["programs"]}
     for one in said[0]:
+        assert all(remark in checked[one["name"]]["remarks"] for remark in one.pop("remarks"))
         assert {key: checked[one["name"]][key] for key in one} == one
 
 
@@ -380,9 +389,9 @@ def test_low_immersions_are_noted_once_and_where_they_concern(run: Run, folder: 
     note = "zero order knows no flip lobes"
     said = run("lobes", "m").out
     assert (said.count(note), "stability_boundary" in said) == (1, False)
-    assert note not in run("lobes", "m", "--cut", "A: slot at 12 900 rpm").out
+    assert note not in run("lobes", "m", "--cut", "A: slot at 12 600 rpm").out
     assert note not in run("lobes", "m", "--method", "semi-discretisation").out
-    said = run("lobes", "m", "--cut", "A: slot at 12 900 rpm", "--radial", "r.svg").out
+    said = run("lobes", "m", "--cut", "A: slot at 12 600 rpm", "--radial", "r.svg").out
     assert said.count(f"--radial: {note}") == 1
     assert note in Path("r.svg").read_text("utf-8")
 

@@ -28,7 +28,7 @@ from acquisition import (
     write_hit,
 )
 from dsm import modal_stiffness, modes_at, receptance, static_stiffness
-from lobes import read_history, zero_order
+from lobes import lowest_of, read_history, zero_order
 from lobewatch.analysis import History, Logbook, Measurement, measure
 from lobewatch.analysis.history import Row
 from lobewatch.machine.folder import MachineFolder
@@ -117,7 +117,8 @@ def test_live_taps_find_what_was_emulated_and_the_history_grows(folder: MachineF
     again = read_history(folder.history)
     assert np.array_equal(again.depth[REFERENCE_CUT][0], history.rows[0].depth[REFERENCE_CUT])
     followed = found.at_tip
-    expected = zero_order(followed, None, folder.machine.cuts("reference")[REFERENCE_CUT], again.speed_rpm)
+    cuts = folder.machine.cuts("reference")[REFERENCE_CUT]
+    expected = lowest_of([zero_order(followed, followed, cut, again.speed_rpm) for cut in cuts])
     assert np.array_equal(again.depth[REFERENCE_CUT][1], expected.depth)
     assert not list(folder.spool.iterdir())
 
@@ -135,7 +136,7 @@ def test_a_history_made_again_is_the_same_and_stale_ones_are_not_used(folder: Ma
             if name not in ("program_limit", "program_verdict"):
                 assert np.array_equal(column, again[name], equal_nan=column.dtype.kind == "f")
             assert np.array_equal(column[-1:], again[name][-1:], equal_nan=column.dtype.kind == "f")
-    folder.toml.write_text(folder.toml.read_text().replace("depth_mm = 8.0", "depth_mm = 1.0"))
+    folder.toml.write_text(folder.toml.read_text().replace("depth_mm = 0.5", "depth_mm = 0.4"))
     changed, _ = up_to_date(folder)
     assert len(changed.rows) == 3
     assert changed.settings_hash != history.settings_hash
@@ -191,10 +192,11 @@ def test_the_newest_x_and_y_make_one_diagram_however_far_apart(folder: MachineFo
     folder.commit(recorded(about(folder, 0.5, "y"), y))
     folder.commit(recorded(about(folder, 300.0, "y"), later))
     alone, both, late = up_to_date(folder)[0].rows
-    cut = folder.machine.cuts("reference")[REFERENCE_CUT]
+    cuts = folder.machine.cuts("reference")[REFERENCE_CUT]
     speeds = Logbook(folder).history.speed_rpm
-    for row, normal in ((alone, None), (both, [y]), (late, [later])):
-        assert row.depth[REFERENCE_CUT] == pytest.approx(zero_order([x], normal, cut, speeds).depth, rel=1e-3)
+    for row, normal in ((alone, x), (both, y), (late, later)):
+        expected = lowest_of([zero_order([x], [normal], cut, speeds) for cut in cuts]).depth
+        assert row.depth[REFERENCE_CUT] == pytest.approx(expected, rel=1e-3)
     assert [codes(row) for row in (alone, both, late)] == [["one-direction"], [], ["older-direction"]]
     assert "direction x is that of 2026-01-15, 300 days older" in str(late.remarks[0])
 

@@ -196,7 +196,8 @@ HERE = Setting(12900.0, 1.95, (12160.0, 13150.0), 1.02, 0.0)
             HERE,
             "no safe speed for this depth in 3 000 to 24 000 rpm; most chips: 2.55 mm at 12 640 rpm "
             "(12 510 to 12 880 rpm is safe; 50 % of depth to spare; f_n may fall by 2.5 %); at 12 900 rpm no "
-            "deeper than 1.95 mm (12 160 to 13 150 rpm is safe; 102 % of depth to spare; f_n may fall by less than 1 %)",
+            "deeper than 1.95 mm (12 160 to 13 150 rpm is safe; 102 % of depth to spare; f_n may fall by less than "
+            "1 %)",
         ),
         (
             HERE,
@@ -224,9 +225,7 @@ def test_advice_in_words(
         assert said.line("D").endswith(f"; until then {words}")
 
 
-def test_a_doubtful_program_says_what_decides_and_what_would_settle_it(
-    shop: Shop, check: Check, no_search: None
-) -> None:
+def test_a_doubtful_program_says_what_would_settle_it(shop: Shop, check: Check, no_search: None) -> None:
     shop.run(("A", 12900, 3))
     shop.tap_both()
     said = check("--json").programs["A"]

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+import re
 from importlib import resources
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from acquisition import DataError
 from dsm import MATERIALS
+from lobewatch.analysis.programs.doubt import SCATTER
+from lobewatch.machine.doubt_table import DoubtTable
 from lobewatch.machine.machine_file import REFERENCE_CUT, parse_machine, read_machine
 
 EXAMPLE = resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")
@@ -28,8 +32,9 @@ def test_the_example_is_the_surrogate_in_si() -> None:
     assert spindle.bearings[0].position == pytest.approx(166e-3)
     assert spindle.bearings[0].stiffness == pytest.approx(1.28e9)
     assert (spindle.youngs_modulus, spindle.density) == (210e9, 7850.0)
-    cut = machine.cuts("reference")["A: slot at 12 600 rpm"]
+    cut, across = machine.cuts("reference")["A: slot at 12 600 rpm"]
     assert (cut.teeth, cut.immersion, cut.direction, cut.tangential, cut.radial) == (4, 1.0, "down", 1400e6, 500e6)
+    assert [cut.feed_angle, across.feed_angle] == pytest.approx([0.0, math.pi / 2])
 
 
 def test_a_fresh_machine_needs_no_spindle() -> None:
@@ -37,6 +42,24 @@ def test_a_fresh_machine_needs_no_spindle() -> None:
     assert machine.spindle is None
     assert machine.tap.hits == 10
     assert list(machine.cuts("anything")) == [REFERENCE_CUT]
+
+
+@pytest.mark.parametrize("text", [EXAMPLE, FRESH], ids=["example", "fresh"])
+def test_the_doubt_in_comments_is_the_default_and_complete(text: str) -> None:
+    block = text[text.index("# [doubt]") :].partition("\n\n")[0]
+    shown = parse_machine('[machine]\nname = "m"\n' + re.sub("^# ", "", block, flags=re.MULTILINE)).doubt
+    own = {"frequency_percent": 0.3, "damping_percent": 10.0, "stiffness_percent": 3.0}
+    assert msgspec.structs.asdict(shown) == msgspec.structs.asdict(DoubtTable()) | own
+    assert pytest.approx([value / 100 for value in own.values()]) == SCATTER
+    assert len(re.findall(r"_percent = [\d.]+ +# \S", block)) == len(DoubtTable.__struct_fields__)
+
+
+@pytest.mark.parametrize("text", [EXAMPLE, FRESH], ids=["example", "fresh"])
+@pytest.mark.parametrize("key", ['feed = "both"', "flute_length_mm = 40", "helix_deg = 30", "feed_per_tooth_mm = 0.1"])
+def test_optional_keys_of_a_program_are_shown_and_right(text: str, key: str) -> None:
+    assert re.search(rf"^# {re.escape(key)}", text, re.MULTILINE)
+    changed = parse_machine(EXAMPLE.replace('direction = "down"\n', f'direction = "down"\n{key}\n', 2))
+    assert str(getattr(changed.program[0], key.partition(" ")[0])).rstrip(".0") in key
 
 
 def test_what_the_fresh_machine_file_shows_in_comments_is_right() -> None:
@@ -77,7 +100,7 @@ def test_programs_belong_to_their_tool() -> None:
         ("outer_mm = 31.5", "outter_mm = 31.5", "spindle segment 1: unknown key 'outter_mm'; is 'outer_mm' meant?"),
         ("bore_mm = 30.0", "bore_mm = 78.0", "spindle segment 7: bore_mm=78 is not smaller than outer_mm=78"),
         ("length_mm = 26.5", "length_mm = 0", "spindle segment 1 length_mm: "),
-        ("length_mm = 26.5", "length_mm = -3", "spindle segment 1 length_mm: "),
+        ("length_mm = 26.5", "length_mm = -3", "spindle segment 1 length_mm: Expected `float` > 0.0, not -3"),
         ("length_mm = 26.5", 'length_mm = "26.5"', "spindle segment 1 length_mm: Expected `float`, got `str`"),
         ("length_mm = 26.5", "length_mm = 26,5", "write 26.5 with a point"),
         ("length_mm = 26.5", "length_mm = nan", "length_mm"),
@@ -104,7 +127,8 @@ def test_programs_belong_to_their_tool() -> None:
         ),
         ("tool_length_mm = 93.5", "", "tool 1: needs [spindle] tool_length_mm"),
         ('name = "long end mill"', 'name = "reference"', "tool 1: name='reference' stands twice"),
-        ("outer_mm = 17.0", "outer_mm = 0", "tool 1 segment 1 outer_mm: "),
+        ("outer_mm = 17.0", "outer_mm = 0", "tool 1 segment 1 outer_mm: Expected `float` > 0.0, not 0"),
+        ("band_hz = [1200, 2200]", "band_hz = [1200, -1]", "mode band_hz 2: Expected `float` > 0.0, not -1"),
         (
             "mass_outer_mm = 18.0",
             "mass_outer_mm = 18.0, end_outer_mm = 16",
@@ -113,7 +137,7 @@ def test_programs_belong_to_their_tool() -> None:
         ("position_mm = 0 ", "position_mm = 5000 ", "tap: position_mm=5000 is off the shaft, 0 to 672 mm"),
         ("tool_length_mm = 93.5", "tool_length_mm = 200", "tool_length_mm=200 reaches beyond the first bearing"),
         ("high_rpm = 24000", "high_rpm = inf", "speed high_rpm: Expected `float` <= 1"),
-        ("depth_mm = 6.0", "depth_mm = inf", "program 1 depth_mm: Expected `float` <= 1"),
+        ("depth_mm = 2.5", "depth_mm = inf", "program 1 depth_mm: Expected `float` <= 1"),
     ],
 )
 def test_every_mistake_is_told_with_its_place(old: str, new: str, message: str) -> None:
@@ -169,10 +193,11 @@ def test_the_settings_hash_changes_with_what_a_history_depends_on_and_with_nothi
     machine = parse_machine(EXAMPLE)
     for old, new, same in (
         ("tap_interval_days = 30", "tap_interval_days = 60", True),
-        ("depth_mm = 6.0", "depth_mm = 5.0", False),
+        ("depth_mm = 2.5", "depth_mm = 2.0", False),
         ("bearing_stiffness_n_per_um = 1280.0", "bearing_stiffness_n_per_um = 1000.0", False),
         ("band_hz = [1200, 2200]", "band_hz = [1200, 2300]", False),
         ("high_rpm = 24000", "high_rpm = 20000", False),
+        ("[speed]", "[doubt]\nspeed_percent = 2\n\n[speed]", False),
     ):
         assert old in EXAMPLE
         assert (parse_machine(EXAMPLE.replace(old, new)).settings_hash == machine.settings_hash) is same

@@ -94,7 +94,7 @@ def test_a_worn_machine_says_how_far_its_frequency_has_fallen(shop: Path) -> Non
 def test_a_machine_tapped_once_has_nothing_to_compare_with(shop: Path) -> None:
     found = Logbook.open(shop / "a-new").standing(DAY)
     (series,) = found.series
-    assert (found.light, series.fall, series.is_first) == ("good", (0.0, 0.0), True)
+    assert (found.light, series.fall, series.is_first) == ("warn", (0.0, 0.0), True)
     assert found.days_left == pytest.approx(20)
 
 
@@ -109,7 +109,7 @@ def test_overdue_is_never_good(shop: Path) -> None:
 def test_another_machine_toml_is_analysed_anew(tmp_path: Path) -> None:
     folder = machine(tmp_path / "mill")
     tap(folder, NEW, DAY)
-    assert Logbook.open(folder.path).standing(DAY).light == "good"
+    assert Logbook.open(folder.path).standing(DAY).light == "warn"
     text = folder.toml.read_text("utf-8")
     folder.toml.write_text(text.replace("band_hz = [1200, 2200]", "band_hz = [3900, 3950]"), "utf-8")
     found = Logbook.open(folder.path).standing(DAY)

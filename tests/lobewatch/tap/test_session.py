@@ -40,7 +40,7 @@ def test_the_words_of_a_test_and_its_result(
     assert (done.good, len(done.hits)) == (10, 10)
     assert [check.name for check in done.checks if not check.passed] == ["calibration"]
     assert done.outcome is not None
-    assert done.outcome.light == "good"
+    assert done.outcome.light == "warn"
     assert "tool reference, direction x" in done.title
     assert done.plots is not None
     assert done.plots.mean is not None

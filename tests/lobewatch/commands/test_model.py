@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -12,9 +13,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from acquisition import Circumstances, Frf, TapTest, new_tap_id
+from acquisition import Circumstances, Frf, TapDirection, TapTest, new_tap_id
 from dsm import modes_at, natural_frequencies, receptance
-from lobes import zero_order
+from lobes import lowest_of, zero_order
 from lobewatch.analysis import Logbook, Word, model_picture, model_state, speed_grid
 from lobewatch.analysis.prediction import predict
 from lobewatch.cli import app
@@ -56,7 +57,9 @@ def bearing_stiffness(found: dict[str, Any]) -> float:
     return float(found["bearings_from"].split(": ")[1].split()[0])
 
 
-def tapped(folder: MachineFolder, factor: float, tool: str = "reference", day: int = 1) -> TapTest:
+def tapped(
+    folder: MachineFolder, factor: float, tool: str = "reference", day: int = 1, direction: TapDirection = "x"
+) -> TapTest:
     """A noiseless tap test of the model with its bearings softened by `factor`.
 
     Its damping is structural, and is fitted as viscous: the stiffness found is a few parts in a thousand off.
@@ -64,7 +67,7 @@ def tapped(folder: MachineFolder, factor: float, tool: str = "reference", day: i
     drawn = folder.machine.model(tool)
     worn = replace(drawn, bearings=[replace(b, stiffness=factor * b.stiffness) for b in drawn.bearings])
     time = datetime(2026, 3, day, tzinfo=UTC)
-    about = Circumstances("trial", time, tool, "x", "", folder.toml.read_text("utf-8"))
+    about = Circumstances("trial", time, tool, direction, "", folder.toml.read_text("utf-8"))
     frf = Frf(LINES, receptance(worn, LINES, loss_factor=0.058), np.full(LINES.size, 0.9999), 10)
     return TapTest(id=new_tap_id(about), circumstances=about, frf=frf)
 
@@ -151,7 +154,8 @@ def test_one_tap_predicts_the_lobes_of_every_tool(folder: MachineFolder) -> None
     worn = replace(drawn, bearings=[replace(b, stiffness=0.6 * b.stiffness) for b in drawn.bearings])
     frequency, stiffness = modes_at(worn, 12)
     modes = [Mode(f, 0.029, k) for f, k in zip(frequency, stiffness, strict=True)]
-    expected = zero_order(modes, modes, folder.machine.cuts(TOOL)[REFERENCE_CUT][0], speed_grid(folder.machine))
+    cuts, speeds = folder.machine.cuts(TOOL)[REFERENCE_CUT], speed_grid(folder.machine)
+    expected = lowest_of([zero_order(modes, modes, cut, speeds) for cut in cuts])
     assert found["minimum_depth_mm"] == pytest.approx(expected.minimum.depth * 1e3, rel=0.02)
     assert found["remarks"][0]["code"] == "predicted"
     coupled = said("lobes", folder.path, "--tool", TOOL, "--source", "frf")
@@ -162,21 +166,28 @@ def test_one_tap_predicts_the_lobes_of_every_tool(folder: MachineFolder) -> None
 
 
 def test_check_predicts_where_a_tool_was_never_tapped(folder: MachineFolder) -> None:
-    with_program(folder)
+    program = EXAMPLE_PROGRAM.format(tool=TOOL).strip()
+    toml = folder.toml.read_text("utf-8")
+    old = toml[toml.index("[[program]]") : toml.index("# The spindle of the example")]
+    folder.toml.write_text(toml.replace(old, f"{program}\n\n"), "utf-8")
     folder = MachineFolder(folder.path)
     folder.commit(tapped(folder, 1.0))
-    logbook = Logbook(folder)
-    (long,) = [one for one in logbook.verdicts() if one.program.tool == TOOL]
+    (long,) = Logbook(folder).verdicts()
     assert long.assembly is not None
     assert long.assembly.tap_id.startswith("prediction from ")
     assert not long.measured
-    assert 0.7 * long.limit_low < long.limit < long.limit_high
-    assert (long.word, long.decided_by) == (Word.DOUBTFUL, "untapped")
-    shown = CliRunner().invoke(app, ["check", str(folder.path)], catch_exceptions=False)
-    assert "predicted" in shown.stdout
-    assert shown.exit_code == 1
-    assert "predicted" in [remark.code for remark in long.remarks]
+    assert {"predicted", "one-direction"} <= {remark.code for remark in long.remarks}
     assert long.limit == pytest.approx(0.4e-3, rel=0.5)
+    assert long.word is Word.DOUBTFUL
+    shown = CliRunner().invoke(app, ["check", str(folder.path)], catch_exceptions=False)
+    assert re.search(r"doubtful\s+\(predicted\)", shown.stdout)
+    assert shown.exit_code == 1
+    folder.commit(tapped(folder, 1.0, direction="y", day=2))
+    tame = toml.replace(old, f"{program.replace('depth_mm = 0.3', 'depth_mm = 0.05')}\n\n")
+    folder.toml.write_text(tame, "utf-8")
+    shown = CliRunner().invoke(app, ["check", str(folder.path)], catch_exceptions=False)
+    assert re.search(r"stable\s+\(predicted\)", shown.stdout)
+    assert (shown.exit_code, "1 program: 1 stable" in shown.stdout) == (0, True)
 
 
 def test_predictions_need_a_model_and_a_tap(folder: MachineFolder) -> None:

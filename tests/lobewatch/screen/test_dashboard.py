@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import http.client
 import json
+import re
 import sys
 import time
 from collections.abc import Iterator
@@ -17,7 +18,7 @@ import aiohttp
 import numpy as np
 import pytest
 
-from acquisition import Circumstances, DataError, TapsEmulator, TapsSource
+from acquisition import Circumstances, DataError, TapDirection, TapsEmulator, TapsSource
 from lobewatch.analysis import Logbook
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
@@ -49,9 +50,9 @@ def hammered(folder: MachineFolder, stiffness: float = NEW, realtime: bool = Fal
         yield device
 
 
-def tap(folder: MachineFolder, stiffness: float, when: datetime) -> None:
+def tap(folder: MachineFolder, stiffness: float, when: datetime, direction: TapDirection = "x") -> None:
     """One tap test more."""
-    about = Circumstances("mill", when, "reference", "x", machine_toml=folder.toml.read_text("utf-8"))
+    about = Circumstances("mill", when, "reference", direction, machine_toml=folder.toml.read_text("utf-8"))
     with hammered(folder, stiffness) as device:
         TapSession(folder, lambda: TapsSource(device.port), about, guided=False).run()
 
@@ -69,7 +70,7 @@ def ask(server: DashboardServer, method: str, path: str, body: object = None, to
 
 @pytest.fixture(scope="module")
 def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A worn machine, a new one, one never tapped, and one with a broken machine.toml."""
+    """A worn machine, one tapped once, one never tapped, and one with a broken machine.toml."""
     path = tmp_path_factory.mktemp("shop")
     worn = machine(path / "b-worn")
     tap(worn, NEW, DAY - timedelta(days=60))
@@ -94,8 +95,22 @@ def test_a_worn_machine_says_how_far_its_frequency_has_fallen(shop: Path) -> Non
 def test_a_machine_tapped_once_has_nothing_to_compare_with(shop: Path) -> None:
     found = Logbook.open(shop / "a-new").standing(DAY)
     (series,) = found.series
-    assert (found.light, series.fall, series.is_first) == ("warn", (0.0, 0.0), True)
+    assert (series.fall, series.is_first) == ((0.0, 0.0), True)
     assert found.days_left == pytest.approx(20)
+
+
+def test_one_direction_warns_of_programs_by_name_and_both_are_good(tmp_path: Path) -> None:
+    folder = machine(tmp_path / "mill")
+    tap(folder, NEW, DAY)
+    alone = Logbook.open(folder.path).standing(DAY)
+    codes = [remark.code for remark in alone.remarks]
+    assert (alone.light, codes) == ("warn", ["program-doubtful"] * 3 + ["one-direction"])
+    with DashboardServer(folder.path) as server:
+        (row,) = ask(server, "GET", "/machines")[1]["machines"]
+    assert re.search(r"A: slot at .*, B: slot at .*, C: slot at .* rpm: doubtful; reference: tapped in", row["note"])
+    assert row["next_step"].startswith("Tap direction y of the same tool too")
+    tap(folder, NEW, DAY + timedelta(hours=1), "y")
+    assert Logbook.open(folder.path).standing(DAY).light == "good"
 
 
 def test_overdue_is_never_good(shop: Path) -> None:
@@ -109,7 +124,7 @@ def test_overdue_is_never_good(shop: Path) -> None:
 def test_another_machine_toml_is_analysed_anew(tmp_path: Path) -> None:
     folder = machine(tmp_path / "mill")
     tap(folder, NEW, DAY)
-    assert Logbook.open(folder.path).standing(DAY).light == "warn"
+    assert "mode-lost" not in [remark.code for remark in Logbook.open(folder.path).standing(DAY).remarks]
     text = folder.toml.read_text("utf-8")
     folder.toml.write_text(text.replace("band_hz = [1200, 2200]", "band_hz = [3900, 3950]"), "utf-8")
     found = Logbook.open(folder.path).standing(DAY)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -60,8 +61,11 @@ def test_the_light_follows_the_fall_of_the_frequency(folder: MachineFolder) -> N
     assert "1720" in first.texts[0]
     assert "the first test of this tool and direction" in first.texts[0]
     assert first.next_step.startswith("Tap direction y of the same tool too")
+    (doubtful,) = (text for text in first.texts if "doubtful" in text)
+    assert all(f"{letter}: slot at" in doubtful for letter in "ABC")
     both = tapped(folder, 0.1, 1700.0, "y")
-    assert both.next_step == "All is well: tap again by 2026-02-14."
+    assert (both.light, both.next_step) == ("good", "All is well: tap again by 2026-02-14.")
+    assert not [text for text in both.texts if "doubtful" in text or "stable" in text]
     lights = [tapped(folder, 30 * month, 1720 * share).light for month, share in enumerate((0.96, 0.94, 0.89), 1)]
     assert lights == ["good", "warn", "alarm"]
     worn = tapped(folder, 120, 0.88 * 1720)
@@ -95,7 +99,21 @@ def test_a_program_that_chatters_is_named(folder: MachineFolder) -> None:
     soft = tapped(folder, 0, 1720.0, stiffness=3e6)
     assert soft.light == "alarm"
     assert any("A: slot at 12 600 rpm" in text and text.endswith(": not stable.") for text in soft.texts)
-    assert soft.next_step.startswith("Do not run these programs")
+    assert soft.next_step.startswith("Do not run these programs. Tap direction y of the same tool too")
+    both = tapped(folder, 0.1, 1700.0, "y", stiffness=3e6)
+    assert both.light == "alarm"
+    assert "lobewatch check names a safe speed and depth" in both.next_step
+
+
+def test_a_doubtful_program_warns_and_says_where_to_ask(shop: Any) -> None:
+    shop.run(("sure", 8700, 0.4), ("unsure", 12900, 3))
+    shop.tap_both()
+    logbook = shop.logbook
+    found = outcome_of(logbook, logbook.measurement(logbook.newest().id))
+    assert found.light == "warn"
+    assert "unsure: doubtful." in found.texts
+    assert not any("sure: stable" in text for text in found.texts)
+    assert found.next_step == "See with lobewatch check what would settle it, and where to go until then."
 
 
 def test_a_test_without_the_mode_asks_for_another(folder: MachineFolder) -> None:

@@ -41,6 +41,7 @@ def test_the_words_of_a_test_and_its_result(
     assert [check.name for check in done.checks if not check.passed] == ["calibration"]
     assert done.outcome is not None
     assert done.outcome.light == "warn"
+    assert done.outcome.next_step.startswith("Tap direction y")
     assert "tool reference, direction x" in done.title
     assert done.plots is not None
     assert done.plots.mean is not None

@@ -108,7 +108,7 @@ def test_one_direction_warns_of_programs_by_name_and_both_are_good(tmp_path: Pat
     with DashboardServer(folder.path) as server:
         (row,) = ask(server, "GET", "/machines")[1]["machines"]
     assert re.search(r"A: slot at .*, B: slot at .*, C: slot at .* rpm: doubtful; reference: tapped in", row["note"])
-    assert row["next_step"].startswith("Tap direction y of the same tool too")
+    assert alone.next_step.startswith("Tap direction y of the same tool too")
     tap(folder, NEW, DAY + timedelta(hours=1), "y")
     assert Logbook.open(folder.path).standing(DAY).light == "good"
 

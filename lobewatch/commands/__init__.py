@@ -11,7 +11,7 @@ COMMANDS = {
     "model": "The spindle model: modes, stiffness, critical speed; with another tool in it, predicted before it is "
     "tapped.",
     "calibrate": "Bearing stiffness for measured natural frequencies; nothing is stored.",
-    "lobes": "Stability lobes of the newest tap test, drawn beside those of the first test, and the best pockets.",
+    "lobes": "Stability lobes of the newest tap tests, drawn beside those of the first, and the pockets that are safe.",
     "check": "Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.",
     "report": "One HTML file with everything in it: what has changed, which programs still hold, lobes then and now.",
     "serve": "Machines in a browser, worst first; START begins a tap test on the port that machine.toml names. "

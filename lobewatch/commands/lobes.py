@@ -46,7 +46,8 @@ def lobes(
     if materials:
         emit({"materials": materials_json(logbook.machine)}, as_json, *material_lines(logbook.machine))
         return
-    notes.print("looking for speeds and depths that are safe; this takes some seconds")
+    if notes.is_terminal:
+        notes.print("looking for speeds and depths that are safe; this takes some seconds")
     found = compare_lobes(logbook, tool, cut, Dynamics(source), Method(method))
     remarks = [
         *logbook.remarks,

@@ -4,7 +4,7 @@ from .advice import Advice, advise
 from .doubt import Doubt, doubt_of
 from .robust_pockets import robust_pockets
 from .setting_search import Setting
-from .verdict import Ruling, Verdict, Word, verdict
+from .verdict import Ruling, Verdict, Word
 
 __all__ = [
     "Advice",
@@ -16,5 +16,4 @@ __all__ = [
     "advise",
     "doubt_of",
     "robust_pockets",
-    "verdict",
 ]

@@ -65,18 +65,21 @@ def test_the_modes_in_readme_are_what_the_command_prints(
     assert printed == shown("python3 run.py modes tests/data/ladisk_beam/acceleration.lvm").splitlines()
 
 
-def test_the_demo_in_readme_is_what_the_command_prints(
+@pytest.mark.timeout(300)
+def test_the_demo_in_readme_is_what_the_commands_print(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", ["lobewatch", "demo"])
-    with pytest.raises(SystemExit):
-        main()
-    printed = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
-    wanted = shown("python3 run.py").splitlines()
-    split = wanted.index("...")
-    assert printed[:split] == wanted[:split]
-    assert printed[-len(wanted) + split + 1 :] == wanted[split + 1 :]
+    monkeypatch.setenv("COLUMNS", "80")
+    for command in ("python3 run.py", "python3 run.py check lobewatch-demo"):
+        monkeypatch.setattr(sys, "argv", ["lobewatch", *(command.split()[2:] or ["demo"])])
+        with pytest.raises(SystemExit):
+            main()
+        printed = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
+        wanted = shown(command).splitlines()
+        split = wanted.index("...")
+        assert printed[:split] == wanted[:split]
+        assert printed[-len(wanted) + split + 1 :] == wanted[split + 1 :]
 
 
 def test_the_python_in_readme_runs(

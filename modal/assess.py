@@ -38,7 +38,6 @@ def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
     share, misfit = _misfit(state, band, i)
     judged = replace(
         mode,
-        modal_constant_phase=_phase(band, mode),
         coherence=_coherence(state, mode),
         misfit=misfit,
         half_power_damping=_half_power_damping(band, mode),
@@ -123,7 +122,7 @@ def _on_its_values(band: FittedBand, i: int, mode: Mode, share: float) -> Iterat
     if error > LARGEST_ERROR:
         text = f"hardly moves at the driving point: K is uncertain by {100 * error:.0f} %"
         yield Remark("near-node", at, text, "take a driving point where it moves")
-    phase, known = mode.modal_constant_phase or 0.0, mode.standard_error[2] / abs(mode.stiffness)
+    phase, known = _phase(band, mode) or 0.0, mode.standard_error[2] / abs(mode.stiffness)
     if abs(phase) > max(LARGEST_PHASE, 3 * known):
         text = f"modal constant {np.degrees(phase):+.0f}° off real: K is that of the real mode nearest to it"
         yield Remark("complex-mode", at, text)

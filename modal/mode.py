@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +15,16 @@ from acquisition import Remark
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """One mode: receptance 1/K / (1 - r^2 + 2i zeta r), r = f/f_n.
+    """One mode: receptance (Re A + Im A (zeta + i r) / sqrt(1 - zeta^2)) / (1 - r^2 + 2i zeta r), r = f/f_n.
+
+    A = exp(i phase) / K is its modal constant (m/N): in R / (i w - lambda) + conj(R) / (i w - conj(lambda)) with the
+    pole lambda = -zeta w_n + i w_d the residue R is A w_n^2 / (2i w_d). A real mode has phase 0 and the receptance
+    1/K / (1 - r^2 + 2i zeta r).
 
     The stiffness of a driving point is positive. A negative one is legal: it belongs to a response measured
     where the mode moves against the hammer, and says so (`is_driving_point`).
+
+    Source: Ewins, Modal Testing, ch. 2.6 (complex modes); docs/modal.md says what K means for one.
     """
 
     frequency: float
@@ -24,7 +32,7 @@ class Mode:
     damping_ratio: float
     """Viscous damping ratio zeta (-)."""
     stiffness: float
-    """Modal stiffness K between hammer and sensor (N/m), signed."""
+    """Modal stiffness K between hammer and sensor (N/m), signed: 1/|A|, negative where Re A is."""
     covariance: NDArray[np.float64] | None = None
     """Covariance of (frequency, damping_ratio, stiffness) from the residual of the fit, SI units, shape (3, 3).
 
@@ -38,8 +46,12 @@ class Mode:
     """The same covariance from the scatter of the hits, whatever their errors, shape (3, 3); None without hits."""
     n_hits: int = 0
     """Hits that the jackknife left out in turn, of the FRF with the fewest."""
-    modal_constant_phase: float | None = None
-    """Phase of its modal constant as a complex number (LSCF), against the sign of K (rad): 0 for a real mode."""
+    phase_deg: float = 0.0
+    """Phase of its modal constant times the sign of K (degrees), -90 to 90; 0 for a real mode."""
+    phase_deg_std: float = 0.0
+    """Standard error of that phase (degrees), of a mode that was found real, too; 0 where it was not asked for."""
+    phase_correlation: NDArray[np.float64] | None = None
+    """Correlations of the error of the phase with those of (frequency, damping_ratio, stiffness), shape (3,)."""
     coherence: float | None = None
     """Mean coherence between the half-power points; None where it is not known."""
     misfit: float | None = None
@@ -53,23 +65,49 @@ class Mode:
 
     def __post_init__(self) -> None:
         """Refuse what is no mode."""
+        for wrong in chain(self._wrong_values(), self._wrong_errors()):
+            raise ValueError(wrong)
+
+    def _wrong_values(self) -> Iterator[str]:
         for name, value in (("frequency", self.frequency), ("damping_ratio", self.damping_ratio)):
             if not (np.isfinite(value) and value > 0):
-                raise ValueError(f"{name}={value} is not a finite number > 0")
+                yield f"{name}={value} is not a finite number > 0"
         if not np.isfinite(self.stiffness) or self.stiffness == 0:
-            raise ValueError(f"stiffness={self.stiffness} is not a finite number other than 0 (N/m)")
+            yield f"stiffness={self.stiffness} is not a finite number other than 0 (N/m)"
+        if not abs(self.phase_deg) <= 90:
+            yield f"phase_deg={self.phase_deg} is not -90 to 90 degrees; beyond that give the stiffness the other sign"
+        if self.phase_deg and self.damping_ratio >= 1:
+            yield f"damping_ratio={self.damping_ratio} with phase_deg={self.phase_deg}: give one below 1"
+
+    def _wrong_errors(self) -> Iterator[str]:
         for name, matrix in (("covariance", self.covariance), ("jackknife", self.jackknife)):
             if matrix is not None and np.shape(matrix) != (3, 3):
-                raise ValueError(f"{name} has shape {np.shape(matrix)}, not (3, 3)")
+                yield f"{name} has shape {np.shape(matrix)}, not (3, 3)"
+        if not (np.isfinite(self.phase_deg_std) and self.phase_deg_std >= 0):
+            yield f"phase_deg_std={self.phase_deg_std} is not a finite number >= 0"
         if not self.freedom > 0:
-            raise ValueError(f"freedom={self.freedom} is not a number > 0")
+            yield f"freedom={self.freedom} is not a number > 0"
         if self.jackknife is not None and self.n_hits < 2:
-            raise ValueError(f"n_hits={self.n_hits}: a jackknife has at least 2 hits")
+            yield f"n_hits={self.n_hits}: a jackknife has at least 2 hits"
 
     @property
     def is_driving_point(self) -> bool:
         """True where hammer and sensor move together in this mode (positive stiffness)."""
         return self.stiffness > 0
+
+    @property
+    def constant(self) -> complex:
+        """Modal constant A = exp(i phase) / K (m/N)."""
+        return complex(np.exp(1j * np.radians(self.phase_deg)) / self.stiffness)
+
+    @property
+    def joint_covariance(self) -> NDArray[np.float64]:
+        """Covariance of (frequency, damping_ratio, stiffness, phase_deg), shape (4, 4); NaN where not estimated."""
+        error = np.append(self.standard_error, self.phase_deg_std)
+        correlation = np.eye(4)
+        correlation[:3, :3] = self.correlation
+        correlation[3, :3] = correlation[:3, 3] = 0.0 if self.phase_correlation is None else self.phase_correlation
+        return np.asarray(correlation * np.outer(error, error))
 
     @property
     def best_covariance(self) -> NDArray[np.float64] | None:
@@ -125,8 +163,9 @@ class Mode:
 
     def receptance(self, frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Receptance of this mode alone (m/N), same shape as frequency (Hz)."""
-        r = np.asarray(frequency) / self.frequency
-        return np.asarray(1 / (self.stiffness * (1 - r**2 + 2j * self.damping_ratio * r)))
+        r, zeta, constant = np.asarray(frequency) / self.frequency, self.damping_ratio, self.constant
+        turned = constant.imag * (zeta + 1j * r) / np.sqrt(1 - zeta**2) if constant.imag else 0.0
+        return np.asarray((constant.real + turned) / (1 - r**2 + 2j * zeta * r))
 
 
 def _root_of_diagonal(covariance: NDArray[np.float64] | None) -> NDArray[np.float64]:

@@ -15,6 +15,7 @@ from modal.predominant import predominant
 from modal.remove_window import remove_window
 from modal.stabilise import StabilisationChart, stabilise
 from modal.synthesize import synthesize
+from modal.trust import Trust, trust_of, trust_rules
 
 __all__ = [
     "Extraction",
@@ -23,6 +24,7 @@ __all__ = [
     "Mode",
     "PhysicalPoles",
     "StabilisationChart",
+    "Trust",
     "cut_edges",
     "extract",
     "fit_modes",
@@ -37,4 +39,6 @@ __all__ = [
     "remove_window",
     "stabilise",
     "synthesize",
+    "trust_of",
+    "trust_rules",
 ]

@@ -56,6 +56,12 @@ class Mode:
     """Mean coherence between the half-power points; None where it is not known."""
     misfit: float | None = None
     """rms of what the fit leaves in its band over rms of the noise there: 1 for a fit that leaves nothing."""
+    misfit_share: float | None = None
+    """rms of what the fit leaves in its band over the height of its peak."""
+    edge_distance: float | None = None
+    """From its frequency to the nearer end of the lines, in its half-power half-widths zeta f_n."""
+    left_ringing: float | None = None
+    """Share of its decay that is left when the record ends; None where the length of the record is not known."""
     half_power_damping: float | None = None
     """Damping ratio from the width of the peak at half power, for comparison; None where it has no such width."""
     shape: NDArray[np.float64] | None = None

@@ -12,7 +12,7 @@ from acquisition import Remark, joined
 from dsm import Calibration, DampingCalibration, StiffnessFit, plus_minus
 from lobewatch.analysis import FileModes, ModelCalibration, ModelSummary
 from lobewatch.show.output import table
-from modal import Mode
+from modal import Mode, trust_of
 
 
 def mode_json(mode: Mode) -> dict[str, Any]:
@@ -37,6 +37,8 @@ def mode_json(mode: Mode) -> dict[str, Any]:
         "phase_deg_std": mode.phase_deg_std,
         "coherence": mode.coherence,
         "misfit": mode.misfit,
+        "misfit_share": mode.misfit_share,
+        "trust": trust_of(mode),
         "half_power_damping_ratio": mode.half_power_damping,
         "remarks": [asdict(remark) for remark in mode.remarks],
         "method": mode.method,

@@ -1,0 +1,80 @@
+"""Which modes to believe, decided in one place from the figures of each."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterator
+
+from modal.mode import Mode
+
+DOUBTFUL_SHARE, REJECTED_SHARE = 0.05, 0.3
+"""What the fit leaves in the band, where it is more than noise, as a share of the peak of the mode."""
+DOUBTFUL_ERROR, REJECTED_ERROR = 0.2, 1 / 3
+"""Relative standard error of damping ratio or stiffness, the larger one."""
+DOUBTFUL_DAMPING, REJECTED_DAMPING = 0.08, 0.15
+"""Damping ratio of a mode without a peak of its own; machine structures have 0.005 to 0.08."""
+HEAVY_DAMPING = 0.3
+"""Damping ratio that no peak makes a mode."""
+LEAST_COHERENCE = 0.5
+"""Mean coherence at the peak below which most of what was measured is not the hammer's."""
+MOST_LEFT = 0.05
+"""Share of the decay left when the record ends: K is off by about as much."""
+MISFIT = 2.0
+"""rms of what the fit leaves over rms of the noise that is more than noise; it matters ..."""
+MISFIT_SHARE = 0.01
+"""... from this share of the peak; on the zeta and K of a mode without a peak of its own it bears more."""
+DOUBTFUL_CODES = ("bent-by-neighbour", "several-modes", "half-power-width")
+"""Remarks that stand for a figure which a mode does not carry."""
+
+
+class Trust(enum.StrEnum):
+    """How far a mode can be believed."""
+
+    TRUSTED = "trusted"
+    """Its values hold within their errors."""
+    DOUBTFUL = "doubtful"
+    """There is a mode; its zeta or K may be off by more than their errors say."""
+    REJECTED = "rejected"
+    """Not to be told from what the fit cannot explain: no decision should rest on it."""
+
+
+def trust_of(mode: Mode) -> Trust:
+    """The worst verdict of all rules, from figures and codes alone; the table of docs/modal.md says why each."""
+    found = {verdict for _, verdict in trust_rules(mode)}
+    return next((one for one in (Trust.REJECTED, Trust.DOUBTFUL) if one in found), Trust.TRUSTED)
+
+
+def trust_rules(mode: Mode) -> Iterator[tuple[str, Trust]]:
+    """What speaks against a mode, as codes of remarks, each with the verdict that it alone would bring."""
+    for code, value, doubtful, rejected in _limits(mode):
+        if value > doubtful:
+            yield code, Trust.REJECTED if value > rejected else Trust.DOUBTFUL
+    for remark in mode.remarks:
+        if remark.code in DOUBTFUL_CODES:
+            yield remark.code, Trust.DOUBTFUL
+
+
+def _limits(mode: Mode) -> Iterator[tuple[str, float, float, float]]:
+    """Code, value, and the limits above which it makes a mode doubtful and rejected."""
+    never, own_peak = float("inf"), mode.half_power_damping is not None
+    share = (mode.misfit_share or 0.0) if (mode.misfit or 1.0) > MISFIT else 0.0
+    if own_peak or mode.misfit is None:
+        yield "misfit", share, DOUBTFUL_SHARE, REJECTED_SHARE
+        yield "heavy-damping", mode.damping_ratio, HEAVY_DAMPING, HEAVY_DAMPING
+    else:
+        yield "misfit", share, MISFIT_SHARE, DOUBTFUL_SHARE
+        yield "heavy-damping", mode.damping_ratio, DOUBTFUL_DAMPING, REJECTED_DAMPING
+    yield "uncertain", relative_error(mode), DOUBTFUL_ERROR, REJECTED_ERROR
+    if mode.coherence is not None:
+        yield "low-coherence", 1 - mode.coherence, 1 - LEAST_COHERENCE, never
+    if mode.edge_distance is not None:
+        yield "cut-by-edge", 1 - mode.edge_distance, 0.0, 1.0
+    yield "still-ringing", mode.left_ringing or 0.0, MOST_LEFT, never
+
+
+def relative_error(mode: Mode) -> float:
+    """The larger of the relative standard errors of damping ratio and stiffness (-); 0 where not estimated."""
+    if mode.best_covariance is None:
+        return 0.0
+    _, damping, stiffness = mode.standard_error
+    return max(float(damping) / mode.damping_ratio, float(stiffness) / abs(mode.stiffness))

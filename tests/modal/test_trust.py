@@ -1,0 +1,78 @@
+"""Which modes to believe follows from their figures alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquisition import Remark
+from modal import Mode, Trust, trust_of, trust_rules
+
+GOOD = Mode(
+    1722.0,
+    0.03,
+    3.5e7,
+    np.diag([0.2, 1e-4, 1e5]) ** 2,
+    coherence=0.99,
+    misfit=1.1,
+    misfit_share=0.4,
+    edge_distance=30.0,
+    left_ringing=1e-9,
+    half_power_damping=0.031,
+)
+UNCERTAIN = np.diag([0.2, 1e-4, 1.05e7]) ** 2
+
+
+def test_a_mode_with_nothing_against_it_is_trusted_and_so_is_one_without_figures() -> None:
+    assert trust_of(GOOD) is Trust.TRUSTED
+    assert trust_of(Mode(1722.0, 0.03, 3.5e7)) is Trust.TRUSTED
+    assert trust_of(replace(GOOD, stiffness=-3.5e7, remarks=(Remark("misfit", "", "a text"),))) is Trust.TRUSTED
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "verdict"),
+    [
+        ({"misfit": 5.0, "misfit_share": 0.06}, "misfit", Trust.DOUBTFUL),
+        ({"misfit": 5.0, "misfit_share": 0.31}, "misfit", Trust.REJECTED),
+        ({"misfit": 5.0, "misfit_share": 0.02, "half_power_damping": None}, "misfit", Trust.DOUBTFUL),
+        ({"misfit": 5.0, "misfit_share": 0.06, "half_power_damping": None}, "misfit", Trust.REJECTED),
+        ({"damping_ratio": 0.1, "half_power_damping": None}, "heavy-damping", Trust.DOUBTFUL),
+        ({"damping_ratio": 0.193, "half_power_damping": None}, "heavy-damping", Trust.REJECTED),
+        ({"damping_ratio": 0.35}, "heavy-damping", Trust.REJECTED),
+        ({"covariance": UNCERTAIN / 2}, "uncertain", Trust.DOUBTFUL),
+        ({"covariance": 2 * UNCERTAIN}, "uncertain", Trust.REJECTED),
+        ({"jackknife": UNCERTAIN / 2, "n_hits": 5}, "uncertain", Trust.DOUBTFUL),
+        ({"coherence": 0.49}, "low-coherence", Trust.DOUBTFUL),
+        ({"edge_distance": 0.9}, "cut-by-edge", Trust.DOUBTFUL),
+        ({"left_ringing": 0.06}, "still-ringing", Trust.DOUBTFUL),
+        ({"remarks": (Remark("several-modes", "", "a text"),)}, "several-modes", Trust.DOUBTFUL),
+    ],
+)
+def test_each_rule_alone(change: dict[str, Any], code: str, verdict: Trust) -> None:
+    mode = replace(GOOD, **change)
+    assert list(trust_rules(mode)) == [(code, verdict)]
+    assert trust_of(mode) is verdict
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"misfit": 5.0, "misfit_share": 0.04},
+        {"damping_ratio": 0.1},
+        {"damping_ratio": 0.07, "half_power_damping": None},
+        {"coherence": 0.51},
+        {"edge_distance": 1.1},
+        {"left_ringing": 0.04},
+    ],
+)
+def test_less_than_a_limit_is_no_reason(change: dict[str, Any]) -> None:
+    assert trust_of(replace(GOOD, **change)) is Trust.TRUSTED
+
+
+def test_the_worst_rule_decides() -> None:
+    both = replace(GOOD, coherence=0.4, damping_ratio=0.5)
+    assert dict(trust_rules(both)) == {"low-coherence": Trust.DOUBTFUL, "heavy-damping": Trust.REJECTED}
+    assert trust_of(both) is Trust.REJECTED

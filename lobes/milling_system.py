@@ -12,10 +12,16 @@ from acquisition import Frf
 from lobes.tip_response import check_modes
 from modal import Mode
 
+UNDERDAMPED = 0.99
+"""A complex constant with a larger damping ratio, as a draw may have it, is taken as if with this one."""
+
 
 @dataclass(frozen=True, eq=False)
 class MillingSystem:
-    """n modes, each in one of the p directions that give way: q'' + 2 zeta w q' + w^2 q = shape F, d = sum shape q."""
+    """n modes, each in one of the p directions that give way: q'' + 2 zeta w q' + w^2 q = shape F.
+
+    The tip shows d = sum shape (place q + velocity q' / w): see `seen_at_tip`. Real modes show d = sum shape q.
+    """
 
     frequency: NDArray[np.float64]
     """Natural frequencies w (rad/s), shape (n,)."""
@@ -23,6 +29,8 @@ class MillingSystem:
     """Damping ratios zeta, shape (n,)."""
     shape: NDArray[np.float64]
     """Mass-normalised mode shapes at the tool tip, w / sqrt(K) (kg^-1/2), shape (n,)."""
+    phase: NDArray[np.float64]
+    """Phases of the modal constants (rad), shape (n,); 0 for real modes."""
     direction: NDArray[np.int64]
     """Row of `axes` in which each mode moves, shape (n,)."""
     axes: NDArray[np.int64]
@@ -32,9 +40,23 @@ class MillingSystem:
         """Receptance of each direction (m/N) at frequencies (Hz) of any shape, shape (..., p)."""
         omega = 2 * np.pi * frequency
         total = np.zeros((*omega.shape, self.axes.size), dtype=np.complex128)
-        for w, zeta, shape, row in zip(self.frequency, self.damping_ratio, self.shape, self.direction, strict=True):
-            total[..., row] += shape**2 / (w**2 - omega**2 + 2j * zeta * w * omega)
+        seen = seen_at_tip(self.damping_ratio, self.phase)
+        each = zip(self.frequency, self.damping_ratio, self.shape, *seen, self.direction, strict=True)
+        for w, zeta, shape, place, velocity, row in each:
+            shown = shape**2 * (place + 1j * velocity * omega / w if velocity else place)
+            total[..., row] += shown / (w**2 - omega**2 + 2j * zeta * w * omega)
         return total
+
+
+def seen_at_tip(
+    damping_ratio: NDArray[np.float64], phase: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What the tip shows of a mode's coordinate q and of its velocity q' / w, for phases (rad); 1 and 0 for phase 0.
+
+    y = (cos + sin zeta / sqrt(1 - zeta^2)) q + sin / sqrt(1 - zeta^2) q' / w has the receptance of `modal.Mode`.
+    """
+    velocity = np.sin(phase) / np.sqrt(1 - np.minimum(damping_ratio, UNDERDAMPED) ** 2)
+    return np.cos(phase) + velocity * damping_ratio, velocity
 
 
 def milling_system(x: Sequence[Mode] | None, y: Sequence[Mode] | None) -> MillingSystem:
@@ -55,6 +77,7 @@ def milling_system(x: Sequence[Mode] | None, y: Sequence[Mode] | None) -> Millin
         frequency=frequency,
         damping_ratio=np.array([mode.damping_ratio for mode in modes]),
         shape=frequency / np.sqrt([mode.stiffness for mode in modes]),
+        phase=np.radians([mode.phase_deg for mode in modes]),
         direction=np.repeat(np.arange(len(given)), [len(group) for _, _, group in given]),
         axes=np.array([axis for axis, _, _ in given]),
     )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes.cut import Cut
-from lobes.milling_system import MillingSystem
+from lobes.milling_system import MillingSystem, seen_at_tip
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +30,8 @@ class MillingRows:
     """Damping ratios, shape (r, n)."""
     stiffness: Floats
     """Stiffnesses at the tool tip (N/m), shape (r, n)."""
+    phase: Floats
+    """Phases of the modal constants (rad), shape (r, n); 0 for real modes."""
     speed_rpm: Floats
     """Spindle speeds (rpm), shape (r,)."""
     tangential: Floats
@@ -52,6 +54,11 @@ class MillingRows:
         return replace(self, feed_angle=np.full(len(self), angle))
 
     @property
+    def seen(self) -> tuple[Floats, Floats]:
+        """What the tip shows of each mode's coordinate q and of its velocity q' / w, each of shape (r, n)."""
+        return seen_at_tip(self.damping_ratio, self.phase)
+
+    @property
     def tooth_period(self) -> Floats:
         """Time between two teeth (s), shape (r,)."""
         return np.asarray(60 / (self.cut.teeth * self.speed_rpm))
@@ -62,7 +69,7 @@ class MillingRows:
         return np.asarray(np.hypot(self.tangential, self.radial))
 
 
-_VARYING = ("frequency", "damping_ratio", "stiffness", "speed_rpm", "tangential", "radial", "feed_angle")
+_VARYING = ("frequency", "damping_ratio", "stiffness", "phase", "speed_rpm", "tangential", "radial", "feed_angle")
 
 
 def joined_rows(first: MillingRows, second: MillingRows) -> MillingRows:
@@ -81,6 +88,7 @@ def rows_of(system: MillingSystem, cut: Cut, speed_rpm: Floats) -> MillingRows:
         frequency=ones * system.frequency,
         damping_ratio=ones * system.damping_ratio,
         stiffness=ones * (system.frequency / system.shape) ** 2,
+        phase=ones * system.phase,
         speed_rpm=speed_rpm,
         tangential=np.full(speed_rpm.shape, cut.tangential),
         radial=np.full(speed_rpm.shape, cut.radial),

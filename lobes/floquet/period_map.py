@@ -8,6 +8,7 @@ the cut the modes ring freely, exactly. For r rows and d depths:
     z (r, d, 2n), w (r, d, nodes p), p directions      theta = w_n times the length of a piece
     D = (1 + 2 zeta theta A + theta^2 A^2)^-1          A integrates from the begin of the piece to its nodes
     velocity = D (p_0 - theta c q_0 + theta/K A force),  q = q_0 + theta A velocity
+    displacement = q, of a complex mode its shares of q and velocity (`MillingRows.seen`)
 
 Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, ch. 3, with polynomials of degree
 7 instead of 1 for the delayed term; Hairer & Wanner, Solving Ordinary Differential Equations II, ch. IV.5.
@@ -141,10 +142,15 @@ class _Response:
         drive = -theta * (weight @ (place + 2 * zeta * velocity))[..., np.newaxis, :] + [[0.0, 1.0]]
         q_push = theta[..., 0] * (weight @ forced)
         v_push = theta[..., 0] * (weight / rows.stiffness[..., np.newaxis] - weight @ (yields + 2 * zeta * forced))
+        shown, shown_forced = place, yields
+        if np.any(rows.phase):
+            of_place, of_velocity = (share[..., np.newaxis, np.newaxis] for share in rows.seen)
+            shown = of_place * place + of_velocity * velocity
+            shown_forced = of_place * yields + of_velocity * forced
         return cls(
             ends=_blocks(q[..., 0, 0], q[..., 0, 1], drive[..., 0, 0], drive[..., 0, 1]),
-            shows=_by_direction(rows, place),
-            gives=np.einsum("rnij,np->rpij", yields, _moves(rows)),
+            shows=_by_direction(rows, shown),
+            gives=np.einsum("rnij,np->rpij", shown_forced, _moves(rows)),
             pushes=np.concatenate([np.einsum("rns,np->rnps", push, _moves(rows)) for push in (q_push, v_push)], axis=1),
         )
 

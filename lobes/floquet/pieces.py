@@ -13,8 +13,8 @@ CYCLES = 0.75
 GROWTH = 1.3
 """Larger numbers are rounded up to powers of this, so that neighbouring speeds share theirs."""
 QUIET = 0.1
-"""A mode counts where depth times force times its largest flexibility 1 / (2 K zeta) is more: a loop of less cannot
-sustain itself, whatever the speed."""
+"""A mode counts where depth times force times its largest flexibility, 1 / (2 K zeta) of a real one, is more: a loop of
+less cannot sustain itself, whatever the speed."""
 NONE = 1e-12
 """Segments shorter than this share of the tooth period are left out."""
 
@@ -43,7 +43,7 @@ def is_free(cut: Cut, ends: Floats, depth: Floats) -> NDArray[np.bool_]:
 
 def piece_numbers(rows: MillingRows, deepest: float) -> NDArray[np.int64]:
     """Pieces of a whole tooth period that each row needs for depths (m) up to `deepest`, shape (r,)."""
-    loop = deepest * rows.force[:, np.newaxis] / (2 * rows.stiffness * rows.damping_ratio)
+    loop = deepest * rows.force[:, np.newaxis] / (2 * rows.stiffness * rows.damping_ratio) * np.hypot(*rows.seen)
     fastest = np.maximum(np.max(np.where(loop > QUIET, rows.frequency, 0.0), axis=1), np.min(rows.frequency, axis=1))
     cycles = fastest / (2 * np.pi) * rows.tooth_period
     return np.asarray(np.ceil(np.maximum(cycles / CYCLES, 1.0)), dtype=np.int64)

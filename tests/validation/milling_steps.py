@@ -10,7 +10,8 @@ d = q - q_periodic, and that of the surface, u, both in units of the feed per to
 
 While all teeth cut this is F = -b H(phi) (q(t) - q(t - tau)) without any rest, and no rounding of the large periodic
 part hides a small deviation. Between steps the modes swing freely, which is exact; the force of a step acts as one
-impulse in its middle (Stoermer-Verlet with exact flight: second order, explicit, without numerical damping).
+impulse in its middle (Stoermer-Verlet with exact flight: second order, explicit, without numerical damping). Complex
+modes jump with an impulse: the force is that of the tip half way, to second order.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Modes = tuple[tuple[float, float, float], ...]
-"""Frequency (Hz), damping ratio and stiffness (N/m) of each mode."""
+Modes = tuple[tuple[float, ...], ...]
+"""Frequency (Hz), damping ratio, stiffness (N/m) and, of complex modes, phase (deg) of each mode."""
 
 CYCLE, PERIOD, ARC = 40, 60, 30
 """Fewest steps in a cycle of the fastest mode (as stiffened by the cut), in a tooth period, and in the arc of cut."""
@@ -68,7 +69,7 @@ class Case:
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated."""
         modes = self.x + self.y
-        if not modes or not all(f > 0 and 0 < zeta < 1 and k > 0 for f, zeta, k in modes):
+        if not modes or not all(f > 0 and 0 < zeta < 1 and k > 0 for f, zeta, k, *_ in modes):
             raise ValueError(f"modes {modes} need frequency > 0, damping ratio in (0, 1), stiffness > 0, one at least")
         if self.teeth < 1 or not 0 < self.immersion <= 1 or self.direction not in ("up", "down"):
             raise ValueError(f"{self.teeth} teeth, immersion {self.immersion}, {self.direction!r} is no cut")
@@ -100,7 +101,7 @@ class Case:
         pitch = 2 * math.pi / self.teeth
         at_once = math.ceil((leave - entry) / pitch)
         cut = self.depth * math.hypot(self.tangential, self.radial) * at_once
-        fastest = max(f * math.sqrt(1 + cut / k) for f, _, k in self.x + self.y)
+        fastest = max(f * math.sqrt(1 + cut / k) for f, _, k, *_ in self.x + self.y)
         return math.ceil(max(CYCLE * fastest * self.tooth_period, PERIOD, ARC * pitch / (leave - entry)))
 
 
@@ -117,6 +118,7 @@ class Stepper:
         self._flight = np.stack([flight for flight, _, _ in modal], axis=-1)
         self._shape = np.stack([shape for _, shape, _ in modal], axis=-1)
         self._kick = np.stack([kick for _, _, kick in modal], axis=-1)
+        self._jump = np.einsum("imc,jmc->ijc", self._shape, self._kick.imag)
         tables = [_normals(case, steps) for case in cases]
         self._normal = np.zeros((steps, 2, max(table.shape[2] for table in tables), len(cases)))
         for i, table in enumerate(tables):
@@ -127,7 +129,7 @@ class Stepper:
 
     def keep(self, which: NDArray[np.bool_]) -> None:
         """Go on with some of the cases only."""
-        for name in ("_flight", "_shape", "_kick", "_normal", "_surface", "_swing"):
+        for name in ("_flight", "_shape", "_kick", "_jump", "_normal", "_surface", "_swing"):
             setattr(self, name, np.ascontiguousarray(getattr(self, name)[..., which]))
 
     def run(self, periods: int) -> Floats:
@@ -135,33 +137,37 @@ class Stepper:
         steps, swing = len(self._normal), self._swing
         recorded = np.linspace(0, steps, SAMPLES, endpoint=False).astype(int)
         record = np.empty((periods, SAMPLES, 2, swing.shape[1]))
-        history = np.empty((steps, 2, swing.shape[1]))
+        history, jumps = np.empty((steps, 2, swing.shape[1])), bool(np.any(self._jump))
         for period in range(periods):
             for normal, surface, d in zip(self._normal, self._surface, history, strict=True):
                 np.multiply(swing, self._flight, out=swing)
                 np.einsum("imc,mc->ic", self._shape, swing.imag, out=d)
                 thinner = np.minimum(surface - np.einsum("iec,ic->ec", normal, d), normal[0])
+                if jumps:
+                    d += np.einsum("ijc,jec,ec->ic", self._jump, normal, thinner) / 2
+                    thinner = np.minimum(surface - np.einsum("iec,ic->ec", normal, d), normal[0])
                 surface -= thinner
-                swing.real += np.einsum("imc,ic->mc", self._kick, np.einsum("iec,ec->ic", normal, thinner))
+                swing += np.einsum("imc,ic->mc", self._kick, np.einsum("iec,ec->ic", normal, thinner))
             record[period] = history[recorded]
         return np.moveaxis(record, -1, 0)
 
 
-def _modal(case: Case, steps: int, most: int) -> tuple[NDArray[np.complex128], Floats, Floats]:
+def _modal(case: Case, steps: int, most: int) -> tuple[NDArray[np.complex128], Floats, NDArray[np.complex128]]:
     """Flight (most,) over a step, feed and normal (2, most) of a swing, swing of a step's force sums (2, most).
 
-    A mode swings as a = (q' + zeta w q) / w_d + i q: free flight is a factor, a force changes the real part.
+    A real mode swings as a = (q' + zeta w q) / w_d + i q: free flight is a factor, a force changes the real part. After
+    an impulse the tip moves as Im(A w^2 / w_d exp(lambda t)), A = exp(i phase) / K: a complex mode is kicked at an angle.
     """
-    f, zeta, k = np.array(case.x + case.y).T
+    f, zeta, k, phase = np.array([(*mode, 0.0)[:4] for mode in case.x + case.y]).T
     w, step = 2 * np.pi * f, case.tooth_period / steps
     damped = w * np.sqrt(1 - zeta**2)
     c, s = math.cos(case.feed_angle), math.sin(case.feed_angle)
     along = np.repeat([[c, s], [-s, c]], [len(case.x), len(case.y)], axis=1)
     force = case.depth * np.array([[case.radial, case.tangential], [-case.tangential, case.radial]])
-    flight, shape, kick = np.zeros(most, dtype=np.complex128), np.zeros((2, most)), np.zeros((2, most))
+    flight, shape, kick = np.zeros(most, dtype=complex), np.zeros((2, most)), np.zeros((2, most), dtype=complex)
     flight[: f.size] = np.exp((-zeta * w + 1j * damped) * step)
     shape[:, : f.size] = along
-    kick[:, : f.size] = force.T @ along * step * w**2 / (k * damped)
+    kick[:, : f.size] = force.T @ along * step * w**2 / (k * damped) * np.exp(1j * np.radians(phase))
     return flight, shape, kick
 
 

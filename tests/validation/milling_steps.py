@@ -25,8 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Modes = tuple[tuple[float, ...], ...]
-"""Frequency (Hz), damping ratio, stiffness (N/m) and, of complex modes, phase (deg) of each mode."""
+Modes = tuple[tuple[float, float, float], ...]
+"""Frequency (Hz), damping ratio and stiffness (N/m) of each mode."""
+ComplexModes = tuple[tuple[float, float, float] | tuple[float, float, float, float], ...]
+"""The same, of some with the phase of the modal constant (deg)."""
 
 CYCLE, PERIOD, ARC = 40, 60, 30
 """Fewest steps in a cycle of the fastest mode (as stiffened by the cut), in a tooth period, and in the arc of cut."""
@@ -46,9 +48,9 @@ class Case:
     Raises ValueError for modes that do not swing and for what is no cut.
     """
 
-    x: Modes
+    x: ComplexModes
     """Modes in machine x, none to six."""
-    y: Modes
+    y: ComplexModes
     """Modes in machine y."""
     feed_angle: float
     """From machine x to the feed (rad): the feed is (cos, sin), the normal to it (-sin, cos)."""
@@ -156,7 +158,8 @@ def _modal(case: Case, steps: int, most: int) -> tuple[NDArray[np.complex128], F
     """Flight (most,) over a step, feed and normal (2, most) of a swing, swing of a step's force sums (2, most).
 
     A real mode swings as a = (q' + zeta w q) / w_d + i q: free flight is a factor, a force changes the real part. After
-    an impulse the tip moves as Im(A w^2 / w_d exp(lambda t)), A = exp(i phase) / K: a complex mode is kicked at an angle.
+    an impulse the tip moves as Im(A w^2 / w_d exp(lambda t)), A = exp(i phase) / K: complex modes are kicked at an
+    angle.
     """
     f, zeta, k, phase = np.array([(*mode, 0.0)[:4] for mode in case.x + case.y]).T
     w, step = 2 * np.pi * f, case.tooth_period / steps

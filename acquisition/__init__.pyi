@@ -19,7 +19,17 @@ from .devices import (
 )
 from .emulation import Bench, EmulatorThread, HammeredStructure, Hammering, SimulatedSource, Structure
 from .errors import DataError, DeviceError
-from .estimation import RunningMean, cross_spectra, estimate_frf, force_noise
+from .estimation import (
+    RunningMean,
+    cross_spectra,
+    estimate_frf,
+    exponential_window,
+    force_noise,
+    infer_averages,
+    time_after_hit,
+    time_of_hit,
+    windowed_receptance,
+)
 from .event import Event, EventKind
 from .files import (
     STANDARD_GRAVITY,
@@ -121,10 +131,12 @@ __all__ = [
     "cross_spectra",
     "driver_names",
     "estimate_frf",
+    "exponential_window",
     "find_driver",
     "find_port",
     "force_noise",
     "from_accelerance",
+    "infer_averages",
     "joined",
     "judge_hit",
     "known_formats",
@@ -145,8 +157,11 @@ __all__ = [
     "stiffness_doubt",
     "survey_ports",
     "tap_direction",
+    "time_after_hit",
+    "time_of_hit",
     "unit_mistake",
     "usb_identity",
+    "windowed_receptance",
     "write_hit",
     "write_tap",
 ]

@@ -12,10 +12,11 @@ from modal.mode_indicator import mode_indicator
 from modal.physical_poles import PhysicalPoles, physical_poles
 from modal.pick_peaks import pick_peaks
 from modal.predominant import predominant
+from modal.quality.peaks_beyond import peaks_beyond
+from modal.quality.trust import Trust, trust_of, trust_rules
 from modal.remove_window import remove_window
 from modal.stabilise import StabilisationChart, stabilise
 from modal.synthesize import synthesize
-from modal.trust import Trust, trust_of, trust_rules
 
 __all__ = [
     "Extraction",
@@ -33,6 +34,7 @@ __all__ = [
     "mac",
     "mode_indicator",
     "modes_of",
+    "peaks_beyond",
     "physical_poles",
     "pick_peaks",
     "predominant",

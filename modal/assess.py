@@ -14,6 +14,7 @@ from modal.extract import LARGEST_ERROR, LEAST_TERMS
 from modal.extraction import Extraction, FittedBand
 from modal.mode import Mode
 from modal.physical_poles import physical_poles
+from modal.quality.trust import relative_error, trust_rules
 
 LEAST_COHERENCE = 0.9
 """Mean coherence between the half-power points; below it the averaged hits disagree."""
@@ -40,6 +41,9 @@ def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
         mode,
         coherence=_coherence(state, mode),
         misfit=misfit,
+        misfit_share=share,
+        edge_distance=_edge_distance(state, mode),
+        left_ringing=_left_at_the_end(state.frf.frequency, mode.damping_ratio * mode.frequency),
         half_power_damping=_half_power_damping(band, mode),
     )
     found = chain(_on_its_place(state, band, judged), _on_its_values(band, i, judged, share), _on_its_errors(judged))
@@ -74,6 +78,12 @@ def _misfit(state: Extraction, band: FittedBand, i: int) -> tuple[float, float]:
     return float(rms / np.max(peaks)), float(rms / noise) if noise > 0 else 1.0
 
 
+def _edge_distance(state: Extraction, mode: Mode) -> float:
+    """Of a mode from the nearer end of the lines, in its half-power half-widths."""
+    f = state.frf.frequency
+    return float(min(mode.frequency - f[0], f[-1] - mode.frequency) / (mode.damping_ratio * mode.frequency))
+
+
 def _half_power_damping(band: FittedBand, mode: Mode) -> float | None:
     reach = mode.damping_ratio * mode.frequency
     near = [r for r in band.resonances if abs(r.frequency - mode.frequency) < max(reach, r.half_width)]
@@ -83,12 +93,11 @@ def _half_power_damping(band: FittedBand, mode: Mode) -> float | None:
 
 def _on_its_place(state: Extraction, band: FittedBand, mode: Mode) -> Iterator[Remark]:
     f, half_width, at = state.frf.frequency, mode.damping_ratio * mode.frequency, _name(mode)
-    if min(mode.frequency - f[0], f[-1] - mode.frequency) < half_width:
+    if mode.edge_distance is not None and mode.edge_distance < 1:
         text = f"its peak is cut by the edge of the lines, {f[0]:.0f}..{f[-1]:.0f} Hz"
         yield Remark("cut-by-edge", at, text, "widen the band")
-    left = _left_at_the_end(f, half_width)
-    if left > MOST_LEFT:
-        text = f"{100 * left:.0f} % of it still rings when the record ends"
+    if mode.left_ringing is not None and mode.left_ringing > MOST_LEFT:
+        text = f"{100 * mode.left_ringing:.0f} % of it still rings when the record ends"
         yield Remark("still-ringing", at, text, "record longer")
     for other in np.delete(band.fit.frequency, np.argmin(np.abs(band.fit.frequency - mode.frequency))):
         if abs(other - mode.frequency) < 2 * half_width:
@@ -106,11 +115,11 @@ def _name(mode: Mode) -> str:
     return f"{mode.frequency:.0f} Hz"
 
 
-def _left_at_the_end(frequency: NDArray[np.float64], half_width: float) -> float:
-    """Share of the decay after the record, whose length is one over the line spacing; 0 for an uneven axis."""
+def _left_at_the_end(frequency: NDArray[np.float64], half_width: float) -> float | None:
+    """Share of the decay after the record, whose length is one over the line spacing; None for an uneven axis."""
     steps = np.diff(frequency)
     even = np.ptp(steps) < 1e-3 * steps[0]
-    return float(np.exp(-2 * np.pi * half_width / np.mean(steps))) if even else 0.0
+    return float(np.exp(-2 * np.pi * half_width / np.mean(steps))) if even else None
 
 
 def _on_its_values(band: FittedBand, i: int, mode: Mode, share: float) -> Iterator[Remark]:
@@ -134,6 +143,13 @@ def _on_its_values(band: FittedBand, i: int, mode: Mode, share: float) -> Iterat
 
 def _on_its_errors(mode: Mode) -> Iterator[Remark]:
     at = _name(mode)
+    rules = dict(trust_rules(mode))
+    if "heavy-damping" in rules:
+        text = f"zeta of {100 * mode.damping_ratio:.0f} % without a clear peak: rather the sum of several modes"
+        yield Remark("heavy-damping", at, text)
+    if "uncertain" in rules:
+        text = f"zeta or K uncertain by {100 * relative_error(mode):.0f} %"
+        yield Remark("uncertain", at, text, "average more hits")
     if mode.coherence is not None and mode.coherence < LEAST_COHERENCE:
         text = f"coherence {mode.coherence:.2f} at its peak, below {LEAST_COHERENCE:g}: the hits disagree"
         yield Remark("low-coherence", at, text, "hit one point in one direction")

@@ -10,20 +10,29 @@ from numpy.typing import NDArray
 from modal.mode import Mode
 
 
-def remove_window(mode: Mode, time_constant: float) -> Mode:
+def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:
     """The mode without the exponential window exp(-t/time_constant) (s) that the response was recorded with.
 
     The window adds 1/time_constant to the decay rate zeta w_n and leaves the damped frequency and the strength of
     the free decay as they are: zeta falls by 1/(w_n time_constant), to first order, and K follows w_n^2. Standard
-    errors are carried over. Of a windowed acceleration K comes out too large by a further 2 zeta/(w_n time_constant)
-    of itself, a few parts in ten thousand.
+    errors are carried over.
 
-    Raises ValueError for a time constant that is not > 0, and for a mode that decays no faster than the window.
+    delay: time from the start of the window to the hit (s), the centre of the pulse. By then the window has fallen to
+    exp(-delay/time_constant), so that all of the response is smaller by that and K is larger: it is taken off as well.
+    0 where the window begins at the hit, or lies over the force, too.
+
+    Of a windowed acceleration K comes out too large by a further 2 zeta/(w_n time_constant) of itself, a few parts in
+    ten thousand, unless `windowed_receptance` has divided by the s^2 that belongs to it.
+
+    Raises ValueError for a time constant that is not > 0, for a delay that is not finite and >= 0, and for a mode that
+    decays no faster than the window.
     Source: Fladung & Rost (1997), Application and correction of the exponential window for FRFs, Mechanical Systems
     and Signal Processing 11, 23.
     """
     if not (np.isfinite(time_constant) and time_constant > 0):
         raise ValueError(f"time_constant={time_constant} s is not a finite number > 0")
+    if not (np.isfinite(delay) and delay >= 0):
+        raise ValueError(f"delay={delay} s is not a finite number >= 0: the window cannot begin after the hit")
     size = 2 * np.pi * mode.frequency
     decay = mode.damping_ratio * size - 1 / time_constant
     if decay <= 0:
@@ -32,17 +41,27 @@ def remove_window(mode: Mode, time_constant: float) -> Mode:
             f"window, {1 / time_constant:.3g}/s: the time constant is not that of its window; look it up"
         )
     w = float(np.hypot(decay, size * np.sqrt(1 - mode.damping_ratio**2)))
-    slope = _slope(mode, time_constant, size, decay, w)
+    left = float(np.exp(-delay / time_constant))
+    slope = np.diag([1, 1, left]) @ _slope(mode, time_constant, size, decay, w)
     covariances = [c if c is None else slope @ c @ slope.T for c in (mode.covariance, mode.jackknife)]
     return replace(
         mode,
         frequency=w / (2 * np.pi),
         damping_ratio=decay / w,
-        stiffness=mode.stiffness * (w / size) ** 2,
+        stiffness=mode.stiffness * (w / size) ** 2 * left,
         covariance=covariances[0],
         jackknife=covariances[1],
+        phase_correlation=_phase_correlation(mode, slope),
         method=f"{mode.method}, without the window of {time_constant:g} s",
     )
+
+
+def _phase_correlation(mode: Mode, slope: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Of the error of the phase, which stays as it is, with those of the values without the window."""
+    if mode.phase_correlation is None or mode.best_covariance is None:
+        return mode.phase_correlation
+    error = np.sqrt(np.diag(slope @ mode.best_covariance @ slope.T))
+    return np.asarray(slope @ (mode.phase_correlation * mode.standard_error) / error)
 
 
 def _slope(mode: Mode, tau: float, size: float, decay: float, w: float) -> NDArray[np.float64]:

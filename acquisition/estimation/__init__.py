@@ -1,13 +1,25 @@
 """From hits to an averaged FRF."""
 
 from acquisition.estimation.estimate_frf import cross_spectra, estimate_frf, frf_of_spectra
+from acquisition.estimation.exponential_window import (
+    exponential_window,
+    time_after_hit,
+    time_of_hit,
+    windowed_receptance,
+)
 from acquisition.estimation.force_noise import force_noise
+from acquisition.estimation.infer_averages import infer_averages
 from acquisition.estimation.running_mean import RunningMean
 
 __all__ = [
     "RunningMean",
     "cross_spectra",
     "estimate_frf",
+    "exponential_window",
     "force_noise",
     "frf_of_spectra",
+    "infer_averages",
+    "time_after_hit",
+    "time_of_hit",
+    "windowed_receptance",
 ]

@@ -12,6 +12,7 @@ from .model_calibration import ModelCalibration, calibrate_model
 from .model_picture import ModelPicture, model_picture
 from .model_state import ModelState, first_critical_speed, model_frf, model_state
 from .model_summary import ModelMode, ModelSummary, model_summary
+from .one_file.recorded_window import Window
 from .programs import Advice, Setting, Verdict, Word
 from .standing import Light, SeriesStanding, Standing, change_since_first, unreadable
 
@@ -39,6 +40,7 @@ __all__ = [
     "Setting",
     "Standing",
     "Verdict",
+    "Window",
     "Word",
     "calibrate_model",
     "change_since_first",

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from acquisition import Frf, Hit, Remark, check_hit, read_frf, read_recording
-from modal import Extraction, Mode, cut_edges, extract, modes_of, pick_peaks, remove_window
+from acquisition import Frf, Remark, windowed_receptance
+from lobewatch.analysis.one_file.own_window import ringing_modes_windowed, without_own_window
+from lobewatch.analysis.one_file.recorded import recorded
+from lobewatch.analysis.one_file.recorded_window import Window
+from modal import Extraction, Mode, cut_edges, extract, modes_of, peaks_beyond, pick_peaks, remove_window
+
+MOST_NAMED = 6
+"""Peaks beyond the usable band that are named one by one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,42 +37,70 @@ class FileModes:
 
 
 def modes_of_file(
-    path: Path, band: tuple[float, float] | None = None, *, window: float | None = None, conjugate: bool = False
+    path: Path,
+    band: tuple[float, float] | None = None,
+    *,
+    window: Window | None = None,
+    conjugate: bool = False,
+    averages: int | None = None,
+    accept: Collection[str] = (),
 ) -> FileModes:
     """Modes between two frequencies (Hz), with standard errors over the hits where the file holds three or more.
 
-    window: time constant (s) of an exponential window on the response, to be corrected. conjugate: the file holds the
-    complex conjugate of response over force.
+    window: exponential window on the response, to be corrected. conjugate: the file holds the complex conjugate of
+    response over force. averages: hits that an FRF was averaged from, to make use of its coherence; where nobody says
+    they are inferred. accept: verdicts on hits ("not-decayed") that do not count. What still rings when the record
+    ends gets an exponential window, which is corrected: all hits where none is good otherwise, else the modes that do.
+
+    Raises ValueError for a window whose hit is not known or comes before it, averages that no coherence belongs to, and
+    verdicts that cannot be accepted.
     """
-    frf = read_frf(path)
-    frf = replace(frf, receptance=frf.receptance.conj()) if conjugate else frf
+    made = recorded(path, accept, averages)
+    frf = replace(made.frf, receptance=made.frf.receptance.conj()) if conjugate else made.frf
+    hits = () if conjugate else made.hits
+    delay = None if window is None else window.delay(made.hits)
+    frf = frf if window is None else windowed_receptance(frf, window.time_constant)
     state = extract([frf], band)
-    found = tuple(modes_of(state, [[] if conjugate else _good_hits(path)]))
+    found = fitted = tuple(modes_of(state, [hits]))
+    own: tuple[Remark, ...] = ()
+    if window is not None and delay is not None:
+        fitted = tuple(remove_window(mode, window.time_constant, delay) for mode in found)
+    elif made.time_constant is not None:
+        fitted = tuple(without_own_window(found, made.time_constant))
+    elif not accept:
+        fitted, own = ringing_modes_windowed(found, hits, band)
     return FileModes(
         path=path,
         frf=frf,
         extraction=state,
         as_recorded=found,
-        fitted=found if window is None else tuple(remove_window(mode, window) for mode in found),
+        fitted=fitted,
         picked=tuple(pick_peaks(frf, band)),
-        remarks=tuple(_remarks(found, cut_edges(frf, found, band))),
+        remarks=(*made.remarks, *own, *_remarks(found, frf, band)),
     )
 
 
-def _good_hits(path: Path) -> list[Hit]:
-    """The hits that the FRF of this file was averaged from; none where it holds only an FRF."""
-    recording = read_recording(path)
-    return [] if isinstance(recording, Frf) else [hit for hit in recording if not check_hit(hit)]
-
-
-def _remarks(found: Sequence[Mode], edges: Sequence[float]) -> Iterator[Remark]:
-    """edges: where a peak may be cut (Hz)."""
+def _remarks(found: Sequence[Mode], frf: Frf, band: tuple[float, float] | None) -> Iterator[Remark]:
     yield from remarks_on_all(found)
-    for edge in edges:
+    for edge in cut_edges(frf, found, band):
         text = "a peak may be cut by the edge of the lines, its mode missing"
         yield Remark("mode-missing-at-edge", f"{edge:.0f} Hz", text, "widen the band (a harder tip reaches higher)")
+    if band is None:
+        yield from _beyond(frf)
     if not found:
         yield Remark("no-mode", "", "no mode found", "look whether the band is right and the hit was hard enough")
+
+
+def _beyond(frf: Frf) -> Iterator[Remark]:
+    """Peaks that are not fitted because the force hardly reached them."""
+    peaks = peaks_beyond(frf)
+    if frf.usable_band is None or not peaks:
+        return
+    where = ", ".join(f"{frequency:.0f}" for frequency in peaks)
+    if len(peaks) > MOST_NAMED:
+        where = f"{len(peaks)} places from {peaks[0]:.0f} to {peaks[-1]:.0f}"
+    text = f"peaks at {where} Hz lie beyond the usable band, which ends at {frf.usable_band[1]:.0f} Hz: not fitted"
+    yield Remark("peaks-beyond", "", text, "a harder tip reaches higher")
 
 
 def remarks_on_all(modes: Sequence[Mode]) -> list[Remark]:

@@ -19,28 +19,47 @@ def modes(
     window: Annotated[
         float | None, typer.Option(help="Time constant (s) of an exponential window on the response, to be corrected.")
     ] = None,
+    window_start: Annotated[float, typer.Option(help="When that window begins (s from the record's start).")] = 0.0,
+    hit_at: Annotated[
+        float | None,
+        typer.Option(help="When the hammer hit (s from the record's start); an FRF with --window needs it."),
+    ] = None,
+    averages: Annotated[
+        int | None,
+        typer.Option(help="Hits that an FRF was averaged from; else inferred from its coherence."),
+    ] = None,
+    accept: Annotated[
+        list[str] | None, typer.Option(help="Use hits with this verdict all the same (not-decayed); may be repeated.")
+    ] = None,
     conjugate: Annotated[
         bool, typer.Option("--conjugate", help="The file holds the complex conjugate of response over force.")
+    ] = False,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Show the rejected modes, too, and every remark on each mode.")
     ] = False,
     as_json: Json = False,
 ) -> None:
     """Natural frequency, damping ratio and stiffness from one recorded file.
 
     Each by a least-squares fit with standard errors, over the hits where the file holds three or more, and beside it
-    by the peak picking of Gaber & Hashemi (2015). What speaks against a mode is said below the table.
+    by the peak picking of Gaber & Hashemi (2015). Trusted modes come first, then doubtful ones with the reason; the
+    rejected ones are counted. Hits that still ring when their record ends get an exponential window, and its damping
+    is taken off again.
 
     Examples:
 
       lobewatch modes acceleration.lvm
       lobewatch modes tap.h5 --band 1200 2200 --figure modes.png
+      lobewatch modes frf.csv --window 0.05 --hit-at 0.01
     """
-    from lobewatch.analysis import modes_of_file
-    from lobewatch.show.describe import file_modes_json, file_modes_texts
+    from lobewatch.analysis import Window, modes_of_file
+    from lobewatch.show.modes.describe_modes import file_modes_json, file_modes_texts
 
-    found = modes_of_file(file, band, window=window, conjugate=conjugate)
+    taken_off = None if window is None else Window(window, window_start, hit_at)
+    found = modes_of_file(file, band, window=taken_off, conjugate=conjugate, averages=averages, accept=accept or ())
     if figure is not None:
         from lobewatch.show.figures import save_figure
         from lobewatch.show.figures_modes import modes_figure
 
         save_figure(modes_figure(found.extraction, found.as_recorded, file.name), figure)
-    emit(file_modes_json(found), as_json, *file_modes_texts(found))
+    emit(file_modes_json(found), as_json, *file_modes_texts(found, everything=everything))

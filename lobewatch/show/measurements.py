@@ -11,8 +11,8 @@ from acquisition import Remark, joined
 from lobes import StabilityLobes
 from lobewatch.analysis import Logbook, Measurement, Verdict, lobes_of, remarks_on_all
 from lobewatch.machine import REFERENCE_CUT
-from lobewatch.show.describe import calibration_json, mode_json, mode_table
-from lobewatch.show.describe import remark_lines as mode_remark_lines
+from lobewatch.show.describe import calibration_json
+from lobewatch.show.modes.describe_modes import in_order, mode_json, mode_table, short_remark_lines
 from lobewatch.show.programs.doubts import reading_lines
 from lobewatch.show.verdicts import is_safe, verdict_json, verdict_table
 
@@ -65,7 +65,8 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
     """A measurement for people."""
     texts: list[str | Table] = [f"{m.tap_id}  (tool {m.tool}, direction {m.direction})"]
     if m.modes:
-        texts += [mode_table(m.modes), *mode_remark_lines(m.modes, remarks_on_all(m.modes))]
+        shown = in_order(m.modes, rejected=False)
+        texts += [mode_table(shown), *short_remark_lines(shown, remarks_on_all(m.modes))]
     if m.followed is not None:
         texts.append(f"followed: {m.followed.frequency:.2f} Hz")
     if m.calibration is not None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from acquisition import Remark
-from modal import Mode, Trust, trust_of, trust_rules
+from modal import Mode, Trust, fit_modes, synthesize, trust_of, trust_rules
 
 GOOD = Mode(
     1722.0,
@@ -76,3 +76,13 @@ def test_the_worst_rule_decides() -> None:
     both = replace(GOOD, coherence=0.4, damping_ratio=0.5)
     assert dict(trust_rules(both)) == {"low-coherence": Trust.DOUBTFUL, "heavy-damping": Trust.REJECTED}
     assert trust_of(both) is Trust.REJECTED
+
+
+def test_a_fitted_mode_carries_the_figures() -> None:
+    lines = np.arange(5.0, 2000.0, 5.0)
+    (mode,) = fit_modes(synthesize([Mode(1722.0, 0.01, 3.5e7)], lines))
+    assert mode.edge_distance == pytest.approx((1995 - 1722) / 17.22, rel=1e-3)
+    assert mode.left_ringing == pytest.approx(np.exp(-2 * np.pi * 17.22 / 5), rel=1e-3)
+    assert mode.misfit_share is not None
+    assert mode.misfit_share < 1e-6
+    assert trust_of(mode) is Trust.TRUSTED

@@ -13,8 +13,8 @@ from matplotlib.text import Annotation
 from acquisition import Frf, Remark, from_accelerance
 from lobewatch.analysis import remarks_on_all
 from lobewatch.cli import main
-from lobewatch.show.describe import mode_lines, mode_table, picked_table, remark_lines
 from lobewatch.show.figures_modes import modes_figure
+from lobewatch.show.modes.describe_modes import mode_lines, mode_table, picked_table, remark_lines
 from lobewatch.show.output import results
 from modal import Mode, extract, fit_modes, pick_peaks, synthesize
 
@@ -117,7 +117,7 @@ def test_command_corrects_an_exponential_window_and_draws(
     assert [(remark["code"], remark["about"]) for remark in plain["remarks"]] == [("not-driving-point", "1722 Hz")]
     assert plain["interval_95"][0][0] < 1722 < plain["interval_95"][0][1]
     picture = tmp_path / "modes.png"
-    assert command(monkeypatch, str(file), "--json", "--window", "0.1", "--figure", str(picture)) == 0
+    assert command(monkeypatch, str(file), "--json", "--window", "0.1", "--hit-at", "0", "--figure", str(picture)) == 0
     corrected = json.loads(capsys.readouterr().out)["modes"][1]
     added = 1 / (2 * np.pi * 1722 * 0.1)
     assert plain["damping_ratio"] - corrected["damping_ratio"] == pytest.approx(added, rel=0.01)
@@ -127,5 +127,5 @@ def test_command_corrects_an_exponential_window_and_draws(
     assert "--conjugate" in capsys.readouterr().err
     assert command(monkeypatch, str(file), "--conjugate", "--json") == 0
     assert json.loads(capsys.readouterr().out)["modes"][1]["damping_ratio"] == pytest.approx(plain["damping_ratio"])
-    assert command(monkeypatch, str(file), "--conjugate", "--window", "-1") == 2
+    assert command(monkeypatch, str(file), "--conjugate", "--window", "-1", "--hit-at", "0") == 2
     assert "time_constant=-1.0 s" in capsys.readouterr().err

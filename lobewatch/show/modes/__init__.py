@@ -1,0 +1,1 @@
+"""The modes of a file for people: table, remarks, JSON."""

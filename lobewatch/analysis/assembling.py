@@ -49,4 +49,4 @@ def predicted(
 
 
 def _point(one: Row | Measurement, mode: Mode) -> Point:
-    return Point(one.time, mode.frequency, mode.damping_ratio, mode.stiffness)
+    return Point(one.time, mode.frequency, mode.damping_ratio, mode.stiffness, mode.phase_deg)

@@ -24,11 +24,11 @@ from modal import Mode
 
 MAX_MODES = 12
 """Modes kept of one measurement."""
-ESTIMATES = {"frequency": "Hz", "damping_ratio": "", "stiffness": "N/m", "bearing_stiffness": "N/m"}
+ESTIMATES = {"frequency": "Hz", "damping_ratio": "", "stiffness": "N/m", "phase_deg": "deg", "bearing_stiffness": "N/m"}
 """Values with a standard error and their units, by name of the field and the column."""
 MODELLED = {"static_tip_stiffness": "N/m", "modal_tip_stiffness": "N/m"}
 """Values of the model."""
-MODE_COLUMNS = {"mode_frequency": "Hz", "mode_damping_ratio": "", "mode_stiffness": "N/m"}
+MODE_COLUMNS = {"mode_frequency": "Hz", "mode_damping_ratio": "", "mode_stiffness": "N/m", "mode_phase_deg": "deg"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,14 +49,16 @@ class Row:
     """Of the mode followed (-)."""
     stiffness: Estimate = UNKNOWN
     """Of the mode followed, where it was tapped (N/m)."""
+    phase_deg: Estimate = UNKNOWN
+    """Of the modal constant of the mode followed (degrees)."""
     bearing_stiffness: Estimate = UNKNOWN
     """Mean of the bearings of the recalibrated model (N/m)."""
     static_tip_stiffness: float = np.nan
     """Of the recalibrated model (N/m)."""
     modal_tip_stiffness: float = np.nan
     """Of the recalibrated model (N/m)."""
-    modes: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
-    """Frequency (Hz), damping ratio and stiffness (N/m) of all modes found, shape (m, 3)."""
+    modes: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))
+    """Frequency (Hz), damping ratio, stiffness (N/m) and phase (degrees) of all modes found, shape (m, 4)."""
     remarks: tuple[Remark, ...] = ()
     """What could not be done, and what is in doubt."""
     depth: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
@@ -69,7 +71,8 @@ class Row:
         """The mode followed, without its errors; None where it was not found."""
         if not self.frequency.is_known:
             return None
-        return Mode(self.frequency.value, self.damping_ratio.value, self.stiffness.value)
+        phase = self.phase_deg.value
+        return Mode(self.frequency.value, self.damping_ratio.value, self.stiffness.value, phase_deg=phase)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +100,8 @@ def empty_history(machine: Machine) -> History:
 
 def row_of(m: Measurement, lobes: Mapping[str, StabilityLobes], remarks: Sequence[Remark]) -> Row:
     """A measurement as a row, with the diagrams and remarks of the assembly as it was then."""
-    modes = [(mode.frequency, mode.damping_ratio, mode.stiffness) for mode in m.modes[:MAX_MODES]]
-    frequency, damping_ratio, stiffness = _of_mode(m.followed)
+    modes = [(one.frequency, one.damping_ratio, one.stiffness, one.phase_deg) for one in m.modes[:MAX_MODES]]
+    frequency, damping_ratio, stiffness, phase = _of_mode(m.followed)
     calibration = m.calibration
     return Row(
         tap_id=m.tap_id,
@@ -108,20 +111,27 @@ def row_of(m: Measurement, lobes: Mapping[str, StabilityLobes], remarks: Sequenc
         frequency=frequency,
         damping_ratio=damping_ratio,
         stiffness=stiffness,
+        phase_deg=phase,
         bearing_stiffness=_of_bearings(calibration),
         static_tip_stiffness=calibration.static_stiffness_after if calibration else np.nan,
         modal_tip_stiffness=calibration.modal_stiffness_after if calibration else np.nan,
-        modes=np.array(modes, dtype=np.float64).reshape(-1, 3),
+        modes=np.array(modes, dtype=np.float64).reshape(-1, 4),
         remarks=tuple(remarks),
         depth={name: one.depth for name, one in lobes.items()},
     )
 
 
-def _of_mode(mode: Mode | None) -> tuple[Estimate, Estimate, Estimate]:
+def _of_mode(mode: Mode | None) -> tuple[Estimate, Estimate, Estimate, Estimate]:
     if mode is None:
-        return UNKNOWN, UNKNOWN, UNKNOWN
+        return UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN
     f_std, zeta_std, k_std = mode.standard_error.tolist()
-    return Estimate(mode.frequency, f_std), Estimate(mode.damping_ratio, zeta_std), Estimate(mode.stiffness, k_std)
+    phase = Estimate(mode.phase_deg, mode.phase_deg_std)
+    return (
+        Estimate(mode.frequency, f_std),
+        Estimate(mode.damping_ratio, zeta_std),
+        Estimate(mode.stiffness, k_std),
+        phase,
+    )
 
 
 def _of_bearings(calibration: Calibration | None) -> Estimate:
@@ -143,7 +153,7 @@ def to_columns(history: History, machine: Machine) -> SldHistory:
         columns[name], columns[f"{name}_std"] = _numbers([getattr(row, name) for row in rows], 2).T
     for name in MODELLED:
         columns[name] = _numbers([getattr(row, name) for row in rows])
-    table = np.full((len(rows), MAX_MODES, 3), np.nan)
+    table = np.full((len(rows), MAX_MODES, len(MODE_COLUMNS)), np.nan)
     for i, row in enumerate(rows):
         table[i, : len(row.modes)] = row.modes
     columns |= {name: table[:, :, k] for k, name in enumerate(MODE_COLUMNS)}
@@ -182,6 +192,7 @@ def _row(stored: SldHistory, i: int, programs: Sequence[str]) -> Row:
         frequency=known["frequency"],
         damping_ratio=known["damping_ratio"],
         stiffness=known["stiffness"],
+        phase_deg=known["phase_deg"],
         bearing_stiffness=known["bearing_stiffness"],
         static_tip_stiffness=number["static_tip_stiffness"],
         modal_tip_stiffness=number["modal_tip_stiffness"],

@@ -23,8 +23,9 @@ AT_REST = 50.0
 def predict(machine: Machine, newest: Sequence[Measurement], tool: str) -> Assembly:
     """A tool as the model has it, in each direction with the bearings of the newest calibrated measurement of it.
 
-    newest: those measurements, the newest of all first. The damping ratio is that of the mode followed. DataError where
-    there is no model of the tool, or no tap test that the bearings could be found from.
+    newest: those measurements, the newest of all first. The damping ratio is that of the mode followed, and so is the
+    phase of the softest mode, since the same bearings and joints damp it; the others are real, as the model has them.
+    DataError where there is no model of the tool, or no tap test that the bearings could be found from.
     """
     if not newest:
         model_state(machine, None, tool)
@@ -60,7 +61,13 @@ def _in_direction(machine: Machine, one: Measurement, tool: str) -> tuple[list[M
         low, high = (edge / followed.frequency * frequency[softest] for edge in machine.mode.band_hz)
         seen &= (frequency >= low) & (frequency <= high)
     modes = [
-        Mode(f, followed.damping_ratio, k, method=f"model, bearings of {one.tap_id}")
-        for f, k in zip(frequency[seen].tolist(), stiffness[seen].tolist(), strict=True)
+        Mode(
+            float(frequency[i]),
+            followed.damping_ratio,
+            float(stiffness[i]),
+            method=f"model, bearings of {one.tap_id}",
+            phase_deg=followed.phase_deg if i == softest else 0.0,
+        )
+        for i in np.flatnonzero(seen).tolist()
     ]
     return modes, calibrate(state.spindle, float(frequency[softest]), mode=softest + 1)

@@ -26,10 +26,12 @@ class Point(NamedTuple):
     """Damping ratio (-)."""
     stiffness: float
     """Stiffness (N/m)."""
+    phase_deg: float = 0.0
+    """Phase of the modal constant (degrees)."""
 
 
 class Scatter(NamedTuple):
-    """How far one tap test is from the next, relative; half-widths that 95 % stay within."""
+    """How far one tap test is from the next, relative but for the phase; half-widths that 95 % stay within."""
 
     frequency: float
     """Of the natural frequency."""
@@ -37,13 +39,15 @@ class Scatter(NamedTuple):
     """Of the damping ratio."""
     stiffness: float
     """Of the stiffness."""
+    phase_deg: float = 0.0
+    """Of the phase of the modal constant (degrees)."""
 
 
 def scatter_of(series: Sequence[Point]) -> Scatter | None:
     """From the steps between neighbours, so that a slow fall does not count; None below 8 tap tests."""
     if len(series) < ENOUGH:
         return None
-    steps = np.diff(np.log([point[1:] for point in series]), axis=0)
+    steps = np.diff([(*np.log(point[1:4]), point.phase_deg) for point in series], axis=0)
     width = np.std(steps, axis=0, ddof=1) / np.sqrt(2) * t.ppf(0.975, len(steps) - 1)
     return Scatter(*width.tolist())
 

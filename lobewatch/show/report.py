@@ -206,7 +206,7 @@ def _modes(row: Row) -> list[dict[str, str]]:
             "stiffness": f"{stiffness / 1e6:.3f}",
             "remark": "" if stiffness > 0 else "not a driving point",
         }
-        for frequency, damping, stiffness in row.modes
+        for frequency, damping, stiffness, _ in row.modes
     ]
 
 

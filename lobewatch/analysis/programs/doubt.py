@@ -21,7 +21,9 @@ from modal import Mode
 SCATTER = Scatter(0.003, 0.10, 0.03)
 """From tap test to tap test, until a series tells its own."""
 LEAST = 0.02
-"""Nothing is drawn below this share of its middle value."""
+"""Nothing is drawn below this share of its middle value ..."""
+MOST_TURNED = np.radians(89)
+"""... and no phase beyond this (rad)."""
 
 Floats = NDArray[np.float64]
 
@@ -40,9 +42,11 @@ class Doubt:
     """What is not known, by what it comes from."""
 
     modes: Mapping[str, Floats]
-    """Relative half-widths of frequency, damping ratio and stiffness of the modes in x, then y, shape (n, 3), by cause:
-    "tap" (the error of the tap test), "clamping" (from tap test to tap test), "prediction" (a tool that was never
-    tapped), "untapped" (a direction that was not)."""
+    """Half-widths of frequency, damping ratio and stiffness (relative) and phase (rad) of the modes in x, then y, shape
+    (n, 4), by cause: "tap" (the error of the tap test), "clamping" (from tap test to tap test), "prediction" (a tool
+    that was never tapped), "untapped" (a direction that was not)."""
+    mixing: Floats
+    """Roots of the correlations of the error of the tap test, lower triangular, shape (n, 4, 4); 1 where none count."""
     speed: float
     """Relative half-width of the spindle speed."""
     tangential: Span
@@ -60,11 +64,15 @@ class Doubt:
 
         without: a cause that is taken as known.
         """
-        random = np.random.default_rng(seed)
+        random, phases = np.random.default_rng(seed), np.random.default_rng((seed, 1))
         factor = np.ones((count, middle.frequency.shape[1], 3))
+        turned = np.zeros(factor.shape[:2])
         for cause, widths in self.modes.items():
-            moved = 1 + widths * random.uniform(-1, 1, factor.shape)
-            factor *= 1.0 if cause == without else np.maximum(moved, LEAST)
+            uniform = random.uniform(-1, 1, factor.shape), phases.uniform(-1, 1, (*turned.shape, 1))
+            moved = widths * self._mixed(cause, np.concatenate(uniform, axis=-1))
+            if cause != without:
+                factor *= np.maximum(1 + moved[..., :3], LEAST)
+                turned += moved[..., 3]
         speed = 1 + self.speed * random.uniform(-1, 1, count) * (without != "speed")
         tangential, ratio = (span.low + (span.high - span.low) * random.uniform(0, 1, count) for span in self._spans)
         if without == "coefficients":
@@ -75,10 +83,15 @@ class Doubt:
             frequency=all_of_them.frequency * factor[..., 0],
             damping_ratio=all_of_them.damping_ratio * factor[..., 1],
             stiffness=all_of_them.stiffness * factor[..., 2],
+            phase=np.clip(all_of_them.phase + turned, -MOST_TURNED, MOST_TURNED),
             speed_rpm=all_of_them.speed_rpm * np.maximum(speed, LEAST),
             tangential=all_of_them.tangential * np.maximum(tangential, LEAST),
             radial=all_of_them.radial * np.maximum(tangential, LEAST) * np.maximum(ratio, 0.0),
         )
+
+    def _mixed(self, cause: str, uniform: Floats) -> Floats:
+        """Correlated where the cause is the error of the tap test, shape (count, n, 4)."""
+        return np.einsum("nij,cnj->cni", self.mixing, uniform) if cause == "tap" else uniform
 
     @property
     def _spans(self) -> tuple[Span, Span]:
@@ -88,27 +101,25 @@ class Doubt:
 def doubt_of(assembly: Assembly, table: CutTable, machine: Machine) -> Doubt:
     """The doubt of a cut with a tool in the spindle as it is known at some time."""
     tangential, ratio = _coefficients(table, machine)
-    return Doubt(_modes(assembly, machine.doubt), machine.doubt.speed_percent / 100, tangential, ratio)
+    modes = [*(assembly.x or ()), *(assembly.y or ())]
+    mixing = np.array([_mixing(mode) for mode in modes])
+    return Doubt(_modes(assembly, machine.doubt), mixing, machine.doubt.speed_percent / 100, tangential, ratio)
 
 
 def _modes(assembly: Assembly, given: DoubtTable) -> dict[str, Floats]:
     x, y = assembly.x or (), assembly.y or ()
-    number, absent = len(x) + len(y), np.zeros((len(x) + len(y), 3))
+    absent = np.zeros((len(x) + len(y), 4))
     if assembly.predicted:
-        predicted = (
-            given.predicted_frequency_percent,
-            given.predicted_damping_percent,
-            given.predicted_stiffness_percent,
-        )
-        made = {"prediction": np.tile(np.array(predicted) / 100, (number, 1))}
+        made = {"prediction": np.array([_of_prediction(mode, given) for mode in (*x, *y)])}
     else:
         sides = (("x", len(x)), ("y", len(y)))
         clamping = [np.tile(_scatter(assembly, side, given), (count, 1)) for side, count in sides]
+        clamping = [widths * [1, 1, 1, np.pi / 180] for widths in clamping]
         made = {"tap": np.array([_error(mode) for mode in (*x, *y)]), "clamping": np.vstack(clamping)}
     if len(assembly.directions) == 1:
         unknown = slice(len(x), None) if assembly.directions[0] == "x" else slice(0, len(x))
         made["untapped"] = absent
-        absent[unknown] = given.untapped_frequency_percent / 100, 0.0, given.untapped_stiffness_percent / 100
+        absent[unknown] = given.untapped_frequency_percent / 100, 0.0, given.untapped_stiffness_percent / 100, 0.0
     return made
 
 
@@ -117,13 +128,31 @@ def _scatter(assembly: Assembly, side: str, given: DoubtTable) -> Scatter:
     known = side if side in assembly.directions else assembly.directions[0]
     found = assembly.scatter(known) or SCATTER
     asked = (given.frequency_percent, given.damping_percent, given.stiffness_percent)
-    return Scatter(*(own if wish is None else wish / 100 for own, wish in zip(found, asked, strict=True)))
+    sizes = [own if wish is None else wish / 100 for own, wish in zip(found[:3], asked, strict=True)]
+    return Scatter(sizes[0], sizes[1], sizes[2], found.phase_deg)
+
+
+def _of_prediction(mode: Mode, given: DoubtTable) -> tuple[float, float, float, float]:
+    """The phase may be none at all, or twice what it is taken for."""
+    frequency, damping = given.predicted_frequency_percent / 100, given.predicted_damping_percent / 100
+    return frequency, damping, given.predicted_stiffness_percent / 100, abs(np.radians(mode.phase_deg))
 
 
 def _error(mode: Mode) -> Floats:
-    """95 % of the error of the tap test, relative; 0 where it is not known."""
-    values = np.array([mode.frequency, mode.damping_ratio, mode.stiffness])
-    return np.asarray(np.nan_to_num(mode.quantile() * mode.standard_error / values))
+    """95 % of the error of the tap test, relative, of the phase in rad; 0 where it is not known."""
+    values = np.array([mode.frequency, mode.damping_ratio, mode.stiffness, 180 / np.pi])
+    error = np.append(mode.standard_error, mode.phase_deg_std)
+    return np.asarray(np.nan_to_num(mode.quantile() * error / values))
+
+
+def _mixing(mode: Mode) -> Floats:
+    """Root of the correlations of the errors of a mode whose phase was fitted, shape (4, 4); else 1."""
+    error = np.sqrt(np.diag(mode.joint_covariance))
+    if not np.all(error > 0):
+        return np.eye(4)
+    value, vector = np.linalg.eigh(mode.joint_covariance / np.outer(error, error))
+    _, triangle = np.linalg.qr((vector * np.sqrt(np.maximum(value, 0.0))).T)
+    return np.asarray((triangle * np.where(np.diag(triangle) < 0, -1.0, 1.0)[:, np.newaxis]).T)
 
 
 def _coefficients(table: CutTable, machine: Machine) -> tuple[Span, Span]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -76,7 +77,9 @@ def _depth(rows: MillingRows, i: int, cuts: Sequence[Cut], speed_rpm: Floats) ->
     modes: dict[int, list[Mode]] = {0: [], 1: []}
     for k, direction in enumerate(rows.axes[rows.direction].tolist()):
         frequency = float(rows.frequency[i, k]) / (2 * np.pi)
-        modes[direction].append(Mode(frequency, float(rows.damping_ratio[i, k]), float(rows.stiffness[i, k])))
+        damping, stiffness = float(rows.damping_ratio[i, k]), float(rows.stiffness[i, k])
+        phase = math.degrees(rows.phase[i, k]) if damping < 1 else 0.0
+        modes[direction].append(Mode(frequency, damping, stiffness, phase_deg=phase))
     turned = [replace(cut, tangential=float(rows.tangential[i]), radial=float(rows.radial[i])) for cut in cuts]
     speeds = float(rows.speed_rpm[i]) * speed_rpm
     found = lowest_of([zero_order(modes[0], modes[1], cut, speeds) for cut in turned])

@@ -21,6 +21,8 @@ AT_REST = (
 )
 """What must be known to read a table of verdicts."""
 GIVEN = "machine.toml"
+SIZES = "frequency", "damping_ratio", "stiffness", "phase_deg"
+DEGREE = 180 / np.pi
 NOTHING = 5e-5
 """A smaller half-width is not told."""
 
@@ -28,12 +30,12 @@ Floats = NDArray[np.float64]
 
 
 def doubt_json(found: Verdict) -> dict[str, Any] | None:
-    """Relative half-widths by cause, those of modes as lists in x, then y; None where nothing was judged."""
+    """Relative half-widths by cause (degrees of phases), those of modes in x, then y; None where nothing was judged."""
     if found.drawn is None:
         return None
     doubt = found.drawn.doubt
     modes = {
-        cause: dict(zip(("frequency", "damping_ratio", "stiffness"), widths.T.tolist(), strict=True))
+        cause: dict(zip(SIZES, (widths * [1, 1, 1, DEGREE]).T.tolist(), strict=True))
         for cause, widths in doubt.modes.items()
     }
     ends = {"tangential": doubt.tangential, "radial_over_tangential": doubt.ratio}
@@ -106,9 +108,11 @@ def _coefficients(found: Verdict, doubt: Doubt, machine: Machine) -> Iterator[st
 
 
 def _sizes(widths: Floats) -> str:
-    """Half-widths of frequency, damping ratio and stiffness; those that are next to nothing are left out."""
-    named = zip(("f_n", "zeta", "K"), widths.tolist(), strict=True)
-    return ", ".join(f"{name} {_half(width)}" for name, width in named if width > NOTHING) or "nothing"
+    """Half-widths of frequency, damping ratio, stiffness and phase; those that are next to nothing are left out."""
+    named = zip(("f_n", "zeta", "K"), widths[:3].tolist(), strict=True)
+    said = [f"{name} {_half(width)}" for name, width in named if width > NOTHING]
+    said += [f"phase ±{DEGREE * widths[3]:.2g} deg"] if widths[3] > NOTHING else []
+    return ", ".join(said) or "nothing"
 
 
 def _half(width: float) -> str:

@@ -320,12 +320,13 @@ def test_rows_are_kept_up_to_the_first_that_differs(path: Path, analysed: list[s
     assert len(analysed) == 2
 
 
-def test_a_history_of_another_make_is_made_anew(path: Path, analysed: list[str]) -> None:
+@pytest.mark.parametrize("column", ["remarks", "mode_phase_deg"])
+def test_a_history_of_another_make_is_made_anew(path: Path, analysed: list[str], column: str) -> None:
     tap(path, 0, 1713.0)
     expected = Logbook.open(path).history.rows[0]
     stored = read_history(path / "history.h5")
     assert {"tap_id", "frequency_std", "notes", "program_limit", "mode_stiffness"} <= stored.columns.keys()
-    older = {name: values for name, values in stored.columns.items() if name != "remarks"}
+    older = {name: values for name, values in stored.columns.items() if name != column}
     object.__setattr__(stored, "columns", older)
     write_history(path / "history.h5", stored)
     analysed.clear()

@@ -141,7 +141,12 @@ def test_the_object_of_a_program(shop: Shop, check: Check) -> None:
         assert advice["depth_margin"] >= 0.2
     assert found["advice_here"]["speed_rpm"] == 12900
     assert found["drive_limit_mm"] is None
-    assert found["doubt"]["clamping"] == {"frequency": [0.003] * 2, "damping_ratio": [0.1] * 2, "stiffness": [0.03] * 2}
+    assert found["doubt"]["clamping"] == {
+        "frequency": [0.003] * 2,
+        "damping_ratio": [0.1] * 2,
+        "stiffness": [0.03] * 2,
+        "phase_deg": [0.0] * 2,
+    }
     assert (found["doubt"]["speed"], found["doubt"]["coefficients"]["tangential"]) == (0.01, pytest.approx([-0.2, 0.2]))
 
 

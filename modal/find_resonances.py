@@ -13,6 +13,7 @@ from scipy.signal import find_peaks
 
 from acquisition import Frf
 from modal.line_weights import measuring_factor
+from modal.without_drift import without_drift
 
 FEWEST_LINES = 8
 """One mode and its residual terms have seven unknowns."""
@@ -70,6 +71,7 @@ def find_resonances(frf: Frf) -> list[Resonance]:
     resonances.
     """
     _check(frf)
+    frf = without_drift(frf)
     peaks = [peak for peak in _peaks_at_all_scales(frf) if peak.coherence >= LEAST_COHERENCE]
     if peaks and not np.any(frf.receptance.imag):
         raise ValueError(

@@ -11,6 +11,7 @@ from modal.mode import Mode
 from modal.mode_indicator import mode_indicator
 from modal.physical_poles import PhysicalPoles, physical_poles
 from modal.pick_peaks import pick_peaks
+from modal.plausible import Believed, believed
 from modal.predominant import predominant
 from modal.quality.peaks_beyond import peaks_beyond
 from modal.quality.trust import Trust, trust_of, trust_rules
@@ -19,6 +20,7 @@ from modal.stabilise import StabilisationChart, stabilise
 from modal.synthesize import synthesize
 
 __all__ = [
+    "Believed",
     "Extraction",
     "FittedBand",
     "Followed",
@@ -26,6 +28,7 @@ __all__ = [
     "PhysicalPoles",
     "StabilisationChart",
     "Trust",
+    "believed",
     "cut_edges",
     "extract",
     "fit_modes",

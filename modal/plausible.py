@@ -5,52 +5,49 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from acquisition import Remark, stiffness_doubt
 from modal.mode import Mode
+from modal.trust import Trust, trust_rules
 
-MOST_DAMPING = float(np.sin(np.pi / 8))
-"""Damping ratio from which on the receptance falls to 1/sqrt(2) of its peak on one side only: 2 zeta sqrt(1 - zeta^2)
-is 1/sqrt(2) there. The pole of a drift behind a high-pass filter (0.5 and more) is above it, a machine tool far below.
-"""
+REASONS = {
+    "heavy-damping": "drift has no peak either",
+    "misfit": "the fit leaves too much of it",
+    "uncertain": "its damping or stiffness is hardly known",
+}
+"""Why a mode is rejected, in words, by the rule of `trust_rules`."""
+CURE = "look at it with lobewatch modes --figure; against drift let the sensor rest longer, or change its cable"
 
 
 @dataclass(frozen=True, eq=False)
 class Believed:
-    """The modes of one FRF, those that may be believed apart from the others."""
+    """The modes of one FRF that may be believed."""
 
     modes: tuple[Mode, ...]
-    """Those that may be followed, calibrated and used for lobes; the first ones come first."""
-    others: tuple[Mode, ...]
-    """The rest."""
+    """They may be followed, calibrated and used for lobes."""
+    against: tuple[Mode, ...]
+    """Those that would be, were their stiffness not negative: no driving point."""
     remarks: tuple[Remark, ...]
     """One about each of the rest, with the reason."""
 
 
 def believed(modes: Sequence[Mode]) -> Believed:
-    """Sort out drift, peaks cut by the edge of the lines, stiffness of no machine, and what is no driving point."""
-    reasons = [(mode, _reason(mode)) for mode in modes]
-    others = [(mode, reason) for mode, reason in reasons if reason]
+    """Leave out drift, peaks cut by the edge of the lines, stiffness of no machine, and what trust_of rejects."""
+    judged = [(mode, _doubt(mode)) for mode in modes]
+    plausible = [mode for mode, doubt in judged if doubt is None]
     return Believed(
-        tuple(mode for mode, reason in reasons if not reason),
-        tuple(mode for mode, _ in others),
-        tuple(_remark(mode, reason) for mode, reason in others),
+        tuple(mode for mode in plausible if mode.is_driving_point),
+        tuple(mode for mode in plausible if not mode.is_driving_point),
+        tuple(doubt for _, doubt in judged if doubt is not None),
     )
 
 
-def _reason(mode: Mode) -> str:
-    """Why a mode is not believed; empty where it is."""
-    if mode.damping_ratio >= MOST_DAMPING:
-        return f"zeta {100 * mode.damping_ratio:.0f} %: it has no peak of its own, as a drift has none"
+def _doubt(mode: Mode) -> Remark | None:
+    """Why a mode is not believed; None where it is."""
+    at, stiffness = f"{mode.frequency:.4g} Hz", stiffness_doubt(mode.stiffness)
+    reasons = [REASONS.get(code, code) for code, verdict in trust_rules(mode) if verdict is Trust.REJECTED]
     if any(remark.code == "cut-by-edge" for remark in mode.remarks):
-        return "its peak is cut by the edge of the lines"
-    doubt = stiffness_doubt(mode.stiffness)
-    if doubt is not None:
-        return doubt.text
-    return "" if mode.is_driving_point else "no driving point, its K is negative"
-
-
-def _remark(mode: Mode, reason: str) -> Remark:
-    cure = "look at the picture (lobewatch modes --figure); a drift goes with another cable or a longer rest"
-    return Remark("mode-not-believed", f"{mode.frequency:.4g} Hz", f"not followed, not used for lobes: {reason}", cure)
+        reasons.append("its peak is cut by the edge of the lines")
+    if reasons:
+        text = f"not followed and not used for lobes, zeta {100 * mode.damping_ratio:.2g} %: {', '.join(reasons)}"
+        return Remark("mode-not-believed", at, text, CURE)
+    return None if stiffness is None else Remark(stiffness.code, at, stiffness.text, stiffness.cure)

@@ -10,10 +10,17 @@ from datetime import datetime
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from acquisition import Remark, TapTest, stiffness_doubt
+from acquisition import Remark, TapTest
 from dsm import Calibration, calibrate, modal_stiffness
 from lobewatch.machine import Machine
-from modal import Mode, fit_modes, follow, predominant
+from modal import Believed, Mode, believed, fit_modes, follow, predominant
+
+BEARING_STIFFNESSES = (1e5, 1e11)
+"""Of a calibrated model (N/m): from a plain bearing on a soft seat to a rigid seat."""
+LARGEST_RATIO = 2.0
+"""K of one test over that of the one before of the series, or the inverse, above which nothing is calibrated.
+
+Wear of 10 % in frequency takes a third off K, tests scatter by a tenth, the smallest mistake of a unit is 4.4."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,9 +56,11 @@ def measure(tap: TapTest, machine: Machine, last: Mode | None = None) -> Measure
             modes = fit_modes(tap.frf, hits=tap.accepted)
         except ValueError as error:
             return Measurement(*named, remarks=(Remark("no-modes", "", f"no modes: {error}"),))
-        followed = _follow(modes, machine, remarks, last)
-        calibration = _calibrate(followed, machine, about.tool, remarks)
-        at_tip = _modes_at_tip(modes, followed, calibration, machine, remarks)
+        found = believed(_in_band(modes, machine))
+        remarks += found.remarks
+        followed = _follow(found, modes, machine, remarks, last)
+        calibration = _calibrate(followed, machine, about.tool, remarks, last)
+        at_tip = _modes_at_tip(found, followed, calibration, machine, remarks)
     return Measurement(*named, modes, followed, calibration, at_tip, tuple(remarks))
 
 
@@ -67,15 +76,15 @@ def _no_mode(modes: Sequence[Mode], machine: Machine) -> Remark:
     return Remark("no-mode-to-follow", "", f"no mode to follow: none with positive stiffness{place}; {found}")
 
 
-def _follow(modes: Sequence[Mode], machine: Machine, remarks: list[Remark], last: Mode | None) -> Mode | None:
-    """The mode that continues the last one, the predominant one where there is none yet."""
-    mode = predominant(modes, machine.mode.band_hz)
+def _follow(
+    found: Believed, modes: Sequence[Mode], machine: Machine, remarks: list[Remark], last: Mode | None
+) -> Mode | None:
+    """The believed mode that continues the last one, the predominant one where there is none yet."""
+    mode = predominant(found.modes)
     if mode is None:
         remarks.append(_no_mode(modes, machine))
     elif last is not None:
-        mode = _continued(last, _in_band(modes, machine), remarks)
-    doubt = None if mode is None else stiffness_doubt(mode.stiffness)
-    remarks += [] if doubt is None else [doubt]
+        mode = _continued(last, found.modes, remarks)
     return mode
 
 
@@ -86,38 +95,57 @@ def _continued(last: Mode, candidates: Sequence[Mode], remarks: list[Remark]) ->
     return found.mode
 
 
-def _calibrate(followed: Mode | None, machine: Machine, tool: str, remarks: list[Remark]) -> Calibration | None:
+def _calibrate(
+    followed: Mode | None, machine: Machine, tool: str, remarks: list[Remark], last: Mode | None
+) -> Calibration | None:
     if followed is None:
         return None
     std = float(followed.standard_error[0])
     try:
         spindle = machine.model(tool)
-        return calibrate(spindle, followed.frequency, std if np.isfinite(std) else None, machine.mode.model_mode)
+        found = calibrate(spindle, followed.frequency, std if np.isfinite(std) else None, machine.mode.model_mode)
     except (ValueError, ArithmeticError) as error:
         remarks.append(Remark("no-bearing-stiffness", "", f"no bearing stiffness: {error}"))
         return None
+    doubt = _calibration_doubt(found, followed, last)
+    remarks += [] if doubt is None else [doubt]
+    return found if doubt is None else None
+
+
+def _calibration_doubt(found: Calibration, followed: Mode, last: Mode | None) -> Remark | None:
+    """Why a calibration is not believed; None where it is."""
+    low, high = BEARING_STIFFNESSES
+    before = followed.stiffness if last is None else last.stiffness
+    ratio = followed.stiffness / before
+    if not low <= found.bearing_stiffness <= high:
+        text = f"bearing stiffness {found.bearing_stiffness:.3g} N/m is outside {low:g} to {high:g} N/m"
+        cure = "compare [spindle] with the drawing, and [mode] model_mode with the mode that is tapped"
+    elif not 1 / LARGEST_RATIO <= ratio <= LARGEST_RATIO:
+        text = f"K was {before:.3g} N/m in the test before, is {followed.stiffness:.3g} now, {ratio:.2g} times as much"
+        cure = "tap again; compare the sensitivities of hammer and accelerometer, and where it was tapped"
+    else:
+        return None
+    return Remark("calibration-not-believed", "", f"bearing stiffness unknown: {text}", cure)
 
 
 def _modes_at_tip(
-    modes: Sequence[Mode],
+    found: Believed,
     followed: Mode | None,
     calibration: Calibration | None,
     machine: Machine,
     remarks: list[Remark],
 ) -> list[Mode]:
-    """Modes in the band, carried to the tip by the model where the tap was elsewhere; none where K < 0."""
-    candidates = _in_band(modes, machine)
-    against = [mode for mode in candidates if not mode.is_driving_point]
-    if not any(mode.is_driving_point for mode in candidates):
+    """Believed modes, carried to the tip by the model where the tap was elsewhere; none where one has K < 0."""
+    if not found.modes:
         return []
-    if against:
-        where = ", ".join(f"{mode.frequency:.0f}" for mode in against)
+    if found.against:
+        where = ", ".join(f"{mode.frequency:.0f}" for mode in found.against)
         text = f"no stability lobes: not a driving point, the stiffness of the modes at {where} Hz is negative"
         cure = "hit and measure at one point in one direction, or leave these modes out with [mode] band_hz"
         remarks.append(Remark("no-lobes-driving-point", "", text, cure))
         return []
     if machine.tap.position_mm == 0:
-        return candidates
+        return list(found.modes)
     if calibration is None or followed is None:
         text = "no stability lobes: the tap was not at the tool tip ([tap] position_mm), and no model is calibrated"
         remarks.append(Remark("no-lobes-beside-tip", "", text, "tap at the tip, or add a [spindle]"))

@@ -11,9 +11,9 @@ from modal.mode import Mode
 from modal.mode_indicator import mode_indicator
 from modal.physical_poles import PhysicalPoles, physical_poles
 from modal.pick_peaks import pick_peaks
-from modal.plausible import Believed, believed
 from modal.predominant import predominant
 from modal.quality.peaks_beyond import peaks_beyond
+from modal.quality.plausible import Believed, believed
 from modal.quality.trust import Trust, trust_of, trust_rules
 from modal.remove_window import remove_window
 from modal.stabilise import StabilisationChart, stabilise

@@ -54,8 +54,6 @@ def test_a_drift_alone_leaves_nothing_to_follow(machine: Machine) -> None:
 
 @pytest.mark.parametrize(("share", "known"), [(0.52, True), (0.48, False), (1.9, True), (2.1, False)])
 def test_a_stiffness_far_from_the_series_calibrates_nothing(machine: Machine, share: float, known: bool) -> None:
-    machine: Machine, share: float, known: bool
-) -> None:
     found = measured(machine, Mode(1713.0, 0.03, share * TRUE.stiffness), last=TRUE)
     assert found.followed is not None
     assert (found.calibration is not None) is known

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from acquisition import Remark, stiffness_doubt
 from modal.mode import Mode
-from modal.trust import Trust, trust_rules
+from modal.quality.trust import Trust, trust_rules
 
 REASONS = {
     "heavy-damping": "drift has no peak either",

@@ -4,15 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 import pytest
 from milling_simulation import Case, judge
 from numpy.typing import ArrayLike
+from random_milling import random_case
 
 from acquisition import Frf
-from lobes import Cut, StabilityLobes, average_angle, milling_system, spectral_radius, stability_boundary, zero_order
+from lobes import (
+    Cut,
+    Program,
+    StabilityLobes,
+    average_angle,
+    milling_system,
+    program_limit,
+    spectral_radius,
+    stability_boundary,
+    zero_order,
+)
 from modal import Mode, fit_modes, synthesize
 
 Phased = tuple[tuple[float, float, float, float], ...]
@@ -84,6 +96,24 @@ def test_limits_are_those_of_the_simulation_in_time(
     exact = np.log(spectral_radius(x, y, cut, speed_rpm, depths)[0])
     assert judged.chatters.tolist() == [False, True]
     assert judged.growth == pytest.approx(exact, rel=0.15)
+
+
+@pytest.mark.parametrize("count", [4, pytest.param(100, marks=pytest.mark.long)])
+def test_random_programs_of_complex_modes_are_judged_as_by_the_simulation(count: int) -> None:
+    """One to six modes in x and y, phases of -40 to 40 degrees, with and without helix, along x."""
+    rng = np.random.default_rng(count)
+    cases, growth = list[Case](), list[float]()
+    for one in (random_case(rng) for _ in range(count)):
+        x, y = (tuple((*mode, rng.uniform(-40.0, 40.0)) for mode in modes) for modes in (one.x, one.y))
+        cut = Cut(one.teeth, one.immersion, one.direction, one.tangential, one.radial, one.helix_lag)
+        found = program_limit(Program(cut, one.speed_rpm, 5e-3), modes_of(x), modes_of(y)).limit
+        depths = [share * min(0.1, found) for share in (0.9, 1.1)]
+        growth += np.log(spectral_radius(modes_of(x), modes_of(y), cut, one.speed_rpm, depths)[0]).tolist()
+        cases += [replace(one.case(depth, 0.0), x=x, y=y) for depth in depths]
+    judged = judge(cases)
+    assert not np.any(judged.chatters[::2])
+    assert judged.chatters.tolist() == [grown > 0 for grown in growth]
+    assert judged.growth == pytest.approx(growth, rel=0.01, abs=2e-3)
 
 
 def test_the_simulation_tells_the_sign_of_the_phase() -> None:

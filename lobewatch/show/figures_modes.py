@@ -11,14 +11,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.ticker import MaxNLocator, MultipleLocator
+from numpy.typing import NDArray
 
+from dsm import plus_minus
 from lobewatch.show.figures import ALARM, NOW, STYLE, THEN
-from modal import Extraction, FittedBand, Mode
+from modal import Extraction, FittedBand, Mode, Trust, trust_of
 
 COLUMNS = 4
 """Circles in a row."""
 MOST_CIRCLES = 8
-"""Of more modes those with the highest peaks of accelerance are drawn."""
+"""Of more modes those that are believed most and have the highest peaks of accelerance are drawn."""
 LEAST_APART = 0.014
 """Between labels of modes that are close (share of the axis)."""
 LEGEND = 0.08
@@ -27,9 +29,13 @@ REACH = 3.0
 """A circle is drawn over this many half-power half-widths on either side."""
 
 
+MARKS = {Trust.TRUSTED: "", Trust.DOUBTFUL: " ?", Trust.REJECTED: " -"}
+"""Behind the frequency of a mode."""
+
+
 def modes_figure(state: Extraction, modes: Sequence[Mode], title: str) -> Figure:
-    """|Accelerance| measured, fitted and what is left; LSCF poles of every order; the circle of each mode."""
-    circles = sorted(modes, key=lambda m: -(m.frequency**2) / abs(m.damping_ratio * m.stiffness))[:MOST_CIRCLES]
+    """|Accelerance| measured, fitted and what is left; LSCF poles of every order; circle and phase of each mode."""
+    circles = sorted(modes, key=_rank)[:MOST_CIRCLES]
     rows = -(-len(circles) // COLUMNS)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 6.0 + 2.4 * rows), layout="constrained")
@@ -41,6 +47,11 @@ def modes_figure(state: Extraction, modes: Sequence[Mode], title: str) -> Figure
         _draw_circles(figure, grid, state, sorted(circles, key=lambda mode: mode.frequency))
     top.set_title(title, pad=10 + 6 * max((len(_name(mode)) for mode in modes), default=0))
     return figure
+
+
+def _rank(mode: Mode) -> tuple[int, float]:
+    """Trusted modes first, of those the one with the highest peak."""
+    return list(Trust).index(trust_of(mode)), -(mode.frequency**2) / abs(mode.damping_ratio * mode.stiffness)
 
 
 def _draw_frf(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
@@ -73,7 +84,7 @@ def _draw_frf(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
 
 
 def _name(mode: Mode) -> str:
-    return f"{mode.frequency:.0f}" + (" ?" if mode.remarks else "")
+    return f"{mode.frequency:.0f}{MARKS[trust_of(mode)]}"
 
 
 def _apart(places: Sequence[float], least: float) -> list[float]:
@@ -94,7 +105,7 @@ def _draw_chart(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
             axes.plot(chart.frequency[which], chart.order[which], mark, **style)
     for mode in modes:
         axes.axvline(mode.frequency, color=NOW, lw=0.6)
-    axes.set(xlabel="frequency (Hz); grey: the bands fitted; ?: has remarks", ylabel="order")
+    axes.set(xlabel="frequency (Hz); grey: the bands fitted; ?: doubtful, -: rejected", ylabel="order")
     axes.set_ylim(0, 13)
     axes.yaxis.set_major_locator(MultipleLocator(2))
     if state.bands:
@@ -109,18 +120,36 @@ def _draw_circles(figure: Figure, grid: GridSpec, state: Extraction, modes: Sequ
 
 
 def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) -> None:
-    """Mobility of the mode over its resonance: lines measured, with all that is fitted beside it taken off; the fit."""
+    """Mobility of the mode over its resonance: lines measured, with all that is fitted beside it taken off; the fit.
+
+    The line from the origin to the natural frequency has the angle of the modal constant: 0 degrees for a real mode of
+    a driving point.
+    """
     f = state.frf.frequency[band.lines]
     reach = REACH * mode.damping_ratio * mode.frequency
     near = np.abs(f - mode.frequency) < reach
     fine = np.linspace(mode.frequency - reach, mode.frequency + reach, 300)
-    scale = 2j * np.pi * 1e3
-    points = (mode.receptance(f) + state.left(band)[0])[near] * f[near] * scale
-    curve = mode.receptance(fine) * fine * scale
-    axes.plot(points.real, points.imag, ".", color=THEN, ms=4)
-    axes.plot(curve.real, curve.imag, color=NOW, lw=1)
+    points = _mobility(f, mode.receptance(f) + state.left(band)[0])[near]
+    curve = _mobility(fine, mode.receptance(fine))
+    top = complex(np.exp(1j * np.angle(mode.constant)) * np.max(np.abs(curve)))
+    axes.axhline(0.0, color=THEN, lw=0.5)
+    axes.plot(points.real, points.imag, ".", color=THEN, ms=4, label="measured")
+    axes.plot(curve.real, curve.imag, color=NOW, lw=1, label="fit")
+    axes.plot([0.0, top.real], [0.0, top.imag], color=ALARM, lw=1, label="phase")
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_title(f"{mode.frequency:.0f} Hz: mobility (mm/s/N)", fontsize=8)
+    axes.set_title(f"{mode.frequency:.0f} Hz{MARKS[trust_of(mode)]}: {_phase(mode)}\nmobility (mm/s/N)", fontsize=8)
     axes.tick_params(labelsize=7)
     axes.xaxis.set_major_locator(MaxNLocator(3))
     axes.yaxis.set_major_locator(MaxNLocator(4))
+
+
+def _mobility(frequency: NDArray[np.float64], receptance: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """(mm/s/N)."""
+    return np.asarray(2j * np.pi * 1e3 * frequency * receptance)
+
+
+def _phase(mode: Mode) -> str:
+    """Of the modal constant against that of a real mode, with its error."""
+    if not mode.phase_deg:
+        return "real"
+    return f"phase {plus_minus(mode.phase_deg, mode.phase_deg_std or None)}°"

@@ -76,10 +76,26 @@ def test_figure_draws_fit_residual_poles_and_circles() -> None:
     assert np.sqrt(np.mean(left**2)) == pytest.approx(np.sqrt(2) * 1e-3 * np.max(measured), rel=0.2)
     stable = np.asarray(chart.lines[1].get_xdata())
     assert np.any(np.abs(stable - 900) < 1)
-    points, circle = (np.asarray(line.get_xydata()) for line in circles[0].lines)
+    points, circle, phase = (
+        np.asarray(line.get_xydata()) for line in circles[0].lines if line.get_label() in ("measured", "fit", "phase")
+    )
+    assert "real" in circles[0].get_title()
+    assert np.degrees(np.arctan2(*phase[1][::-1])) == pytest.approx(0, abs=0.5)
     radius = np.pi * 900 / (2 * 0.02 * 4e7) * 1e3
     assert np.hypot(circle[:, 0] - radius, circle[:, 1]) == pytest.approx(radius, rel=0.02)
     assert np.hypot(points[:, 0] - radius, points[:, 1]) == pytest.approx(radius, rel=0.1)
+
+
+@pytest.mark.parametrize("degrees", [-40.0, 25.0])
+def test_figure_writes_and_draws_the_phase_of_a_complex_mode(degrees: float) -> None:
+    mode = Mode(1722.0, 0.03, -3.5e7, phase_deg=degrees, phase_deg_std=1.5)
+    circle = modes_figure(extract([synthesize([mode], LINES)]), [mode], "x").axes[2]
+    assert f"phase {degrees:.1f} ± 1.5°" in circle.get_title()
+    (phase,) = (np.asarray(line.get_xydata()) for line in circle.lines if line.get_label() == "phase")
+    x, y = phase[1] - phase[0]
+    assert np.degrees(np.arctan2(y, x)) == pytest.approx(degrees + (180 if degrees < 0 else -180))
+    radius = np.pi * 1722 / (0.03 * 3.5e7) * 1e3
+    assert np.hypot(x, y) == pytest.approx(radius, rel=0.05)
 
 
 def test_figure_keeps_labels_of_close_modes_apart() -> None:

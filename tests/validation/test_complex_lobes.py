@@ -98,7 +98,7 @@ def test_limits_are_those_of_the_simulation_in_time(
     assert judged.growth == pytest.approx(exact, rel=0.15)
 
 
-@pytest.mark.parametrize("count", [4, pytest.param(100, marks=pytest.mark.long)])
+@pytest.mark.parametrize("count", [2, pytest.param(100, marks=pytest.mark.long)])
 def test_random_programs_of_complex_modes_are_judged_as_by_the_simulation(count: int) -> None:
     """One to six modes in x and y, phases of -40 to 40 degrees, with and without helix, along x."""
     rng = np.random.default_rng(count)
@@ -127,8 +127,8 @@ def test_the_simulation_tells_the_sign_of_the_phase() -> None:
 def test_the_error_of_the_simulation_is_of_second_order_for_complex_modes() -> None:
     given = two_and_two((-40.0, -40.0, -40.0, -40.0))
     case = case_of(given, cut_of(3, 0.5), 12000.0, 3e-3)
-    coarse, fine, finest = (judge([case], fineness).growth[0] for fineness in (1.0, 2.0, 8.0))
-    assert (coarse - finest) / (fine - finest) == pytest.approx(4.2, rel=0.15)
+    coarse, fine, finest = (judge([case], fineness).growth[0] for fineness in (1.0, 2.0, 4.0))
+    assert (coarse - finest) / (fine - finest) == pytest.approx(5.0, rel=0.15)
 
 
 def test_in_a_slot_with_four_teeth_limits_and_frequencies_are_those_of_zero_order() -> None:

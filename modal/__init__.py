@@ -15,7 +15,7 @@ from modal.predominant import predominant
 from modal.quality.peaks_beyond import peaks_beyond
 from modal.quality.plausible import Believed, believed
 from modal.quality.trust import Trust, trust_of, trust_rules
-from modal.remove_window import remove_window
+from modal.remove_window import remove_window, with_windowed_noise
 from modal.stabilise import StabilisationChart, stabilise
 from modal.synthesize import synthesize
 
@@ -46,4 +46,5 @@ __all__ = [
     "synthesize",
     "trust_of",
     "trust_rules",
+    "with_windowed_noise",
 ]

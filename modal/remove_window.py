@@ -56,6 +56,26 @@ def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:
     )
 
 
+def with_windowed_noise(mode: Mode, time_constant: float, record: float) -> Mode:
+    """The mode with its covariance from the fit widened by what a window over a record (s) does to white noise.
+
+    Under the window the noise of neighbouring lines is alike: of the values of a record of length T as many are
+    independent as the share (integral of w^2)^2 / (T integral of w^4) says, 1 for no window and time_constant/T for a
+    short one. A fit takes them all for independent. What the scatter of the hits says holds anyhow.
+
+    Source: Harris (1978), On the use of windows for harmonic analysis, Proc. IEEE 66, 51 (noise bandwidth).
+    """
+    if mode.covariance is None:
+        return mode
+    factor = _widening(record / time_constant)
+    return replace(mode, covariance=mode.covariance * factor, freedom=mode.freedom / factor)
+
+
+def _widening(a: float) -> float:
+    """T (integral of w^4) / (integral of w^2)^2 of w = exp(-a t/T) from 0 to T."""
+    return float(a * np.expm1(-4 * a) / -(np.expm1(-2 * a) ** 2))
+
+
 def _phase_correlation(mode: Mode, slope: NDArray[np.float64]) -> NDArray[np.float64] | None:
     """Of the error of the phase, which stays as it is, with those of the values without the window."""
     if mode.phase_correlation is None or mode.best_covariance is None:

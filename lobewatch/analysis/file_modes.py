@@ -6,11 +6,23 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from acquisition import Frf, Remark, windowed_receptance
 from lobewatch.analysis.one_file.own_window import ringing_modes_windowed, without_own_window
 from lobewatch.analysis.one_file.recorded import recorded
 from lobewatch.analysis.one_file.recorded_window import Window
-from modal import Extraction, Mode, cut_edges, extract, modes_of, peaks_beyond, pick_peaks, remove_window
+from modal import (
+    Extraction,
+    Mode,
+    cut_edges,
+    extract,
+    modes_of,
+    peaks_beyond,
+    pick_peaks,
+    remove_window,
+    with_windowed_noise,
+)
 
 MOST_NAMED = 6
 """Peaks beyond the usable band that are named one by one."""
@@ -64,7 +76,9 @@ def modes_of_file(
     found = fitted = tuple(modes_of(state, [hits]))
     own: tuple[Remark, ...] = ()
     if window is not None and delay is not None:
-        fitted = tuple(remove_window(mode, window.time_constant, delay) for mode in found)
+        record = 1 / float(np.mean(np.diff(frf.frequency)))
+        wider = (with_windowed_noise(mode, window.time_constant, record) for mode in found)
+        fitted = tuple(remove_window(mode, window.time_constant, delay) for mode in wider)
     elif made.time_constant is not None:
         fitted = tuple(without_own_window(found, made.time_constant))
     elif not accept:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from acquisition import Frf
-from modal import Mode, fit_modes, remove_window, synthesize
+from modal import Mode, fit_modes, remove_window, synthesize, with_windowed_noise
 
 MODE = Mode(1722.0, 0.03, 3.5e7)
 LINES = np.arange(1000.0, 2600.0, 2.0)
@@ -66,3 +66,35 @@ def test_a_time_constant_that_is_none(tau: float) -> None:
 def test_a_mode_cannot_decay_slower_than_its_window() -> None:
     with pytest.raises(ValueError, match="no faster than the window"):
         remove_window(MODE, 0.003)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.01])
+def test_what_the_window_lost_before_the_hit_is_taken_off_the_stiffness(delay: float) -> None:
+    tau, base = 0.05, Mode(1722.0, 0.03, 3.5e7, np.diag([0.2, 1e-4, 1e5]) ** 2)
+    late, at_once = remove_window(base, tau, delay), remove_window(base, tau)
+    assert late.stiffness == pytest.approx(at_once.stiffness * np.exp(-delay / tau))
+    assert late.standard_error[2] == pytest.approx(at_once.standard_error[2] * np.exp(-delay / tau))
+    assert late.standard_error[:2] == pytest.approx(at_once.standard_error[:2])
+
+
+def test_phase_stays_and_its_correlations_are_carried_over() -> None:
+    root = np.array([[0.2, 0.0, 0.0], [5e-5, 1e-4, 0.0], [3e4, -9e4, 1e4]])
+    correlation = np.array([0.5, -0.3, 0.1])
+    base = Mode(1722.0, 0.03, 3.5e7, root @ root.T, phase_deg=20.0, phase_deg_std=1.0, phase_correlation=correlation)
+    found = remove_window(base, 1e9)
+    assert found.phase_deg == 20.0
+    assert found.phase_correlation == pytest.approx(correlation)
+
+
+@pytest.mark.parametrize("delay", [-0.01, np.nan, np.inf])
+def test_a_window_cannot_begin_after_the_hit(delay: float) -> None:
+    with pytest.raises(ValueError, match="delay"):
+        remove_window(MODE, 0.1, delay)
+
+
+def test_noise_under_a_window_widens_the_errors_as_its_lines_are_alike() -> None:
+    base = Mode(1722.0, 0.03, 3.5e7, np.diag([0.2, 1e-4, 1e5]) ** 2, freedom=100)
+    none, short = with_windowed_noise(base, 1e6, 0.25), with_windowed_noise(base, 0.01, 0.25)
+    assert none.standard_error == pytest.approx(base.standard_error, rel=1e-6)
+    assert short.standard_error == pytest.approx(5 * base.standard_error, rel=1e-6)
+    assert short.freedom == pytest.approx(4)

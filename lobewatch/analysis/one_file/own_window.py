@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from acquisition import Frf, Hit, Remark, estimate_frf, exponential_window, time_after_hit, windowed_receptance
-from modal import Mode, fit_modes, remove_window
+from modal import Mode, fit_modes, remove_window, with_windowed_noise
 
 LEFT = 0.005
 """Share of the ringing that the window lets through at the end of the record."""
@@ -35,7 +35,8 @@ def without_own_window(modes: Sequence[Mode], time_constant: float) -> Iterator[
     """Modes without that window; one that decays no faster than it is no mode."""
     for mode in modes:
         if 2 * np.pi * mode.damping_ratio * mode.frequency > 1 / time_constant:
-            yield remove_window(mode, time_constant)
+            wider = with_windowed_noise(mode, time_constant, -time_constant * float(np.log(LEFT)))
+            yield remove_window(wider, time_constant)
 
 
 def ringing_modes_windowed(

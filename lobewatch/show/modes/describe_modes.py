@@ -67,7 +67,7 @@ def mode_table(modes: Sequence[Mode]) -> Table:
     for mode in modes:
         values = (mode.frequency, mode.damping_ratio, mode.stiffness)
         cells = [
-            plus_minus(value, std, scale, percent=scale != 1 or not with_phase)
+            plus_minus(value, std, scale, percent=scale == 1e6 or not with_phase)
             for value, std, scale in zip(values, mode.standard_error, (1.0, 0.01, 1e6), strict=True)
         ]
         made.add_row(*cells, *([_phase(mode)] if with_phase else []), _notes(mode))

@@ -66,7 +66,7 @@ def test_modes_of_hits_that_ring_on_hold_the_truth(tmp_path: Path, left: float) 
     found = modes_of_file(file)
     assert "windowed-here" in codes(found.remarks)
     mode = first(found.fitted)
-    assert np.all(distance(mode) < 2)
+    assert np.all(distance(mode) < 1)
     assert mode.stiffness == pytest.approx(STIFFNESS, rel=0.02)
     assert trust_of(mode) is Trust.TRUSTED
 

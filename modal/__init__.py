@@ -1,5 +1,6 @@
 """From an FRF to natural frequencies, damping ratios and stiffnesses."""
 
+from modal.common_delay import CommonDelay, common_delay
 from modal.cut_edges import cut_edges
 from modal.extract import extract
 from modal.extraction import Extraction, FittedBand
@@ -9,18 +10,18 @@ from modal.follow import Followed, follow
 from modal.mac import mac
 from modal.mode import Mode
 from modal.mode_indicator import mode_indicator
-from modal.physical_poles import PhysicalPoles, physical_poles
 from modal.pick_peaks import pick_peaks
+from modal.poles import PhysicalPoles, StabilisationChart, physical_poles, stabilise
 from modal.predominant import predominant
 from modal.quality.peaks_beyond import peaks_beyond
 from modal.quality.plausible import Believed, believed
 from modal.quality.trust import Trust, trust_of, trust_rules
 from modal.remove_window import remove_window, with_windowed_noise
-from modal.stabilise import StabilisationChart, stabilise
 from modal.synthesize import synthesize
 
 __all__ = [
     "Believed",
+    "CommonDelay",
     "Extraction",
     "FittedBand",
     "Followed",
@@ -29,6 +30,7 @@ __all__ = [
     "StabilisationChart",
     "Trust",
     "believed",
+    "common_delay",
     "cut_edges",
     "extract",
     "fit_modes",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain
 
@@ -10,16 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Remark
-from modal.extract import LARGEST_ERROR, LEAST_TERMS
+from modal.common_delay import common_delay
 from modal.extraction import Extraction, FittedBand
+from modal.fit_peaks import LARGEST_ERROR
+from modal.fitting import LEAST_TERMS
 from modal.mode import Mode
-from modal.physical_poles import physical_poles
 from modal.quality.trust import relative_error, trust_rules
 
 LEAST_COHERENCE = 0.9
 """Mean coherence between the half-power points; below it the averaged hits disagree."""
-LARGEST_PHASE = np.radians(15)
-"""Of the complex modal constant (rad)."""
+LARGEST_PHASE = 20.0
+"""Of the modal constant, beyond what a delay between the channels gives all modes (degrees)."""
 LARGEST_MISFIT = 2.0
 """rms of what the fit leaves over rms of the noise ..."""
 MISFIT_SHARE = 0.01
@@ -50,15 +51,6 @@ def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
     return replace(judged, remarks=tuple(found))
 
 
-def _phase(band: FittedBand, mode: Mode) -> float | None:
-    """Of the complex modal constant of the LSCF pole of this mode against its real value (rad); None without a pole."""
-    poles = physical_poles(band.chart)
-    distance = np.abs(poles.frequency - mode.frequency)
-    if not np.any(distance < mode.damping_ratio * mode.frequency):
-        return None
-    return float(np.angle(poles.flexibility[np.argmin(distance), 0] * np.sign(mode.stiffness)))
-
-
 def _coherence(state: Extraction, mode: Mode) -> float | None:
     frf = state.frf
     if frf.coherence is None or frf.random_error is None:
@@ -74,7 +66,7 @@ def _misfit(state: Extraction, band: FittedBand, i: int) -> tuple[float, float]:
     rms = np.sqrt(fit.sum_of_squares / fit.freedom * 2)
     noise = np.median(np.abs(np.diff(fit.complex_residual, 3))) / np.sqrt(20 * np.log(2))
     nearest = np.argmin(np.abs(state.frf.frequency - fit.frequency[i]) + 1e9 * (weight == 0), axis=1)
-    peaks = weight[np.arange(nearest.size), nearest] * np.abs(fit.flexibility[:, i] / (2 * fit.damping_ratio[i]))
+    peaks = weight[np.arange(nearest.size), nearest] * np.abs(fit.constant[:, i] / (2 * fit.damping_ratio[i]))
     return float(rms / np.max(peaks)), float(rms / noise) if noise > 0 else 1.0
 
 
@@ -127,14 +119,10 @@ def _on_its_values(band: FittedBand, i: int, mode: Mode, share: float) -> Iterat
     if not mode.is_driving_point:
         cure = "put the sensor where the hammer hits; if it is there, swap the sign of one of them"
         yield Remark("not-driving-point", at, "K is negative: sensor and hammer move against each other", cure)
-    error = band.fit.standard_error[2, i] / abs(band.fit.flexibility[0, i])
+    error = band.fit.size_error[0, i]
     if error > LARGEST_ERROR:
         text = f"hardly moves at the driving point: K is uncertain by {100 * error:.0f} %"
         yield Remark("near-node", at, text, "take a driving point where it moves")
-    phase, known = _phase(band, mode) or 0.0, mode.standard_error[2] / abs(mode.stiffness)
-    if abs(phase) > max(LARGEST_PHASE, 3 * known):
-        text = f"modal constant {np.degrees(phase):+.0f}° off real: K is that of the real mode nearest to it"
-        yield Remark("complex-mode", at, text)
     if mode.misfit is not None and mode.misfit > LARGEST_MISFIT and share > MISFIT_SHARE:
         yield Remark("misfit", at, f"the fit leaves {mode.misfit:.1f} times the noise, {100 * share:.0f} % of its peak")
     if width is not None and band.height.size == 1 and abs(width / mode.damping_ratio - 1) > LARGEST_DIFFERENCE:
@@ -156,3 +144,17 @@ def _on_its_errors(mode: Mode) -> Iterator[Remark]:
     if mode.jackknife is not None and np.max(mode.standard_error / mode.fit_error) > LARGEST_SCATTER:
         text = f"scatters {np.max(mode.standard_error / mode.fit_error):.1f} times more from hit to hit than in the fit"
         yield Remark("scatter", at, text, "hit one point in one direction, equally hard")
+
+
+def with_phase_remarks(modes: Sequence[Mode]) -> list[Mode]:
+    """All modes of an FRF, those whose modal constants are far off real with a remark."""
+    delay = common_delay(modes)
+    return [_with_phase_remark(mode, 0.0 if delay is None else delay.phase_deg(mode.frequency)) for mode in modes]
+
+
+def _with_phase_remark(mode: Mode, expected: float) -> Mode:
+    if abs(mode.phase_deg - expected) <= max(LARGEST_PHASE, 3 * mode.phase_deg_std):
+        return mode
+    text = f"modal constant {mode.phase_deg:+.0f} ± {mode.phase_deg_std:.1g}° off real"
+    cure = "look for loose clamping, for another mode close to it, and for a delay between the channels"
+    return replace(mode, remarks=(*mode.remarks, Remark("complex-mode", _name(mode), text, cure)))

@@ -3,39 +3,63 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Frf
 from modal.find_resonances import Resonance
-from modal.fit_band import BandFit
-from modal.stabilise import StabilisationChart
+from modal.fitting import BandFit
+from modal.poles import StabilisationChart, stabilise
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
+
+ORDERS = 10
+"""Highest order of the LSCF models of a band, several times the modes that one holds."""
+
+
+@dataclass(frozen=True, eq=False)
+class BandLines:
+    """The lines of a band, and what is to be fitted to them."""
+
+    lines: slice
+    """Where on the frequency axis."""
+    frequency: Array
+    """Of the lines (Hz), shape (lines,)."""
+    weight: Array
+    """Of each FRF, shape (p, lines)."""
+    own: ComplexArray
+    """The receptances without the modes of all other bands (m/N), shape (p, lines)."""
+
+    @cached_property
+    def chart(self) -> StabilisationChart:
+        """LSCF poles of these lines."""
+        return stabilise(self.frequency, self.own, self.weight, ORDERS)
 
 
 @dataclass(frozen=True, eq=False)
 class FittedBand:
     """Some neighbouring modes that were fitted together."""
 
-    lines: slice
-    """Where on the frequency axis."""
+    data: BandLines
+    """What they were fitted to."""
     resonances: tuple[Resonance, ...]
     """The peaks that the band was laid around."""
     height: Array
     """What the mobility of each mode is measured against, its own peak or the highest of the band (m/s/N), (m,)."""
     fit: BandFit
     """Their values."""
-    own: ComplexArray
-    """What they were fitted to: the receptances without the modes of all other bands (m/N), shape (p, lines)."""
     terms: int
     """Complex residual terms in each FRF."""
-    suspects: tuple[float, ...]
+    suspects: tuple[float, ...] = ()
     """Frequencies of modes that may stand here instead of those fitted, but are too uncertain (Hz)."""
-    chart: StabilisationChart
-    """LSCF poles of these lines."""
+
+    @property
+    def lines(self) -> slice:
+        """Where on the frequency axis."""
+        return self.data.lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +83,12 @@ class Extraction:
         parts = [band.fit.receptance(frequency) for band in self.bands if band is not without]
         return np.asarray(sum(parts, np.zeros((len(self.frfs), frequency.size), complex)))
 
-    def own(self, band: FittedBand) -> ComplexArray:
-        """Measured receptances on the lines of a band without the modes of all others (m/N), shape (p, lines)."""
-        measured = np.array([frf.receptance[band.lines] for frf in self.frfs])
-        return np.asarray(measured - self.receptance(self.frf.frequency[band.lines], without=band))
+    def data(self, lines: slice, without: FittedBand | None = None) -> BandLines:
+        """What is left on some lines when the modes of all bands but one are taken off."""
+        frequency = self.frf.frequency[lines]
+        measured = np.array([frf.receptance[lines] for frf in self.frfs])
+        own = np.asarray(measured - self.receptance(frequency, without))
+        return BandLines(lines, frequency, self.weight[:, lines], own)
 
     def left(self, band: FittedBand) -> ComplexArray:
         """Measured receptances on the lines of a band less the fit with its residual terms (m/N), shape (p, lines).

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Frf, Hit
-from modal.assess import assess
+from modal.assess import assess, with_phase_remarks
 from modal.extract import extract
-from modal.extraction import Extraction, FittedBand
+from modal.extraction import Array, Extraction, FittedBand
+from modal.fitting import BandFit
 from modal.hammer_covariance import hammer_covariance
 from modal.jackknife import jackknife, left_out
 from modal.mode import Mode
@@ -46,7 +48,7 @@ def modes_of(state: Extraction, hits: Sequence[Sequence[Hit]] = ()) -> list[Mode
         raise ValueError(f"hits of {len(hits)} FRFs for {len(state.frfs)}; give a list of hits for each, maybe empty")
     without = [left_out(own, frf) for own, frf in zip(hits, state.frfs, strict=False)]
     found = [mode for band in state.bands for mode in _modes(state, band, hits, without)]
-    return sorted(found, key=lambda mode: mode.frequency)
+    return with_phase_remarks(sorted(found, key=lambda mode: mode.frequency))
 
 
 def _modes(
@@ -56,21 +58,31 @@ def _modes(
     covariance = fit.covariance + sum(hammer_covariance(state, band, i, own) for i, own in enumerate(hits))
     n_hits = min(map(len, without), default=0)
     scatter = np.sum([jackknife(state, band, *one) for one in enumerate(without)], axis=0) if n_hits else None
-    modes = [
-        Mode(
-            float(fit.frequency[i]),
-            float(fit.damping_ratio[i]),
-            float(1 / fit.flexibility[0, i]),
-            _of_one(covariance, i, fit.flexibility[0]),
-            fit.freedom,
-            _method(state, band),
-            None if scatter is None else _of_one(scatter, i, fit.flexibility[0]),
-            n_hits,
-            shape=_shape(fit.flexibility[:, i]),
-        )
-        for i in range(fit.frequency.size)
-    ]
-    return [assess(state, band, i, mode) for i, mode in enumerate(modes)]
+    modes = [_mode(fit, i, covariance, scatter, n_hits) for i in range(fit.frequency.size)]
+    return [assess(state, band, i, replace(mode, method=_method(state, band))) for i, mode in enumerate(modes)]
+
+
+def _mode(fit: BandFit, i: int, covariance: Array, scatter: Array | None, n_hits: int) -> Mode:
+    """Mode i of a band, as the driving point shows it."""
+    constant = complex(fit.constant[0, i])
+    sign = 1.0 if constant.real > 0 else -1.0
+    of_fit = _of_one(covariance, fit, i)
+    over_hits = None if scatter is None else _of_one(scatter, fit, i)
+    best = of_fit if over_hits is None else over_hits
+    error = np.sqrt(np.diag(best))
+    return Mode(
+        float(fit.frequency[i]),
+        float(fit.damping_ratio[i]),
+        sign / abs(constant),
+        of_fit[:3, :3],
+        fit.freedom,
+        jackknife=None if over_hits is None else over_hits[:3, :3],
+        n_hits=n_hits,
+        phase_deg=float(np.degrees(np.angle(sign * constant))),
+        phase_deg_std=float(np.hypot(error[3], np.degrees(fit.unasked[0, i]))),
+        phase_correlation=best[3, :3] / (error[3] * error[:3]),
+        shape=_shape(fit.constant[:, i]),
+    )
 
 
 def _method(state: Extraction, band: FittedBand) -> str:
@@ -79,15 +91,19 @@ def _method(state: Extraction, band: FittedBand) -> str:
     return f"least squares{of}, {f[0]:.0f}..{f[-1]:.0f} Hz{together}"
 
 
-def _shape(flexibility: NDArray[np.float64]) -> NDArray[np.float64] | None:
-    """The largest of all FRFs 1 or -1, that of the driving point > 0; None of one FRF."""
-    if flexibility.size == 1:
+def _shape(constants: NDArray[np.complex128]) -> Array | None:
+    """Part of each in phase with the driving point or against it, the largest 1 or -1; None of one FRF."""
+    if constants.size == 1:
         return None
-    return np.asarray(flexibility / np.max(np.abs(flexibility)) * np.sign(flexibility[0]))
+    along = np.real(constants * np.exp(-1j * np.angle(constants[0])))
+    return np.asarray(along / np.max(np.abs(along)))
 
 
-def _of_one(covariance: NDArray[np.float64], i: int, flexibility: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Covariance of frequency, damping ratio and stiffness of mode i from that of all modes of a band."""
-    mine = np.ix_(*2 * [[i, flexibility.size + i, 2 * flexibility.size + i]])
-    chain = np.array([1.0, 1.0, -1 / flexibility[i] ** 2])
-    return np.asarray(covariance[mine] * np.outer(chain, chain))
+def _of_one(covariance: Array, fit: BandFit, i: int) -> Array:
+    """Covariance of frequency, damping ratio, stiffness and phase (degrees) of mode i from that of its band, (4, 4)."""
+    p, m = fit.constant.shape
+    mine = np.ix_(*2 * [[i, m + i, 2 * m + i, (2 + p) * m + i]])
+    constant = fit.constant[0, i]
+    by_size = -np.sign(constant.real) / abs(constant) ** 2
+    scale = np.array([1.0, 1.0, by_size, np.degrees(1 / abs(constant))])
+    return np.asarray(covariance[mine] * np.outer(scale, scale))

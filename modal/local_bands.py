@@ -28,6 +28,11 @@ class LocalBand:
     lines: slice
     """Where on the frequency axis."""
 
+    @property
+    def height(self) -> float:
+        """Of its highest resonance (m/s/N)."""
+        return max(resonance.height for resonance in self.resonances)
+
 
 def local_bands(resonances: Sequence[Resonance], frequency: NDArray[np.float64]) -> list[LocalBand]:
     """Bands around close resonances; neighbouring ones meet between them, in proportion to their half-widths.

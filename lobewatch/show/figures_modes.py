@@ -97,7 +97,7 @@ def _apart(places: Sequence[float], least: float) -> list[float]:
 
 def _draw_chart(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
     for i, band in enumerate(state.bands):
-        chart, ends = band.chart, state.frf.frequency[band.lines][[0, -1]]
+        chart, ends = band.data.chart, state.frf.frequency[band.lines][[0, -1]]
         axes.axvspan(*ends, color=THEN, alpha=0.10, lw=0)
         for stable, mark, colour, label in ((False, "x", THEN, "pole"), (True, "o", NOW, "stable pole")):
             which = chart.stable == stable

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from modal.orthogonal_basis import OrthogonalBasis, orthogonal_basis
+from modal.poles.orthogonal_basis import OrthogonalBasis, orthogonal_basis
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from modal.stabilise import StabilisationChart
+from modal.poles.stabilise import StabilisationChart
 
 LEAST_ORDERS = 4
 """Orders in a row that a mode is stable in, at least."""

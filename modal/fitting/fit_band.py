@@ -1,0 +1,129 @@
+"""Poles by Levenberg-Marquardt, modal constants real unless the sum of squares asks for complex ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from modal.fitting.band_fit import Array, BandFit, ComplexArray
+from modal.fitting.projected_band import ProjectedBand, State, projected_band
+from modal.fitting.residual_terms import LEAST_TERMS
+
+AKAIKE = 2.0
+"""Complex constants are taken where they lower the sum of squares by this many times what an unknown does by chance."""
+MOST_TRIALS = 60
+"""Evaluations of the model; a mode in its own band takes some five."""
+CONVERGED = 1e-13
+"""Step (share of the half-power half-width) after which there is nothing left to gain."""
+GAINED = 1e-6
+"""Fall of the sum of squares, against that by chance of one unknown, not worth a step: a thousandth of an error."""
+LEAST_SINGULAR = 1e-10
+"""Share of the largest singular value below which an unknown cannot be told from the others."""
+
+
+def fit_band(
+    frequency: Array, receptance: ComplexArray, weight: Array, starts: Array, terms: int = LEAST_TERMS
+) -> BandFit | None:
+    """Fit modes with complex constants (`Mode.receptance`) and L/f^2 + U + ... to FRFs; None where nothing fits.
+
+    L (modes far below, and the free body) and U (modes far above) are complex: the tail of a damped neighbour is not
+    real, and a real L or U would push its imaginary part into zeta and K, by percents. In accelerance,
+    -(2 pi f)^2 H, L is a constant and U grows with f^2: the weight says what was measured. Further terms, f^2,
+    f^4, ..., follow the tails of strong modes just outside the band.
+
+    The linear unknowns are eliminated, f and zeta found by Levenberg-Marquardt. frequency (Hz) has shape (n,),
+    receptance (m/N) and weight (p, n), starts (Hz; damping ratios) (2, m).
+
+    Source: Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, 413; Kaufman (1975), BIT 15, 49 (Jacobian).
+    """
+    p, m = receptance.shape[0], starts.shape[1]
+    if 2 * m + p * (2 * m + 2 * terms) >= 2 * receptance.size or m == 0:
+        return None
+    with np.errstate(all="ignore"):
+        try:
+            state = _solved(projected_band(frequency, receptance, weight, terms), starts, is_complex=True)
+            influence = None if state is None else _influence(state)
+        except np.linalg.LinAlgError:
+            return None
+    return None if state is None or influence is None else _fit_of(state, influence)
+
+
+def with_real_constants(fit: BandFit, frequency: Array, receptance: ComplexArray, weight: Array, terms: int) -> BandFit:
+    """The same modes with real constants, where Akaike's criterion allows.
+
+    It does where they raise the sum of squares by no more than twice what phases take off by chance. The errors stay
+    those of the complex fit, for a phase that is not asked for is not known to be 0. Else the fit as it is. Arguments
+    as `fit_band`.
+
+    Source: Akaike (1974), IEEE Trans. Automatic Control 19, 716.
+    """
+    with np.errstate(all="ignore"):
+        state = _solved(projected_band(frequency, receptance, weight, terms), fit.poles, is_complex=False)
+    allowed = AKAIKE * fit.constant.size * fit.sum_of_squares / fit.freedom
+    if state is None or state.cost - fit.sum_of_squares > allowed:
+        return fit
+    across = fit.constant / state.constant
+    return replace(_fit_of(state, fit.influence), unasked=np.angle(across * np.sign(across.real)))
+
+
+def _fit_of(state: State, influence: Array) -> BandFit:
+    return BandFit(
+        state.poles[0],
+        state.poles[1],
+        state.constant,
+        influence @ influence.T * (state.cost / state.freedom),
+        state.freedom,
+        influence,
+        state.residual,
+        np.zeros(state.constant.shape),
+    )
+
+
+def _solved(band: ProjectedBand, starts: Array, is_complex: bool) -> State | None:
+    """Levenberg-Marquardt; None where it does not converge."""
+    state, damping = band.at(starts, is_complex), 1e-4
+    for _ in range(MOST_TRIALS):
+        if not np.isfinite(state.cost):
+            return None
+        step, gain = _step(state, damping)
+        if gain < GAINED * state.cost / state.freedom or np.max(np.abs(step)) < CONVERGED:
+            return state
+        trial = band.at(state.poles + (step * state.scale).reshape(2, -1), is_complex)
+        if trial.cost < state.cost:
+            state, damping = trial, damping / 10
+        elif damping > 1e8 or np.max(np.abs(step)) < 1e-6:
+            return state
+        else:
+            damping = max(damping, 1e-6) * 10
+    return None
+
+
+def _step(state: State, damping: float) -> tuple[Array, float]:
+    """Damped Gauss-Newton step in units of the scale, shape (2 m,), and the fall of the cost that it promises."""
+    jacobian = state.jacobian
+    norm = np.linalg.norm(jacobian, axis=0)
+    gram = (jacobian.T @ jacobian) / np.outer(norm, norm) + damping * np.eye(norm.size)
+    step = np.linalg.solve(gram, -(jacobian.T @ state.residual) / norm) / norm
+    change = jacobian @ step
+    return step, float(change @ change)
+
+
+def _influence(state: State) -> Array | None:
+    """Of the weighted FRFs on the errors of a complex fit; None where an unknown cannot be told from the others."""
+    jacobian = state.jacobian
+    norm = np.linalg.norm(jacobian, axis=0)
+    left, singular, right = np.linalg.svd(jacobian / norm, full_matrices=False)
+    if not singular[-1] > LEAST_SINGULAR * singular[0]:
+        return None
+    on_poles = -(right.T / singular) @ left.T / norm[:, None]
+    n = jacobian.shape[0] // len(state.frfs)
+    on_constants = np.zeros((len(state.frfs), state.poles.size, jacobian.shape[0]))
+    for i, frf in enumerate(state.frfs):
+        on_constants[i] = -frf.inverse @ (frf.q.T @ frf.slope) @ on_poles
+        on_constants[i, :, i * n : (i + 1) * n] += frf.inverse @ frf.q.T
+    real, imaginary = np.split(on_constants, 2, axis=1)
+    turn = np.exp(-1j * np.angle(state.constant))[:, :, np.newaxis]
+    off = turn * (real + 1j * imaginary)
+    width = jacobian.shape[0]
+    return np.concatenate([on_poles * state.scale[:, None], off.real.reshape(-1, width), off.imag.reshape(-1, width)])

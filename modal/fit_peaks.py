@@ -17,6 +17,8 @@ LARGEST_ERROR = 1 / 3
 """Relative standard error of damping ratio and stiffness above which a peak is not a mode."""
 LEAST_SHARE = 0.05
 """Share of its peak of the mobility that a mode has; 1 dB of prominence needs twice this."""
+LARGEST_DAMPING = 0.9
+"""Damping ratio up to which a mode oscillates visibly; the fit itself ends at 1."""
 CLEAR = 0.05
 """A fit from the peaks alone that leaves less than this share (rms) needs no LSCF poles to start from."""
 
@@ -43,7 +45,8 @@ def fit_again(band: FittedBand, data: BandLines) -> FittedBand | None:
 def fit_real(band: FittedBand) -> FittedBand:
     """The band with real modal constants, where they do."""
     data = band.data
-    return replace(band, fit=with_real_constants(band.fit, data.frequency, data.own, data.weight, band.terms))
+    fit = with_real_constants(band.fit, data.frequency, data.own, data.weight, band.terms)
+    return replace(band, fit=fit) if np.all(are_modes(fit, data.frequency, band.height)) else band
 
 
 def are_modes(fit: BandFit, frequency: Array, height: Array, largest_error: float = LARGEST_ERROR) -> NDArray[np.bool_]:
@@ -51,6 +54,7 @@ def are_modes(fit: BandFit, frequency: Array, height: Array, largest_error: floa
     return np.asarray(
         (fit.frequency > frequency[0])
         & (fit.frequency < frequency[-1])
+        & (fit.damping_ratio < LARGEST_DAMPING)
         & (fit.mobility_peak > LEAST_SHARE * height)
         & (fit.standard_error[1] < largest_error * fit.damping_ratio)
         & np.any(fit.size_error < largest_error, axis=0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +26,6 @@ class BandFit:
     """Damping ratios (-), shape (m,)."""
     constant: ComplexArray
     """Modal constants A (m/N), shape (p, m); all of them real where complex ones were not asked for."""
-    covariance: Array
-    """Of the errors, shape (2 m + 2 p m, 2 m + 2 p m)."""
     freedom: int
     """Real values that were fitted less unknowns."""
     influence: Array
@@ -35,6 +34,11 @@ class BandFit:
     """Of the weighted FRFs, each its real and then its imaginary part, shape (2 n p,)."""
     unasked: Array
     """Phases (rad) that complex constants would have where they were not asked for, shape (p, m); else 0."""
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Of the errors, by what the fit leaves, shape (2 m + 2 p m, 2 m + 2 p m)."""
+        return np.asarray(self.influence @ self.influence.T * (self.sum_of_squares / self.freedom))
 
     @property
     def standard_error(self) -> Array:

@@ -72,7 +72,6 @@ def _fit_of(state: State, influence: Array) -> BandFit:
         state.poles[0],
         state.poles[1],
         state.constant,
-        influence @ influence.T * (state.cost / state.freedom),
         state.freedom,
         influence,
         state.residual,

@@ -123,6 +123,9 @@ def _on_its_values(band: FittedBand, i: int, mode: Mode, share: float) -> Iterat
     if error > LARGEST_ERROR:
         text = f"hardly moves at the driving point: K is uncertain by {100 * error:.0f} %"
         yield Remark("near-node", at, text, "take a driving point where it moves")
+    elif "uncertain" in dict(trust_rules(mode)):
+        text = f"zeta or K uncertain by {100 * relative_error(mode):.0f} %"
+        yield Remark("uncertain", at, text, "average more hits")
     if mode.misfit is not None and mode.misfit > LARGEST_MISFIT and share > MISFIT_SHARE:
         yield Remark("misfit", at, f"the fit leaves {mode.misfit:.1f} times the noise, {100 * share:.0f} % of its peak")
     if width is not None and band.height.size == 1 and abs(width / mode.damping_ratio - 1) > LARGEST_DIFFERENCE:
@@ -135,9 +138,6 @@ def _on_its_errors(mode: Mode) -> Iterator[Remark]:
     if "heavy-damping" in rules:
         text = f"zeta of {100 * mode.damping_ratio:.0f} % without a clear peak: rather the sum of several modes"
         yield Remark("heavy-damping", at, text)
-    if "uncertain" in rules:
-        text = f"zeta or K uncertain by {100 * relative_error(mode):.0f} %"
-        yield Remark("uncertain", at, text, "average more hits")
     if mode.coherence is not None and mode.coherence < LEAST_COHERENCE:
         text = f"coherence {mode.coherence:.2f} at its peak, below {LEAST_COHERENCE:g}: the hits disagree"
         yield Remark("low-coherence", at, text, "hit one point in one direction")

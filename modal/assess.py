@@ -47,7 +47,7 @@ def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
         left_ringing=_left_at_the_end(state.frf.frequency, mode.damping_ratio * mode.frequency),
         half_power_damping=_half_power_damping(band, mode),
     )
-    found = chain(_on_its_place(state, band, judged), _on_its_values(band, i, judged, share), _on_its_errors(judged))
+    found = chain(_on_its_place(state, band, i, judged), _on_its_values(band, i, judged, share), _on_its_errors(judged))
     return replace(judged, remarks=tuple(found))
 
 
@@ -83,7 +83,7 @@ def _half_power_damping(band: FittedBand, mode: Mode) -> float | None:
     return min(widths, key=lambda width: abs(width - mode.damping_ratio), default=None)
 
 
-def _on_its_place(state: Extraction, band: FittedBand, mode: Mode) -> Iterator[Remark]:
+def _on_its_place(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
     f, half_width, at = state.frf.frequency, mode.damping_ratio * mode.frequency, _name(mode)
     if mode.edge_distance is not None and mode.edge_distance < 1:
         text = f"its peak is cut by the edge of the lines, {f[0]:.0f}..{f[-1]:.0f} Hz"
@@ -94,7 +94,7 @@ def _on_its_place(state: Extraction, band: FittedBand, mode: Mode) -> Iterator[R
     for other in np.delete(band.fit.frequency, np.argmin(np.abs(band.fit.frequency - mode.frequency))):
         if abs(other - mode.frequency) < 2 * half_width:
             yield Remark("overlaps", at, f"overlaps with the mode at {other:.1f} Hz")
-    if band.terms > LEAST_TERMS and mode.standard_error[2] > BENT * abs(mode.stiffness):
+    if band.terms > LEAST_TERMS and band.fit.size_error[0, i] > BENT:
         text = "a far stronger mode beside the band bends the fit: zeta and K may be off by more than their errors"
         yield Remark("bent-by-neighbour", at, text)
     if any(abs(suspect - mode.frequency) < half_width for suspect in band.suspects):

@@ -16,6 +16,7 @@ from modal.fitting import BandFit
 from modal.hammer_covariance import hammer_covariance
 from modal.jackknife import jackknife, left_out
 from modal.mode import Mode
+from modal.quality.systematic import systematic
 
 
 def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[Hit] = ()) -> list[Mode]:
@@ -55,14 +56,17 @@ def _modes(
     state: Extraction, band: FittedBand, hits: Sequence[Sequence[Hit]], without: Sequence[Sequence[Frf]]
 ) -> list[Mode]:
     fit = band.fit
-    covariance = fit.covariance + sum(hammer_covariance(state, band, i, own) for i, own in enumerate(hits))
+    beyond = systematic(band)
+    by_hammer = sum(hammer_covariance(state, band, i, own) for i, own in enumerate(hits))
+    covariance = fit.covariance * beyond.factor + by_hammer + beyond.covariance
     n_hits = min(map(len, without), default=0)
-    scatter = np.sum([jackknife(state, band, *one) for one in enumerate(without)], axis=0) if n_hits else None
-    modes = [_mode(fit, i, covariance, scatter, n_hits) for i in range(fit.frequency.size)]
+    over_hits = np.sum([jackknife(state, band, *one) for one in enumerate(without)], axis=0) if n_hits else None
+    scatter = None if over_hits is None else over_hits + beyond.covariance
+    modes = [_mode(fit, i, covariance, beyond.freedom, scatter, n_hits) for i in range(fit.frequency.size)]
     return [assess(state, band, i, replace(mode, method=_method(state, band))) for i, mode in enumerate(modes)]
 
 
-def _mode(fit: BandFit, i: int, covariance: Array, scatter: Array | None, n_hits: int) -> Mode:
+def _mode(fit: BandFit, i: int, covariance: Array, freedom: float, scatter: Array | None, n_hits: int) -> Mode:
     """Mode i of a band, as the driving point shows it."""
     constant = complex(fit.constant[0, i])
     sign = 1.0 if constant.real > 0 else -1.0
@@ -75,7 +79,7 @@ def _mode(fit: BandFit, i: int, covariance: Array, scatter: Array | None, n_hits
         float(fit.damping_ratio[i]),
         sign / abs(constant),
         of_fit[:3, :3],
-        fit.freedom,
+        freedom,
         jackknife=None if over_hits is None else over_hits[:3, :3],
         n_hits=n_hits,
         phase_deg=float(np.degrees(np.angle(sign * constant))),

@@ -1,0 +1,82 @@
+"""Errors of a fit that are no noise: what it leaves is alike from line to line, as unfitted structure is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from modal.extraction import Array, BandLines, FittedBand
+from modal.fitting import LEAST_TERMS, MOST_TERMS, BandFit, fit_band, with_real_constants
+
+SIGNIFICANT = 3.0
+"""Times 1/sqrt(lines) that the share of independent values must be below 1; white noise is so in one of 700."""
+ROUNDING = 1e-7
+"""Share of what was measured below which a residual means nothing."""
+PARTS = ((0.1, 1.0), (0.0, 0.9), (0.1, 0.9), (0.2, 0.8))
+"""Of the lines of a band, that the fit is tried on again."""
+
+
+@dataclass(frozen=True, eq=False)
+class Systematic:
+    """What is to be added to the errors of a band."""
+
+    factor: float
+    """On the covariance from the residual: real values fitted over those that count as independent; 1 where white."""
+    freedom: float
+    """Degrees of freedom that are left."""
+    covariance: Array
+    """Of the errors in the order of `BandFit`, by how far other bands and residual terms move them; 0 where white."""
+
+
+def systematic(band: FittedBand) -> Systematic:
+    """Errors beyond those of white noise, where the residual of a band is coloured; none where it is white.
+
+    Structure that the model lacks leaves a residual that is alike over many lines. As many of its values are
+    independent as its power fills bins of their transform, (sum P)^2 / sum P^2; white noise fills half of them.
+    What such structure shifts in the modes the residual does not show: each band is fitted again with fewer and more
+    residual terms and on parts of its lines, and each value may be off by as much as the fit that moves it most.
+    """
+    fit, size = band.fit, len(band.fit.influence)
+    none = Systematic(1.0, fit.freedom, np.zeros((size, size)))
+    independent = _independent_values(fit)
+    scale = np.linalg.norm(band.data.own * band.data.weight)
+    is_white = independent > fit.freedom * (1 - SIGNIFICANT / np.sqrt(fit.residual.size / 2))
+    if is_white or fit.sum_of_squares < (ROUNDING * scale) ** 2:
+        return none
+    moved = np.array([_moved(fit, other) for other in _others(band)]).reshape(-1, size)
+    most = np.max(np.abs(moved), axis=0, initial=0.0)
+    return Systematic(max(fit.freedom / independent, 1.0), min(fit.freedom, independent), np.diag(most**2))
+
+
+def _independent_values(fit: BandFit) -> float:
+    """How many of the real values that a fit leaves are independent; about all of them for white noise."""
+    power = np.abs(np.fft.fft(fit.complex_residual, axis=1)) ** 2
+    return float(4 * power.sum() ** 2 / np.sum(power**2)) if power.any() else float(fit.residual.size)
+
+
+def _others(band: FittedBand) -> Iterator[BandFit]:
+    """Fits of the same modes with other residual terms, and on parts of the lines, where they converge."""
+    for terms in range(LEAST_TERMS - 2, MOST_TERMS + 1):
+        if terms != band.terms:
+            yield from _fitted(band, band.data, terms)
+    data, n = band.data, band.data.frequency.size
+    for low, high in PARTS:
+        part = slice(round(low * n), round(high * n))
+        lines = BandLines(part, data.frequency[part], data.weight[:, part], data.own[:, part])
+        yield from _fitted(band, lines, band.terms)
+
+
+def _fitted(band: FittedBand, data: BandLines, terms: int) -> Iterator[BandFit]:
+    arguments = (data.frequency, data.own, data.weight)
+    fit = fit_band(*arguments, band.fit.poles, terms)
+    if fit is not None and np.all(fit.frequency > 0) and np.all(fit.damping_ratio > 0):
+        yield fit if np.any(band.fit.constant.imag) else with_real_constants(fit, *arguments, terms)
+
+
+def _moved(fit: BandFit, other: BandFit) -> Array:
+    """Change of the values in the order of `BandFit`."""
+    turn = np.exp(-1j * np.angle(fit.constant))
+    off = (other.constant - fit.constant) * turn
+    return np.concatenate([(other.poles - fit.poles).ravel(), off.real.ravel(), off.imag.ravel()])

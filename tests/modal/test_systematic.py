@@ -1,0 +1,87 @@
+"""Errors where the fit leaves more than noise: structure that the model lacks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from acquisition import Frf, from_accelerance
+from modal import Mode, Trust, extract, fit_modes, synthesize, trust_of
+from modal.quality.systematic import systematic
+
+MODE = Mode(1722.0, 0.03, 3.5e7)
+
+
+def noisy(modes: list[Mode], level: float, seed: int, step: float = 5.0) -> Frf:
+    lines = np.arange(step, 4000.0, step)
+    exact = synthesize(modes, lines).accelerance
+    noise = np.random.default_rng(seed).normal(size=(2, lines.size)) / np.sqrt(2) * level * np.max(np.abs(exact))
+    return from_accelerance(lines, exact + noise[0] + 1j * noise[1])
+
+
+def values(mode: Mode) -> NDArray[np.float64]:
+    return np.array([mode.frequency, mode.damping_ratio, mode.stiffness])
+
+
+def test_white_noise_changes_nothing() -> None:
+    for seed in range(10):
+        state = extract([noisy([MODE], 2e-3, seed)])
+        (band,) = state.bands
+        beyond = systematic(band)
+        assert beyond.factor == 1.0
+        assert beyond.freedom == band.fit.freedom
+        assert not np.any(beyond.covariance)
+
+
+def test_what_the_model_lacks_widens_the_errors_until_they_hold_the_truth() -> None:
+    frf = noisy([MODE], 1e-4, 0)
+    rippled = Frf(frf.frequency, frf.receptance * (1 + 0.03 * np.sin(frf.frequency / 30)), measured_as="accelerance")
+    (band, *_) = extract([rippled]).bands
+    beyond = systematic(band)
+    assert beyond.factor > 3
+    assert beyond.freedom < band.fit.freedom / 3
+    mode = min(fit_modes(rippled), key=lambda mode: abs(mode.frequency - 1722))
+    reach = mode.quantile() * mode.standard_error
+    assert np.all(np.abs(values(mode) - values(MODE)) < reach)
+    i = int(np.argmin(np.abs(band.fit.frequency - 1722)))
+    assert reach[0] > 5 * band.fit.standard_error[0, i]
+
+
+def test_an_frf_without_noise_is_not_taken_for_coloured() -> None:
+    (band,) = extract([synthesize([MODE], np.arange(5.0, 4000.0, 5.0))]).bands
+    assert systematic(band).factor == 1.0
+
+
+def dense(seed: int) -> tuple[list[Mode], Frf]:
+    """28 modes from 250 to 4000 Hz, on average a half-power width apart."""
+    random = np.random.default_rng(seed)
+    columns = np.sort(random.uniform(250, 4000, 28)), random.uniform(0.01, 0.04, 28), 10 ** random.uniform(7.3, 8.8, 28)
+    modes = [Mode(float(f), float(zeta), float(k)) for f, zeta, k in zip(*columns, strict=True)]
+    return modes, noisy(modes, 1e-4, seed, step=2.0)
+
+
+def stands_alone(mode: Mode, modes: list[Mode]) -> bool:
+    """Whether its half-power band touches that of no other."""
+    reach = [mode.damping_ratio * mode.frequency + other.damping_ratio * other.frequency for other in modes]
+    distance = [abs(other.frequency - mode.frequency) for other in modes]
+    return sum(apart < near for apart, near in zip(distance, reach, strict=True)) == 1
+
+
+@pytest.mark.long
+@pytest.mark.timeout(900)
+def test_95_percent_intervals_hold_the_truth_among_modes_that_are_not_fitted() -> None:
+    """Of modes that stand alone; a mode found in place of two has no true value of its own."""
+    held: dict[Trust, list[NDArray[np.bool_]]] = {trust: [] for trust in Trust}
+    for seed in range(40):
+        modes, frf = dense(seed)
+        for mode in fit_modes(frf):
+            true = min(modes, key=lambda other: abs(other.frequency - mode.frequency))
+            if stands_alone(true, modes):
+                limits = mode.interval()
+                held[trust_of(mode)].append((limits[:, 0] < values(true)) & (values(true) < limits[:, 1]))
+    shares = {trust: np.mean(each, axis=0) for trust, each in held.items()}
+    print({str(trust): (len(held[trust]), share) for trust, share in shares.items()})  # noqa: T201
+    assert np.all(shares[Trust.TRUSTED] > 0.75)
+    assert np.all(shares[Trust.DOUBTFUL] > 0.8)
+    assert np.all(shares[Trust.REJECTED] > 0.9)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,8 @@ FARTHEST = 4.0
 """Distance above which a mode is no longer the same."""
 DOUBTFUL = 2.5
 """Distance above which it may be another one."""
+MOST_MOVED = 0.15
+"""Relative change of the frequency up to which a mode is the same where nothing else may be another one's."""
 RIVAL = 2.0
 """A second mode that is less than this many times as far may be the one, too."""
 
@@ -37,10 +39,11 @@ def follow(last: Mode, modes: Sequence[Mode]) -> Followed:
     """Of modes (driving points) the one that is most like the last one followed, with a remark where that is not clear.
 
     The distance is the root of the sum of squares of the changes of frequency, damping ratio and stiffness, each
-    in units of a likely change, and of 1 - MAC where both modes have shapes over the same points.
+    in units of a likely change, and of 1 - MAC where both modes have shapes over the same points. A mode that is alike
+    but for its frequency is the same up to 15 %, the fall of a spindle that must be seen.
     """
     near = sorted((m for m in modes if m.is_driving_point), key=lambda mode: _distance(last, mode))
-    if not near or _distance(last, near[0]) > FARTHEST:
+    if not near or not _is_same(last, near[0]):
         nearest = f" (nearest is {near[0].frequency:.1f} Hz)" if near else ""
         text = f"no mode to follow, none is like this one{nearest}"
         return Followed(None, (Remark("no-mode-to-follow", f"{last.frequency:.0f} Hz", text),))
@@ -52,6 +55,13 @@ def follow(last: Mode, modes: Sequence[Mode]) -> Followed:
         text = f"followed mode in doubt: it was {_values(last)}, now {_values(near[0])}"
         return Followed(near[0], (Remark("large-change", about, text),))
     return Followed(near[0], ())
+
+
+def _is_same(last: Mode, mode: Mode) -> bool:
+    if _distance(last, mode) <= FARTHEST:
+        return True
+    moved = abs(mode.frequency / last.frequency - 1) <= MOST_MOVED
+    return moved and _distance(replace(last, frequency=mode.frequency), mode) <= DOUBTFUL
 
 
 def _values(mode: Mode) -> str:

@@ -10,6 +10,7 @@ from lobewatch.analysis.history import Row
 from lobewatch.analysis.measurement import Measurement
 from lobewatch.analysis.order import Place
 from lobewatch.analysis.prediction import predict
+from lobewatch.analysis.questions.asked import open_questions
 from lobewatch.analysis.series import Point
 from lobewatch.machine import Machine
 from modal import Mode
@@ -26,9 +27,9 @@ def tapped(place: Place, places: Sequence[Place], rows: Sequence[Row], measured:
     newest, other = measured(place), None if place.other is None else measured(places[place.other])
     points: dict[str, list[Point]] = {"x": [], "y": []}
     for row in rows[: place.number]:
-        if row.tool == newest.tool and row.mode is not None:
+        if row.tool == newest.tool and row.mode is not None and not row.questions:
             points.setdefault(row.direction, []).append(_point(row, row.mode))
-    if newest.followed is not None:
+    if newest.followed is not None and not open_questions(newest.remarks):
         points.setdefault(newest.direction, []).append(_point(newest, newest.followed))
     return assemble(newest, other, points)
 
@@ -40,7 +41,7 @@ def predicted(
     newest: dict[str, Measurement] = {}
     for place in reversed(places):
         row = rows[place.number]
-        if row.bearing_stiffness.is_known and row.direction not in newest:
+        if row.bearing_stiffness.is_known and not row.questions and row.direction not in newest:
             newest[row.direction] = measured(place)
     try:
         return predict(machine, list(newest.values()), tool)

@@ -13,6 +13,7 @@ from acquisition import Remark
 from dsm import Calibration
 from lobes import StabilityLobes, lowest_of, zero_order
 from lobewatch.analysis.measurement import Measurement
+from lobewatch.analysis.questions.asked import in_question, open_questions
 from lobewatch.analysis.series import Point, Scatter, frequency_at, scatter_of
 from lobewatch.machine import Machine
 from modal import Mode
@@ -52,6 +53,14 @@ class Assembly:
     series: Mapping[str, Sequence[Point]] = field(default_factory=dict)
     """Tap tests of the same tool up to then, by direction; empty where it is predicted."""
 
+    questions: tuple[Remark, ...] = ()
+    """What nobody has answered of these tap tests; until then nothing is sure."""
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether both directions are known, from tap tests that nothing is asked about."""
+        return len(self.directions) == 2 and not self.questions
+
     @property
     def label(self) -> str:
         """What a legend says."""
@@ -87,6 +96,7 @@ def assemble(newest: Measurement, other: Measurement | None, series: Mapping[str
         predicted=False,
         remarks=(*newest.remarks, *_about_directions(newest, other, directions, moved)),
         series=series,
+        questions=tuple(in_question(one.tap_id, asked) for one in seen for asked in open_questions(one.remarks)),
     )
 
 

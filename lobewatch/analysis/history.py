@@ -19,6 +19,7 @@ from lobewatch.analysis.assembly import speed_grid
 from lobewatch.analysis.estimate import UNKNOWN, Estimate
 from lobewatch.analysis.measurement import Measurement
 from lobewatch.analysis.programs.verdict import Ruling, Word
+from lobewatch.analysis.questions.asked import open_questions
 from lobewatch.machine import Machine
 from modal import Mode
 
@@ -65,6 +66,11 @@ class Row:
     """Limiting depth by zero order over the speeds of the history (m), by name of the cut; a chart, no verdict."""
     rulings: Mapping[str, Ruling] | None = None
     """The word on every program with the machine as it was after this tap test; None where nobody has asked yet."""
+
+    @property
+    def questions(self) -> tuple[Remark, ...]:
+        """What nobody has answered yet; until then it is no reference for other tests."""
+        return open_questions(self.remarks)
 
     @property
     def mode(self) -> Mode | None:

@@ -8,7 +8,8 @@ from itertools import takewhile
 
 from acquisition import Remark
 from lobes import read_history, write_history
-from lobewatch.analysis.history import History, empty_history, from_columns, to_columns
+from lobewatch.analysis.history import History, Row, empty_history, from_columns, to_columns
+from lobewatch.analysis.questions.asked import accepted_codes
 from lobewatch.machine import BusyError, MachineFolder, TapEntry
 
 
@@ -23,7 +24,12 @@ def stored_history(folder: MachineFolder, taps: Sequence[TapEntry]) -> History:
     except (ValueError, KeyError, IndexError, FileNotFoundError):
         return empty
     pairs = zip(rows, taps, strict=False)
-    return replace(empty, rows=tuple(row for row, _ in takewhile(lambda pair: pair[0].tap_id == pair[1].id, pairs)))
+    return replace(empty, rows=tuple(row for row, _ in takewhile(lambda pair: _is_of(*pair), pairs)))
+
+
+def _is_of(row: Row, tap: TapEntry) -> bool:
+    """Whether a row was made of this tap test, with all that was accepted of it."""
+    return row.tap_id == tap.id and accepted_codes(row.remarks) == set(tap.accepted)
 
 
 def store_history(folder: MachineFolder, history: History) -> list[Remark]:

@@ -14,13 +14,14 @@ from lobewatch.analysis.assembly import Assembly, lobes_of
 from lobewatch.analysis.history import History, Row, row_of
 from lobewatch.analysis.history_cache import store_history, stored_history
 from lobewatch.analysis.measurement import Measurement, measure
-from lobewatch.analysis.order import Place, places
+from lobewatch.analysis.order import Place, earlier, places
 from lobewatch.analysis.programs.advice import Advice, advise
 from lobewatch.analysis.programs.verdict import Ruling, Verdict, unknown, verdict
+from lobewatch.analysis.questions.accepting import accept
+from lobewatch.analysis.questions.asked import answered
 from lobewatch.analysis.recordings import Stored, store_recordings
 from lobewatch.analysis.standing import Standing, stand
 from lobewatch.machine import Machine, MachineFolder, ProgramTable, TapEntry
-from modal import Mode
 
 
 class Logbook:
@@ -70,9 +71,8 @@ class Logbook:
         found = [tap for tap in self.taps if tool in (None, tap.tool)]
         if not found:
             which = "" if tool is None else f" with tool {tool!r}"
-            raise DataError(
-                f"{self.folder.path}: no tap test{which} yet; take one with lobewatch tap, or replay a recorded file"
-            )
+            cure = "take one with lobewatch tap, or replay a recorded file"
+            raise DataError(f"{self.folder.path}: no tap test{which} yet; {cure}")
         return found[-1]
 
     def commit(self, tap: TapTest) -> None:
@@ -132,10 +132,10 @@ class Logbook:
         """The earliest of the same tool that knows the same directions; None where that is itself or a prediction."""
         seen: set[str] = set()
         for tap in self.taps:
-            if tap.tool != now.tool or now.predicted:
-                continue
             if tap.id == now.tap_id:
                 return None
+            if tap.tool != now.tool or now.predicted or tap.id in self.questions:
+                continue
             seen.add(tap.direction)
             if seen >= set(now.directions):
                 then = self.assembly(until=tap.id)
@@ -177,13 +177,25 @@ class Logbook:
 
     def standing(self, now: datetime | None = None) -> Standing:
         """The light of the machine, the reasons, and one next step."""
-        return stand(self.machine, self.history, now or datetime.now(UTC))
+        return stand(self.machine, self.history, now or datetime.now(UTC), self.folder.path)
+
+    @property
+    def questions(self) -> Mapping[str, tuple[str, ...]]:
+        """Codes of what is asked and not answered, by tap test; what --accept takes."""
+        return {row.tap_id: tuple(one.code for one in row.questions) for row in self.history.rows if row.questions}
+
+    def accept(self, tap_ids: Sequence[str], codes: Sequence[str]) -> list[str]:
+        """Accept what is asked of these tap tests, for good; the codes that none of them asks."""
+        unasked = accept(self.folder, self.questions, tap_ids, codes) if codes else []
+        if len(unasked) < len(codes):
+            self._forget()
+        return unasked
 
     @property
     def calibrated(self) -> Measurement | None:
         """The newest measurement that the bearings of the model could be found from; None where there is none."""
-        newest = next((row for row in reversed(self.history.rows) if row.bearing_stiffness.is_known), None)
-        return None if newest is None else self.measurement(newest.tap_id)
+        known = [row for row in self.history.rows if row.bearing_stiffness.is_known and not row.questions]
+        return self.measurement(known[-1].tap_id) if known else None
 
     def _forget(self) -> None:
         """What a new tap test alters."""
@@ -227,18 +239,11 @@ class Logbook:
         """rows: the history before this tap test at least."""
         tap_id = place.entry.id
         if tap_id not in self._measurements:
-            last = self._last_followed(place, rows)
-            self._measurements[tap_id] = measure(self.folder.read(place.entry), self.machine, last)
+            before = (rows[number] for number in earlier(place, self._places))
+            last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
+            found = measure(self.folder.read(place.entry), self.machine, last)
+            self._measurements[tap_id] = replace(found, remarks=answered(found.remarks, place.entry.accepted))
         return self._measurements[tap_id]
-
-    def _last_followed(self, place: Place, rows: Sequence[Row]) -> Mode | None:
-        """The mode that was followed last before a tap test, in its series."""
-        before = place.before
-        while before is not None:
-            if rows[before].mode is not None:
-                return rows[before].mode
-            before = self._places[before].before
-        return None
 
     def _assembled(self, place: Place, rows: Sequence[Row]) -> Assembly:
         return tapped(place, self._places, rows, lambda one: self._measured(one, rows))

@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from acquisition import Remark, TapTest
 from dsm import Calibration, calibrate, modal_stiffness
+from lobewatch.analysis.questions.asked import frequency_jump, no_mode_in_band, other_band
 from lobewatch.machine import Machine
 from modal import Believed, Mode, believed, fit_modes, follow, predominant
 
@@ -49,13 +50,15 @@ class Measurement:
 
 def measure(tap: TapTest, machine: Machine, last: Mode | None = None) -> Measurement:
     """All that follows from one tap test; last: the mode that was followed in the test before."""
-    about, remarks = tap.circumstances, list[Remark]()
+    about, band = tap.circumstances, other_band(tap.frf, machine)
+    remarks = [band] if band is not None else []
     named = (tap.id, about.created, about.tool, about.direction)
     with threadpool_limits(limits=1):
         try:
             modes = fit_modes(tap.frf, hits=tap.accepted)
         except ValueError as error:
-            return Measurement(*named, remarks=(Remark("no-modes", "", f"no modes: {error}"),))
+            none = Remark("no-modes", "", f"no modes: {error}")
+            return Measurement(*named, remarks=(*remarks, none, no_mode_in_band((), machine)))
         found = believed(_in_band(modes, machine))
         remarks += found.remarks
         followed = _follow(found, modes, machine, remarks, last)
@@ -69,27 +72,25 @@ def _in_band(modes: Sequence[Mode], machine: Machine) -> list[Mode]:
     return [mode for mode in modes if low <= mode.frequency <= high]
 
 
-def _no_mode(modes: Sequence[Mode], machine: Machine) -> Remark:
-    low, high = machine.mode.band_hz or (0.0, np.inf)
-    place = "" if machine.mode.band_hz is None else f" in [mode] band_hz {low:g}..{high:g} Hz"
-    found = f"found are {', '.join(f'{mode.frequency:.0f}' for mode in modes)} Hz" if modes else "none was found at all"
-    return Remark("no-mode-to-follow", "", f"no mode to follow: none with positive stiffness{place}; {found}")
-
-
 def _follow(
     found: Believed, modes: Sequence[Mode], machine: Machine, remarks: list[Remark], last: Mode | None
 ) -> Mode | None:
     """The believed mode that continues the last one, the predominant one where there is none yet."""
     mode = predominant(found.modes)
     if mode is None:
-        remarks.append(_no_mode(modes, machine))
+        remarks.append(no_mode_in_band(modes, machine))
     elif last is not None:
-        mode = _continued(last, found.modes, remarks)
+        mode = _continued(last, mode, found.modes, remarks)
     return mode
 
 
-def _continued(last: Mode, candidates: Sequence[Mode], remarks: list[Remark]) -> Mode | None:
+def _continued(last: Mode, now: Mode, candidates: Sequence[Mode], remarks: list[Remark]) -> Mode | None:
+    """now: the predominant one, which is taken, and asked about, where none is like the last one and it is far off."""
     found = follow(last, candidates)
+    jump = frequency_jump(last, now) if found.mode is None else None
+    if jump is not None:
+        remarks.append(jump)
+        return now
     cure = "for a rebuilt spindle lay [mode] band_hz around its new mode" if found.mode is None else ""
     remarks += [replace(remark, cure=cure or remark.cure) for remark in found.remarks]
     return found.mode

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from lobewatch.machine import TapEntry
@@ -31,3 +31,10 @@ def places(taps: Sequence[TapEntry]) -> list[Place]:
         found.append(Place(i, tap, newest.get((tap.tool, tap.direction)), max(others, default=None)))
         newest[tap.tool, tap.direction] = i
     return found
+
+
+def earlier(place: Place, among: Sequence[Place]) -> Iterator[int]:
+    """Numbers of the tap tests of the same tool and direction before it, the newest first."""
+    while place.before is not None:
+        place = among[place.before]
+        yield place.number

@@ -6,10 +6,12 @@ The one place that says how far a frequency has fallen and what that calls for. 
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from enum import StrEnum
+from pathlib import Path
 
 from acquisition import Remark
 from lobewatch.analysis.estimate import UNKNOWN, Estimate
@@ -34,7 +36,11 @@ LIGHTS = {
     "unreadable": Light.UNKNOWN,
     "never-tapped": Light.UNKNOWN,
     "frequency-warn": Light.WARN,
+    "frequency-jump": Light.WARN,
     "mode-lost": Light.WARN,
+    "no-mode-in-band": Light.WARN,
+    "no-mode-to-follow": Light.WARN,
+    "other-band": Light.WARN,
     "overdue": Light.WARN,
     "program-unknown": Light.WARN,
     "program-doubtful": Light.WARN,
@@ -101,8 +107,8 @@ def unreadable(reason: str) -> Standing:
     return _of([Remark("unreadable", "", reason)], "Put its files right: the sentence above says which.")
 
 
-def stand(machine: Machine, history: History, now: datetime) -> Standing:
-    """The standing at a time; the last row holds the word on every program."""
+def stand(machine: Machine, history: History, now: datetime, path: Path | str = "MACHINE") -> Standing:
+    """The standing at a time; the last row holds the word on every program. path: of the folder, for commands."""
     rows = history.rows
     if not rows:
         cure = "Take the first tap test: all others are compared with it."
@@ -111,6 +117,7 @@ def stand(machine: Machine, history: History, now: datetime) -> Standing:
     series = [_series(history.series(*pair), machine.limits) for pair in pairs]
     left = machine.machine.tap_interval_days - (now - rows[-1].time) / timedelta(days=1)
     remarks = [remark for one in series for remark in one.remarks]
+    remarks += [asked for row in rows for asked in _about_questions(row, path)]
     remarks += [*_about_programs(rows, machine), *_about_dates(left), *_about_directions(rows)]
     due = rows[-1].time + timedelta(days=math.floor(machine.machine.tap_interval_days))
     series.sort(key=lambda one: -one.fall.value if one.fall.is_known else math.inf)
@@ -118,14 +125,20 @@ def stand(machine: Machine, history: History, now: datetime) -> Standing:
 
 
 def change_since_first(rows: Sequence[Row], name: str) -> Estimate:
-    """Change (%) of a value from the first row of a series that knows it to the last; unknown where that does not.
+    """Change (%) of a value from its reference in a series to the last row; unknown where that does not know it.
 
     name: frequency, damping_ratio, stiffness or bearing_stiffness. The one formula for light, report and screen.
     """
-    known: list[Estimate] = [value for row in rows if (value := getattr(row, name)).is_known]
-    if not known or not getattr(rows[-1], name).is_known:
+    first, now = reference(rows, name), rows[-1]
+    value: Estimate = getattr(now, name)
+    if first is None or not value.is_known:
         return UNKNOWN
-    return known[-1].change_since(known[0]) if len(known) > 1 else Estimate(0.0, 0.0)
+    return Estimate(0.0, 0.0) if first is now else value.change_since(getattr(first, name))
+
+
+def reference(rows: Sequence[Row], name: str) -> Row | None:
+    """The row that a value is compared with: the first of a series that knows it and that nothing is asked about."""
+    return next((row for row in rows if getattr(row, name).is_known and not row.questions), None)
 
 
 def _of(remarks: Sequence[Remark], well: str = "", *others: object) -> Standing:
@@ -136,17 +149,33 @@ def _of(remarks: Sequence[Remark], well: str = "", *others: object) -> Standing:
 
 def _series(rows: Sequence[Row], limits: Limits) -> SeriesStanding:
     known = [row for row in rows if row.frequency.is_known] or rows
-    change = change_since_first(known, "frequency")
-    fall = Estimate(-change.value + 0.0, change.std)
+    first, fall = reference(known, "frequency") or known[0], _fall(known)
     name = f"{rows[-1].tool}, {rows[-1].direction}"
     remarks = (*_about_loss(name, rows[-1]), *_about_fall(name, fall, limits))
-    return SeriesStanding(rows[-1].tool, rows[-1].direction, rows[-1].time, known[0].time, fall, remarks)
+    return SeriesStanding(rows[-1].tool, rows[-1].direction, rows[-1].time, first.time, fall, remarks)
+
+
+def _fall(known: Sequence[Row]) -> Estimate:
+    """To the newest test, or where something is asked about that, to the newest other one if it had fallen farther."""
+    sure = [row for row in known if not row.questions]
+    changes = [change_since_first(rows, "frequency") for rows in (known, sure) if rows]
+    change = min(changes, key=lambda one: one.value)
+    return Estimate(-change.value + 0.0, change.std)
 
 
 def _about_loss(name: str, newest: Row) -> Iterator[Remark]:
     if not newest.frequency.is_known:
         cure = "Tap again: the mode that is followed was not found in the newest test."
         yield Remark("mode-lost", name, "the newest test does not show the mode followed", cure)
+
+
+def _about_questions(row: Row, path: Path | str) -> Iterator[Remark]:
+    file = Path(path) / "taps" / f"{row.tap_id}.h5"
+    for asked in row.questions:
+        answer = shlex.join(["lobewatch", "replay", str(path), str(file), "--accept", asked.code])
+        text = f"{asked.text}; it sets no reference until you say that it is right: {answer}"
+        cure = f"Tap again; if this test is right, say so: {answer}"
+        yield Remark(asked.code, f"tap test {row.tap_id}", text, cure)
 
 
 def _about_fall(name: str, fall: Estimate, limits: Limits) -> Iterator[Remark]:

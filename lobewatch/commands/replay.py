@@ -24,22 +24,31 @@ def replay(
     date: Annotated[
         datetime | None, typer.Option(help="When it was recorded, local time; from the file where not given.")
     ] = None,
+    accept: Annotated[
+        list[str] | None,
+        typer.Option(help="Take these recordings though they raise this question, by its code; as often as needed."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Recorded files through the same pipeline as a live test; each is stored once.
 
-    All files are read and judged before the first one is stored.
+    All files are read and judged before the first one is stored. A recording that is implausible for the machine is
+    stored too, and asked about; --accept answers, at once or later: then with the file of the tap test.
 
     Examples:
 
       lobewatch replay mill-3 acceleration.lvm
       lobewatch replay mill-3 2024/*.h5 --tool "shrink-fit 20"
+      lobewatch replay mill-3 mill-3/taps/ID.h5 --accept frequency-jump
     """
     from lobewatch.analysis import Logbook
+    from lobewatch.analysis.questions.asked import checked_codes
     from lobewatch.show.measurements import measurement_json, measurement_texts, program_texts, programs_json
 
     logbook = Logbook.open(machine)
+    codes = checked_codes(accept or ())
     stored = logbook.replay_all(files, date, tool, direction)
+    unasked = logbook.accept(stored.tap_ids, codes)
     for file, tap_id in stored.known.items():
         notes.print(f"{file.name}: stored already as {tap_id}", markup=False)
     shown = [logbook.measurement(tap_id) for tap_id in stored.fresh]
@@ -49,5 +58,13 @@ def replay(
         "programs": programs_json(logbook.verdicts()) if shown else [],
         "known": {str(file): tap_id for file, tap_id in stored.known.items()},
     }
+    payload |= {"accepted": [code for code in codes if code not in unasked], "questions": logbook.questions}
+    texts += [f"accepted: {code}" for code in payload["accepted"]]
     last = f"{len(shown)} of {len(files)} file(s) stored in {logbook.folder.path}"
     emit(payload, as_json, *texts, *(program_texts(logbook) if shown else []), last)
+    if unasked:
+        open_ones = "; ".join(f"{tap_id}: {', '.join(found)}" for tap_id, found in logbook.questions.items())
+        raise ValueError(
+            f"--accept {' '.join(unasked)}: not asked of {', '.join(stored.tap_ids)}, which is stored; open questions: "
+            f"{open_ones or 'none'}"
+        )

@@ -20,6 +20,10 @@ def tap(
     direction: Annotated[str, typer.Option(help="Direction at the tool tip, x or y.")] = "x",
     operator: Annotated[str, typer.Option(help="Who holds the hammer.")] = "",
     new: Annotated[bool, typer.Option("--new", help="Begin anew, do not go on with an interrupted test.")] = False,
+    accept: Annotated[
+        list[str] | None,
+        typer.Option(help="Take the recording though it raises this question, by its code; as often as needed."),
+    ] = None,
     screen: Annotated[bool, typer.Option("--screen", help="Show the test in a browser too.")] = False,
     listen: Listen = "127.0.0.1",
     token: Token = None,
@@ -46,7 +50,9 @@ def tap(
     from lobewatch.tap import TapStopped, plan_session
 
     folder = MachineFolder(machine)
-    session = plan_session(folder, port=port, tool=tool, direction=direction, operator=operator, resume=not new)
+    session = plan_session(
+        folder, port=port, tool=tool, direction=direction, operator=operator, resume=not new, accept=accept or ()
+    )
     try:
         with contextlib.ExitStack() as screens:
             if screen:
@@ -59,6 +65,8 @@ def tap(
         notes.print(f"stopped with {session.state.good} good hits; the same command goes on with them")
         raise KeyboardInterrupt from stopped
     notes.print(f"saved {done.id}")
+    told = [remark.about for remark in session.measurement.remarks if remark.code == "accepted"]
+    notes.print(*(f"accepted: {code}" for code in told), sep="\n", end="\n" if told else "")
     logbook, found = Logbook(folder), session.measurement
     payload = measurement_json(found, logbook) | {"programs": programs_json(logbook.verdicts())}
     emit(payload, as_json, *measurement_texts(found, logbook), *program_texts(logbook))

@@ -11,7 +11,7 @@ import shutil
 import zlib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, fields
-from datetime import datetime
+from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -43,6 +43,8 @@ class TapEntry:
     """Direction at the tool tip, "x" or "y"."""
     source_sha256: str
     """Of the recording it was replayed from; empty for a live test."""
+    accepted: tuple[str, ...] = ()
+    """Questions about it that a person has accepted, by code; lines of their own."""
 
 
 class MachineFolder:
@@ -105,8 +107,16 @@ class MachineFolder:
 
     def taps(self) -> list[TapEntry]:
         """The committed tap tests, oldest first by their time."""
-        names = [field.name for field in fields(TapEntry)]
-        taps = [TapEntry(*(line[name] for name in names)) for line in self._lines() if line["kind"] == "tap"]
+        names = [field.name for field in fields(TapEntry) if field.name != "accepted"]
+        lines, accepted = self._lines(), dict[str, list[str]]()
+        for line in lines:
+            if line["kind"] == "accept":
+                accepted.setdefault(line["tap"], []).append(line["code"])
+        taps = [
+            TapEntry(**{name: line[name] for name in names}, accepted=tuple(accepted.get(line["id"], ())))
+            for line in lines
+            if line["kind"] == "tap"
+        ]
         return sorted(taps, key=lambda tap: datetime.fromisoformat(tap.time))
 
     def read(self, entry: TapEntry) -> TapTest:
@@ -127,8 +137,14 @@ class MachineFolder:
         source = hashlib.sha256(tap.source.content).hexdigest() if tap.source else ""
         digest = hashlib.sha256(content).hexdigest()
         entry = TapEntry(tap.id, digest, about.created.isoformat(), about.tool, about.direction, source)
-        self._append({"kind": "tap", "size": len(content), **asdict(entry)})
+        told = {name: value for name, value in asdict(entry).items() if name != "accepted"}
+        self._append({"kind": "tap", "size": len(content), **told})
         shutil.rmtree(self.spool / tap.id, ignore_errors=True)
+
+    def accept(self, tap_id: str, code: str) -> None:
+        """Write down that a person has accepted what was asked of a tap test; saved for good when this returns."""
+        with self.locked():
+            self._append({"kind": "accept", "tap": tap_id, "code": code, "time": datetime.now(UTC).isoformat()})
 
     def _file(self, tap_id: str) -> Path:
         return self.path / "taps" / f"{tap_id}.h5"

@@ -190,7 +190,7 @@ class Machine(Table, frozen=True):
         cutting = (self.material, self.reference_cut, self.program)
         model = (self.spindle, self.tool, self.tap.tool, self.tap.position_mm)
         settings = (
-            "charts by zero order, four words over the doubt",
+            "charts by zero order, four words over the doubt, questions",
             self.mode,
             self.speed,
             self.doubt,

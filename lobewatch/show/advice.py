@@ -137,7 +137,7 @@ def _worst_feed(found: Verdict) -> str:
 
 def _or_elsewhere(one: Advised, speeds: SpeedRange) -> Iterator[str]:
     """What to do until it is settled; tapping what was not tapped comes first."""
-    if one.verdict.assembly is not None and len(one.verdict.assembly.directions) == 2:
+    if one.verdict.assembly is not None and one.verdict.assembly.is_sure:
         yield f"until then {_elsewhere(one, speeds)}"
 
 
@@ -147,6 +147,8 @@ def _elsewhere(one: Advised, speeds: SpeedRange) -> str:
     known = one.verdict.assembly
     if known is not None and len(known.directions) == 1:
         return f"tap direction {_missing(known)} too: only then can a safe speed be named"
+    if known is not None and known.questions:
+        return "answer what is asked of its tap tests: only then can a safe speed be named"
     reach = f"in {rpm(speeds.low_rpm)} to {rpm(speeds.high_rpm)} rpm"
     if best is None:
         return f"no safe speed {reach}; choose another tool"

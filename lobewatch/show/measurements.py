@@ -10,6 +10,7 @@ from rich.table import Table
 from acquisition import Remark, joined
 from lobes import StabilityLobes
 from lobewatch.analysis import Logbook, Measurement, Verdict, lobes_of, remarks_on_all
+from lobewatch.analysis.questions.asked import QUESTIONS
 from lobewatch.machine import REFERENCE_CUT
 from lobewatch.show.describe import calibration_json
 from lobewatch.show.modes.describe_modes import in_order, mode_json, mode_table, short_remark_lines
@@ -76,7 +77,13 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
     if lobes is not None:
         low = lobes.minimum
         texts.append(f"{REFERENCE_CUT}: lowest limit {low.depth * 1e3:.2f} mm at {low.speed_rpm:.0f} rpm")
-    return [*texts, *remark_lines(assembly.remarks)]
+    asked = [one for one in logbook.standing().remarks if one.about == f"tap test {m.tap_id}"]
+    return [*texts, *remark_lines([one for one in assembly.remarks if one.code not in QUESTIONS]), *map(_asked, asked)]
+
+
+def _asked(question: Remark) -> str:
+    """What is asked, and the command that answers."""
+    return f"question ({question.code}): {question.text}"
 
 
 def program_texts(logbook: Logbook) -> list[str | Table]:

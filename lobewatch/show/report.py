@@ -25,6 +25,7 @@ from lobewatch.analysis import (
     lobes_of,
 )
 from lobewatch.analysis.programs.limit_band import limit_band
+from lobewatch.analysis.standing import reference
 from lobewatch.machine import Machine
 from lobewatch.show.advice import Advised, advised, advised_lines, decay_text
 from lobewatch.show.figures import frf_figure, svg, trend_figure
@@ -186,7 +187,9 @@ def _changes(rows: Sequence[Row]) -> list[dict[str, str]]:
         known = [getattr(row, name) for row in rows if getattr(row, name).is_known]
         change = change_since_first(rows, name)
         if change.is_known:
-            now, then = (plus_minus(one.value, one.std, scale) for one in (known[-1], known[0]))
+            then_row = reference(rows, name)
+            first = known[0] if then_row is None else getattr(then_row, name)
+            now, then = (plus_minus(one.value, one.std, scale) for one in (known[-1], first))
             table.append({"label": label, "then": then, "now": now, "change": f"{change.value:+.2f} %"})
     for name, label in (("static_tip_stiffness", "static"), ("modal_tip_stiffness", "modal")):
         values = [float(getattr(row, name)) for row in rows if np.isfinite(getattr(row, name))]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from acquisition import joined
 from dsm import plus_minus
 from lobewatch.analysis import Logbook, Measurement, SeriesStanding
+from lobewatch.analysis.questions.asked import open_questions
 from lobewatch.tap.state import Outcome
 
 
@@ -12,7 +13,8 @@ def outcome_of(logbook: Logbook, found: Measurement) -> Outcome:
     """The standing of the machine after this test, and what was measured."""
     standing = logbook.standing(found.time)
     series = standing.series_of(found.tool, found.direction)
-    told = [*found.remarks, *joined(standing.remarks), *logbook.remarks]
+    asked = open_questions(found.remarks)
+    told = [*(remark for remark in found.remarks if remark not in asked), *joined(standing.remarks), *logbook.remarks]
     texts = [*_values(found, series), *(f"{remark.finding}." for remark in told)]
     return Outcome(standing.light, texts, standing.next_step)
 
@@ -23,7 +25,9 @@ def _values(found: Measurement, series: SeriesStanding | None) -> list[str]:
         return []
     f_std, zeta_std, k_std = mode.standard_error.tolist()
     against = "the first test of this tool and direction"
-    if series is not None and not series.is_first:
+    if open_questions(found.remarks):
+        against = "in question"
+    elif series is not None and not series.is_first:
         sign = "+" if series.fall.value < 0 else ""
         against = f"{sign}{plus_minus(-series.fall.value, series.fall.std)} % against the first test"
     damping = plus_minus(mode.damping_ratio, zeta_std, 0.01)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import UTC, datetime
 
 from acquisition import Circumstances, tap_direction
@@ -18,6 +19,7 @@ def plan_session(
     direction: str = "x",
     operator: str = "",
     resume: bool = True,
+    accept: Sequence[str] = (),
 ) -> TapSession:
     """A session of today; what is left empty is taken from machine.toml. ValueError where that names no port either."""
     machine = folder.machine
@@ -32,4 +34,4 @@ def plan_session(
         operator,
         folder.toml.read_text("utf-8"),
     )
-    return TapSession(folder, Plug(machine.daq, port).open, about, resume=resume)
+    return TapSession(folder, Plug(machine.daq, port).open, about, resume=resume, accept=accept)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import errno
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from acquisition import Circumstances, DataError, Device, DeviceError, TapTest
 from lobewatch.analysis import Logbook, Measurement
+from lobewatch.analysis.questions.asked import checked_codes
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.connection import Connector
 from lobewatch.tap.hit_loop import HitLoop, TapStopped, Wishes
@@ -34,11 +35,14 @@ class TapSession:
         *,
         resume: bool = True,
         guided: bool = True,
+        accept: Sequence[str] = (),
         clock: Callable[[], float] = time.monotonic,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         """Nothing is opened yet. guided False leaves out what only a person needs: self-check, re-arming by decay,
-        curves, the time to take back the last hit, and the outcome."""
+        curves, the time to take back the last hit, and the outcome. accept: questions about the recording that are
+        answered already, by code; ValueError for one that there is not."""
+        self._accept = checked_codes(accept)
         self._folder, self._about, self._resume, self._guided = folder, circumstances, resume, guided
         about = f"{circumstances.machine}, tool {circumstances.tool}, direction {circumstances.direction}"
         first = TapState(0, Word.CHECKING, about, wanted=folder.machine.tap.hits)
@@ -109,6 +113,7 @@ class TapSession:
         logbook = Logbook(self._folder)
         logbook.commit(tap)
         try:
+            logbook.accept([tap.id], self._accept)
             self._measurement = logbook.measurement(tap.id)
             outcome = outcome_of(logbook, self._measurement) if self._guided else None
         except (ArithmeticError, KeyError, OSError, ValueError) as error:

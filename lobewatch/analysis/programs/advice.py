@@ -35,7 +35,7 @@ def advise(found: Verdict, machine: Machine) -> Advice:
     stiffness_at, remark = softening(found.assembly)
     decay = tolerable_decay(found.drawn, found.program.depth_mm / 1e3, stiffness_at) if found.stable else 0.0
     remarks = (remark,) if found.stable else ()
-    if found.word is Word.STABLE or len(found.assembly.directions) < 2:
+    if found.word is Word.STABLE or not found.assembly.is_sure:
         return Advice(decay=decay, remarks=remarks)
     search = SettingSearch.of(found.program, found.drawn, found.assembly, machine)
     best = search.elsewhere()

@@ -23,9 +23,9 @@ def robust_pockets(table: CutTable, assembly: Assembly, machine: Machine, count:
     """Speeds and depths that would be called stable with depth to spare, the largest removal rate first.
 
     The speed is the middle of those that are safe now and until it is tapped again. Empty where nothing is safe in the
-    range of speeds, or a direction was not tapped: then nothing is called stable.
+    range of speeds, or a direction was not tapped or is in question: then nothing is called stable.
     """
-    if len(assembly.directions) < 2:
+    if not assembly.is_sure:
         return []
     table = _as_program(table, assembly, machine)
     program = as_program(table, machine)

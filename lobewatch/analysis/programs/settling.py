@@ -44,6 +44,10 @@ def settles(cause: str, table: ProgramTable, tangential: float, assembly: Assemb
         ),
         "tap": ("the error of the tap test decides", "tap again with more hits"),
         "prediction": ("the prediction decides", f"tap tool {table.tool!r}"),
+        "question": (
+            f"it rests on a tap test in question ({', '.join(dict.fromkeys(one.code for one in assembly.questions))})",
+            "answer the question, or tap again",
+        ),
         "untapped": (f"direction {'y' if known == 'x' else 'x'} was not tapped", f"tap {'y' if known == 'x' else 'x'}"),
     }[cause]
     return Remark("doubt-decides", table.name, text, cure)

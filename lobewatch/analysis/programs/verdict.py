@@ -72,7 +72,8 @@ class Verdict:
     chance_turning: float = math.nan
     """Chance of chatter with the spindle turning, under plausible differences between rest and cut."""
     decided_by: str = ""
-    """Cause of the doubt that decides (`Doubt.causes`); empty unless it is doubtful."""
+    """Cause of the doubt that decides (`Doubt.causes`), "question" where a tap test is in question; empty unless it is
+    doubtful."""
     chatter_frequency: float = math.nan
     """Frequency that is heard at the limit (Hz); NaN where there is none."""
     kind: str = ""
@@ -130,7 +131,8 @@ def verdict(table: ProgramTable, assembly: Assembly, machine: Machine) -> Verdic
     word, cause = _word(found.stable, chatters, assembly), ""
     remarks = [*_remarks(table, assembly, machine)]
     if word is Word.DOUBTFUL:
-        cause = decisive(drawn, chatters, middle_row(program, assembly), program.depth)
+        middle = middle_row(program, assembly)
+        cause = "question" if assembly.questions else decisive(drawn, chatters, middle, program.depth)
         remarks.append(settles(cause, table, found.limit / program.depth * program.cut.tangential, assembly))
     return Verdict(
         program=table,
@@ -155,7 +157,7 @@ def verdict(table: ProgramTable, assembly: Assembly, machine: Machine) -> Verdic
 def _word(stable: bool, chatters: np.ndarray[tuple[int], np.dtype[np.bool_]], assembly: Assembly) -> Word:
     if not stable:
         return Word.NOT_STABLE
-    sure = not np.any(chatters) and len(assembly.directions) == 2
+    sure = not np.any(chatters) and assembly.is_sure
     return Word.STABLE if sure else Word.DOUBTFUL
 
 
@@ -174,5 +176,6 @@ def as_program(table: ProgramTable, machine: Machine) -> Program:
 def _remarks(table: ProgramTable, assembly: Assembly, machine: Machine) -> Iterator[Remark]:
     about_modes = (*ABOUT_DIRECTIONS, "predicted")
     yield from (remark for remark in assembly.remarks if remark.code in about_modes)
+    yield from assembly.questions
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and table.feed_per_tooth_mm is None:
         yield Remark("drive-ignored", table.name, "[drive] does not count: feed_per_tooth_mm is missing")

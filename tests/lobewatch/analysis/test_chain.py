@@ -254,7 +254,7 @@ def test_an_frf_that_cannot_be_fitted_is_stored_with_the_reason_and_blocks_nothi
     folder.commit(replace(first, frf=Frf(LINES, first.frf.receptance.conj())))
     folder.commit(good)
     _, (conjugated, fine) = up_to_date(folder)
-    assert codes(conjugated) == ["no-modes"]
+    assert codes(conjugated) == ["no-modes", "no-mode-in-band"]
     assert fine.at_tip
     assert "natural frequency" in render_report(Logbook.open(folder.path), "reference", "x")
 
@@ -333,14 +333,14 @@ def test_a_mode_is_followed_past_a_neighbour_that_becomes_the_highest(folder: Ma
     assert [row.frequency for row in again.rows] == [row.frequency for row in history.rows]
 
 
-def test_a_jump_of_the_frequency_is_said_and_a_far_one_is_not_followed(folder: MachineFolder) -> None:
+def test_a_jump_of_the_frequency_is_said_and_a_far_one_is_asked_about(folder: MachineFolder) -> None:
     for days, f in ((0.0, 1500.0), (30.0, 1640.0), (60.0, 2100.0)):
         folder.commit(recorded(about(folder, days), Mode(f, 0.03, 3.5e7)))
     history, (_, jumped, far) = up_to_date(folder)
     assert codes(jumped) == ["large-change"]
     assert "now 1640.0 Hz" in jumped.remarks[0].text
-    assert codes(far) == ["no-mode-to-follow"]
-    assert far.remarks[0].about == "1640 Hz"
-    assert "nearest is 2100.0 Hz" in far.remarks[0].text
-    assert not history.rows[2].frequency.is_known
+    assert codes(far) == ["frequency-jump"]
+    assert far.remarks[0].about == "2100 Hz"
+    assert "2100.0 Hz is +28 % off the newest test of the series (1640.0 Hz)" in far.remarks[0].text
+    assert history.rows[2].frequency.value == pytest.approx(2100.0, abs=0.5)
     assert far.at_tip

@@ -1,0 +1,1 @@
+"""Recordings that are implausible for a machine: what is asked of a person, and what was answered."""

@@ -1,0 +1,82 @@
+"""What a recording makes one ask: whether it is of this machine at all, and what was answered."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from acquisition import Frf, Remark
+from lobewatch.machine import Machine
+from modal import Mode
+
+QUESTIONS = ("frequency-jump", "no-mode-in-band", "other-band", "no-mode-to-follow")
+"""Codes of the remarks that ask a person: until each is accepted the test sets no reference, and nothing is good."""
+LARGEST_JUMP = 0.15
+"""Relative change of the frequency against the newest test of the series that is asked about, up or down."""
+LEAST_COVERED = 0.9
+"""Share of [mode] band_hz that a recording has to cover."""
+
+
+def frequency_jump(last: Mode, now: Mode) -> Remark | None:
+    """Asks about a change of the frequency that no wear makes within one interval; None where it is smaller."""
+    change = now.frequency / last.frequency - 1
+    if abs(change) <= LARGEST_JUMP:
+        return None
+    text = f"f_n {now.frequency:.1f} Hz is {100 * change:+.0f} % off the newest test of the series"
+    text += f" ({last.frequency:.1f} Hz): is this the machine, the tool and the direction it is said to be?"
+    return Remark("frequency-jump", f"{now.frequency:.0f} Hz", text)
+
+
+def no_mode_in_band(modes: Sequence[Mode], machine: Machine) -> Remark:
+    """Asks about a recording that shows no mode to follow; modes: all that were found."""
+    low, high = machine.mode.band_hz or (0.0, np.inf)
+    place = "" if machine.mode.band_hz is None else f" in [mode] band_hz {low:g}..{high:g} Hz"
+    found = f"found are {', '.join(f'{mode.frequency:.0f}' for mode in modes)} Hz" if modes else "none was found at all"
+    return Remark("no-mode-in-band", "", f"no mode to follow: none with positive stiffness{place}; {found}")
+
+
+def other_band(frf: Frf, machine: Machine) -> Remark | None:
+    """Asks about a recording that does not cover [mode] band_hz; None where it does, or there is none."""
+    if machine.mode.band_hz is None:
+        return None
+    usable = frf.usable_band or (0.0, np.inf)
+    low, high = max(usable[0], float(frf.frequency[0])), min(usable[1], float(frf.frequency[-1]))
+    wanted = machine.mode.band_hz
+    if min(high, wanted[1]) - max(low, wanted[0]) >= LEAST_COVERED * (wanted[1] - wanted[0]):
+        return None
+    text = f"its usable lines, {low:.0f}..{high:.0f} Hz, do not cover [mode] band_hz {wanted[0]:g}..{wanted[1]:g} Hz"
+    return Remark("other-band", "", text)
+
+
+def answered(remarks: Iterable[Remark], accepted: Collection[str]) -> tuple[Remark, ...]:
+    """The remarks on a test with the questions that a person has accepted told as such, and the open ones left."""
+    remarks = tuple(remarks)
+    asked = {remark.code: str(remark) for remark in remarks}
+    told = [Remark("accepted", code, asked.get(code, "asked no longer")) for code in accepted]
+    return (*(remark for remark in remarks if remark.code not in accepted), *told)
+
+
+def open_questions(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
+    """The questions among these that nobody has answered."""
+    return tuple(remark for remark in remarks if remark.code in QUESTIONS)
+
+
+def accepted_codes(remarks: Iterable[Remark]) -> set[str]:
+    """Codes of the questions that were answered."""
+    return {remark.about for remark in remarks if remark.code == "accepted"}
+
+
+def checked_codes(codes: Iterable[str]) -> list[str]:
+    """Each code once; ValueError for one that is no question."""
+    found = list(dict.fromkeys(codes))
+    for code in found:
+        if code not in QUESTIONS:
+            raise ValueError(f"--accept {code}: no such question; there are {', '.join(QUESTIONS)}")
+    return found
+
+
+def in_question(tap_id: str, remark: Remark) -> Remark:
+    """A question as the assembly passes it on, told of the tap test."""
+    return replace(remark, about=f"tap test {tap_id}")

@@ -1,0 +1,212 @@
+"""Recordings that are implausible for a machine: stored, asked about, never silently good, answered by --accept."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from lobewatch.analysis import Logbook, Standing
+from lobewatch.analysis.programs.verdict import Word
+from lobewatch.cli import app
+from lobewatch.show.report import render_report
+from lobewatch.tap.outcome import outcome_of
+
+SPINDLE = "# The spindle of the example"
+SAFE = """
+[[program]]
+name = "A"
+teeth = 4
+tool_diameter_mm = 20
+radial_depth_mm = 20
+direction = "down"
+tangential_n_per_mm2 = 1400
+radial_n_per_mm2 = 500
+speed_rpm = 12900
+depth_mm = 0.2
+
+"""
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+
+
+@pytest.fixture
+def shop(shop: Shop) -> Shop:
+    """Without programs, which take their time."""
+    shop.put("")
+    return shop
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
+
+
+def refused(*arguments: object) -> str:
+    """The one sentence of an error."""
+    with pytest.raises(ValueError, match="--accept") as said:
+        run(*arguments)
+    return str(said.value)
+
+
+def standing(shop: Shop, days: float = 1.0) -> Standing:
+    found: Standing = shop.logbook.standing(shop.start + timedelta(days=days))
+    return found
+
+
+def codes(found: Standing) -> list[str]:
+    return [remark.code for remark in found.remarks]
+
+
+def tap_file(shop: Shop, tap_id: str) -> Path:
+    path: Path = shop.path / "taps" / f"{tap_id}.h5"
+    return path
+
+
+def newest(logbook: Logbook) -> str:
+    return logbook.newest().id
+
+
+def words(shop: Shop) -> set[Word]:
+    return {found.word for found in shop.logbook.verdicts()}
+
+
+def test_a_beam_is_stored_and_never_the_baseline_of_a_mill(shop: Shop, beam: Path) -> None:
+    shop.edit("band_hz = [1200, 2200]", "band_hz = [1200, 1800]")
+    said = run("replay", shop.path, beam, "--date", "2026-01-10")
+    assert said.exit_code == 0
+    assert "question (no-mode-in-band)" in said.output
+    shop.edit(SPINDLE, SAFE + SPINDLE)
+    shop.tap_both()
+    found = standing(shop)
+    assert (found.light, codes(found)) == ("warn", ["no-mode-in-band"])
+    series = found.series_of("reference", "x")
+    assert series is not None
+    assert series.is_first
+    assert words(shop) == {Word.STABLE}
+
+
+def test_a_beam_between_the_taps_of_a_mill_is_asked_about(shop: Shop, beam: Path) -> None:
+    shop.edit("band_hz", "# band_hz")
+    shop.tap_both()
+    assert standing(shop).light == "good"
+    run("replay", shop.path, beam, "--date", "2026-01-20")
+    found = standing(shop, 6)
+    assert found.light != "good"
+    assert set(codes(found)) & {"frequency-jump", "no-mode-to-follow"}
+    shop.tap(10, 1713.0)
+    shop.tap(10.1, 1690.0, "y")
+    again = standing(shop, 11)
+    assert again.light == "warn"
+    assert "frequency-alarm" not in codes(again)
+
+
+def test_the_lines_of_a_recording_must_cover_the_band(shop: Shop) -> None:
+    shop.tap_both()
+    shop.edit("band_hz = [1200, 2200]", "band_hz = [1200, 5000]")
+    found = standing(shop)
+    assert found.light == "warn"
+    assert codes(found).count("other-band") == 2
+    assert "4..3996 Hz, do not cover [mode] band_hz 1200..5000 Hz" in found.remarks[0].text
+    shop.edit("band_hz = [1200, 5000]", "band_hz = [1200, 4200]")
+    assert "other-band" not in codes(standing(shop))
+
+
+@pytest.mark.parametrize(
+    ("share", "light", "asked"), [(0.8, "alarm", True), (1.2, "warn", True), (0.87, "alarm", False)]
+)
+def test_a_jump_alarms_downwards_and_is_asked_about(shop: Shop, share: float, light: str, asked: bool) -> None:
+    shop.tap_both()
+    shop.tap(30, 1713.0 * share)
+    found = standing(shop, 31)
+    assert found.light == light
+    assert ("frequency-jump" in codes(found)) is asked
+    assert ("frequency-alarm" in codes(found)) is (light == "alarm")
+
+
+def test_an_upward_jump_hides_no_alarm(shop: Shop) -> None:
+    for days, share in enumerate((1.0, 0.95, 0.89)):
+        shop.tap(days, 1713.0 * share)
+    assert standing(shop, 3).light == "alarm"
+    shop.tap(3, 1713.0 * 1.1)
+    found = standing(shop, 4)
+    assert {"frequency-alarm", "frequency-jump"} <= set(codes(found))
+
+
+def test_the_outcome_and_the_report_name_the_command_that_answers(shop: Shop) -> None:
+    shop.edit(SPINDLE, SAFE + SPINDLE)
+    shop.tap_both()
+    shop.tap(30, 1713.0 * 1.2)
+    logbook = shop.logbook
+    tap_id = newest(logbook)
+    command = shlex.join(
+        ["lobewatch", "replay", str(shop.path), str(tap_file(shop, tap_id)), "--accept", "frequency-jump"]
+    )
+    outcome = outcome_of(logbook, logbook.measurement(tap_id))
+    assert any(command in text for text in outcome.texts)
+    assert "in question" in outcome.texts[0]
+    assert command in render_report(logbook, "reference", "x")
+    (doubtful,) = logbook.verdicts()
+    assert (doubtful.word, doubtful.decided_by) == (Word.DOUBTFUL, "question")
+    _, *words_of_it = shlex.split(command)
+    assert run(*words_of_it).exit_code == 0
+    assert "frequency-jump" not in codes(standing(shop, 31))
+
+
+def test_what_is_accepted_stays_so_and_counts(shop: Shop) -> None:
+    shop.tap_both()
+    shop.tap(30, 1713.0 * 0.8)
+    shop.tap(60, 1713.0 * 0.79)
+    logbook = shop.logbook
+    jumped = logbook.taps[2].id
+    assert [*logbook.questions] == [tap.id for tap in logbook.taps[2:]]
+    said = run("replay", shop.path, tap_file(shop, jumped), "--accept", "frequency-jump", "--json")
+    assert json.loads(said.stdout)["accepted"] == ["frequency-jump"]
+    line = json.loads((shop.path / "journal.jsonl").read_text().splitlines()[-1])
+    assert (line["kind"], line["tap"], line["code"]) == ("accept", jumped, "frequency-jump")
+    for _ in range(2):
+        found = standing(shop, 61)
+        assert "frequency-jump" not in codes(found)
+        assert "frequency-alarm" in codes(found)
+        (shop.path / "history.h5").unlink()
+    row = shop.logbook.history.rows[2]
+    assert [(remark.code, remark.about) for remark in row.remarks if remark.code == "accepted"] == [
+        ("accepted", "frequency-jump")
+    ]
+
+
+def test_accept_takes_open_questions_only(shop: Shop, beam: Path) -> None:
+    shop.tap_both()
+    logbook = shop.logbook
+    file = tap_file(shop, newest(logbook))
+    before = (shop.path / "journal.jsonl").read_bytes()
+    nonsense = refused("replay", shop.path, beam, "--accept", "nonsense")
+    assert "no such question; there are frequency-jump, no-mode-in-band, other-band, no-mode-to-follow" in nonsense
+    assert "no such question" in refused("tap", shop.path, "--port", "x", "--accept", "nonsense")
+    assert "open questions: none" in refused("replay", shop.path, file, "--accept", "frequency-jump")
+    assert (shop.path / "journal.jsonl").read_bytes() == before
+    shop.tap(30, 1713.0 * 1.2)
+    asked = newest(shop.logbook)
+    sentence = refused("replay", shop.path, tap_file(shop, asked), "--accept", "other-band")
+    assert f"open questions: {asked}: frequency-jump" in sentence
+
+
+def test_a_replay_can_be_accepted_at_once(shop: Shop, beam: Path) -> None:
+    shop.edit("band_hz = [1200, 2200]", "band_hz = [1200, 1800]")
+    said = run("replay", shop.path, beam, "--accept", "no-mode-in-band")
+    assert said.exit_code == 0
+    assert "accepted: no-mode-in-band" in said.output
+    assert not re.search(r"question \(", said.output)
+    assert shop.logbook.questions == {}
+
+
+def test_no_other_tool_is_predicted_from_a_test_in_question(shop: Shop) -> None:
+    shop.tap_both()
+    sure = shop.logbook.calibrated.tap_id
+    shop.tap(30, 1713.0 * 0.8)
+    assert shop.logbook.calibrated.tap_id == sure

@@ -10,7 +10,7 @@ import typer
 
 from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json
-from lobewatch.show.show_address import Listen, Token, show_address
+from lobewatch.show.show_address import Listen, Token, WatchToken, show_address
 
 
 def serve(
@@ -20,6 +20,7 @@ def serve(
     listen: Listen = "127.0.0.1",
     http_port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the pages; 0: any free one.")] = 0,
     token: Token = None,
+    watch_token: WatchToken = None,
     as_json: Json = False,
 ) -> None:
     """Machines in a browser, worst first; START begins a tap test on the port that machine.toml names. Ctrl-C ends it.
@@ -31,7 +32,7 @@ def serve(
     """
     from lobewatch.screen import DashboardServer
 
-    with DashboardServer(folder, listen=listen, port=http_port, token=token) as server:
-        show_address(server.url, as_json)
+    with DashboardServer(folder, listen=listen, port=http_port, token=token, watch_token=watch_token) as server:
+        show_address(server.url, server.watch_url, as_json)
         while True:
             time.sleep(1)

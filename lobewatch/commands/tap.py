@@ -10,7 +10,7 @@ import typer
 
 from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit, notes
-from lobewatch.show.show_address import Listen, Token, show_address
+from lobewatch.show.show_address import Listen, Token, WatchToken, show_address
 
 
 def tap(
@@ -27,6 +27,7 @@ def tap(
     screen: Annotated[bool, typer.Option("--screen", help="Show the test in a browser too.")] = False,
     listen: Listen = "127.0.0.1",
     token: Token = None,
+    watch_token: WatchToken = None,
     as_json: Json = False,
 ) -> None:
     """The live tap test: hit until ten hits are good, then see what has changed.
@@ -58,7 +59,9 @@ def tap(
             if screen:
                 from lobewatch.screen import ScreenServer  # brings aiohttp, which most tap tests do not need
 
-                show_address(screens.enter_context(ScreenServer(session, listen=listen, token=token)).url)
+                server = ScreenServer(session, listen=listen, token=token, watch_token=watch_token)
+                screens.enter_context(server)
+                show_address(server.url, server.watch_url)
             screens.enter_context(TerminalScreen(session) if notes.is_terminal else TapPrinter(session, notes))
             done = session.run()
     except (TapStopped, KeyboardInterrupt) as stopped:

@@ -15,7 +15,7 @@ from acquisition import DataError, TapDirection
 from lobewatch.analysis import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.screen.dashboard import Board, find_machines
-from lobewatch.screen.guard import OPEN
+from lobewatch.screen.guard import MAY_ALTER, OPEN, WATCH
 from lobewatch.screen.live_tests import LiveTest
 from lobewatch.screen.pages import add_pages
 from lobewatch.screen.screen_server import add_session
@@ -36,12 +36,20 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class DashboardServer(WebThread):
     """Serves a machine or a folder of machines from __enter__ to __exit__, in a thread of its own."""
 
-    def __init__(self, path: Path | str, *, listen: str = "127.0.0.1", port: int = 0, token: str | None = None) -> None:
+    def __init__(
+        self,
+        path: Path | str,
+        *,
+        listen: str = "127.0.0.1",
+        port: int = 0,
+        token: str | None = None,
+        watch_token: str | None = None,
+    ) -> None:
         """Brings the histories up to date. Port 0: any free one; token None: a new one.
 
         DataError where there is no machine, ValueError for a token that does not fit into an address.
         """
-        super().__init__(listen, port, token)
+        super().__init__(listen, port, token, watch_token)
         self._machines = find_machines(Path(path))
         self._tests: dict[str, LiveTest] = {}
         self._reports: dict[str, tuple[str, str]] = {}
@@ -52,7 +60,7 @@ class DashboardServer(WebThread):
         router = self.application.router
         router.add_get("/machines", self._list)
         router.add_post("/machines/{machine}/start", self._start)
-        router.add_post("/machines/{machine}/report", self._write_report)
+        router.add_post("/machines/{machine}/report", self._write_report, name=f"{WATCH}report")
         router.add_get("/report/{machine}/{key}", self._report, name=f"{OPEN}report")
 
     def __exit__(
@@ -78,10 +86,11 @@ class DashboardServer(WebThread):
             raise web.HTTPNotFound(text="no tap test runs on this machine; go to All machines and press START")
         return test
 
-    async def _list(self, _: web.Request) -> web.Response:
+    async def _list(self, request: web.Request) -> web.Response:
         rows = await asyncio.to_thread(self._board.rows)
         running = {key for key, test in self._tests.items() if test.running}
-        return web.json_response({"machines": [row | {"running": row["key"] in running} for row in rows]})
+        machines = [row | {"running": row["key"] in running} for row in rows]
+        return web.json_response({"machines": machines, "may_alter": request[MAY_ALTER]})
 
     async def _start(self, request: web.Request) -> web.Response:
         key, folder = self._find_machine(request)
@@ -105,6 +114,7 @@ class DashboardServer(WebThread):
         key, html = self._reports.get(request.match_info["machine"], ("", ""))
         if not key or not secrets.compare_digest(key.encode(), request.match_info["key"].encode()):
             raise web.HTTPNotFound(text="this report is gone; open it from the list of machines")
+        self.door.trust(request)
         return web.Response(text=html, content_type="text/html", headers={"Content-Security-Policy": REPORT_POLICY})
 
 

@@ -7,13 +7,20 @@ import ipaddress
 import logging
 import re
 import secrets
+from dataclasses import dataclass
 
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 from yarl import URL
 
+from lobewatch.screen.door import Door
+
 OPEN = "open-"
 """A route whose name begins with this answers without a token; it must neither tell nor alter anything."""
+WATCH = "watch-"
+"""A route whose name begins with this alters nothing although it is not asked by GET."""
+MAY_ALTER = web.RequestKey("MAY_ALTER", bool)
+"""Whether the token of a request is the full one."""
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
@@ -35,9 +42,28 @@ def checked_token(token: str | None) -> str:
     return token
 
 
-def guarded_application(token: str, listen: str) -> web.Application:
-    """An application that answers only to its own page, and tells and alters nothing without the token."""
-    application = web.Application(middlewares=[_guard(token, listen)], client_max_size=4096)
+@dataclass(frozen=True)
+class Tokens:
+    """What a browser must know."""
+
+    full: str
+    """To see and alter."""
+    watch: str
+    """Only to see."""
+
+
+def checked_tokens(full: str | None, watch: str | None) -> Tokens:
+    """Both, each a new one for None. ValueError for one that does not fit into an address, and for one twice."""
+    tokens = Tokens(checked_token(full), checked_token(watch))
+    if tokens.full == tokens.watch:
+        raise ValueError("the token to watch is the full one too; give two different ones, or leave one out")
+    return tokens
+
+
+def guarded_application(tokens: Tokens, listen: str, door: Door) -> web.Application:
+    """An application that answers only to its own page, tells nothing without a token, alters nothing without the
+    full one."""
+    application = web.Application(middlewares=[_attend(door), _guard(tokens, listen, door)], client_max_size=4096)
     application.on_response_prepare.append(_add_headers)
     return application
 
@@ -47,14 +73,26 @@ async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:
         response.headers.setdefault(name, value)
 
 
-def _guard(token: str, listen: str) -> Middleware:
+def _attend(door: Door) -> Middleware:
+    @web.middleware
+    async def attend(request: web.Request, handler: Handler) -> web.StreamResponse:
+        """The head of a request has come: its connection is not hung up before there is an answer."""
+        with door.attending(request):
+            return await handler(request)
+
+    return attend
+
+
+def _guard(tokens: Tokens, listen: str, door: Door) -> Middleware:
     @web.middleware
     async def guard(request: web.Request, handler: Handler) -> web.StreamResponse:
         try:
             _check_host(request, listen)
             _check_origin(request)
-            if not (request.match_info.route.name or "").startswith(OPEN):
-                _check_token(request, token)
+            name = request.match_info.route.name or ""
+            if not name.startswith(OPEN):
+                _check_token(request, tokens, alters=request.method != "GET" and not name.startswith(WATCH))
+                door.trust(request)
             return await handler(request)
         except web.HTTPException as refusal:
             return web.json_response({"error": refusal.text or refusal.reason}, status=refusal.status)
@@ -88,10 +126,17 @@ def _check_origin(request: web.Request) -> None:
         raise web.HTTPForbidden(text="this request does not come from lobewatch's own page")
 
 
-def _check_token(request: web.Request, token: str) -> None:
+def _check_token(request: web.Request, tokens: Tokens, alters: bool) -> None:
     """In the header Authorization, or for a WebSocket, which has none, among its protocols."""
     given = [request.headers.get("Authorization", "").removeprefix("Bearer ")]
     protocols = request.headers.get("Sec-WebSocket-Protocol", "").split(",")
     given += [name.strip().removeprefix("token.") for name in protocols]
-    if not any(hmac.compare_digest(one.encode("utf-8", "surrogateescape"), token.encode()) for one in given):
+    request[MAY_ALTER] = _is_among(given, tokens.full)
+    if not request[MAY_ALTER] and not _is_among(given, tokens.watch):
         raise web.HTTPUnauthorized(text="open the whole address that lobewatch printed, with its token")
+    if alters and not request[MAY_ALTER]:
+        raise web.HTTPForbidden(text="this address is only to watch; open the other one that lobewatch printed")
+
+
+def _is_among(given: list[str], token: str) -> bool:
+    return any(hmac.compare_digest(one.encode("utf-8", "surrogateescape"), token.encode()) for one in given)

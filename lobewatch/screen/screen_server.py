@@ -8,6 +8,7 @@ from collections.abc import Callable
 from aiohttp import web
 
 from lobewatch.screen.feed import feed
+from lobewatch.screen.guard import MAY_ALTER
 from lobewatch.screen.pages import add_pages
 from lobewatch.screen.web_thread import WebThread
 from lobewatch.show.printer import Watched
@@ -17,12 +18,20 @@ class ScreenServer(WebThread):
     """Serves the screen of a tap test from __enter__ to __exit__, in a thread of its own.
 
     The session is only asked for its newest state, at most 20 times a second and page: it never waits for a screen.
-    Whoever has `url` may watch, undo and stop; without its token nothing can be seen or altered.
+    Whoever has `url` may watch, undo and stop, whoever has `watch_url` only watch; without a token nothing can be seen.
     """
 
-    def __init__(self, session: Watched, *, listen: str = "127.0.0.1", port: int = 0, token: str | None = None) -> None:
+    def __init__(
+        self,
+        session: Watched,
+        *,
+        listen: str = "127.0.0.1",
+        port: int = 0,
+        token: str | None = None,
+        watch_token: str | None = None,
+    ) -> None:
         """Port 0: any free one. Token None: a new one. ValueError for a token that does not fit into an address."""
-        super().__init__(listen, port, token)
+        super().__init__(listen, port, token, watch_token)
         add_pages(self.application, {"/": "screen.html"})
         add_session(self.application, "/", lambda _: session)
 
@@ -44,7 +53,7 @@ def add_session(application: web.Application, prefix: str, find: Callable[[web.R
 
     async def access(request: web.Request) -> web.Response:
         find(request)
-        return web.json_response({})
+        return web.json_response({"may_alter": request[MAY_ALTER]})
 
     application.router.add_get(f"{prefix}feed", follow)
     application.router.add_get(f"{prefix}access", access)

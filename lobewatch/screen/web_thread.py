@@ -7,13 +7,14 @@ import logging
 import socket
 import threading
 from types import TracebackType
-from typing import Self
+from typing import Self, cast
 
 from aiohttp import web
 
 from acquisition import DeviceError
+from lobewatch.screen.door import Door, open_port
 from lobewatch.screen.feed import ENDING
-from lobewatch.screen.guard import checked_token, guarded_application
+from lobewatch.screen.guard import checked_tokens, guarded_application
 
 QUIET = logging.getLogger("lobewatch.screen.http")
 """Requests that are no HTTP are answered with 400 and not logged: anybody could fill the operator's terminal."""
@@ -29,13 +30,16 @@ FAR_AWAY = {
 class WebThread:
     """Base of the servers: `application` is served from __enter__ to __exit__; add its routes before."""
 
-    def __init__(self, listen: str, port: int, token: str | None) -> None:
+    def __init__(self, listen: str, port: int, token: str | None, watch_token: str | None = None) -> None:
         """ValueError for a token that does not fit into an address, and for no address to listen at."""
         if not listen:
             raise ValueError("no address to listen at; use 127.0.0.1 for this computer alone, 0.0.0.0 for the network")
-        self.token = checked_token(token)
+        tokens = checked_tokens(token, watch_token)
+        self.token, self.watch_token = tokens.full, tokens.watch
         self._listen = listen.lower()
-        self.application = guarded_application(self.token, self._listen)
+        self.door = Door()
+        """Lets connections in, and counts them."""
+        self.application = guarded_application(tokens, self._listen, self.door)
         self._port = port
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="lobewatch screen", daemon=True)
         self._ready = threading.Event()
@@ -73,21 +77,34 @@ class WebThread:
         """Address with the token behind #, which browsers keep to themselves."""
         return f"{self.origin}/#token={self.token}"
 
+    @property
+    def watch_url(self) -> str:
+        """The same for who may only watch."""
+        return f"{self.origin}/#token={self.watch_token}"
+
     async def _serve(self) -> None:
         self.application[ENDING] = asyncio.Event()
         self.application.on_shutdown.append(_end)
         runner = web.AppRunner(self.application, access_log=None, logger=QUIET, shutdown_timeout=2.0)
         try:
             await runner.setup()
-            await web.TCPSite(runner, self._listen, self._port).start()
-            self._port = runner.addresses[0][1]
-            self._loop = asyncio.get_running_loop()
+            listener = open_port(self._listen, self._port)
         except (OSError, ValueError) as error:  # ValueError: a name that no network can have
             self._error = error
-            self._stop.set()
+            self._ready.set()
+        else:
+            with listener:
+                await self._let_in(listener, cast(web.Server, runner.server))
+        await runner.cleanup()
+
+    async def _let_in(self, listener: socket.socket, server: web.Server) -> None:
+        self._port = listener.getsockname()[1]
+        self._loop = asyncio.get_running_loop()
+        serving = self._loop.create_task(self.door.serve(listener, server))
         self._ready.set()
         await self._stop.wait()
-        await runner.cleanup()
+        serving.cancel()
+        await asyncio.wait([serving])
 
 
 async def _end(application: web.Application) -> None:

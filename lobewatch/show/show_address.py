@@ -16,15 +16,19 @@ Listen = Annotated[str, typer.Option(help="Address of this computer at which the
 Token = Annotated[
     str | None, typer.Option(help="What a browser must know to see and alter anything; a new one where not given.")
 ]
+WatchToken = Annotated[
+    str | None, typer.Option(help="What a browser must know only to see anything; a new one where not given.")
+]
 
 
-def show_address(url: str, as_json: bool = False) -> None:
-    """Print the address, and open it where somebody sits at a screen."""
+def show_address(url: str, watch_url: str, as_json: bool = False) -> None:
+    """Print the address and that for those who may only watch; open the first where somebody sits at a screen."""
     if as_json:
-        results.print(json.dumps({"url": url}), markup=False)
+        results.print(json.dumps({"url": url, "watch_url": watch_url}), markup=False)
         results.file.flush()
     else:
         notes.print(f"screen: {url}", markup=False)
+        notes.print(f"only to watch: {watch_url}", markup=False)
     display = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.stdout.isatty() and display:
         webbrowser.open(url)

@@ -32,7 +32,7 @@ async function go(button, path, body) {
   button.disabled = false;
 }
 
-function row(machine) {
+function row(machine, mayAlter) {
   const item = at("machine").content.cloneNode(true).firstElementChild;
   const part = (name) => item.querySelector(`.${name}`);
   const path = `/machines/${encodeURIComponent(machine.key)}`;
@@ -49,8 +49,9 @@ function row(machine) {
   part("report").addEventListener("click", ({ target }) => go(target, `${path}/report`));
   for (const button of item.querySelectorAll(".start")) {
     if (machine.running) button.textContent = "Watch the test";
-    button.hidden = machine.running && button.dataset.direction === "y";
-    button.addEventListener("click", ({ target }) => go(target, `${path}/start`, { direction: target.dataset.direction }));
+    button.hidden = machine.running ? button.dataset.direction === "y" : !mayAlter;
+    if (mayAlter) button.addEventListener("click", ({ target }) => go(target, `${path}/start`, { direction: target.dataset.direction }));
+    else button.addEventListener("click", () => location.assign(`/tap/${encodeURIComponent(machine.key)}/`));
   }
   return item;
 }
@@ -59,9 +60,9 @@ let shown = "";
 
 async function refresh() {
   try {
-    const { machines } = await ask("machines");
+    const { machines, may_alter: mayAlter } = await ask("machines");
     const text = JSON.stringify(machines.map((one) => ({ ...one, days_left: Math.round(one.days_left) })));
-    if (text !== shown) at("machines").replaceChildren(...machines.map(row));
+    if (text !== shown) at("machines").replaceChildren(...machines.map((one) => row(one, mayAlter)));
     shown = text;
     if (at("error").dataset.lost) fail("");
     delete at("error").dataset.lost;

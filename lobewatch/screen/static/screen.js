@@ -149,7 +149,7 @@ function toast(text) {
 }
 
 async function undo() {
-  if (undoing || at("undo").disabled) return;
+  if (undoing || at("undo").disabled || at("undo").hidden) return;
   undoing = true;
   await ask("undo", "POST").catch((error) => toast(error.message));
   undoing = false;
@@ -157,7 +157,7 @@ async function undo() {
 
 // Twice within three seconds: a hammer handle on the keyboard must not end a test, and no dialog stands in the way.
 async function stop() {
-  if (at("stop").disabled) return;
+  if (at("stop").disabled || at("stop").hidden) return;
   const again = stopTimer !== null;
   clearTimeout(stopTimer);
   stopTimer = again ? null : setTimeout(() => { stopTimer = null; showStop(); }, STOP_AGAIN_MS);
@@ -168,6 +168,12 @@ async function stop() {
 function showStop() {
   at("stop").classList.toggle("armed", stopTimer !== null);
   put("stop-text", stopTimer === null ? "Stop" : "Again to stop");
+}
+
+// Who came by the address that is only to watch has no buttons that alter anything; the server refuses them too.
+async function showButtons() {
+  const { may_alter: mayAlter } = await ask("access");
+  at("undo").hidden = at("stop").hidden = !mayAlter;
 }
 
 function showSound() {
@@ -205,4 +211,5 @@ addEventListener("pointerdown", () => { unlock(); showSound(); });
 new ResizeObserver(fitWord).observe(at("now"));
 makePlots();
 showSound();
+showButtons().catch(() => {});
 follow(showState, showPlots, showLost);

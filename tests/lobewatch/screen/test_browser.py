@@ -75,6 +75,20 @@ def test_the_token_leaves_the_address_and_a_reload_keeps_it(
     browser.see("text", "CHECKING")
 
 
+def test_the_address_to_watch_has_no_buttons_that_alter_anything(
+    browser: Browser, session: Session, server: ScreenServer
+) -> None:
+    browser.open(server.watch_url)
+    session.hit()
+    browser.see("good", "1")
+    browser.wait(lambda: not browser.part("undo").is_displayed() and not browser.part("stop").is_displayed())
+    browser.press("u", Keys.ESCAPE, Keys.ESCAPE)
+    session.hit()
+    browser.see("good", "2")
+    assert not session.undone.is_set()
+    assert not session.stopped.is_set()
+
+
 def test_without_the_token_the_page_says_which_address_to_open(opened: Browser, server: ScreenServer) -> None:
     opened.open(f"{server.origin}/")
     opened.see("reason", "address that lobewatch printed")

@@ -155,6 +155,19 @@ def test_a_report_is_written_on_demand_and_read_by_a_name_that_cannot_be_guessed
         assert ask(server, "POST", "/machines/c-untapped/report")[1]["error"] == "no tap test yet: press START"
 
 
+def test_who_may_only_watch_reads_lists_and_reports_and_starts_nothing(shop: Path) -> None:
+    with DashboardServer(shop) as server:
+        token = server.watch_token
+        status, answer = ask(server, "GET", "/machines", token=token)
+        assert (status, answer["may_alter"], len(answer["machines"])) == (200, False, 4)
+        assert ask(server, "POST", "/machines/a-new/report", token=token)[0] == 200
+        status, answer = ask(server, "POST", "/machines/a-new/start", {"direction": "x"}, token)
+        assert (status, answer["error"]) == (
+            403,
+            "this address is only to watch; open the other one that lobewatch printed",
+        )
+
+
 @pytest.mark.parametrize("body", [None, {}, {"direction": "z"}, {"direction": "x", "port": "/dev/null"}, [1], "x"])
 def test_what_cannot_be_started_is_refused(shop: Path, body: object) -> None:
     with DashboardServer(shop) as server:

@@ -94,8 +94,9 @@ def test_the_page_needs_no_token_and_tells_nothing(session: Session) -> None:
 
 
 def test_every_token_is_another() -> None:
-    tokens = {WebThread("127.0.0.1", 0, None).token for _ in range(20)}
-    assert len(tokens) == 20
+    servers = [WebThread("127.0.0.1", 0, None) for _ in range(20)]
+    tokens = {token for server in servers for token in (server.token, server.watch_token)}
+    assert len(tokens) == 40
     assert min(map(len, tokens)) >= 32
 
 
@@ -124,6 +125,32 @@ def test_with_the_token_it_is(session: Session) -> None:
         assert session.undone.is_set()
         assert ask(server, "POST", "/stop")[0] == 200
         assert session.stopped.is_set()
+
+
+def test_the_token_to_watch_shows_and_alters_nothing(session: Session) -> None:
+    session.hit()
+    seen: list[dict[str, Any]] = []
+
+    async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:
+        seen.append(await next_state(feed))
+
+    with ScreenServer(session, token=TOKEN) as server:
+        assert server.watch_url == f"{server.origin}/#token={server.watch_token}"
+        follow(server, talk, token=server.watch_token)
+        watching = f"Bearer {server.watch_token}"
+        assert ask(server, "GET", "/access", Authorization=watching)[:2] == (200, {"may_alter": False})
+        assert ask(server, "GET", "/access")[1] == {"may_alter": True}
+        for path in ("/undo", "/stop"):
+            status, answer, _ = ask(server, "POST", path, Authorization=watching)
+            assert (status, "only to watch" in answer["error"]) == (403, True)
+    assert seen[0]["good"] == 1
+    assert not session.undone.is_set()
+    assert not session.stopped.is_set()
+
+
+def test_one_token_cannot_be_both(session: Session) -> None:
+    with pytest.raises(ValueError, match="give two different ones"):
+        ScreenServer(session, token=TOKEN, watch_token=TOKEN)
 
 
 @pytest.mark.parametrize("origin", [None, "null", "http://evil.example", "https://127.0.0.1", "http://localhost:1"])

@@ -15,6 +15,7 @@ from lobewatch.analysis.one_file.recorded_window import Window
 from modal import (
     Extraction,
     Mode,
+    common_delay,
     cut_edges,
     extract,
     modes_of,
@@ -119,7 +120,19 @@ def _beyond(frf: Frf) -> Iterator[Remark]:
 
 def remarks_on_all(modes: Sequence[Mode]) -> list[Remark]:
     """What speaks against all modes of an FRF together."""
-    if len(modes) < 2 or any(mode.is_driving_point for mode in modes):
-        return []
-    text = "every K is negative: hammer or sensor is mounted or wired the other way round"
-    return [Remark("sign-swapped", "", text, "turn it, or give its sensitivity the other sign")]
+    return [*_wrong_sign(modes), *_delayed(modes)]
+
+
+def _wrong_sign(modes: Sequence[Mode]) -> Iterator[Remark]:
+    if len(modes) > 1 and not any(mode.is_driving_point for mode in modes):
+        text = "every K is negative: hammer or sensor is mounted or wired the other way round"
+        yield Remark("sign-swapped", "", text, "turn it, or give its sensitivity the other sign")
+
+
+def _delayed(modes: Sequence[Mode]) -> Iterator[Remark]:
+    delay = common_delay(modes)
+    if delay is not None:
+        skew, std = 1e6 * delay.skew, 1e6 * delay.skew_std
+        text = f"the phases of all modes grow with frequency: the response is sampled {skew:.1f} ± {std:.1g} us late"
+        cure = f"measure it with lobewatch sensors, or add {skew:.1f} to skew_us of the accelerometer in machine.toml"
+        yield Remark("channel-delay", "", text, cure)

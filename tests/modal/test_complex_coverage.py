@@ -72,3 +72,41 @@ def test_without_noise_it_is_exact() -> None:
         assert mode.stiffness == pytest.approx(true.stiffness, rel=1e-5)
         assert mode.phase_deg == pytest.approx(true.phase_deg, abs=1e-3)
     assert synthesize(found, LINES).receptance == pytest.approx(synthesize(truth, LINES).receptance, rel=1e-4)
+
+
+@pytest.mark.parametrize("phase", [90.0, -90.0])
+def test_a_quarter_turn_is_a_mode_of_either_sign(phase: float) -> None:
+    truth = Mode(1500.0, 0.03, 3e7, phase_deg=phase)
+    (found,) = fit_modes(measured([truth], 0))
+    assert abs(found.phase_deg) == pytest.approx(90.0, abs=5 * found.phase_deg_std)
+    assert found.constant == pytest.approx(truth.constant, rel=0.01)
+
+
+def test_a_negative_real_part_is_no_driving_point() -> None:
+    for phase in (-30.0, 50.0):
+        (found,) = fit_modes(measured([Mode(1500.0, 0.03, -3e7, phase_deg=phase)], 0))
+        assert not found.is_driving_point
+        assert found.phase_deg == pytest.approx(phase, abs=5 * found.phase_deg_std)
+
+
+def test_one_line_in_a_mode_makes_no_phase_up() -> None:
+    """Half-power half-width 1.5 Hz, lines 5 Hz apart."""
+    for seed in range(20):
+        for found in fit_modes(measured([Mode(1500.0, 0.001, 3e8)], seed)):
+            assert abs(found.phase_deg) < 4.5 * found.phase_deg_std
+
+
+def test_two_modes_a_percent_apart_with_opposite_phases() -> None:
+    truth = [Mode(1500.0, 0.01, 6e7, phase_deg=40.0), Mode(1515.0, 0.01, 6e7, phase_deg=-40.0)]
+    lines = np.arange(1.0, 4000.0)
+    exact = synthesize(truth, lines).accelerance
+    noise = np.random.default_rng(0).normal(size=(2, lines.size)) * 1e-3 * np.max(np.abs(exact))
+    found = fit_modes(from_accelerance(lines, exact + noise[0] + 1j * noise[1]))
+    both = synthesize(found, lines).receptance
+    near = np.abs(lines - 1507) < 60
+    assert np.max(np.abs(both - synthesize(truth, lines).receptance)[near]) < 0.02 * np.max(np.abs(both))
+    if len(found) == 2:
+        for mode, true in zip(found, truth, strict=True):
+            assert abs(mode.phase_deg - true.phase_deg) < 5 * mode.phase_deg_std
+    else:
+        assert any(remark.code == "several-modes" for remark in found[0].remarks)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from acquisition import Frf
 from modal.extraction import Extraction, FittedBand
@@ -35,8 +36,14 @@ def extract(frfs: Sequence[Frf], band: tuple[float, float] | None = None) -> Ext
 
     One FRF, or several on the same lines, the driving point first. Raises ValueError as `fit_points`.
     """
-    with threadpool_limits(limits=1):
+    with _blas().limit(limits=1):
         return _extract(tuple(usable_lines(frf, band) for frf in _with_common_band(frfs)))
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    """Found once: looking for the libraries of this process takes as long as a fit."""
+    return ThreadpoolController()
 
 
 def _extract(lines: tuple[Frf, ...]) -> Extraction:

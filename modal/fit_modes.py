@@ -18,6 +18,9 @@ from modal.jackknife import jackknife, left_out
 from modal.mode import Mode
 from modal.quality.systematic import systematic
 
+UNKNOWN_PHASE = 90.0
+"""Standard error (degrees) of a phase of which nothing is known."""
+
 
 def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[Hit] = ()) -> list[Mode]:
     """Modes from the lines between band[0] and band[1] (Hz), by rising frequency, each with its covariance; maybe none.
@@ -83,7 +86,7 @@ def _mode(fit: BandFit, i: int, covariance: Array, freedom: float, scatter: Arra
         jackknife=None if over_hits is None else over_hits[:3, :3],
         n_hits=n_hits,
         phase_deg=float(np.degrees(np.angle(sign * constant))),
-        phase_deg_std=float(np.hypot(error[3], np.degrees(fit.unasked[0, i]))),
+        phase_deg_std=min(float(np.hypot(error[3], np.degrees(fit.unasked[0, i]))), UNKNOWN_PHASE),
         phase_correlation=best[3, :3] / (error[3] * error[:3]),
         shape=_shape(fit.constant[:, i]),
     )

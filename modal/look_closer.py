@@ -11,6 +11,7 @@ from modal.extraction import Array, FittedBand
 from modal.fit_peaks import LEAST_SHARE, are_modes
 from modal.fitting import MOST_TERMS, BandFit, fit_band, gain_of_a_term
 from modal.poles import physical_poles
+from modal.quality.systematic import systematic
 
 BLOCKS = 48
 """Runs of lines that the means of what a fit leaves are looked at in."""
@@ -40,7 +41,9 @@ def look_closer(band: FittedBand) -> FittedBand:
         if fit is None or not _is_better(fit, band.fit, TERM_F) or not _is_likelier(fit, bent.fit):
             continue
         if _is_better(fit, band.fit, HIDDEN_F) and np.all(are_modes(fit, band.data.frequency, height, HIDDEN_ERROR)):
-            return _with_terms(replace(band, fit=fit, height=height))
+            found = _with_terms(replace(band, fit=fit, height=height))
+            if _is_sure(found):
+                return found
         if np.all(are_modes(fit, band.data.frequency, height, np.inf)):
             bent = replace(bent, suspects=tuple(sorted(fit.frequency.tolist())))
     return bent
@@ -54,6 +57,14 @@ def _is_white(fit: BandFit) -> bool:
     size = np.sum(np.abs(blocks.mean(axis=2)) ** 2) * length
     expected = fit.sum_of_squares / left.size * blocks[..., 0].size
     return bool(size < expected * (1 + WHITE / np.sqrt(blocks[..., 0].size)))
+
+
+def _is_sure(band: FittedBand) -> bool:
+    """Whether all its modes are known well enough when what the model lacks counts, too."""
+    more, fit = systematic(band), band.fit
+    error = np.sqrt(np.diag(more.factor * fit.covariance + more.covariance)).reshape(-1, fit.frequency.size)
+    sizes = error[2 : 2 + len(fit.constant)] / np.abs(fit.constant)
+    return bool(np.all(error[1] < HIDDEN_ERROR * fit.damping_ratio) and np.all(np.any(sizes < HIDDEN_ERROR, axis=0)))
 
 
 def _more_modes(band: FittedBand, split: bool) -> Iterator[Array]:

@@ -31,8 +31,8 @@ LEAST_TURN = 0.5
 On the circle of a mode, from half-power point to half-power point, it is -pi/2, whatever its neighbours add."""
 MOST_TURN = 2.6
 """Of a mode narrower than the line spacing the chords lie side by side; which way it turns is not to be seen (rad)."""
-LEAST_COHERENCE = 0.5
-"""Mean coherence over a peak."""
+LEAST_COHERENCE = 0.3
+"""Mean coherence over a peak, of hum at random phase one over the number of hits; below 0.5 a mode is doubtful."""
 BESIDE = 2.0
 """A peak of the residual counts this many times the sum of the half-widths away from all known ones ..."""
 LEAST_BESIDE = 0.02

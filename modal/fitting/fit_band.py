@@ -16,8 +16,8 @@ MOST_TRIALS = 60
 """Evaluations of the model; a mode in its own band takes some five."""
 CONVERGED = 1e-13
 """Step (share of the half-power half-width) after which there is nothing left to gain."""
-GAINED = 1e-6
-"""Fall of the sum of squares, against that by chance of one unknown, not worth a step: a thousandth of an error."""
+GAINED = 1e-4
+"""Fall of the sum of squares, against that by chance of one unknown, not worth a step: a hundredth of an error."""
 LEAST_SINGULAR = 1e-10
 """Share of the largest singular value below which an unknown cannot be told from the others."""
 
@@ -59,12 +59,23 @@ def with_real_constants(fit: BandFit, frequency: Array, receptance: ComplexArray
     Source: Akaike (1974), IEEE Trans. Automatic Control 19, 716.
     """
     with np.errstate(all="ignore"):
-        state = _solved(projected_band(frequency, receptance, weight, terms), fit.poles, is_complex=False)
+        band = projected_band(frequency, receptance, weight, terms)
+        state = _solved(band, _poles_of_real(fit), is_complex=False)
     allowed = AKAIKE * fit.constant.size * fit.sum_of_squares / fit.freedom
     if state is None or state.cost - fit.sum_of_squares > allowed:
         return fit
     across = fit.constant / state.constant
     return replace(_fit_of(state, fit.influence), unasked=np.angle(across * np.sign(across.real)))
+
+
+def _poles_of_real(fit: BandFit) -> Array:
+    """Poles (2, m) that real constants would have, to first order in the phases taken off."""
+    m, covariance = fit.frequency.size, fit.covariance
+    across = slice(2 * m + fit.constant.size, None)
+    off = fit.constant.imag * np.sign(fit.constant.real)
+    change = covariance[: 2 * m, across] @ np.linalg.solve(covariance[across, across], off.ravel())
+    moved = fit.poles - change.reshape(2, m)
+    return moved if np.all(moved > 0) and np.all(moved[1] < 1) else fit.poles
 
 
 def _fit_of(state: State, influence: Array) -> BandFit:

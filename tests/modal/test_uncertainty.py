@@ -208,8 +208,7 @@ def test_95_percent_intervals_of_tap_tests_hold_the_truth(n_hits: int, hammer_no
 
 def correlation_of_neighbouring_lines(hits: list[Hit]) -> float:
     """Of what the fit of the first mode leaves, weighted."""
-    state = extract([estimate_frf(hits)])
-    left = state.left(state.bands[0]) * state.weight[state.bands[0].lines]
+    left = extract([estimate_frf(hits)]).bands[0].fit.complex_residual[0]
     return float(np.real(np.vdot(left[:-1], left[1:])) / np.linalg.norm(left) ** 2)
 
 

@@ -142,13 +142,10 @@ def test_a_taken_port(run: Run, trial: MachineFolder, device: TapsEmulator) -> N
 
 def test_the_real_beam_hit(run: Run, beam: Path) -> None:
     modes = run("modes", beam, "--json").json["modes"]
-    found = {round(mode["frequency_hz"]): mode for mode in modes}
-    for f, zeta, positive in ((696, 0.0047, True), (1898, 0.0031, True), (3671, 0.0019, False), (5974, 0.0044, False)):
-        assert found[f]["damping_ratio"] == pytest.approx(zeta, rel=0.15)
-        assert found[f]["driving_point"] is positive
-    assert [found[f]["frequency_hz"] for f in (696, 1898, 3671, 5974)] == pytest.approx(
-        [695.8, 1898.0, 3671, 5975], rel=2e-3
-    )
+    for f, zeta, positive in ((695.8, 0.0047, True), (1898, 0.0031, True), (3671, 0.0019, False), (5975, 0.0044, False)):
+        (mode,) = (mode for mode in modes if abs(mode["frequency_hz"] / f - 1) < 2e-3)
+        assert mode["damping_ratio"] == pytest.approx(zeta, rel=0.15)
+        assert mode["driving_point"] is positive
     assert "not a driving point" in run("modes", beam).out
 
 

@@ -195,7 +195,7 @@ def test_lobes_of_true_complex_modes_are_those_of_the_frf(seed: int) -> None:
 @pytest.mark.parametrize("noise", [1e-3, 2e-3])
 @pytest.mark.parametrize("seed", range(5))
 def test_lobes_of_fitted_complex_modes_are_within_1_percent_of_those_of_the_frf(seed: int, noise: float) -> None:
-    """The lowest limit of the FRF with its noise, and limits over speeds of the same FRF without: ten times the noise."""
+    """The lowest limit of the FRF with its noise; limits over speeds of the FRF without, within ten times the noise."""
     noisy, clean = measured(TIPS[seed], noise, seed), measured(TIPS[seed], 0.0, seed)
     fitted = fit_modes(noisy)
     assert far_apart(fitted, noisy)[0] < 0.01

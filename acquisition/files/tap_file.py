@@ -24,6 +24,7 @@ from acquisition.channel import Channel, tap_direction
 from acquisition.errors import DataError
 from acquisition.estimation.estimate_frf import cross_spectra
 from acquisition.files.seal import is_broken, sealed
+from acquisition.files.unpacked import check_unpacked
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
 from acquisition.tap import Circumstances, SourceFile, TapTest
@@ -85,9 +86,13 @@ def _open(path: Path) -> h5py.File:
         file = h5py.File(io.BytesIO(content), "r")
     except OSError as error:
         raise DataError(f"{path}: no readable HDF5 file ({error}); is it cut short?") from error
-    if file.attrs.get("format") != FORMAT:
+    try:
+        if file.attrs.get("format") != FORMAT:
+            raise DataError(f"{path}: an HDF5 file, but no tap test of lobewatch (attribute format is not {FORMAT!r})")
+        check_unpacked(file, len(content), path)
+    except BaseException:
         file.close()
-        raise DataError(f"{path}: an HDF5 file, but no tap test of lobewatch (attribute format is not {FORMAT!r})")
+        raise
     return file
 
 

@@ -169,6 +169,22 @@ def test_a_truncated_file_is_refused_by_name(tap: TapTest, tmp_path: Path, keep:
         read_tap(path)
 
 
+@pytest.mark.parametrize("what", ["long", "in one chunk"])
+def test_a_small_file_that_unpacks_to_much_is_refused_unread(tap: TapTest, tmp_path: Path, what: str) -> None:
+    """Zeros shrink a thousandfold: 800 MB fit into less than 1 MB."""
+    write_tap(tmp_path / "bomb.h5", tap)
+    count = 400_000_000
+    with h5py.File(tmp_path / "bomb.h5", "r+") as file:
+        del file["raw/codes"]
+        shape = {"long": (10, 2, count // 20), "in one chunk": (10, 2, 100)}[what]
+        limits, chunk = (None, None, None), (1, 1, 100_000) if what == "long" else (1, 1, count)
+        file.create_dataset("raw/codes", shape, np.int16, maxshape=limits, chunks=chunk, compression="gzip")
+    assert (tmp_path / "bomb.h5").stat().st_size < 1_000_000
+    for read in (read_tap, read_tap_hits, read_frf):
+        with pytest.raises(DataError, match=r"bomb\.h5: .* MB that unpack to (800|1.6e\+04)"):
+            read(tmp_path / "bomb.h5")
+
+
 def test_foreign_hdf5_is_refused(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = 1

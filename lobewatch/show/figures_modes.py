@@ -84,7 +84,11 @@ def _draw_frf(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
 
 
 def _name(mode: Mode) -> str:
-    return f"{mode.frequency:.0f}{MARKS[trust_of(mode)]}"
+    return f"{_hertz(mode.frequency)}{MARKS[trust_of(mode)]}"
+
+
+def _hertz(frequency: float) -> str:
+    return f"{frequency:.0f}" if frequency >= 100 else f"{frequency:.3g}"
 
 
 def _apart(places: Sequence[float], least: float) -> list[float]:
@@ -137,7 +141,7 @@ def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) ->
     axes.plot(curve.real, curve.imag, color=NOW, lw=1, label="fit")
     axes.plot([0.0, top.real], [0.0, top.imag], color=ALARM, lw=1, label="phase")
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_title(f"{mode.frequency:.0f} Hz{MARKS[trust_of(mode)]}: {_phase(mode)}\nmobility (mm/s/N)", fontsize=8)
+    axes.set_title(f"{_hertz(mode.frequency)} Hz{MARKS[trust_of(mode)]}: {_phase(mode)}\nmobility (mm/s/N)", fontsize=8)
     axes.tick_params(labelsize=7)
     axes.xaxis.set_major_locator(MaxNLocator(3))
     axes.yaxis.set_major_locator(MaxNLocator(4))

@@ -20,5 +20,10 @@ def is_broken(content: bytes) -> bool:
     return seal.startswith(MARK) and seal != _seal(content[:-SIZE])
 
 
+def is_sealed(content: bytes) -> bool:
+    """Whether a file has a seal that fits the rest of it."""
+    return content[-SIZE:] == _seal(content[:-SIZE])
+
+
 def _seal(content: bytes) -> bytes:
     return MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"

@@ -34,7 +34,7 @@ VERSION = 1
 
 
 def write_tap(path: Path | str, tap: TapTest) -> bytes:
-    """Write a tap test; returns the bytes of the file, on the disk when this returns."""
+    """Write a tap test, sealed; returns the bytes of the file, on the disk when this returns."""
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         file.attrs.update(format=FORMAT, version=VERSION, software=f"lobewatch {version('lobewatch')}", id=tap.id)
@@ -45,8 +45,9 @@ def write_tap(path: Path | str, tap: TapTest) -> bytes:
             _write_spectra(file, tap)
         if tap.source is not None:
             _write_source(file, tap.source)
-    atomic_write(Path(path), memory.getvalue())
-    return memory.getvalue()
+    content = sealed(memory.getvalue())
+    atomic_write(Path(path), content)
+    return content
 
 
 def read_tap(path: Path | str) -> TapTest:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 from acquisition import DataError
 from lobewatch.analysis.assembly import Assembly, assemble
@@ -12,7 +12,7 @@ from lobewatch.analysis.order import Place
 from lobewatch.analysis.prediction import predict
 from lobewatch.analysis.questions.asked import open_questions
 from lobewatch.analysis.series import Point
-from lobewatch.machine import Machine
+from lobewatch.machine import Machine, TapEntry
 from modal import Mode
 
 Measured = Callable[[Place], Measurement]
@@ -47,6 +47,27 @@ def predicted(
         return predict(machine, list(newest.values()), tool)
     except DataError as error:
         raise NotTappedError(f"no tap test with tool {tool!r}, and no prediction: {error}") from error
+
+
+def first_like(
+    now: Assembly, taps: Sequence[TapEntry], asked: Collection[str], assembly: Callable[[str, str], Assembly]
+) -> Assembly | None:
+    """The earliest of the same tool that knows the same directions; None where that is itself or a prediction.
+
+    asked: tap tests in question, which are no reference; assembly: of a tool after a tap test.
+    """
+    seen: set[str] = set()
+    for tap in taps:
+        if tap.id == now.tap_id:
+            return None
+        if tap.tool != now.tool or now.predicted or tap.id in asked:
+            continue
+        seen.add(tap.direction)
+        if seen >= set(now.directions):
+            then = assembly(tap.tool, tap.id)
+            if then.directions == now.directions:
+                return then
+    return None
 
 
 def _point(one: Row | Measurement, mode: Mode) -> Point:

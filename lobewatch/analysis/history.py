@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from datetime import datetime
 from importlib.metadata import version
 from typing import Any
@@ -102,6 +102,12 @@ class History:
 def empty_history(machine: Machine) -> History:
     """The history of a machine that was never tapped."""
     return History(machine.settings_hash, f"lobewatch {version('lobewatch')}", speed_grid(machine), ())
+
+
+def without_last_word(history: History) -> History:
+    """The same as if nobody had asked for the programs after the newest tap test yet."""
+    *before, last = history.rows
+    return replace(history, rows=(*before, replace(last, rulings=None)))
 
 
 def row_of(m: Measurement, lobes: Mapping[str, StabilityLobes], remarks: Sequence[Remark]) -> Row:

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Self
 
-from acquisition import DataError, Remark, TapTest
-from lobewatch.analysis.assembling import NotTappedError, predicted, tapped
+from acquisition import Remark, TapTest
+from lobewatch.analysis.assembling import NotTappedError, first_like, predicted, tapped
 from lobewatch.analysis.assembly import Assembly, lobes_of
-from lobewatch.analysis.history import History, Row, row_of
+from lobewatch.analysis.damage.usable import Result, UsableTaps
+from lobewatch.analysis.history import History, Row, row_of, without_last_word
 from lobewatch.analysis.history_cache import store_history, stored_history
 from lobewatch.analysis.measurement import Measurement, measure
-from lobewatch.analysis.order import Place, earlier, places
+from lobewatch.analysis.order import Place, earlier
 from lobewatch.analysis.programs.advice import Advice, advise
-from lobewatch.analysis.programs.verdict import Ruling, Verdict, unknown, verdict
+from lobewatch.analysis.programs.verdict import Ruling, Verdict, judge
 from lobewatch.analysis.questions.accepting import accept
 from lobewatch.analysis.questions.asked import answered
 from lobewatch.analysis.recordings import Stored, store_recordings
 from lobewatch.analysis.standing import Standing, stand
-from lobewatch.machine import Machine, MachineFolder, ProgramTable, TapEntry
+from lobewatch.machine import Machine, MachineFolder, TapEntry
 
 
 class Logbook:
@@ -34,10 +35,8 @@ class Logbook:
     def __init__(self, folder: MachineFolder) -> None:
         """Nothing is read yet."""
         self.folder = folder
-        self.remarks: list[Remark] = []
-        """What is to be said of the files themselves."""
+        self._files, self._said = UsableTaps(folder), list[Remark]()
         self._mark = folder.mark
-        self._placed: Sequence[Place] | None = None
         self._history: History | None = None
         self._measurements: dict[str, Measurement] = {}
         self._verdicts: dict[str | None, dict[str, Verdict]] = {}
@@ -53,14 +52,19 @@ class Logbook:
         return self.folder.machine
 
     @property
+    def remarks(self) -> list[Remark]:
+        """What is to be said of the files themselves."""
+        return [*self._files.remarks, *self._said]
+
+    @property
     def is_current(self) -> bool:
         """Whether journal and machine.toml are as they were when this was opened or added to."""
         return self.folder.mark == self._mark
 
     @property
     def taps(self) -> Sequence[TapEntry]:
-        """The committed tap tests, oldest first by their time."""
-        return [place.entry for place in self._places]
+        """The committed tap tests whose files can be used, oldest first by their time."""
+        return [place.entry for place in self._files.places]
 
     def series(self, tool: str, direction: str) -> list[TapEntry]:
         """Tap tests of one tool and direction, oldest first."""
@@ -68,12 +72,7 @@ class Logbook:
 
     def newest(self, tool: str | None = None) -> TapEntry:
         """The newest tap test, of a tool where one is named; DataError where there is none."""
-        found = [tap for tap in self.taps if tool in (None, tap.tool)]
-        if not found:
-            which = "" if tool is None else f" with tool {tool!r}"
-            cure = "take one with lobewatch tap, or replay a recorded file"
-            raise DataError(f"{self.folder.path}: no tap test{which} yet; {cure}")
-        return found[-1]
+        return self._files.newest(tool)
 
     def commit(self, tap: TapTest) -> None:
         """Add a tap test; saved for good when this returns."""
@@ -101,73 +100,58 @@ class Logbook:
         return stored
 
     def measurement(self, tap_id: str) -> Measurement:
-        """What a tap test says, worked out once; KeyError for a tap test that is not in the journal."""
-        return self._measured(self._place(tap_id), self.history.rows)
+        """What a tap test says, worked out once; KeyError for a tap test that is not in the journal or is left out."""
+        return self._measured(self._files.place(tap_id), self.history.rows)
 
     @property
     def history(self) -> History:
         """All measurements in order of time, up to date; on the disk too where that could be written."""
-        if self._history is None:
-            self._history = self._up_to_date()
-            if self._history.rows:
-                self.rulings(self._history.rows[-1].tap_id)
-        return self._history
+        return self.from_the_rest(self._known_history)
 
     def assembly(self, tool: str | None = None, until: str | None = None) -> Assembly:
         """The newest x and y of a tool (None: of the newest tap test), as they were after the tap test `until`.
 
         Predicted by the model where the tool was not tapped by then; DataError where there is no model of it.
         """
-        known = self._places if until is None else self._places[: self._place(until).number + 1]
-        if not known:
-            self.newest(tool)
-        tool = known[-1].entry.tool if tool is None else tool
-        newest = next((place for place in reversed(known) if place.entry.tool == tool), None)
-        if newest is not None:
-            return self._assembled(newest, self.history.rows)
-        rows = self.history.rows
-        return predicted(self.machine, known, rows, lambda place: self._measured(place, rows), tool)
+        return self.from_the_rest(lambda: self._assembly(tool, until))
 
     def first_assembly(self, now: Assembly) -> Assembly | None:
         """The earliest of the same tool that knows the same directions; None where that is itself or a prediction."""
-        seen: set[str] = set()
-        for tap in self.taps:
-            if tap.id == now.tap_id:
-                return None
-            if tap.tool != now.tool or now.predicted or tap.id in self.questions:
-                continue
-            seen.add(tap.direction)
-            if seen >= set(now.directions):
-                then = self.assembly(until=tap.id)
-                if then.directions == now.directions:
-                    return then
-        return None
+        return self.from_the_rest(lambda: first_like(now, self.taps, self.questions, self.assembly))
 
     def verdicts(self, until: str | None = None, names: Collection[str] | None = None) -> list[Verdict]:
         """One a program (of these names), from the newest tap tests of its tool as they were after the test `until`."""
+        return self.from_the_rest(lambda: self._judged(until, names))
+
+    def _judged(self, until: str | None, names: Collection[str] | None) -> list[Verdict]:
         tables = [table for table in self.machine.program if names is None or table.name in names]
         rows = self.history.rows
         until = rows[-1].tap_id if until is None and rows else until
         judged = self._verdicts.setdefault(until, {})
         missing = [table for table in tables if table.name not in judged]
         known = {tool: self._known(tool, until) for tool in dict.fromkeys(table.tool for table in missing)}
-        judged |= {table.name: self._judge(table, known[table.tool]) for table in missing}
+        judged |= {table.name: judge(table, known[table.tool], self.machine) for table in missing}
         return [judged[table.name] for table in tables]
 
     def rulings(self, tap_id: str) -> Mapping[str, Ruling]:
         """Word and limit of every program as they were after a tap test; the history keeps them once asked for."""
-        number, rows = self._place(tap_id).number, list(self.history.rows)
+        number, rows = self._files.place(tap_id).number, list(self.history.rows)
         found = rows[number].rulings
         if found is None:
             found = {one.program.name: one.ruling for one in self.verdicts(tap_id)}
             rows[number] = replace(rows[number], rulings=found)
             self._history = replace(self.history, rows=tuple(rows))
-            said = store_history(self.folder, self._history)
-            self.remarks += [remark for remark in said if remark not in self.remarks]
+            said = store_history(
+                self.folder, without_last_word(self._history) if self._files.doubts() else self._history
+            )
+            self._said += [remark for remark in said if remark not in self._said]
         return found
 
     def ruling_then(self, now: Verdict) -> Ruling | None:
         """Word and limit of a program at the first tap tests of its tool in the same directions; None without them."""
+        return self.from_the_rest(lambda: self._ruling_then(now))
+
+    def _ruling_then(self, now: Verdict) -> Ruling | None:
         then = None if now.assembly is None else self.first_assembly(now.assembly)
         return None if then is None else self.rulings(then.tap_id)[now.program.name]
 
@@ -177,7 +161,7 @@ class Logbook:
 
     def standing(self, now: datetime | None = None) -> Standing:
         """The light of the machine, the reasons, and one next step."""
-        return stand(self.machine, self.history, now or datetime.now(UTC), self.folder.path)
+        return stand(self.machine, self.history, now or datetime.now(UTC), self.folder.path, self._files.remarks)
 
     @property
     def questions(self) -> Mapping[str, tuple[str, ...]]:
@@ -197,11 +181,19 @@ class Logbook:
         known = [row for row in self.history.rows if row.bearing_stiffness.is_known and not row.questions]
         return self.measurement(known[-1].tap_id) if known else None
 
+    def from_the_rest(self, work: Callable[[], Result]) -> Result:
+        """What some work gives; where it meets a damaged tap file, all of it again without that."""
+        return self._files.from_the_rest(work, self._forget_results)
+
     def _forget(self) -> None:
         """What a new tap test alters."""
-        self._placed = self._history = None
-        self._measurements, self._verdicts = {}, {}
+        self._files.forget()
+        self._forget_results()
         self._mark = self.folder.mark
+
+    def _forget_results(self) -> None:
+        self._history = None
+        self._measurements, self._verdicts = {}, {}
 
     def _known(self, tool: str, until: str | None) -> Assembly | NotTappedError:
         try:
@@ -209,41 +201,45 @@ class Logbook:
         except NotTappedError as error:
             return error
 
-    def _judge(self, table: ProgramTable, known: Assembly | NotTappedError) -> Verdict:
-        if isinstance(known, Assembly):
-            return verdict(table, known, self.machine)
-        return unknown(table, (Remark("no-tap", "", str(known)),))
-
-    def _place(self, tap_id: str) -> Place:
-        for place in reversed(self._places):
-            if place.entry.id == tap_id:
-                return place
-        raise KeyError(tap_id)
-
-    @property
-    def _places(self) -> Sequence[Place]:
-        if self._placed is None:
-            self._placed = places(self.folder.taps())
-        return self._placed
+    def _known_history(self) -> History:
+        if self._history is None:
+            self._history = self._up_to_date()
+            if self._history.rows:
+                self.rulings(self._history.rows[-1].tap_id)
+        return self._history
 
     def _up_to_date(self) -> History:
         """The stored rows as far as they still hold, and those that are missing."""
         history = stored_history(self.folder, self.taps)
         rows = list(history.rows)
-        for place in self._places[len(rows) :]:
+        for place in self._files.places[len(rows) :]:
             assembly = self._assembled(place, rows)
             rows.append(row_of(self._measured(place, rows), lobes_of(assembly, self.machine), assembly.remarks))
-        return replace(history, rows=tuple(rows))
+        history = replace(history, rows=tuple(rows))
+        return without_last_word(history) if rows and self._files.doubts() else history
+
+    def _assembly(self, tool: str | None, until: str | None) -> Assembly:
+        known = self._files.places if until is None else self._files.places[: self._files.place(until).number + 1]
+        if not known:
+            self.newest(tool)
+        tool, rows = known[-1].entry.tool if tool is None else tool, self.history.rows
+        newest = next((place for place in reversed(known) if place.entry.tool == tool), None)
+        if newest is not None:
+            found = self._assembled(newest, rows)
+        else:
+            found = predicted(self.machine, known, rows, lambda place: self._measured(place, rows), tool)
+        doubts = self._files.doubts("" if found.predicted else tool) if len(known) == len(self._files.places) else ()
+        return replace(found, questions=(*found.questions, *doubts))
 
     def _measured(self, place: Place, rows: Sequence[Row]) -> Measurement:
         """rows: the history before this tap test at least."""
         tap_id = place.entry.id
         if tap_id not in self._measurements:
-            before = (rows[number] for number in earlier(place, self._places))
+            before = (rows[number] for number in earlier(place, self._files.places))
             last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
             found = measure(self.folder.read(place.entry), self.machine, last)
             self._measurements[tap_id] = replace(found, remarks=answered(found.remarks, place.entry.accepted))
         return self._measurements[tap_id]
 
     def _assembled(self, place: Place, rows: Sequence[Row]) -> Assembly:
-        return tapped(place, self._places, rows, lambda one: self._measured(one, rows))
+        return tapped(place, self._files.places, rows, lambda one: self._measured(one, rows))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
@@ -35,6 +35,9 @@ LIGHTS = {
     "program-not-stable": Light.ALARM,
     "unreadable": Light.UNKNOWN,
     "never-tapped": Light.UNKNOWN,
+    "journal-damaged": Light.WARN,
+    "tap-damaged": Light.WARN,
+    "tap-unlisted": Light.WARN,
     "frequency-warn": Light.WARN,
     "frequency-jump": Light.WARN,
     "mode-lost": Light.WARN,
@@ -107,9 +110,16 @@ def unreadable(reason: str) -> Standing:
     return _of([Remark("unreadable", "", reason)], "Put its files right: the sentence above says which.")
 
 
-def stand(machine: Machine, history: History, now: datetime, path: Path | str = "MACHINE") -> Standing:
-    """The standing at a time; the last row holds the word on every program. path: of the folder, for commands."""
+def stand(
+    machine: Machine, history: History, now: datetime, path: Path | str = "MACHINE", files: Sequence[Remark] = ()
+) -> Standing:
+    """The standing at a time; the last row holds the word on every program.
+
+    path: of the folder, for commands; files: what is wrong with those in it.
+    """
     rows = history.rows
+    if not rows and files:
+        return unreadable("; ".join(map(str, files)))
     if not rows:
         cure = "Take the first tap test: all others are compared with it."
         return _of([Remark("never-tapped", "", "no tap test yet", cure)])
@@ -117,6 +127,7 @@ def stand(machine: Machine, history: History, now: datetime, path: Path | str = 
     series = [_series(history.series(*pair), machine.limits) for pair in pairs]
     left = machine.machine.tap_interval_days - (now - rows[-1].time) / timedelta(days=1)
     remarks = [remark for one in series for remark in one.remarks]
+    remarks += [_of_files(remark) for remark in files if remark.code in LIGHTS]
     remarks += [asked for row in rows for asked in _about_questions(row, path)]
     remarks += [*_about_programs(rows, machine), *_about_dates(left), *_about_directions(rows)]
     due = rows[-1].time + timedelta(days=math.floor(machine.machine.tap_interval_days))
@@ -167,6 +178,11 @@ def _about_loss(name: str, newest: Row) -> Iterator[Remark]:
     if not newest.frequency.is_known:
         cure = "Tap again: the mode that is followed was not found in the newest test."
         yield Remark("mode-lost", name, "the newest test does not show the mode followed", cure)
+
+
+def _of_files(remark: Remark) -> Remark:
+    """With a cure that can be the next step."""
+    return replace(remark, cure=f"{remark.about}: {remark.cure}.")
 
 
 def _about_questions(row: Row, path: Path | str) -> Iterator[Remark]:

@@ -1,10 +1,11 @@
 """What is known of one machine: machine.toml, its folder, its journal, its devices."""
 
+from .archive.tap_entry import DamagedTapError, TapEntry
 from .cut_tables import CutTable, ProgramTable
 from .daq_tables import Daq
 from .doubt_table import DoubtTable
 from .drive import drive_limit
-from .folder import BusyError, MachineFolder, TapEntry
+from .folder import BusyError, MachineFolder
 from .known_devices import checked_rate, has_clock, known_rate, use_rate
 from .machine_file import REFERENCE_CUT, Limits, Machine, SpeedRange, TapSetup
 from .new_folder import make_machine_folder
@@ -13,6 +14,7 @@ __all__ = [
     "REFERENCE_CUT",
     "BusyError",
     "CutTable",
+    "DamagedTapError",
     "Daq",
     "DoubtTable",
     "Limits",

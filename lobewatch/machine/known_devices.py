@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import zlib
 from collections.abc import Callable
 from datetime import UTC, datetime
 
@@ -24,6 +25,18 @@ class KnownDevice(msgspec.Struct, frozen=True):
     seconds: float
     measured: str
     """When (ISO 8601, UTC)."""
+    crc: int = 0
+    """CRC-32 of all others; 0 in the first files."""
+
+    @property
+    def is_altered(self) -> bool:
+        """Whether it is not as it was written."""
+        return self.crc not in (0, self.right_crc)
+
+    @property
+    def right_crc(self) -> int:
+        """CRC-32 of all but the CRC."""
+        return zlib.crc32(msgspec.json.encode(msgspec.structs.replace(self, crc=0)))
 
 
 def checked_rate(
@@ -51,7 +64,7 @@ def has_clock(device: Device) -> bool:
 
 def known_rate(folder: MachineFolder, device: Device) -> MeasuredRate | None:
     """What was measured of this device at this nominal rate; None where it is not known."""
-    for known in _read(folder):
+    for known in read_known_devices(folder):
         if _same(known, device):
             return MeasuredRate(known.measured_rate_hz, known.measured_rate_hz_std, known.n_scans, known.seconds)
     return None
@@ -80,18 +93,22 @@ def _same(known: KnownDevice, device: Device) -> bool:
     return (known.model, known.serial) == (identity.model, identity.serial) and device.sample_rate in rates
 
 
-def _read(folder: MachineFolder) -> list[KnownDevice]:
+def read_known_devices(folder: MachineFolder) -> list[KnownDevice]:
+    """Those in daq.json; DataError where that is damaged."""
     path = folder.path / "daq.json"
     try:
-        return msgspec.json.decode(path.read_bytes(), type=list[KnownDevice])
+        found = msgspec.json.decode(path.read_bytes(), type=list[KnownDevice])
     except FileNotFoundError:
         return []
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise DataError(f"{path}: {error}; delete this file, the DAQ's rate is then measured anew") from error
+    if any(known.is_altered for known in found):
+        raise DataError(f"{path}: altered since it was written; delete this file, the DAQ's rate is then measured anew")
+    return found
 
 
 def _remember(folder: MachineFolder, device: Device, measured: MeasuredRate) -> None:
-    others = [known for known in _read(folder) if not _same(known, device)]
+    others = [known for known in read_known_devices(folder) if not _same(known, device)]
     now = datetime.now(UTC).isoformat(timespec="seconds")
     new = KnownDevice(
         device.identity.model,
@@ -103,5 +120,7 @@ def _remember(folder: MachineFolder, device: Device, measured: MeasuredRate) -> 
         measured.seconds,
         now,
     )
-    content = msgspec.json.format(msgspec.json.encode([*others, new]), indent=2)
+    content = msgspec.json.format(
+        msgspec.json.encode([*others, msgspec.structs.replace(new, crc=new.right_crc)]), indent=2
+    )
     atomic_write(folder.path / "daq.json", content + b"\n")

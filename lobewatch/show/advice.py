@@ -148,7 +148,9 @@ def _elsewhere(one: Advised, speeds: SpeedRange) -> str:
     if known is not None and len(known.directions) == 1:
         return f"tap direction {_missing(known)} too: only then can a safe speed be named"
     if known is not None and known.questions:
-        return "answer what is asked of its tap tests: only then can a safe speed be named"
+        cure = "answer what is asked of its tap tests"
+        cure = "tap again" if any(one.code == "newest-damaged" for one in known.questions) else cure
+        return f"{cure}: only then can a safe speed be named"
     reach = f"in {rpm(speeds.low_rpm)} to {rpm(speeds.high_rpm)} rpm"
     if best is None:
         return f"no safe speed {reach}; choose another tool"

@@ -69,12 +69,17 @@ def write_report(logbook: Logbook, path: Path | None = None, tool: str = "", dir
 
 def render_report(logbook: Logbook, tool: str, direction: str) -> str:
     """HTML of one series (tool and direction); ValueError where it holds no tap test."""
+    content = logbook.from_the_rest(lambda: _content_of(logbook, tool, direction))
+    source = resources.files("lobewatch.show").joinpath("report.html").read_text(encoding="utf-8")
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
+    return environment.from_string(source).render(content)
+
+
+def _content_of(logbook: Logbook, tool: str, direction: str) -> dict[str, Any]:
     rows = logbook.history.series(tool, direction)
     if not rows:
         raise ValueError(f"{logbook.folder.path}: no tap test with tool {tool!r} in direction {direction!r} yet")
-    source = resources.files("lobewatch.show").joinpath("report.html").read_text(encoding="utf-8")
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
-    return environment.from_string(source).render(_content(logbook, rows))
+    return _content(logbook, rows)
 
 
 def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:

@@ -124,7 +124,9 @@ class TapInProgress:
 
 
 def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool = True) -> TapInProgress:
-    """A new tap test, or the interrupted one of the same tool and direction; DataError where the disk is full."""
+    """A new tap test, or the interrupted one of the same tool and direction; DataError where the disk is full or the
+    journal damaged."""
+    folder.refuse_damage()
     free = shutil.disk_usage(folder.path).free
     if free < RESERVE_BYTES:
         raise DataError(
@@ -141,7 +143,7 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
 
 def _interrupted(folder: MachineFolder, circumstances: Circumstances, damaged: list[Path]) -> TapInProgress | None:
     """The newest test of the same tool and direction that can be gone on with."""
-    committed = {entry.id for entry in folder.taps()}
+    committed = folder.committed
     for path in sorted(folder.spool.iterdir(), reverse=True) if folder.spool.is_dir() else []:
         hits = spooled_hits(path, damaged)
         first = None if path.name in committed else next(hits, None)

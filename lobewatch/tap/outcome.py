@@ -6,6 +6,7 @@ from acquisition import joined
 from dsm import plus_minus
 from lobewatch.analysis import Logbook, Measurement, SeriesStanding
 from lobewatch.analysis.questions.asked import open_questions
+from lobewatch.analysis.standing import LIGHTS
 from lobewatch.tap.state import Outcome
 
 
@@ -14,7 +15,8 @@ def outcome_of(logbook: Logbook, found: Measurement) -> Outcome:
     standing = logbook.standing(found.time)
     series = standing.series_of(found.tool, found.direction)
     asked = open_questions(found.remarks)
-    told = [*(remark for remark in found.remarks if remark not in asked), *joined(standing.remarks), *logbook.remarks]
+    told = [*(remark for remark in found.remarks if remark not in asked), *joined(standing.remarks)]
+    told += [remark for remark in logbook.remarks if remark.code not in LIGHTS]
     texts = [*_values(found, series), *(f"{remark.finding}." for remark in told)]
     return Outcome(standing.light, texts, standing.next_step)
 

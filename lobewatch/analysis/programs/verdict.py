@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from acquisition import Remark
+from acquisition import DataError, Remark
 from lobes import Program, program_limit
 from lobewatch.analysis.assembly import ABOUT_DIRECTIONS, Assembly
 from lobewatch.analysis.programs.doubt import doubt_of
@@ -115,6 +115,13 @@ class Verdict:
     def ruling(self) -> Ruling:
         """What the history keeps."""
         return Ruling(self.word, self.limit)
+
+
+def judge(table: ProgramTable, known: Assembly | DataError, machine: Machine) -> Verdict:
+    """The verdict on a program, or why its tool is not known."""
+    if isinstance(known, DataError):
+        return unknown(table, (Remark("no-tap", "", str(known)),))
+    return verdict(table, known, machine)
 
 
 def verdict(table: ProgramTable, assembly: Assembly, machine: Machine) -> Verdict:

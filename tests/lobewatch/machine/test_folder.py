@@ -50,18 +50,6 @@ def test_every_line_of_the_journal_names_the_one_before(folder: MachineFolder) -
     assert all(line["kind"] == "tap" for line in lines)
 
 
-def test_a_torn_last_line_counts_for_nothing_and_does_not_block(folder: MachineFolder) -> None:
-    journal = folder.path / "journal.jsonl"
-    folder.commit(tap(0))
-    whole = journal.read_bytes()
-    folder.commit(tap(1))
-    for cut in range(len(whole), journal.stat().st_size, 40):
-        journal.write_bytes(journal.read_bytes()[:cut])
-        assert len(folder.taps()) == 1
-        folder.commit(tap(2))
-        assert len(folder.taps()) == 2
-
-
 def test_a_line_cut_short_by_a_full_disk_is_no_commit(folder: MachineFolder, monkeypatch: pytest.MonkeyPatch) -> None:
     spooled = folder.spool / tap(0).id
     committed = replace(tap(0), id=spooled.name)
@@ -76,20 +64,6 @@ def test_a_line_cut_short_by_a_full_disk_is_no_commit(folder: MachineFolder, mon
     folder.commit(committed)
     assert len(folder.taps()) == 1
     assert not spooled.exists()
-
-
-def test_a_damaged_line_in_the_middle_is_told_by_its_number(folder: MachineFolder) -> None:
-    for day in range(3):
-        folder.commit(tap(day))
-    journal = folder.path / "journal.jsonl"
-    lines = journal.read_text().splitlines()
-    for damaged in (lines[1].replace("reference", "referense"), "not json", ""):
-        journal.write_text("\n".join([lines[0], damaged, lines[2], ""]))
-        with pytest.raises(DataError, match="line 2 is damaged"):
-            folder.taps()
-    journal.write_text("\n".join([lines[0], lines[2], ""]))
-    with pytest.raises(DataError, match="line 2 is damaged"):
-        folder.taps()
 
 
 def test_an_altered_or_missing_file_is_named(folder: MachineFolder) -> None:

@@ -1,0 +1,1 @@
+"""Tap tests whose files are damaged: left out, said, and nothing is stable where a newer one is lost."""

@@ -1,0 +1,102 @@
+"""The tap tests of a machine that can be used; where one turns out to be damaged, all is done again without it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from typing import TypeVar
+
+from acquisition import DataError, Remark
+from lobewatch.analysis.order import Place, places
+from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
+from lobewatch.machine.archive.contents import Contents
+
+Result = TypeVar("Result")
+BEFORE_ALL = datetime.min.replace(tzinfo=UTC)
+
+
+class UsableTaps:
+    """What the folder holds, looked at once."""
+
+    def __init__(self, folder: MachineFolder) -> None:
+        """Nothing is read yet."""
+        self._folder = folder
+        self._contents: Contents | None = None
+        self._places: Sequence[Place] | None = None
+        self._left_out: dict[str, tuple[TapEntry, Remark]] = {}
+        self._works = False
+
+    @property
+    def places(self) -> Sequence[Place]:
+        """Those that can be used, oldest first by their time."""
+        if self._places is None:
+            self._places = places([tap for tap in self._all.taps if tap.id not in self._left_out])
+        return self._places
+
+    def place(self, tap_id: str) -> Place:
+        """Of one of them; KeyError where it is none."""
+        for place in reversed(self.places):
+            if place.entry.id == tap_id:
+                return place
+        raise KeyError(tap_id)
+
+    @property
+    def remarks(self) -> list[Remark]:
+        """What is wrong with the files, as far as it is known by now."""
+        known = () if self._contents is None else self._contents.remarks
+        return [*known, *(remark for _, remark in self._left_out.values())]
+
+    def newest(self, tool: str | None) -> TapEntry:
+        """The newest one, of a tool where one is named; DataError where there is none."""
+        found = [place.entry for place in self.places if tool in (None, place.entry.tool)]
+        if found:
+            return found[-1]
+        which = "" if tool is None else f" with tool {tool!r}"
+        damaged = [str(remark) for remark in self.remarks]
+        if damaged:
+            raise DataError(f"{self._folder.path}: no tap test{which} that can be used: {'; '.join(damaged)}")
+        cure = "take one with lobewatch tap, or replay a recorded file"
+        raise DataError(f"{self._folder.path}: no tap test{which} yet; {cure}")
+
+    def doubts(self, tool: str = "") -> tuple[Remark, ...]:
+        """Damaged ones (of a tool; "": of any) that are newer than all of their tool that can be used."""
+        known = {place.entry.tool: _time(place.entry) for place in self.places}
+        lost = [*self._all.lost, *(entry for entry, _ in self._left_out.values())]
+        newer = [one for one in lost if tool in ("", one.tool) and _time(one) > known.get(one.tool, BEFORE_ALL)]
+        text = "newer than all of its tool that can be used, but its file is damaged"
+        return tuple(Remark("newest-damaged", f"tap test {one.id}", text, "tap again") for one in newer)
+
+    def from_the_rest(self, work: Callable[[], Result], forget: Callable[[], None]) -> Result:
+        """What some work gives; where it meets a damaged tap file, without that, all that was known forgotten."""
+        if self._works:
+            return work()
+        self._works = True
+        try:
+            while True:
+                try:
+                    return work()
+                except DamagedTapError as error:
+                    self._leave_out(error)
+                    forget()
+        finally:
+            self._works = False
+
+    def forget(self) -> None:
+        """Look again."""
+        self._contents = self._places = None
+
+    def _leave_out(self, error: DamagedTapError) -> None:
+        if error.entry.id in self._left_out:
+            raise error
+        self._left_out[error.entry.id] = error.entry, error.remark
+        self._places = None
+
+    @property
+    def _all(self) -> Contents:
+        if self._contents is None:
+            self._contents = self._folder.contents()
+        return self._contents
+
+
+def _time(entry: TapEntry) -> datetime:
+    return datetime.fromisoformat(entry.time)

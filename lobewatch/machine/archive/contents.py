@@ -1,0 +1,130 @@
+"""The journal compared with taps/: which tap tests there are, and which of them cannot be used."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from acquisition import Remark
+from lobewatch.machine.archive.doubtful import read_doubtful
+from lobewatch.machine.archive.journal import JOURNAL, Reading, command, journal_damage
+from lobewatch.machine.archive.tap_entry import TapEntry
+
+PROVED_BYTES = 100_000_000
+"""Tap files whose SHA-256 is compared whenever a machine is looked at, the newest first; lobewatch verify takes all."""
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What a folder holds."""
+
+    taps: tuple[TapEntry, ...]
+    """Tap tests whose files are as they were committed, oldest first by their time."""
+    lost: tuple[TapEntry, ...]
+    """Committed ones that cannot be used, likewise."""
+    remarks: tuple[Remark, ...]
+    """What is wrong."""
+
+
+def contents_of(folder: Path, reading: Reading) -> Contents:
+    """What the journal and taps/ say together; reading: of the journal."""
+    committed = listed(reading)
+    remarks, taps, lost = [*reading.damage], list[TapEntry](), list[TapEntry]()
+    files, without, proved = tap_files(folder), given_up(reading), 0
+    for entry in sorted(committed.values(), key=_time, reverse=True):
+        proved += entry.size
+        wrong = fault_of(folder, entry, prove=proved <= PROVED_BYTES)
+        (lost if wrong else taps).append(entry)
+        if wrong:
+            remarks.append(about_lost(folder, entry, wrong, entry.id in without))
+    extra = [path for name, path in files.items() if name not in committed]
+    missing = not reading.lines and not reading.damage and any(_is_unexplained(folder, path) for path in extra)
+    if missing:
+        remarks.append(no_journal(folder, len(extra)))
+    if reading.damage or missing:
+        found = [(path, read_doubtful(path)) for path in extra]
+        taps += [entry for path, entry in found if entry is not None and entry.id == path.stem]
+    else:
+        cure = f"{command('verify', folder)} says what it is and what to do"
+        remarks += [unlisted(path, "not in the journal, does not count", cure) for path in extra]
+    return Contents(tuple(sorted(taps, key=_time)), tuple(sorted(lost, key=_time)), tuple(remarks))
+
+
+def listed(reading: Reading) -> dict[str, TapEntry]:
+    """The tap tests of the journal by identity."""
+    accepted: dict[str, list[str]] = {}
+    for line in reading.entries:
+        if line["kind"] == "accept":
+            accepted.setdefault(line["tap"], []).append(line["code"])
+    return {
+        line["id"]: TapEntry.from_line(line, tuple(accepted.get(line["id"], ())))
+        for line in reading.entries
+        if line["kind"] == "tap"
+    }
+
+
+def tap_files(folder: Path) -> Mapping[str, Path]:
+    """The files in taps/ that could be tap tests, by identity."""
+    found = folder / "taps"
+    files = sorted(found.glob("*.h5")) if found.is_dir() else []
+    return {path.stem: path for path in files if not path.name.startswith(".")}
+
+
+def fault_of(folder: Path, entry: TapEntry, prove: bool = True) -> str:
+    """What is wrong with the file of a tap test; empty where nothing is. prove: by its SHA-256, not its size alone."""
+    path = folder / entry.file
+    try:
+        size = path.stat().st_size
+        if size != entry.size:
+            return f"{size} bytes, not {entry.size} as when it was written"
+        if prove and hashlib.sha256(path.read_bytes()).hexdigest() != entry.sha256:
+            return "altered since it was written (SHA-256 differs)"
+    except FileNotFoundError:
+        return "named in the journal but missing"
+    except OSError as error:
+        return f"cannot be read ({os.strerror(error.errno or 0)})"
+    return ""
+
+
+def about_lost(folder: Path, entry: TapEntry, wrong: str, is_given_up: bool = False) -> Remark:
+    """That a tap test cannot be used."""
+    told = f"{wrong}; results are those of the other tap tests"
+    if is_given_up:
+        return Remark("tap-lost", entry.file, told)
+    cure = f"put it back from a backup; without one, {command('rebuild', folder)} goes on without it"
+    return Remark("tap-damaged", entry.file, told, cure)
+
+
+def no_journal(folder: Path, count: int) -> Remark:
+    """That tap files lie there alone."""
+    return journal_damage(folder / JOURNAL, f"is missing beside {count} tap file{'s' if count > 1 else ''}")
+
+
+def is_explained(folder: Path, entry: TapEntry) -> bool:
+    """Whether a tap file without a line is what an ended program leaves: its hits or its recording are still there."""
+    return bool(entry.source_sha256) or (folder / "spool" / entry.id).is_dir()
+
+
+def _is_unexplained(folder: Path, path: Path) -> bool:
+    if (folder / "spool" / path.stem).is_dir():
+        return False
+    entry = read_doubtful(path)
+    return entry is None or not is_explained(folder, entry)
+
+
+def unlisted(path: Path, text: str, cure: str) -> Remark:
+    """That a file in taps/ is in no journal."""
+    return Remark("tap-unlisted", f"taps/{path.name}", text, cure)
+
+
+def given_up(reading: Reading) -> set[str]:
+    """Tap tests that `lobewatch rebuild` went on without."""
+    return {line["tap"] for line in reading.entries if line["kind"] == "lost"}
+
+
+def _time(entry: TapEntry) -> datetime:
+    return datetime.fromisoformat(entry.time)

@@ -1,0 +1,234 @@
+"""The journal of a machine: a line for each thing that was committed, in two files, so that each proves the other.
+
+A line is JSON with the SHA-256 of the line before it (`previous`), its number (`number`) and a CRC-32 (`crc`). It is
+written to journal.jsonl, which is the commit, then to journal.copy.jsonl: after a crash the copy may be one line short,
+never longer.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+import os
+import shlex
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from acquisition import DataError, Remark
+from acquisition.atomic import atomic_write, sync_folder
+
+JOURNAL = "journal.jsonl"
+COPY = "journal.copy.jsonl"
+Entry = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class _Text:
+    """One of the two files as it stands on the disk."""
+
+    there: bool
+    chain: tuple[bytes, ...] = ()
+    """Lines from the first on, each naming the one before, without their ends."""
+    whole: bytes = b""
+    """The bytes of these lines, with their ends."""
+    broken: int = 0
+    """Number of the first line that does not continue the chain; 0 where all do."""
+    ending: bytes = b"\n"
+    """How the last line of the chain ends."""
+    torn: bytes = b""
+    """What a crash has left of a line."""
+    loose: tuple[bytes, ...] = ()
+    """Sound lines behind a broken one."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What the two files say together."""
+
+    lines: tuple[bytes, ...]
+    """All sound lines, oldest first, without their ends."""
+    damage: tuple[Remark, ...]
+    """What is wrong with the files; until it is mended nothing is written."""
+    torn: bytes = b""
+    """What a crash has left of a line in journal.jsonl; counts for nothing."""
+
+    @property
+    def entries(self) -> list[Entry]:
+        """The lines as JSON objects."""
+        return [json.loads(line) for line in self.lines]
+
+
+class Journal:
+    """The two files in the folder of a machine."""
+
+    def __init__(self, folder: Path) -> None:
+        """Nothing is read yet."""
+        self.path, self.copy = folder / JOURNAL, folder / COPY
+        self._known = _Text(there=False)
+
+    def read(self) -> Reading:
+        """All sound lines of both files, and what is wrong with these; neither need be there."""
+        journal = _scan(self.path, self._known)
+        copy = _scan(self.copy, journal)
+        self._known = journal
+        longer, shorter = sorted((journal.chain, copy.chain), key=len, reverse=True)
+        if longer[: len(shorter)] != shorter:
+            longer = journal.chain
+        damage = [*self._about_journal(journal, copy), *self._about_copy(journal, copy)]
+        loose = (*journal.chain, *copy.chain, *journal.loose, *copy.loose) if damage else ()
+        lines = tuple(dict.fromkeys((*longer, *loose)))
+        return Reading(lines, tuple(damage), journal.torn)
+
+    def append(self, entry: Entry) -> None:
+        """One write, one fsync: committed when this returns. DataError, and nothing is written, where it is damaged."""
+        reading = self.read()
+        self.refuse_damage(reading)
+        self._put_right(reading)
+        last = reading.lines[-1] if reading.lines else b""
+        line = as_line(entry, len(reading.lines) + 1, last)
+        _add(self.path, line)
+        try:
+            _add(self.copy, line)
+        except OSError:  # it is committed; the copy is brought up at the next line
+            return
+
+    def refuse_damage(self, reading: Reading | None = None) -> None:
+        """DataError where something is to be mended before anything is written."""
+        damage = (reading or self.read()).damage
+        if damage:
+            raise DataError(f"{self.path.parent}: {'; '.join(map(str, damage))}; nothing is written before")
+
+    def rewrite(self, entries: list[Entry]) -> None:
+        """Both files anew from these lines, in a chain of their own; what was there is kept beside them."""
+        for path in (self.path, self.copy):
+            if path.exists():
+                keep_aside(path, path.read_bytes(), "damaged")
+        lines: list[bytes] = []
+        for number, entry in enumerate(entries, 1):
+            lines.append(as_line(entry, number, lines[-1] if lines else b""))
+        content = b"".join(line + b"\n" for line in lines)
+        atomic_write(self.path, content)
+        atomic_write(self.copy, content)
+
+    def _put_right(self, reading: Reading) -> None:
+        """After a crash: the torn end is kept in a file of its own and cut away, the copy brought up."""
+        whole = b"".join(line + b"\n" for line in reading.lines)
+        if reading.torn:
+            keep_aside(self.path, reading.torn, "torn")
+        for path in (self.path, self.copy):
+            if (path.read_bytes() if path.exists() else b"") != whole:
+                atomic_write(path, whole)
+
+    def _about_journal(self, journal: _Text, copy: _Text) -> Iterator[Remark]:
+        missing = len(copy.chain) - len(journal.chain)
+        if not journal.there and copy.there:
+            yield journal_damage(self.path, "is missing beside its copy")
+        elif journal.broken:
+            yield journal_damage(self.path, f"line {journal.broken} is damaged")
+        elif missing > 0:
+            lines = "its last line is" if missing == 1 else f"its last {missing} lines are"
+            yield journal_damage(self.path, f"{lines} missing")
+        elif journal.ending != b"\n" and (missing == 0 or journal.ending):
+            yield journal_damage(self.path, f"the end of its line {len(journal.chain)} is damaged")
+        elif copy.chain != journal.chain[: len(copy.chain)]:
+            yield journal_damage(self.path, f"it is not the journal that {COPY} is a copy of")
+
+    def _about_copy(self, journal: _Text, copy: _Text) -> Iterator[Remark]:
+        behind = len(journal.chain) - len(copy.chain)
+        if copy.broken:
+            yield journal_damage(self.copy, f"line {copy.broken} is damaged")
+        elif copy.ending != b"\n" and (behind == 0 or copy.ending):
+            yield journal_damage(self.copy, f"the end of its line {len(copy.chain)} is damaged")
+        elif not copy.there and behind > 1 and any("number" in json.loads(line) for line in journal.chain[:-1]):
+            yield journal_damage(self.copy, "is missing")
+        elif copy.there and behind > 1:
+            yield journal_damage(self.copy, f"its last {behind} lines are missing")
+
+
+def as_line(entry: Entry, number: int, last: bytes) -> bytes:
+    """A line without its end; last: the line before, without its end too."""
+    told = {name: value for name, value in entry.items() if name != "crc"}
+    told |= {"number": number, "previous": hashlib.sha256(last).hexdigest() if last else ""}
+    return json.dumps(told | {"crc": _crc(told)}).encode()
+
+
+def keep_aside(path: Path, content: bytes, why: str) -> Path:
+    """Bytes that are to be cut away or written over, in a new file beside: PATH.1.torn, PATH.2.torn, ..."""
+    number = 1
+    while (aside := path.with_name(f"{path.name}.{number}.{why}")).exists():
+        number += 1
+    atomic_write(aside, content)
+    return aside
+
+
+def journal_damage(path: Path, what: str) -> Remark:
+    """What is wrong with a file of the journal."""
+    return Remark("journal-damaged", path.name, what, f"mend it with {command('rebuild', path.parent)}")
+
+
+def command(name: str, folder: Path) -> str:
+    """A command of lobewatch for a machine, to be copied."""
+    return shlex.join(["lobewatch", name, str(folder)])
+
+
+def _scan(path: Path, known: _Text) -> _Text:
+    """A file of the journal, line by line, from where it is known on."""
+    if not path.exists():
+        return _Text(there=False)
+    content = path.read_bytes()
+    begun = known if content.startswith(known.whole) else _Text(there=False)
+    *lines, end = content[len(begun.whole) :].split(b"\n")
+    chain, broken, loose = list(begun.chain), 0, list[bytes]()
+    for number, line in enumerate(lines, len(chain) + 1):
+        if not broken and _continues(chain, line):
+            chain.append(line)
+        else:
+            broken = broken or number
+            loose += [line] if _parsed(line) else []
+    for part in (end, end[:-1]):
+        if part.endswith(b"}") and not broken and _continues(chain, part):
+            return _Text(True, (*chain, part), ending=end[len(part) :])
+    loose += [part for part in (end, end[:-1]) if broken and _parsed(part)][:1]
+    whole = begun.whole + b"".join(line + b"\n" for line in chain[len(begun.chain) :])
+    return _Text(True, tuple(chain), whole, broken, torn=end, loose=tuple(loose))
+
+
+def _continues(chain: list[bytes], line: bytes) -> bool:
+    entry = _parsed(line)
+    return entry is not None and entry["previous"] == (hashlib.sha256(chain[-1]).hexdigest() if chain else "")
+
+
+def _parsed(line: bytes) -> Entry | None:
+    """A sound line as a JSON object; None for any other."""
+    try:
+        entry: Entry = json.loads(line)
+        crc = entry.pop("crc")
+        return entry if crc == _crc(entry) and isinstance(entry["previous"], str) and "kind" in entry else None
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return None
+
+
+def _crc(entry: Entry) -> int:
+    """CRC-32 of a journal entry without its crc."""
+    return zlib.crc32(json.dumps(entry, sort_keys=True).encode())
+
+
+def _add(path: Path, line: bytes) -> None:
+    """A line and its end in one write."""
+    new, content = not path.exists(), line + b"\n"
+    try:
+        handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
+        try:
+            if os.write(handle, content) < len(content):  # what a full disk does with the last bytes it has
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+    if new:
+        sync_folder(path.parent)

@@ -1,0 +1,140 @@
+"""A folder put right as far as its sound files allow; what is damaged is put out of the way, never deleted."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from acquisition import DataError, read_tap
+from acquisition.atomic import atomic_write
+from lobewatch.machine.archive.contents import fault_of, given_up, listed, tap_files
+from lobewatch.machine.archive.doubtful import read_doubtful
+from lobewatch.machine.archive.journal import JOURNAL, Journal
+from lobewatch.machine.archive.tap_entry import TapEntry
+from lobewatch.machine.folder import BusyError, MachineFolder
+from lobewatch.machine.known_devices import read_known_devices
+
+ASIDE = "damaged"
+"""Folder of what was put out of the way."""
+
+
+def rebuild_files(path: Path) -> list[str]:
+    """Mend machine.toml where it is missing, taps/, the journal and daq.json; what was done, a sentence each.
+
+    DataError where this is no machine folder, BusyError where another program writes.
+    """
+    if not (path / "machine.toml").is_file() and not tap_files(path):
+        MachineFolder(path)
+    with _locked(path):
+        journal = Journal(path)
+        reading = journal.read()
+        told = [*_misplaced(path, listed(reading))]
+        committed = listed(reading)
+        fresh = _unlisted(path, committed, told)
+        if reading.damage or (fresh and not reading.lines):
+            journal.rewrite([*reading.entries, *(entry.line for entry in fresh)])
+            told.append(f"{JOURNAL}: written anew with {len(reading.entries) + len(fresh)} lines")
+        else:
+            for entry in fresh:
+                journal.append(entry.line)
+        told += [f"{entry.file}: entered in the journal" for entry in fresh]
+        told += _go_on_without(path, journal)
+        told += [*_machine_file(path), *_devices(path)]
+    return told
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """As MachineFolder.locked, also without a machine.toml."""
+    try:
+        with FileLock(path / ".lock", timeout=0):
+            yield
+    except Timeout as error:
+        raise BusyError(f"{path}: another lobewatch is writing here; wait until it is done") from error
+
+
+def _misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator[str]:
+    """Files with the content of another tap test: each is given back where its own is wrong, else put aside."""
+    known = {entry.sha256: entry for entry in committed.values()}
+    found: dict[Path, TapEntry] = {}
+    for path in tap_files(folder).values():
+        entry = known.get(hashlib.sha256(path.read_bytes()).hexdigest())
+        if entry is not None and path != folder / entry.file:
+            found[path] = entry
+    asides = {_put_aside(folder, path): entry for path, entry in found.items()}
+    for aside, entry in asides.items():
+        if fault_of(folder, entry):
+            if (folder / entry.file).exists():
+                _put_aside(folder, folder / entry.file)
+            atomic_write(folder / entry.file, aside.read_bytes())
+            aside.unlink()
+            yield f"{entry.file}: given its name back"
+        else:
+            yield f"{aside.relative_to(folder).as_posix()}: put there, a copy of {entry.file}"
+
+
+def _unlisted(folder: Path, committed: dict[str, TapEntry], told: list[str]) -> list[TapEntry]:
+    """Whole tap files without a line, under their own names; all others without a line are put out of the way."""
+    found = []
+    for name, path in tap_files(folder).items():
+        if name in committed:
+            continue
+        entry = read_doubtful(path)
+        taken = entry is not None and entry.id != name and (folder / entry.file).exists()
+        if entry is None or taken or entry.id in committed:
+            told.append(f"taps/{path.name}: put into {_put_aside(folder, path).relative_to(folder).as_posix()}")
+            continue
+        if entry.id != name:
+            path.rename(folder / entry.file)
+        found.append(entry)
+    return found
+
+
+def _go_on_without(folder: Path, journal: Journal) -> Iterator[str]:
+    """Tap tests that cannot be had back."""
+    reading = journal.read()
+    for name, entry in listed(reading).items():
+        if not fault_of(folder, entry):
+            continue
+        if (folder / entry.file).exists():
+            _put_aside(folder, folder / entry.file)
+        if name not in given_up(reading):
+            journal.append({"kind": "lost", "tap": name, "time": datetime.now(UTC).isoformat()})
+            yield f"{entry.file}: lost; all goes on without it, and with it again when it is put back from a backup"
+
+
+def _machine_file(folder: Path) -> Iterator[str]:
+    """From the newest tap test that has a copy."""
+    toml = folder / "machine.toml"
+    if toml.exists():
+        return
+    entries = [entry for entry in listed(Journal(folder).read()).values() if not fault_of(folder, entry)]
+    for entry in sorted(entries, key=lambda one: one.time, reverse=True):
+        text = read_tap(folder / entry.file).circumstances.machine_toml
+        if text:
+            atomic_write(toml, text.encode())
+            yield f"machine.toml: the copy in {entry.file}"
+            return
+    raise DataError(f"{toml}: is missing, and no tap test has a copy; put it back from a backup")
+
+
+def _devices(folder: Path) -> Iterator[str]:
+    try:
+        read_known_devices(MachineFolder(folder))
+    except DataError:
+        aside = _put_aside(folder, folder / "daq.json")
+        yield f"daq.json: put into {aside.relative_to(folder).as_posix()}; the rates of DAQs are measured anew"
+
+
+def _put_aside(folder: Path, path: Path) -> Path:
+    """Into the folder of what is damaged, under a name that nothing has there."""
+    (folder / ASIDE).mkdir(exist_ok=True)
+    aside, number = folder / ASIDE / path.name, 1
+    while aside.exists():
+        aside, number = folder / ASIDE / f"{path.name}.{number}", number + 1
+    return path.replace(aside)

@@ -1,0 +1,66 @@
+"""One committed tap test as the journal tells of it."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any, Self
+
+from acquisition import DataError, Remark, TapTest
+
+
+class DamagedTapError(DataError):
+    """The file of a committed tap test is missing, altered or unreadable."""
+
+    def __init__(self, remark: Remark, entry: TapEntry, path: Path) -> None:
+        """path: of the folder."""
+        super().__init__(f"{path / remark.about}: {remark.text}; {remark.cure}")
+        self.remark, self.entry = remark, entry
+
+
+@dataclass(frozen=True)
+class TapEntry:
+    """One committed tap test, a line of the journal."""
+
+    id: str
+    """Name of its file in taps/, without .h5."""
+    sha256: str
+    """Of that file."""
+    size: int
+    """Of that file (bytes)."""
+    time: str
+    """When it was taken (ISO 8601)."""
+    tool: str
+    """What was in the spindle."""
+    direction: str
+    """Direction at the tool tip, "x" or "y"."""
+    source_sha256: str
+    """Of the recording it was replayed from; empty for a live test."""
+    accepted: tuple[str, ...] = ()
+    """Questions about it that a person has accepted, by code; lines of their own."""
+
+    @classmethod
+    def of(cls, tap: TapTest, content: bytes) -> Self:
+        """content: of its file."""
+        about = tap.circumstances
+        source = hashlib.sha256(tap.source.content).hexdigest() if tap.source else ""
+        digest = hashlib.sha256(content).hexdigest()
+        return cls(tap.id, digest, len(content), about.created.isoformat(), about.tool, about.direction, source)
+
+    @classmethod
+    def from_line(cls, line: dict[str, Any], accepted: tuple[str, ...] = ()) -> Self:
+        """From the line of the journal that `line` has made."""
+        named = {field.name: line[field.name] for field in fields(cls) if field.name != "accepted"}
+        return cls(**named, accepted=accepted)
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """For the journal."""
+        told = {name: value for name, value in asdict(self).items() if name != "accepted"}
+        return {"kind": "tap", **told}
+
+    @property
+    def file(self) -> str:
+        """Its place in the folder of the machine."""
+        return f"taps/{self.id}.h5"

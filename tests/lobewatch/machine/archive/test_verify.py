@@ -1,0 +1,222 @@
+"""Every damage of a machine folder is named, or harmless; and what is said to mend it does."""
+
+from __future__ import annotations
+
+import random
+import re
+import shlex
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from acquisition import SourceFile, TapTest
+from lobewatch.cli import app
+from lobewatch.machine.archive.rebuild import rebuild_files
+from lobewatch.machine.archive.verify import Verified, verify
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.known_devices import KnownDevice
+
+MakeTap = Callable[..., TapTest]
+NAMES = ["tap_0", "tap_1", "tap_2"]
+
+
+def file(folder: MachineFolder, number: int) -> Path:
+    return folder.path / "taps" / f"tap_{number}.h5"
+
+
+def flipped(content: bytes, at: int, bit: int = 0) -> bytes:
+    return content[:at] + bytes([content[at] ^ 1 << bit]) + content[at + 1 :]
+
+
+def swap(one: Path, other: Path) -> None:
+    first, second = one.read_bytes(), other.read_bytes()
+    one.write_bytes(second)
+    other.write_bytes(first)
+
+
+def rename(folder: MachineFolder) -> None:
+    file(folder, 1).rename(file(folder, 7))
+
+
+def cut_both(folder: MachineFolder) -> None:
+    """The last line, off both files at its boundary."""
+    for name in ("journal.jsonl", "journal.copy.jsonl"):
+        path = folder.path / name
+        path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
+
+
+def remove_journals(folder: MachineFolder) -> None:
+    (folder.path / "journal.jsonl").unlink()
+    (folder.path / "journal.copy.jsonl").unlink()
+
+
+DAMAGES: dict[str, tuple[Callable[[MachineFolder], object], str, list[str]]] = {
+    "a flipped bit": (lambda m: file(m, 1).write_bytes(flipped(file(m, 1).read_bytes(), 4000)), "tap_1.h5", NAMES[::2]),
+    "half a file": (lambda m: file(m, 2).write_bytes(file(m, 2).read_bytes()[:5000]), "tap_2.h5", NAMES[:2]),
+    "an empty file": (lambda m: file(m, 0).write_bytes(b""), "tap_0.h5", NAMES[1:]),
+    "a missing file": (lambda m: file(m, 0).unlink(), "tap_0.h5", NAMES[1:]),
+    "two swapped": (lambda m: swap(file(m, 0), file(m, 2)), "tap_0.h5", NAMES),
+    "one renamed": (rename, "tap_7.h5", NAMES),
+    "a copy": (lambda m: shutil.copy(file(m, 1), file(m, 7)), "tap_7.h5", NAMES),
+    "one over another": (lambda m: shutil.copy(file(m, 1), file(m, 2)), "tap_2.h5", NAMES[:2]),
+    "a broken stranger": (lambda m: file(m, 7).write_bytes(b"\x89HDF"), "tap_7.h5", NAMES),
+    "no journal": (remove_journals, "journal.jsonl", NAMES),
+    "no last line": (cut_both, "tap_2.h5", NAMES),
+    "a journal cut short": (lambda m: m.journal.path.write_bytes(m.journal.path.read_bytes()[:-9]), "journal.j", NAMES),
+    "an altered copy": (
+        lambda m: m.journal.copy.write_bytes(b"?" + m.journal.copy.read_bytes()),
+        "journal.copy",
+        NAMES,
+    ),
+    "no machine.toml": (lambda m: m.toml.unlink(), "machine.toml", NAMES),
+    "an altered history": (lambda m: m.history.write_bytes(b"no history"), "history.h5", NAMES),
+    "an altered daq.json": (lambda m: (m.path / "daq.json").write_text("[{"), "daq.json", NAMES),
+}
+
+
+@pytest.mark.parametrize("what", DAMAGES)
+def test_damage_is_named_and_what_is_said_to_mend_it_does(what: str, folder: MachineFolder) -> None:
+    harm, name, left = DAMAGES[what]
+    assert verify(folder.path).remarks == ()
+    harm(folder)
+    found = verify(folder.path)
+    assert any(name in remark.about for remark in found.damage), found
+    for remark in found.damage:
+        commands = re.findall(r"lobewatch (\w+) (\S+)", remark.cure)
+        assert commands or "delete this file" in remark.cure + remark.text
+        assert all(word == "rebuild" and shlex.split(path) == [str(folder.path)] for word, path in commands)
+    rebuild_files(folder.path)
+    (folder.path / "history.h5").unlink(missing_ok=True)
+    again = verify(folder.path)
+    assert again.damage == ()
+    assert [entry.id for entry in MachineFolder(folder.path).taps()] == left
+    assert rebuild_files(folder.path) == []
+
+
+def test_a_lost_tap_put_back_from_a_backup_counts_again(folder: MachineFolder) -> None:
+    content = file(folder, 1).read_bytes()
+    file(folder, 1).unlink()
+    rebuild_files(folder.path)
+    assert [remark.code for remark in verify(folder.path).remarks] == ["tap-lost"]
+    file(folder, 1).write_bytes(content)
+    assert verify(folder.path).remarks == ()
+    assert [entry.id for entry in MachineFolder(folder.path).taps()] == NAMES
+
+
+@pytest.mark.parametrize("source", [None, SourceFile("a.csv", b"abc")])
+def test_a_tap_that_an_ended_program_has_not_entered_is_entered(
+    source: SourceFile | None, folder: MachineFolder, make_tap: MakeTap
+) -> None:
+    tap = replace(make_tap(3, source), id="tap_3")
+    folder.commit(tap)
+    cut_both(folder)
+    if source is None:
+        (folder.spool / "tap_3").mkdir(parents=True)
+    found = verify(folder.path)
+    assert (found.damage, found.adopted) == ((), ("taps/tap_3.h5",))
+    assert [entry.id for entry in MachineFolder(folder.path).taps()] == [*NAMES, "tap_3"]
+    assert verify(folder.path).adopted == ()
+
+
+def test_an_edited_machine_file_is_told_with_its_first_line(folder: MachineFolder) -> None:
+    text = folder.toml.read_text("utf-8")
+    folder.toml.write_text(f"# edited\n{text}", "utf-8")
+    (folder.path / "report.html").write_text("mine")
+    found = verify(folder.path)
+    assert found.damage == ()
+    assert [remark.code for remark in found.remarks] == ["machine-file-edited", "not-verified"]
+    assert "# edited" in found.remarks[0].text
+
+
+def test_the_commands_say_it(folder: MachineFolder) -> None:
+    said = CliRunner().invoke(app, ["verify", str(folder.path)])
+    assert (said.exit_code, said.stdout) == (0, "3 tap test(s) as they were committed, nothing is damaged\n")
+    file(folder, 1).write_bytes(b"")
+    said = CliRunner().invoke(app, ["verify", str(folder.path)])
+    assert said.exit_code == 1
+    assert "damaged: taps/tap_1.h5: 0 bytes, not " in said.stdout
+    assert "2 tap test(s) as they were committed, 1 damaged" in said.stdout
+
+
+def test_the_history_is_rebuilt_with_equal_arrays(tmp_path: Path, shop: object) -> None:
+    from lobes import read_history
+
+    shop.run(("A", 12900, 1.0))  # type: ignore[attr-defined]
+    for days in (0, 30):
+        shop.tap_both(days)  # type: ignore[attr-defined]
+        shop.logbook.standing()  # type: ignore[attr-defined]
+    path: Path = shop.path  # type: ignore[attr-defined]
+    logbook = shop.logbook  # type: ignore[attr-defined]
+    for tap in logbook.taps:
+        logbook.rulings(tap.id)
+    before = read_history(path / "history.h5")
+    said = CliRunner().invoke(app, ["rebuild", str(path)], catch_exceptions=False)
+    assert said.stdout.endswith("history.h5: made anew from 4 tap test(s)\n")
+    after = read_history(path / "history.h5")
+    assert before.columns.keys() == after.columns.keys()
+    for name, values in before.columns.items():
+        assert values.tobytes() == after.columns[name].tobytes(), name
+
+
+def damaged_somewhere(folder: MachineFolder, chance: random.Random) -> str:
+    """One flipped bit or one cut in one file; its name."""
+    files = sorted(path for path in folder.path.rglob("*") if path.is_file() and path.name != ".lock")
+    path = chance.choice(files)
+    content = path.read_bytes()
+    at = chance.randrange(len(content))
+    cut = chance.random() < 0.3
+    path.write_bytes(content[:at] if cut else flipped(content, at, chance.randrange(8)))
+    return path.name
+
+
+def is_harmless(folder: MachineFolder, results: list[bytes]) -> bool:
+    return results_of(folder) == results
+
+
+def results_of(folder: MachineFolder) -> list[bytes]:
+    """What all results follow from."""
+    found = MachineFolder(folder.path)
+    taps = found.taps()
+    return [*(found.read(entry).frf.receptance.tobytes() for entry in taps), found.toml.read_bytes()]
+
+
+def one_round(pristine: Path, work: Path, seed: int) -> str:
+    """Damage a copy; "named" or "harmless", else what went wrong."""
+    shutil.rmtree(work, ignore_errors=True)
+    shutil.copytree(pristine, work)
+    folder = MachineFolder(work)
+    results = results_of(folder)
+    name = damaged_somewhere(folder, random.Random(seed))
+    found: Verified = verify(work)
+    if any(name in remark.about for remark in found.remarks):
+        return "named"
+    return "harmless" if is_harmless(folder, results) else f"silent: {name}, seed {seed}"
+
+
+@pytest.fixture
+def full(folder: MachineFolder) -> Path:
+    """With all that can stand in a folder."""
+    import msgspec
+
+    device = KnownDevice("a", "1", 25600.0, 25600.1, 0.01, 100, 5.0, "2026-01-15T09:00:00+00:00")
+    device = msgspec.structs.replace(device, crc=device.right_crc)
+    (folder.path / "daq.json").write_bytes(msgspec.json.format(msgspec.json.encode([device]), indent=2))
+    return folder.path
+
+
+def test_flips_and_cuts_are_named_or_harmless(full: Path, tmp_path: Path) -> None:
+    found = [one_round(full, tmp_path / "work", seed) for seed in range(30)]
+    assert set(found) <= {"named", "harmless"}
+    assert found.count("named") >= 27
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3600)
+def test_two_thousand_flips_and_cuts_are_named_or_harmless(full: Path, tmp_path: Path) -> None:
+    found = [one_round(full, tmp_path / "work", seed) for seed in range(2000)]
+    assert set(found) <= {"named", "harmless"}
+    assert found.count("named") >= 1900

@@ -27,7 +27,7 @@ def flip(path: Path) -> None:
     path.write_bytes(content)
 
 
-DAMAGES: dict[str, Callable[[Path], None]] = {
+DAMAGES: dict[str, Callable[[Path], object]] = {
     "altered": flip,
     "missing": Path.unlink,
     "of another size": lambda path: path.write_bytes(path.read_bytes()[:-1]),

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import Frf, Remark, windowed_receptance
+from dsm import plus_minus
 from lobewatch.analysis.one_file.own_window import ringing_modes_windowed, without_own_window
 from lobewatch.analysis.one_file.recorded import recorded
 from lobewatch.analysis.one_file.recorded_window import Window
@@ -132,7 +133,7 @@ def _wrong_sign(modes: Sequence[Mode]) -> Iterator[Remark]:
 def _delayed(modes: Sequence[Mode]) -> Iterator[Remark]:
     delay = common_delay(modes)
     if delay is not None:
-        skew, std = 1e6 * delay.skew, 1e6 * delay.skew_std
-        text = f"the phases of all modes grow with frequency: the response is sampled {skew:.1f} ± {std:.1g} us late"
-        cure = f"measure it with lobewatch sensors, or add {skew:.1f} to skew_us of the accelerometer in machine.toml"
+        late = plus_minus(delay.skew, delay.skew_std, 1e-6)
+        text = f"the phases of all modes grow with frequency: the response is sampled {late} us late"
+        cure = "measure it with lobewatch sensors --skew, or add that to skew_us of the accelerometer in machine.toml"
         yield Remark("channel-delay", "", text, cure)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -145,3 +146,14 @@ def test_command_corrects_an_exponential_window_and_draws(
     assert json.loads(capsys.readouterr().out)["modes"][1]["damping_ratio"] == pytest.approx(plain["damping_ratio"])
     assert command(monkeypatch, str(file), "--conjugate", "--window", "-1", "--hit-at", "0") == 2
     assert "time_constant=-1.0 s" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("skew", [15e-6, -15e-6])
+def test_a_delay_between_the_channels_is_offered_as_skew(skew: float) -> None:
+    modes = [Mode(700.0, 0.02, 6e7), Mode(1500.0, 0.03, 3e7), Mode(2600.0, 0.02, 9e7)]
+    late = synthesize(modes, LINES).receptance * np.exp(2j * np.pi * LINES * skew)
+    (said,) = remarks_on_all(fit_modes(Frf(LINES, late)))
+    assert said.code == "channel-delay"
+    found = re.search(r"sampled (-?[\d.]+) ± ([\d.]+) us late", said.text)
+    assert found is not None
+    assert float(found[1]) == pytest.approx(1e6 * skew, abs=float(found[2]))

@@ -66,7 +66,7 @@ def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: H
     """One hit of a test in progress and the verdict on it, sealed; on the disk when this returns."""
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
-        file.attrs.update(format=FORMAT, version=VERSION)
+        file.attrs.update(format=FORMAT, version=VERSION, file=Path(path).name)
         _write_circumstances(file, circumstances)
         _write_raw(file, [hit], [flags])
     atomic_write(Path(path), sealed(memory.getvalue()))
@@ -77,6 +77,12 @@ def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tup
     with _open(Path(path)) as file:
         hits, flags = _read_raw(file)
         return hits, _read_circumstances(file), flags
+
+
+def read_hit_name(path: Path | str) -> str:
+    """The name that a hit file was written under; empty in the first ones."""
+    with _open(Path(path)) as file:
+        return str(file.attrs.get("file", ""))
 
 
 def _open(path: Path) -> h5py.File:
@@ -90,6 +96,10 @@ def _open(path: Path) -> h5py.File:
     try:
         if file.attrs.get("format") != FORMAT:
             raise DataError(f"{path}: an HDF5 file, but no tap test of lobewatch (attribute format is not {FORMAT!r})")
+        newest = int(file.attrs.get("version", VERSION))
+        if newest > VERSION:
+            told = f"a tap file of version {newest}, this lobewatch reads up to {VERSION}"
+            raise DataError(f"{path}: {told}; update lobewatch")
         check_unpacked(file, len(content), path)
     except BaseException:
         file.close()

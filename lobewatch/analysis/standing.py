@@ -37,6 +37,7 @@ LIGHTS = {
     "never-tapped": Light.UNKNOWN,
     "journal-damaged": Light.WARN,
     "tap-damaged": Light.WARN,
+    "tap-unreadable": Light.WARN,
     "tap-unlisted": Light.WARN,
     "frequency-warn": Light.WARN,
     "frequency-jump": Light.WARN,
@@ -182,7 +183,7 @@ def _about_loss(name: str, newest: Row) -> Iterator[Remark]:
 
 def _of_files(remark: Remark) -> Remark:
     """With a cure that can be the next step."""
-    return replace(remark, cure=f"{remark.about}: {remark.cure}.")
+    return replace(remark, cure=f"{remark.about}: {remark.cure or remark.text}.")
 
 
 def _about_questions(row: Row, path: Path | str) -> Iterator[Remark]:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from acquisition import DataError, TapTest, read_tap, write_tap
+from acquisition import DataError, Remark, TapTest, read_tap, write_tap
 from lobewatch.machine.archive.contents import (
     Contents,
     about_lost,
@@ -122,7 +122,12 @@ class MachineFolder:
         wrong = fault_of(self.path, entry)
         if wrong:
             raise DamagedTapError(about_lost(self.path, entry, wrong), entry, self.path)
-        return read_tap(self.path / entry.file)
+        path = self.path / entry.file
+        try:
+            return read_tap(path)
+        except DataError as error:
+            told = str(error).removeprefix(f"{path}: ")
+            raise DamagedTapError(Remark("tap-unreadable", entry.file, told), entry, self.path) from error
 
     def commit(self, tap: TapTest) -> None:
         """Write the tap file, then its journal line; saved for good when this returns.

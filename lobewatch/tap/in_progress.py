@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import shutil
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from pathlib import Path
 
@@ -16,14 +15,13 @@ from acquisition import (
     HitFlags,
     TapTest,
     Trigger,
-    atomic_write,
     estimate_frf,
     judge_hit,
     new_tap_id,
     write_hit,
 )
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.spool import SETUP, SpooledHit, spooled_hits, spooled_trigger
+from lobewatch.tap.spool import SpooledHit, spooled_hits, spooled_trigger, tidy_spool, write_set_up
 from lobewatch.tap.state import TakenHit
 
 RESERVE_BYTES = 50_000_000
@@ -58,6 +56,8 @@ class TapInProgress:
     """A record at rest; None until the self-check has run."""
     damaged: list[Path] = field(default_factory=list)
     """Files of an interrupted test that could not be read, where they were set aside."""
+    left: list[str] = field(default_factory=list)
+    """Interrupted tests that are not gone on with, a sentence each."""
 
     @property
     def good(self) -> int:
@@ -92,7 +92,7 @@ class TapInProgress:
         """Keep a hit; on the disk when this returns."""
         self.folder.mkdir(parents=True, exist_ok=True)
         if not self.hits and self.trigger is not None:
-            atomic_write(self.folder / SETUP, json.dumps(asdict(self.trigger)).encode())
+            write_set_up(self.folder, self.trigger)
         number = max(self.numbers, default=-1) + 1
         self._write(number, hit, flags)
         self._append(number, hit, flags, reason)
@@ -132,28 +132,34 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
         raise DataError(
             f"{folder.path}: {free / 1e6:.0f} MB free on this disk; a tap test needs {RESERVE_BYTES / 1e6:.0f} MB"
         )
-    damaged: list[Path] = []
-    tap = _interrupted(folder, circumstances, damaged) if resume else None
-    if tap is None:
-        tap_id = new_tap_id(circumstances)
-        tap = TapInProgress(tap_id, circumstances, folder.spool / tap_id)
-    tap.damaged = damaged
+    tidy_spool(folder.spool)
+    damaged, left = list[Path](), list[str]()
+    found = _interrupted(folder, circumstances, resume, damaged, left)
+    tap_id = new_tap_id(circumstances)
+    tap = found or TapInProgress(tap_id, circumstances, folder.spool / tap_id)
+    tap.damaged, tap.left = damaged, left
     return tap
 
 
-def _interrupted(folder: MachineFolder, circumstances: Circumstances, damaged: list[Path]) -> TapInProgress | None:
-    """The newest test of the same tool and direction that can be gone on with."""
-    committed = folder.committed
+def _interrupted(
+    folder: MachineFolder, circumstances: Circumstances, resume: bool, damaged: list[Path], left: list[str]
+) -> TapInProgress | None:
+    """The newest test of the same tool and direction to go on with, if that is wished; `left`: all others."""
+    committed, found = folder.committed, None
     for path in sorted(folder.spool.iterdir(), reverse=True) if folder.spool.is_dir() else []:
+        if not path.is_dir() or path.name in committed:
+            continue
         hits = spooled_hits(path, damaged)
-        first = None if path.name in committed else next(hits, None)
+        first = next(hits, None)
         if first is None:
             continue
         about = first.circumstances
         same = (about.tool, about.direction) == (circumstances.tool, circumstances.direction)
-        if same and circumstances.created - about.created < RESUMABLE:
-            tap = TapInProgress(path.name, about, path, trigger=spooled_trigger(path, damaged))
+        if resume and found is None and same and circumstances.created - about.created < RESUMABLE:
+            found = TapInProgress(path.name, about, path, trigger=spooled_trigger(path, damaged))
             for hit in (first, *hits):
-                tap.add_spooled(hit)
-            return tap
-    return None
+                found.add_spooled(hit)
+        else:
+            when = f"{about.created:%Y-%m-%d %H:%M} UTC, tool {about.tool}, direction {about.direction}"
+            left.append(f"an interrupted test of {when} is still in {path}; delete that folder if it is not needed")
+    return found

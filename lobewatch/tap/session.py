@@ -102,6 +102,7 @@ class TapSession:
             told.append(f"going on with the test begun {begun}: {hits.progress} are there")
         if hits.tap.damaged:
             told.append(f"damaged and set aside: {', '.join(str(path) for path in hits.tap.damaged)}")
+        told += hits.tap.left
         if told:
             self._publisher.show_hits(hits, resumed="; ".join(told))
         return hits

@@ -1,13 +1,21 @@
-"""Hits of an interrupted test, read back from its spool; damaged files are set aside, not lost."""
+"""Hits of an interrupted test, read back from its spool; damaged files are set aside, not lost.
+
+A hit file ends with its SHA-256, the set-up holds a CRC-32: what does not fit never reaches HDF5 or the test.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import json
+import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from acquisition import Circumstances, Hit, HitFlags, Trigger, read_tap_hits
+from acquisition import Circumstances, Hit, HitFlags, Trigger, atomic_write, read_tap_hits
+from acquisition.files.seal import is_sealed
+from acquisition.files.tap_file import read_hit_name
+from lobewatch.machine.archive.doubtful import has_whole_hits
 
 SETUP = "setup.json"
 """File with the trigger of a test."""
@@ -28,7 +36,10 @@ class SpooledHit:
 
 
 def spooled_hits(folder: Path, damaged: list[Path]) -> Iterator[SpooledHit]:
-    """The sound hits of a test, oldest first; a damaged file is set aside, and where to is added to `damaged`."""
+    """The sound hits of a test, oldest first; a damaged file is set aside, and where to is added to `damaged`.
+
+    A file under the name of another one is damaged too: no hit counts twice.
+    """
     for path in sorted(folder.glob("[0-9]*.h5")):
         found = _read(path)
         if found is None:
@@ -37,21 +48,51 @@ def spooled_hits(folder: Path, damaged: list[Path]) -> Iterator[SpooledHit]:
             yield found
 
 
+def write_set_up(folder: Path, trigger: Trigger) -> None:
+    """Keep how the hits are recorded; on the disk when this returns."""
+    told = asdict(trigger)
+    atomic_write(folder / SETUP, json.dumps(told | {"crc": _crc(told)}).encode())
+
+
 def spooled_trigger(folder: Path, damaged: list[Path]) -> Trigger | None:
     """How the hits were recorded; None where that was not kept, or is damaged and set aside as hits are."""
     path = folder / SETUP
     try:
-        return Trigger(**json.loads(path.read_text("utf-8")))
+        told = json.loads(path.read_text("utf-8"))
+        crc = told.pop("crc", None)  # not in the first files
+        if crc not in (None, _crc(told)):
+            raise ValueError("altered")
+        return Trigger(**told)
     except FileNotFoundError:
         return None
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, AttributeError):
         damaged.append(_set_aside(path))
         return None
 
 
+def tidy_spool(spool: Path) -> None:
+    """Remove what an ended program leaves of no use: half-written files and empty folders."""
+    for path in sorted(spool.rglob(".*.tmp")) if spool.is_dir() else []:
+        path.unlink(missing_ok=True)
+    for path in sorted(spool.iterdir()) if spool.is_dir() else []:
+        if path.is_dir():
+            if [one.name for one in path.iterdir()] == [SETUP]:
+                (path / SETUP).unlink()
+            with contextlib.suppress(OSError):  # it is not empty
+                path.rmdir()
+
+
+def _crc(told: object) -> int:
+    return zlib.crc32(json.dumps(told, sort_keys=True).encode())
+
+
 def _read(path: Path) -> SpooledHit | None:
     """A hit; None where its file is damaged."""
+    if not is_sealed(path.read_bytes()) and not has_whole_hits(path):
+        return None
     try:
+        if read_hit_name(path) not in ("", path.name):
+            return None
         (hit,), about, (flags,) = read_tap_hits(path)
         return SpooledHit(int(path.stem), hit, flags, about)
     except (ValueError, KeyError, TypeError, RuntimeError):
@@ -63,5 +104,9 @@ def _read(path: Path) -> SpooledHit | None:
 
 
 def _set_aside(path: Path) -> Path:
-    """Out of the folder, which is removed when the test is committed."""
-    return path.replace(path.parent.with_name(f"{path.parent.name}-{path.name}.damaged"))
+    """Out of the folder, which is removed when the test is committed, under a name that nothing has there."""
+    name, number = f"{path.parent.name}-{path.name}", 1
+    while (aside := path.parent.with_name(f"{name}.damaged")).exists():
+        number += 1
+        name = f"{path.parent.name}-{path.name}.{number}"
+    return path.replace(aside)

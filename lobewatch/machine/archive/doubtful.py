@@ -10,8 +10,9 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
-from acquisition import read_tap
+from acquisition import read_tap, read_tap_hits
 from acquisition.files.seal import is_broken, is_sealed
 from lobewatch.machine.archive.tap_entry import TapEntry
 
@@ -34,18 +35,34 @@ def _read(path: Path) -> TapEntry | None:
         return None
 
 
+def has_whole_hits(path: Path) -> bool:
+    """Whether the hits of a file without a seal can be read."""
+    return not is_broken(path.read_bytes()) and _asked_apart("hits", path) is not None
+
+
 def _read_apart(path: Path) -> TapEntry | None:
-    command = [sys.executable, "-m", __name__, str(path)]
+    line = _asked_apart("tap", path)
+    return None if line is None else TapEntry.from_line(line)
+
+
+def _asked_apart(what: str, path: Path) -> dict[str, Any] | None:
+    command = [sys.executable, "-m", __name__, what, str(path)]
     try:
         said = subprocess.run(command, capture_output=True, timeout=PATIENCE, check=True)
-        return TapEntry.from_line(json.loads(said.stdout))
-    except (subprocess.SubprocessError, ValueError, TypeError):
+        found: dict[str, Any] | None = json.loads(said.stdout)
+        return found
+    except (subprocess.SubprocessError, ValueError):
         return None
 
 
 def main() -> None:
-    """Print the tap test in the file that is named, as JSON."""
-    found = _read(Path(sys.argv[1]))
+    """Print as JSON what is in the file that is named: of a "tap" its line, of "hits" that they can be read."""
+    _, what, name = sys.argv
+    if what == "hits":
+        read_tap_hits(name)
+        sys.stdout.write("{}")
+        return
+    found = _read(Path(name))
     sys.stdout.write("null" if found is None else json.dumps(found.line))
 
 

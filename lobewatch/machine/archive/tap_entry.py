@@ -15,7 +15,7 @@ class DamagedTapError(DataError):
 
     def __init__(self, remark: Remark, entry: TapEntry, path: Path) -> None:
         """path: of the folder."""
-        super().__init__(f"{path / remark.about}: {remark.text}; {remark.cure}")
+        super().__init__(f"{path}/{remark}")
         self.remark, self.entry = remark, entry
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import hashlib
 import json
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition import DataError, Remark, read_tap
+from acquisition import DataError, Remark, Trigger
 from acquisition.files.seal import is_sealed
 from lobes import read_history
 from lobewatch.machine.archive.contents import (
@@ -149,7 +151,9 @@ def _about_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterato
         yield Remark("file-damaged", "machine.toml", str(error), cure)
         return
     newest = max(sound, key=lambda entry: entry.time, default=None)
-    then = read_tap(folder.path / newest.file).circumstances.machine_toml if newest else ""
+    then = ""
+    with contextlib.suppress(DataError):  # a newer lobewatch has written it
+        then = folder.read(newest).circumstances.machine_toml if newest else ""
     now = folder.toml.read_text("utf-8")
     if newest is not None and then and now != then:
         changed = [line for line in difflib.ndiff(then.splitlines(), now.splitlines()) if line[:2] in ("+ ", "- ")]
@@ -180,13 +184,17 @@ def _about_spool(folder: Path) -> Iterator[Remark]:
     for path in sorted(spool.rglob("*")) if spool.is_dir() else []:
         about = path.relative_to(folder).as_posix()
         if path.is_dir():
+            cure = f"put it back from a backup, or {command('tap', folder)} goes on with the others"
+            yield from (Remark("file-damaged", f"{about}/{name}", "missing", cure) for name in _missing_hits(path))
             continue
         if path.suffix == ".h5" and not is_sealed(path.read_bytes()):
             cure = f"{command('tap', folder)} sets it aside and goes on with the others"
             yield Remark("file-damaged", about, "altered or cut short since it was written", cure)
-        elif path.name == "setup.json" and not _is_json(path):
+        elif path.name == "setup.json" and not _is_whole_set_up(path):
             cure = f"{command('tap', folder)} sets it aside and chooses the set-up anew"
             yield Remark("file-damaged", about, "altered or cut short since it was written", cure)
+        elif path.suffix == ".tmp":
+            yield Remark("set-aside", about, "half written", f"{command('tap', folder)} removes it")
         elif path.suffix == ".damaged":
             yield Remark(
                 "set-aside", about, "a damaged file of an interrupted test", "delete it when you do not need it"
@@ -209,12 +217,20 @@ def _about_others(folder: Path) -> Iterator[Remark]:
             yield Remark("not-verified", f"taps/{path.name}", "no tap file, does not count", "take it out of taps/")
 
 
-def _is_json(path: Path) -> bool:
+def _is_whole_set_up(path: Path) -> bool:
     try:
-        json.loads(path.read_bytes())
-    except ValueError:
+        told = json.loads(path.read_bytes())
+        crc = told.pop("crc", None)
+        return bool(Trigger(**told)) and crc in (None, zlib.crc32(json.dumps(told, sort_keys=True).encode()))
+    except (ValueError, TypeError, AttributeError):
         return False
-    return True
+
+
+def _missing_hits(test: Path) -> list[str]:
+    """Names of hits that must have been there: one with a higher number is, and none was set aside under theirs."""
+    numbers = [int(path.stem) for path in test.glob("[0-9]*.h5") if path.stem.isdigit()]
+    names = [f"{number:04d}.h5" for number in range(max(numbers, default=0)) if number not in numbers]
+    return [name for name in names if not list(test.parent.glob(f"{test.name}-{name}*.damaged"))]
 
 
 def _sha256(path: Path) -> str:

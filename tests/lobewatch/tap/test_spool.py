@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import random
+import re
 from collections.abc import Callable
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -149,3 +151,78 @@ def test_a_disk_that_cannot_be_read_is_no_damaged_hit(
     with pytest.raises(OSError, match="Input/output error"):
         begun_again(open_folder)
     assert (interrupted / "0000.h5").is_file()
+
+
+def test_what_was_set_aside_is_never_written_over(interrupted: Path, open_folder: MachineFolder) -> None:
+    sound = (interrupted / "0003.h5").read_bytes()
+    first = damage(interrupted / "0003.h5")
+    begun_again(open_folder)
+    (interrupted / "0003.h5").write_bytes(sound[: len(sound) // 2])
+    begun_again(open_folder)
+    asides = sorted(open_folder.spool.glob("*.damaged"))
+    assert sorted(path.read_bytes() for path in asides) == sorted([first, sound[: len(sound) // 2]])
+
+
+def test_no_hit_counts_twice(interrupted: Path, open_folder: MachineFolder) -> None:
+    (interrupted / "0004.h5").write_bytes((interrupted / "0001.h5").read_bytes())
+    tap = begun_again(open_folder)
+    assert tap.numbers == [0, 1, 2, 3]
+    assert [path.name for path in tap.damaged] == [f"{interrupted.name}-0004.h5.damaged"]
+
+
+def test_an_altered_figure_of_the_set_up_is_found(interrupted: Path, open_folder: MachineFolder) -> None:
+    told = (interrupted / "setup.json").read_text()
+    level = re.search(r'"level": (\d)', told)
+    assert level is not None
+    other = str((int(level[1]) + 1) % 10)
+    (interrupted / "setup.json").write_text(told[: level.start(1)] + other + told[level.end(1) :])
+    assert begun_again(open_folder).trigger is None
+
+
+def test_other_interrupted_tests_are_told_and_kept(
+    interrupted: Path, open_folder: MachineFolder, go_on: Callable[[], TapSession]
+) -> None:
+    later = datetime.now(UTC) + timedelta(hours=13)
+    for about in (Circumstances("m", later, "reference"), Circumstances("m", datetime.now(UTC), "reference", "y")):
+        tap = begin_tap(open_folder, about)
+        assert tap.hits == []
+        assert len(tap.left) == 1
+        assert f"is still in {interrupted}" in tap.left[0]
+    anew = begin_tap(open_folder, Circumstances("m", datetime.now(UTC), "reference"), resume=False)
+    assert (anew.hits, len(anew.left)) == ([], 1)
+    assert len(list(interrupted.glob("*.h5"))) == 4
+
+
+def test_half_written_files_and_empty_folders_are_removed(interrupted: Path, open_folder: MachineFolder) -> None:
+    (interrupted / ".0004.h5.abcd.tmp").write_bytes(b"half")
+    (open_folder.spool / "empty").mkdir()
+    (open_folder.spool / "without hits").mkdir()
+    (open_folder.spool / "without hits" / "setup.json").write_text("{}")
+    assert len(begun_again(open_folder).hits) == 4
+    assert [path.name for path in open_folder.spool.iterdir()] == [interrupted.name]
+    assert sorted(path.suffix for path in interrupted.iterdir()) == [".h5"] * 4 + [".json"]
+
+
+def resumed(spool: Path, folder: MachineFolder, seed: int) -> bool:
+    """Whether a test with one bit flipped or one end cut off somewhere goes on with all that is sound."""
+    chance = random.Random(seed)
+    sound = {path: path.read_bytes() for path in spool.iterdir()}
+    path = chance.choice(sorted(sound))
+    at = chance.randrange(len(sound[path]))
+    flip = bytes([sound[path][at] ^ 1 << chance.randrange(8)])
+    path.write_bytes(sound[path][:at] + (b"" if seed % 4 == 0 else flip + sound[path][at + 1 :]))
+    tap = begun_again(folder)
+    for name, content in sound.items():
+        name.write_bytes(content)
+    count = len(sound) - 1
+    return tap.id == spool.name and len(tap.hits) >= count - 1 and len(tap.hits) + len(tap.damaged) >= count
+
+
+def test_damaged_tests_are_gone_on_with(interrupted: Path, open_folder: MachineFolder) -> None:
+    assert all(resumed(interrupted, open_folder, seed) for seed in range(12))
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3600)
+def test_130_damaged_tests_are_gone_on_with(interrupted: Path, open_folder: MachineFolder) -> None:
+    assert sum(resumed(interrupted, open_folder, seed) for seed in range(130)) == 130

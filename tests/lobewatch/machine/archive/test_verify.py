@@ -10,15 +10,19 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from acquisition import SourceFile, TapTest
+from acquisition import Hit, HitFlags, SourceFile, TapTest, Trigger, write_hit
+from lobes import SldHistory, read_history, write_history
 from lobewatch.cli import app
 from lobewatch.machine.archive.rebuild import rebuild_files
 from lobewatch.machine.archive.verify import Verified, verify
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import KnownDevice
+from lobewatch.tap.spool import write_set_up
 
 MakeTap = Callable[..., TapTest]
 NAMES = ["tap_0", "tap_1", "tap_2"]
@@ -143,8 +147,6 @@ def test_the_commands_say_it(folder: MachineFolder) -> None:
 
 
 def test_the_history_is_rebuilt_with_equal_arrays(tmp_path: Path, shop: object) -> None:
-    from lobes import read_history
-
     shop.run(("A", 12900, 1.0))  # type: ignore[attr-defined]
     for days in (0, 30):
         shop.tap_both(days)  # type: ignore[attr-defined]
@@ -177,6 +179,13 @@ def is_harmless(folder: MachineFolder, results: list[bytes]) -> bool:
     return results_of(folder) == results
 
 
+def test_spool_files_are_named(full: Path) -> None:
+    assert verify(full).remarks == ()
+    (full / "spool" / "tap_9" / "0000.h5").unlink()
+    (full / "spool" / "tap_9" / "setup.json").write_text("{")
+    assert [one.about for one in verify(full).damage] == ["spool/tap_9/0000.h5", "spool/tap_9/setup.json"]
+
+
 def results_of(folder: MachineFolder) -> list[bytes]:
     """What all results follow from."""
     found = MachineFolder(folder.path)
@@ -198,13 +207,19 @@ def one_round(pristine: Path, work: Path, seed: int) -> str:
 
 
 @pytest.fixture
-def full(folder: MachineFolder) -> Path:
+def full(folder: MachineFolder, make_tap: MakeTap) -> Path:
     """With all that can stand in a folder."""
-    import msgspec
-
     device = KnownDevice("a", "1", 25600.0, 25600.1, 0.01, 100, 5.0, "2026-01-15T09:00:00+00:00")
     device = msgspec.structs.replace(device, crc=device.right_crc)
     (folder.path / "daq.json").write_bytes(msgspec.json.format(msgspec.json.encode([device]), indent=2))
+    write_history(folder.history, SldHistory("hash", "1", np.array([1.0, 2.0]), {}, {"cut": np.array([[1.0, 2.0]])}))
+    spool = folder.spool / "tap_9"
+    spool.mkdir(parents=True)
+    write_set_up(spool, Trigger(20.0, 1000, 100))
+    pulse = np.exp(-((np.arange(1000) / 30 - 5) ** 2))
+    for number in range(2):
+        hit = Hit(500 * pulse, 100 * pulse, 25600.0)
+        write_hit(spool / f"000{number}.h5", hit, make_tap().circumstances, HitFlags.OK)
     return folder.path
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 ChannelQuantity = Literal["force", "acceleration"]
+FEWEST_BITS = 8
+"""No converter for sensors has fewer."""
 TapDirection = Literal["x", "y"]
 """Direction at the tool tip in which is tapped."""
 
@@ -65,6 +67,19 @@ class Channel:
     def rails(self) -> tuple[int, int]:
         """Lowest and highest ADC code."""
         return -(2 ** (self.adc_bits - 1)), 2 ** (self.adc_bits - 1) - 1
+
+    def step_in(self, codes: NDArray[np.integer[Any]]) -> int:
+        """Smallest step between codes: a power of 2 above 1 where a converter of fewer bits fills the upper ones only.
+
+        Some devices have fewer bits at higher rates; their highest code is then a step below 2^(bits-1).
+        """
+        used = int(np.bitwise_or.reduce(codes, axis=None))
+        return min(used & -used, 2 ** max(self.adc_bits - FEWEST_BITS, 0)) or 1
+
+    def rails_in(self, codes: NDArray[np.integer[Any]]) -> tuple[int, int]:
+        """Lowest and highest code that a converter can give whose codes are these."""
+        low, high = self.rails
+        return low, high + 1 - self.step_in(codes)
 
     def encode(self, values: NDArray[np.float64]) -> NDArray[np.int32]:
         """ADC codes of values (N or m/s^2), rounded and clipped at the rails as the converter does."""

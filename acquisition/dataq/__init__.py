@@ -1,4 +1,4 @@
-"""The DATAQ DI-x108 devices: protocol, dialogue, stream, source and emulator."""
+"""DATAQ devices (DI-1120, 2108, 2108-P, 4108, 4208, 4718B): protocol, dialogue, stream, source and emulator."""
 
 from acquisition.dataq.dialogue import DataqDialogue
 from acquisition.dataq.emulator import DataqEmulator, DataqFaults, DataqTraits

@@ -1,4 +1,4 @@
-"""A DATAQ DI-x108 device made of software: the same bytes on a pseudo-terminal or a TCP port."""
+"""A DATAQ device made of software: the same bytes on a pseudo-terminal or a TCP port."""
 
 from __future__ import annotations
 
@@ -44,6 +44,8 @@ class DataqTraits:
     """Lines end with CR NUL, not with CR alone."""
     digital_word: int = 0x7F00
     """What the digital inputs give: pulled up where nothing is connected."""
+    bits: int = 16
+    """Resolution; the lower bits of each word are 0. The devices have fewer than 16 at high rates."""
     scanned: bool = False
     """Inputs are converted one after the other within a scan, not at once."""
     echoes_stop: bool = False
@@ -226,6 +228,7 @@ class DataqEmulator(EmulatorThread):
                 words[:, position] = self._traits.digital_word
             elif number in self._inputs:
                 row, one = self._inputs[number]
-                channel = replace(one.channel, full_scale=self._ranges[gain])
-                words[:, position] = channel.encode(values[row, position % step :: step])
+                bits = self._traits.bits
+                channel = replace(one.channel, full_scale=self._ranges[gain], adc_bits=bits)
+                words[:, position] = channel.encode(values[row, position % step :: step]) << 16 - bits
         return words

@@ -1,4 +1,4 @@
-"""Facts of the DATAQ DI-x108 protocol (DI-1120, 2108, 2108-P, 4108, 4208, 4718B) over its virtual serial port.
+"""Facts of the protocol of the DATAQ DI-1120, 2108, 2108-P, 4108, 4208 and 4718B over their virtual serial port.
 
 Commands are lower-case ASCII, ended by CR, and come back as an echo while the device is not scanning; what it scans is
 a bare stream of little-endian 16-bit words, one an entry of the scan list, without header, counter or checksum.

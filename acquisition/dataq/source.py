@@ -1,4 +1,4 @@
-"""A DATAQ DI-x108 device on its virtual serial port as a source of scans."""
+"""A DATAQ device on its virtual serial port as a source of scans."""
 
 from __future__ import annotations
 

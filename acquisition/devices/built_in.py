@@ -76,7 +76,7 @@ BUILT_IN = (
     ),
     Driver(
         "dataq",
-        "a DATAQ DI-x108 device",
+        "a DATAQ DI-1120, 2108, 2108-P, 4108, 4208 or 4718B",
         _open_dataq,
         _probe_dataq,
         _check_dataq,

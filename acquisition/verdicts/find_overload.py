@@ -45,11 +45,13 @@ def find_overload(hit: Hit, index: int) -> Overload | None:
     signal = np.asarray((hit.force, hit.acceleration)[index])
     scale = 0.0
     if hit.codes is not None and hit.channels is not None:
-        scale = hit.channels[index].scale
-        for rail in hit.channels[index].rails:
-            count = int(np.count_nonzero(hit.codes[index] == rail))
+        codes, channel = hit.codes[index], hit.channels[index]
+        low, high = channel.rails_in(codes)
+        for rail, beyond in ((low, codes <= low), (high, codes >= high)):
+            count = int(np.count_nonzero(beyond))
             if count >= RAIL_SAMPLES:
-                return Overload(rail * scale, count, inferred=False)
+                return Overload(rail * channel.scale, count, inferred=False)
+        scale = channel.scale * channel.step_in(codes)
     middle = float(np.median(signal))
     noise = float(np.std(baseline(signal, samples_before(hit))))
     for sign in (1, -1):

@@ -81,7 +81,7 @@ def _samples(baseline: Hit) -> Check:
 
 
 def _sensor(codes: NDArray[np.int32], channel: Channel) -> Check:
-    name, low, high = f"{channel.quantity} sensor", *channel.rails
+    name, low, high = f"{channel.quantity} sensor", *channel.rails_in(codes)
     stuck = np.mean((codes <= low) | (codes >= high))
     if stuck > 0.5:
         return Check(name, False, "stands at the end of its range: cable open or sensor not powered")

@@ -22,6 +22,7 @@ from acquisition import (
     DeviceError,
     HammeredStructure,
     Hammering,
+    Hit,
     HitFlags,
     SensorInput,
     SimulatedSource,
@@ -299,6 +300,26 @@ def test_inputs_that_are_scanned_lag_by_a_part_of_a_scan(structure: Structure) -
         source.start()
         codes = take(source, 2000)[0].codes[:, -1]
     assert np.diff(codes) * inputs[0].channel.scale == pytest.approx(1 / 3000, abs=inputs[0].channel.scale)
+
+
+@pytest.mark.parametrize("bits", [12, 14, 16])
+def test_an_overload_is_found_at_the_resolution_of_the_rate(bits: int) -> None:
+    """A sine of 102 % of the range, in words whose lower bits are 0."""
+
+    def loud(rate: float) -> Signal:
+        return lambda first, n: np.tile(2.04 * np.sin(2 * np.pi * 300 / rate * (first + np.arange(n))), (2, 1))
+
+    inputs = SensorInput(0, Channel("force", 1.0, 10.0)), SensorInput(5, Channel("acceleration", 1.0, 2.0))
+    with (
+        DataqEmulator(loud, inputs, realtime=False, traits=DataqTraits(bits=bits)) as device,
+        DataqSource(device.port, inputs, RATE) as source,
+    ):
+        source.start()
+        codes = np.concatenate([block.codes for block in take(source, 2000)], axis=1)
+    assert codes[1].max() == 32768 - 2 ** (16 - bits)
+    flags = check_hit(Hit.from_codes(codes, (inputs[0].channel, inputs[1].channel), RATE))
+    assert HitFlags.OVERLOAD_RESPONSE in flags
+    assert HitFlags.OVERLOAD_FORCE not in flags
 
 
 @pytest.mark.parametrize("firmware", ["87", "1.36", "2A0", "beta"])

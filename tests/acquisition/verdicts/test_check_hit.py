@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +82,29 @@ def test_clipping_with_noise_on_top_is_found_by_the_codes(channels: tuple[Channe
     loud = 20 * good.acceleration + np.random.default_rng(1).normal(size=TIME.size)
     codes = np.stack([force.encode(good.force), response.encode(loud)])
     assert check_hit(Hit.from_codes(codes, channels, RATE, 512)) == HitFlags.OVERLOAD_RESPONSE
+
+
+@pytest.mark.parametrize("bits", [12, 13, 14, 16])
+def test_rails_of_a_converter_of_fewer_bits_are_those_of_its_codes(
+    channels: tuple[Channel, Channel], bits: int
+) -> None:
+    """50 responses cut off at 98 % of their peak, and the same on twice the range: words whose lower bits are 0."""
+    random = np.random.default_rng(bits)
+    force, caught = pulse(200), 0
+    for _ in range(50):
+        slow = np.sin(2 * np.pi * random.uniform(200, 500) * TIME) * np.exp(-60 * TIME) * (TIME > 0) * 100
+        good = hit(force, slow)
+        top = float(np.abs(good.acceleration).max())
+        for scale in (0.98, 2.0):
+            pair = channels[0], replace(channels[1], full_scale=scale * top * abs(channels[1].sensitivity))
+            coarse = [replace(channel, adc_bits=bits) for channel in pair]
+            signals = zip(coarse, (good.force, good.acceleration), strict=True)
+            codes = np.stack([channel.encode(signal) << 16 - bits for channel, signal in signals])
+            flags = check_hit(Hit.from_codes(codes, pair, RATE, 512))
+            assert flags in (HitFlags.OK, HitFlags.OVERLOAD_RESPONSE)
+            assert scale < 1 or not flags
+            caught += bool(flags)
+    assert caught >= 49
 
 
 def test_two_samples_at_a_rail_are_no_overload(channels: tuple[Channel, Channel]) -> None:

@@ -11,7 +11,7 @@ import contextlib
 import ipaddress
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import AsyncIterator
 from dataclasses import dataclass
 
 from aiohttp import web
@@ -29,7 +29,8 @@ HELD_BACK = 64
 NO_LIMIT = 1 << 20
 """Descriptors, where the system names no limit."""
 PACE = 0.002
-"""Between two connections that are let in (s): a flood of them costs little, and a page needs seven."""
+"""Between two connections that are let in, and between two answers to strangers (s): a flood of them costs little, and
+a page needs seven."""
 BACKLOG = 128
 """Connections that wait in the system to be let in."""
 
@@ -73,6 +74,7 @@ class Door:
     def __init__(self) -> None:
         """Nobody is in."""
         self._guests: list[Guest] = []
+        self._turn = asyncio.Lock()
 
     @property
     def connections(self) -> int:
@@ -98,15 +100,18 @@ class Door:
                 connection.close()
             await asyncio.sleep(PACE)
 
-    @contextlib.contextmanager
-    def attending(self, request: web.Request) -> Iterator[None]:
-        """While a request is answered its connection is not hung up."""
+    @contextlib.asynccontextmanager
+    async def attending(self, request: web.Request) -> AsyncIterator[None]:
+        """While a request is answered its connection is not hung up; strangers are answered one after the other."""
         guest = self._guest(request)
         if guest is None:
             yield
             return
         guest.hold()
         try:
+            if not guest.known:
+                async with self._turn:
+                    await asyncio.sleep(PACE)
             yield
         finally:
             guest.wait()

@@ -77,7 +77,7 @@ def _attend(door: Door) -> Middleware:
     @web.middleware
     async def attend(request: web.Request, handler: Handler) -> web.StreamResponse:
         """The head of a request has come: its connection is not hung up before there is an answer."""
-        with door.attending(request):
+        async with door.attending(request):
             return await handler(request)
 
     return attend

@@ -137,6 +137,24 @@ def test_who_sends_no_request_in_time_is_hung_up(
         assert server.door.connections == 0
 
 
+def test_strangers_are_answered_slowly_and_those_with_the_token_at_once(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(door, "PACE", 0.05)
+    with ScreenServer(session) as server:
+        connection = http.client.HTTPConnection("127.0.0.1", port_of(server), timeout=10)
+        with contextlib.closing(connection):
+            for path, headers, least, most in (
+                ("/", {}, 0.25, 5.0),
+                ("/access", {"Authorization": f"Bearer {server.token}"}, 0.0, 0.25),
+            ):
+                begun = time.monotonic()
+                for _ in range(5):
+                    connection.request("GET", path, headers=headers)
+                    assert connection.getresponse().read()
+                assert least <= time.monotonic() - begun < most
+
+
 def test_a_feed_is_not_hung_up_for_its_silence(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(door, "HEAD_TIME", 0.1)
     monkeypatch.setattr(door, "IDLE_TIME", 0.1)

@@ -39,6 +39,7 @@ LIGHTS = {
     "tap-damaged": Light.WARN,
     "tap-unreadable": Light.WARN,
     "tap-unlisted": Light.WARN,
+    "file-damaged": Light.WARN,
     "frequency-warn": Light.WARN,
     "frequency-jump": Light.WARN,
     "mode-lost": Light.WARN,
@@ -109,6 +110,15 @@ class Standing:
 def unreadable(reason: str) -> Standing:
     """The standing of a machine whose files cannot be read."""
     return _of([Remark("unreadable", "", reason)], "Put its files right: the sentence above says which.")
+
+
+def with_files(found: Standing, damage: Sequence[Remark]) -> Standing:
+    """The same with what else was found damaged in the folder."""
+    known = {(remark.code, remark.about) for remark in found.remarks}
+    new = [_of_files(remark) for remark in damage if (remark.code, remark.about) not in known]
+    if not new:
+        return found
+    return _of([*found.remarks, *new], found.next_step, found.series, found.last_tap, found.days_left)
 
 
 def stand(

@@ -7,12 +7,17 @@ import threading
 from pathlib import Path
 from typing import Any
 
-from acquisition import DataError, joined
+from acquisition import DataError, Remark, joined
 from lobewatch.analysis import Light, Logbook, Standing, unreadable
+from lobewatch.analysis.standing import with_files
 from lobewatch.machine import MachineFolder
+from lobewatch.machine.archive.verify import verify
 
 SHOWN_APART = ("frequency-alarm", "frequency-warn", "overdue")
 """Reasons that the page shows as the fall and the date."""
+
+VERIFY_EVERY = 6 * 3600.0
+"""Time between two looks at every byte (s)."""
 
 
 def find_machines(path: Path) -> dict[str, MachineFolder]:
@@ -32,6 +37,7 @@ class Board:
         """machines: by name of their folders."""
         self._machines = machines
         self._logbooks: dict[str, Logbook] = {}
+        self._damage: dict[str, tuple[Remark, ...]] = {}
         self._lock = threading.Lock()
 
     def rows(self) -> list[dict[str, Any]]:
@@ -42,12 +48,29 @@ class Board:
         order = sorted(standings, key=lambda key: (lights.index(standings[key].light), -_fall(standings[key]), key))
         return [_row(key, self._name(key), standings[key]) for key in order]
 
+    def verify_until(self, end: threading.Event) -> None:
+        """Look at every byte of all machines, now and every few hours until the end; what is damaged stands in rows."""
+        while True:
+            for key, folder in self._machines.items():
+                if end.is_set():
+                    return
+                try:
+                    damage = verify(folder.path).damage
+                except (ValueError, OSError):
+                    continue  # the row says it
+                with self._lock:
+                    if damage != self._damage.get(key, ()):
+                        self._logbooks.pop(key, None)
+                    self._damage[key] = damage
+            if end.wait(VERIFY_EVERY):
+                return
+
     def _standing(self, key: str) -> Standing:
         logbook = self._logbooks.get(key)
         try:
             if logbook is None or not logbook.is_current:
                 self._logbooks[key] = logbook = Logbook(MachineFolder(self._machines[key].path))
-            return logbook.standing()
+            return with_files(logbook.standing(), self._damage.get(key, ()))
         except (ValueError, OSError) as error:
             return unreadable(str(error))
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import secrets
+import threading
 from pathlib import Path
 from types import TracebackType
+from typing import Self
 from urllib.parse import quote
 
 import msgspec
@@ -22,6 +24,7 @@ from lobewatch.screen.screen_server import add_session
 from lobewatch.screen.web_thread import WebThread
 from lobewatch.show.printer import Watched
 from lobewatch.show.report import render_report
+from lobewatch.tap.spool import interrupted_tests
 
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'; sandbox"
 """A report has its style in it, and no script."""
@@ -31,6 +34,8 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Body of the request that starts a tap test."""
 
     direction: TapDirection
+    resume: bool = True
+    """Whether an interrupted test of the same tool and direction is gone on with."""
 
 
 class DashboardServer(WebThread):
@@ -55,6 +60,8 @@ class DashboardServer(WebThread):
         self._reports: dict[str, tuple[str, str]] = {}
         self._board = Board(self._machines)
         self._board.rows()
+        self._end = threading.Event()
+        self._verifier = threading.Thread(target=self._board.verify_until, args=(self._end,), daemon=True)
         add_pages(self.application, {"/": "dashboard.html", "/tap/{machine}/": "screen.html"})
         add_session(self.application, "/tap/{machine}/", self._find_test)
         router = self.application.router
@@ -63,10 +70,18 @@ class DashboardServer(WebThread):
         router.add_post("/machines/{machine}/report", self._write_report, name=f"{WATCH}report")
         router.add_get("/report/{machine}/{key}", self._report, name=f"{OPEN}report")
 
+    def __enter__(self) -> Self:
+        """Serve, and look at every byte of the machines meanwhile."""
+        self._verifier.start()
+        return super().__enter__()
+
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Stop the tap tests that run, then close; their hits stay in the spool."""
+        self._end.set()
+        if self._verifier.is_alive():
+            self._verifier.join(10)
         for test in self._tests.values():
             test.stop()
         for test in self._tests.values():
@@ -89,7 +104,8 @@ class DashboardServer(WebThread):
     async def _list(self, request: web.Request) -> web.Response:
         rows = await asyncio.to_thread(self._board.rows)
         running = {key for key, test in self._tests.items() if test.running}
-        machines = [row | {"running": row["key"] in running} for row in rows]
+        begun = await asyncio.to_thread(lambda: {key: _interrupted(folder) for key, folder in self._machines.items()})
+        machines = [row | {"running": row["key"] in running, "interrupted": begun[row["key"]]} for row in rows]
         return web.json_response({"machines": machines, "may_alter": request[MAY_ALTER]})
 
     async def _start(self, request: web.Request) -> web.Response:
@@ -100,7 +116,7 @@ class DashboardServer(WebThread):
             raise web.HTTPBadRequest(text='the body must be {"direction": "x"} or {"direction": "y"}') from None
         test = self._tests.get(key)
         if test is None or not test.running:
-            self._tests[key] = LiveTest(folder, wish.direction)
+            self._tests[key] = LiveTest(folder, wish.direction, resume=wish.resume)
         return web.json_response({"url": f"/tap/{quote(key)}/"})
 
     async def _write_report(self, request: web.Request) -> web.Response:
@@ -116,6 +132,13 @@ class DashboardServer(WebThread):
             raise web.HTTPNotFound(text="this report is gone; open it from the list of machines")
         self.door.trust(request)
         return web.Response(text=html, content_type="text/html", headers={"Content-Security-Policy": REPORT_POLICY})
+
+
+def _interrupted(folder: MachineFolder) -> dict[str, int]:
+    try:
+        return interrupted_tests(MachineFolder(folder.path))
+    except (OSError, ValueError):
+        return {}  # the row says what is wrong
 
 
 def _render(folder: MachineFolder) -> str:

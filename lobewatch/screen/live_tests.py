@@ -15,11 +15,11 @@ from lobewatch.tap.state import TapState, Word
 class LiveTest:
     """A tap test that runs in a thread of its own from the beginning on."""
 
-    def __init__(self, folder: MachineFolder, direction: TapDirection) -> None:
-        """Begin; DataError where machine.toml names no port."""
+    def __init__(self, folder: MachineFolder, direction: TapDirection, *, resume: bool = True) -> None:
+        """Begin, or go on with an interrupted test; DataError where machine.toml names no port."""
         if not folder.machine.daq.port:
             raise DataError(f"{folder.toml}: no port in [daq]; write port there, as lobewatch tap --port takes it")
-        self._session = plan_session(folder, direction=direction)
+        self._session = plan_session(folder, direction=direction, resume=resume)
         self._end: TapState | None = None
         self._thread = threading.Thread(target=self._run, name="tap test", daemon=True)
         self._thread.start()

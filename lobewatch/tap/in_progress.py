@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import dataclass, field, replace
-from datetime import timedelta
 from pathlib import Path
 
 from acquisition import (
@@ -21,13 +20,11 @@ from acquisition import (
     write_hit,
 )
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.spool import SpooledHit, spooled_hits, spooled_trigger, tidy_spool, write_set_up
+from lobewatch.tap.spool import RESUMABLE, SpooledHit, spooled_hits, spooled_trigger, tidy_spool, write_set_up
 from lobewatch.tap.state import TakenHit
 
 RESERVE_BYTES = 50_000_000
 """Free disk space needed before the trigger is armed."""
-RESUMABLE = timedelta(hours=12)
-"""An interrupted test older than this is not gone on with."""
 
 
 @dataclass

@@ -10,13 +10,17 @@ import json
 import zlib
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from acquisition import Circumstances, Hit, HitFlags, Trigger, atomic_write, read_tap_hits
 from acquisition.files.seal import is_sealed
 from acquisition.files.tap_file import read_hit_name
 from lobewatch.machine.archive.doubtful import has_whole_hits
+from lobewatch.machine.folder import MachineFolder
 
+RESUMABLE = timedelta(hours=12)
+"""An interrupted test older than this is not gone on with."""
 SETUP = "setup.json"
 """File with the trigger of a test."""
 
@@ -46,6 +50,19 @@ def spooled_hits(folder: Path, damaged: list[Path]) -> Iterator[SpooledHit]:
             damaged.append(_set_aside(path))
         else:
             yield found
+
+
+def interrupted_tests(folder: MachineFolder) -> dict[str, int]:
+    """Hits on the disk of interrupted tests of the tool of machine.toml that START would go on with, by direction."""
+    found: dict[str, int] = {}
+    for path in sorted(folder.spool.iterdir()) if folder.spool.is_dir() else []:
+        files = sorted(path.glob("[0-9]*.h5"))
+        first = next(filter(None, map(_read, files)), None)
+        if first is None or first.circumstances.tool != folder.machine.tap.tool:
+            continue
+        if datetime.now(UTC) - first.circumstances.created < RESUMABLE and path.name not in folder.committed:
+            found[first.circumstances.direction] = len(files)
+    return found
 
 
 def write_set_up(folder: Path, trigger: Trigger) -> None:

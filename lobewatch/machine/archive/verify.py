@@ -112,7 +112,8 @@ def _about_taps(
 ) -> Iterator[Remark]:
     contents, without = {entry.sha256: entry for entry in committed.values()}, given_up(reading)
     files = tap_files(folder)
-    extra = [path for name, path in files.items() if name not in committed]
+    late = listed(Journal(folder).read())  # what another program has committed meanwhile
+    extra = [path for name, path in files.items() if name not in committed and name not in late]
     if not reading.lines and not reading.damage and extra:
         yield no_journal(folder, len(extra))
     for name, fault in wrong.items():
@@ -136,6 +137,11 @@ def _about_extra(folder: Path, path: Path, other: TapEntry | None, is_needed: bo
         return unlisted(path, "no whole tap file, and not in the journal", f"{mend} puts it out of the way")
     if entry.id != path.stem:
         return unlisted(path, f"it is tap test {entry.id}", f"{mend} gives it its name and takes it in")
+    if is_explained(folder, entry):
+        cure = f"{command('verify', folder)} enters it where nobody else writes"
+        return Remark(
+            "not-entered", f"taps/{path.name}", "not entered in the journal by the program that wrote it", cure
+        )
     cure = f"take it out of taps/ where it does not belong here, else {mend} takes it in"
     return unlisted(path, "a whole tap file that is not in the journal", cure)
 

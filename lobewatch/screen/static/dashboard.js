@@ -53,6 +53,12 @@ function row(machine, mayAlter) {
     if (mayAlter) button.addEventListener("click", ({ target }) => go(target, `${path}/start`, { direction: target.dataset.direction }));
     else button.addEventListener("click", () => location.assign(`/tap/${encodeURIComponent(machine.key)}/`));
   }
+  for (const [direction, count] of Object.entries(machine.running || !mayAlter ? {} : machine.interrupted)) {
+    const anew = Object.assign(document.createElement("button"), { type: "button", className: "anew", textContent: `Begin ${direction} anew` });
+    anew.addEventListener("click", () => go(anew, `${path}/start`, { direction, resume: false }));
+    item.querySelector(`.start[data-direction=${direction}]`).after(anew);
+    part("next").append(` An interrupted test in ${direction} has ${count} hit${count === 1 ? "" : "s"}: START ${direction} goes on with it.`);
+  }
   return item;
 }
 

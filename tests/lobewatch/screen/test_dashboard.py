@@ -18,7 +18,16 @@ import aiohttp
 import numpy as np
 import pytest
 
-from acquisition import Circumstances, DataError, TapDirection, TapsEmulator, TapsSource
+from acquisition import (
+    Circumstances,
+    DataError,
+    Hit,
+    HitFlags,
+    TapDirection,
+    TapsEmulator,
+    TapsSource,
+    write_hit,
+)
 from lobewatch.analysis import Logbook
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
@@ -111,6 +120,43 @@ def test_one_direction_warns_of_programs_by_name_and_both_are_good(tmp_path: Pat
     assert alone.next_step.startswith("Tap direction y of the same tool too")
     tap(folder, NEW, DAY + timedelta(hours=1), "y")
     assert Logbook.open(folder.path).standing(DAY).light == "good"
+
+
+def test_what_is_damaged_is_found_in_the_background(tmp_path: Path) -> None:
+    folder = machine(tmp_path / "mill")
+    tap(folder, NEW, DAY)
+    (folder.path / "daq.json").write_text("no devices")
+    with DashboardServer(folder.path) as server:
+        for _ in range(100):
+            (row,) = ask(server, "GET", "/machines")[1]["machines"]
+            if "daq.json" in row["note"]:
+                break
+            time.sleep(0.1)
+    assert (row["light"], "daq.json: " in row["note"]) == ("warn", True)
+
+
+def test_an_interrupted_test_is_gone_on_with_or_begun_anew(tmp_path: Path) -> None:
+    folder = machine(tmp_path / "mill", hits=3)
+    with hammered(folder) as device:
+        toml = folder.toml.read_text("utf-8").replace("[daq]", f'[daq]\nport = "{device.port}"')
+        folder.toml.write_text(toml, "utf-8")
+        about = Circumstances("mill", datetime.now(UTC), "reference", "y")
+        spool = folder.spool / "earlier"
+        spool.mkdir(parents=True)
+        pulse = np.exp(-((np.arange(1000) / 30 - 5) ** 2))
+        write_hit(spool / "0000.h5", Hit(500 * pulse, 100 * pulse, 25600.0), about, HitFlags.OK)
+        with DashboardServer(folder.path) as server:
+            (row,) = ask(server, "GET", "/machines")[1]["machines"]
+            assert row["interrupted"] == {"y": 1}
+            ask(server, "POST", "/machines/mill/start", {"direction": "y", "resume": False})
+            for _ in range(300):
+                (row,) = ask(server, "GET", "/machines")[1]["machines"]
+                if row["last_tap"]:
+                    break
+                time.sleep(0.1)
+    (entry,) = MachineFolder(folder.path).taps()
+    assert entry.id != "earlier"
+    assert (spool / "0000.h5").is_file()
 
 
 def test_overdue_is_never_good(shop: Path) -> None:

@@ -23,6 +23,7 @@ from lobewatch.analysis.questions.asked import answered
 from lobewatch.analysis.recordings import Stored, store_recordings
 from lobewatch.analysis.standing import Standing, stand
 from lobewatch.machine import Machine, MachineFolder, TapEntry
+from lobewatch.machine.archive.verify import enter_explained
 
 
 class Logbook:
@@ -95,6 +96,7 @@ class Logbook:
     ) -> Stored:
         """Store recorded files, each once; all are read and judged before the first one is stored."""
         with self.folder.locked():
+            enter_explained(self.folder)  # else what an interrupted replay has stored would be stored twice
             stored = store_recordings(self.folder, files, date, tool, direction)
             self._forget()
         return stored

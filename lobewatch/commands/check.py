@@ -34,7 +34,7 @@ def check(
     from acquisition import DataError
     from lobewatch.analysis import Logbook
     from lobewatch.show.advice import Advised, advised, advised_json, advised_lines, advised_table, counts, summary
-    from lobewatch.show.measurements import remark_lines
+    from lobewatch.show.measurements import remark_json, remark_lines
     from lobewatch.show.programs.doubts import reading_lines
     from lobewatch.show.verdicts import is_safe
 
@@ -50,7 +50,11 @@ def check(
             told = True
         programs.append(advised(logbook, verdict))
     emit(
-        {"programs": [advised_json(one) for one in programs], **counts(programs)},
+        {
+            "programs": [advised_json(one) for one in programs],
+            **counts(programs),
+            "remarks": [remark_json(remark) for remark in logbook.remarks],
+        },
         as_json,
         advised_table(programs),
         *(line for one in programs for line in advised_lines(one, logbook.machine.speed)),

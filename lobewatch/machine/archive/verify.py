@@ -74,8 +74,8 @@ def verify(path: Path) -> Verified:
         )
         return Verified((Remark("file-damaged", "machine.toml", "is missing beside tap tests", cure),), (), 0)
     folder = MachineFolder(path)
-    journal = Journal(path)
-    adopted = _adopt(folder, journal)
+    journal = folder.journal
+    adopted = enter_explained(folder)
     reading = journal.read()
     committed = listed(reading)
     wrong = {name: fault for name, entry in committed.items() if (fault := fault_of(path, entry))}
@@ -91,9 +91,12 @@ def verify(path: Path) -> Verified:
     return Verified(tuple(remarks), tuple(adopted), len(committed) - len(wrong))
 
 
-def _adopt(folder: MachineFolder, journal: Journal) -> list[str]:
-    """Enter what an ended program has not; nothing where another one writes, or the folder cannot be written."""
-    adopted: list[str] = []
+def enter_explained(folder: MachineFolder) -> list[str]:
+    """Enter in the journal what an ended program has stored and not entered: its files.
+
+    Nothing where another program writes, the journal is damaged, or the folder cannot be written.
+    """
+    journal, adopted = folder.journal, list[str]()
     try:
         with folder.locked():
             committed = set(listed(journal.read()))

@@ -210,3 +210,12 @@ def test_no_other_tool_is_predicted_from_a_test_in_question(shop: Shop) -> None:
     sure = shop.logbook.calibrated.tap_id
     shop.tap(30, 1713.0 * 0.8)
     assert shop.logbook.calibrated.tap_id == sure
+
+
+def test_what_an_ended_replay_has_stored_is_not_stored_twice(shop: Shop, beam: Path) -> None:
+    CliRunner().invoke(app, ["replay", str(shop.path), str(beam)])
+    for name in ("journal.jsonl", "journal.copy.jsonl"):
+        (shop.path / name).unlink()
+    said = CliRunner().invoke(app, ["replay", str(shop.path), str(beam)])
+    assert said.exit_code == 0
+    assert len(list((shop.path / "taps").iterdir())) == len(shop.folder.taps()) == 1

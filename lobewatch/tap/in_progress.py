@@ -130,12 +130,23 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
             f"{folder.path}: {free / 1e6:.0f} MB free on this disk; a tap test needs {RESERVE_BYTES / 1e6:.0f} MB"
         )
     tidy_spool(folder.spool)
+    _remove_committed(folder)
     damaged, left = list[Path](), list[str]()
     found = _interrupted(folder, circumstances, resume, damaged, left)
     tap_id = new_tap_id(circumstances)
     tap = found or TapInProgress(tap_id, circumstances, folder.spool / tap_id)
     tap.damaged, tap.left = damaged, left
     return tap
+
+
+def _remove_committed(folder: MachineFolder) -> None:
+    """Hits that an ended program has left behind though their tap test is committed; kept where its file is damaged."""
+    begun = [path for path in folder.spool.iterdir() if path.is_dir()] if folder.spool.is_dir() else []
+    if begun:
+        stored = {entry.id for entry in folder.taps()}
+        for path in begun:
+            if path.name in stored:
+                shutil.rmtree(path, ignore_errors=True)
 
 
 def _interrupted(

@@ -59,11 +59,11 @@ class UsableTaps:
         raise DataError(f"{self._folder.path}: no tap test{which} yet; {cure}")
 
     def doubts(self, tool: str = "") -> tuple[Remark, ...]:
-        """Damaged ones (of a tool; "": of any) that are newer than all of their tool that can be used."""
-        known = {place.entry.tool: _time(place.entry) for place in self.places}
+        """Damaged ones (of a tool; "": of any) that are newer than all of their series that can be used."""
+        known = {_series(place.entry): _time(place.entry) for place in self.places}
         lost = [*self._all.lost, *(entry for entry, _ in self._left_out.values())]
-        newer = [one for one in lost if tool in ("", one.tool) and _time(one) > known.get(one.tool, BEFORE_ALL)]
-        text = "newer than all of its tool that can be used, but its file is damaged"
+        newer = [one for one in lost if tool in ("", one.tool) and _time(one) > known.get(_series(one), BEFORE_ALL)]
+        text = "newer than all of its tool and direction that can be used, but its file is damaged"
         return tuple(Remark("newest-damaged", f"tap test {one.id}", text, "tap again") for one in newer)
 
     def from_the_rest(self, work: Callable[[], Result], forget: Callable[[], None]) -> Result:
@@ -96,6 +96,10 @@ class UsableTaps:
         if self._contents is None:
             self._contents = self._folder.contents()
         return self._contents
+
+
+def _series(entry: TapEntry) -> tuple[str, str]:
+    return entry.tool, entry.direction
 
 
 def _time(entry: TapEntry) -> datetime:

@@ -203,6 +203,18 @@ def test_half_written_files_and_empty_folders_are_removed(interrupted: Path, ope
     assert sorted(path.suffix for path in interrupted.iterdir()) == [".h5"] * 4 + [".json"]
 
 
+def test_hits_of_a_committed_test_are_removed(
+    interrupted: Path, open_folder: MachineFolder, go_on: Callable[[], TapSession]
+) -> None:
+    kept = {path.name: path.read_bytes() for path in interrupted.iterdir()}
+    go_on().run()
+    interrupted.mkdir()
+    for name, content in kept.items():
+        (interrupted / name).write_bytes(content)
+    assert begun_again(open_folder).hits == []
+    assert not interrupted.exists()
+
+
 def resumed(spool: Path, folder: MachineFolder, seed: int) -> bool:
     """Whether a test with one bit flipped or one end cut off somewhere goes on with all that is sound."""
     chance = random.Random(seed)

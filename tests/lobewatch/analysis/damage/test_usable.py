@@ -64,6 +64,11 @@ def test_an_old_one_is_left_out_and_said(tapped: Shop) -> None:
 
 
 def test_without_the_newest_nothing_is_stable_until_it_is_tapped_again(tapped: Shop) -> None:
+    older = file_of(tapped, -2)
+    content = older.read_bytes()
+    flip(older)
+    assert [one.word for one in tapped.logbook.verdicts()] == [Word.DOUBTFUL]
+    older.write_bytes(content)
     bad = file_of(tapped, -1)
     assert run("check", tapped.path).exit_code == 0
     content = bad.read_bytes()

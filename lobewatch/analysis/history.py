@@ -44,6 +44,8 @@ class Row:
     """What was in the spindle."""
     direction: str
     """Direction at the tool tip, "x" or "y"."""
+    baseline: datetime | None = None
+    """The event before it from which on all comparing begins anew."""
     frequency: Estimate = UNKNOWN
     """Of the mode followed (Hz)."""
     damping_ratio: Estimate = UNKNOWN
@@ -93,10 +95,17 @@ class History:
     """Common speeds of the depths (rpm), shape (n,)."""
     rows: tuple[Row, ...]
     """One a measurement."""
+    baseline: datetime | None = None
+    """The newest event from which on all comparing begins anew."""
+
+    @property
+    def current(self) -> list[Row]:
+        """Those since the baseline."""
+        return [row for row in self.rows if row.baseline == self.baseline]
 
     def series(self, tool: str, direction: str) -> list[Row]:
-        """Rows of one tool and direction, oldest first."""
-        return [row for row in self.rows if (row.tool, row.direction) == (tool, direction)]
+        """Rows of one tool and direction since the baseline, oldest first."""
+        return [row for row in self.current if (row.tool, row.direction) == (tool, direction)]
 
 
 def empty_history(machine: Machine) -> History:
@@ -110,7 +119,9 @@ def without_last_word(history: History) -> History:
     return replace(history, rows=(*before, replace(last, rulings=None)))
 
 
-def row_of(m: Measurement, lobes: Mapping[str, StabilityLobes], remarks: Sequence[Remark]) -> Row:
+def row_of(
+    m: Measurement, lobes: Mapping[str, StabilityLobes], remarks: Sequence[Remark], baseline: datetime | None = None
+) -> Row:
     """A measurement as a row, with the diagrams and remarks of the assembly as it was then."""
     modes = [(one.frequency, one.damping_ratio, one.stiffness, one.phase_deg) for one in m.modes[:MAX_MODES]]
     frequency, damping_ratio, stiffness, phase = _of_mode(m.followed)
@@ -120,6 +131,7 @@ def row_of(m: Measurement, lobes: Mapping[str, StabilityLobes], remarks: Sequenc
         time=m.time,
         tool=m.tool,
         direction=m.direction,
+        baseline=baseline,
         frequency=frequency,
         damping_ratio=damping_ratio,
         stiffness=stiffness,
@@ -158,6 +170,7 @@ def to_columns(history: History, machine: Machine) -> SldHistory:
     rows, programs = history.rows, [program.name for program in machine.program]
     columns: dict[str, Any] = {name: _texts(getattr(row, name) for row in rows) for name in ("tap_id", "tool")}
     columns["time"] = _texts(row.time.isoformat() for row in rows)
+    columns["baseline"] = _texts(row.baseline.isoformat() if row.baseline else "" for row in rows)
     columns["direction"] = _texts(row.direction for row in rows)
     columns["notes"] = _texts("\n".join(map(str, row.remarks)) for row in rows)
     columns["remarks"] = _texts(_as_json([asdict(one) for one in row.remarks]) for row in rows)
@@ -193,7 +206,7 @@ def _row(stored: SldHistory, i: int, programs: Sequence[str]) -> Row:
     columns = stored.columns
     number = {name: float(columns[name][i]) for name in (*ESTIMATES, *MODELLED)}
     known = {name: Estimate(number[name], float(columns[f"{name}_std"][i])) for name in ESTIMATES}
-    text = {name: str(columns[name][i]) for name in ("tap_id", "time", "tool", "direction", "remarks")}
+    text = {name: str(columns[name][i]) for name in ("tap_id", "time", "tool", "direction", "baseline", "remarks")}
     modes = np.stack([columns[name][i] for name in MODE_COLUMNS], axis=1)
     depth = {name: values[i] for name, values in stored.depth.items()}
     return Row(
@@ -201,6 +214,7 @@ def _row(stored: SldHistory, i: int, programs: Sequence[str]) -> Row:
         time=datetime.fromisoformat(text["time"]),
         tool=text["tool"],
         direction=text["direction"],
+        baseline=datetime.fromisoformat(text["baseline"]) if text["baseline"] else None,
         frequency=known["frequency"],
         damping_ratio=known["damping_ratio"],
         stiffness=known["stiffness"],

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from datetime import datetime
 from itertools import takewhile
 
 from acquisition import Remark
 from lobes import read_history, write_history
 from lobewatch.analysis.history import History, Row, empty_history, from_columns, to_columns
+from lobewatch.analysis.order import Place
 from lobewatch.analysis.questions.asked import accepted_codes
-from lobewatch.machine import BusyError, MachineFolder, TapEntry
+from lobewatch.machine import BusyError, MachineFolder
 
 
-def stored_history(folder: MachineFolder, taps: Sequence[TapEntry]) -> History:
-    """The stored rows of the oldest taps on, as far as they were made with these settings and this version."""
-    empty = empty_history(folder.machine)
+def stored_history(folder: MachineFolder, places: Sequence[Place], baseline: datetime | None) -> History:
+    """The stored rows of the oldest taps on, as far as they were made with these settings and this version.
+
+    baseline: the newest one.
+    """
+    empty = replace(empty_history(folder.machine), baseline=baseline)
     try:
         stored = read_history(folder.history)
         if (stored.settings_hash, stored.software) != (empty.settings_hash, empty.software):
@@ -23,13 +28,15 @@ def stored_history(folder: MachineFolder, taps: Sequence[TapEntry]) -> History:
         rows = from_columns(stored, folder.machine).rows
     except (ValueError, KeyError, IndexError, FileNotFoundError):
         return empty
-    pairs = zip(rows, taps, strict=False)
+    pairs = zip(rows, places, strict=False)
     return replace(empty, rows=tuple(row for row, _ in takewhile(lambda pair: _is_of(*pair), pairs)))
 
 
-def _is_of(row: Row, tap: TapEntry) -> bool:
-    """Whether a row was made of this tap test, with all that was accepted of it."""
-    return row.tap_id == tap.id and accepted_codes(row.remarks) == set(tap.accepted)
+def _is_of(row: Row, place: Place) -> bool:
+    """Whether a row was made of this tap test, with all that was accepted of it, since the same baseline."""
+    tap = place.entry
+    made = row.tap_id, row.baseline, accepted_codes(row.remarks)
+    return made == (tap.id, place.baseline, set(tap.accepted))
 
 
 def store_history(folder: MachineFolder, history: History) -> list[Remark]:

@@ -90,7 +90,7 @@ def _frfs(logbook: Logbook, assembly: Assembly) -> tuple[Frf, Frf]:
 
 def _predicted_frf(logbook: Logbook, assembly: Assembly, direction: str) -> Frf:
     """With the newest bearings that were found in this direction."""
-    rows = logbook.history.rows
+    rows = logbook.history.current
     newest = [row for row in rows if row.direction == direction and row.bearing_stiffness.is_known][-1]
     return model_frf(model_state(logbook.machine, logbook.measurement(newest.tap_id), assembly.tool))
 

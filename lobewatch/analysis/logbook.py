@@ -36,7 +36,9 @@ class Logbook:
     def __init__(self, folder: MachineFolder) -> None:
         """Nothing is read yet."""
         self.folder = folder
-        self._files, self._said = UsableTaps(folder), list[Remark]()
+        self.files = UsableTaps(folder)
+        """What the folder holds, and what was done to the machine."""
+        self._said: list[Remark] = []
         self._mark = folder.mark
         self._history: History | None = None
         self._measurements: dict[str, Measurement] = {}
@@ -55,7 +57,7 @@ class Logbook:
     @property
     def remarks(self) -> list[Remark]:
         """What is to be said of the files themselves."""
-        return [*self._files.remarks, *self._said]
+        return [*self.files.remarks, *self._said]
 
     @property
     def is_current(self) -> bool:
@@ -65,7 +67,7 @@ class Logbook:
     @property
     def taps(self) -> Sequence[TapEntry]:
         """The committed tap tests whose files can be used, oldest first by their time."""
-        return [place.entry for place in self._files.places]
+        return [place.entry for place in self.files.places]
 
     def series(self, tool: str, direction: str) -> list[TapEntry]:
         """Tap tests of one tool and direction, oldest first."""
@@ -73,7 +75,7 @@ class Logbook:
 
     def newest(self, tool: str | None = None) -> TapEntry:
         """The newest tap test, of a tool where one is named; DataError where there is none."""
-        return self._files.newest(tool)
+        return self.files.newest(tool)
 
     def commit(self, tap: TapTest) -> None:
         """Add a tap test; saved for good when this returns."""
@@ -89,6 +91,7 @@ class Logbook:
         trusted, with the reason.
         """
         (tap_id,) = self.replay_all([Path(file)], date, tool, direction).tap_ids
+        self.files.refuse_excluded(tap_id)
         return self.measurement(tap_id)
 
     def replay_all(
@@ -103,7 +106,7 @@ class Logbook:
 
     def measurement(self, tap_id: str) -> Measurement:
         """What a tap test says, worked out once; KeyError for a tap test that is not in the journal or is left out."""
-        return self._measured(self._files.place(tap_id), self.history.rows)
+        return self._measured(self.files.place(tap_id), self.history.rows)
 
     @property
     def history(self) -> History:
@@ -119,7 +122,7 @@ class Logbook:
 
     def first_assembly(self, now: Assembly) -> Assembly | None:
         """The earliest of the same tool that knows the same directions; None where that is itself or a prediction."""
-        return self.from_the_rest(lambda: first_like(now, self.taps, self.questions, self.assembly))
+        return self.from_the_rest(lambda: first_like(now, self.files.since(now.tap_id), self.questions, self.assembly))
 
     def verdicts(self, until: str | None = None, names: Collection[str] | None = None) -> list[Verdict]:
         """One a program (of these names), from the newest tap tests of its tool as they were after the test `until`."""
@@ -128,7 +131,7 @@ class Logbook:
     def _judged(self, until: str | None, names: Collection[str] | None) -> list[Verdict]:
         tables = [table for table in self.machine.program if names is None or table.name in names]
         rows = self.history.rows
-        until = rows[-1].tap_id if until is None and rows else until
+        until = rows[-1].tap_id if until is None and self.history.current else until
         judged = self._verdicts.setdefault(until, {})
         missing = [table for table in tables if table.name not in judged]
         known = {tool: self._known(tool, until) for tool in dict.fromkeys(table.tool for table in missing)}
@@ -137,14 +140,14 @@ class Logbook:
 
     def rulings(self, tap_id: str) -> Mapping[str, Ruling]:
         """Word and limit of every program as they were after a tap test; the history keeps them once asked for."""
-        number, rows = self._files.place(tap_id).number, list(self.history.rows)
+        number, rows = self.files.place(tap_id).number, list(self.history.rows)
         found = rows[number].rulings
         if found is None:
             found = {one.program.name: one.ruling for one in self.verdicts(tap_id)}
             rows[number] = replace(rows[number], rulings=found)
             self._history = replace(self.history, rows=tuple(rows))
             said = store_history(
-                self.folder, without_last_word(self._history) if self._files.doubts() else self._history
+                self.folder, without_last_word(self._history) if self.files.doubts() else self._history
             )
             self._said += [remark for remark in said if remark not in self._said]
         return found
@@ -163,7 +166,7 @@ class Logbook:
 
     def standing(self, now: datetime | None = None) -> Standing:
         """The light of the machine, the reasons, and one next step."""
-        return stand(self.machine, self.history, now or datetime.now(UTC), self.folder.path, self._files.remarks)
+        return stand(self.machine, self.history, now or datetime.now(UTC), self.folder.path, self.files.remarks)
 
     @property
     def questions(self) -> Mapping[str, tuple[str, ...]]:
@@ -180,16 +183,16 @@ class Logbook:
     @property
     def calibrated(self) -> Measurement | None:
         """The newest measurement that the bearings of the model could be found from; None where there is none."""
-        known = [row for row in self.history.rows if row.bearing_stiffness.is_known and not row.questions]
+        known = [row for row in self.history.current if row.bearing_stiffness.is_known and not row.questions]
         return self.measurement(known[-1].tap_id) if known else None
 
     def from_the_rest(self, work: Callable[[], Result]) -> Result:
         """What some work gives; where it meets a damaged tap file, all of it again without that."""
-        return self._files.from_the_rest(work, self._forget_results)
+        return self.files.from_the_rest(work, self._forget_results)
 
     def _forget(self) -> None:
         """What a new tap test alters."""
-        self._files.forget()
+        self.files.forget()
         self._forget_results()
         self._mark = self.folder.mark
 
@@ -212,16 +215,17 @@ class Logbook:
 
     def _up_to_date(self) -> History:
         """The stored rows as far as they still hold, and those that are missing."""
-        history = stored_history(self.folder, self.taps)
+        history = stored_history(self.folder, self.files.places, self.files.baseline)
         rows = list(history.rows)
-        for place in self._files.places[len(rows) :]:
+        for place in self.files.places[len(rows) :]:
             assembly = self._assembled(place, rows)
-            rows.append(row_of(self._measured(place, rows), lobes_of(assembly, self.machine), assembly.remarks))
+            lobes = lobes_of(assembly, self.machine)
+            rows.append(row_of(self._measured(place, rows), lobes, assembly.remarks, place.baseline))
         history = replace(history, rows=tuple(rows))
-        return without_last_word(history) if rows and self._files.doubts() else history
+        return without_last_word(history) if rows and self.files.doubts() else history
 
     def _assembly(self, tool: str | None, until: str | None) -> Assembly:
-        known = self._files.places if until is None else self._files.places[: self._files.place(until).number + 1]
+        known = self.files.until(until)
         if not known:
             self.newest(tool)
         tool, rows = known[-1].entry.tool if tool is None else tool, self.history.rows
@@ -230,18 +234,18 @@ class Logbook:
             found = self._assembled(newest, rows)
         else:
             found = predicted(self.machine, known, rows, lambda place: self._measured(place, rows), tool)
-        doubts = self._files.doubts("" if found.predicted else tool) if len(known) == len(self._files.places) else ()
+        doubts = self.files.doubts("" if found.predicted else tool) if known[-1] is self.files.places[-1] else ()
         return replace(found, questions=(*found.questions, *doubts))
 
     def _measured(self, place: Place, rows: Sequence[Row]) -> Measurement:
         """rows: the history before this tap test at least."""
         tap_id = place.entry.id
         if tap_id not in self._measurements:
-            before = (rows[number] for number in earlier(place, self._files.places))
+            before = (rows[number] for number in earlier(place, self.files.places))
             last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
             found = measure(self.folder.read(place.entry), self.machine, last)
             self._measurements[tap_id] = replace(found, remarks=answered(found.remarks, place.entry.accepted))
         return self._measurements[tap_id]
 
     def _assembled(self, place: Place, rows: Sequence[Row]) -> Assembly:
-        return tapped(place, self._files.places, rows, lambda one: self._measured(one, rows))
+        return tapped(place, self.files.places, rows, lambda one: self._measured(one, rows))

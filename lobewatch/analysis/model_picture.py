@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from acquisition import Frf
 from dsm import Modes, Spindle, WhirlMap, mode_shapes, natural_frequencies, stiffness_curve, whirl_map
+from lobewatch.analysis.assembling import NotTappedError
 from lobewatch.analysis.logbook import Logbook
 from lobewatch.analysis.model_state import POINTS, ModelState, first_critical_speed, model_frf, tap_position
 
@@ -72,11 +73,13 @@ def _curve(spindle: Spindle, mode: int) -> tuple[_Float, _Float]:
 
 
 def _points(logbook: Logbook, tool: str) -> tuple[_Float, _Float]:
-    mine = [row for row in logbook.history.rows if row.tool == tool and row.bearing_stiffness.is_known]
+    mine = [row for row in logbook.history.current if row.tool == tool and row.bearing_stiffness.is_known]
     points = np.array([(row.bearing_stiffness.value, row.frequency.value) for row in mine]).reshape(-1, 2)
     return points[:, 0], points[:, 1]
 
 
 def _measured_frf(logbook: Logbook, tool: str) -> Frf | None:
-    taps = [tap for tap in logbook.taps if tap.tool == tool]
-    return logbook.folder.read(taps[-1]).frf if taps else None
+    try:
+        return logbook.folder.read(logbook.newest(tool)).frf
+    except NotTappedError:
+        return None

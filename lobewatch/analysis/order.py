@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 
 from lobewatch.machine import TapEntry
 
@@ -20,15 +21,21 @@ class Place:
     """Place of the one before it of the same tool and direction."""
     other: int | None
     """Place of the newest one before it of the same tool in another direction."""
+    baseline: datetime | None = None
+    """The event before it from which on all comparing begins anew; nothing before that is built on."""
 
 
-def places(taps: Sequence[TapEntry]) -> list[Place]:
-    """taps: oldest first."""
+def places(taps: Sequence[TapEntry], baselines: Sequence[datetime] = ()) -> list[Place]:
+    """taps, baselines: oldest first."""
     newest: dict[tuple[str, str], int] = {}
-    found = []
+    found: list[Place] = []
     for i, tap in enumerate(taps):
+        time = datetime.fromisoformat(tap.time)
+        baseline = next((one for one in reversed(baselines) if one <= time), None)
+        if found and found[-1].baseline != baseline:
+            newest = {}
         others = [j for (tool, direction), j in newest.items() if tool == tap.tool and direction != tap.direction]
-        found.append(Place(i, tap, newest.get((tap.tool, tap.direction)), max(others, default=None)))
+        found.append(Place(i, tap, newest.get((tap.tool, tap.direction)), max(others, default=None), baseline))
         newest[tap.tool, tap.direction] = i
     return found
 

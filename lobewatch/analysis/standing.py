@@ -128,12 +128,13 @@ def stand(
 
     path: of the folder, for commands; files: what is wrong with those in it.
     """
-    rows = history.rows
+    rows = history.current
     if not rows and files:
         return unreadable("; ".join(map(str, files)))
     if not rows:
         cure = "Take the first tap test: all others are compared with it."
-        return _of([Remark("never-tapped", "", "no tap test yet", cure)])
+        since = "yet" if history.baseline is None else f"since the new baseline of {history.baseline:%Y-%m-%d}"
+        return _of([Remark("never-tapped", "", f"no tap test {since}", cure)])
     pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
     series = [_series(history.series(*pair), machine.limits) for pair in pairs]
     left = machine.machine.tap_interval_days - (now - rows[-1].time) / timedelta(days=1)

@@ -7,6 +7,10 @@ COMMANDS = {
     "sensors": "Hammer, accelerometer and DAQ: what they are, and whether they are right.",
     "tap": "The live tap test: hit until ten hits are good, then see what has changed.",
     "replay": "Recorded files through the same pipeline as a live test; each is stored once.",
+    "event": "Write down what was done to a machine; after a repair the following of the mode may begin anew.",
+    "exclude": "Take a tap test out of the series: all results are as if it had never been taken.",
+    "include": "Take a tap test back into the series that lobewatch exclude has taken out.",
+    "history": "All tap tests of a machine with what they say, those excluded, and what was done to it, oldest first.",
     "modes": "Natural frequency, damping ratio and stiffness from one recorded file.",
     "model": "The spindle model: modes, stiffness, critical speed; with another tool in it, predicted before it is "
     "tapped.",

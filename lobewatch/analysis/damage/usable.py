@@ -7,9 +7,12 @@ from datetime import UTC, datetime
 from typing import TypeVar
 
 from acquisition import DataError, Remark
+from lobewatch.analysis.assembling import NotTappedError
 from lobewatch.analysis.order import Place, places
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.archive.contents import Contents
+from lobewatch.machine.archive.journal import command
+from lobewatch.machine.corrections.event import Event
 
 Result = TypeVar("Result")
 BEFORE_ALL = datetime.min.replace(tzinfo=UTC)
@@ -30,7 +33,8 @@ class UsableTaps:
     def places(self) -> Sequence[Place]:
         """Those that can be used, oldest first by their time."""
         if self._places is None:
-            self._places = places([tap for tap in self._all.taps if tap.id not in self._left_out])
+            taps = [tap for tap in self._all.taps if tap.id not in self._left_out and not tap.excluded]
+            self._places = places(taps, self._all.baselines)
         return self._places
 
     def place(self, tap_id: str) -> Place:
@@ -40,28 +44,68 @@ class UsableTaps:
                 return place
         raise KeyError(tap_id)
 
+    def refuse_excluded(self, tap_id: str) -> None:
+        """DataError for one that a person has taken out."""
+        for tap in self.excluded:
+            if tap.id == tap_id:
+                cure = f"{command('include', self._folder.path)} {tap_id} takes it back"
+                raise DataError(f"{tap_id}: stored already, but excluded, for {tap.excluded!r}; {cure}")
+
+    def until(self, tap_id: str | None) -> list[Place]:
+        """Those up to one of them, since the baseline that counted then; None: up to now."""
+        last = None if tap_id is None else self.place(tap_id)
+        baseline = self.baseline if last is None else last.baseline
+        known = self.places if last is None else self.places[: last.number + 1]
+        return [place for place in known if place.baseline == baseline]
+
+    def since(self, tap_id: str) -> list[TapEntry]:
+        """Those that are compared with one of them."""
+        baseline = self.place(tap_id).baseline
+        return [place.entry for place in self.places if place.baseline == baseline]
+
     @property
     def remarks(self) -> list[Remark]:
         """What is wrong with the files, as far as it is known by now."""
         known = () if self._contents is None else self._contents.remarks
         return [*known, *(remark for _, remark in self._left_out.values())]
 
+    @property
+    def events(self) -> Sequence[Event]:
+        """What was done to the machine, oldest first."""
+        return self._all.events
+
+    @property
+    def excluded(self) -> Sequence[TapEntry]:
+        """Those that a person has taken out, oldest first."""
+        return [tap for tap in self._all.taps if tap.excluded]
+
+    @property
+    def baseline(self) -> datetime | None:
+        """The newest event from which on all comparing begins anew."""
+        return max(self._all.baselines, default=None)
+
     def newest(self, tool: str | None) -> TapEntry:
-        """The newest one, of a tool where one is named; DataError where there is none."""
-        found = [place.entry for place in self.places if tool in (None, place.entry.tool)]
+        """The newest one since the baseline, of a tool where one is named; NotTappedError where there is none."""
+        known = [place.entry for place in self.places if place.baseline == self.baseline]
+        found = [tap for tap in known if tool in (None, tap.tool)]
         if found:
             return found[-1]
         which = "" if tool is None else f" with tool {tool!r}"
         damaged = [str(remark) for remark in self.remarks]
         if damaged:
-            raise DataError(f"{self._folder.path}: no tap test{which} that can be used: {'; '.join(damaged)}")
+            raise NotTappedError(f"{self._folder.path}: no tap test{which} that can be used: {'; '.join(damaged)}")
         cure = "take one with lobewatch tap, or replay a recorded file"
-        raise DataError(f"{self._folder.path}: no tap test{which} yet; {cure}")
+        since = "yet" if self.baseline is None else f"since the new baseline of {self.baseline.astimezone():%Y-%m-%d}"
+        if self.excluded:
+            since += f", but {len(self.excluded)} excluded"
+            cure += f"; {command('include', self._folder.path)} TAP takes one back"
+        raise NotTappedError(f"{self._folder.path}: no tap test{which} {since}; {cure}")
 
     def doubts(self, tool: str = "") -> tuple[Remark, ...]:
         """Damaged ones (of a tool; "": of any) that are newer than all of their series that can be used."""
         known = {_series(place.entry): _time(place.entry) for place in self.places}
         lost = [*self._all.lost, *(entry for entry, _ in self._left_out.values())]
+        lost = [one for one in lost if not one.excluded and _time(one) >= (self.baseline or BEFORE_ALL)]
         newer = [one for one in lost if tool in ("", one.tool) and _time(one) > known.get(_series(one), BEFORE_ALL)]
         text = "newer than all of its tool and direction that can be used, but its file is damaged"
         return tuple(Remark("newest-damaged", f"tap test {one.id}", text, "tap again") for one in newer)

@@ -13,6 +13,8 @@ from acquisition import Remark
 from lobewatch.machine.archive.doubtful import read_doubtful
 from lobewatch.machine.archive.journal import JOURNAL, Reading, command, journal_damage
 from lobewatch.machine.archive.tap_entry import TapEntry
+from lobewatch.machine.corrections.event import Event, events_of
+from lobewatch.machine.corrections.exclusion import reasons_of
 
 PROVED_BYTES = 100_000_000
 """Tap files whose SHA-256 is compared whenever a machine is looked at, the newest first; lobewatch verify takes all."""
@@ -28,12 +30,20 @@ class Contents:
     """Committed ones that cannot be used, likewise."""
     remarks: tuple[Remark, ...]
     """What is wrong."""
+    events: tuple[Event, ...] = ()
+    """What was done to the machine, oldest first."""
+
+    @property
+    def baselines(self) -> list[datetime]:
+        """When all comparing began anew, oldest first."""
+        return [event.time for event in self.events if event.new_baseline]
 
 
 def contents_of(folder: Path, reading: Reading) -> Contents:
     """What the journal and taps/ say together; reading: of the journal."""
     committed = listed(reading)
     remarks, taps, lost = [*reading.damage], list[TapEntry](), list[TapEntry]()
+    events = events_of(reading.entries)
     files, without, proved = tap_files(folder), given_up(reading), 0
     for entry in sorted(committed.values(), key=_time, reverse=True):
         proved += entry.size
@@ -51,18 +61,20 @@ def contents_of(folder: Path, reading: Reading) -> Contents:
     else:
         cure = f"{command('verify', folder)} says what it is and what to do"
         remarks += [unlisted(path, "not in the journal, does not count", cure) for path in extra]
-    return Contents(tuple(sorted(taps, key=_time)), tuple(sorted(lost, key=_time)), tuple(remarks))
+    return Contents(tuple(sorted(taps, key=_time)), tuple(sorted(lost, key=_time)), tuple(remarks), events)
 
 
 def listed(reading: Reading) -> dict[str, TapEntry]:
     """The tap tests of the journal by identity."""
     accepted: dict[str, list[str]] = {}
-    for line in reading.entries:
+    entries = reading.entries
+    excluded = reasons_of(entries)
+    for line in entries:
         if line["kind"] == "accept":
             accepted.setdefault(line["tap"], []).append(line["code"])
     return {
-        line["id"]: TapEntry.from_line(line, tuple(accepted.get(line["id"], ())))
-        for line in reading.entries
+        line["id"]: TapEntry.from_line(line, tuple(accepted.get(line["id"], ())), excluded.get(line["id"], ""))
+        for line in entries
         if line["kind"] == "tap"
     }
 

@@ -9,6 +9,9 @@ from typing import Any, Self
 
 from acquisition import DataError, Remark, TapTest
 
+LATER = ("accepted", "excluded")
+"""What other lines of the journal say of a tap test."""
+
 
 class DamagedTapError(DataError):
     """The file of a committed tap test is missing, altered or unreadable."""
@@ -39,6 +42,8 @@ class TapEntry:
     """Of the recording it was replayed from; empty for a live test."""
     accepted: tuple[str, ...] = ()
     """Questions about it that a person has accepted, by code; lines of their own."""
+    excluded: str = ""
+    """Why a person has taken it out of the series; empty where it counts; lines of their own."""
 
     @classmethod
     def of(cls, tap: TapTest, content: bytes) -> Self:
@@ -49,15 +54,15 @@ class TapEntry:
         return cls(tap.id, digest, len(content), about.created.isoformat(), about.tool, about.direction, source)
 
     @classmethod
-    def from_line(cls, line: dict[str, Any], accepted: tuple[str, ...] = ()) -> Self:
+    def from_line(cls, line: dict[str, Any], accepted: tuple[str, ...] = (), excluded: str = "") -> Self:
         """From the line of the journal that `line` has made."""
-        named = {field.name: line[field.name] for field in fields(cls) if field.name != "accepted"}
-        return cls(**named, accepted=accepted)
+        named = {field.name: line[field.name] for field in fields(cls) if field.name not in LATER}
+        return cls(**named, accepted=accepted, excluded=excluded)
 
     @property
     def line(self) -> dict[str, Any]:
         """For the journal."""
-        told = {name: value for name, value in asdict(self).items() if name != "accepted"}
+        told = {name: value for name, value in asdict(self).items() if name not in LATER}
         return {"kind": "tap", **told}
 
     @property

@@ -1,0 +1,48 @@
+"""lobewatch event."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lobewatch.machine.named_folder import named_folder
+from lobewatch.show.output import Json, emit
+
+
+def event(
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    text: Annotated[str, typer.Argument(help="What was done; with --withdraw not needed.")] = "",
+    date: Annotated[datetime | None, typer.Option(help="When it was done, local time; now where not given.")] = None,
+    new_baseline: Annotated[
+        bool, typer.Option("--new-baseline", help="Compare tap tests from then on with none before it.")
+    ] = False,
+    withdraw: Annotated[str, typer.Option(help="Take back the event of this name; lobewatch history lists them.")] = "",
+    as_json: Json = False,
+) -> None:
+    """Write down what was done to a machine; after a repair the following of the mode may begin anew.
+
+    It is a line of the journal and stays there; --withdraw adds one that takes it back.
+
+    Examples:
+
+      lobewatch event mill-3 "bearings replaced" --date 2026-11-02 --new-baseline
+      lobewatch event mill-3 "coolant pump replaced" --date 2026-11-02T14:30:00
+      lobewatch event mill-3 --withdraw e2
+    """
+    from lobewatch.machine import MachineFolder
+    from lobewatch.machine.corrections.correct import add_event, withdraw_event
+    from lobewatch.show.history.describe_history import event_json, event_text
+
+    folder = MachineFolder(machine)
+    if withdraw and (text or date or new_baseline):
+        raise ValueError(f"--withdraw {withdraw}: takes neither TEXT nor --date nor --new-baseline; leave them out")
+    if withdraw:
+        gone = withdraw_event(folder, withdraw)
+        emit({"withdrawn": event_json(gone)}, as_json, f"withdrawn {event_text(gone)}")
+        return
+    found = add_event(folder, text, date, new_baseline)
+    next_step = ["tap next: all tests after it are compared with the first of them"] if new_baseline else []
+    emit({"event": event_json(found)}, as_json, f"saved {event_text(found)}", *next_step)

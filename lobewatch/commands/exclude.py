@@ -1,0 +1,34 @@
+"""lobewatch exclude."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lobewatch.machine.named_folder import named_folder
+from lobewatch.show.output import Json, emit
+
+
+def exclude(
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    tap: Annotated[str, typer.Argument(help="The tap test: its identity, its file, or a part that no other has.")],
+    reason: Annotated[str, typer.Option(help="Why it does not count.")],
+    as_json: Json = False,
+) -> None:
+    """Take a tap test out of the series: all results are as if it had never been taken.
+
+    Its file stays; lobewatch include takes it back.
+
+    Examples:
+
+      lobewatch exclude mill-3 20261102T0914 --reason "wrong tool in the spindle"
+    """
+    from lobewatch.machine import MachineFolder
+    from lobewatch.machine.corrections.correct import exclude as take_out
+
+    folder = MachineFolder(machine)
+    found = take_out(folder, tap, reason)
+    payload = {"excluded": found.id, "reason": reason}
+    emit(payload, as_json, f"excluded {found.id}", f"back with: lobewatch include {folder.path} {found.id}")

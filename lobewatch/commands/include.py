@@ -1,0 +1,29 @@
+"""lobewatch include."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lobewatch.machine.named_folder import named_folder
+from lobewatch.show.output import Json, emit
+
+
+def include(
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    tap: Annotated[str, typer.Argument(help="The tap test: its identity, its file, or a part that no other has.")],
+    as_json: Json = False,
+) -> None:
+    """Take a tap test back into the series that lobewatch exclude has taken out.
+
+    Examples:
+
+      lobewatch include mill-3 20261102T0914
+    """
+    from lobewatch.machine import MachineFolder
+    from lobewatch.machine.corrections.correct import include as take_back
+
+    found = take_back(MachineFolder(machine), tap)
+    emit({"included": found.id}, as_json, f"included {found.id}: it counts again")

@@ -1,0 +1,1 @@
+"""What has happened to a machine: tap tests, exclusions, events, as a table, CSV and JSON."""

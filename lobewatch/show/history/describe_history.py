@@ -1,0 +1,121 @@
+"""The history of a machine line by line: tap tests, those that do not count, and events."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from typing import Any
+
+from rich.cells import cell_len, set_cell_size
+
+from lobewatch.analysis import Logbook, Row
+from lobewatch.machine import TapEntry
+from lobewatch.machine.corrections.event import Event
+
+VALUES = {"frequency_hz": "frequency", "damping_ratio": "damping_ratio", "stiffness_n_per_m": "stiffness"}
+"""Field of a row by its name in CSV and JSON."""
+HEADINGS = ["time", "what", "tool", "in", "f_n (Hz)", "zeta (%)", "K (N/um)", "identity, programs and remarks"]
+COLUMNS = ("time", "kind", "id", "tool", "direction")
+
+
+def event_text(event: Event) -> str:
+    """For people."""
+    baseline = " (new baseline)" if event.new_baseline else ""
+    return f"{event.id}: {event.time.astimezone():%Y-%m-%d %H:%M} {event.text}{baseline}"
+
+
+def event_json(event: Event) -> dict[str, Any]:
+    """One event."""
+    named = {"id": event.id, "time": _utc(event.time), "text": event.text}
+    return {**named, "new_baseline": event.new_baseline}
+
+
+def history_json(logbook: Logbook) -> dict[str, Any]:
+    """All of it; an excluded tap test has no values."""
+    return {
+        "machine": logbook.machine.machine.name,
+        "taps": [_tap_json(row, logbook) for row in logbook.history.rows],
+        "excluded": [_excluded_json(tap) for tap in logbook.files.excluded],
+        "events": [event_json(event) for event in logbook.files.events],
+    }
+
+
+def history_csv(logbook: Logbook) -> str:
+    """A line for each tap test, excluded or not, and for each event, oldest first; headings on top."""
+    names = [program.name for program in logbook.machine.program]
+    values = [heading for name in VALUES for heading in (name, f"{name}_std")]
+    verdicts = {name: f"verdict: {name}" for name in names}
+    written = io.StringIO()
+    heads = [*COLUMNS, *values, "questions", *verdicts.values(), "reason", "text"]
+    writer = csv.DictWriter(written, heads, restval="", lineterminator="\n")
+    writer.writeheader()
+    for line in _lines(logbook):
+        told = {key: value for key, value in line.items() if key in heads}
+        told |= {verdicts[name]: word for name, word in line.get("verdicts", {}).items()}
+        told["questions"] = " ".join(line.get("questions", ()))
+        writer.writerow({key: _cell(value) for key, value in told.items()})
+    return written.getvalue()
+
+
+def history_lines(logbook: Logbook) -> list[str]:
+    """For people, in local time: a line for each tap test and event below the headings."""
+    rows = [HEADINGS, *(_cells(line) for line in _lines(logbook))]
+    widths = [max(map(cell_len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(map(set_cell_size, row, [*widths[:-1], cell_len(row[-1])])) for row in rows]
+
+
+def _cells(line: Mapping[str, Any]) -> list[str]:
+    when = f"{datetime.fromisoformat(line['time']).astimezone():%Y-%m-%d %H:%M}"
+    numbers = [_number(line, name, scale) for name, scale in zip(VALUES, (1.0, 0.01, 1e6), strict=True)]
+    return [when, line["kind"], line.get("tool", ""), line.get("direction", ""), *numbers, _said(line)]
+
+
+def _lines(logbook: Logbook) -> list[dict[str, Any]]:
+    """Tap tests, excluded ones and events, oldest first."""
+    found = history_json(logbook)
+    events = [one | {"kind": "new baseline" if one["new_baseline"] else "event"} for one in found["events"]]
+    excluded = [one | {"kind": "excluded"} for one in found["excluded"]]
+    return sorted([*events, *excluded, *(one | {"kind": "tap"} for one in found["taps"])], key=lambda one: one["time"])
+
+
+def _tap_json(row: Row, logbook: Logbook) -> dict[str, Any]:
+    found: dict[str, Any] = {"id": row.tap_id, "time": _utc(row.time), "tool": row.tool, "direction": row.direction}
+    for name, own in VALUES.items():
+        found[name], found[f"{name}_std"] = getattr(row, own)
+    found["baseline"] = None if row.baseline is None else _utc(row.baseline)
+    found["questions"] = [one.code for one in row.questions]
+    words = row.rulings or {}
+    found["verdicts"] = {p.name: words[p.name].word.value for p in logbook.machine.program if p.name in words}
+    return found
+
+
+def _excluded_json(tap: TapEntry) -> dict[str, Any]:
+    time = _utc(datetime.fromisoformat(tap.time))
+    return {"id": tap.id, "time": time, "tool": tap.tool, "direction": tap.direction, "reason": tap.excluded}
+
+
+def _utc(time: datetime) -> str:
+    """All alike, so that they sort as texts."""
+    return time.astimezone(UTC).isoformat(timespec="microseconds")
+
+
+def _cell(value: Any) -> Any:
+    return "" if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _number(line: Mapping[str, Any], name: str, scale: float) -> str:
+    value = line.get(name, math.nan)
+    return f"{value / scale:.5g}" if math.isfinite(value) else ""
+
+
+def _said(line: Mapping[str, Any]) -> str:
+    """Its text or reason, what is asked, and the verdicts of then; of a tap test the identity too."""
+    if line["kind"] in ("event", "new baseline"):
+        return f"{line['id']}: {line['text']}"
+    if line["kind"] == "excluded":
+        return f"{line['id']}: {line['reason']}"
+    words = [f"{name}: {word}" for name, word in line["verdicts"].items()]
+    return "; ".join([line["id"], *(f"question {code}" for code in line["questions"]), *words])

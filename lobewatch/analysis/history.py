@@ -16,9 +16,10 @@ from acquisition import Remark
 from dsm import Calibration
 from lobes import SldHistory, StabilityLobes
 from lobewatch.analysis.assembly import speed_grid
+from lobewatch.analysis.columns.ruling_columns import limits, rulings_of, words
 from lobewatch.analysis.estimate import UNKNOWN, Estimate
 from lobewatch.analysis.measurement import Measurement
-from lobewatch.analysis.programs.verdict import Ruling, Word
+from lobewatch.analysis.programs.verdict import Ruling
 from lobewatch.analysis.questions.asked import open_questions
 from lobewatch.machine import Machine
 from modal import Mode
@@ -183,8 +184,8 @@ def to_columns(history: History, machine: Machine) -> SldHistory:
         table[i, : len(row.modes)] = row.modes
     columns |= {name: table[:, :, k] for k, name in enumerate(MODE_COLUMNS)}
     if programs:
-        columns["program_limit"] = _numbers([_limits(row, programs) for row in rows], len(programs))
-        columns["program_verdict"] = _texts(_words(row, programs) for row in rows)
+        columns["program_limit"] = _numbers([limits(row.rulings, programs) for row in rows], len(programs))
+        columns["program_verdict"] = _texts(words(row.rulings, programs) for row in rows)
     nowhere = np.full(history.speed_rpm.size, np.nan)
     depth = {
         name: _numbers([row.depth.get(name, nowhere) for row in rows], history.speed_rpm.size)
@@ -225,7 +226,7 @@ def _row(stored: SldHistory, i: int, programs: Sequence[str]) -> Row:
         modes=modes[np.isfinite(modes[:, 0])],
         remarks=msgspec.json.decode(text["remarks"], type=tuple[Remark, ...]),
         depth={name: values for name, values in depth.items() if not np.isnan(values[0])},
-        rulings=_rulings(stored, i, programs),
+        rulings=rulings_of(stored, i, programs),
     )
 
 
@@ -239,23 +240,3 @@ def _numbers(values: Sequence[Any], *width: int) -> NDArray[np.float64]:
 
 def _as_json(value: Any) -> str:
     return msgspec.json.encode(value).decode()
-
-
-def _limits(row: Row, programs: Sequence[str]) -> list[float]:
-    return [row.rulings[name].limit if row.rulings else np.nan for name in programs]
-
-
-def _words(row: Row, programs: Sequence[str]) -> str:
-    """One word a program, a line each; empty where nobody has asked yet."""
-    return "\n".join(row.rulings[name].word for name in programs) if row.rulings else ""
-
-
-def _rulings(stored: SldHistory, i: int, programs: Sequence[str]) -> dict[str, Ruling] | None:
-    if not programs:
-        return {}
-    words = str(stored.columns["program_verdict"][i])
-    if not words:
-        return None
-    limits = stored.columns["program_limit"][i].tolist()
-    pairs = zip(programs, words.split("\n"), limits, strict=True)
-    return {name: Ruling(Word(word), limit) for name, word, limit in pairs}

@@ -1,0 +1,1 @@
+"""Columns of history.h5 that are more than a value a row."""

@@ -23,7 +23,7 @@ def history(
     Examples:
 
       lobewatch history mill-3
-      lobewatch history mill-3 --csv > mill-3.csv
+      lobewatch history mill-3 --csv
     """
     from lobewatch.analysis import Logbook
     from lobewatch.show.history.describe_history import history_csv, history_json, history_lines

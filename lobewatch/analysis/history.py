@@ -45,8 +45,6 @@ class Row:
     """What was in the spindle."""
     direction: str
     """Direction at the tool tip, "x" or "y"."""
-    baseline: datetime | None = None
-    """The event before it from which on all comparing begins anew."""
     frequency: Estimate = UNKNOWN
     """Of the mode followed (Hz)."""
     damping_ratio: Estimate = UNKNOWN
@@ -69,6 +67,8 @@ class Row:
     """Limiting depth by zero order over the speeds of the history (m), by name of the cut; a chart, no verdict."""
     rulings: Mapping[str, Ruling] | None = None
     """The word on every program with the machine as it was after this tap test; None where nobody has asked yet."""
+    baseline: datetime | None = None
+    """The event before it from which on all comparing begins anew."""
 
     @property
     def questions(self) -> tuple[Remark, ...]:

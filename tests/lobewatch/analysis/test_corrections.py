@@ -13,9 +13,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from acquisition import DataError
-from lobewatch.analysis import Logbook
-from lobewatch.analysis.logbook import measure
+from acquisition import DataError, TapTest
+from lobewatch.analysis import Logbook, Measurement, measure
 from lobewatch.cli import app
 from lobewatch.machine import MachineFolder
 from lobewatch.machine.corrections.correct import add_event, exclude, include, withdraw_event
@@ -67,10 +66,13 @@ def codes(shop: Shop, days: float) -> list[str]:
 def analysed(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Tap tests that bringing the history up to date analyses."""
     seen: list[str] = []
+
+    def counted(tap: TapTest, *others: Any) -> Measurement:
+        seen.append(tap.id)
+        return measure(tap, *others)
+
     with monkeypatch.context() as patch:
-        patch.setattr(
-            "lobewatch.analysis.logbook.measure", lambda tap, *rest: (seen.append(tap.id), measure(tap, *rest))[1]
-        )
+        patch.setattr("lobewatch.analysis.logbook.measure", counted)
         assert shop.logbook.history.rows
     return seen
 

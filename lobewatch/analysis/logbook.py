@@ -146,9 +146,8 @@ class Logbook:
             found = {one.program.name: one.ruling for one in self.verdicts(tap_id)}
             rows[number] = replace(rows[number], rulings=found)
             self._history = replace(self.history, rows=tuple(rows))
-            said = store_history(
-                self.folder, without_last_word(self._history) if self.files.doubts() else self._history
-            )
+            kept = without_last_word(self._history) if self.files.doubts() else self._history
+            said = store_history(self.folder, kept)
             self._said += [remark for remark in said if remark not in self._said]
         return found
 

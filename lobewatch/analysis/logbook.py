@@ -20,6 +20,7 @@ from lobewatch.analysis.programs.advice import Advice, advise
 from lobewatch.analysis.programs.verdict import Ruling, Verdict, judge
 from lobewatch.analysis.questions.accepting import accept
 from lobewatch.analysis.questions.asked import answered
+from lobewatch.analysis.questions.clock import clock_questions
 from lobewatch.analysis.recordings import Stored, store_recordings
 from lobewatch.analysis.standing import Standing, stand
 from lobewatch.machine import Machine, MachineFolder, TapEntry
@@ -77,9 +78,10 @@ class Logbook:
         """The newest tap test, of a tool where one is named; DataError where there is none."""
         return self.files.newest(tool)
 
-    def commit(self, tap: TapTest) -> None:
-        """Add a tap test; saved for good when this returns."""
-        self.folder.commit(tap)
+    def commit(self, tap: TapTest, now: datetime | None = None) -> None:
+        """Add a tap test; saved for good when this returns. now: of a live test, whose time is then asked about."""
+        taps = self.folder.taps() if now else ()
+        self.folder.commit(tap, clock_questions(tap.circumstances.created, now, taps) if now else ())
         self._forget()
 
     def replay(
@@ -243,7 +245,7 @@ class Logbook:
             before = (rows[number] for number in earlier(place, self.files.places))
             last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
             found = measure(self.folder.read(place.entry), self.machine, last)
-            self._measurements[tap_id] = replace(found, remarks=answered(found.remarks, place.entry.accepted))
+            self._measurements[tap_id] = replace(found, remarks=answered(found.remarks, place.entry))
         return self._measurements[tap_id]
 
     def _assembled(self, place: Place, rows: Sequence[Row]) -> Assembly:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 
 from acquisition import (
@@ -20,6 +20,7 @@ from acquisition import (
     recorded_as,
     tap_direction,
 )
+from lobewatch.analysis.questions.clock import is_ahead
 from lobewatch.machine import MachineFolder
 
 
@@ -60,14 +61,28 @@ def _circumstances(
     folder: MachineFolder, file: Path, date: datetime | None, tool: str, direction: str
 ) -> Circumstances:
     own, setup = recorded_as(file), folder.machine
+    created = _time_of(file, date, own.created)
     return replace(
         own,
         machine=setup.machine.name,
-        created=date.astimezone() if date else own.created,
+        created=created,
         tool=tool or own.tool or setup.tap.tool,
         direction=tap_direction(direction or own.direction),
         machine_toml=folder.toml.read_text("utf-8"),
     )
+
+
+def _time_of(file: Path, date: datetime | None, own: datetime) -> datetime:
+    """When it was recorded; ValueError for a time in the future, or one that no calendar of UTC has."""
+    try:
+        created = (date or own).astimezone()
+    except (OverflowError, ValueError, OSError) as error:
+        raise ValueError(f"{file}: recorded on {date or own}: out of range; give --date from year 2 on") from error
+    if is_ahead(created, datetime.now(UTC)):
+        raise ValueError(
+            f"{file}: recorded on {created:%Y-%m-%d}, in the future; give the day with --date, or set the clock right"
+        )
+    return created
 
 
 def _tap_test(file: Path, about: Circumstances, source: SourceFile) -> TapTest:

@@ -17,6 +17,7 @@ from acquisition import Remark
 from lobewatch.analysis.estimate import UNKNOWN, Estimate
 from lobewatch.analysis.history import History, Row
 from lobewatch.analysis.programs.verdict import Word
+from lobewatch.analysis.questions.clock import about_future
 from lobewatch.machine import Limits, Machine
 
 
@@ -46,6 +47,10 @@ LIGHTS = {
     "no-mode-in-band": Light.WARN,
     "no-mode-to-follow": Light.WARN,
     "other-band": Light.WARN,
+    "clock-behind": Light.WARN,
+    "clock-before-release": Light.WARN,
+    "clock-ahead": Light.WARN,
+    "tap-in-future": Light.WARN,
     "overdue": Light.WARN,
     "program-unknown": Light.WARN,
     "program-doubtful": Light.WARN,
@@ -141,7 +146,12 @@ def stand(
     remarks = [remark for one in series for remark in one.remarks]
     remarks += [_of_files(remark) for remark in files if remark.code in LIGHTS]
     remarks += [asked for row in rows for asked in _about_questions(row, path)]
-    remarks += [*_about_programs(rows, machine), *_about_dates(left), *_about_directions(rows)]
+    remarks += [
+        *_about_programs(rows, machine),
+        *_about_dates(left),
+        *about_future(rows[-1].tap_id, rows[-1].time, now, path),
+        *_about_directions(rows),
+    ]
     due = rows[-1].time + timedelta(days=math.floor(machine.machine.tap_interval_days))
     series.sort(key=lambda one: -one.fall.value if one.fall.is_known else math.inf)
     return _of(remarks, f"All is well: tap again by {due:%Y-%m-%d}.", tuple(series), rows[-1].time, left)

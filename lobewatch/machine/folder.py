@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cached_property
@@ -129,16 +129,17 @@ class MachineFolder:
             told = str(error).removeprefix(f"{path}: ")
             raise DamagedTapError(Remark("tap-unreadable", entry.file, told), entry, self.path) from error
 
-    def commit(self, tap: TapTest) -> None:
+    def commit(self, tap: TapTest, asked: Sequence[str] = ()) -> None:
         """Write the tap file, then its journal line; saved for good when this returns.
 
+        asked: what is asked about its time, by code.
         DataError, and nothing is written, where the journal is damaged.
         """
         self.refuse_damage()
         path = self.path / "taps" / f"{tap.id}.h5"
         path.parent.mkdir(exist_ok=True)
         content = write_tap(path, tap)
-        self.journal.append(TapEntry.of(tap, content).line)
+        self.journal.append(replace(TapEntry.of(tap, content), asked=tuple(asked)).line)
         shutil.rmtree(self.spool / tap.id, ignore_errors=True)
 
     def accept(self, tap_id: str, code: str) -> None:

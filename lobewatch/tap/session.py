@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import time
 from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
 
 from acquisition import Circumstances, DataError, Device, DeviceError, TapTest
 from lobewatch.analysis import Logbook, Measurement
@@ -112,7 +113,7 @@ class TapSession:
         self._publisher.show(word=Word.DONE, reason="The result is being worked out.", levels=None)
         tap = hits.tap.finish()
         logbook = Logbook(self._folder)
-        logbook.commit(tap)
+        logbook.commit(tap, datetime.now(UTC) if self._guided else None)
         try:
             logbook.accept([tap.id], self._accept)
             self._measurement = logbook.measurement(tap.id)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from acquisition import Frf, Remark
-from lobewatch.machine import Machine
+from lobewatch.analysis.questions.clock import CLOCK_QUESTIONS, about_clock
+from lobewatch.machine import Machine, TapEntry
 from modal import Mode
 
-QUESTIONS = ("frequency-jump", "no-mode-in-band", "other-band", "no-mode-to-follow")
+QUESTIONS = ("frequency-jump", "no-mode-in-band", "other-band", "no-mode-to-follow", *CLOCK_QUESTIONS)
 """Codes of the remarks that ask a person: until each is accepted the test sets no reference, and nothing is good."""
 LARGEST_JUMP = 0.15
 """Relative change of the frequency against the newest test of the series that is asked about, up or down."""
@@ -50,9 +51,10 @@ def other_band(frf: Frf, machine: Machine) -> Remark | None:
     return Remark("other-band", "", text)
 
 
-def answered(remarks: Iterable[Remark], accepted: Collection[str]) -> tuple[Remark, ...]:
-    """The remarks on a test with the questions that a person has accepted told as such, and the open ones left."""
-    remarks = tuple(remarks)
+def answered(remarks: Iterable[Remark], tap: TapEntry) -> tuple[Remark, ...]:
+    """The remarks on a test and on its time, with the questions that were accepted told as such, the open ones left."""
+    accepted = tap.accepted
+    remarks = (*remarks, *(about_clock(code, tap.time) for code in tap.asked))
     asked = {remark.code: str(remark) for remark in remarks}
     told = [Remark("accepted", code, asked.get(code, "asked no longer")) for code in accepted]
     return (*(remark for remark in remarks if remark.code not in accepted), *told)

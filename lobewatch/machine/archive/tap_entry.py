@@ -40,6 +40,8 @@ class TapEntry:
     """Direction at the tool tip, "x" or "y"."""
     source_sha256: str
     """Of the recording it was replayed from; empty for a live test."""
+    asked: tuple[str, ...] = ()
+    """What was asked about its time when it was committed, by code; lines of older versions have none."""
     accepted: tuple[str, ...] = ()
     """Questions about it that a person has accepted, by code; lines of their own."""
     excluded: str = ""
@@ -56,8 +58,8 @@ class TapEntry:
     @classmethod
     def from_line(cls, line: dict[str, Any], accepted: tuple[str, ...] = (), excluded: str = "") -> Self:
         """From the line of the journal that `line` has made."""
-        named = {field.name: line[field.name] for field in fields(cls) if field.name not in LATER}
-        return cls(**named, accepted=accepted, excluded=excluded)
+        named = {field.name: line[field.name] for field in fields(cls) if field.name not in (*LATER, "asked")}
+        return cls(**named, asked=tuple(line.get("asked", ())), accepted=accepted, excluded=excluded)
 
     @property
     def line(self) -> dict[str, Any]:

@@ -6,15 +6,18 @@ import errno
 import json
 import re
 from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
 from itertools import groupby
 from typing import Any
 
+import numpy as np
 import pytest
 
-from acquisition import Channel, DataError, HammeredStructure, write_hit
+from acquisition import Channel, Circumstances, DataError, HammeredStructure, TapTest, new_tap_id, write_hit
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.session import TapSession, TapStopped
 from lobewatch.tap.state import TapState, Word
+from modal import Mode, synthesize
 
 Tapper = Callable[..., HammeredStructure]
 Pair = tuple[Channel, Channel]
@@ -140,3 +143,18 @@ def test_there_is_no_measurement_before_the_end(
     session = session_of(folder, lambda: simulated(tapper(), channels))
     with pytest.raises(ValueError, match="not finished"):
         _ = session.measurement
+
+
+def test_a_clock_behind_the_newest_test_is_asked_about_and_accepted(
+    folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
+) -> None:
+    about = Circumstances("m", datetime.now(UTC) + timedelta(hours=1), "reference")
+    folder.commit(
+        TapTest(new_tap_id(about), about, synthesize([Mode(1713.0, 0.03, 3.5e7)], np.arange(4.0, 4000.0, 4.0)))
+    )
+    session = session_of(folder, lambda: simulated(tapper(), channels), accept=["clock-behind"])
+    tap = session.run()
+    assert folder.taps()[0].id == tap.id
+    assert folder.taps()[0].asked == ("clock-behind",)
+    told = [(remark.code, remark.about) for remark in session.measurement.remarks]
+    assert ("accepted", "clock-behind") in told

@@ -80,8 +80,7 @@ class Logbook:
 
     def commit(self, tap: TapTest, now: datetime | None = None) -> None:
         """Add a tap test; saved for good when this returns. now: of a live test, whose time is then asked about."""
-        taps = self.folder.taps() if now else ()
-        self.folder.commit(tap, clock_questions(tap.circumstances.created, now, taps) if now else ())
+        self.folder.commit(tap, clock_questions(tap.circumstances.created, now, self.folder.taps()))
         self._forget()
 
     def replay(
@@ -198,8 +197,7 @@ class Logbook:
         self._mark = self.folder.mark
 
     def _forget_results(self) -> None:
-        self._history = None
-        self._measurements, self._verdicts = {}, {}
+        self._history, self._measurements, self._verdicts = None, {}, {}
 
     def _known(self, tool: str, until: str | None) -> Assembly | NotTappedError:
         try:

@@ -6,7 +6,6 @@ The one place that says how far a frequency has fallen and what that calls for. 
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
@@ -17,6 +16,7 @@ from acquisition import Remark
 from lobewatch.analysis.estimate import UNKNOWN, Estimate
 from lobewatch.analysis.history import History, Row
 from lobewatch.analysis.programs.verdict import Word
+from lobewatch.analysis.questions.accepting import about_questions
 from lobewatch.analysis.questions.clock import about_future
 from lobewatch.machine import Limits, Machine
 
@@ -145,7 +145,7 @@ def stand(
     left = machine.machine.tap_interval_days - (now - rows[-1].time) / timedelta(days=1)
     remarks = [remark for one in series for remark in one.remarks]
     remarks += [_of_files(remark) for remark in files if remark.code in LIGHTS]
-    remarks += [asked for row in rows for asked in _about_questions(row, path)]
+    remarks += [asked for row in rows for asked in about_questions(row.tap_id, row.questions, path)]
     remarks += [
         *_about_programs(rows, machine),
         *_about_dates(left),
@@ -205,15 +205,6 @@ def _about_loss(name: str, newest: Row) -> Iterator[Remark]:
 def _of_files(remark: Remark) -> Remark:
     """With a cure that can be the next step."""
     return replace(remark, cure=f"{remark.about}: {remark.cure or remark.text}.")
-
-
-def _about_questions(row: Row, path: Path | str) -> Iterator[Remark]:
-    file = Path(path) / "taps" / f"{row.tap_id}.h5"
-    for asked in row.questions:
-        answer = shlex.join(["lobewatch", "replay", str(path), str(file), "--accept", asked.code])
-        text = f"{asked.text}; it sets no reference until you say that it is right: {answer}"
-        cure = f"Tap again; if this test is right, say so: {answer}"
-        yield Remark(asked.code, f"tap test {row.tap_id}", text, cure)
 
 
 def _about_fall(name: str, fall: Estimate, limits: Limits) -> Iterator[Remark]:

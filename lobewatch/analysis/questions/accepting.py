@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 
+from acquisition import Remark
 from lobewatch.analysis.questions.asked import checked_codes
 from lobewatch.machine import MachineFolder
 
@@ -21,3 +24,13 @@ def accept(
         folder.accept(tap_id, code)
     answered = {code for _, code in found}
     return [code for code in codes if code not in answered]
+
+
+def about_questions(tap_id: str, questions: Sequence[Remark], path: Path | str) -> Iterator[Remark]:
+    """What is asked of a tap test, with the command that answers; path: of the folder."""
+    file = Path(path) / "taps" / f"{tap_id}.h5"
+    for asked in questions:
+        answer = shlex.join(["lobewatch", "replay", str(path), str(file), "--accept", asked.code])
+        text = f"{asked.text}; it sets no reference until you say that it is right: {answer}"
+        cure = f"Tap again; if this test is right, say so: {answer}"
+        yield Remark(asked.code, f"tap test {tap_id}", text, cure)

@@ -20,8 +20,10 @@ FAR = timedelta(days=1)
 """A time farther ahead than any time zone accounts for."""
 
 
-def clock_questions(created: datetime, now: datetime, taps: Iterable[TapEntry]) -> tuple[str, ...]:
-    """What is asked of a live test of this time, by code; now: when it is committed; taps: those that count."""
+def clock_questions(created: datetime, now: datetime | None, taps: Iterable[TapEntry]) -> tuple[str, ...]:
+    """What is asked of a test of this time, by code; now: when a live one is committed, None for any other."""
+    if now is None:
+        return ()
     newest = max((datetime.fromisoformat(tap.time) for tap in taps if not tap.excluded), default=None)
     behind = newest is not None and (now < newest or created < newest - RESUMED)
     asked = {BEHIND: behind, TOO_OLD: created < RELEASED, AHEAD: is_ahead(created, now)}

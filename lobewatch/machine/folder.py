@@ -86,12 +86,18 @@ class MachineFolder:
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
-        """Keep other programs from writing here, once or several times over; BusyError where one already does."""
+        """Keep other programs from writing here, once or several times over; BusyError where one already does.
+
+        OSError where this folder can only be read.
+        """
         lock = self._lock
         try:
             lock.acquire()
         except Timeout as error:
             raise BusyError(f"{self.path}: another lobewatch is writing here; wait until it is done") from error
+        except OSError as error:
+            told = f"{error.strerror}: it can be read, not written; copy it to where you may write"
+            raise OSError(error.errno, told, str(self.path)) from error
         try:
             yield
         finally:

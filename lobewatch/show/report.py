@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import re
 from collections.abc import Sequence
 from importlib import resources
@@ -34,6 +35,8 @@ from lobewatch.show.programs.doubts import reading_lines
 from lobewatch.show.verdicts import WORDS, band_text, limit_text, margin_text, turning_text, verdict_text
 
 LIGHTS = {Light.ALARM: "✗ ALARM", Light.UNKNOWN: "? UNKNOWN", Light.WARN: "! WARNING", Light.GOOD: "✓ GOOD"}
+NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
+"""Errors of a folder that can only be read."""
 CHANGES = (
     ("frequency", "natural frequency (Hz)", 1.0),
     ("damping_ratio", "damping ratio (%)", 0.01),
@@ -62,7 +65,9 @@ def write_report(logbook: Logbook, path: Path | None = None, tool: str = "", dir
     path = path or logbook.folder.path / "report.html"
     try:
         atomic_write(path, html.encode())
-    except PermissionError as error:
+    except OSError as error:
+        if error.errno not in NOT_ALLOWED:
+            raise
         raise DataError(f"{path}: {error.strerror}; name another file with --out") from error
     return path
 

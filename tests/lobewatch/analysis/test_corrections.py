@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import json
+import os
 import shutil
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -260,3 +262,30 @@ def test_two_events_on_a_day_count_both_and_the_newest_baseline_holds(shop: Shop
     first, last = shop.logbook.history.rows
     assert (first.baseline, last.baseline) == (day(shop, -10), day(shop, 10))
     assert len(shop.logbook.files.events) == 3
+
+
+def test_a_folder_on_a_read_only_disk_is_reported_and_checked(
+    shop: Shop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mill(shop)
+    shop.tap_both()
+    own = os.open
+
+    def read_only(path: Any, flags: int, *others: Any, **more: Any) -> int:
+        if str(path).startswith(str(shop.path)) and flags & (os.O_WRONLY | os.O_RDWR):
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+        return own(path, flags, *others, **more)
+
+    def refuse(path: Path, _: bytes) -> None:
+        os.close(read_only(path, os.O_WRONLY | os.O_CREAT))
+
+    monkeypatch.setattr(os, "open", read_only)
+    monkeypatch.setattr("lobewatch.show.report.atomic_write", refuse)
+    with pytest.raises(DataError, match="name another file with --out"):
+        run("report", shop.path)
+    assert run("report", shop.path, "--out", tmp_path / "report.html").exit_code == 0
+    assert run("check", shop.path).exit_code in {0, 1}
+    assert run("history", shop.path).exit_code == 0
+    with pytest.raises(OSError, match="it can be read, not written"):
+        run("event", shop.path, "greased")
+    assert not shop.folder.history.exists()

@@ -52,7 +52,7 @@ def predicted(
 def first_like(
     now: Assembly, taps: Sequence[TapEntry], asked: Collection[str], assembly: Callable[[str, str], Assembly]
 ) -> Assembly | None:
-    """The earliest of the same tool that knows the same directions; None where that is itself or a prediction.
+    """The earliest of the same tool that knows the same directions; None where that is itself.
 
     asked: tap tests in question, which are no reference; assembly: of a tool after a tap test.
     """
@@ -60,7 +60,7 @@ def first_like(
     for tap in taps:
         if tap.id == now.tap_id:
             return None
-        if tap.tool != now.tool or now.predicted or tap.id in asked:
+        if tap.tool != now.tool or tap.id in asked:
             continue
         seen.add(tap.direction)
         if seen >= set(now.directions):

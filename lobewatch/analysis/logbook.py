@@ -123,8 +123,6 @@ class Logbook:
 
     def first_assembly(self, now: Assembly) -> Assembly | None:
         """The earliest of the same tool that knows the same directions; None where that is itself or a prediction."""
-        if now.predicted:
-            return None
         return self.from_the_rest(lambda: first_like(now, self.files.since(now.tap_id), self.questions, self.assembly))
 
     def verdicts(self, until: str | None = None, names: Collection[str] | None = None) -> list[Verdict]:

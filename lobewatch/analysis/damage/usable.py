@@ -59,9 +59,11 @@ class UsableTaps:
         return [place for place in known if place.baseline == baseline]
 
     def since(self, tap_id: str) -> list[TapEntry]:
-        """Those that are compared with one of them."""
-        baseline = self.place(tap_id).baseline
-        return [place.entry for place in self.places if place.baseline == baseline]
+        """Those that are compared with one of them; none with what is none of them, a prediction."""
+        baselines = {place.entry.id: place.baseline for place in self.places}
+        if tap_id not in baselines:
+            return []
+        return [place.entry for place in self.places if place.baseline == baselines[tap_id]]
 
     @property
     def remarks(self) -> list[Remark]:

@@ -264,7 +264,7 @@ def test_only_the_newest_row_pays_for_its_verdicts(path: Path, monkeypatch: pyte
     assert len(asked) == 3
     assert [row.rulings is None for row in rows] == [True] * 5 + [False]
     asked.clear()
-    assert Logbook.open(path).standing(START).light == "good"
+    assert Logbook.open(path).standing(START + timedelta(days=5)).light == "good"
     assert not asked
 
 

@@ -15,16 +15,12 @@ from modal.extraction import Extraction, FittedBand
 from modal.fit_peaks import LARGEST_ERROR
 from modal.fitting import LEAST_TERMS
 from modal.mode import Mode
-from modal.quality.trust import relative_error, trust_rules
+from modal.quality.trust import MISFIT, MISFIT_SHARE, relative_error, trust_rules
 
 LEAST_COHERENCE = 0.9
 """Mean coherence between the half-power points; below it the averaged hits disagree."""
 LARGEST_PHASE = 20.0
 """Of the modal constant, beyond what a delay between the channels gives all modes (degrees)."""
-LARGEST_MISFIT = 2.0
-"""rms of what the fit leaves over rms of the noise ..."""
-MISFIT_SHARE = 0.01
-"""... that matters where it is more than this share of the mode's own peak."""
 BENT = 0.005
 """Relative standard error of K above which a strong mode beside the band may have bent the fit by more than that."""
 MOST_LEFT = 0.02
@@ -126,7 +122,7 @@ def _on_its_values(band: FittedBand, i: int, mode: Mode, share: float) -> Iterat
     elif "uncertain" in dict(trust_rules(mode)):
         text = f"zeta or K uncertain by {100 * relative_error(mode):.0f} %"
         yield Remark("uncertain", at, text, "average more hits")
-    if mode.misfit is not None and mode.misfit > LARGEST_MISFIT and share > MISFIT_SHARE:
+    if mode.misfit is not None and mode.misfit > MISFIT and share > MISFIT_SHARE:
         yield Remark("misfit", at, f"the fit leaves {mode.misfit:.1f} times the noise, {100 * share:.0f} % of its peak")
     if width is not None and band.height.size == 1 and abs(width / mode.damping_ratio - 1) > LARGEST_DIFFERENCE:
         yield Remark("half-power-width", at, f"zeta from its half-power width is {100 * width:.2g} %")

@@ -1,4 +1,4 @@
-"""Modes by LSCF and weighted least squares: the default."""
+"""Modes by weighted least squares: the default."""
 
 from __future__ import annotations
 
@@ -25,13 +25,14 @@ UNKNOWN_PHASE = 90.0
 def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[Hit] = ()) -> list[Mode]:
     """Modes from the lines between band[0] and band[1] (Hz), by rising frequency, each with its covariance; maybe none.
 
-    Every resonance is fitted in a local band of some half-power widths, close ones together, from LSCF poles that
-    stay where they are as the order grows; those without a peak of their own are taken where the sum of squares asks
-    for them. Complex residual terms stand for what lies outside, and the tails of all other fitted modes are taken
-    off. A line counts by its random error (from a smoothed coherence), or equally in the measured quantity where
-    none is known; the covariance is scaled by the reduced chi-square. A peak is left out where least squares does
-    not converge to a mode inside its local band, or leaves its damping ratio or stiffness uncertain by more than a
-    third; `pick_peaks` may still list it. What else speaks against a mode stands in its `remarks`.
+    Every resonance is fitted in a local band of some half-power widths, close ones together, with complex modal
+    constants, which are real where Akaike's criterion allows; modes without a peak of their own are taken where the
+    sum of squares asks for them, from LSCF poles that stay where they are as the order grows. Complex residual terms
+    stand for what lies outside, and the tails of all other fitted modes are taken off. A line counts by its random
+    error (from a smoothed coherence), or equally in the measured quantity where none is known; the covariance is scaled
+    by the reduced chi-square. A peak is left out where least squares does not converge to a mode inside its local band,
+    or leaves its damping ratio or stiffness uncertain by more than a third; `pick_peaks` may still list it. What else
+    speaks against a mode stands in its `remarks`.
 
     hits: those that the FRF was averaged from (H1). Noise of the hammer is alike at neighbouring lines, so the fit does
     not see it: the covariance then has it from the baselines of the hits. With three or more the modes also have a
@@ -77,6 +78,7 @@ def _mode(fit: BandFit, i: int, covariance: Array, freedom: float, scatter: Arra
     over_hits = None if scatter is None else _of_one(scatter, fit, i)
     best = of_fit if over_hits is None else over_hits
     error = np.sqrt(np.diag(best))
+    error[3] = np.hypot(error[3], np.degrees(fit.unasked[0, i]))
     return Mode(
         float(fit.frequency[i]),
         float(fit.damping_ratio[i]),
@@ -86,7 +88,7 @@ def _mode(fit: BandFit, i: int, covariance: Array, freedom: float, scatter: Arra
         jackknife=None if over_hits is None else over_hits[:3, :3],
         n_hits=n_hits,
         phase_deg=float(np.degrees(np.angle(sign * constant))),
-        phase_deg_std=min(float(np.hypot(error[3], np.degrees(fit.unasked[0, i]))), UNKNOWN_PHASE),
+        phase_deg_std=min(float(error[3]), UNKNOWN_PHASE),
         phase_correlation=best[3, :3] / (error[3] * error[:3]),
         shape=_shape(fit.constant[:, i]),
     )

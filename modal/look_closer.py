@@ -18,7 +18,7 @@ BLOCKS = 48
 WHITE = 1.0
 """Standard deviations that their size may lie above what independent errors have."""
 HIDDEN_F = 40.0
-"""A mode without a peak of its own lowers the sum of squares by this many times what three unknowns do by chance."""
+"""A mode without a peak of its own lowers the sum of squares by this many times what its unknowns do by chance."""
 TERM_F = 6.0
 """A further residual term lowers it by this many times what two unknowns do by chance."""
 SPLIT = 0.35

@@ -68,7 +68,9 @@ def with_windowed_noise(mode: Mode, time_constant: float, record: float) -> Mode
     if mode.covariance is None:
         return mode
     factor = _widening(record / time_constant)
-    return replace(mode, covariance=mode.covariance * factor, freedom=mode.freedom / factor)
+    of_phase = mode.phase_deg_std * (np.sqrt(factor) if mode.jackknife is None else 1.0)
+    covariance, freedom = mode.covariance * factor, mode.freedom / factor
+    return replace(mode, covariance=covariance, freedom=freedom, phase_deg_std=float(of_phase))
 
 
 def _widening(a: float) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -40,13 +41,11 @@ def fit_band(
     p, m = receptance.shape[0], starts.shape[1]
     if 2 * m + p * (2 * m + 2 * terms) >= 2 * receptance.size or m == 0:
         return None
-    with np.errstate(all="ignore"):
-        try:
-            state = _solved(projected_band(frequency, receptance, weight, terms), starts, is_complex=True)
-            influence = None if state is None else _influence(state)
-        except np.linalg.LinAlgError:
-            return None
-    return None if state is None or influence is None else _fit_of(state, influence)
+    with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
+        state = _solved(projected_band(frequency, receptance, weight, terms), starts, is_complex=True)
+        influence = None if state is None else _influence(state)
+        return None if state is None or influence is None else _fit_of(state, influence)
+    return None
 
 
 def with_real_constants(fit: BandFit, frequency: Array, receptance: ComplexArray, weight: Array, terms: int) -> BandFit:
@@ -58,14 +57,14 @@ def with_real_constants(fit: BandFit, frequency: Array, receptance: ComplexArray
 
     Source: Akaike (1974), IEEE Trans. Automatic Control 19, 716.
     """
-    with np.errstate(all="ignore"):
+    allowed = AKAIKE * fit.constant.size * fit.sum_of_squares / fit.freedom
+    with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
         band = projected_band(frequency, receptance, weight, terms)
         state = _solved(band, _poles_of_real(fit), is_complex=False)
-    allowed = AKAIKE * fit.constant.size * fit.sum_of_squares / fit.freedom
-    if state is None or state.cost - fit.sum_of_squares > allowed:
-        return fit
-    across = fit.constant / state.constant
-    return replace(_fit_of(state, fit.influence), unasked=np.angle(across * np.sign(across.real)))
+        if state is not None and state.cost - fit.sum_of_squares <= allowed:
+            across = fit.constant / state.constant
+            return replace(_fit_of(state, fit.influence), unasked=np.angle(across * np.sign(across.real)))
+    return fit
 
 
 def _poles_of_real(fit: BandFit) -> Array:

@@ -110,3 +110,13 @@ def test_two_modes_a_percent_apart_with_opposite_phases() -> None:
             assert abs(mode.phase_deg - true.phase_deg) < 5 * mode.phase_deg_std
     else:
         assert any(remark.code == "several-modes" for remark in found[0].remarks)
+
+
+@pytest.mark.parametrize("phase", [0.0, 20.0])
+def test_errors_of_all_four_values_go_together(phase: float) -> None:
+    """A joint covariance of a mode that was found real holds, too: its phase is less certain, not more correlated."""
+    for seed in range(6):
+        for mode in fit_modes(measured(structure(phase, neighbour=True), seed)):
+            joint = mode.joint_covariance
+            assert np.all(np.linalg.eigvalsh(joint / np.outer(*2 * [np.sqrt(np.diag(joint))])) > 0)
+            assert joint[3, 3] == pytest.approx(mode.phase_deg_std**2)

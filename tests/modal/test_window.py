@@ -93,8 +93,9 @@ def test_a_window_cannot_begin_after_the_hit(delay: float) -> None:
 
 
 def test_noise_under_a_window_widens_the_errors_as_its_lines_are_alike() -> None:
-    base = Mode(1722.0, 0.03, 3.5e7, np.diag([0.2, 1e-4, 1e5]) ** 2, freedom=100)
+    base = Mode(1722.0, 0.03, 3.5e7, np.diag([0.2, 1e-4, 1e5]) ** 2, freedom=100, phase_deg_std=0.3)
     none, short = with_windowed_noise(base, 1e6, 0.25), with_windowed_noise(base, 0.01, 0.25)
     assert none.standard_error == pytest.approx(base.standard_error, rel=1e-6)
     assert short.standard_error == pytest.approx(5 * base.standard_error, rel=1e-6)
+    assert short.phase_deg_std == pytest.approx(5 * 0.3, rel=1e-6)
     assert short.freedom == pytest.approx(4)

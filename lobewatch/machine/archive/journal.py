@@ -15,6 +15,7 @@ import shlex
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,7 @@ class Reading:
     torn: bytes = b""
     """What a crash has left of a line in journal.jsonl; counts for nothing."""
 
-    @property
+    @cached_property
     def entries(self) -> list[Entry]:
         """The lines as JSON objects."""
         return [json.loads(line) for line in self.lines]

@@ -74,12 +74,11 @@ def make_environment(extras):
 
 
 def tests(arguments):
-    """Commands that run the tests under coverage and judge it."""
-    run = [PYTHON, "-m", "coverage", "run", "-m", "pytest"]
-    if "--long" in arguments:
-        arguments = ["-m", "long or not long", "--timeout", "3600"] + [a for a in arguments if a != "--long"]
-    whole = not [a for a in arguments if a.endswith(".py") or "::" in a or a == "-k"]
-    return [run + arguments] + ([[PYTHON, "-m", "coverage", "report"]] if whole else [])
+    """Command that runs the tests; all of them where none are chosen, on all cores, with their coverage judged."""
+    chosen = [argument for argument in arguments if argument != "--long"]
+    whole = [] if chosen else ["-n", "auto", "--dist", "loadfile", "--cov"]
+    every = ["-m", "long or not long", "--timeout", "3600"] if "--long" in arguments else []
+    return [PYTHON, "-m", "pytest"] + whole + every + chosen
 
 
 def main():
@@ -91,14 +90,11 @@ def main():
     make_environment("[dev]" if testing else "")
     if testing:
         os.chdir(ROOT)
-    commands = tests(arguments[1:]) if testing else [[PYTHON, "-m", "lobewatch.cli"] + arguments]
-    for command in commands:
-        try:
-            status = subprocess.call(command)
-        except KeyboardInterrupt:
-            status = 130
-        if status:
-            sys.exit(status)
+    command = tests(arguments[1:]) if testing else [PYTHON, "-m", "lobewatch.cli"] + arguments
+    try:
+        sys.exit(subprocess.call(command))
+    except KeyboardInterrupt:
+        sys.exit(130)
 
 
 if __name__ == "__main__":

@@ -124,8 +124,12 @@ def test_a_lock_that_does_not_fit_gives_way_to_what_pyproject_allows(
     [
         ([], ["lobewatch.cli", "demo"]),
         (["modes", "x.lvm"], ["lobewatch.cli", "modes", "x.lvm"]),
-        (["test"], ["coverage", "run", "-m", "pytest"]),
-        (["test", "--long"], ["coverage", "run", "-m", "pytest", "-m", "long or not long", "--timeout", "3600"]),
+        (["test"], ["pytest", "-n", "auto", "--dist", "loadfile", "--cov"]),
+        (
+            ["test", "--long"],
+            ["pytest", "-n", "auto", "--dist", "loadfile", "--cov", "-m", "long or not long", "--timeout", "3600"],
+        ),
+        (["test", "tests/dsm", "--long"], ["pytest", "-m", "long or not long", "--timeout", "3600", "tests/dsm"]),
     ],
 )
 def test_what_is_run_and_that_its_status_is_passed_on(

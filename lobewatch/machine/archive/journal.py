@@ -12,38 +12,21 @@ import hashlib
 import json
 import os
 import shlex
-import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+
+import msgspec
 
 from acquisition import DataError, Remark
 from acquisition.atomic import atomic_write, sync_folder
+from lobewatch.machine.archive.journal_text import Entry, JournalText, crc_of, scan
 
 JOURNAL = "journal.jsonl"
 COPY = "journal.copy.jsonl"
-Entry = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class _Text:
-    """One of the two files as it stands on the disk."""
-
-    there: bool
-    chain: tuple[bytes, ...] = ()
-    """Lines from the first on, each naming the one before, without their ends."""
-    whole: bytes = b""
-    """The bytes of these lines, with their ends."""
-    broken: int = 0
-    """Number of the first line that does not continue the chain; 0 where all do."""
-    ending: bytes = b"\n"
-    """How the last line of the chain ends."""
-    torn: bytes = b""
-    """What a crash has left of a line."""
-    loose: tuple[bytes, ...] = ()
-    """Sound lines behind a broken one."""
+BATCH = "batch"
+"""Key of the number of the first line that was written together with a line; where it was written alone, none."""
 
 
 @dataclass(frozen=True)
@@ -56,11 +39,14 @@ class Reading:
     """What is wrong with the files; until it is mended nothing is written."""
     torn: bytes = b""
     """What a crash has left of a line in journal.jsonl; counts for nothing."""
+    tidy: bool = False
+    """Whether both files hold just these lines."""
 
     @cached_property
     def entries(self) -> list[Entry]:
         """The lines as JSON objects."""
-        return [json.loads(line) for line in self.lines]
+        found: list[Entry] = msgspec.json.decode(b"[" + b",".join(self.lines) + b"]")
+        return found
 
 
 class Journal:
@@ -69,12 +55,12 @@ class Journal:
     def __init__(self, folder: Path) -> None:
         """Nothing is read yet."""
         self.path, self.copy = folder / JOURNAL, folder / COPY
-        self._known = _Text(there=False)
+        self._known = JournalText(there=False)
 
     def read(self) -> Reading:
         """All sound lines of both files, and what is wrong with these; neither need be there."""
-        journal = _scan(self.path, self._known)
-        copy = _scan(self.copy, journal)
+        journal = scan(self.path, self._known)
+        copy = scan(self.copy, journal)
         self._known = journal
         longer, shorter = sorted((journal.chain, copy.chain), key=len, reverse=True)
         if longer[: len(shorter)] != shorter:
@@ -82,18 +68,23 @@ class Journal:
         damage = [*self._about_journal(journal, copy), *self._about_copy(journal, copy)]
         loose = (*journal.chain, *copy.chain, *journal.loose, *copy.loose) if damage else ()
         lines = tuple(dict.fromkeys((*longer, *loose)))
-        return Reading(lines, tuple(damage), journal.torn)
+        tidy = copy.there and copy.whole == journal.whole and not (damage or journal.torn or copy.torn)
+        return Reading(lines, tuple(damage), journal.torn, tidy)
 
-    def append(self, entry: Entry) -> None:
+    def append(self, *entries: Entry) -> None:
         """One write, one fsync: committed when this returns. DataError, and nothing is written, where it is damaged."""
         reading = self.read()
         self.refuse_damage(reading)
-        self._put_right(reading)
-        last = reading.lines[-1] if reading.lines else b""
-        line = as_line(entry, len(reading.lines) + 1, last)
-        _add(self.path, line)
+        if not reading.tidy:
+            self._put_right(reading)
+        first = len(reading.lines) + 1
+        together = {BATCH: first} if len(entries) > 1 else {}
+        lines = [reading.lines[-1] if reading.lines else b""]
+        for number, entry in enumerate(entries, first):
+            lines.append(as_line(entry | together, number, lines[-1]))
+        _add(self.path, lines[1:])
         try:
-            _add(self.copy, line)
+            _add(self.copy, lines[1:])
         except OSError:  # it is committed; the copy is brought up at the next line
             return
 
@@ -124,7 +115,7 @@ class Journal:
             if (path.read_bytes() if path.exists() else b"") != whole:
                 atomic_write(path, whole)
 
-    def _about_journal(self, journal: _Text, copy: _Text) -> Iterator[Remark]:
+    def _about_journal(self, journal: JournalText, copy: JournalText) -> Iterator[Remark]:
         missing = len(copy.chain) - len(journal.chain)
         if not journal.there and copy.there:
             yield journal_damage(self.path, "is missing beside its copy")
@@ -138,23 +129,31 @@ class Journal:
         elif copy.chain != journal.chain[: len(copy.chain)]:
             yield journal_damage(self.path, f"it is not the journal that {COPY} is a copy of")
 
-    def _about_copy(self, journal: _Text, copy: _Text) -> Iterator[Remark]:
+    def _about_copy(self, journal: JournalText, copy: JournalText) -> Iterator[Remark]:
         behind = len(journal.chain) - len(copy.chain)
         if copy.broken:
             yield journal_damage(self.copy, f"line {copy.broken} is damaged")
         elif copy.ending != b"\n" and (behind == 0 or copy.ending):
             yield journal_damage(self.copy, f"the end of its line {len(copy.chain)} is damaged")
+        elif _are_of_one_write(journal.chain[len(copy.chain) :]):
+            return
         elif not copy.there and behind > 1 and any("number" in json.loads(line) for line in journal.chain[:-1]):
             yield journal_damage(self.copy, "is missing")
         elif copy.there and behind > 1:
             yield journal_damage(self.copy, f"its last {behind} lines are missing")
 
 
+def _are_of_one_write(lines: Sequence[bytes]) -> bool:
+    """Whether a crash can have kept all of these from the copy: one line, or lines that were written together."""
+    written = {json.loads(line).get(BATCH, -number) for number, line in enumerate(lines)}
+    return len(written) < 2
+
+
 def as_line(entry: Entry, number: int, last: bytes) -> bytes:
     """A line without its end; last: the line before, without its end too."""
     told = {name: value for name, value in entry.items() if name != "crc"}
     told |= {"number": number, "previous": hashlib.sha256(last).hexdigest() if last else ""}
-    return json.dumps(told | {"crc": _crc(told)}).encode()
+    return json.dumps(told | {"crc": crc_of(told)}).encode()
 
 
 def keep_aside(path: Path, content: bytes, why: str) -> Path:
@@ -176,51 +175,9 @@ def command(name: str, folder: Path) -> str:
     return shlex.join(["lobewatch", name, str(folder)])
 
 
-def _scan(path: Path, known: _Text) -> _Text:
-    """A file of the journal, line by line, from where it is known on."""
-    if not path.exists():
-        return _Text(there=False)
-    content = path.read_bytes()
-    begun = known if content.startswith(known.whole) else _Text(there=False)
-    *lines, end = content[len(begun.whole) :].split(b"\n")
-    chain, broken, loose = list(begun.chain), 0, list[bytes]()
-    for number, line in enumerate(lines, len(chain) + 1):
-        if not broken and _continues(chain, line):
-            chain.append(line)
-        else:
-            broken = broken or number
-            loose += [line] if _parsed(line) else []
-    for part in (end, end[:-1]):
-        if part.endswith(b"}") and not broken and _continues(chain, part):
-            return _Text(True, (*chain, part), ending=end[len(part) :])
-    loose += [part for part in (end, end[:-1]) if broken and _parsed(part)][:1]
-    whole = begun.whole + b"".join(line + b"\n" for line in chain[len(begun.chain) :])
-    return _Text(True, tuple(chain), whole, broken, torn=end, loose=tuple(loose))
-
-
-def _continues(chain: list[bytes], line: bytes) -> bool:
-    entry = _parsed(line)
-    return entry is not None and entry["previous"] == (hashlib.sha256(chain[-1]).hexdigest() if chain else "")
-
-
-def _parsed(line: bytes) -> Entry | None:
-    """A sound line as a JSON object; None for any other."""
-    try:
-        entry: Entry = json.loads(line)
-        crc = entry.pop("crc")
-        return entry if crc == _crc(entry) and isinstance(entry["previous"], str) and "kind" in entry else None
-    except (ValueError, KeyError, TypeError, AttributeError):
-        return None
-
-
-def _crc(entry: Entry) -> int:
-    """CRC-32 of a journal entry without its crc."""
-    return zlib.crc32(json.dumps(entry, sort_keys=True).encode())
-
-
-def _add(path: Path, line: bytes) -> None:
-    """A line and its end in one write."""
-    new, content = not path.exists(), line + b"\n"
+def _add(path: Path, lines: Sequence[bytes]) -> None:
+    """Lines and their ends in one write."""
+    new, content = not path.exists(), b"".join(line + b"\n" for line in lines)
     try:
         handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)
         try:

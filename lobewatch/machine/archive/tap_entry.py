@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Self
+
+import msgspec
 
 from acquisition import DataError, Remark, TapTest
 
@@ -58,8 +60,7 @@ class TapEntry:
     @classmethod
     def from_line(cls, line: dict[str, Any], accepted: tuple[str, ...] = (), excluded: str = "") -> Self:
         """From the line of the journal that `line` has made."""
-        named = {field.name: line[field.name] for field in fields(cls) if field.name not in (*LATER, "asked")}
-        return cls(**named, asked=tuple(line.get("asked", ())), accepted=accepted, excluded=excluded)
+        return msgspec.convert({**line, "accepted": accepted, "excluded": excluded}, cls)
 
     @property
     def line(self) -> dict[str, Any]:

@@ -158,3 +158,27 @@ def test_a_file_without_a_line_does_not_count_and_is_named(folder: MachineFolder
     (folder.path / "taps" / "copy.h5").write_bytes((folder.path / "taps" / "tap_1.h5").read_bytes())
     assert ids(folder) == ["tap_0", "tap_1", "tap_2"]
     assert "taps/copy.h5: not in the journal" in told(folder)
+
+
+def test_lines_of_one_write_may_all_be_missing_from_the_copy_but_no_other(folder: MachineFolder) -> None:
+    journal, copy = folder.path / NAMES[0], folder.path / NAMES[1]
+    before = copy.read_bytes()
+    folder.journal.append(*({"kind": "note", "text": str(number)} for number in range(3)))
+    assert len(json.loads(f"[{','.join(journal.read_text().splitlines())}]")) == 6
+    assert copy.read_bytes() == journal.read_bytes()
+    copy.write_bytes(before)
+    assert not told(folder)
+    copy.write_bytes(before[: line_ends(copy)[1] + 1])
+    assert "journal.copy.jsonl: its last 4 lines are missing" in told(folder)
+    copy.write_bytes(before)
+    as_it_is(folder).journal.append({"kind": "note", "text": "brings the copy up"})
+    assert copy.read_bytes() == journal.read_bytes()
+
+
+def test_a_flipped_bit_in_a_long_journal_is_named(folder: MachineFolder) -> None:
+    folder.journal.append(*({"kind": "note", "text": "x"} for _ in range(40)))
+    path = folder.path / NAMES[0]
+    whole = path.read_bytes()
+    for at in range(0, len(whole), 397):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 4]) + whole[at + 1 :])
+        assert "journal.jsonl: " in told(folder), at

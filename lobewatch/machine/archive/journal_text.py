@@ -1,0 +1,90 @@
+"""One of the two files of a journal as it stands on the disk: which of its lines are sound, and how it ends."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zlib
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+Entry = dict[str, Any]
+PREVIOUS = b'"previous": "'
+
+
+@dataclass(frozen=True)
+class JournalText:
+    """One of the two files as it stands on the disk."""
+
+    there: bool
+    chain: tuple[bytes, ...] = ()
+    """Lines from the first on, each naming the one before, without their ends."""
+    whole: bytes = b""
+    """The bytes of these lines, with their ends."""
+    broken: int = 0
+    """Number of the first line that does not continue the chain; 0 where all do."""
+    ending: bytes = b"\n"
+    """How the last line of the chain ends."""
+    torn: bytes = b""
+    """What a crash has left of a line."""
+    loose: tuple[bytes, ...] = ()
+    """Sound lines behind a broken one."""
+
+
+def scan(path: Path, known: JournalText) -> JournalText:
+    """A file of the journal, line by line, from where it is known on."""
+    if not path.exists():
+        return JournalText(there=False)
+    content = path.read_bytes()
+    begun = known if content.startswith(known.whole) else JournalText(there=False)
+    *lines, end = content[len(begun.whole) :].split(b"\n")
+    chain, broken, loose = list(begun.chain), 0, list[bytes]()
+    if _are_chained(chain, lines):
+        chain, lines = chain + lines, []
+    for number, line in enumerate(lines, len(chain) + 1):
+        if not broken and _continues(chain, line):
+            chain.append(line)
+        else:
+            broken = broken or number
+            loose += [line] if _parsed(line) else []
+    for part in (end, end[:-1]):
+        if part.endswith(b"}") and not broken and _continues(chain, part):
+            return JournalText(True, (*chain, part), ending=end[len(part) :])
+    loose += [part for part in (end, end[:-1]) if broken and _parsed(part)][:1]
+    whole = begun.whole + b"".join(line + b"\n" for line in chain[len(begun.chain) :])
+    return JournalText(True, tuple(chain), whole, broken, torn=end, loose=tuple(loose))
+
+
+def _are_chained(chain: list[bytes], lines: list[bytes]) -> bool:
+    """Whether all of these continue the chain: each but the last is proved by the SHA-256 in the line behind it."""
+    if len(lines) < 2 or not (_continues(chain, lines[0]) and _continues(lines[:-1], lines[-1])):
+        return False
+    return all(_named(line) == hashlib.sha256(before).hexdigest().encode() for before, line in pairwise(lines))
+
+
+def _named(line: bytes) -> bytes:
+    """What a line says of the one before it; anything where it is damaged."""
+    begin = line.rfind(PREVIOUS) + len(PREVIOUS)
+    return line[begin : begin + 64]
+
+
+def _continues(chain: list[bytes], line: bytes) -> bool:
+    entry = _parsed(line)
+    return entry is not None and entry["previous"] == (hashlib.sha256(chain[-1]).hexdigest() if chain else "")
+
+
+def _parsed(line: bytes) -> Entry | None:
+    """A sound line as a JSON object; None for any other."""
+    try:
+        entry: Entry = json.loads(line)
+        crc = entry.pop("crc")
+        return entry if crc == crc_of(entry) and isinstance(entry["previous"], str) and "kind" in entry else None
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return None
+
+
+def crc_of(entry: Entry) -> int:
+    """CRC-32 of a journal entry without its crc."""
+    return zlib.crc32(json.dumps(entry, sort_keys=True).encode())

@@ -65,17 +65,19 @@ from .sensors import (
     unit_mistake,
 )
 from .source import Device, DeviceIdentity, Source
-from .tap import Circumstances, SourceFile, TapTest, new_tap_id
+from .tap import UNSAID, Circumstances, Conditions, SourceFile, TapTest, new_tap_id
 from .taps import Faults, TapsEmulator, TapsSource
 from .verdicts import Verdict, average_good, check_hit, judge_hit
 
 __all__ = [
     "STANDARD_GRAVITY",
+    "UNSAID",
     "Answer",
     "Bench",
     "Block",
     "Channel",
     "Circumstances",
+    "Conditions",
     "DataError",
     "DataqEmulator",
     "DataqFaults",

@@ -4,13 +4,64 @@ from __future__ import annotations
 
 import re
 import secrets
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from datetime import UTC, datetime
+from typing import Any, Self
 
 from acquisition.channel import TapDirection, tap_direction
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
 from acquisition.names import check_name
+
+RANGES = {"temperature_c": (-40.0, 150.0), "stick_out_mm": (0.1, 5000.0), "drawbar_kn": (0.1, 1000.0)}
+"""What a spindle can have: temperature (degC), stick-out of the tool (mm), drawbar force (kN)."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What a tap test was taken under, as the shop says it and in its units; None or empty where nobody said."""
+
+    temperature_c: float | None = None
+    """Of the spindle (degC)."""
+    stick_out_mm: float | None = None
+    """Of the tool (mm)."""
+    drawbar_kn: float | None = None
+    """Force of the drawbar (kN)."""
+    state: str = ""
+    """Of the machine, in a word or two of the shop's: "warm", "gearbox low"."""
+    reclamped: bool = False
+    """Whether the tool was clamped anew for it; False: nobody said so."""
+    note: str = ""
+    """What else is to be remembered."""
+
+    def __post_init__(self) -> None:
+        """Refuse values that no spindle has, and control characters."""
+        for name, (low, high) in RANGES.items():
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise ValueError(f"{name}={value:g} is outside {low:g} to {high:g}; correct it, or leave it out")
+        for name in ("state", "note"):
+            check_name(getattr(self, name), name)
+
+    @classmethod
+    def of(cls, told: Mapping[str, Any]) -> Self:
+        """From what `known` has told, among other things."""
+        return cls(**{field.name: told[field.name] for field in fields(cls) if field.name in told})
+
+    @property
+    def known(self) -> dict[str, Any]:
+        """What somebody said, by name."""
+        told = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: value for name, value in told.items() if value not in (None, "", False)}
+
+    def over(self, other: Self) -> Self:
+        """The same, with what the other one knows where this one does not."""
+        return replace(other, **self.known)
+
+
+UNSAID = Conditions()
+"""Nobody said anything."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +82,8 @@ class Circumstances:
     """Text of the machine file at that time."""
     device: str = ""
     """What recorded it: model, serial number and firmware of the DAQ, and how lost scans were found."""
+    conditions: Conditions = UNSAID
+    """Temperature, clamping, state; of files without them, unknown."""
 
     def __post_init__(self) -> None:
         """Refuse a direction that is none, and a time without its zone."""

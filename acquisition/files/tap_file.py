@@ -27,7 +27,7 @@ from acquisition.files.seal import is_broken, sealed
 from acquisition.files.unpacked import check_unpacked
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
-from acquisition.tap import Circumstances, SourceFile, TapTest
+from acquisition.tap import Circumstances, Conditions, SourceFile, TapTest
 
 FORMAT = "lobewatch-tap"
 VERSION = 1
@@ -112,6 +112,7 @@ def _write_circumstances(file: h5py.File, about: Circumstances) -> None:
     file.attrs["machine_toml_sha256"] = hashlib.sha256(about.machine_toml.encode()).hexdigest()
     for name in ("machine", "tool", "direction", "operator", "device"):
         file.attrs[name] = getattr(about, name).replace("\0", "")  # HDF5 text ends there, and a device may send it
+    file.attrs.update(about.conditions.known)
     file["machine_toml"] = about.machine_toml
 
 
@@ -121,7 +122,10 @@ def _read_circumstances(file: h5py.File) -> Circumstances:
     created = datetime.fromisoformat(file.attrs["created"])
     device = str(file.attrs.get("device", ""))
     text = file["machine_toml"][()].decode()
-    return Circumstances(created=created, direction=direction, machine_toml=text, device=device, **named)
+    under = Conditions.of(_plain(file.attrs))  # none in the first files
+    return Circumstances(
+        created=created, direction=direction, machine_toml=text, device=device, conditions=under, **named
+    )
 
 
 def _dataset(group: h5py.Group, name: str, data: Any, units: str, **options: Any) -> None:
@@ -169,8 +173,11 @@ def _read_raw(file: h5py.File) -> tuple[tuple[Hit, ...], tuple[HitFlags, ...]]:
 
 
 def _read_channel(group: h5py.Group) -> Channel:
-    values = {name: value.item() if isinstance(value, np.generic) else value for name, value in group.attrs.items()}
-    return Channel(**values)
+    return Channel(**_plain(group.attrs))
+
+
+def _plain(attributes: h5py.AttributeManager) -> dict[str, Any]:
+    return {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
 
 
 def _write_frf(file: h5py.File, frf: Frf) -> None:

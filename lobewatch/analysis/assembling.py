@@ -27,7 +27,7 @@ def tapped(place: Place, places: Sequence[Place], rows: Sequence[Row], measured:
     newest, other = measured(place), None if place.other is None else measured(places[place.other])
     points: dict[str, list[Point]] = {"x": [], "y": []}
     for row in rows[: place.number]:
-        if (row.tool, row.baseline) == (newest.tool, place.baseline) and row.mode is not None and not row.questions:
+        if row.series == place.series and row.mode is not None and not row.questions:
             points.setdefault(row.direction, []).append(_point(row, row.mode))
     if newest.followed is not None and not open_questions(newest.remarks):
         points.setdefault(newest.direction, []).append(_point(newest, newest.followed))

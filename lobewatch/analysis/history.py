@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from importlib.metadata import version
-from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Remark
+from acquisition import UNSAID, Conditions, Remark
 from dsm import Calibration
-from lobes import SldHistory, StabilityLobes
+from lobes import StabilityLobes
 from lobewatch.analysis.assembly import speed_grid
-from lobewatch.analysis.columns.ruling_columns import limits, rulings_of, words
 from lobewatch.analysis.estimate import UNKNOWN, Estimate
 from lobewatch.analysis.measurement import Measurement
+from lobewatch.analysis.order import Place
 from lobewatch.analysis.programs.verdict import Ruling
 from lobewatch.analysis.questions.asked import open_questions
 from lobewatch.machine import Machine
@@ -26,11 +24,6 @@ from modal import Mode
 
 MAX_MODES = 12
 """Modes kept of one measurement."""
-ESTIMATES = {"frequency": "Hz", "damping_ratio": "", "stiffness": "N/m", "phase_deg": "deg", "bearing_stiffness": "N/m"}
-"""Values with a standard error and their units, by name of the field and the column."""
-MODELLED = {"static_tip_stiffness": "N/m", "modal_tip_stiffness": "N/m"}
-"""Values of the model."""
-MODE_COLUMNS = {"mode_frequency": "Hz", "mode_damping_ratio": "", "mode_stiffness": "N/m", "mode_phase_deg": "deg"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +62,10 @@ class Row:
     """The word on every program with the machine as it was after this tap test; None where nobody has asked yet."""
     baseline: datetime | None = None
     """The event before it from which on all comparing begins anew."""
+    series: str = ""
+    """The first tap test of those that it is compared with: of one tool with one stick-out in one state."""
+    conditions: Conditions = UNSAID
+    """What it was taken under."""
 
     @property
     def questions(self) -> tuple[Remark, ...]:
@@ -101,11 +98,13 @@ class History:
 
     @property
     def current(self) -> list[Row]:
-        """Those since the baseline."""
-        return [row for row in self.rows if row.baseline == self.baseline]
+        """Those since the baseline, of each tool with the stick-out and in the state of its newest."""
+        since = [row for row in self.rows if row.baseline == self.baseline]
+        newest = {row.tool: row.series for row in since}
+        return [row for row in since if row.series == newest[row.tool]]
 
     def series(self, tool: str, direction: str) -> list[Row]:
-        """Rows of one tool and direction since the baseline, oldest first."""
+        """Those of one tool and direction, oldest first."""
         return [row for row in self.current if (row.tool, row.direction) == (tool, direction)]
 
 
@@ -120,9 +119,7 @@ def without_last_word(history: History) -> History:
     return replace(history, rows=(*before, replace(last, rulings=None)))
 
 
-def row_of(
-    m: Measurement, lobes: Mapping[str, StabilityLobes], remarks: Sequence[Remark], baseline: datetime | None = None
-) -> Row:
+def row_of(m: Measurement, lobes: Mapping[str, StabilityLobes], remarks: Sequence[Remark], place: Place) -> Row:
     """A measurement as a row, with the diagrams and remarks of the assembly as it was then."""
     modes = [(one.frequency, one.damping_ratio, one.stiffness, one.phase_deg) for one in m.modes[:MAX_MODES]]
     frequency, damping_ratio, stiffness, phase = _of_mode(m.followed)
@@ -132,7 +129,9 @@ def row_of(
         time=m.time,
         tool=m.tool,
         direction=m.direction,
-        baseline=baseline,
+        baseline=place.baseline,
+        series=place.series,
+        conditions=place.entry.conditions,
         frequency=frequency,
         damping_ratio=damping_ratio,
         stiffness=stiffness,
@@ -164,79 +163,3 @@ def _of_bearings(calibration: Calibration | None) -> Estimate:
         return UNKNOWN
     std = calibration.bearing_stiffness_std
     return Estimate(calibration.bearing_stiffness, np.nan if std is None else std)
-
-
-def to_columns(history: History, machine: Machine) -> SldHistory:
-    """What history.h5 holds."""
-    rows, programs = history.rows, [program.name for program in machine.program]
-    columns: dict[str, Any] = {name: _texts(getattr(row, name) for row in rows) for name in ("tap_id", "tool")}
-    columns["time"] = _texts(row.time.isoformat() for row in rows)
-    columns["baseline"] = _texts(row.baseline.isoformat() if row.baseline else "" for row in rows)
-    columns["direction"] = _texts(row.direction for row in rows)
-    columns["notes"] = _texts("\n".join(map(str, row.remarks)) for row in rows)
-    columns["remarks"] = _texts(_as_json([asdict(one) for one in row.remarks]) for row in rows)
-    for name in ESTIMATES:
-        columns[name], columns[f"{name}_std"] = _numbers([getattr(row, name) for row in rows], 2).T
-    for name in MODELLED:
-        columns[name] = _numbers([getattr(row, name) for row in rows])
-    table = np.full((len(rows), MAX_MODES, len(MODE_COLUMNS)), np.nan)
-    for i, row in enumerate(rows):
-        table[i, : len(row.modes)] = row.modes
-    columns |= {name: table[:, :, k] for k, name in enumerate(MODE_COLUMNS)}
-    if programs:
-        columns["program_limit"] = _numbers([limits(row.rulings, programs) for row in rows], len(programs))
-        columns["program_verdict"] = _texts(words(row.rulings, programs) for row in rows)
-    nowhere = np.full(history.speed_rpm.size, np.nan)
-    depth = {
-        name: _numbers([row.depth.get(name, nowhere) for row in rows], history.speed_rpm.size)
-        for name in machine.cut_names
-    }
-    units = ESTIMATES | {f"{name}_std": unit for name, unit in ESTIMATES.items()} | MODELLED | MODE_COLUMNS
-    units = {name: unit for name, unit in (units | {"program_limit": "m"}).items() if unit and name in columns}
-    return SldHistory(history.settings_hash, history.software, history.speed_rpm, columns, depth, units)
-
-
-def from_columns(stored: SldHistory, machine: Machine) -> History:
-    """What history.h5 says. KeyError, IndexError or ValueError where it is of another make."""
-    programs = [program.name for program in machine.program]
-    rows = [_row(stored, i, programs) for i in range(len(stored))]
-    return History(stored.settings_hash, stored.software, stored.speed_rpm, tuple(rows))
-
-
-def _row(stored: SldHistory, i: int, programs: Sequence[str]) -> Row:
-    columns = stored.columns
-    number = {name: float(columns[name][i]) for name in (*ESTIMATES, *MODELLED)}
-    known = {name: Estimate(number[name], float(columns[f"{name}_std"][i])) for name in ESTIMATES}
-    text = {name: str(columns[name][i]) for name in ("tap_id", "time", "tool", "direction", "baseline", "remarks")}
-    modes = np.stack([columns[name][i] for name in MODE_COLUMNS], axis=1)
-    depth = {name: values[i] for name, values in stored.depth.items()}
-    return Row(
-        tap_id=text["tap_id"],
-        time=datetime.fromisoformat(text["time"]),
-        tool=text["tool"],
-        direction=text["direction"],
-        baseline=datetime.fromisoformat(text["baseline"]) if text["baseline"] else None,
-        frequency=known["frequency"],
-        damping_ratio=known["damping_ratio"],
-        stiffness=known["stiffness"],
-        phase_deg=known["phase_deg"],
-        bearing_stiffness=known["bearing_stiffness"],
-        static_tip_stiffness=number["static_tip_stiffness"],
-        modal_tip_stiffness=number["modal_tip_stiffness"],
-        modes=modes[np.isfinite(modes[:, 0])],
-        remarks=msgspec.json.decode(text["remarks"], type=tuple[Remark, ...]),
-        depth={name: values for name, values in depth.items() if not np.isnan(values[0])},
-        rulings=rulings_of(stored, i, programs),
-    )
-
-
-def _texts(values: Any) -> NDArray[np.str_]:
-    return np.array(list(values), dtype=np.str_)
-
-
-def _numbers(values: Sequence[Any], *width: int) -> NDArray[np.float64]:
-    return np.array(values, dtype=np.float64).reshape(len(values), *width)
-
-
-def _as_json(value: Any) -> str:
-    return msgspec.json.encode(value).decode()

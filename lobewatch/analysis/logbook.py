@@ -8,12 +8,13 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Self
 
-from acquisition import Remark, TapTest
+from acquisition import UNSAID, Conditions, Remark, TapTest
 from lobewatch.analysis.assembling import NotTappedError, first_like, predicted, tapped
-from lobewatch.analysis.assembly import Assembly, lobes_of
+from lobewatch.analysis.assembly import Assembly
+from lobewatch.analysis.cache.history_cache import store_history
+from lobewatch.analysis.cache.up_to_date import up_to_date
 from lobewatch.analysis.damage.usable import Result, UsableTaps
-from lobewatch.analysis.history import History, Row, row_of, without_last_word
-from lobewatch.analysis.history_cache import store_history, stored_history
+from lobewatch.analysis.history import History, Row, without_last_word
 from lobewatch.analysis.measurement import Measurement, measure
 from lobewatch.analysis.order import Place, earlier
 from lobewatch.analysis.programs.advice import Advice, advise
@@ -84,24 +85,34 @@ class Logbook:
         self._forget()
 
     def replay(
-        self, file: Path | str, date: datetime | None = None, tool: str = "", direction: str = ""
+        self,
+        file: Path | str,
+        date: datetime | None = None,
+        tool: str = "",
+        direction: str = "",
+        conditions: Conditions = UNSAID,
     ) -> Measurement:
         """Store a recorded file as a tap test, unless it is stored already, and say what it means.
 
-        date, tool and direction are taken from the file where they are not given. DataError for a file that cannot be
-        trusted, with the reason.
+        date, tool, direction and conditions are taken from the file where they are not given. DataError for a file
+        that cannot be trusted, with the reason.
         """
-        (tap_id,) = self.replay_all([Path(file)], date, tool, direction).tap_ids
+        (tap_id,) = self.replay_all([Path(file)], date, tool, direction, conditions).tap_ids
         self.files.refuse_excluded(tap_id)
         return self.measurement(tap_id)
 
     def replay_all(
-        self, files: Sequence[Path], date: datetime | None = None, tool: str = "", direction: str = ""
+        self,
+        files: Sequence[Path],
+        date: datetime | None = None,
+        tool: str = "",
+        direction: str = "",
+        conditions: Conditions = UNSAID,
     ) -> Stored:
         """Store recorded files, each once; all are read and judged before the first one is stored."""
         with self.folder.locked():
             enter_explained(self.folder)  # else what an interrupted replay has stored would be stored twice
-            stored = store_recordings(self.folder, files, date, tool, direction)
+            stored = store_recordings(self.folder, files, date, tool, direction, conditions)
             self._forget()
         return stored
 
@@ -207,21 +218,10 @@ class Logbook:
 
     def _known_history(self) -> History:
         if self._history is None:
-            self._history = self._up_to_date()
+            self._history = up_to_date(self.folder, self.files, self._measured, self._assembled)
             if self._history.rows:
                 self.rulings(self._history.rows[-1].tap_id)
         return self._history
-
-    def _up_to_date(self) -> History:
-        """The stored rows as far as they still hold, and those that are missing."""
-        history = stored_history(self.folder, self.files.places, self.files.baseline)
-        rows = list(history.rows)
-        for place in self.files.places[len(rows) :]:
-            assembly = self._assembled(place, rows)
-            lobes = lobes_of(assembly, self.machine)
-            rows.append(row_of(self._measured(place, rows), lobes, assembly.remarks, place.baseline))
-        history = replace(history, rows=tuple(rows))
-        return without_last_word(history) if rows and self.files.doubts() else history
 
     def _assembly(self, tool: str | None, until: str | None) -> Assembly:
         known = self.files.until(until)
@@ -243,7 +243,7 @@ class Logbook:
             before = (rows[number] for number in earlier(place, self.files.places))
             last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
             found = measure(self.folder.read(place.entry), self.machine, last)
-            self._measurements[tap_id] = replace(found, remarks=answered(found.remarks, place.entry))
+            self._measurements[tap_id] = replace(found, remarks=answered((*found.remarks, *place.said), place.entry))
         return self._measurements[tap_id]
 
     def _assembled(self, place: Place, rows: Sequence[Row]) -> Assembly:

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
+from acquisition import Remark
+from lobewatch.analysis.mounting.mountings import Mountings
 from lobewatch.machine import TapEntry
 
 
@@ -18,30 +20,36 @@ class Place:
     entry: TapEntry
     """Of the journal."""
     before: int | None
-    """Place of the one before it of the same tool and direction."""
+    """Place of the one before it of the same series and direction."""
     other: int | None
-    """Place of the newest one before it of the same tool in another direction."""
+    """Place of the newest one before it of the same series in another direction."""
     baseline: datetime | None = None
     """The event before it from which on all comparing begins anew; nothing before that is built on."""
+    series: str = ""
+    """Its first tap test: of one tool with one stick-out in one state, both directions, since the baseline."""
+    said: tuple[Remark, ...] = ()
+    """Where the series or the drawbar force is not that of the test before."""
 
 
 def places(taps: Sequence[TapEntry], baselines: Sequence[datetime] = ()) -> list[Place]:
     """taps, baselines: oldest first."""
     newest: dict[tuple[str, str], int] = {}
-    found: list[Place] = []
+    mountings, found = Mountings(), list[Place]()
     for i, tap in enumerate(taps):
         time = datetime.fromisoformat(tap.time)
         baseline = next((one for one in reversed(baselines) if one <= time), None)
         if found and found[-1].baseline != baseline:
-            newest = {}
-        others = [j for (tool, direction), j in newest.items() if tool == tap.tool and direction != tap.direction]
-        found.append(Place(i, tap, newest.get((tap.tool, tap.direction)), max(others, default=None), baseline))
-        newest[tap.tool, tap.direction] = i
+            newest, mountings = {}, Mountings()
+        series, said = mountings.place(tap)
+        others = [j for (one, direction), j in newest.items() if one == series and direction != tap.direction]
+        before, other = newest.get((series, tap.direction)), max(others, default=None)
+        found.append(Place(i, tap, before, other, baseline, series, said))
+        newest[series, tap.direction] = i
     return found
 
 
 def earlier(place: Place, among: Sequence[Place]) -> Iterator[int]:
-    """Numbers of the tap tests of the same tool and direction before it, the newest first."""
+    """Numbers of the tap tests of the same series and direction before it, the newest first."""
     while place.before is not None:
         place = among[place.before]
         yield place.number

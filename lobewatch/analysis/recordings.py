@@ -10,6 +10,7 @@ from pathlib import Path
 
 from acquisition import (
     Circumstances,
+    Conditions,
     DataError,
     Frf,
     SourceFile,
@@ -37,9 +38,17 @@ class Stored:
 
 
 def store_recordings(
-    folder: MachineFolder, files: Sequence[Path], date: datetime | None, tool: str, direction: str
+    folder: MachineFolder,
+    files: Sequence[Path],
+    date: datetime | None,
+    tool: str,
+    direction: str,
+    conditions: Conditions,
 ) -> Stored:
-    """Commit recorded files, each once; all are read and judged before the first one is stored."""
+    """Commit recorded files, each once; all are read and judged before the first one is stored.
+
+    What conditions leave open, a tap file says itself, and machine.toml of any other file.
+    """
     stored = {digest: tap.id for tap in folder.taps() for digest in (tap.source_sha256, tap.sha256)}
     tap_ids, known, fresh = list[str](), dict[Path, str](), list[TapTest]()
     for file in files:
@@ -49,6 +58,7 @@ def store_recordings(
             known[file] = stored[digest]
         else:
             about = _circumstances(folder, file, date, tool, direction)
+            about = replace(about, conditions=conditions.over(about.conditions))
             fresh.append(_tap_test(file, about, SourceFile(file.name, content)))
             stored[digest] = fresh[-1].id
         tap_ids.append(stored[digest])
@@ -61,14 +71,15 @@ def _circumstances(
     folder: MachineFolder, file: Path, date: datetime | None, tool: str, direction: str
 ) -> Circumstances:
     own, setup = recorded_as(file), folder.machine
-    created = _time_of(file, date, own.created)
+    created, tool = _time_of(file, date, own.created), tool or own.tool or setup.tap.tool
     return replace(
         own,
         machine=setup.machine.name,
         created=created,
-        tool=tool or own.tool or setup.tap.tool,
+        tool=tool,
         direction=tap_direction(direction or own.direction),
         machine_toml=folder.toml.read_text("utf-8"),
+        conditions=own.conditions if own.machine else setup.tap.conditions(tool),
     )
 
 

@@ -28,6 +28,9 @@ def replay(
         list[str] | None,
         typer.Option(help="Take these recordings though they raise this question, by its code; as often as needed."),
     ] = None,
+    temperature: Annotated[float | None, typer.Option(help="Of the spindle then, degC.")] = None,
+    note: Annotated[str, typer.Option(help="What else is to be remembered of these tests.")] = "",
+    reclamped: Annotated[bool, typer.Option("--reclamped", help="The tool was clamped anew for these tests.")] = False,
     as_json: Json = False,
 ) -> None:
     """Recorded files through the same pipeline as a live test; each is stored once.
@@ -41,13 +44,16 @@ def replay(
       lobewatch replay mill-3 2024/*.h5 --tool "shrink-fit 20"
       lobewatch replay mill-3 mill-3/taps/ID.h5 --accept frequency-jump
     """
+    from acquisition import Conditions
     from lobewatch.analysis import Logbook
+    from lobewatch.analysis.questions.accepting import not_asked
     from lobewatch.analysis.questions.asked import checked_codes
     from lobewatch.show.measurements import measurement_json, measurement_texts, program_texts, programs_json
 
+    said = Conditions(temperature_c=temperature, note=note, reclamped=reclamped)
     logbook = Logbook.open(machine)
     codes = checked_codes(accept or ())
-    stored = logbook.replay_all(files, date, tool, direction)
+    stored = logbook.replay_all(files, date, tool, direction, said)
     unasked = logbook.accept(stored.tap_ids, codes)
     for file, tap_id in stored.known.items():
         notes.print(f"{file.name}: stored already as {tap_id}", markup=False)
@@ -63,8 +69,4 @@ def replay(
     last = f"{len(shown)} of {len(files)} file(s) stored in {logbook.folder.path}"
     emit(payload, as_json, *texts, *(program_texts(logbook) if shown else []), last)
     if unasked:
-        open_ones = "; ".join(f"{tap_id}: {', '.join(found)}" for tap_id, found in logbook.questions.items())
-        raise ValueError(
-            f"--accept {' '.join(unasked)}: not asked of {', '.join(stored.tap_ids)}, which is stored; open questions: "
-            f"{open_ones or 'none'}"
-        )
+        raise ValueError(not_asked(unasked, stored.tap_ids, logbook.questions))

@@ -24,6 +24,9 @@ def tap(
         list[str] | None,
         typer.Option(help="Take the recording though it raises this question, by its code; as often as needed."),
     ] = None,
+    temperature: Annotated[float | None, typer.Option(help="Of the spindle, degC.")] = None,
+    note: Annotated[str, typer.Option(help="What else is to be remembered of this test.")] = "",
+    reclamped: Annotated[bool, typer.Option("--reclamped", help="The tool was clamped anew for this test.")] = False,
     screen: Annotated[bool, typer.Option("--screen", help="Show the test in a browser too.")] = False,
     listen: Listen = "127.0.0.1",
     token: Token = None,
@@ -41,9 +44,12 @@ def tap(
       lobewatch tap mill-3 --port /dev/ttyACM0
       lobewatch tap mill-3 --port COM3 --direction y --operator Kim
       lobewatch tap mill-3 --screen --listen 0.0.0.0
+      lobewatch tap mill-3 --temperature 24 --reclamped --note "after a warm-up of 20 min"
       lobewatch tap trial --port file:taps/ID.h5
     """
+    from acquisition import Conditions
     from lobewatch.analysis import Logbook
+    from lobewatch.analysis.questions.accepting import not_asked
     from lobewatch.machine import MachineFolder
     from lobewatch.show.measurements import measurement_json, measurement_texts, program_texts, programs_json
     from lobewatch.show.printer import TapPrinter
@@ -51,9 +57,9 @@ def tap(
     from lobewatch.tap import TapStopped, plan_session
 
     folder = MachineFolder(machine)
-    session = plan_session(
-        folder, port=port, tool=tool, direction=direction, operator=operator, resume=not new, accept=accept or ()
-    )
+    said = Conditions(temperature_c=temperature, note=note, reclamped=reclamped)
+    named = {"port": port, "tool": tool, "direction": direction, "operator": operator}
+    session = plan_session(folder, **named, resume=not new, accept=accept or (), conditions=said)
     try:
         with contextlib.ExitStack() as screens:
             if screen:
@@ -71,5 +77,7 @@ def tap(
     told = [remark.about for remark in session.measurement.remarks if remark.code == "accepted"]
     notes.print(*(f"accepted: {code}" for code in told), sep="\n", end="\n" if told else "")
     logbook, found = Logbook(folder), session.measurement
+    if session.unasked:
+        notes.print(not_asked(session.unasked, [done.id], logbook.questions), markup=False)
     payload = measurement_json(found, logbook) | {"programs": programs_json(logbook.verdicts())}
     emit(payload, as_json, *measurement_texts(found, logbook), *program_texts(logbook))

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import Meta
 
-from acquisition import DataError
+from acquisition import Conditions, DataError
 from dsm import Spindle
 from lobes import Coefficients, Cut, cutting_coefficients
 from lobewatch.machine.cut_tables import FEED_ANGLES, CutTable, Drive, MaterialTable, ProgramTable
@@ -42,6 +42,18 @@ class TapSetup(Table, frozen=True):
     pre_trigger_s: Positive = 0.02
     trigger_n: Positive | None = None
     position_mm: NotNegative = 0.0
+    stick_out_mm: float | None = None
+    drawbar_kn: float | None = None
+    state: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse what no spindle has."""
+        self.conditions(self.tool)
+
+    def conditions(self, tool: str) -> Conditions:
+        """What is known of a tap test with a tool; the stick-out of `tool` alone."""
+        stick_out = self.stick_out_mm if tool == self.tool else None
+        return Conditions(stick_out_mm=stick_out, drawbar_kn=self.drawbar_kn, state=self.state)
 
 
 class ModeChoice(Table, frozen=True):

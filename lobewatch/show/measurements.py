@@ -7,12 +7,13 @@ from typing import Any
 
 from rich.table import Table
 
-from acquisition import Remark, joined
+from acquisition import Conditions, Remark, joined
 from lobes import StabilityLobes
 from lobewatch.analysis import Logbook, Measurement, Verdict, lobes_of, remarks_on_all
 from lobewatch.analysis.questions.asked import QUESTIONS
 from lobewatch.machine import REFERENCE_CUT
 from lobewatch.show.describe import calibration_json
+from lobewatch.show.history.under import conditions_texts
 from lobewatch.show.modes.describe_modes import in_order, mode_json, mode_table, short_remark_lines
 from lobewatch.show.programs.doubts import reading_lines
 from lobewatch.show.verdicts import is_safe, verdict_json, verdict_table
@@ -49,6 +50,7 @@ def measurement_json(m: Measurement, logbook: Logbook) -> dict[str, Any]:
         "time": m.time.isoformat(),
         "tool": m.tool,
         "direction": m.direction,
+        "conditions": _conditions(m, logbook).known,
         "modes": [mode_json(mode) for mode in m.modes],
         "followed": mode_json(m.followed) if m.followed else None,
         "calibration": calibration_json(m.calibration) if m.calibration else None,
@@ -64,7 +66,8 @@ def programs_json(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
 
 def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
     """A measurement for people."""
-    texts: list[str | Table] = [f"{m.tap_id}  (tool {m.tool}, direction {m.direction})"]
+    named = [f"tool {m.tool}", f"direction {m.direction}", *conditions_texts(_conditions(m, logbook))]
+    texts: list[str | Table] = [f"{m.tap_id}  ({', '.join(named)})"]
     if m.modes:
         shown = in_order(m.modes, rejected=False)
         texts += [mode_table(shown), *short_remark_lines(shown, remarks_on_all(m.modes))]
@@ -79,6 +82,10 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
         texts.append(f"{REFERENCE_CUT}: lowest limit {low.depth * 1e3:.2f} mm at {low.speed_rpm:.0f} rpm")
     asked = [one for one in logbook.standing().remarks if one.about == f"tap test {m.tap_id}"]
     return [*texts, *remark_lines([one for one in assembly.remarks if one.code not in QUESTIONS]), *map(_asked, asked)]
+
+
+def _conditions(m: Measurement, logbook: Logbook) -> Conditions:
+    return logbook.files.place(m.tap_id).entry.conditions
 
 
 def _asked(question: Remark) -> str:

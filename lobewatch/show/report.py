@@ -31,6 +31,7 @@ from lobewatch.machine import Machine
 from lobewatch.show.advice import Advised, advised, advised_lines, decay_text
 from lobewatch.show.figures import frf_figure, svg, trend_figure
 from lobewatch.show.figures_lobes import lobes_figure
+from lobewatch.show.history.under import conditions_texts
 from lobewatch.show.programs.doubts import reading_lines
 from lobewatch.show.verdicts import WORDS, band_text, limit_text, margin_text, turning_text, verdict_text
 
@@ -111,7 +112,7 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
         "program_doubt": [*map(_whole, reading_lines(checked, machine))],
         "remarks": [str(remark) for remark in _remarks(last, assembly)],
         "modes": _modes(last),
-        "operator": now.circumstances.operator,
+        "said": [*filter(None, [now.circumstances.operator]), *conditions_texts(last.conditions)],
         "tap_id": now.id,
         "good": len(now.accepted),
         "hits": len(now.hits),

@@ -98,6 +98,7 @@ class TapInProgress:
         """Go on with a hit that is on the disk already."""
         found = judge_hit(spooled.hit)
         self._append(spooled.number, spooled.hit, spooled.flags | found.flags, found.text or spooled.flags.cure)
+        self.circumstances = spooled.circumstances
         self.earlier = len(self.hits)
 
     def take_out(self, number: int, flags: HitFlags, reason: str) -> None:
@@ -167,6 +168,8 @@ def _interrupted(
             found = TapInProgress(path.name, about, path, trigger=spooled_trigger(path, damaged))
             for hit in (first, *hits):
                 found.add_spooled(hit)
+            said = circumstances.conditions.over(found.circumstances.conditions)
+            found.circumstances = replace(found.circumstances, conditions=said)
         else:
             when = f"{about.created:%Y-%m-%d %H:%M} UTC, tool {about.tool}, direction {about.direction}"
             left.append(f"an interrupted test of {when} is still in {path}; delete that folder if it is not needed")

@@ -50,6 +50,8 @@ class TapSession:
         self._publisher, self._wishes = Publisher(first, clock), Wishes()
         self._connector = Connector(folder, open_device, self._publisher, sleep)
         self._measurement: Measurement | None = None
+        self.unasked: Sequence[str] = ()
+        """Of `accept`, what the finished test does not ask."""
 
     @property
     def state(self) -> TapState:
@@ -115,7 +117,7 @@ class TapSession:
         logbook = Logbook(self._folder)
         logbook.commit(tap, datetime.now(UTC) if self._guided else None)
         try:
-            logbook.accept([tap.id], self._accept)
+            self.unasked = logbook.accept([tap.id], self._accept)
             self._measurement = logbook.measurement(tap.id)
             outcome = outcome_of(logbook, self._measurement) if self._guided else None
         except (ArithmeticError, KeyError, OSError, ValueError) as error:

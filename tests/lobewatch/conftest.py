@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
+from acquisition import UNSAID, Circumstances, Conditions, TapDirection, TapTest, from_accelerance, new_tap_id
 from lobewatch.analysis import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
@@ -83,10 +83,12 @@ class Shop:
         tool: str = "reference",
         stiffness: float = 3.5e7,
         damping_ratio: float = 0.029136,
+        conditions: Conditions = UNSAID,
     ) -> str:
         """A tap test without noise, so many days after the start; its identity."""
         when = START + timedelta(days=days)
-        about = Circumstances("m", when, tool, direction, "", (self.path / "machine.toml").read_text("utf-8"))
+        text = (self.path / "machine.toml").read_text("utf-8")
+        about = Circumstances("m", when, tool, direction, "", text, conditions=conditions)
         frf = synthesize([Mode(frequency, damping_ratio, stiffness)], LINES)
         self.folder.commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
         return new_tap_id(about)

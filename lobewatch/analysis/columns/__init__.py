@@ -1,1 +1,1 @@
-"""Columns of history.h5 that are more than a value a row."""
+"""The columns of history.h5."""

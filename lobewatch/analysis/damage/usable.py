@@ -60,10 +60,8 @@ class UsableTaps:
 
     def since(self, tap_id: str) -> list[TapEntry]:
         """Those that are compared with one of them; none with what is none of them, a prediction."""
-        baselines = {place.entry.id: place.baseline for place in self.places}
-        if tap_id not in baselines:
-            return []
-        return [place.entry for place in self.places if place.baseline == baselines[tap_id]]
+        series = {place.entry.id: place.series for place in self.places}
+        return [place.entry for place in self.places if place.series == series.get(tap_id)]
 
     @property
     def remarks(self) -> list[Remark]:

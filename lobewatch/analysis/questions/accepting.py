@@ -26,6 +26,13 @@ def accept(
     return [code for code in codes if code not in answered]
 
 
+def not_asked(codes: Sequence[str], tap_ids: Sequence[str], asked: Mapping[str, Sequence[str]]) -> str:
+    """That these codes are no open questions of these tap tests, and which there are; asked: as for `accept`."""
+    open_ones = "; ".join(f"{tap_id}: {', '.join(found)}" for tap_id, found in asked.items())
+    told = f"--accept {' '.join(codes)}: not asked of {', '.join(tap_ids)}, which is stored"
+    return f"{told}; open questions: {open_ones or 'none'}"
+
+
 def about_questions(tap_id: str, questions: Sequence[Remark], path: Path | str) -> Iterator[Remark]:
     """What is asked of a tap test, with the command that answers; path: of the folder."""
     file = Path(path) / "taps" / f"{tap_id}.h5"

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Self
 
 import msgspec
 
-from acquisition import DataError, Remark, TapTest
+from acquisition import UNSAID, Conditions, DataError, Remark, TapTest
 
 LATER = ("accepted", "excluded")
 """What other lines of the journal say of a tap test."""
@@ -42,6 +42,8 @@ class TapEntry:
     """Direction at the tool tip, "x" or "y"."""
     source_sha256: str
     """Of the recording it was replayed from; empty for a live test."""
+    conditions: Conditions = UNSAID
+    """What it was taken under; unknown in lines of older versions."""
     asked: tuple[str, ...] = ()
     """What was asked about its time when it was committed, by code; lines of older versions have none."""
     accepted: tuple[str, ...] = ()
@@ -55,7 +57,8 @@ class TapEntry:
         about = tap.circumstances
         source = hashlib.sha256(tap.source.content).hexdigest() if tap.source else ""
         digest = hashlib.sha256(content).hexdigest()
-        return cls(tap.id, digest, len(content), about.created.isoformat(), about.tool, about.direction, source)
+        named = about.created.isoformat(), about.tool, about.direction
+        return cls(tap.id, digest, len(content), *named, source, about.conditions)
 
     @classmethod
     def from_line(cls, line: dict[str, Any], accepted: tuple[str, ...] = (), excluded: str = "") -> Self:
@@ -65,8 +68,8 @@ class TapEntry:
     @property
     def line(self) -> dict[str, Any]:
         """For the journal."""
-        told = {name: value for name, value in asdict(self).items() if name not in LATER}
-        return {"kind": "tap", **told}
+        told = {field.name: getattr(self, field.name) for field in fields(self) if field.name not in LATER}
+        return {"kind": "tap", **told, "conditions": self.conditions.known, "asked": list(self.asked)}
 
     @property
     def file(self) -> str:

@@ -6,18 +6,22 @@ import csv
 import io
 import math
 from collections.abc import Mapping
+from dataclasses import fields
 from datetime import UTC, datetime
 from typing import Any
 
 from rich.cells import cell_len, set_cell_size
 
+from acquisition import Conditions
 from lobewatch.analysis import Logbook, Row
 from lobewatch.machine import TapEntry
 from lobewatch.machine.corrections.event import Event
+from lobewatch.show.history.under import conditions_texts
 
 VALUES = {"frequency_hz": "frequency", "damping_ratio": "damping_ratio", "stiffness_n_per_m": "stiffness"}
 """Field of a row by its name in CSV and JSON."""
 HEADINGS = ["time", "what", "tool", "in", "f_n (Hz)", "zeta (%)", "K (N/um)", "identity, programs and remarks"]
+UNDER = tuple(field.name for field in fields(Conditions))
 COLUMNS = ("time", "kind", "id", "tool", "direction")
 
 
@@ -49,11 +53,11 @@ def history_csv(logbook: Logbook) -> str:
     values = [heading for name in VALUES for heading in (name, f"{name}_std")]
     verdicts = {name: f"verdict: {name}" for name in names}
     written = io.StringIO()
-    heads = [*COLUMNS, *values, "questions", *verdicts.values(), "reason", "text"]
+    heads = [*COLUMNS, *values, *UNDER, "questions", *verdicts.values(), "reason", "text"]
     writer = csv.DictWriter(written, heads, restval="", lineterminator="\n")
     writer.writeheader()
     for line in _lines(logbook):
-        told = {key: value for key, value in line.items() if key in heads}
+        told = {key: value for key, value in line.items() if key in heads} | line.get("conditions", {})
         told |= {verdicts[name]: word for name, word in line.get("verdicts", {}).items()}
         told["questions"] = " ".join(line.get("questions", ()))
         writer.writerow({key: _cell(value) for key, value in told.items()})
@@ -86,6 +90,7 @@ def _tap_json(row: Row, logbook: Logbook) -> dict[str, Any]:
     for name, own in VALUES.items():
         found[name], found[f"{name}_std"] = getattr(row, own)
     found["baseline"] = None if row.baseline is None else _utc(row.baseline)
+    found["series"], found["conditions"] = row.series, row.conditions.known
     found["questions"] = [one.code for one in row.questions]
     words = row.rulings or {}
     found["verdicts"] = {p.name: words[p.name].word.value for p in logbook.machine.program if p.name in words}
@@ -94,7 +99,8 @@ def _tap_json(row: Row, logbook: Logbook) -> dict[str, Any]:
 
 def _excluded_json(tap: TapEntry) -> dict[str, Any]:
     time = _utc(datetime.fromisoformat(tap.time))
-    return {"id": tap.id, "time": time, "tool": tap.tool, "direction": tap.direction, "reason": tap.excluded}
+    named = {"id": tap.id, "time": time, "tool": tap.tool, "direction": tap.direction}
+    return {**named, "conditions": tap.conditions.known, "reason": tap.excluded}
 
 
 def _utc(time: datetime) -> str:
@@ -112,10 +118,11 @@ def _number(line: Mapping[str, Any], name: str, scale: float) -> str:
 
 
 def _said(line: Mapping[str, Any]) -> str:
-    """Its text or reason, what is asked, and the verdicts of then; of a tap test the identity too."""
+    """Its text or reason, conditions, what is asked, and the verdicts of then; of a tap test the identity too."""
     if line["kind"] in ("event", "new baseline"):
         return f"{line['id']}: {line['text']}"
+    under = conditions_texts(Conditions.of(line["conditions"]))
     if line["kind"] == "excluded":
-        return f"{line['id']}: {line['reason']}"
+        return "; ".join([f"{line['id']}: {line['reason']}", *under])
     words = [f"{name}: {word}" for name, word in line["verdicts"].items()]
-    return "; ".join([line["id"], *(f"question {code}" for code in line["questions"]), *words])
+    return "; ".join([line["id"], *under, *(f"question {code}" for code in line["questions"]), *words])

@@ -16,6 +16,7 @@ import pytest
 from acquisition import (
     Channel,
     Circumstances,
+    Conditions,
     DataError,
     Frf,
     HammeredStructure,
@@ -40,6 +41,7 @@ from acquisition import (
 ABOUT = Circumstances(
     "mill 3", datetime(2026, 1, 15, 9, 30, 0, 123456, UTC), "20 mm/ø", "y", "Kim", "[machine]\n", "DI-4108"
 )
+ABOUT = replace(ABOUT, conditions=Conditions(-4.5, 80.25, 18.0, "wärm", True, "note"))
 
 
 @pytest.fixture

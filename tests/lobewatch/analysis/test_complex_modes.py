@@ -12,8 +12,9 @@ import pytest
 
 from lobes import lowest_of, program_limit, read_history, write_history, zero_order
 from lobewatch.analysis import Assembly
+from lobewatch.analysis.columns.history_columns import from_columns, to_columns
 from lobewatch.analysis.estimate import Estimate
-from lobewatch.analysis.history import Row, empty_history, from_columns, to_columns
+from lobewatch.analysis.history import Row, empty_history
 from lobewatch.analysis.prediction import predict
 from lobewatch.analysis.programs.doubt import doubt_of
 from lobewatch.analysis.programs.drawn import middle_row

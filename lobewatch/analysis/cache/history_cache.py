@@ -9,7 +9,8 @@ from itertools import takewhile
 
 from acquisition import Remark
 from lobes import read_history, write_history
-from lobewatch.analysis.history import History, Row, empty_history, from_columns, to_columns
+from lobewatch.analysis.columns.history_columns import from_columns, to_columns
+from lobewatch.analysis.history import History, Row, empty_history
 from lobewatch.analysis.order import Place
 from lobewatch.analysis.questions.asked import accepted_codes
 from lobewatch.machine import BusyError, MachineFolder
@@ -35,8 +36,8 @@ def stored_history(folder: MachineFolder, places: Sequence[Place], baseline: dat
 def _is_of(row: Row, place: Place) -> bool:
     """Whether a row was made of this tap test, with all that was accepted of it, since the same baseline."""
     tap = place.entry
-    made = row.tap_id, row.baseline, accepted_codes(row.remarks)
-    return made == (tap.id, place.baseline, set(tap.accepted))
+    made = row.tap_id, row.baseline, row.series, accepted_codes(row.remarks)
+    return made == (tap.id, place.baseline, place.series, set(tap.accepted))
 
 
 def store_history(folder: MachineFolder, history: History) -> list[Remark]:

@@ -65,7 +65,7 @@ from .sensors import (
     unit_mistake,
 )
 from .source import Device, DeviceIdentity, Source
-from .tap import UNSAID, Circumstances, Conditions, SourceFile, TapTest, new_tap_id
+from .tap import UNSAID, Circumstances, Conditions, SourceFile, TapTest, machine_of, named_in_id, new_tap_id
 from .taps import Faults, TapsEmulator, TapsSource
 from .verdicts import Verdict, average_good, check_hit, judge_hit
 
@@ -144,8 +144,10 @@ __all__ = [
     "known_formats",
     "list_ports",
     "load_drivers",
+    "machine_of",
     "measure_rate",
     "measure_skew",
+    "named_in_id",
     "new_tap_id",
     "no_ports_hint",
     "probe_port",

@@ -135,5 +135,14 @@ def new_tap_id(circumstances: Circumstances) -> str:
         check_name(getattr(circumstances, what), what)
     stamp = circumstances.created.astimezone(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
     names = (circumstances.machine, circumstances.tool, circumstances.direction)
-    slugs = [re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-")[:24] for name in names]
-    return "_".join([stamp, *filter(None, slugs), secrets.token_hex(2)])
+    return "_".join([stamp, *filter(None, map(named_in_id, names)), secrets.token_hex(2)])
+
+
+def named_in_id(name: str) -> str:
+    """A name as it stands in identities; empty where nothing of it can."""
+    return re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-")[:24]
+
+
+def machine_of(tap_id: str) -> str:
+    """Name of the machine as it stands in an identity; empty where that is none of `new_tap_id`."""
+    return tap_id.split("_")[1] if re.match(r"\d{8}T\d{6}\.\d{6}Z_", tap_id) else ""

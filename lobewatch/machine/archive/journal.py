@@ -21,6 +21,7 @@ import msgspec
 
 from acquisition import DataError, Remark
 from acquisition.atomic import atomic_write, sync_folder
+from lobewatch.machine.archive.foreign import foreign
 from lobewatch.machine.archive.journal_text import Entry, JournalText, crc_of, scan
 
 JOURNAL = "journal.jsonl"
@@ -68,6 +69,9 @@ class Journal:
         damage = [*self._about_journal(journal, copy), *self._about_copy(journal, copy)]
         loose = (*journal.chain, *copy.chain, *journal.loose, *copy.loose) if damage else ()
         lines = tuple(dict.fromkeys((*longer, *loose)))
+        other = foreign(self.path.parent, lines)
+        if other:
+            return Reading((), (journal_damage(self.path, other),))
         tidy = copy.there and copy.whole == journal.whole and not (damage or journal.torn or copy.torn)
         return Reading(lines, tuple(damage), journal.torn, tidy)
 

@@ -96,7 +96,11 @@ def test_a_live_tap_finds_the_emulated_spindle(run: Run, trial: MachineFolder, d
 
 
 def test_json_of_a_live_tap(run: Run, device: TapsEmulator) -> None:
-    said = run("tap", "trial", "--port", device.port, "--json").json
+    ended = run("tap", "trial", "--port", device.port, "--json", "--temperature", "24.5", "--accept", "other-band")
+    assert ended.err.count("--accept other-band: not asked of ") == 1
+    assert "open questions: none" in ended.err
+    said = ended.json
+    assert said["conditions"] == {"temperature_c": 24.5}
     assert said["followed"]["frequency_hz"] == pytest.approx(1713.05, abs=0.5)
     assert 0 < said["followed"]["frequency_hz_std"] < 0.1
     assert said["calibration"]["bearing_stiffness_n_per_m"] == pytest.approx(1.28e9, rel=0.01)

@@ -152,9 +152,10 @@ def test_a_clock_behind_the_newest_test_is_asked_about_and_accepted(
     folder.commit(
         TapTest(new_tap_id(about), about, synthesize([Mode(1713.0, 0.03, 3.5e7)], np.arange(4.0, 4000.0, 4.0)))
     )
-    session = session_of(folder, lambda: simulated(tapper(), channels), accept=["clock-behind"])
+    session = session_of(folder, lambda: simulated(tapper(), channels), accept=["clock-behind", "other-band"])
     tap = session.run()
     assert folder.taps()[0].id == tap.id
     assert folder.taps()[0].asked == ("clock-behind",)
     told = [(remark.code, remark.about) for remark in session.measurement.remarks]
     assert ("accepted", "clock-behind") in told
+    assert session.unasked == ["other-band"]

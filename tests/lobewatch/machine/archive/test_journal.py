@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from acquisition import DataError, TapTest
+from acquisition import DataError, TapTest, new_tap_id
+from lobewatch.machine.archive.rebuild import rebuild_files
+from lobewatch.machine.archive.verify import verify
+from lobewatch.machine.corrections.correct import add_event
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
 
 MakeTap = Callable[..., TapTest]
 NAMES = ("journal.jsonl", "journal.copy.jsonl")
@@ -182,3 +187,43 @@ def test_a_flipped_bit_in_a_long_journal_is_named(folder: MachineFolder) -> None
     for at in range(0, len(whole), 397):
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 4]) + whole[at + 1 :])
         assert "journal.jsonl: " in told(folder), at
+
+
+def test_a_journal_of_another_machine_is_named_and_mended(tmp_path: Path, make_tap: MakeTap) -> None:
+    mine, other = (of_two_taps(tmp_path / name, make_tap) for name in ("mill 3", "mill 7"))
+    known = ids(mine)
+    for name in NAMES:
+        (mine.path / name).write_bytes((other.path / name).read_bytes())
+    wrong = "journal.jsonl: is that of another machine: it lists 2 tap tests of mill-7, none of them here, "
+    assert f"{wrong}while taps/ holds 2 of mill 3" in told(mine)
+    assert ids(mine) == known
+    assert as_it_is(mine).contents().events == ()
+    with pytest.raises(DataError, match=r"another machine.*lobewatch rebuild"):
+        as_it_is(mine).commit(make_tap(9))
+    assert next(one.code for one in verify(mine.path).damage) == "journal-damaged"
+    rebuild_files(mine.path)
+    assert verify(mine.path).damage == ()
+    assert ids(mine) == known
+
+
+def test_a_renamed_machine_and_lost_taps_are_no_other_machine(tmp_path: Path, make_tap: MakeTap) -> None:
+    mine = of_two_taps(tmp_path / "mill 3", make_tap)
+    text = mine.toml.read_text("utf-8")
+    mine.toml.write_text(text.replace('"mill 3"', '"mill 8"'), "utf-8")
+    assert told(mine) == ""
+    mine.toml.write_text(text, "utf-8")
+    for path in (mine.path / "taps").iterdir():
+        path.rename(path.with_name(path.name.replace("reference", "ref")))
+    assert "another machine" not in told(mine)
+
+
+def of_two_taps(path: Path, make_tap: MakeTap) -> MachineFolder:
+    """With an event."""
+    make_machine_folder(path, "new_machine.toml")
+    folder = MachineFolder(path)
+    for day in range(2):
+        tap = make_tap(day)
+        about = replace(tap.circumstances, machine=path.name)
+        folder.commit(replace(tap, circumstances=about, id=new_tap_id(about)))
+    add_event(folder, "greased")
+    return folder

@@ -2,6 +2,7 @@
 
 from .assembly import ABOUT_DIRECTIONS, Assembly, lobes_of, speed_grid
 from .charts import Chart, Dynamics, Method, chart
+from .decay.fallen import change_since_start
 from .estimate import Estimate
 from .file_modes import FileModes, modes_of_file, remarks_on_all
 from .history import History, Row
@@ -14,7 +15,7 @@ from .model_state import ModelState, first_critical_speed, model_frf, model_stat
 from .model_summary import ModelMode, ModelSummary, model_summary
 from .one_file.recorded_window import Window
 from .programs import Advice, Setting, Verdict, Word
-from .standing import Light, SeriesStanding, Standing, change_since_first, unreadable
+from .standing import Light, SeriesStanding, Standing, unreadable
 
 __all__ = [
     "ABOUT_DIRECTIONS",
@@ -43,7 +44,7 @@ __all__ = [
     "Window",
     "Word",
     "calibrate_model",
-    "change_since_first",
+    "change_since_start",
     "chart",
     "compare_lobes",
     "first_critical_speed",

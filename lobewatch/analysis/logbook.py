@@ -94,8 +94,7 @@ class Logbook:
     ) -> Measurement:
         """Store a recorded file as a tap test, unless it is stored already, and say what it means.
 
-        date, tool, direction and conditions are taken from the file where they are not given. DataError for a file
-        that cannot be trusted, with the reason.
+        What is not given is taken from the file. DataError for a file that cannot be trusted, with the reason.
         """
         (tap_id,) = self.replay_all([Path(file)], date, tool, direction, conditions).tap_ids
         self.files.refuse_excluded(tap_id)
@@ -177,7 +176,8 @@ class Logbook:
 
     def standing(self, now: datetime | None = None) -> Standing:
         """The light of the machine, the reasons, and one next step."""
-        return stand(self.machine, self.history, now or datetime.now(UTC), self.folder.path, self.files.remarks)
+        now, files = now or datetime.now(UTC), self.files
+        return stand(self.machine, self.history, now, self.folder.path, files.remarks, files.event_times)
 
     @property
     def questions(self) -> Mapping[str, tuple[str, ...]]:

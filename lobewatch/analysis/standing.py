@@ -1,24 +1,26 @@
 """How a machine stands: one light from all its series and all its programs, the reasons, one next step.
 
-The one place that says how far a frequency has fallen and what that calls for. Pure: rows in, records out.
+Pure: rows in, records out.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
 
 from acquisition import Remark
-from lobewatch.analysis.estimate import UNKNOWN, Estimate
+from lobewatch.analysis.decay.fallen import about_fall, about_trend, fall_of, known_rows, trend_in
+from lobewatch.analysis.decay.trend import Trend
+from lobewatch.analysis.estimate import Estimate
 from lobewatch.analysis.history import History, Row
 from lobewatch.analysis.programs.verdict import Word
 from lobewatch.analysis.questions.accepting import about_questions
 from lobewatch.analysis.questions.clock import about_future
-from lobewatch.machine import Limits, Machine
+from lobewatch.machine import Machine
 
 
 class Light(StrEnum):
@@ -33,6 +35,7 @@ class Light(StrEnum):
 
 LIGHTS = {
     "frequency-alarm": Light.ALARM,
+    "decay": Light.ALARM,
     "program-not-stable": Light.ALARM,
     "unreadable": Light.UNKNOWN,
     "never-tapped": Light.UNKNOWN,
@@ -42,6 +45,7 @@ LIGHTS = {
     "tap-unlisted": Light.WARN,
     "file-damaged": Light.WARN,
     "frequency-warn": Light.WARN,
+    "decay-doubtful": Light.WARN,
     "frequency-jump": Light.WARN,
     "mode-lost": Light.WARN,
     "no-mode-in-band": Light.WARN,
@@ -54,6 +58,7 @@ LIGHTS = {
     "overdue": Light.WARN,
     "program-unknown": Light.WARN,
     "program-doubtful": Light.WARN,
+    "frequency-rose": Light.GOOD,
     "one-direction": Light.GOOD,
 }
 """What each reason means, in order of harm."""
@@ -72,7 +77,9 @@ class SeriesStanding:
     first: datetime
     """Of the test that it is compared with."""
     fall: Estimate
-    """Fall of the followed frequency from the first test of the series to the last that shows it (%)."""
+    """Fall of the followed frequency from the start of the series to the last test that shows it (%)."""
+    trend: Trend | None = field(compare=False)
+    """Points, alarm and forecast; None where no test of it can be compared with."""
     remarks: tuple[Remark, ...]
     """Reasons that it gives."""
 
@@ -127,11 +134,16 @@ def with_files(found: Standing, damage: Sequence[Remark]) -> Standing:
 
 
 def stand(
-    machine: Machine, history: History, now: datetime, path: Path | str = "MACHINE", files: Sequence[Remark] = ()
+    machine: Machine,
+    history: History,
+    now: datetime,
+    path: Path | str = "MACHINE",
+    files: Sequence[Remark] = (),
+    events: Sequence[datetime] = (),
 ) -> Standing:
     """The standing at a time; the last row holds the word on every program.
 
-    path: of the folder, for commands; files: what is wrong with those in it.
+    path: of the folder, for commands; files: what is wrong with those in it; events: when something was done to it.
     """
     rows = history.current
     if not rows and files:
@@ -141,7 +153,7 @@ def stand(
         since = "yet" if history.baseline is None else f"since the new baseline of {history.baseline:%Y-%m-%d}"
         return _of([Remark("never-tapped", "", f"no tap test {since}", cure)])
     pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
-    series = [_series(history.series(*pair), machine.limits) for pair in pairs]
+    series = [_series(history.series(*pair), machine, now, path, events) for pair in pairs]
     left = machine.machine.tap_interval_days - (now - rows[-1].time) / timedelta(days=1)
     remarks = [remark for one in series for remark in one.remarks]
     remarks += [_of_files(remark) for remark in files if remark.code in LIGHTS]
@@ -157,43 +169,21 @@ def stand(
     return _of(remarks, f"All is well: tap again by {due:%Y-%m-%d}.", tuple(series), rows[-1].time, left)
 
 
-def change_since_first(rows: Sequence[Row], name: str) -> Estimate:
-    """Change (%) of a value from its reference in a series to the last row; unknown where that does not know it.
-
-    name: frequency, damping_ratio, stiffness or bearing_stiffness. The one formula for light, report and screen.
-    """
-    first, now = reference(rows, name), rows[-1]
-    value: Estimate = getattr(now, name)
-    if first is None or not value.is_known:
-        return UNKNOWN
-    return Estimate(0.0, 0.0) if first is now else value.change_since(getattr(first, name))
-
-
-def reference(rows: Sequence[Row], name: str) -> Row | None:
-    """The row that a value is compared with: the first of a series that knows it and that nothing is asked about."""
-    return next((row for row in rows if getattr(row, name).is_known and not row.questions), None)
-
-
 def _of(remarks: Sequence[Remark], well: str = "", *others: object) -> Standing:
     order = list(LIGHTS)
     worst = sorted(remarks, key=lambda remark: order.index(remark.code))
     return Standing(tuple(worst), worst[0].cure if worst and worst[0].cure else well, *others)  # type: ignore[arg-type]
 
 
-def _series(rows: Sequence[Row], limits: Limits) -> SeriesStanding:
-    known = [row for row in rows if row.frequency.is_known] or rows
-    first, fall = reference(known, "frequency") or known[0], _fall(known)
-    name = f"{rows[-1].tool}, {rows[-1].direction}"
-    remarks = (*_about_loss(name, rows[-1]), *_about_fall(name, fall, limits))
-    return SeriesStanding(rows[-1].tool, rows[-1].direction, rows[-1].time, first.time, fall, remarks)
-
-
-def _fall(known: Sequence[Row]) -> Estimate:
-    """To the newest test, or where something is asked about that, to the newest other one if it had fallen farther."""
-    sure = [row for row in known if not row.questions]
-    changes = [change_since_first(rows, "frequency") for rows in (known, sure) if rows]
-    change = min(changes, key=lambda one: one.value)
-    return Estimate(-change.value + 0.0, change.std)
+def _series(
+    rows: Sequence[Row], machine: Machine, now: datetime, path: Path | str, events: Sequence[datetime]
+) -> SeriesStanding:
+    known = known_rows(rows, "frequency") or [row for row in rows if row.frequency.is_known] or rows
+    name, fall = f"{rows[-1].tool}, {rows[-1].direction}", fall_of(rows)
+    trend = trend_in(rows, "frequency", now, events)
+    remarks = [*_about_loss(name, rows[-1]), *about_fall(name, fall, machine.limits)]
+    remarks += about_trend(name, trend, path) if trend else ()
+    return SeriesStanding(rows[-1].tool, rows[-1].direction, rows[-1].time, known[0].time, fall, trend, tuple(remarks))
 
 
 def _about_loss(name: str, newest: Row) -> Iterator[Remark]:
@@ -205,16 +195,6 @@ def _about_loss(name: str, newest: Row) -> Iterator[Remark]:
 def _of_files(remark: Remark) -> Remark:
     """With a cure that can be the next step."""
     return replace(remark, cure=f"{remark.about}: {remark.cure or remark.text}.")
-
-
-def _about_fall(name: str, fall: Estimate, limits: Limits) -> Iterator[Remark]:
-    text = f"frequency fallen by {fall.value:.1f} % since the first test"
-    if fall.value >= limits.frequency_alarm_percent:
-        cure = "Do not cut on: have the bearings, the tool and its clamping looked at, then tap again."
-        yield Remark("frequency-alarm", name, f"{text} (alarm at {limits.frequency_alarm_percent:g} %)", cure)
-    elif fall.value >= limits.frequency_warn_percent:
-        cure = "Tap again to be sure; if it stays, have the bearings and the tool's clamping looked at soon."
-        yield Remark("frequency-warn", name, f"{text} (warning at {limits.frequency_warn_percent:g} %)", cure)
 
 
 def _about_programs(rows: Sequence[Row], machine: Machine) -> Iterator[Remark]:

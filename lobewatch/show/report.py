@@ -22,11 +22,10 @@ from lobewatch.analysis import (
     Row,
     Standing,
     Word,
-    change_since_first,
     lobes_of,
 )
+from lobewatch.analysis.decay.fallen import change_since_start, start
 from lobewatch.analysis.programs.limit_band import limit_band
-from lobewatch.analysis.standing import reference
 from lobewatch.machine import Machine
 from lobewatch.show.advice import Advised, advised, advised_lines, decay_text
 from lobewatch.show.figures import frf_figure, svg, trend_figure
@@ -196,11 +195,9 @@ def _changes(rows: Sequence[Row]) -> list[dict[str, str]]:
     table = []
     for name, label, scale in CHANGES:
         known = [getattr(row, name) for row in rows if getattr(row, name).is_known]
-        change = change_since_first(rows, name)
+        change = change_since_start(rows, name)
         if change.is_known:
-            then_row = reference(rows, name)
-            first = known[0] if then_row is None else getattr(then_row, name)
-            now, then = (plus_minus(one.value, one.std, scale) for one in (known[-1], first))
+            now, then = (plus_minus(one.value, one.std, scale) for one in (known[-1], start(rows, name)))
             table.append({"label": label, "then": then, "now": now, "change": f"{change.value:+.2f} %"})
     for name, label in (("static_tip_stiffness", "static"), ("modal_tip_stiffness", "modal")):
         values = [float(getattr(row, name)) for row in rows if np.isfinite(getattr(row, name))]

@@ -75,6 +75,11 @@ class UsableTaps:
         return self._all.events
 
     @property
+    def event_times(self) -> list[datetime]:
+        """When something was done to the machine, oldest first."""
+        return [event.time for event in self.events]
+
+    @property
     def excluded(self) -> Sequence[TapEntry]:
         """Those that a person has taken out, oldest first."""
         return [tap for tap in self._all.taps if tap.excluded]

@@ -70,8 +70,10 @@ class Forecast:
     """Of each, shape (j,), their sum 1."""
     spread: float
     """Standard deviation of the points around the shapes, in the unit of the series."""
+    fitted: Floats
+    """Mean of the mixture at the points themselves, shape (n,)."""
     dates: Floats
-    """From that of the last point to the horizon, shape (d,)."""
+    """From now to the horizon, shape (d,)."""
     mean: Floats
     """Of each shape at these dates, shape (j, d)."""
     error: Floats
@@ -116,15 +118,19 @@ class Forecast:
         return np.asarray((low + high) / 2)
 
 
-def forecast(dates: Floats, y: Floats, horizon: float, temperature: Floats | None = None) -> Forecast:
+def forecast(
+    dates: Floats, y: Floats, horizon: float, temperature: Floats | None = None, now: float = -np.inf
+) -> Forecast:
     """Foretell a series y (n,) over its dates (n,), increasing, to a date, but never farther than twice its own span.
 
-    temperature: at each point (K or degC), NaN where it was not recorded. ValueError below 8 points and without a span.
+    temperature: at each point (K or degC), NaN where it was not recorded; now: if that is later than the last point.
+    ValueError below 8 points and without a span.
     """
     at = dates - dates[:1].sum()
     if y.size < ENOUGH or at[-1] <= 0:
         raise ValueError(f"{y.size} points on {np.unique(at).size} dates: a forecast needs {ENOUGH}")
-    ahead = np.linspace(at[-1], max(min(horizon - dates[0], 3 * at[-1]), at[-1]), LOOKS)
+    start = max(at[-1], now - dates[0])
+    ahead = np.linspace(start, max(min(horizon - dates[0], 3 * at[-1]), start), LOOKS)
     base = base_of(y, temperature)
     shapes, columns = zip(*_shapes(at, np.concatenate([at, ahead])), strict=True)
     rss, mean, error = base.fit_columns(np.array(columns), at.size)
@@ -136,7 +142,8 @@ def forecast(dates: Floats, y: Floats, horizon: float, temperature: Floats | Non
     weight = weight[kept] / weight[kept].sum()
     moved = tuple(shapes[j]._replace(start=shapes[j].start + float(dates[0])) for j in kept)
     spread = float(np.sqrt(weight @ rss[kept] / base.freedom))
-    return Forecast(moved, weight, spread, dates[0] + ahead, mean[kept] + y[0], error[kept], base.freedom)
+    past, mean = np.split(mean[kept] + y[0], [at.size], axis=1)
+    return Forecast(moved, weight, spread, weight @ past, dates[0] + ahead, mean, error[kept, at.size :], base.freedom)
 
 
 def _shapes(at: Floats, all_dates: Floats) -> Iterator[tuple[Shape, Floats]]:

@@ -72,11 +72,11 @@ class Base:
         return self.y.size - 2
 
     def fit_columns(self, columns: Floats, n: int) -> tuple[Floats, Floats, Floats]:
-        """Sum of squares (j,) that each column (j, n + d) leaves in n points, its mean and its error at d others.
+        """Sum of squares (j,) that each column (j, n + d) leaves in the first n, its mean and its error in all.
 
-        Mean and error of shape (j, d), at the mean temperature.
+        Mean and error of shape (j, n + d), at the mean temperature.
         """
-        inner, outer = columns[:, :n], columns[:, n:]
+        inner = columns[:, :n]
         gram = np.linalg.inv(self.columns.T @ self.columns + self.precision(np.array([n]))[0])
         level = gram @ self.columns.T @ self.y
         leaning = inner @ self.columns @ gram
@@ -86,7 +86,7 @@ class Base:
         total = self.y @ (self.y - self.columns @ level)
         size = product / square
         rss = np.maximum(total - size * product, LEAST * total + np.finfo(float).tiny)
-        away = outer - leaning[:, :1]
+        away = columns - leaning[:, :1]
         variance = (gram[0, 0] + away**2 / square[:, np.newaxis]) * (rss / self.freedom)[:, np.newaxis]
         return rss, level[0] + size[:, np.newaxis] * away, np.sqrt(variance)
 

@@ -26,7 +26,7 @@ from acquisition import (
     new_tap_id,
 )
 from lobewatch.analysis import Estimate, Logbook
-from lobewatch.analysis.standing import change_since_first
+from lobewatch.analysis.decay.fallen import change_since_start
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.tap.outcome import outcome_of
@@ -80,7 +80,7 @@ def test_the_fall_has_the_standard_error_of_both_frequencies(folder: MachineFold
     first, last = Logbook(folder).history.rows
     first = replace(first, frequency=Estimate(first.frequency.value, 1.72))
     last = replace(last, frequency=Estimate(last.frequency.value, 0.96 * 1.72))
-    change = change_since_first([first, last], "frequency")
+    change = change_since_start([first, last], "frequency")
     assert change.value == pytest.approx(-4.0, abs=0.01)
     assert change.std == pytest.approx(0.136, abs=0.001)
 

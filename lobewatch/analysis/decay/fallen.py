@@ -1,0 +1,92 @@
+"""How far the values of a series are from where they started, and what that calls for; the one place that says so."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from pathlib import Path
+
+from acquisition import Remark
+from lobewatch.analysis.decay.trend import Tapped, Trend, trend_of
+from lobewatch.analysis.estimate import UNKNOWN, Estimate
+from lobewatch.analysis.history import Row
+from lobewatch.machine import Limits
+
+
+def known_rows(rows: Sequence[Row], name: str) -> list[Row]:
+    """Those that know a value and that nothing is asked about: what others are compared with."""
+    return [row for row in rows if getattr(row, name).is_known and not row.questions]
+
+
+def trend_in(rows: Sequence[Row], name: str, now: datetime, events: Sequence[datetime] = ()) -> Trend | None:
+    """The trend of a value (frequency, damping_ratio, stiffness or bearing_stiffness); None where none is known."""
+    taps = [_tapped(row, getattr(row, name)) for row in known_rows(rows, name) if getattr(row, name).value > 0]
+    return trend_of(taps, now, events) if taps else None
+
+
+def _tapped(row: Row, value: Estimate) -> Tapped:
+    return Tapped(row.time, value.value, 100 * value.std / value.value, row.conditions.temperature_c)
+
+
+def start(rows: Sequence[Row], name: str) -> Estimate:
+    """The value that a series is compared with, not one tap test but where its first ones lie; UNKNOWN without any.
+
+    From 8 points on its error is the scatter from tap test to tap test.
+    """
+    known = known_rows(rows, name) or [row for row in rows if getattr(row, name).is_known]
+    if not known:
+        return UNKNOWN
+    first: Estimate = getattr(known[0], name)
+    found = trend_in(rows, name, known[-1].time)
+    if found is None or (found.forecast is None and name != "frequency"):
+        return first
+    value = found.first * math.exp(found.start / 100)
+    return Estimate(value, first.std if found.forecast is None else value * found.spread / 100)
+
+
+def change_since_start(rows: Sequence[Row], name: str) -> Estimate:
+    """Change (%) of a value from where its series started to the last row; unknown where that does not know it."""
+    now: Estimate = getattr(rows[-1], name)
+    if not now.is_known:
+        return UNKNOWN
+    then = start(rows, name)
+    return Estimate(0.0, 0.0) if then == now else now.change_since(then)
+
+
+def fall_of(rows: Sequence[Row]) -> Estimate:
+    """Fall of the frequency (%) to the newest test, or where that is in question, to another if that fell farther."""
+    known = [row for row in rows if row.frequency.is_known] or rows
+    sure = known_rows(rows, "frequency")
+    changes = [change_since_start(some, "frequency") for some in (known, sure) if some]
+    change = min(changes, key=lambda one: one.value)
+    return Estimate(-change.value + 0.0, change.std)
+
+
+def about_fall(name: str, fall: Estimate, limits: Limits) -> Iterator[Remark]:
+    """The limits of machine.toml."""
+    text = f"frequency fallen by {fall.value:.1f} % since the first tests"
+    if fall.value >= limits.frequency_alarm_percent:
+        cure = "Do not cut on: have the bearings, the tool and its clamping looked at, then tap again."
+        yield Remark("frequency-alarm", name, f"{text} (alarm at {limits.frequency_alarm_percent:g} %)", cure)
+    elif fall.value >= limits.frequency_warn_percent:
+        cure = "Tap again to be sure; if it stays, have the bearings and the tool's clamping looked at soon."
+        yield Remark("frequency-warn", name, f"{text} (warning at {limits.frequency_warn_percent:g} %)", cure)
+
+
+def about_trend(name: str, trend: Trend, path: Path | str = "MACHINE") -> Iterator[Remark]:
+    """What the watch over the series calls for; path: of the folder, for the commands."""
+    event = f'lobewatch event {shlex.quote(str(path))} "what was done"'
+    if trend.watch.fall is not None and trend.fallen_since is not None:
+        fall = trend.watch.fall
+        how = "fell at once before" if fall.kind == "step" else "has been falling since"
+        text = f"frequency {how} {trend.fallen_since:%Y-%m-%d}, by {fall.size:.2f} ±{fall.half_width:.2f} %"
+        cure = "Have the bearings, the tool and its clamping looked at"
+        yield Remark("decay", name, text, f"{cure}; {event} ends this alarm, --new-baseline with it after a repair.")
+    elif trend.watch.asks_again:
+        text = "the newest test is lower than those before it"
+        yield Remark("decay-doubtful", name, text, "Clamp the tool anew and tap again: that shows whether it fell.")
+    if trend.rise.fall is not None:
+        text = f"frequency rose by {trend.rise.fall.size:.2f} ±{trend.rise.fall.half_width:.2f} %: assembly changed?"
+        yield Remark("frequency-rose", name, text, f"If so: {event} --new-baseline")

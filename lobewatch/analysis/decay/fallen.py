@@ -22,12 +22,15 @@ def known_rows(rows: Sequence[Row], name: str) -> list[Row]:
 
 def trend_in(rows: Sequence[Row], name: str, now: datetime, events: Sequence[datetime] = ()) -> Trend | None:
     """The trend of a value (frequency, damping_ratio, stiffness or bearing_stiffness); None where none is known."""
-    taps = [_tapped(row, getattr(row, name)) for row in known_rows(rows, name) if getattr(row, name).value > 0]
+    taps = [_tapped(row, name) for row in known_rows(rows, name) if getattr(row, name).value > 0]
     return trend_of(taps, now, events) if taps else None
 
 
-def _tapped(row: Row, value: Estimate) -> Tapped:
-    return Tapped(row.time, value.value, 100 * value.std / value.value, row.conditions.temperature_c)
+def _tapped(row: Row, name: str) -> Tapped:
+    """The temperature counts for the frequency alone: of the others nothing is known beforehand."""
+    value: Estimate = getattr(row, name)
+    warmth = row.conditions.temperature_c if name == "frequency" else None
+    return Tapped(row.time, value.value, 100 * value.std / value.value, math.nan if warmth is None else warmth)
 
 
 def start(rows: Sequence[Row], name: str) -> Estimate:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Collection, Sequence
 
 from acquisition import DataError
@@ -22,13 +23,44 @@ class NotTappedError(DataError):
     """A tool was neither tapped nor can it be predicted."""
 
 
-def tapped(place: Place, places: Sequence[Place], rows: Sequence[Row], measured: Measured) -> Assembly:
-    """The assembly after a tap test; rows: the history before it at least."""
+def or_reason(work: Callable[[], Assembly]) -> Assembly | NotTappedError:
+    """What some work gives, or why it is not known."""
+    try:
+        return work()
+    except NotTappedError as error:
+        return error
+
+
+class Followed:
+    """The modes followed in the rows of a history, by series and direction, each row looked at once."""
+
+    def __init__(self) -> None:
+        """No row yet."""
+        self._points: dict[str, dict[str, list[Point]]] = {}
+        self._numbers: dict[str, dict[str, list[int]]] = {}
+        self._rows = 0
+
+    def before(self, place: Place, rows: Sequence[Row]) -> dict[str, list[Point]]:
+        """Those of the same series before a tap test, by direction; rows: the history before it at least."""
+        for number in range(self._rows, len(rows)):
+            self._add(number, rows[number])
+        self._rows = max(self._rows, len(rows))
+        numbers = self._numbers.get(place.series, {})
+        found = {
+            direction: points[: bisect_left(numbers[direction], place.number)]
+            for direction, points in self._points.get(place.series, {}).items()
+        }
+        return {"x": [], "y": [], **found}
+
+    def _add(self, number: int, row: Row) -> None:
+        if row.mode is not None and not row.questions:
+            self._points.setdefault(row.series, {}).setdefault(row.direction, []).append(_point(row, row.mode))
+            self._numbers.setdefault(row.series, {}).setdefault(row.direction, []).append(number)
+
+
+def tapped(place: Place, places: Sequence[Place], points: dict[str, list[Point]], measured: Measured) -> Assembly:
+    """The assembly after a tap test; points: those before it of the same series, by direction."""
     newest, other = measured(place), None if place.other is None else measured(places[place.other])
-    points: dict[str, list[Point]] = {"x": [], "y": []}
-    for row in rows[: place.number]:
-        if row.series == place.series and row.mode is not None and not row.questions:
-            points.setdefault(row.direction, []).append(_point(row, row.mode))
     if newest.followed is not None and not open_questions(newest.remarks):
         points.setdefault(newest.direction, []).append(_point(newest, newest.followed))
     return assemble(newest, other, points)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from acquisition import Remark
 from dsm import Calibration
-from lobes import StabilityLobes, lowest_of, zero_order
+from lobes import Cut, StabilityLobes, lowest_of, zero_order
 from lobewatch.analysis.measurement import Measurement
 from lobewatch.analysis.questions.asked import in_question, open_questions
 from lobewatch.analysis.series import Point, Scatter, frequency_at, scatter_of
@@ -137,10 +137,18 @@ def lobes_of(assembly: Assembly, machine: Machine) -> dict[str, StabilityLobes]:
 
     Each shows the lower one of its directions of feed. Empty where no modes are known.
     """
-    if not assembly.directions:
+    return tip_lobes(assembly.tool, assembly.x, assembly.y, machine)
+
+
+def tip_lobes(
+    tool: str, x: Modes, y: Modes, machine: Machine, names: Collection[str] | None = None
+) -> dict[str, StabilityLobes]:
+    """The same of modes at the tip; names: of these cuts alone. Cuts that are alike are worked out once."""
+    if not x and not y:
         return {}
-    speeds = speed_grid(machine)
-    return {
-        name: lowest_of([zero_order(assembly.x, assembly.y, cut, speeds) for cut in cuts])
-        for name, cuts in machine.cuts(assembly.tool).items()
-    }
+    speeds, known = speed_grid(machine), dict[tuple[Cut, ...], StabilityLobes]()
+    wanted = {name: cuts for name, cuts in machine.cuts(tool).items() if names is None or name in names}
+    for cuts in wanted.values():
+        if cuts not in known:
+            known[cuts] = lowest_of([zero_order(x, y, cut, speeds) for cut in cuts])
+    return {name: known[cuts] for name, cuts in wanted.items()}

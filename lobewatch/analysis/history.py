@@ -1,19 +1,18 @@
-"""The history of a machine as typed rows, one a measurement, and its columns in history.h5."""
+"""The history of a machine as typed rows, one a measurement."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import cached_property
 from importlib.metadata import version
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import UNSAID, Conditions, Remark
 from dsm import Calibration
-from lobes import StabilityLobes
-from lobewatch.analysis.assembly import speed_grid
+from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.estimate import UNKNOWN, Estimate
 from lobewatch.analysis.measurement import Measurement
 from lobewatch.analysis.order import Place
@@ -24,6 +23,12 @@ from modal import Mode
 
 MAX_MODES = 12
 """Modes kept of one measurement."""
+ESTIMATES = {"frequency": "Hz", "damping_ratio": "", "stiffness": "N/m", "phase_deg": "deg", "bearing_stiffness": "N/m"}
+"""Values with a standard error and their units, by name of the field and the column."""
+MODELLED = {"static_tip_stiffness": "N/m", "modal_tip_stiffness": "N/m"}
+"""Values of the model."""
+Values = tuple[float, float, float, float]
+"""Frequency (Hz), damping ratio, stiffness (N/m) and phase (degrees) of a mode."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +57,14 @@ class Row:
     """Of the recalibrated model (N/m)."""
     modal_tip_stiffness: float = np.nan
     """Of the recalibrated model (N/m)."""
-    modes: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))
-    """Frequency (Hz), damping ratio, stiffness (N/m) and phase (degrees) of all modes found, shape (m, 4)."""
+    modes: tuple[Values, ...] = ()
+    """All modes found."""
     remarks: tuple[Remark, ...] = ()
     """What could not be done, and what is in doubt."""
-    depth: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
-    """Limiting depth by zero order over the speeds of the history (m), by name of the cut; a chart, no verdict."""
+    x: tuple[Values, ...] = ()
+    """Modes at the tool tip in x of the assembly as it was then; empty where no direction was known."""
+    y: tuple[Values, ...] = ()
+    """The same in y."""
     rulings: Mapping[str, Ruling] | None = None
     """The word on every program with the machine as it was after this tap test; None where nobody has asked yet."""
     baseline: datetime | None = None
@@ -67,7 +74,7 @@ class Row:
     conditions: Conditions = UNSAID
     """What it was taken under."""
 
-    @property
+    @cached_property
     def questions(self) -> tuple[Remark, ...]:
         """What nobody has answered yet; until then it is no reference for other tests."""
         return open_questions(self.remarks)
@@ -89,8 +96,6 @@ class History:
     """Of the settings that it was made with."""
     software: str
     """Name and version of the program that made it."""
-    speed_rpm: NDArray[np.float64]
-    """Common speeds of the depths (rpm), shape (n,)."""
     rows: tuple[Row, ...]
     """One a measurement."""
     baseline: datetime | None = None
@@ -110,7 +115,7 @@ class History:
 
 def empty_history(machine: Machine) -> History:
     """The history of a machine that was never tapped."""
-    return History(machine.settings_hash, f"lobewatch {version('lobewatch')}", speed_grid(machine), ())
+    return History(machine.settings_hash, f"lobewatch {version('lobewatch')}", ())
 
 
 def without_last_word(history: History) -> History:
@@ -119,9 +124,8 @@ def without_last_word(history: History) -> History:
     return replace(history, rows=(*before, replace(last, rulings=None)))
 
 
-def row_of(m: Measurement, lobes: Mapping[str, StabilityLobes], remarks: Sequence[Remark], place: Place) -> Row:
-    """A measurement as a row, with the diagrams and remarks of the assembly as it was then."""
-    modes = [(one.frequency, one.damping_ratio, one.stiffness, one.phase_deg) for one in m.modes[:MAX_MODES]]
+def row_of(m: Measurement, assembly: Assembly, place: Place) -> Row:
+    """A measurement as a row, with the tip and the remarks of the assembly as it was then."""
     frequency, damping_ratio, stiffness, phase = _of_mode(m.followed)
     calibration = m.calibration
     return Row(
@@ -139,9 +143,10 @@ def row_of(m: Measurement, lobes: Mapping[str, StabilityLobes], remarks: Sequenc
         bearing_stiffness=_of_bearings(calibration),
         static_tip_stiffness=calibration.static_stiffness_after if calibration else np.nan,
         modal_tip_stiffness=calibration.modal_stiffness_after if calibration else np.nan,
-        modes=np.array(modes, dtype=np.float64).reshape(-1, 4),
-        remarks=tuple(remarks),
-        depth={name: one.depth for name, one in lobes.items()},
+        modes=_values(m.modes[:MAX_MODES]),
+        remarks=tuple(assembly.remarks),
+        x=_values(assembly.x or ()),
+        y=_values(assembly.y or ()),
     )
 
 
@@ -163,3 +168,7 @@ def _of_bearings(calibration: Calibration | None) -> Estimate:
         return UNKNOWN
     std = calibration.bearing_stiffness_std
     return Estimate(calibration.bearing_stiffness, np.nan if std is None else std)
+
+
+def _values(modes: Sequence[Mode]) -> tuple[Values, ...]:
+    return tuple((one.frequency, one.damping_ratio, one.stiffness, one.phase_deg) for one in modes)

@@ -5,22 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Self
 
 from acquisition import UNSAID, Conditions, Remark, TapTest
-from lobewatch.analysis.assembling import NotTappedError, first_like, predicted, tapped
+from lobewatch.analysis.assembling import first_like, or_reason, predicted
 from lobewatch.analysis.assembly import Assembly
-from lobewatch.analysis.cache.history_cache import store_history
-from lobewatch.analysis.cache.up_to_date import up_to_date
+from lobewatch.analysis.cache.history_cache import HistoryCache
+from lobewatch.analysis.cache.worked_out import WorkedOut
 from lobewatch.analysis.damage.usable import Result, UsableTaps
-from lobewatch.analysis.history import History, Row, without_last_word
-from lobewatch.analysis.measurement import Measurement, measure
-from lobewatch.analysis.order import Place, earlier
+from lobewatch.analysis.history import History, without_last_word
+from lobewatch.analysis.measurement import Measurement
 from lobewatch.analysis.programs.advice import Advice, advise
 from lobewatch.analysis.programs.verdict import Ruling, Verdict, judge
 from lobewatch.analysis.questions.accepting import accept
-from lobewatch.analysis.questions.asked import answered
 from lobewatch.analysis.questions.clock import clock_questions
 from lobewatch.analysis.recordings import Stored, store_recordings
 from lobewatch.analysis.standing import Standing, stand
@@ -29,7 +28,7 @@ from lobewatch.machine.archive.verify import enter_explained
 
 
 class Logbook:
-    """One machine. Reading brings history.h5 up to date where its lock can be had, else works in memory and says so.
+    """One machine. Reading brings history.rows up to date where its lock can be had, else works in memory and says so.
 
     It holds what the disk said when it was first asked; `commit` and `replay` add to it, `is_current` tells whether
     somebody else has.
@@ -42,8 +41,9 @@ class Logbook:
         """What the folder holds, and what was done to the machine."""
         self._said: list[Remark] = []
         self._mark = folder.mark
+        self._cache = HistoryCache(folder)
         self._history: History | None = None
-        self._measurements: dict[str, Measurement] = {}
+        self._worked_out: WorkedOut | None = None
         self._verdicts: dict[str | None, dict[str, Verdict]] = {}
 
     @classmethod
@@ -63,7 +63,7 @@ class Logbook:
 
     @property
     def is_current(self) -> bool:
-        """Whether journal and machine.toml are as they were when this was opened or added to."""
+        """Whether journal and machine.toml are as they were then."""
         return self.folder.mark == self._mark
 
     @property
@@ -117,7 +117,7 @@ class Logbook:
 
     def measurement(self, tap_id: str) -> Measurement:
         """What a tap test says, worked out once; KeyError for a tap test that is not in the journal or is left out."""
-        return self._measured(self.files.place(tap_id), self.history.rows)
+        return self._all.measured(self.files.place(tap_id), self.history.rows)
 
     @property
     def history(self) -> History:
@@ -145,20 +145,24 @@ class Logbook:
         until = rows[-1].tap_id if until is None and self.history.current else until
         judged = self._verdicts.setdefault(until, {})
         missing = [table for table in tables if table.name not in judged]
-        known = {tool: self._known(tool, until) for tool in dict.fromkeys(table.tool for table in missing)}
+        known = {
+            tool: or_reason(partial(self.assembly, tool, until)) for tool in dict.fromkeys(one.tool for one in missing)
+        }
         judged |= {table.name: judge(table, known[table.tool], self.machine) for table in missing}
         return [judged[table.name] for table in tables]
 
     def rulings(self, tap_id: str) -> Mapping[str, Ruling]:
         """Word and limit of every program as they were after a tap test; the history keeps them once asked for."""
         number, rows = self.files.place(tap_id).number, list(self.history.rows)
-        found = rows[number].rulings
-        if found is None:
-            found = {one.program.name: one.ruling for one in self.verdicts(tap_id)}
+        found = dict(rows[number].rulings or {})
+        names = [table.name for table in self.machine.program if table.name not in found]
+        if names or rows[number].rulings is None:
+            found |= {one.program.name: one.ruling for one in self.verdicts(tap_id, names)}
+            found = {table.name: found[table.name] for table in self.machine.program}
             rows[number] = replace(rows[number], rulings=found)
             self._history = replace(self.history, rows=tuple(rows))
             kept = without_last_word(self._history) if self.files.doubts() else self._history
-            said = store_history(self.folder, kept)
+            said = self._cache.store(kept)
             self._said += [remark for remark in said if remark not in self._said]
         return found
 
@@ -208,20 +212,21 @@ class Logbook:
         self._mark = self.folder.mark
 
     def _forget_results(self) -> None:
-        self._history, self._measurements, self._verdicts = None, {}, {}
-
-    def _known(self, tool: str, until: str | None) -> Assembly | NotTappedError:
-        try:
-            return self.assembly(tool, until)
-        except NotTappedError as error:
-            return error
+        self._history, self._worked_out, self._verdicts = None, None, {}
 
     def _known_history(self) -> History:
         if self._history is None:
-            self._history = up_to_date(self.folder, self.files, self._measured, self._assembled)
+            self._history = self._up_to_date()
             if self._history.rows:
                 self.rulings(self._history.rows[-1].tap_id)
         return self._history
+
+    def _up_to_date(self) -> History:
+        """The stored rows as far as they still hold, and those that are missing."""
+        history = self._cache.read(self.files.places, self.files.baseline)
+        rows = self._all.with_all(history.rows)
+        history = replace(history, rows=rows)
+        return without_last_word(history) if rows and self.files.doubts() else history
 
     def _assembly(self, tool: str | None, until: str | None) -> Assembly:
         known = self.files.until(until)
@@ -230,21 +235,14 @@ class Logbook:
         tool, rows = known[-1].entry.tool if tool is None else tool, self.history.rows
         newest = next((place for place in reversed(known) if place.entry.tool == tool), None)
         if newest is not None:
-            found = self._assembled(newest, rows)
+            found = self._all.assembled(newest, rows)
         else:
-            found = predicted(self.machine, known, rows, lambda place: self._measured(place, rows), tool)
+            found = predicted(self.machine, known, rows, lambda place: self._all.measured(place, rows), tool)
         doubts = self.files.doubts("" if found.predicted else tool) if known[-1] is self.files.places[-1] else ()
         return replace(found, questions=(*found.questions, *doubts))
 
-    def _measured(self, place: Place, rows: Sequence[Row]) -> Measurement:
-        """rows: the history before this tap test at least."""
-        tap_id = place.entry.id
-        if tap_id not in self._measurements:
-            before = (rows[number] for number in earlier(place, self.files.places))
-            last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
-            found = measure(self.folder.read(place.entry), self.machine, last)
-            self._measurements[tap_id] = replace(found, remarks=answered((*found.remarks, *place.said), place.entry))
-        return self._measurements[tap_id]
-
-    def _assembled(self, place: Place, rows: Sequence[Row]) -> Assembly:
-        return tapped(place, self.files.places, rows, lambda one: self._measured(one, rows))
+    @property
+    def _all(self) -> WorkedOut:
+        if self._worked_out is None:
+            self._worked_out = WorkedOut(self.folder, self.files.places)
+        return self._worked_out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from datetime import datetime, timedelta
 from typing import NamedTuple
@@ -69,7 +70,8 @@ def fall_in(series: Sequence[Point], days: float) -> float | None:
 
 def frequency_at(series: Sequence[Point], time: datetime) -> float | None:
     """Natural frequency (Hz) at a time, linear between the tests before and after; None before the first."""
-    if not series or time < series[0].time:
+    behind = bisect_right(series, time, key=lambda point: point.time)
+    if not behind:
         return None
-    at = [point.time.timestamp() for point in series]
-    return float(np.interp(time.timestamp(), at, [point.frequency for point in series]))
+    near = series[behind - 1 : behind + 1]
+    return float(np.interp(time.timestamp(), [one.time.timestamp() for one in near], [one.frequency for one in near]))

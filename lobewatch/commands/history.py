@@ -14,6 +14,9 @@ from lobewatch.show.output import Json, emit, notes, results
 def history(
     machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
     as_csv: Annotated[bool, typer.Option("--csv", help="A table with commas on stdout instead of text.")] = False,
+    hdf5: Annotated[
+        Path | None, typer.Option(help="Write all values and the diagrams of every test to this file (HDF5).")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """All tap tests of a machine with what they say, those excluded, and what was done to it, oldest first.
@@ -24,13 +27,18 @@ def history(
 
       lobewatch history mill-3
       lobewatch history mill-3 --csv
+      lobewatch history mill-3 --hdf5 history.h5
     """
+    from lobes import write_history
     from lobewatch.analysis import Logbook
+    from lobewatch.analysis.columns.history_columns import to_columns
     from lobewatch.show.history.describe_history import history_csv, history_json, history_lines
 
     if as_csv and as_json:
         raise ValueError("--csv and --json: give one of them")
     logbook = Logbook.open(machine)
+    if hdf5 is not None:
+        write_history(hdf5, to_columns(logbook.history, logbook.machine))
     if as_csv:
         results.out(history_csv(logbook), end="", highlight=False)
     else:

@@ -30,12 +30,14 @@ def rebuild(
     from lobewatch.show.measurements import remark_json, remark_lines
 
     told = rebuild_files(machine)
-    (machine / "history.h5").unlink(missing_ok=True)
     logbook = Logbook.open(machine)
+    logbook.folder.history.unlink(missing_ok=True)
     rows = logbook.history.rows
     for number, row in enumerate(rows, 1):
         logbook.rulings(row.tap_id)
         if number % 10 == 0:
             notes.print(f"{number} of {len(rows)} tap tests")
     payload = {"done": told, "tap_tests": len(rows), "remarks": [remark_json(one) for one in logbook.remarks]}
-    emit(payload, as_json, *told, *remark_lines(logbook.remarks), f"history.h5: made anew from {len(rows)} tap test(s)")
+    emit(
+        payload, as_json, *told, *remark_lines(logbook.remarks), f"history.rows: made anew from {len(rows)} tap test(s)"
+    )

@@ -1,4 +1,4 @@
-"""The folder of one machine: machine.toml, taps/, journal.jsonl, spool/ and history.h5."""
+"""The folder of one machine: machine.toml, taps/, journal.jsonl, spool/ and history.rows."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ class MachineFolder:
 
     @property
     def history(self) -> Path:
-        """The history of the stability lobes, a cache."""
-        return self.path / "history.h5"
+        """What was worked out of the tap tests, a cache."""
+        return self.path / "history.rows"
 
     @property
     def spool(self) -> Path:

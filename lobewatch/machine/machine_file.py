@@ -198,18 +198,20 @@ class Machine(Table, frozen=True):
 
     @property
     def settings_hash(self) -> str:
-        """SHA-256 of all that decides what a history holds."""
-        cutting = (self.material, self.reference_cut, self.program)
-        model = (self.spindle, self.tool, self.tap.tool, self.tap.position_mm)
-        settings = (
-            "charts by zero order, four words over the doubt, questions",
-            self.mode,
-            self.speed,
-            self.doubt,
-            cutting,
-            model,
-        )
-        return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
+        """SHA-256 of all that decides what follows from a tap test but for the words on programs."""
+        return _hash("questions", self.mode, self.spindle, self.tool, self.tap.tool, self.tap.position_mm)
+
+    @property
+    def program_hashes(self) -> dict[str, str]:
+        """SHA-256 of all that decides the word on a program beside `settings_hash`, by its name."""
+        return {
+            one.name: _hash("four words over the doubt", one, self.coefficients(one), self.doubt)
+            for one in self.program
+        }
+
+
+def _hash(*settings: object) -> str:
+    return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
 
 
 def read_machine(path: Path) -> Machine:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,13 +11,16 @@ from matplotlib.figure import Figure
 
 from acquisition import DataError, Remark
 from lobes import Cut, StabilityLobes, radial_lobes
-from lobewatch.analysis import Chart, LobeComparison, Logbook, Method, chart
+from lobewatch.analysis import Chart, LobeComparison, Logbook, Method, Row, chart, speed_grid
+from lobewatch.analysis.columns.row_lobes import row_lobes
 from lobewatch.analysis.programs.limit_band import limit_band
 from lobewatch.machine import Machine
 from lobewatch.show.figures import save_figure
 from lobewatch.show.figures_lobes import lobes_figure, radial_figure, waterfall_figure
 
 IMMERSIONS = np.linspace(0.05, 1.0, 39)
+MOST_LINES = 200
+"""Tap tests of a waterfall."""
 
 
 def save_pictures(
@@ -74,9 +78,15 @@ def waterfall_picture(logbook: Logbook, now: Chart) -> Figure:
     cut, tool = now.name, now.assembly.tool
     newest = None if now.assembly.predicted else logbook.measurement(now.assembly.tap_id)
     series = [] if newest is None else logbook.history.series(tool, newest.direction)
-    rows = [row for row in series if cut in row.depth]
-    if not rows:
+    shown = [row for row in _spread(series) if row.x]
+    found = [(row.time, lobes[cut]) for row in shown if cut in (lobes := row_lobes(row, logbook.machine, [cut]))]
+    if not found:
         raise DataError(f"--waterfall shows measured lobes; no tap test with tool {tool!r} has any of {cut!r}")
     title = f"{logbook.machine.machine.name}: {cut}\nzero order"
-    depth = np.stack([row.depth[cut] for row in rows])
-    return waterfall_figure(logbook.history.speed_rpm, [row.time for row in rows], depth, title)
+    depth = np.stack([lobes.depth for _, lobes in found])
+    return waterfall_figure(speed_grid(logbook.machine), [time for time, _ in found], depth, title)
+
+
+def _spread(rows: Sequence[Row]) -> list[Row]:
+    """The first, the newest, and others evenly between them, no more than one can see."""
+    return [rows[i] for i in np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_LINES)).round().astype(int))]

@@ -1,1 +1,1 @@
-"""history.h5: what it still holds, what is to be added, and its place on the disk."""
+"""history.rows: what it still holds, what is to be added, and its place on the disk."""

@@ -1,4 +1,4 @@
-"""history.h5: what it still holds, and its place on the disk."""
+"""history.rows: what it still holds, and its place on the disk."""
 
 from __future__ import annotations
 
@@ -8,29 +8,84 @@ from datetime import datetime
 from itertools import takewhile
 
 from acquisition import Remark
-from lobes import read_history, write_history
-from lobewatch.analysis.columns.history_columns import from_columns, to_columns
+from lobewatch.analysis.columns.stored_row import packed, unpacked
 from lobewatch.analysis.history import History, Row, empty_history
 from lobewatch.analysis.order import Place
 from lobewatch.analysis.questions.asked import accepted_codes
 from lobewatch.machine import BusyError, MachineFolder
+from lobewatch.machine.archive.rows import add_rows, read_rows, write_rows
+
+MOST_DEAD = 1_000_000
+"""Bytes of rows that later ones stand for, beyond as many as count, above which the file is written anew."""
 
 
-def stored_history(folder: MachineFolder, places: Sequence[Place], baseline: datetime | None) -> History:
-    """The stored rows of the oldest taps on, as far as they were made with these settings and this version.
+class HistoryCache:
+    """The file of one machine; it knows what is on the disk, and adds to it."""
 
-    baseline: the newest one.
-    """
-    empty = replace(empty_history(folder.machine), baseline=baseline)
-    try:
-        stored = read_history(folder.history)
-        if (stored.settings_hash, stored.software) != (empty.settings_hash, empty.software):
-            return empty
-        rows = from_columns(stored, folder.machine).rows
-    except (ValueError, KeyError, IndexError, FileNotFoundError):
-        return empty
-    pairs = zip(rows, places, strict=False)
-    return replace(empty, rows=tuple(row for row, _ in takewhile(lambda pair: _is_of(*pair), pairs)))
+    def __init__(self, folder: MachineFolder) -> None:
+        """Nothing is read yet."""
+        self._folder = folder
+        self._rows: list[Row] = []
+        self._packed: list[bytes] = []
+        self._size = self._length = 0
+
+    def read(self, places: Sequence[Place], baseline: datetime | None) -> History:
+        """The rows of the oldest taps on, as far as they were made with these settings and this version.
+
+        baseline: the newest one.
+        """
+        empty = replace(empty_history(self._folder.machine), baseline=baseline)
+        self._read(_head(empty))
+        pairs = zip(self._rows, places, strict=False)
+        return replace(empty, rows=tuple(row for row, _ in takewhile(lambda pair: _is_of(*pair), pairs)))
+
+    def store(self, history: History) -> list[Remark]:
+        """What is new of it, under the lock where that can be had at once; else say so."""
+        try:
+            with self._folder.locked():
+                self._store(history)
+        except (BusyError, OSError) as error:
+            text = f"not brought up to date on the disk, worked out in memory: {error}"
+            return [Remark("history-in-memory", self._folder.history.name, text)]
+        return []
+
+    def _read(self, head: bytes) -> None:
+        self._rows, self._packed, self._size, self._length = [], [], 0, 0
+        try:
+            found = read_rows(self._folder.history)
+            for content in found.rows[1:] if found.rows[:1] == (head,) else ():
+                number, row = unpacked(content, self._folder.machine.program_hashes)
+                self._rows[number : number + 1] = [row]
+                self._packed[number : number + 1] = [content]
+        except (ValueError, FileNotFoundError):
+            self._rows, self._packed = [], []
+        else:
+            self._size, self._length = found.size if found.rows[:1] == (head,) else 0, found.length
+
+    def _store(self, history: History) -> None:
+        path, hashes = self._folder.history, self._folder.machine.program_hashes
+        if path.exists() and path.stat().st_size != self._length:
+            self._read(_head(history))  # another program has written
+        contents = [
+            self._packed[n] if n < len(self._rows) and self._rows[n] is row else packed(n, row, hashes)
+            for n, row in enumerate(history.rows)
+        ]
+        fresh = [content for n, content in enumerate(contents) if self._packed[n : n + 1] != [content]]
+        most = 2 * sum(map(len, contents)) + MOST_DEAD
+        if (
+            self._size
+            and path.exists()
+            and self._size + sum(map(len, fresh)) < most
+            and contents[len(self._packed) - 1 :]
+        ):
+            self._length = add_rows(path, self._size, fresh) if fresh else self._length
+        else:
+            self._length = write_rows(path, [_head(history), *contents])
+        self._rows, self._packed, self._size = list(history.rows), contents, self._length
+
+
+def _head(history: History) -> bytes:
+    return f"{history.settings_hash} {history.software}".encode()
 
 
 def _is_of(row: Row, place: Place) -> bool:
@@ -38,14 +93,3 @@ def _is_of(row: Row, place: Place) -> bool:
     tap = place.entry
     made = row.tap_id, row.baseline, row.series, accepted_codes(row.remarks)
     return made == (tap.id, place.baseline, place.series, set(tap.accepted))
-
-
-def store_history(folder: MachineFolder, history: History) -> list[Remark]:
-    """Write it under the lock where that can be had at once; else say so."""
-    try:
-        with folder.locked():
-            write_history(folder.history, to_columns(history, folder.machine))
-    except (BusyError, OSError) as error:
-        text = f"not brought up to date on the disk, worked out in memory: {error}"
-        return [Remark("history-in-memory", "history.h5", text)]
-    return []

@@ -1,1 +1,1 @@
-"""The columns of history.h5."""
+"""Rows of the history as bytes, as columns and as diagrams."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,11 +21,3 @@ def condition_columns(conditions: Sequence[Conditions]) -> dict[str, NDArray[Any
     numbers = {name: np.array([one.get(name, np.nan) for one in told], dtype=np.float64) for name in NUMBERS}
     texts = {name: np.array([one.get(name, "") for one in told], dtype=np.str_) for name in TEXTS}
     return {**numbers, **texts, "reclamped": np.array([one.reclamped for one in conditions], dtype=np.float64)}
-
-
-def conditions_of(columns: Mapping[str, NDArray[Any]], i: int) -> Conditions:
-    """Those of a row."""
-    found = {name: float(columns[name][i]) for name in NUMBERS}
-    told: dict[str, Any] = {name: value for name, value in found.items() if np.isfinite(value)}
-    told |= {name: str(columns[name][i]) for name in TEXTS}
-    return Conditions.of(told | {"reclamped": bool(columns["reclamped"][i])})

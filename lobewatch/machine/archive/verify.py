@@ -13,7 +13,6 @@ from pathlib import Path
 
 from acquisition import DataError, Remark, Trigger
 from acquisition.files.seal import is_sealed
-from lobes import read_history
 from lobewatch.machine.archive.contents import (
     about_lost,
     fault_of,
@@ -26,6 +25,7 @@ from lobewatch.machine.archive.contents import (
 )
 from lobewatch.machine.archive.doubtful import read_doubtful
 from lobewatch.machine.archive.journal import COPY, JOURNAL, Journal, Reading, command
+from lobewatch.machine.archive.rows import read_rows
 from lobewatch.machine.archive.tap_entry import TapEntry
 from lobewatch.machine.folder import BusyError, MachineFolder
 from lobewatch.machine.known_devices import read_known_devices
@@ -36,7 +36,7 @@ OURS = (
     JOURNAL,
     COPY,
     "machine.toml",
-    "history.h5",
+    "history.rows",
     "daq.json",
     "standing.json",
     "report.html",
@@ -172,13 +172,9 @@ def _about_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterato
 
 
 def _about_history(folder: MachineFolder) -> Iterator[Remark]:
-    try:
-        read_history(folder.history)
-    except FileNotFoundError:
-        return
-    except (ValueError, KeyError, OSError):
+    if folder.history.exists() and read_rows(folder.history).is_damaged:
         cure = f"{command('rebuild', folder.path)} makes it anew, and so does any command that reads it"
-        yield Remark("file-damaged", "history.h5", "altered since it was written", cure)
+        yield Remark("file-damaged", folder.history.name, "altered since it was written", cure)
 
 
 def _about_devices(folder: MachineFolder) -> Iterator[Remark]:
@@ -217,6 +213,10 @@ def _about_others(folder: Path) -> Iterator[Remark]:
         elif path.name == "report.html":
             yield Remark(
                 "not-verified", path.name, "a report is not verified", command("report", folder) + " writes it anew"
+            )
+        elif path.name == "history.h5":
+            yield Remark(
+                "not-verified", path.name, "no cache any more, or an export", "delete it when you do not need it"
             )
         elif path.name not in OURS:
             yield Remark("not-verified", path.name, "no file of lobewatch")

@@ -28,8 +28,11 @@ from acquisition import (
     write_hit,
 )
 from dsm import modal_stiffness, modes_at, receptance, static_stiffness
-from lobes import lowest_of, read_history, zero_order
+from lobes import SldHistory, lowest_of, zero_order
 from lobewatch.analysis import History, Logbook, Measurement, measure
+from lobewatch.analysis.assembly import speed_grid
+from lobewatch.analysis.columns.history_columns import to_columns
+from lobewatch.analysis.columns.row_lobes import row_lobes
 from lobewatch.analysis.history import Row
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.machine_file import REFERENCE_CUT, parse_machine
@@ -82,6 +85,10 @@ def codes(found: Measurement | Row) -> list[str]:
     return [remark.code for remark in found.remarks]
 
 
+def columns_of(folder: MachineFolder) -> SldHistory:
+    return to_columns(Logbook(folder).history, folder.machine)
+
+
 def test_the_emulated_structure_has_the_receptance_of_the_model() -> None:
     table = parse_machine(_example()).spindle
     assert table is not None
@@ -114,8 +121,7 @@ def test_live_taps_find_what_was_emulated_and_the_history_grows(folder: MachineF
         assert found.calibration.bearing_stiffness == pytest.approx(k, rel=0.01)
         assert len(history.rows) == month + 1
     assert history.rows[1].stiffness.value < history.rows[0].stiffness.value
-    again = read_history(folder.history)
-    assert np.array_equal(again.depth[REFERENCE_CUT][0], history.rows[0].depth[REFERENCE_CUT])
+    again = columns_of(folder)
     followed = found.at_tip
     cuts = folder.machine.cuts("reference")[REFERENCE_CUT]
     expected = lowest_of([zero_order(followed, followed, cut, again.speed_rpm) for cut in cuts])
@@ -127,16 +133,16 @@ def test_a_history_made_again_is_the_same_and_stale_ones_are_not_used(folder: Ma
     for month, k in enumerate((1.28e9, 1.0e9, 0.8e9)):
         live_tap(folder, k, 30.0 * month)
     history, _ = up_to_date(folder)
-    columns = read_history(folder.history).columns
+    columns = columns_of(folder).columns
     for spoil in (folder.history.unlink, lambda: folder.history.write_bytes(b"rubbish")):
         spoil()
         up_to_date(folder)
-        again = read_history(folder.history).columns
+        again = columns_of(folder).columns
         for name, column in columns.items():
             if name not in ("program_limit", "program_verdict"):
                 assert np.array_equal(column, again[name], equal_nan=column.dtype.kind == "f")
             assert np.array_equal(column[-1:], again[name][-1:], equal_nan=column.dtype.kind == "f")
-    folder.toml.write_text(folder.toml.read_text().replace("depth_mm = 0.5", "depth_mm = 0.4"))
+    folder.toml.write_text(folder.toml.read_text().replace("band_hz = [1200, 2200]", "band_hz = [1200, 2300]"))
     changed, _ = up_to_date(folder)
     assert len(changed.rows) == 3
     assert changed.settings_hash != history.settings_hash
@@ -193,10 +199,10 @@ def test_the_newest_x_and_y_make_one_diagram_however_far_apart(folder: MachineFo
     folder.commit(recorded(about(folder, 300.0, "y"), later))
     alone, both, late = up_to_date(folder)[0].rows
     cuts = folder.machine.cuts("reference")[REFERENCE_CUT]
-    speeds = Logbook(folder).history.speed_rpm
+    speeds = speed_grid(folder.machine)
     for row, normal in ((alone, x), (both, y), (late, later)):
         expected = lowest_of([zero_order([x], [normal], cut, speeds) for cut in cuts]).depth
-        assert row.depth[REFERENCE_CUT] == pytest.approx(expected, rel=1e-3)
+        assert row_lobes(row, folder.machine)[REFERENCE_CUT].depth == pytest.approx(expected, rel=1e-3)
     assert [codes(row) for row in (alone, both, late)] == [["one-direction"], [], ["older-direction"]]
     assert "direction x is that of 2026-01-15, 300 days older" in str(late.remarks[0])
 
@@ -210,8 +216,8 @@ def test_a_tap_recorded_earlier_and_stored_later_takes_its_place_in_time(folder:
     folder.history.unlink()
     made_again, _ = up_to_date(folder)
     assert [row.direction for row in kept_up.rows] == ["y", "x"]
-    assert np.array_equal(kept_up.rows[1].depth[REFERENCE_CUT], made_again.rows[1].depth[REFERENCE_CUT])
-    assert not np.array_equal(kept_up.rows[1].depth[REFERENCE_CUT], alone.rows[0].depth[REFERENCE_CUT])
+    assert kept_up.rows[1].x == made_again.rows[1].x
+    assert kept_up.rows[1].y == made_again.rows[1].y != alone.rows[0].y
 
 
 def test_a_negative_stiffness_is_stored_and_stops_the_lobes_with_a_reason(folder: MachineFolder) -> None:
@@ -226,8 +232,8 @@ def test_a_negative_stiffness_is_stored_and_stops_the_lobes_with_a_reason(folder
     folder.toml.write_text(text)
     folder.commit(tap)
     history, _ = up_to_date(folder)
-    assert not history.rows[0].depth
-    assert np.isnan(read_history(folder.history).depth[REFERENCE_CUT]).all()
+    assert not row_lobes(history.rows[0], folder.machine)
+    assert np.isnan(columns_of(folder).depth[REFERENCE_CUT]).all()
     html = render_report(Logbook.open(folder.path), "reference", "x")
     assert "not a driving point" in html
 
@@ -280,7 +286,7 @@ def test_a_machine_without_spindle_gives_all_but_the_models_part(tmp_path: Path)
     folder.commit(recorded(about(folder, 30.0), Mode(1600.0, 0.03, 3.5e7)))
     history, measurements = up_to_date(folder)
     assert "no model" in measurements[0].remarks[0].text
-    assert REFERENCE_CUT in history.rows[0].depth
+    assert REFERENCE_CUT in row_lobes(history.rows[0], folder.machine)
     html = render_report(Logbook.open(folder.path), "reference", "x")
     assert "natural frequency" in html
     assert "Bearing stiffness" not in html

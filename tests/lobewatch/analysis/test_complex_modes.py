@@ -12,7 +12,8 @@ import pytest
 
 from lobes import lowest_of, program_limit, read_history, write_history, zero_order
 from lobewatch.analysis import Assembly
-from lobewatch.analysis.columns.history_columns import from_columns, to_columns
+from lobewatch.analysis.columns.history_columns import to_columns
+from lobewatch.analysis.columns.stored_row import packed, unpacked
 from lobewatch.analysis.estimate import Estimate
 from lobewatch.analysis.history import Row, empty_history
 from lobewatch.analysis.prediction import predict
@@ -122,14 +123,16 @@ def test_history_keeps_the_phase(shop: Shop) -> None:
         "reference",
         "x",
         *(Estimate(1713.0, 0.5), Estimate(0.03, 1e-4), Estimate(3.5e7, 1e5), Estimate(-12.5, 0.4)),
-        modes=np.array([[1713.0, 0.03, 3.5e7, -12.5], [2900.0, 0.02, 9e7, 8.0]]),
+        modes=((1713.0, 0.03, 3.5e7, -12.5), (2900.0, 0.02, 9e7, 8.0)),
     )
     path = shop.path / "history.h5"
     write_history(path, to_columns(replace(empty_history(machine), rows=(row,)), machine))
     stored = read_history(path)
-    (read,) = from_columns(stored, machine).rows
+    number, read = unpacked(packed(3, row, {}), {})
+    assert number == 3
+    assert stored.columns["mode_phase_deg"][0, :2].tolist() == [-12.5, 8.0]
     assert (stored.units["phase_deg"], stored.units["mode_phase_deg"]) == ("deg", "deg")
-    assert (read.phase_deg, read.modes.tolist()) == (row.phase_deg, row.modes.tolist())
+    assert (read.phase_deg, read.modes) == (row.phase_deg, row.modes)
     assert read.mode is not None
     assert read.mode.constant == turned(-12.5).constant
 

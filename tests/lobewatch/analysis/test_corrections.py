@@ -74,7 +74,7 @@ def analysed(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return measure(tap, *others)
 
     with monkeypatch.context() as patch:
-        patch.setattr("lobewatch.analysis.logbook.measure", counted)
+        patch.setattr("lobewatch.analysis.cache.worked_out.measure", counted)
         assert shop.logbook.history.rows
     return seen
 

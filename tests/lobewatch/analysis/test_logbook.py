@@ -9,25 +9,28 @@ import re
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
 from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
-from lobes import Program, ProgramLimit, program_limit, read_history, write_history, zero_order
+from lobes import Program, ProgramLimit, program_limit, zero_order
 from lobes.program import Modes
 from lobewatch import Logbook
 from lobewatch.analysis import Advice, Assembly, Measurement, Verdict, Word, compare_lobes, measure
+from lobewatch.analysis.cache.history_cache import HistoryCache
 from lobewatch.analysis.charts import Dynamics, Method
 from lobewatch.analysis.programs.verdict import as_program, verdict
 from lobewatch.cli import app
 from lobewatch.machine import Machine, MachineFolder, ProgramTable
+from lobewatch.machine.archive.rows import read_rows, write_rows
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen.dashboard import Board
 from lobewatch.show.report import render_report
@@ -89,7 +92,7 @@ def analysed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         found.append(tap.id)
         return measure(tap, machine, last)
 
-    monkeypatch.setattr("lobewatch.analysis.logbook.measure", counting)
+    monkeypatch.setattr("lobewatch.analysis.cache.worked_out.measure", counting)
     return found
 
 
@@ -115,16 +118,16 @@ def test_no_command_analyses_a_tap_twice(
 def test_a_reader_beside_a_writer_reads_on_and_writes_nothing(path: Path) -> None:
     tap(path, 0, 1713.0)
     Logbook.open(path).standing()
-    before = (path / "history.h5").read_bytes()
+    before = (path / "history.rows").read_bytes()
     with MachineFolder(path).locked():
         tap(path, 30, 1690.0)
         said = run("check", path, "--json")
         shown = run("lobes", path)
     assert json.loads(said.stdout)["programs"][0]["tap_id"].startswith("20260214")
-    assert "history.h5: not brought up to date on the disk, worked out in memory" in shown.stdout
-    assert (path / "history.h5").read_bytes() == before
+    assert "history.rows: not brought up to date on the disk, worked out in memory" in shown.stdout
+    assert (path / "history.rows").read_bytes() == before
     assert "in memory" not in run("lobes", path).stdout
-    assert (path / "history.h5").read_bytes() != before
+    assert (path / "history.rows").read_bytes() != before
 
 
 def without_override() -> None:
@@ -182,7 +185,8 @@ def test_one_program_has_one_word_in_every_place(shop: Shop, path: Path, program
     ruling = (logbook.history.rows[-1].rulings or {})[name]
     assert ruling.word is word
     assert ruling.limit == pytest.approx(checked["limit_mm"] / 1e3)
-    assert read_history(path / "history.h5").columns["program_verdict"][-1].split("\n") == [str(word)]
+    stored = HistoryCache(logbook.folder).read(logbook.files.places, None).rows[-1]
+    assert [one.word for one in (stored.rulings or {}).values()] == [word]
     html = render_report(logbook, "reference", "x")
     assert f"{name}: {word}" in html[: html.index("<table>")]
     assert f"<td>{checked['limit_mm']:.2f}" in html
@@ -304,9 +308,9 @@ def test_reading_again_writes_nothing_with_or_without_programs(path: Path, tmp_p
     for folder in (path, tmp_path / "plain"):
         tap(folder, 0, 1713.0)
         Logbook.open(folder).standing()
-        before = (folder / "history.h5").stat().st_ino
+        before = (folder / "history.rows").stat().st_mtime_ns
         Logbook.open(folder).standing()
-        assert (folder / "history.h5").stat().st_ino == before
+        assert (folder / "history.rows").stat().st_mtime_ns == before
 
 
 def test_rows_are_kept_up_to_the_first_that_differs(path: Path, analysed: list[str]) -> None:
@@ -320,15 +324,37 @@ def test_rows_are_kept_up_to_the_first_that_differs(path: Path, analysed: list[s
     assert len(analysed) == 2
 
 
-@pytest.mark.parametrize("column", ["remarks", "mode_phase_deg"])
-def test_a_history_of_another_make_is_made_anew(path: Path, analysed: list[str], column: str) -> None:
+def test_another_depth_analyses_nothing_and_keeps_the_words_on_other_programs(path: Path, analysed: list[str]) -> None:
+    tap(path, 0, 1713.0)
+    before = Logbook.open(path).history.rows[0]
+    analysed.clear()
+    text = (path / "machine.toml").read_text()
+    assert len(before.rulings or ()) == len(Logbook.open(path).machine.program) == 3
+    (path / "machine.toml").write_text(re.sub(r"(?m)^depth_mm = [0-9.]+", "depth_mm = 0.01", text, count=1))
+    logbook = Logbook.open(path)
+    (kept,) = HistoryCache(logbook.folder).read(logbook.files.places, None).rows
+    changed, *others = [table.name for table in logbook.machine.program]
+    assert {name: (before.rulings or {})[name] for name in others} == kept.rulings
+    assert logbook.rulings(before.tap_id)[changed].word is not Word.NOT_STABLE
+    assert list(logbook.rulings(before.tap_id)) == [changed, *others]
+    assert analysed == [before.tap_id]  # to judge the program that has changed
+
+
+def of_fewer_fields(rows: list[bytes]) -> list[bytes]:
+    return [rows[0], *(msgspec.msgpack.encode(msgspec.msgpack.decode(row)[:-2]) for row in rows[1:])]
+
+
+def of_another_version(rows: list[bytes]) -> list[bytes]:
+    return [rows[0] + b".1", *rows[1:]]
+
+
+@pytest.mark.parametrize("older", [of_fewer_fields, of_another_version])
+def test_a_history_of_another_make_is_made_anew(
+    path: Path, analysed: list[str], older: Callable[[list[bytes]], list[bytes]]
+) -> None:
     tap(path, 0, 1713.0)
     expected = Logbook.open(path).history.rows[0]
-    stored = read_history(path / "history.h5")
-    assert {"tap_id", "frequency_std", "notes", "program_limit", "mode_stiffness"} <= stored.columns.keys()
-    older = {name: values for name, values in stored.columns.items() if name != column}
-    object.__setattr__(stored, "columns", older)
-    write_history(path / "history.h5", stored)
+    write_rows(path / "history.rows", older(list(read_rows(path / "history.rows").rows)))
     analysed.clear()
     assert Logbook.open(path).history.rows[0].frequency == expected.frequency
     assert len(analysed) == 1
@@ -365,7 +391,7 @@ def test_a_damaged_tap_is_called_so_and_no_wrong_word_is_kept(path: Path) -> Non
     logbook = Logbook.open(path)
     expected = [found.word for found in logbook.verdicts()]
     sound = (path / "taps" / f"{logbook.taps[1].id}.h5").read_bytes()
-    (path / "history.h5").unlink()
+    (path / "history.rows").unlink()
     damage(path, logbook.taps[1].id)
     rest = Logbook.open(path)
     assert rest.rulings(rest.taps[0].id) == {one.program.name: one.ruling for one in rest.verdicts()}

@@ -28,6 +28,7 @@ from lobewatch.analysis import (
     lobes_of,
     speed_grid,
 )
+from lobewatch.analysis.columns.row_lobes import row_lobes
 from lobewatch.analysis.programs.limit_band import LimitBand, limit_band
 from lobewatch.analysis.programs.robust_pockets import robust_pockets
 from lobewatch.cli import main
@@ -486,8 +487,8 @@ def test_maps_stand_where_the_numbers_say(folder: MachineFolder) -> None:
     tap(folder, 1713.0)
     tap(folder, 1650.0, days=200)
     history = Logbook(folder).history
-    depth = np.stack([row.depth["reference cut"] for row in history.rows])
-    figure = waterfall_figure(history.speed_rpm, [START, START + timedelta(days=200)], depth, "t")
+    depth = np.stack([row_lobes(row, folder.machine)["reference cut"].depth for row in history.rows])
+    figure = waterfall_figure(speed_grid(folder.machine), [START, START + timedelta(days=200)], depth, "t")
     (mesh,) = figure.axes[0].collections
     shown = np.asarray(mesh.get_array()).reshape(depth.shape)
     low = shown < 0.99 * shown.max()

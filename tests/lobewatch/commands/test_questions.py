@@ -173,7 +173,7 @@ def test_what_is_accepted_stays_so_and_counts(shop: Shop) -> None:
         found = standing(shop, 61)
         assert "frequency-jump" not in codes(found)
         assert "frequency-alarm" in codes(found)
-        (shop.path / "history.h5").unlink()
+        (shop.path / "history.rows").unlink()
     row = shop.logbook.history.rows[2]
     assert [(remark.code, remark.about) for remark in row.remarks if remark.code == "accepted"] == [
         ("accepted", "frequency-jump")

@@ -189,15 +189,17 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
         read_machine(path)
 
 
-def test_the_settings_hash_changes_with_what_a_history_depends_on_and_with_nothing_else() -> None:
+def test_hashes_change_with_what_a_history_depends_on_and_with_nothing_else() -> None:
     machine = parse_machine(EXAMPLE)
-    for old, new, same in (
-        ("tap_interval_days = 30", "tap_interval_days = 60", True),
-        ("depth_mm = 2.5", "depth_mm = 2.0", False),
-        ("bearing_stiffness_n_per_um = 1280.0", "bearing_stiffness_n_per_um = 1000.0", False),
-        ("band_hz = [1200, 2200]", "band_hz = [1200, 2300]", False),
-        ("high_rpm = 24000", "high_rpm = 20000", False),
-        ("[speed]", "[doubt]\nspeed_percent = 2\n\n[speed]", False),
+    for old, new, same, same_words in (
+        ("tap_interval_days = 30", "tap_interval_days = 60", True, True),
+        ("depth_mm = 2.5", "depth_mm = 2.0", True, False),
+        ("bearing_stiffness_n_per_um = 1280.0", "bearing_stiffness_n_per_um = 1000.0", False, True),
+        ("band_hz = [1200, 2200]", "band_hz = [1200, 2300]", False, True),
+        ("high_rpm = 24000", "high_rpm = 20000", True, True),
+        ("[speed]", "[doubt]\nspeed_percent = 2\n\n[speed]", True, False),
     ):
         assert old in EXAMPLE
-        assert (parse_machine(EXAMPLE.replace(old, new)).settings_hash == machine.settings_hash) is same
+        changed = parse_machine(EXAMPLE.replace(old, new))
+        assert (changed.settings_hash == machine.settings_hash) is same
+        assert (changed.program_hashes == machine.program_hashes) is same_words

@@ -16,9 +16,9 @@ import pytest
 from typer.testing import CliRunner
 
 from acquisition import Hit, HitFlags, SourceFile, TapTest, Trigger, write_hit
-from lobes import SldHistory, read_history, write_history
 from lobewatch.cli import app
 from lobewatch.machine.archive.rebuild import rebuild_files
+from lobewatch.machine.archive.rows import read_rows, write_rows
 from lobewatch.machine.archive.verify import Verified, verify
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import KnownDevice
@@ -77,7 +77,7 @@ DAMAGES: dict[str, tuple[Callable[[MachineFolder], object], str, list[str]]] = {
         NAMES,
     ),
     "no machine.toml": (lambda m: m.toml.unlink(), "machine.toml", NAMES),
-    "an altered history": (lambda m: m.history.write_bytes(b"no history"), "history.h5", NAMES),
+    "an altered history": (lambda m: m.history.write_bytes(b"no history"), "history.rows", NAMES),
     "an altered daq.json": (lambda m: (m.path / "daq.json").write_text("[{"), "daq.json", NAMES),
 }
 
@@ -94,7 +94,7 @@ def test_damage_is_named_and_what_is_said_to_mend_it_does(what: str, folder: Mac
         assert commands or "delete this file" in remark.cure + remark.text
         assert all(word == "rebuild" and shlex.split(path) == [str(folder.path)] for word, path in commands)
     rebuild_files(folder.path)
-    (folder.path / "history.h5").unlink(missing_ok=True)
+    (folder.path / "history.rows").unlink(missing_ok=True)
     again = verify(folder.path)
     assert again.damage == ()
     assert [entry.id for entry in MachineFolder(folder.path).taps()] == left
@@ -146,6 +146,11 @@ def test_the_commands_say_it(folder: MachineFolder) -> None:
     assert "2 tap test(s) as they were committed, 1 damaged" in said.stdout
 
 
+def newest_rows(path: Path) -> dict[int, bytes]:
+    """The bytes of each row by its number; a later one stands for an earlier one."""
+    return {msgspec.msgpack.decode(row)[0]: row for row in read_rows(path / "history.rows").rows[1:]}
+
+
 def test_the_history_is_rebuilt_with_equal_arrays(tmp_path: Path, shop: object) -> None:
     shop.run(("A", 12900, 1.0))  # type: ignore[attr-defined]
     for days in (0, 30):
@@ -155,13 +160,11 @@ def test_the_history_is_rebuilt_with_equal_arrays(tmp_path: Path, shop: object) 
     logbook = shop.logbook  # type: ignore[attr-defined]
     for tap in logbook.taps:
         logbook.rulings(tap.id)
-    before = read_history(path / "history.h5")
+    before = newest_rows(path)
     said = CliRunner().invoke(app, ["rebuild", str(path)], catch_exceptions=False)
-    assert said.stdout.endswith("history.h5: made anew from 4 tap test(s)\n")
-    after = read_history(path / "history.h5")
-    assert before.columns.keys() == after.columns.keys()
-    for name, values in before.columns.items():
-        assert values.tobytes() == after.columns[name].tobytes(), name
+    assert said.stdout.endswith("history.rows: made anew from 4 tap test(s)\n")
+    assert newest_rows(path) == before
+    assert len(before) == 4
 
 
 def damaged_somewhere(folder: MachineFolder, chance: random.Random) -> str:
@@ -212,7 +215,7 @@ def full(folder: MachineFolder, make_tap: MakeTap) -> Path:
     device = KnownDevice("a", "1", 25600.0, 25600.1, 0.01, 100, 5.0, "2026-01-15T09:00:00+00:00")
     device = msgspec.structs.replace(device, crc=device.right_crc)
     (folder.path / "daq.json").write_bytes(msgspec.json.format(msgspec.json.encode([device]), indent=2))
-    write_history(folder.history, SldHistory("hash", "1", np.array([1.0, 2.0]), {}, {"cut": np.array([[1.0, 2.0]])}))
+    write_rows(folder.history, [b"head", b"first", b"second"])
     spool = folder.spool / "tap_9"
     spool.mkdir(parents=True)
     write_set_up(spool, Trigger(20.0, 1000, 100))

@@ -1,0 +1,54 @@
+"""What follows from each tap test of a machine, one after the other, each worked out once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from lobewatch.analysis.assembling import Followed, tapped
+from lobewatch.analysis.assembly import Assembly
+from lobewatch.analysis.history import Row, row_of
+from lobewatch.analysis.measurement import Measurement, measure
+from lobewatch.analysis.order import Place, earlier
+from lobewatch.analysis.questions.asked import answered
+from lobewatch.machine import MachineFolder
+
+KEPT = 500
+"""Measurements kept in memory, those asked for last."""
+
+
+class WorkedOut:
+    """Measurements and assemblies of one machine from its tap files; rows: the history before a place at least."""
+
+    def __init__(self, folder: MachineFolder, places: Sequence[Place]) -> None:
+        """places: all tap tests, oldest first. Nothing is worked out yet."""
+        self._folder, self._places = folder, places
+        self._measurements: dict[str, Measurement] = {}
+        self._followed = Followed()
+
+    def measured(self, place: Place, rows: Sequence[Row]) -> Measurement:
+        """What one tap test says."""
+        known = self._measurements
+        found = known.pop(place.entry.id, None)
+        if found is None:
+            before = (rows[number] for number in earlier(place, self._places))
+            last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
+            found = measure(self._folder.read(place.entry), self._folder.machine, last)
+            found = replace(found, remarks=answered((*found.remarks, *place.said), place.entry))
+        known[place.entry.id] = found
+        if len(known) > KEPT:
+            del known[next(iter(known))]
+        return found
+
+    def assembled(self, place: Place, rows: Sequence[Row]) -> Assembly:
+        """The tool of one tap test as it was known then."""
+        points = self._followed.before(place, rows)
+        return tapped(place, self._places, points, lambda one: self.measured(one, rows))
+
+    def with_all(self, rows: Sequence[Row]) -> tuple[Row, ...]:
+        """These rows, and those of all tap tests after them."""
+        found = list(rows)
+        for place in self._places[len(found) :]:
+            assembly = self.assembled(place, found)
+            found.append(row_of(self.measured(place, found), assembly, place))
+        return tuple(found)

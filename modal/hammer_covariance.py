@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Hit, force_noise
+from acquisition import Hit
+from acquisition.estimation import force_noise_through
 from modal.extraction import Extraction, FittedBand
 
 
@@ -21,7 +22,6 @@ def hammer_covariance(state: Extraction, band: FittedBand, i: int, hits: Sequenc
     real, imaginary = np.hsplit(band.fit.influence_of(i), 2)
     by_share = (real - 1j * imaginary) * (state.weight[i] * frf.receptance)[part]
     covariance = np.zeros_like(band.fit.covariance)
-    for columns in force_noise(hits, frf.frequency[part]) if hits else ():
-        steps = (by_share @ columns).real
-        covariance += steps @ steps.T
+    for steps in force_noise_through(by_share, hits, frf.frequency[part]) if hits else ():
+        covariance += steps.real @ steps.real.T
     return covariance

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Frf, Hit, estimate_frf
+from acquisition import Frf, Hit
+from acquisition.estimation import cross_spectra
 from modal.extraction import Extraction, FittedBand
 
 FEWEST_HITS = 3
@@ -15,15 +16,20 @@ FEWEST_HITS = 3
 
 
 def left_out(hits: Sequence[Hit], frf: Frf) -> list[Frf]:
-    """FRFs of all hits but one, for each hit, on the lines of frf; none for fewer than three hits.
+    """FRFs (H1) of all hits but one, for each hit, on the lines of frf; none for fewer than three hits.
+
+    The spectra of each hit are worked out once, and taken from their sum.
 
     Raises ValueError where a hit has other lines than the FRF.
     """
     parts = [_lines(hit, frf) for hit in hits]
     if len(hits) < FEWEST_HITS:
         return []
-    found = [estimate_frf([*hits[:i], *hits[i + 1 :]]) for i in range(len(hits))]
-    return [Frf(frf.frequency, one.receptance[part]) for one, part in zip(found, parts, strict=True)]
+    lines = parts[0]
+    own = [(s_ff[1:][lines], s_fx[1:][lines]) for s_ff, _, s_fx in (cross_spectra([hit]) for hit in hits)]
+    s_ff, s_fx = (np.sum(one, axis=0) for one in zip(*own, strict=True))
+    per_line = -1 / (2 * np.pi * frf.frequency) ** 2
+    return [Frf(frf.frequency, (s_fx - fx) / (s_ff - ff) * per_line) for ff, fx in own]
 
 
 def _lines(hit: Hit, frf: Frf) -> slice:

@@ -7,7 +7,7 @@ from acquisition.estimation.exponential_window import (
     time_of_hit,
     windowed_receptance,
 )
-from acquisition.estimation.force_noise import force_noise
+from acquisition.estimation.force_noise import force_noise, force_noise_through
 from acquisition.estimation.infer_averages import infer_averages
 from acquisition.estimation.running_mean import RunningMean
 
@@ -17,6 +17,7 @@ __all__ = [
     "estimate_frf",
     "exponential_window",
     "force_noise",
+    "force_noise_through",
     "frf_of_spectra",
     "infer_averages",
     "time_after_hit",

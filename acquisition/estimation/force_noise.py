@@ -25,15 +25,18 @@ def force_noise(hits: Sequence[Hit], frequency: NDArray[np.float64]) -> Iterator
 
     Source: H1 of `estimate_frf` with F + N for F, expanded in N. Raises ValueError for a hit without a pulse.
     """
+    yield from force_noise_through(np.eye(frequency.size), hits, frequency)
+
+
+def force_noise_through(
+    rows: NDArray[np.complex128] | NDArray[np.float64], hits: Sequence[Hit], frequency: NDArray[np.float64]
+) -> Iterator[NDArray[np.complex128]]:
+    """What linear maps (k, n) make of each array of `force_noise`, without making that: shape (k, samples + 1)."""
     parts = [windowed_force(hit) for hit in hits]
     time = np.arange(max(part.window.size for part in parts)) / hits[0].sample_rate
     waves = np.exp(-2j * np.pi * np.outer(frequency, time))
     spectra = [waves[:, : part.force.size] @ part.force for part in parts]
     power = np.sum(np.abs(spectra) ** 2, axis=0)
     for part, spectrum in zip(parts, spectra, strict=True):
-        size = part.window.size
-        columns = np.empty((frequency.size, size + 1), np.complex128)
-        np.multiply(waves[:, :size], -part.noise * part.window, out=columns[:, :size])
-        columns[:, size] = part.mean_noise * (waves[:, :size] @ part.window)
-        columns *= (np.conj(spectrum) / power)[:, None]
-        yield columns
+        seen = (rows * (np.conj(spectrum) / power)) @ waves[:, : part.window.size]
+        yield np.column_stack((seen * (-part.noise * part.window), seen @ (part.mean_noise * part.window)))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import io
 from collections.abc import Sequence
-from dataclasses import fields
+from dataclasses import fields, replace
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from acquisition.atomic import atomic_write
 from acquisition.channel import Channel, tap_direction
 from acquisition.errors import DataError
-from acquisition.estimation.estimate_frf import cross_spectra
 from acquisition.files.seal import is_broken, sealed
 from acquisition.files.unpacked import check_unpacked
 from acquisition.frf import Frf
@@ -31,23 +30,34 @@ from acquisition.tap import Circumstances, Conditions, SourceFile, TapTest
 
 FORMAT = "lobewatch-tap"
 VERSION = 1
+PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
 
 
 def write_tap(path: Path | str, tap: TapTest) -> bytes:
     """Write a tap test, sealed; returns the bytes of the file, on the disk when this returns."""
+    content = tap_content(tap)
+    atomic_write(Path(path), content)
+    return content
+
+
+def tap_content(tap: TapTest) -> bytes:
+    """The bytes of the file of a tap test."""
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         file.attrs.update(format=FORMAT, version=VERSION, software=f"lobewatch {version('lobewatch')}", id=tap.id)
         _write_circumstances(file, tap.circumstances)
         _write_raw(file, tap.hits, tap.flags)
-        _write_frf(file, tap.frf)
-        if tap.hits:
-            _write_spectra(file, tap)
+        _write_frf(file, as_written(tap).frf, np.float32 if tap.hits else np.float64)
         if tap.source is not None:
             _write_source(file, tap.source)
-    content = sealed(memory.getvalue())
-    atomic_write(Path(path), content)
-    return content
+    return sealed(memory.getvalue())
+
+
+def as_written(tap: TapTest) -> TapTest:
+    """The tap test as it is read from its file: where the hits are there the coherence is rounded to float32."""
+    if not tap.hits or tap.frf.coherence is None:
+        return tap
+    return replace(tap, frf=replace(tap.frf, coherence=tap.frf.coherence.astype(np.float32)))
 
 
 def read_tap(path: Path | str) -> TapTest:
@@ -137,18 +147,17 @@ def _write_raw(file: h5py.File, hits: Sequence[Hit], flags: Sequence[HitFlags]) 
         return
     raw = file.create_group("raw")
     first = hits[0]
-    packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
     if first.codes is not None and first.channels is not None:
         word = np.int16 if max(channel.adc_bits for channel in first.channels) <= 16 else np.int32
         codes = np.stack([hit.codes for hit in hits if hit.codes is not None]).astype(word)
-        _dataset(raw, "codes", codes, "ADC code", chunks=(1, *codes.shape[1:]), **packed)
+        _dataset(raw, "codes", codes, "ADC code", chunks=(1, *codes.shape[1:]), **PACKED)
         for i, channel in enumerate(first.channels):
             raw.create_group(f"channel_{i}").attrs.update(
                 {field.name: getattr(channel, field.name) for field in fields(Channel)}
             )
     else:
         samples = np.stack([[hit.force, hit.acceleration] for hit in hits])
-        _dataset(raw, "samples", samples, "N, m/s^2", chunks=(1, *samples.shape[1:]), **packed)
+        _dataset(raw, "samples", samples, "N, m/s^2", chunks=(1, *samples.shape[1:]), **PACKED)
     raw.attrs.update(sample_rate_hz=first.sample_rate, pre_trigger_samples=first.pre_trigger)
     _dataset(raw, "lost_scans", [hit.lost_scans for hit in hits], "1")
     _dataset(raw, "overload", [hit.overload for hit in hits], "1")
@@ -180,29 +189,25 @@ def _plain(attributes: h5py.AttributeManager) -> dict[str, Any]:
     return {name: value.item() if isinstance(value, np.generic) else value for name, value in attributes.items()}
 
 
-def _write_frf(file: h5py.File, frf: Frf) -> None:
+def _write_frf(file: h5py.File, frf: Frf, precision: type[np.floating[Any]]) -> None:
+    """precision: of the coherence."""
     group = file.create_group("frf")
     group.attrs.update(n_averages=frf.n_averages, measured_as=frf.measured_as)
     if frf.usable_band is not None:
         group.attrs["usable_band_hz"] = frf.usable_band
-    _write_lines(
-        group,
-        frf.frequency,
-        receptance=(frf.receptance, "m/N"),
-        coherence=(frf.coherence, "1"),
-        random_error=(frf.random_error, "1"),
-    )
+    coherence = None if frf.coherence is None else frf.coherence.astype(precision)
+    _write_lines(group, frf.frequency, receptance=(frf.receptance, "m/N"), coherence=(coherence, "1"))
 
 
 def _write_lines(
     group: h5py.Group, frequency: NDArray[np.floating[Any]], **arrays: tuple[NDArray[Any] | None, str]
 ) -> None:
     """Arrays over frequency, which becomes their dimension scale."""
-    _dataset(group, "frequency", frequency, "Hz")
+    _dataset(group, "frequency", frequency, "Hz", **PACKED)
     group["frequency"].make_scale("frequency")
     for name, (data, units) in arrays.items():
         if data is not None:
-            _dataset(group, name, data, units)
+            _dataset(group, name, data, units, **PACKED)
             group[name].dims[0].attach_scale(group["frequency"])
 
 
@@ -220,20 +225,8 @@ def _read_frf(file: h5py.File) -> Frf:
     )
 
 
-def _write_spectra(file: h5py.File, tap: TapTest) -> None:
-    s_ff, s_xx, s_fx = cross_spectra(tap.accepted)
-    hit = tap.hits[0]
-    _write_lines(
-        file.create_group("spectra"),
-        np.fft.rfftfreq(hit.force.size, 1 / hit.sample_rate),
-        S_ff=(s_ff, "N^2"),
-        S_xx=(s_xx, "(m/s^2)^2"),
-        S_fx=(s_fx, "N m/s^2"),
-    )
-
-
 def _write_source(file: h5py.File, source: SourceFile) -> None:
-    stored = file.create_dataset("source", data=np.frombuffer(source.content, np.uint8), compression="gzip")
+    stored = file.create_dataset("source", data=np.frombuffer(source.content, np.uint8), **PACKED)
     digest = hashlib.sha256(source.content).hexdigest()
     stored.attrs.update(name=source.name, sha256=digest, units="byte")
 

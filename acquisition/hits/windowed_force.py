@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +32,17 @@ def windowed_force(hit: Hit) -> WindowedForce:
     """The pulse with one of its widths on either side kept whole, then tapered to zero over one more (raised cosine).
 
     A tight window matters: noise inside it is alike at neighbouring lines, and so passes for a shift of the mode.
-    Raises ValueError for a hit without a pulse.
+    Each hit is looked at once. Raises ValueError for a hit without a pulse.
     """
+    if hit not in _known:
+        _known[hit] = _windowed(hit)
+    return _known[hit]
+
+
+_known: WeakKeyDictionary[Hit, WindowedForce] = WeakKeyDictionary()
+
+
+def _windowed(hit: Hit) -> WindowedForce:
     pulse = find_pulse(hit)
     if pulse is None:
         raise ValueError("a hit has no force pulse; check hits with check_hit before averaging")

@@ -26,12 +26,25 @@ def atomic_write(path: Path, content: bytes) -> None:
     sync_folder(path.parent)
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder, and those above it that are missing; they outlast a power cut when this returns."""
+    missing = [one for one in (folder, *folder.parents) if not one.is_dir()]
+    for one in reversed(missing):
+        one.mkdir(exist_ok=True)
+        sync_folder(one.parent)
+
+
 def sync_folder(folder: Path) -> None:
-    """Make a rename in this folder outlast a power cut (a no-op where folders cannot be opened, as on Windows)."""
+    """Make a rename in this folder outlast a power cut (a no-op where folders cannot be opened, as on Windows).
+
+    Raises OSError with the name of the folder.
+    """
     if os.name == "nt":
         return
     handle = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(handle)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(folder)) from error
     finally:
         os.close(handle)

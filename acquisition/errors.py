@@ -6,6 +6,23 @@ ValueError
 └── DataError       a file that cannot be used, with the place and what to do
 """
 
+from __future__ import annotations
+
+import errno
+
+NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
+"""Errors of a place that can only be read, or not even that."""
+ROOM = "make room on that disk"
+DESCRIPTORS = "close other programs, too many files are open"
+CURES = {
+    errno.ENOSPC: ROOM,
+    errno.EDQUOT: ROOM,
+    errno.EMFILE: DESCRIPTORS,
+    errno.ENFILE: DESCRIPTORS,
+    errno.EIO: "the disk fails: copy the folder to another one",
+}
+"""What to do where the system cannot do what it is asked for, by error number."""
+
 
 class DeviceError(OSError):
     """The DAQ cannot be reached or has stopped."""
@@ -21,3 +38,10 @@ class DeviceError(OSError):
 
 class DataError(ValueError):
     """A file cannot be used for a tap test."""
+
+
+def system_failure(error: OSError) -> str:
+    """An error of the operating system in a sentence: where, what, and what to do where that is known."""
+    told = f"{error.filename or 'the disk'}: {error.strerror or error}"
+    cure = CURES.get(error.errno or 0, "")
+    return f"{told}; {cure}" if cure else told

@@ -111,7 +111,9 @@ def main() -> None:
 def _sentence(error: Exception) -> str:
     """The error with the name of its file, for the errors of the operating system."""
     if isinstance(error, OSError) and error.filename and error.strerror:
-        return f"{error.filename}: {error.strerror}"
+        from acquisition.errors import system_failure
+
+        return system_failure(error)
     return str(error)
 
 

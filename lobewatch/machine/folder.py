@@ -13,6 +13,8 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from acquisition import DataError, Remark, TapTest, read_tap, write_tap
+from acquisition.atomic import make_folder
+from acquisition.errors import NOT_ALLOWED
 from lobewatch.machine.archive.contents import (
     Contents,
     about_lost,
@@ -96,6 +98,8 @@ class MachineFolder:
         except Timeout as error:
             raise BusyError(f"{self.path}: another lobewatch is writing here; wait until it is done") from error
         except OSError as error:
+            if error.errno not in NOT_ALLOWED:
+                raise
             told = f"{error.strerror}: it can be read, not written; copy it to where you may write"
             raise OSError(error.errno, told, str(self.path)) from error
         try:
@@ -143,7 +147,7 @@ class MachineFolder:
         """
         self.refuse_damage()
         path = self.path / "taps" / f"{tap.id}.h5"
-        path.parent.mkdir(exist_ok=True)
+        make_folder(path.parent)
         content = write_tap(path, tap)
         self.journal.append(replace(TapEntry.of(tap, content), asked=tuple(asked)).line)
         shutil.rmtree(self.spool / tap.id, ignore_errors=True)

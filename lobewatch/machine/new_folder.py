@@ -6,7 +6,7 @@ import json
 from importlib import resources
 from pathlib import Path
 
-from acquisition.atomic import atomic_write
+from acquisition.atomic import atomic_write, make_folder
 from acquisition.errors import DataError
 from acquisition.names import check_name
 
@@ -21,7 +21,7 @@ def make_machine_folder(folder: Path, template: str) -> Path:
     toml = folder / "machine.toml"
     if toml.exists():
         raise DataError(f"{toml}: is there already; choose another folder or edit that file")
-    folder.mkdir(parents=True, exist_ok=True)
+    make_folder(folder)
     text = resources.files("sim_data").joinpath(template).read_text(encoding="utf-8")
     quoted = json.dumps(name, ensure_ascii=False)  # TOML escapes as JSON does
     atomic_write(toml, text.replace('"MACHINE_NAME"', quoted).encode())

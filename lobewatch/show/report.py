@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import re
 from collections.abc import Sequence
 from importlib import resources
@@ -13,6 +12,7 @@ import jinja2
 import numpy as np
 
 from acquisition import DataError, Frf, Remark, atomic_write, joined
+from acquisition.errors import NOT_ALLOWED
 from dsm import plus_minus
 from lobewatch.analysis import (
     ABOUT_DIRECTIONS,
@@ -35,8 +35,6 @@ from lobewatch.show.programs.doubts import reading_lines
 from lobewatch.show.verdicts import WORDS, band_text, limit_text, margin_text, turning_text, verdict_text
 
 LIGHTS = {Light.ALARM: "✗ ALARM", Light.UNKNOWN: "? UNKNOWN", Light.WARN: "! WARNING", Light.GOOD: "✓ GOOD"}
-NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
-"""Errors of a folder that can only be read."""
 CHANGES = (
     ("frequency", "natural frequency (Hz)", 1.0),
     ("damping_ratio", "damping ratio (%)", 0.01),

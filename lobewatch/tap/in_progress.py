@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -9,7 +10,6 @@ from pathlib import Path
 from acquisition import (
     Channel,
     Circumstances,
-    DataError,
     Hit,
     HitFlags,
     TapTest,
@@ -19,12 +19,14 @@ from acquisition import (
     new_tap_id,
     write_hit,
 )
+from acquisition.atomic import make_folder
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.spool import RESUMABLE, SpooledHit, spooled_hits, spooled_trigger, tidy_spool, write_set_up
+from lobewatch.machine.reserve import Reserve
+from lobewatch.tap.spool import RESUMABLE, SpooledHit, spooled_hits, spooled_trigger, tidy, write_set_up
 from lobewatch.tap.state import TakenHit
 
-RESERVE_BYTES = 50_000_000
-"""Free disk space needed before the trigger is armed."""
+FULL = (errno.ENOSPC, errno.EDQUOT)
+"""Errors of a disk without room."""
 
 
 @dataclass
@@ -55,6 +57,8 @@ class TapInProgress:
     """Files of an interrupted test that could not be read, where they were set aside."""
     left: list[str] = field(default_factory=list)
     """Interrupted tests that are not gone on with, a sentence each."""
+    reserve: Reserve | None = None
+    """Room on the disk that is held for it."""
 
     @property
     def good(self) -> int:
@@ -87,11 +91,8 @@ class TapInProgress:
 
     def add(self, hit: Hit, flags: HitFlags, reason: str) -> None:
         """Keep a hit; on the disk when this returns."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        if not self.hits and self.trigger is not None:
-            write_set_up(self.folder, self.trigger)
         number = max(self.numbers, default=-1) + 1
-        self._write(number, hit, flags)
+        self._store(number, hit, flags)
         self._append(number, hit, flags, reason)
 
     def add_spooled(self, spooled: SpooledHit) -> None:
@@ -103,7 +104,7 @@ class TapInProgress:
 
     def take_out(self, number: int, flags: HitFlags, reason: str) -> None:
         """Refuse a good hit (by its index) afterwards; it stays stored."""
-        self._write(self.numbers[number], self.hits[number], flags)
+        self._store(self.numbers[number], self.hits[number], flags)
         self.flags[number], self.reasons[number] = flags, reason
 
     def finish(self) -> TapTest:
@@ -117,20 +118,26 @@ class TapInProgress:
         self.flags.append(flags)
         self.reasons.append(reason)
 
+    def _store(self, number: int, hit: Hit, flags: HitFlags) -> None:
+        """On the disk when this returns; where that is full, in the room that was held."""
+        try:
+            self._write(number, hit, flags)
+        except OSError as error:
+            if error.errno not in FULL or self.reserve is None or not self.reserve.release():
+                raise
+            self._write(number, hit, flags)
+
     def _write(self, number: int, hit: Hit, flags: HitFlags) -> None:
+        make_folder(self.folder)
+        if not self.hits and self.trigger is not None:
+            write_set_up(self.folder, self.trigger)
         write_hit(self.folder / f"{number:04d}.h5", hit, self.circumstances, flags)
 
 
 def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool = True) -> TapInProgress:
-    """A new tap test, or the interrupted one of the same tool and direction; DataError where the disk is full or the
-    journal damaged."""
+    """A new tap test, or the interrupted one of the same tool and direction; DataError where the journal is damaged."""
     folder.refuse_damage()
-    free = shutil.disk_usage(folder.path).free
-    if free < RESERVE_BYTES:
-        raise DataError(
-            f"{folder.path}: {free / 1e6:.0f} MB free on this disk; a tap test needs {RESERVE_BYTES / 1e6:.0f} MB"
-        )
-    tidy_spool(folder.spool)
+    tidy(folder)
     _remove_committed(folder)
     damaged, left = list[Path](), list[str]()
     found = _interrupted(folder, circumstances, resume, damaged, left)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Channel, Hit
-from lobewatch.tap.in_progress import RESERVE_BYTES
+from lobewatch.machine.reserve import RESERVE_BYTES
 from lobewatch.tap.sensor_doubts import sensor_doubts
 from lobewatch.tap.state import Check
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import errno
 import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 
 from acquisition import Circumstances, DataError, Device, DeviceError, TapTest
+from acquisition.errors import NOT_ALLOWED, system_failure
 from lobewatch.analysis import Logbook, Measurement
 from lobewatch.analysis.questions.asked import checked_codes
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.reserve import Reserve
 from lobewatch.tap.connection import Connector
 from lobewatch.tap.hit_loop import HitLoop, TapStopped, Wishes
 from lobewatch.tap.in_progress import begin_tap
@@ -21,8 +22,6 @@ from lobewatch.tap.publisher import Publisher
 from lobewatch.tap.state import TapState, Word
 
 __all__ = ["TapSession", "TapStopped"]
-
-NOT_ALLOWED = (errno.EACCES, errno.EPERM, errno.EROFS)
 
 
 class TapSession:
@@ -81,11 +80,13 @@ class TapSession:
         another set-up, TapStopped after stop().
         """
         try:
-            with self._folder.locked():
+            with self._folder.locked(), Reserve(self._folder.path) as reserve:
                 hits = self._begin()
+                hits.tap.reserve = reserve
                 if hits.missing:
                     loop = HitLoop(hits, self._publisher, self._wishes, guided=self._guided)
                     Phases(self._folder, hits, loop, self._publisher, guided=self._guided).run(self._connector)
+                reserve.release()
                 return self._finish(hits)
         except TapStopped:
             raise
@@ -121,7 +122,8 @@ class TapSession:
             self._measurement = logbook.measurement(tap.id)
             outcome = outcome_of(logbook, self._measurement) if self._guided else None
         except (ArithmeticError, KeyError, OSError, ValueError) as error:
-            raise DataError(f"saved {tap.id}, but what it means cannot be worked out: {error}") from error
+            why = system_failure(error) if isinstance(error, OSError) and error.errno else error
+            raise DataError(f"saved {tap.id}, but what it means cannot be worked out: {why}") from error
         self._publisher.show(reason="", outcome=outcome)
         return tap
 
@@ -133,6 +135,6 @@ def _told(error: Exception) -> Exception:
         return error
     kept = "the hits so far are kept: the same command goes on with them"
     if isinstance(error, OSError):
-        cure = "you may not write there" if error.errno in NOT_ALLOWED else f"make room or put the disk right, {kept}"
-        return DataError(f"{error.filename or 'the disk'}: {error.strerror or error}; {cure}")
+        cure = "you may not write there" if error.errno in NOT_ALLOWED else kept
+        return DataError(f"{system_failure(error)}; {cure}")
     return RuntimeError(f"lobewatch itself has failed ({type(error).__name__}: {error}); {kept}")

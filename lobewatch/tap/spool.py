@@ -21,6 +21,8 @@ from lobewatch.machine.folder import MachineFolder
 
 RESUMABLE = timedelta(hours=12)
 """An interrupted test older than this is not gone on with."""
+HALF_WRITTEN = (".journal*.tmp", ".history.h5.*.tmp", "taps/.*.tmp", "spool/**/.*.tmp")
+"""Temporary names of what is written under the lock."""
 SETUP = "setup.json"
 """File with the trigger of a test."""
 
@@ -87,10 +89,14 @@ def spooled_trigger(folder: Path, damaged: list[Path]) -> Trigger | None:
         return None
 
 
-def tidy_spool(spool: Path) -> None:
-    """Remove what an ended program leaves of no use: half-written files and empty folders."""
-    for path in sorted(spool.rglob(".*.tmp")) if spool.is_dir() else []:
+def tidy(folder: MachineFolder) -> None:
+    """Remove what an ended program leaves of no use: half-written files and empty folders; under the lock.
+
+    Half-written files that programs without the lock may be writing just now are left alone.
+    """
+    for path in [path for names in HALF_WRITTEN for path in folder.path.glob(names)]:
         path.unlink(missing_ok=True)
+    spool = folder.spool
     for path in sorted(spool.iterdir()) if spool.is_dir() else []:
         if path.is_dir():
             if [one.name for one in path.iterdir()] == [SETUP]:

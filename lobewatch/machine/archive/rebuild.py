@@ -11,7 +11,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from acquisition import DataError, read_tap
-from acquisition.atomic import atomic_write
+from acquisition.atomic import atomic_write, make_folder
 from lobewatch.machine.archive.contents import fault_of, given_up, listed, tap_files
 from lobewatch.machine.archive.doubtful import read_doubtful
 from lobewatch.machine.archive.journal import JOURNAL, Journal
@@ -133,7 +133,7 @@ def _devices(folder: Path) -> Iterator[str]:
 
 def _put_aside(folder: Path, path: Path) -> Path:
     """Into the folder of what is damaged, under a name that nothing has there."""
-    (folder / ASIDE).mkdir(exist_ok=True)
+    make_folder(folder / ASIDE)
     aside, number = folder / ASIDE / path.name, 1
     while aside.exists():
         aside, number = folder / ASIDE / f"{path.name}.{number}", number + 1

@@ -5,14 +5,11 @@ from __future__ import annotations
 import contextlib
 import difflib
 import hashlib
-import json
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition import DataError, Remark, Trigger
-from acquisition.files.seal import is_sealed
+from acquisition import DataError, Remark
 from lobewatch.machine.archive.contents import (
     about_lost,
     fault_of,
@@ -27,6 +24,7 @@ from lobewatch.machine.archive.doubtful import read_doubtful
 from lobewatch.machine.archive.journal import COPY, JOURNAL, Journal, Reading, command
 from lobewatch.machine.archive.rows import read_rows
 from lobewatch.machine.archive.tap_entry import TapEntry
+from lobewatch.machine.archive.verify_spool import about_spool
 from lobewatch.machine.folder import BusyError, MachineFolder
 from lobewatch.machine.known_devices import read_known_devices
 
@@ -85,7 +83,7 @@ def verify(path: Path) -> Verified:
         *_about_machine_file(folder, [entry for name, entry in committed.items() if name not in wrong]),
         *_about_history(folder),
         *_about_devices(folder),
-        *_about_spool(path),
+        *about_spool(path, committed.keys() - wrong.keys()),
         *_about_others(path),
     ]
     return Verified(tuple(remarks), tuple(adopted), len(committed) - len(wrong))
@@ -184,28 +182,6 @@ def _about_devices(folder: MachineFolder) -> Iterator[Remark]:
         yield Remark("file-damaged", "daq.json", str(error).removeprefix(f"{folder.path / 'daq.json'}: "))
 
 
-def _about_spool(folder: Path) -> Iterator[Remark]:
-    spool = folder / "spool"
-    for path in sorted(spool.rglob("*")) if spool.is_dir() else []:
-        about = path.relative_to(folder).as_posix()
-        if path.is_dir():
-            cure = f"put it back from a backup, or {command('tap', folder)} goes on with the others"
-            yield from (Remark("file-damaged", f"{about}/{name}", "missing", cure) for name in _missing_hits(path))
-            continue
-        if path.suffix == ".h5" and not is_sealed(path.read_bytes()):
-            cure = f"{command('tap', folder)} sets it aside and goes on with the others"
-            yield Remark("file-damaged", about, "altered or cut short since it was written", cure)
-        elif path.name == "setup.json" and not _is_whole_set_up(path):
-            cure = f"{command('tap', folder)} sets it aside and chooses the set-up anew"
-            yield Remark("file-damaged", about, "altered or cut short since it was written", cure)
-        elif path.suffix == ".tmp":
-            yield Remark("set-aside", about, "half written", f"{command('tap', folder)} removes it")
-        elif path.suffix == ".damaged":
-            yield Remark(
-                "set-aside", about, "a damaged file of an interrupted test", "delete it when you do not need it"
-            )
-
-
 def _about_others(folder: Path) -> Iterator[Remark]:
     for path in sorted(folder.iterdir()):
         if path.suffix in (".tmp", ".torn", ".damaged") or path.name == "damaged":
@@ -224,22 +200,6 @@ def _about_others(folder: Path) -> Iterator[Remark]:
     for path in sorted(taps.iterdir()) if taps.is_dir() else []:
         if path.name not in {file.name for file in tap_files(folder).values()}:
             yield Remark("not-verified", f"taps/{path.name}", "no tap file, does not count", "take it out of taps/")
-
-
-def _is_whole_set_up(path: Path) -> bool:
-    try:
-        told = json.loads(path.read_bytes())
-        crc = told.pop("crc", None)
-        return bool(Trigger(**told)) and crc in (None, zlib.crc32(json.dumps(told, sort_keys=True).encode()))
-    except (ValueError, TypeError, AttributeError):
-        return False
-
-
-def _missing_hits(test: Path) -> list[str]:
-    """Names of hits that must have been there: one with a higher number is, and none was set aside under theirs."""
-    numbers = [int(path.stem) for path in test.glob("[0-9]*.h5") if path.stem.isdigit()]
-    names = [f"{number:04d}.h5" for number in range(max(numbers, default=0)) if number not in numbers]
-    return [name for name in names if not list(test.parent.glob(f"{test.name}-{name}*.damaged"))]
 
 
 def _sha256(path: Path) -> str:

@@ -12,7 +12,6 @@ import pytest
 
 from acquisition import (
     Circumstances,
-    DataError,
     Faults,
     Frf,
     HammeredStructure,
@@ -180,15 +179,6 @@ def test_a_committed_test_whose_spool_was_left_is_not_gone_on_with(folder: Machi
     hit = Hit(np.ones(100), np.ones(100), 1000.0)
     write_hit(folder.spool / tap.id / "0000.h5", hit, about(folder), HitFlags.OK)
     assert begin_tap(folder, about(folder)).hits == []
-
-
-def test_a_full_disk_is_told_before_the_first_hit(folder: MachineFolder, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Usage:
-        free = 1_000_000
-
-    monkeypatch.setattr("lobewatch.tap.in_progress.shutil.disk_usage", lambda _: Usage)
-    with pytest.raises(DataError, match="1 MB free on this disk; a tap test needs 50 MB"):
-        begin_tap(folder, about(folder))
 
 
 def test_the_newest_x_and_y_make_one_diagram_however_far_apart(folder: MachineFolder) -> None:

@@ -113,6 +113,48 @@ def test_a_full_disk_or_a_mistake_of_ours_is_told_and_costs_no_hit(
     assert sum(hit.earlier for hit in session.state.hits) == 3
 
 
+def test_a_full_disk_is_told_before_the_first_hit(
+    folder: MachineFolder,
+    tapper: Tapper,
+    channels: Pair,
+    monkeypatch: pytest.MonkeyPatch,
+    simulated: Simulate,
+    session_of: OpenSession,
+) -> None:
+    class Usage:
+        free = 1_000_000
+
+    monkeypatch.setattr("lobewatch.machine.reserve.shutil.disk_usage", lambda _: Usage)
+    session = session_of(folder, lambda: simulated(tapper(), channels))
+    with pytest.raises(DataError, match="1 MB free on this disk; a tap test needs 50 MB: make room"):
+        session.run()
+    assert session.state.hits == ()
+
+
+def test_a_disk_that_fills_up_meanwhile_does_not_end_the_test(
+    folder: MachineFolder,
+    tapper: Tapper,
+    channels: Pair,
+    monkeypatch: pytest.MonkeyPatch,
+    simulated: Simulate,
+    session_of: OpenSession,
+) -> None:
+    reserve = folder.spool / ".reserve"
+    held: list[int] = []
+
+    def filled_by_others(*arguments: Any) -> None:
+        if reserve.exists() and session.state.good == 3:
+            held.append(reserve.stat().st_blocks * 512)
+            raise OSError(errno.ENOSPC, "No space left on device", "m/spool/x/0003.h5")
+        write_hit(*arguments)
+
+    monkeypatch.setattr("lobewatch.tap.in_progress.write_hit", filled_by_others)
+    session = session_of(folder, lambda: simulated(tapper(), channels))
+    assert len(session.run().hits) == 10
+    assert held[0] >= 50_000_000
+    assert list(folder.spool.iterdir()) == []
+
+
 def test_a_stopped_test_is_gone_on_with_by_the_set_up_it_began_with(
     open_folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
 ) -> None:

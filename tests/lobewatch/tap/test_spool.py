@@ -195,12 +195,15 @@ def test_other_interrupted_tests_are_told_and_kept(
 
 def test_half_written_files_and_empty_folders_are_removed(interrupted: Path, open_folder: MachineFolder) -> None:
     (interrupted / ".0004.h5.abcd.tmp").write_bytes(b"half")
+    (open_folder.path / ".history.h5.abcd.tmp").write_bytes(b"half")
+    (open_folder.path / ".report.html.abcd.tmp").write_bytes(b"of a program without the lock")
     (open_folder.spool / "empty").mkdir()
     (open_folder.spool / "without hits").mkdir()
     (open_folder.spool / "without hits" / "setup.json").write_text("{}")
     assert len(begun_again(open_folder).hits) == 4
     assert [path.name for path in open_folder.spool.iterdir()] == [interrupted.name]
     assert sorted(path.suffix for path in interrupted.iterdir()) == [".h5"] * 4 + [".json"]
+    assert [path.name for path in open_folder.path.glob(".*.tmp")] == [".report.html.abcd.tmp"]
 
 
 def test_hits_of_a_committed_test_are_removed(

@@ -189,6 +189,12 @@ def test_spool_files_are_named(full: Path) -> None:
     assert [one.about for one in verify(full).damage] == ["spool/tap_9/0000.h5", "spool/tap_9/setup.json"]
 
 
+def test_the_rest_of_the_spool_of_a_saved_test_is_no_damage(full: Path) -> None:
+    (full / "spool" / "tap_9").rename(full / "spool" / "tap_1")
+    (full / "spool" / "tap_1" / "0000.h5").unlink()
+    assert verify(full).remarks == ()
+
+
 def results_of(folder: MachineFolder) -> list[bytes]:
     """What all results follow from."""
     found = MachineFolder(folder.path)

@@ -1,0 +1,65 @@
+"""The files of interrupted tests against what was written: hits by their seals, the set-up by its CRC-32."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Collection, Iterator
+from pathlib import Path
+
+from acquisition import Remark, Trigger
+from acquisition.files.seal import is_sealed
+from lobewatch.machine.archive.journal import command
+
+ALTERED = "altered or cut short since it was written"
+
+
+def about_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
+    """What is wrong with the files of interrupted tests.
+
+    saved: identities of tap tests that need theirs no more. What another program removes meanwhile is left out.
+    """
+    spool = folder / "spool"
+    for path in sorted(spool.rglob("*")) if spool.is_dir() else []:
+        inside = path.relative_to(spool)
+        if inside.parts[0] in saved:
+            continue
+        try:
+            yield from _about_test(folder, path) if path.is_dir() else _about_file(folder, path)
+        except FileNotFoundError:
+            continue
+
+
+def _about_test(folder: Path, path: Path) -> Iterator[Remark]:
+    cure = f"put it back from a backup, or {command('tap', folder)} goes on with the others"
+    about = path.relative_to(folder).as_posix()
+    yield from (Remark("file-damaged", f"{about}/{name}", "missing", cure) for name in _missing_hits(path))
+
+
+def _about_file(folder: Path, path: Path) -> Iterator[Remark]:
+    about, tap = path.relative_to(folder).as_posix(), command("tap", folder)
+    if path.suffix == ".h5" and not is_sealed(path.read_bytes()):
+        yield Remark("file-damaged", about, ALTERED, f"{tap} sets it aside and goes on with the others")
+    elif path.name == "setup.json" and not _is_whole_set_up(path):
+        yield Remark("file-damaged", about, ALTERED, f"{tap} sets it aside and chooses the set-up anew")
+    elif path.suffix == ".tmp":
+        yield Remark("set-aside", about, "half written", f"{tap} removes it")
+    elif path.suffix == ".damaged":
+        cure = "delete it when you do not need it"
+        yield Remark("set-aside", about, "a damaged file of an interrupted test", cure)
+
+
+def _is_whole_set_up(path: Path) -> bool:
+    try:
+        told = json.loads(path.read_bytes())
+        crc = told.pop("crc", None)
+        return bool(Trigger(**told)) and crc in (None, zlib.crc32(json.dumps(told, sort_keys=True).encode()))
+    except (ValueError, TypeError, AttributeError):
+        return False
+
+
+def _missing_hits(test: Path) -> list[str]:
+    """Names of hits that must have been there: one with a higher number is, and none was set aside under theirs."""
+    numbers = [int(path.stem) for path in test.glob("[0-9]*.h5") if path.stem.isdigit()]
+    names = [f"{number:04d}.h5" for number in range(max(numbers, default=0)) if number not in numbers]
+    return [name for name in names if not list(test.parent.glob(f"{test.name}-{name}*.damaged"))]

@@ -1,0 +1,144 @@
+"""The file calls of a program inside one folder: written down, failing, or the last thing that it does.
+
+Every call of os and every opening and writing of a file by Python below the folder is counted; the one with the wished
+number does what it is told to. Files of HDF5 are made in memory and written by Python, so nothing passes by.
+"""
+
+from __future__ import annotations
+
+import builtins
+import errno
+import io
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+KILLED = 77
+"""Exit code of a program that was ended by a fault."""
+KILLS = ("killed before", "killed after", "killed half-way")
+ERRORS = {"ENOSPC": errno.ENOSPC, "EIO": errno.EIO, "EMFILE": errno.EMFILE}
+FAULTS = (*KILLS, *ERRORS)
+ROOM = ("create", "append", "write", "mkdir", "rename")
+"""Calls that need room on the disk."""
+
+
+@dataclass(frozen=True)
+class Call:
+    """One file call that was made."""
+
+    name: str
+    """create, append, read, write, fsync, rename, unlink, mkdir, rmdir; failed for one that
+    could not be done; or what was announced."""
+    path: str
+    """What it was about."""
+    data: bytes = b""
+    """What was written."""
+    to: str = ""
+    """The new name."""
+
+
+class FaultyFiles:
+    """Counts the file calls below a folder from `begin` on, and lets one fail."""
+
+    def __init__(self, root: Path, at: int = -1, fault: str = "") -> None:
+        """at: number of the call that the fault befalls, from 0; a full disk stays full until room that was
+        held on it is given up."""
+        self.calls: list[Call] = []
+        """All that were made, oldest first."""
+        self._root, self._at, self._fault, self._count = f"{root}/", at, fault, 0
+        self._full = False
+        self._opened: dict[int, str] = {}
+        self._open, self._io_open, self._write = os.open, io.open, os.write
+
+    def begin(self) -> None:
+        """From now on, until the program ends."""
+        os.open = self._opening
+        os.write = self._writing
+        io.open = builtins.open = self._opening_file
+        os.fsync = self._about("fsync", os.fsync)
+        os.unlink = self._about("unlink", os.unlink)
+        os.mkdir = self._about("mkdir", os.mkdir)
+        os.rmdir = self._about("rmdir", os.rmdir)
+        os.replace = self._renaming(os.replace)
+        os.rename = self._renaming(os.rename)
+
+    def write(self, path: str, data: bytes, real: Callable[[bytes], int]) -> int:
+        """Write, perhaps half of it."""
+        return self._made(Call("write", path, data), lambda: real(data), lambda: real(data[: len(data) // 2]))
+
+    def _made(self, call: Call, real: Callable[[], T], half: Callable[[], object] = lambda: None) -> T:
+        """Make the call, or let the fault befall it."""
+        if not call.path.startswith(self._root):
+            return real()
+        due = self._count == self._at
+        full = self._full and call.name in ROOM
+        self._count += 1
+        self._full &= (call.name, call.path[-8:]) != ("unlink", ".reserve")
+        if (due or full) and self._fault in ERRORS:
+            self._full = self._fault == "ENOSPC"
+            half()
+            code = ERRORS[self._fault]
+            raise OSError(code, os.strerror(code), call.path)
+        if due and self._fault in ("killed before", "killed half-way"):
+            if self._fault == "killed half-way":
+                half()
+            os._exit(KILLED)
+        self.calls.append(replace(call, name="failed"))
+        done = real()
+        self.calls[-1] = call
+        if due:
+            os._exit(KILLED)
+        return done
+
+    def _path(self, path: Any, dir_fd: int | None = None) -> str:
+        if isinstance(path, int):
+            return self._opened.get(path, "")
+        name = os.fspath(path)
+        return name if dir_fd is None else str(Path(self._opened.get(dir_fd, ""), name))
+
+    def _opening(self, path: Any, flags: int, mode: int = 0o777, *, dir_fd: int | None = None) -> int:
+        name = self._path(path, dir_fd)
+        creates = flags & os.O_CREAT and not Path(name).exists()
+        kind = "create" if creates else "append" if flags & os.O_APPEND else "read"
+        handle = self._made(Call(kind, name), lambda: self._open(path, flags, mode, dir_fd=dir_fd))
+        self._opened[handle] = name
+        return handle
+
+    def _writing(self, handle: int, data: Any) -> int:
+        return self.write(self._path(handle), bytes(data), lambda part: self._write(handle, part))
+
+    def _opening_file(self, file: Any, mode: str = "r", *arguments: Any, **options: Any) -> Any:
+        name = self._path(file)
+        if not name.startswith(self._root) or not set(mode) & set("wxa+"):
+            return self._made(Call("read", name), lambda: self._io_open(file, mode, *arguments, **options))
+        raw = self._made(Call("create", name), lambda: _Counted(name, mode, self))
+        self._opened[raw.fileno()] = name
+        return io.BufferedWriter(raw)
+
+    def _about(self, name: str, real: Callable[..., T]) -> Callable[..., T]:
+        def call(path: Any, *arguments: Any, dir_fd: int | None = None, **options: Any) -> T:
+            told = {"dir_fd": dir_fd, **options} if dir_fd is not None else options
+            return self._made(Call(name, self._path(path, dir_fd)), lambda: real(path, *arguments, **told))
+
+        return call
+
+    def _renaming(self, real: Callable[..., T]) -> Callable[..., T]:
+        def call(old: Any, new: Any, **options: Any) -> T:
+            about = Call("rename", os.fspath(old), to=os.fspath(new))
+            return self._made(about, lambda: real(old, new, **options))
+
+        return call
+
+
+class _Counted(io.FileIO):
+    """A file whose writing is counted."""
+
+    def __init__(self, name: str, mode: str, files: FaultyFiles) -> None:
+        super().__init__(name, mode.replace("b", ""))
+        self._name, self._files = name, files
+
+    def write(self, data: Any, /) -> int:
+        return self._files.write(self._name, bytes(data), super().write)

@@ -260,7 +260,7 @@ def main() -> None:
     rounds = Rounds(work)
     if what == "faults":
         numbers = range(len(rounds.file_calls))
-        pairs = [(at, fault) for at in numbers for fault in FAULTS if _is_possible(rounds.file_calls[at], fault)]
+        pairs = [(at, fault) for fault in FAULTS for at in numbers if _is_possible(rounds.file_calls[at], fault)]
         for at, fault in pairs[first::step]:
             say(rounds.fault(at, fault))
     else:

@@ -45,10 +45,10 @@ class Reserve:
         self.release()
 
     def release(self) -> bool:
-        """Give it up; whether there was any."""
+        """Give it up; whether there was any that could be given up: what stays is taken over by the next test."""
         try:
             self._file.unlink()
-        except FileNotFoundError:
+        except OSError:
             return False
         return True
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 
-from acquisition import Circumstances, DataError, Device, DeviceError, TapTest
+from acquisition import Circumstances, DataError, Device, DeviceError, Remark, TapTest
 from acquisition.errors import NOT_ALLOWED, system_failure
 from lobewatch.analysis import Logbook, Measurement
 from lobewatch.analysis.questions.asked import checked_codes
@@ -122,10 +122,17 @@ class TapSession:
             self._measurement = logbook.measurement(tap.id)
             outcome = outcome_of(logbook, self._measurement) if self._guided else None
         except (ArithmeticError, KeyError, OSError, ValueError) as error:
-            why = system_failure(error) if isinstance(error, OSError) and error.errno else error
+            why = _why(error, [remark for remark in logbook.remarks if tap.id in remark.about])
             raise DataError(f"saved {tap.id}, but what it means cannot be worked out: {why}") from error
         self._publisher.show(reason="", outcome=outcome)
         return tap
+
+
+def _why(error: Exception, remarks: Sequence[Remark]) -> str:
+    """Why a saved tap test has no result; remarks: about its file."""
+    if isinstance(error, OSError) and error.errno:
+        return system_failure(error)
+    return "; ".join(map(str, remarks)) or str(error)
 
 
 def _told(error: Exception) -> Exception:

@@ -21,7 +21,7 @@ from lobewatch.machine.folder import MachineFolder
 
 RESUMABLE = timedelta(hours=12)
 """An interrupted test older than this is not gone on with."""
-HALF_WRITTEN = (".journal*.tmp", ".history.h5.*.tmp", "taps/.*.tmp", "spool/**/.*.tmp")
+HALF_WRITTEN = (".journal*.tmp", ".history.*.tmp", "taps/.*.tmp", "spool/**/.*.tmp")
 """Temporary names of what is written under the lock."""
 SETUP = "setup.json"
 """File with the trigger of a test."""

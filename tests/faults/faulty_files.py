@@ -30,7 +30,7 @@ class Call:
     """One file call that was made."""
 
     name: str
-    """create, append, read, write, fsync, rename, unlink, mkdir, rmdir; failed for one that
+    """create, append, read, write, truncate, fsync, rename, unlink, mkdir, rmdir; failed for one that
     could not be done; or what was announced."""
     path: str
     """What it was about."""
@@ -38,6 +38,8 @@ class Call:
     """What was written."""
     to: str = ""
     """The new name."""
+    size: int = 0
+    """What was left of it (bytes)."""
 
 
 class FaultyFiles:
@@ -68,6 +70,10 @@ class FaultyFiles:
     def write(self, path: str, data: bytes, real: Callable[[bytes], int]) -> int:
         """Write, perhaps half of it."""
         return self._made(Call("write", path, data), lambda: real(data), lambda: real(data[: len(data) // 2]))
+
+    def truncate(self, path: str, size: int, real: Callable[[], int]) -> int:
+        """Cut off what is behind so many bytes."""
+        return self._made(Call("truncate", path, size=size), real)
 
     def _made(self, call: Call, real: Callable[[], T], half: Callable[[], object] = lambda: None) -> T:
         """Make the call, or let the fault befall it."""
@@ -110,13 +116,13 @@ class FaultyFiles:
     def _writing(self, handle: int, data: Any) -> int:
         return self.write(self._path(handle), bytes(data), lambda part: self._write(handle, part))
 
-    def _opening_file(self, file: Any, mode: str = "r", *arguments: Any, **options: Any) -> Any:
+    def _opening_file(self, file: Any, mode: str = "r", buffering: int = -1, *arguments: Any, **options: Any) -> Any:
         name = self._path(file)
         if not name.startswith(self._root) or not set(mode) & set("wxa+"):
-            return self._made(Call("read", name), lambda: self._io_open(file, mode, *arguments, **options))
-        raw = self._made(Call("create", name), lambda: _Counted(name, mode, self))
+            return self._made(Call("read", name), lambda: self._io_open(file, mode, buffering, *arguments, **options))
+        raw = self._made(Call("append" if "r" in mode else "create", name), lambda: _Counted(name, mode, self))
         self._opened[raw.fileno()] = name
-        return io.BufferedWriter(raw)
+        return io.BufferedWriter(raw) if buffering else raw
 
     def _about(self, name: str, real: Callable[..., T]) -> Callable[..., T]:
         def call(path: Any, *arguments: Any, dir_fd: int | None = None, **options: Any) -> T:
@@ -142,3 +148,7 @@ class _Counted(io.FileIO):
 
     def write(self, data: Any, /) -> int:
         return self._files.write(self._name, bytes(data), super().write)
+
+    def truncate(self, size: int | None = None, /) -> int:
+        end = self.tell() if size is None else size
+        return self._files.truncate(self._name, end, lambda: super(_Counted, self).truncate(end))

@@ -62,6 +62,8 @@ class Disk:
             self._now[path] = None
         elif call.name == "write":
             self._written[self._file(path)] += call.data
+        elif call.name == "truncate":
+            self._written[self._file(path)] = self._written[self._file(path)][: call.size]
         elif call.name == "rename":
             self._now[call.to] = self._now.pop(path)
         elif call.name in ("unlink", "rmdir"):

@@ -17,7 +17,7 @@ import re
 import shutil
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -187,7 +187,7 @@ class Rounds:
         """The power cut after so many calls, and what became of the tap test."""
         self._clear()
         disk = Disk(self._pristine)
-        moved = [Call(one.name, self._moved(one.path), one.data, self._moved(one.to)) for one in self.calls[:at]]
+        moved = [replace(one, path=self._moved(one.path), to=self._moved(one.to)) for one in self.calls[:at]]
         disk.replay(moved)
         disk.survivor(way, self._work)
         told = Told()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 from collections.abc import Mapping
@@ -96,7 +97,10 @@ def tap_files(folder: Path) -> Mapping[str, Path]:
 
 
 def fault_of(folder: Path, entry: TapEntry) -> str:
-    """What is wrong with the file of a tap test; empty where nothing is."""
+    """What is wrong with the file of a tap test; empty where nothing is.
+
+    OSError where this program can open no more files.
+    """
     path = folder / entry.file
     try:
         size = path.stat().st_size
@@ -107,6 +111,8 @@ def fault_of(folder: Path, entry: TapEntry) -> str:
     except FileNotFoundError:
         return "named in the journal but missing"
     except OSError as error:
+        if error.errno in (errno.EMFILE, errno.ENFILE):  # nothing is said of this file
+            raise
         return f"cannot be read ({os.strerror(error.errno or 0)})"
     return ""
 

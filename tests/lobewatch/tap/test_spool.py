@@ -195,7 +195,7 @@ def test_other_interrupted_tests_are_told_and_kept(
 
 def test_half_written_files_and_empty_folders_are_removed(interrupted: Path, open_folder: MachineFolder) -> None:
     (interrupted / ".0004.h5.abcd.tmp").write_bytes(b"half")
-    (open_folder.path / ".history.h5.abcd.tmp").write_bytes(b"half")
+    (open_folder.path / ".history.rows.abcd.tmp").write_bytes(b"half")
     (open_folder.path / ".report.html.abcd.tmp").write_bytes(b"of a program without the lock")
     (open_folder.spool / "empty").mkdir()
     (open_folder.spool / "without hits").mkdir()

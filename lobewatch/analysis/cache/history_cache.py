@@ -57,7 +57,7 @@ class HistoryCache:
                 number, row = unpacked(content, self._folder.machine.program_hashes)
                 self._rows[number : number + 1] = [row]
                 self._packed[number : number + 1] = [content]
-        except (ValueError, FileNotFoundError):
+        except (ValueError, OSError):
             self._rows, self._packed = [], []
         else:
             self._size, self._length = found.size if found.rows[:1] == (head,) else 0, found.length

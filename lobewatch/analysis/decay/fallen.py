@@ -84,12 +84,19 @@ def about_trend(name: str, trend: Trend, path: Path | str = "MACHINE") -> Iterat
     if trend.watch.fall is not None and trend.fallen_since is not None:
         fall = trend.watch.fall
         how = "fell at once before" if fall.kind == "step" else "has been falling since"
-        text = f"frequency {how} {trend.fallen_since:%Y-%m-%d}, by {fall.size:.2f} ±{fall.half_width:.2f} %"
+        text = f"frequency {how} {trend.fallen_since:%Y-%m-%d}, by {_relative(fall.size, fall.half_width)}"
         cure = "Have the bearings, the tool and its clamping looked at"
         yield Remark("decay", name, text, f"{cure}; {event} ends this alarm, --new-baseline with it after a repair.")
     elif trend.watch.asks_again:
         text = "the newest test is lower than those before it"
         yield Remark("decay-doubtful", name, text, "Clamp the tool anew and tap again: that shows whether it fell.")
     if trend.rise.fall is not None:
-        text = f"frequency rose by {trend.rise.fall.size:.2f} ±{trend.rise.fall.half_width:.2f} %: assembly changed?"
+        rise = trend.rise.fall
+        text = f"frequency rose by {_relative(-rise.size, rise.half_width)}: assembly changed?"
         yield Remark("frequency-rose", name, text, f"If so: {event} --new-baseline")
+
+
+def _relative(fall: float, half_width: float) -> str:
+    """Of a logarithm in %, with the half-width of its 95 % interval."""
+    share = math.exp(-fall / 100)
+    return f"{100 * abs(1 - share):.2f} ±{half_width * share:.2f} %"

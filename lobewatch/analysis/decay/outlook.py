@@ -1,0 +1,105 @@
+"""When each program becomes doubtful and not stable, and when the fixed limits of machine.toml are reached."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from acquisition import DataError
+from lobewatch.analysis.decay.forecast import Reached
+from lobewatch.analysis.decay.trend import Trend
+from lobewatch.analysis.logbook import Logbook
+from lobewatch.analysis.programs.critical import CriticalFall, critical_fall
+from lobewatch.analysis.programs.verdict import Verdict
+from lobewatch.analysis.standing import SeriesStanding, Standing
+
+ALREADY = Reached(-math.inf, -math.inf, -math.inf)
+NEVER = Reached(math.inf, math.inf, math.inf)
+
+
+@dataclass(frozen=True)
+class Fate:
+    """What becomes of one program; dates in days since 1970."""
+
+    critical: CriticalFall
+    """How far the frequency of its newest tap tests may fall."""
+    doubtful: Reached | None
+    """When it becomes doubtful; None where nothing can be foretold."""
+    not_stable: Reached | None
+    """When it is not stable any more; None where nothing can be foretold."""
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """What becomes of a machine if it is used as before."""
+
+    standing: Standing
+    """As it stands now."""
+    programs: Mapping[str, Fate]
+    """By name."""
+    limits: Mapping[float, Reached | None]
+    """When the worst of its series has fallen by so much (%), those of machine.toml; None where it cannot be told."""
+
+    def series(self, tool: str | None = None, direction: str | None = None) -> SeriesStanding:
+        """The series of a tool and direction, the one that fell most where several fit; DataError where none does."""
+        fits = [one for one in self.standing.series if tool in (None, one.tool) and direction in (None, one.direction)]
+        if not fits:
+            there = "; ".join(f"--tool {one.tool} --direction {one.direction}" for one in self.standing.series)
+            raise DataError(f"tool {tool or 'any'}, direction {direction or 'any'}: no such series; there are: {there}")
+        return fits[0]
+
+
+def outlook(logbook: Logbook, now: datetime | None = None) -> Outlook:
+    """The outlook of a machine; DataError where it was never tapped."""
+    logbook.newest()
+    standing = logbook.standing(now or datetime.now(UTC))
+    fixed = logbook.machine.limits
+    percents = (fixed.frequency_warn_percent, fixed.frequency_alarm_percent)
+    series = [one.trend for one in standing.series if one.trend is not None]
+    return Outlook(
+        standing,
+        {one.program.name: _fate(one, standing.series) for one in logbook.verdicts()},
+        {percent: _first(_of_limit(trend, percent) for trend in series) for percent in percents},
+    )
+
+
+def _fate(found: Verdict, series: Sequence[SeriesStanding]) -> Fate:
+    critical = critical_fall(found)
+    if found.assembly is None or math.isnan(critical.not_stable):
+        return Fate(critical, None, None)
+    own = [one for one in series if one.tool == found.assembly.tool] or series
+    trends = [one.trend for one in own if one.trend is not None]
+    doubtful = _first(_after(trend, critical.doubtful, 0.0) for trend in trends)
+    return Fate(critical, doubtful, _first(_after(trend, critical.not_stable, critical.error) for trend in trends))
+
+
+def _after(trend: Trend, fall: float, error: float) -> Reached | None:
+    """When the frequency of the last point, which the word rests on, has fallen by a share.
+
+    error: standard error of the share.
+    """
+    if fall == 0:
+        return ALREADY
+    if trend.forecast is None:
+        return None
+    if math.isinf(fall):
+        return NEVER
+    level = trend.points[-1].percent + 100 * math.log1p(-fall)
+    return trend.forecast.reached(level, 100 * error / (1 - fall))
+
+
+def _of_limit(trend: Trend, percent: float) -> Reached | None:
+    if trend.forecast is None:
+        return None
+    return trend.forecast.reached(trend.start + 100 * math.log1p(-percent / 100))
+
+
+def _first(found: Iterator[Reached | None]) -> Reached | None:
+    """The earliest of several series; None where one of them cannot be foretold and none is past it."""
+    dates = [*found]
+    if ALREADY in dates:
+        return ALREADY
+    known = [one for one in dates if one is not None]
+    return Reached(*map(min, zip(*known, strict=True))) if known and len(known) == len(dates) else None

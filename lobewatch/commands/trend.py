@@ -1,0 +1,45 @@
+"""lobewatch trend."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lobewatch.machine.named_folder import named_folder
+from lobewatch.show.output import Json, emit, notes, results
+
+
+def trend(
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    tool: Annotated[str | None, typer.Option(help="Of this tool; else that of the series that fell most.")] = None,
+    direction: Annotated[str | None, typer.Option(help="x or y; else the one that fell more.")] = None,
+    as_csv: Annotated[bool, typer.Option("--csv", help="The points with commas on stdout instead of text.")] = False,
+    as_json: Json = False,
+) -> None:
+    """How the frequency has fallen, whether that is more than scatter, and until when each program holds.
+
+    Exit code 1 where the machine's light is alarm.
+
+    Examples:
+
+      lobewatch trend mill-3
+      lobewatch trend mill-3 --direction y --json
+    """
+    from lobewatch.analysis import Light, Logbook
+    from lobewatch.analysis.decay.outlook import outlook
+    from lobewatch.show.trends.describe_trend import trend_csv, trend_json, trend_texts
+
+    if as_csv and as_json:
+        raise ValueError("--csv and --json: give one of them")
+    logbook = Logbook.open(machine)
+    found = outlook(logbook)
+    series = found.series(tool, direction)
+    if as_csv:
+        results.out(trend_csv(series), end="", highlight=False)
+    else:
+        emit(trend_json(found, series), as_json, *([] if as_json else trend_texts(found, series)))
+    for remark in [*found.standing.remarks, *logbook.remarks]:
+        notes.print(f"note: {remark}", markup=False)
+    raise typer.Exit(int(found.standing.light is Light.ALARM))

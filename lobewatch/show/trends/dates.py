@@ -1,0 +1,44 @@
+"""Dates that a level is reached at, as people say them and as JSON."""
+
+from __future__ import annotations
+
+import math
+
+from lobewatch.analysis.decay.forecast import Reached
+from lobewatch.analysis.decay.trend import Trend, date
+
+ASSUMED = "Dates hold if the machine is used as before; an acceleration that is not yet visible cannot be foreseen."
+
+
+def dates_text(found: Reached | None, horizon: float) -> str:
+    """For people; horizon: days since 1970 up to which was looked."""
+    if found is None:
+        return "history too short"
+    if found.probable == -math.inf:
+        return "already"
+    if found.earliest == math.inf:
+        return f"not before {date(horizon):%Y-%m}"
+    if found.latest == math.inf:
+        return f"not before {_day(found.earliest)}"
+    return f"between {_day(found.earliest)} and {_day(found.latest)} (80 %), probably {_day(found.probable)}"
+
+
+def dates_json(found: Reached | None) -> dict[str, str | None]:
+    """Dates as "2026-03-01", null where none is known, "already"."""
+    named = zip(("p10", "p50", "p90"), found or (math.inf,) * 3, strict=True)
+    return {name: _or_word(days) for name, days in named}
+
+
+def horizon_of(trend: Trend) -> float:
+    """Last day that is foretold, in days since 1970."""
+    return math.nan if trend.forecast is None else float(trend.forecast.dates[-1])
+
+
+def _day(days: float) -> str:
+    return "now" if days == -math.inf else f"{date(days):%Y-%m-%d}"
+
+
+def _or_word(days: float) -> str | None:
+    if math.isfinite(days):
+        return f"{date(days):%Y-%m-%d}"
+    return "already" if days < 0 else None

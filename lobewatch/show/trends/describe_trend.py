@@ -1,0 +1,122 @@
+"""The trend of one series and what becomes of the machine: for people, as CSV, as JSON."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from typing import Any
+
+from rich.table import Table
+
+from dsm import plus_minus
+from lobewatch.analysis import SeriesStanding
+from lobewatch.analysis.decay.forecast import Shape
+from lobewatch.analysis.decay.outlook import Fate, Outlook
+from lobewatch.analysis.decay.trend import Trend, date
+from lobewatch.show.output import table
+from lobewatch.show.trends.chart import chart_lines
+from lobewatch.show.trends.dates import ASSUMED, dates_json, dates_text, horizon_of
+
+
+def trend_json(found: Outlook, series: SeriesStanding) -> dict[str, Any]:
+    """Points, score, alarm, light, forecast; percents are 100 ln of the frequency over that of the first test."""
+    trend = series.trend
+    return {
+        "tool": series.tool,
+        "direction": series.direction,
+        "points": [] if trend is None else _points_json(trend),
+        "score": None if trend is None or not trend.watch.scores.size else float(trend.watch.scores[-1]),
+        "alarm": None if trend is None else _alarm_json(trend),
+        "light": found.standing.light.value,
+        "fall_percent": series.fall.value,
+        "fall_std_percent": series.fall.std,
+        "forecast": {
+            **{name: _fate_json(fate) for name, fate in found.programs.items()},
+            **{f"{percent:g} %": {"reached": dates_json(when)} for percent, when in found.limits.items()},
+        },
+    }
+
+
+def trend_csv(series: SeriesStanding) -> str:
+    """A line a point, headings on top."""
+    written = io.StringIO()
+    heads = ["time", "percent", "error_percent", "temperature_c", "taps", "score"]
+    writer = csv.writer(written, lineterminator="\n")
+    writer.writerow(heads)
+    trend = series.trend
+    if trend is not None:
+        for point, score in zip(trend.points, _scores(trend), strict=True):
+            numbers = (point.percent, point.error, point.temperature)
+            row = [point.time.isoformat(), *map(_cell, numbers), len(point.taps), _cell(score)]
+            writer.writerow(row)
+    return written.getvalue()
+
+
+def trend_texts(found: Outlook, series: SeriesStanding) -> list[str | Table]:
+    """Chart, sentence and table."""
+    trend = series.trend
+    if trend is None:
+        return [f"{series.name}: no tap test that others can be compared with"]
+    horizon = horizon_of(trend)
+    dates = table("~what", "~becomes doubtful", "~is not stable")
+    for name, fate in found.programs.items():
+        dates.add_row(name, dates_text(fate.doubtful, horizon), dates_text(fate.not_stable, horizon))
+    for percent, when in found.limits.items():
+        dates.add_row(f"-{percent:g} % (fixed limit, as in the paper)", "", dates_text(when, horizon))
+    others = [f"{one.name}: {_short(one)}" for one in found.standing.series if one is not series]
+    return [*chart_lines(trend), sentence(series), dates, ASSUMED, *others]
+
+
+def sentence(series: SeriesStanding) -> str:
+    """What the series has done so far."""
+    trend = series.trend
+    if trend is None:
+        return f"{series.name}: unknown"
+    n = len(trend.points)
+    said = f"{series.name}: {_short(series)} after {n} point{'s' if n > 1 else ''}"
+    if trend.forecast is None:
+        return f"{said}; from 8 points on there is a forecast, from 9 on an alarm"
+    shape = _shape(trend.forecast.likeliest, falls=trend.forecast.fitted[-1] < trend.start)
+    return f"{said}; {shape}; scatter {trend.spread:.2f} %, score {_score(trend)}"
+
+
+def _short(series: SeriesStanding) -> str:
+    fall = series.fall
+    return f"{plus_minus(-fall.value, fall.std)} % since it started" if fall.is_known else "unknown"
+
+
+def _shape(shape: Shape, falls: bool) -> str:
+    since, goes, went = f"{date(shape.start):%Y-%m-%d}", *(("falling", "fell") if falls else ("rising", "rose"))
+    steadily = f"{goes} steadily since {since}"
+    words = {"none": "steady", "line": steadily, "slope": steadily, "step": f"{went} once before {since}, steady since"}
+    return words.get(shape.kind, f"{goes}, {'faster and faster' if shape.accelerates else 'ever more slowly'}")
+
+
+def _score(trend: Trend) -> str:
+    score = _scores(trend)[-1]
+    return f"{score:.1f} (alarm at 3.3 twice)" if math.isfinite(score) else "from 9 points on"
+
+
+def _scores(trend: Trend) -> list[float]:
+    """One a point; NaN where none is judged."""
+    return [*[math.nan] * trend.watched, *map(float, trend.watch.scores)]
+
+
+def _points_json(trend: Trend) -> list[dict[str, Any]]:
+    return [{"time": one.time.isoformat(), "percent": one.percent, "used": True} for one in trend.points]
+
+
+def _alarm_json(trend: Trend) -> dict[str, Any] | None:
+    fall, since = trend.watch.fall, trend.fallen_since
+    if fall is None or since is None:
+        return None
+    return {"kind": fall.kind, "since": since.isoformat(), "size_percent": fall.size}
+
+
+def _fate_json(fate: Fate) -> dict[str, Any]:
+    return {"doubtful": dates_json(fate.doubtful), "not stable": dates_json(fate.not_stable)}
+
+
+def _cell(value: float) -> float | str:
+    return value if math.isfinite(value) else ""

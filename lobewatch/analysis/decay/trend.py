@@ -69,13 +69,13 @@ class Trend:
 
     @property
     def start(self) -> float:
-        """Where it started (%): on the fitted line from 8 points on, else the highest of the first three.
+        """Where it started (%): the highest of the fitted line at the first 8 points, else of the first three points.
 
         A first test clamped badly must not hide a fall for ever, and a mean of the first ones would hide that of a
         spindle that falls from the beginning.
         """
         if self.forecast is not None:
-            return float(self.forecast.fitted[0])
+            return float(self.forecast.fitted[:ENOUGH].max())
         return max(point.percent for point in self.points[:3])
 
     @property

@@ -1,0 +1,128 @@
+"""When programs stop holding: the fall at which they do, and the date of that fall."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from lobewatch.analysis import Logbook, Word
+from lobewatch.analysis.decay.outlook import outlook
+from lobewatch.analysis.decay.trend import date, day
+from lobewatch.cli import app
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
+
+
+@pytest.fixture
+def worn(shop: Shop) -> Shop:
+    """One program, two directions that fall by 0.3 % every 15 days, ten times."""
+    shop.run(("A", 12900, 1.5))
+    for i in range(11):
+        shop.tap_both(15 * i, 1 - 0.003 * i + 0.0003 * (-1) ** i)
+    return shop
+
+
+def words_after(shop: Shop, fall: float) -> dict[str, Word]:
+    """The words with both directions fallen by so much of what they are now."""
+    shop.tap_both(160.0, (1 - 0.03 + 0.0003) * (1 - fall))
+    return {one.program.name: one.word for one in shop.logbook.verdicts()}
+
+
+def test_a_program_holds_up_to_its_critical_fall_and_not_beyond(worn: Shop) -> None:
+    critical = outlook(worn.logbook).programs["A"].critical
+    assert 0.0 <= critical.doubtful < critical.not_stable < 0.1
+    assert words_after(worn, critical.not_stable - 0.002)["A"] is Word.DOUBTFUL
+    worn.tap_both(170.0, (1 - 0.03 + 0.0003) * (1 - critical.not_stable - 0.002))
+    assert {one.program.name: one.word for one in worn.logbook.verdicts()}["A"] is Word.NOT_STABLE
+
+
+def test_the_date_is_that_of_the_critical_fall_on_the_line(worn: Shop) -> None:
+    logbook = worn.logbook
+    now = logbook.history.rows[-1].time
+    found = outlook(logbook, now)
+    fate, (x,) = found.programs["A"], [one for one in found.standing.series if one.direction == "x"]
+    assert fate.not_stable is not None
+    assert x.trend is not None
+    last = x.trend.points[-1]
+    a_day = -100 * math.log1p(-0.03) / 150
+    expected = last.time + timedelta(days=-100 * math.log1p(-fate.critical.not_stable) / a_day)
+    assert fate.not_stable.earliest < fate.not_stable.probable < fate.not_stable.latest
+    assert abs((date(fate.not_stable.probable) - expected).days) < 40
+    assert fate.doubtful is not None
+    assert fate.doubtful.probable < fate.not_stable.probable
+    paper = found.limits[5.0]
+    assert paper is not None
+    years_of_five_percent = (-100 * math.log1p(-0.05)) / a_day
+    assert paper.probable - day(worn.start) == pytest.approx(years_of_five_percent, rel=0.1)
+
+
+def test_a_short_history_foretells_nothing(shop: Shop) -> None:
+    shop.tap_both()
+    shop.run(("A", 12900, 1.5))
+    found = outlook(shop.logbook)
+    assert found.programs["A"].not_stable is None
+    assert found.limits == {5.0: None, 10.0: None}
+    told = run("trend", shop.path)
+    assert "history too short" in told.stdout
+    assert "after 1 point; from 8 points on there is a forecast" in told.stdout
+
+
+def test_trend_in_json(worn: Shop) -> None:
+    told = run("trend", worn.path, "--direction", "x", "--json")
+    found = json.loads(told.stdout)
+    assert (found["tool"], found["direction"]) == ("reference", "x")
+    assert [one["used"] for one in found["points"]] == [True] * 11
+    assert found["points"][10]["percent"] == pytest.approx(100 * np.log((1 - 0.03 + 0.0003) / 1.0003), abs=0.01)
+    assert found["score"] > 3.3
+    assert found["alarm"]["kind"] == "slope"
+    assert found["light"] == Logbook.open(worn.path).standing().light
+    assert told.exit_code == int(found["light"] == "alarm") == 1
+    assert set(found["forecast"]) == {"A", "5 %", "10 %"}
+    assert set(found["forecast"]["A"]) == {"doubtful", "not stable"}
+    assert set(found["forecast"]["5 %"]["reached"]) == {"p10", "p50", "p90"}
+
+
+def test_trend_as_text_and_csv(worn: Shop) -> None:
+    text = run("trend", worn.path).stdout
+    lines = text.splitlines()
+    assert sum(line.count("o") for line in lines[:12]) >= 9
+    assert lines[0].startswith("   +0.0")
+    assert "falling steadily since 2026-01-15; scatter 0.03 %" in text
+    assert "-5 % (fixed limit" in text
+    rows = [*csv.DictReader(io.StringIO(run("trend", worn.path, "--csv").stdout))]
+    assert len(rows) == 11
+    assert rows[0]["score"] == ""
+    assert float(rows[-1]["score"]) > 3.3
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--tool", "other"], "no such series; there are: --tool reference --direction x"),
+        (["--direction", "z"], "no such series"),
+        (["--csv", "--json"], "give one of them"),
+    ],
+)
+def test_what_is_not_there_is_refused_in_a_sentence(shop: Shop, options: list[str], said: str) -> None:
+    shop.tap(0, 1713.0)
+    shop.put("")
+    told = CliRunner().invoke(app, ["trend", str(shop.path), *options])
+    assert said in str(told.exception)
+
+
+def test_a_machine_that_was_never_tapped_has_no_trend(shop: Shop) -> None:
+    told = CliRunner().invoke(app, ["trend", str(shop.path)])
+    assert "no tap test yet" in str(told.exception)

@@ -1,0 +1,91 @@
+"""Points of a series, what an event ends, where a series started."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+
+from lobewatch.analysis.decay.trend import Tapped, Trend, trend_of
+
+START = datetime(2024, 1, 15, 9, tzinfo=UTC)
+FALLING = np.fromstring(
+    "0 .12 -.09 .05 -.14 .08 .02 -.06 .11 -.03 .04 -.10 -.31 -.55 -.62 -.93 -1.02 -1.31 -1.38 -1.62", sep=" "
+)
+
+
+def tapped(days: float, percent: float) -> Tapped:
+    return Tapped(START + timedelta(days=days), 1700.0 * float(np.exp(percent / 100)), 0.01)
+
+
+def judged(series: list[Tapped], *events: float) -> Trend:
+    return trend_of(series, series[-1].time, [START + timedelta(days=days) for days in events])
+
+
+def monthly(percents: np.ndarray[tuple[int], np.dtype[np.float64]]) -> list[Tapped]:
+    return [tapped(30.0 * i, percent) for i, percent in enumerate(percents)]
+
+
+def test_tests_of_a_day_are_one_point_the_mean_of_two_the_median_of_three() -> None:
+    series = [tapped(0, 0.0), tapped(30, 0.1), tapped(30.5, 0.3), tapped(60, 0.1), tapped(60.1, 0.2), tapped(60.9, 9.0)]
+    found = judged(series).points
+    assert [point.taps for point in found] == [(0,), (1, 2), (3, 4, 5)]
+    assert [point.percent for point in found] == pytest.approx([0.0, 0.2, 0.2])
+    assert found[1].error == pytest.approx(0.01 / np.sqrt(2))
+
+
+def test_a_test_that_was_asked_for_is_a_point_of_its_own() -> None:
+    asked = monthly(FALLING[:14])
+    found = judged([*asked, asked[-1]._replace(time=asked[-1].time + timedelta(hours=1))])
+    assert len(found.points) == 15
+    assert found.watch.alarm_at == 14
+    unasked = monthly(FALLING[:13])
+    again = judged([*unasked, unasked[-1]._replace(time=unasked[-1].time + timedelta(hours=1))])
+    assert len(again.points) == 13
+
+
+def test_the_alarm_is_dated_and_its_size_grows_with_the_fall() -> None:
+    first, later = judged(monthly(FALLING[:15])), judged(monthly(FALLING))
+    assert first.fallen_since == later.fallen_since == START + timedelta(days=300)
+    assert first.watch.fall is not None
+    assert later.watch.fall is not None
+    assert first.watch.fall.size < later.watch.fall.size == pytest.approx(1.62, abs=0.1)
+
+
+def test_an_event_after_the_alarm_ends_it_and_one_before_it_does_not() -> None:
+    steps = np.repeat([0.0, -1.0], [12, 12]) + np.tile([0.05, -0.05], 12)
+    assert judged(monthly(steps)).watch.alarm_at == 13
+    assert judged(monthly(steps), 100.0).watch.alarm_at == 13
+    ended = judged(monthly(steps), 400.0)
+    assert (ended.watch.alarm_at, ended.watched, ended.fallen_since) == (None, 14, None)
+    again = judged(monthly(np.append(steps, [-2.0, -2.05])), 400.0)
+    assert again.watch.fall is not None
+    assert again.watch.fall.size == pytest.approx(1.0, abs=0.1)
+    assert again.fallen_since == START + timedelta(days=720)
+
+
+def test_a_low_first_test_hides_no_fall() -> None:
+    assert judged(monthly(np.array([-3.0, 0.0, 0.1]))).start == pytest.approx(3.1)
+    many = np.append(-3.0, np.tile([0.05, -0.05], 12))
+    assert judged(monthly(many)).start == pytest.approx(3.0, abs=0.35)
+
+
+def test_a_spindle_that_falls_from_the_beginning_started_where_its_line_does() -> None:
+    found = judged(monthly(-0.4 * np.arange(24.0) + np.tile([0.05, -0.05], 12)))
+    assert found.start == pytest.approx(-0.05, abs=0.05)
+    assert found.spread == pytest.approx(0.05, abs=0.01)
+
+
+def test_a_rise_is_told_apart() -> None:
+    found = judged(monthly(-FALLING))
+    assert found.watch.alarm_at is None
+    assert found.rise.alarm_at == 14
+
+
+@pytest.mark.parametrize("n", [1, 2, 7])
+def test_a_short_series_foretells_nothing(n: int) -> None:
+    found = judged(monthly(FALLING[:n]))
+    assert found.forecast is None
+    assert found.spread == 0.0
+    assert found.start == pytest.approx(max(FALLING[:n][:3]))

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from acquisition.files.contents.contents import Contents
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.tap import Circumstances
@@ -24,12 +25,12 @@ class Format:
     title: str
     """What people call it."""
     extensions: tuple[str, ...]
-    """How names of such files mostly end, with the dot: for messages only, a file is told by its content."""
+    """How names of such files mostly end, with the dot: for messages, and for what of a folder is read at all."""
     is_it: Callable[[bytes, Path], bool]
     """Whether a file is of this kind, from its first 4096 bytes (it has at least one) and, where need be, all of it."""
-    read: Callable[[Path], list[Hit] | Frf]
-    """Its hits in SI units, at least one, or the FRF where it holds only that."""
+    read: Callable[[Path], Contents | list[Hit] | Frf]
+    """What stands in it; hits in SI units, at least one, or an FRF, where the format leaves nothing open."""
     recorded_as: Callable[[Path], Circumstances | None] = _says_nothing
-    """What it says of when, where and by whom it was recorded; None where it says nothing."""
+    """What it says of when, where and by whom it was recorded, beside its Contents; None where it says nothing."""
     read_frf: Callable[[Path], Frf] | None = None
     """The FRF that it holds beside its hits; None where it is to be estimated from them."""

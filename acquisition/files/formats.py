@@ -9,15 +9,20 @@ from pathlib import Path
 
 from acquisition.errors import DataError
 from acquisition.files.format import Format
-from acquisition.files.read_csv import TEXT_TABLE
-from acquisition.files.read_lvm import LVM
+from acquisition.files.readers.read_lvm import LVM
+from acquisition.files.readers.read_mat import MAT
+from acquisition.files.readers.read_sep005 import SEP005
+from acquisition.files.readers.read_table import TEXT_TABLE
+from acquisition.files.readers.read_tdms import TDMS
+from acquisition.files.readers.read_uff import UFF
+from acquisition.files.readers.read_wav import WAV
 from acquisition.files.tap_recording import TAP_FILE
 from acquisition.plugin import load_plugin, not_loaded, package_of
 from acquisition.remark import Remark
 
 GROUP = "lobewatch.formats"
 """Entry points that each name one Format."""
-BUILT_IN = (TAP_FILE, LVM, TEXT_TABLE)
+BUILT_IN = (TAP_FILE, UFF, MAT, LVM, TDMS, WAV, SEP005, TEXT_TABLE)
 """The table last: it takes any text."""
 HEAD = 4096
 """Bytes at the start of a file that a format is asked with."""

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from datetime import datetime
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from acquisition.errors import DataError
+from acquisition.files.contents.contents import Contents
+from acquisition.files.contents.description import Description
+from acquisition.files.contents.ledger import Fact
+from acquisition.files.contents.recording import Recording, understood
 from acquisition.files.format import Format
 from acquisition.files.formats import broken_formats, format_of
 from acquisition.frf import Frf
@@ -13,22 +18,43 @@ from acquisition.hit import Hit
 from acquisition.tap import Circumstances
 from acquisition.verdicts.average_good import average_good
 
+NOTHING = Description()
+"""A person who says nothing."""
 
-def read_hits(path: Path | str) -> list[Hit]:
+
+def look(path: Path | str, said: Description = NOTHING) -> Recording:
+    """A recorded file as it is understood, what is missing or wrong in it told as its `complaint`.
+
+    DataError for a file that is damaged or of no format that is known.
+    """
+    path = Path(path)
+    found = format_of(path)
+    held = _read(found, path)
+    if isinstance(held, Contents):
+        return understood(path, found.title, held, said)
+    about = found.recorded_as(path)
+    hits, frf = ((), held) if isinstance(held, Frf) else (tuple(held), None)
+    options = said.of_signals()
+    complaint = f"a {found.title} says itself what it holds; leave out {', '.join(options)}" if options else ""
+    recording = Recording(path, found.title, hits, frf, tuple(_facts(hits, frf)), complaint)
+    return recording if about is None else _labelled(recording, about)
+
+
+def read_hits(path: Path | str, said: Description = NOTHING) -> list[Hit]:
     """The hits in a recorded file of any known format; DataError where there are none."""
-    recording = read_recording(path)
+    recording = read_recording(path, said)
     if isinstance(recording, Frf):
         raise DataError(f"{path}: holds an FRF, not the hits it was made from")
     return recording
 
 
-def read_frf(path: Path | str) -> Frf:
+def read_frf(path: Path | str, said: Description = NOTHING) -> Frf:
     """The FRF that a recorded file holds, or that estimated (H1) from its good hits."""
     path = Path(path)
     found = format_of(path)
     if found.read_frf is not None:
         return found.read_frf(path)
-    recording = _read(found, path)
+    recording = read_recording(path, said)
     if isinstance(recording, Frf):
         return recording
     try:
@@ -37,22 +63,13 @@ def read_frf(path: Path | str) -> Frf:
         raise DataError(f"{path}: {error}") from error
 
 
-def read_recording(path: Path | str) -> list[Hit] | Frf:
-    """Hits where the file holds time histories, an FRF where it holds only that; DataError where it holds neither."""
-    return _read(format_of(Path(path)), Path(path))
+def read_recording(path: Path | str, said: Description = NOTHING) -> list[Hit] | Frf:
+    """Hits where the file holds time histories, an FRF where it holds one; DataError where it holds neither."""
+    recording = look(path, said).checked()
+    return list(recording.hits) if recording.frf is None else recording.frf
 
 
-def recorded_as(path: Path | str) -> Circumstances:
-    """What a recording says of itself: all of it in our own files, else mostly only when it was made.
-
-    The time is that in the file, or that of its modification where there is none.
-    """
-    path = Path(path)
-    said = format_of(path).recorded_as(path)
-    return said or Circumstances("", datetime.fromtimestamp(path.stat().st_mtime).astimezone())
-
-
-def _read(found: Format, path: Path) -> list[Hit] | Frf:
+def _read(found: Format, path: Path) -> Contents | list[Hit] | Frf:
     try:
         return found.read(path)
     except DataError as error:
@@ -62,3 +79,23 @@ def _read(found: Format, path: Path) -> list[Hit] | Frf:
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
         raise DataError(f"{path}: cannot be read as {found.title} ({reason}); export it in another format") from error
+
+
+def _facts(hits: Sequence[Hit], frf: Frf | None) -> list[Fact]:
+    if frf is not None:
+        span = f"{frf.frequency.size}, {frf.frequency[0]:.4g} to {frf.frequency[-1]:.6g} Hz"
+        return [Fact("lines", span, "file"), Fact("unit", f"m/N, from {frf.measured_as}", "file")]
+    unit = Fact("unit", "m/s^2 (acceleration)", "file")
+    return [Fact("sample rate", f"{hits[0].sample_rate:.8g} Hz", "file"), Fact("force", "N", "file"), unit]
+
+
+def _labelled(recording: Recording, about: Circumstances) -> Recording:
+    return replace(
+        recording,
+        created=about.created,
+        tool=about.tool,
+        direction=about.direction,
+        operator=about.operator,
+        device=about.device,
+        conditions=about.conditions if about.machine else None,
+    )

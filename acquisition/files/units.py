@@ -1,50 +1,149 @@
-"""Units as they stand in the headings of recorded files, and their way to SI."""
+"""Units as they stand in recorded files, and their way to SI."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+import math
+import re
+from dataclasses import dataclass
+from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-from acquisition.errors import DataError
-from acquisition.hit import Hit
+Dimension = tuple[int, int, int]
+"""Exponents of length, time and force."""
+Measured = Literal[
+    "time",
+    "frequency",
+    "force",
+    "displacement",
+    "velocity",
+    "acceleration",
+    "receptance",
+    "mobility",
+    "accelerance",
+    "",
+]
 
 STANDARD_GRAVITY = 9.80665
 """m/s^2 per g."""
+POUND_FORCE = 4.4482216152605
+"""N per lbf."""
 
-FACTORS: Mapping[str, tuple[str, float]] = {
-    "n": ("force", 1.0),
-    "newton": ("force", 1.0),
-    "newtons": ("force", 1.0),
-    "kn": ("force", 1e3),
-    "lbf": ("force", 4.4482216152605),
-    "g": ("acceleration", STANDARD_GRAVITY),
-    "m/s^2": ("acceleration", 1.0),
-    "m/s2": ("acceleration", 1.0),
-    "m/s²": ("acceleration", 1.0),
-    "m_s2": ("acceleration", 1.0),
-    "mm/s^2": ("acceleration", 1e-3),
+QUANTITIES: dict[Dimension, Measured] = {
+    (0, 1, 0): "time",
+    (0, -1, 0): "frequency",
+    (0, 0, 1): "force",
+    (1, 0, 0): "displacement",
+    (1, -1, 0): "velocity",
+    (1, -2, 0): "acceleration",
+    (1, 0, -1): "receptance",
+    (1, -1, -1): "mobility",
+    (1, -2, -1): "accelerance",
 }
-"""Unit label in lower case -> quantity and factor to SI."""
+_LENGTH, _TIME, _FORCE, _NONE = (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)
+_NAMES: dict[str, tuple[float, Dimension]] = {
+    "m": (1.0, _LENGTH),
+    "cm": (1e-2, _LENGTH),
+    "mm": (1e-3, _LENGTH),
+    "um": (1e-6, _LENGTH),
+    "micron": (1e-6, _LENGTH),
+    "nm": (1e-9, _LENGTH),
+    "in": (0.0254, _LENGTH),
+    "inch": (0.0254, _LENGTH),
+    "mil": (2.54e-5, _LENGTH),
+    "ft": (0.3048, _LENGTH),
+    "s": (1.0, _TIME),
+    "sec": (1.0, _TIME),
+    "second": (1.0, _TIME),
+    "seconds": (1.0, _TIME),
+    "ms": (1e-3, _TIME),
+    "us": (1e-6, _TIME),
+    "Hz": (1.0, (0, -1, 0)),
+    "kHz": (1e3, (0, -1, 0)),
+    "rad": (1 / (2 * math.pi), _NONE),
+    "N": (1.0, _FORCE),
+    "newton": (1.0, _FORCE),
+    "newtons": (1.0, _FORCE),
+    "kN": (1e3, _FORCE),
+    "mN": (1e-3, _FORCE),
+    "lbf": (POUND_FORCE, _FORCE),
+    "lb": (POUND_FORCE, _FORCE),
+    "kgf": (STANDARD_GRAVITY, _FORCE),
+    "kg": (1.0, (-1, 2, 1)),
+    "g": (STANDARD_GRAVITY, (1, -2, 0)),
+    "gn": (STANDARD_GRAVITY, (1, -2, 0)),
+}
+_LOWER = {name.lower(): value for name, value in _NAMES.items() if name != "mN"}
+"""Mega and milli differ in case only: MN is not known, and mN only as it is written."""
+_TOKEN = re.compile(r"\s*(?:([A-Za-z]+)(?:\^?(-?\d+))?|(\d+(?:\.\d+)?(?:[eE]-?\d+)?)|([*/()])(?:\^(-?\d+))?)")
+_PLAIN = str.maketrans({"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": "*", "⋅": "*", "_": "/"})
 
 
-def hit_from(path: Path, columns: Sequence[tuple[str, NDArray[np.float64]]], sample_rate: float) -> Hit:
-    """The hit in columns of known unit; DataError unless there is one force and one acceleration, all finite."""
-    signals: dict[str, NDArray[np.float64]] = {}
-    for unit, values in columns:
-        quantity, factor = FACTORS.get(unit.strip().lower(), ("", 0.0))
-        if not quantity:
-            raise DataError(f"{path}: unit {unit!r} is not known; known are {', '.join(FACTORS)}")
-        if quantity in signals:
-            raise DataError(f"{path}: two columns are {quantity}; one force and one acceleration are needed")
-        signals[quantity] = values * factor
-    missing = {"force", "acceleration"} - set(signals)
-    if missing:
-        units = ", ".join(unit for unit, _ in columns)
-        raise DataError(f"{path}: no {' and no '.join(sorted(missing))} channel (units {units})")
+@dataclass(frozen=True)
+class Unit:
+    """A unit that is known."""
+
+    quantity: Measured
+    """What is measured in it; empty where that is nothing a tap test has."""
+    factor: float
+    """SI values are so many times as large."""
+
+
+def unit_of(text: str) -> Unit | None:
+    """The unit in a text such as "um/N", "(m/s²)/N", "m_s2", "1/kg"; None where it is not known.
+
+    Hz and rad/s are frequency, in Hz; g is standard gravity.
+    """
+    plain = re.sub(r"_?\bper\b_?|_per_", "/", text.strip()).translate(_PLAIN).replace("**", "^")
     try:
-        return Hit(signals["force"], signals["acceleration"], sample_rate)
-    except ValueError as error:
-        raise DataError(f"{path}: {error}") from error
+        tokens = _tokens(plain)
+        value, dimension = _product(tokens)
+    except (ValueError, IndexError, OverflowError, ZeroDivisionError):
+        return None
+    named = any(token[0] for token in _TOKEN.findall(plain))
+    return Unit(QUANTITIES.get(dimension, ""), value) if named and not tokens and value > 0 else None
+
+
+def motion_of(quantity: str) -> str:
+    """Of the response that an FRF was made from; that itself otherwise."""
+    motions = {"receptance": "displacement", "mobility": "velocity", "accelerance": "acceleration"}
+    return motions.get(quantity, quantity)
+
+
+def _tokens(text: str) -> list[tuple[str, str, str, str, str]]:
+    """In reverse order: the next one is the last."""
+    found, at = list[tuple[str, str, str, str, str]](), 0
+    while text[at:].strip():
+        token = _TOKEN.match(text, at)
+        if token is None:
+            raise ValueError(text)
+        found.append(token.groups(default=""))  # type: ignore[arg-type]
+        at = token.end()
+    return found[::-1]
+
+
+def _product(tokens: list[tuple[str, str, str, str, str]]) -> tuple[float, Dimension]:
+    """Factors up to the end or a closing bracket, which is left; "a/b/c" and "a/b*c" go from left to right."""
+    value, dimension = _factor(tokens)
+    while tokens and tokens[-1][3] != ")":
+        sign = -1 if tokens[-1][3] == "/" else 1
+        if tokens[-1][3] in ("*", "/"):
+            tokens.pop()
+        other, exponents = _factor(tokens)
+        value *= other**sign
+        dimension = tuple(a + sign * b for a, b in zip(dimension, exponents, strict=True))  # type: ignore[assignment]
+    return value, dimension
+
+
+def _factor(tokens: list[tuple[str, str, str, str, str]]) -> tuple[float, Dimension]:
+    name, power, number, sign, _ = tokens.pop()
+    if number:
+        return float(number), _NONE
+    if sign == "(":
+        (value, dimension), power = _product(tokens), tokens.pop()[4]
+    elif name in _NAMES or name.lower() in _LOWER:
+        value, dimension = _NAMES.get(name) or _LOWER[name.lower()]
+    else:
+        raise ValueError(name or sign)
+    exponent = int(power or 1)
+    if abs(exponent) > 9:
+        raise ValueError(power)
+    return value**exponent, tuple(exponent * one for one in dimension)  # type: ignore[return-value]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from datetime import date
 
 from acquisition.channel import Channel, ChannelQuantity
-from acquisition.files.units import FACTORS, STANDARD_GRAVITY
+from acquisition.files.units import POUND_FORCE, STANDARD_GRAVITY
 from acquisition.remark import Remark
 
 SENSITIVITIES: Mapping[ChannelQuantity, tuple[float, float, float, str]] = {
@@ -24,7 +24,7 @@ NEAR = 0.15
 """How near to the factor of a unit mistake a ratio must be."""
 DAYS_PER_MONTH = 365.25 / 12
 
-_LBF = FACTORS["lbf"][1]
+_LBF = POUND_FORCE
 _MISTAKES: Mapping[float, tuple[str, str]] = {
     STANDARD_GRAVITY: ("9.81", "is the acceleration in g, not m/s^2? A sensitivity in V/g is divided by 9.80665"),
     1 / STANDARD_GRAVITY: (

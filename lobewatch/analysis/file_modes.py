@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import Frf, Remark, windowed_receptance
+from acquisition import Description, Fact, Frf, Remark, windowed_receptance
 from dsm import plus_minus
 from lobewatch.analysis.one_file.own_window import ringing_modes_windowed, without_own_window
 from lobewatch.analysis.one_file.recorded import recorded
@@ -48,6 +48,8 @@ class FileModes:
     """By the peak picking of the paper, for comparison."""
     remarks: tuple[Remark, ...]
     """On all modes together, and on those that are missing."""
+    facts: tuple[Fact, ...] = ()
+    """What is known of the file, and from where."""
 
 
 def modes_of_file(
@@ -56,20 +58,20 @@ def modes_of_file(
     *,
     window: Window | None = None,
     conjugate: bool = False,
-    averages: int | None = None,
     accept: Collection[str] = (),
+    said: Description | None = None,
 ) -> FileModes:
     """Modes between two frequencies (Hz), with standard errors over the hits where the file holds three or more.
 
     window: exponential window on the response, to be corrected. conjugate: the file holds the complex conjugate of
-    response over force. averages: hits that an FRF was averaged from, to make use of its coherence; where nobody says
-    they are inferred. accept: verdicts on hits ("not-decayed") that do not count. What still rings when the record
-    ends gets an exponential window, which is corrected: all hits where none is good otherwise, else the modes that do.
+    response over force. accept: verdicts on hits ("not-decayed") that do not count. said: what the file does not say;
+    the hits that an FRF was averaged from are inferred where nobody says. What still rings when the record ends gets an
+    exponential window, which is corrected: all hits where none is good otherwise, else the modes that do.
 
     Raises ValueError for a window whose hit is not known or comes before it, averages that no coherence belongs to, and
     verdicts that cannot be accepted.
     """
-    made = recorded(path, accept, averages)
+    made = recorded(path, accept, said or Description())
     frf = replace(made.frf, receptance=made.frf.receptance.conj()) if conjugate else made.frf
     hits = () if conjugate else made.hits
     delay = None if window is None else window.delay(made.hits)
@@ -93,6 +95,7 @@ def modes_of_file(
         fitted=fitted,
         picked=tuple(pick_peaks(frf, band)),
         remarks=(*made.remarks, *own, *_remarks(found, frf, band)),
+        facts=made.facts,
     )
 
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
-from acquisition import UNSAID, Conditions, Remark, TapTest
+from acquisition import UNSAID, Conditions, Description, Remark, TapTest
 from lobewatch.analysis.assembling import first_like, or_reason, predicted
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.cache.history_cache import HistoryCache
@@ -21,7 +21,7 @@ from lobewatch.analysis.programs.advice import Advice, advise
 from lobewatch.analysis.programs.verdict import Ruling, Verdict, judge
 from lobewatch.analysis.questions.accepting import accept
 from lobewatch.analysis.questions.clock import clock_questions
-from lobewatch.analysis.recordings import Stored, store_recordings
+from lobewatch.analysis.replaying.store import Stored, store_recordings
 from lobewatch.analysis.standing import Standing, stand
 from lobewatch.machine import Machine, MachineFolder, TapEntry
 from lobewatch.machine.archive.verify import enter_explained
@@ -91,27 +91,23 @@ class Logbook:
         tool: str = "",
         direction: str = "",
         conditions: Conditions = UNSAID,
+        **said: Any,
     ) -> Measurement:
         """Store a recorded file as a tap test, unless it is stored already, and say what it means.
 
-        What is not given is taken from the file. DataError for a file that cannot be trusted, with the reason.
+        date, tool, direction, conditions and the other fields of `acquisition.Description` (unit="g/N") say what the
+        file does not. DataError for a file that cannot be trusted, or does not say enough, with the reason.
         """
-        (tap_id,) = self.replay_all([Path(file)], date, tool, direction, conditions).tap_ids
+        described = Description(date=date, tool=tool, direction=direction, conditions=conditions, **said)
+        (tap_id,) = self.replay_all([Path(file)], described).tap_ids
         self.files.refuse_excluded(tap_id)
         return self.measurement(tap_id)
 
-    def replay_all(
-        self,
-        files: Sequence[Path],
-        date: datetime | None = None,
-        tool: str = "",
-        direction: str = "",
-        conditions: Conditions = UNSAID,
-    ) -> Stored:
-        """Store recorded files, each once; all are read and judged before the first one is stored."""
+    def replay_all(self, files: Sequence[Path], said: Description, **how: Any) -> Stored:
+        """Store recorded files, each once; how: keep_going and progress of `store_recordings`."""
         with self.folder.locked():
             enter_explained(self.folder)  # else what an interrupted replay has stored would be stored twice
-            stored = store_recordings(self.folder, files, date, tool, direction, conditions)
+            stored = store_recordings(self.folder, files, said, **how)
             self._forget()
         return stored
 

@@ -7,11 +7,14 @@ from typing import Annotated
 
 import typer
 
+from lobewatch.commands.describing import Columns, ForceUnit, FullScale, Quantity, Rate, Response, Unit, described
 from lobewatch.show.output import Json, emit
 
 
 def modes(
-    file: Annotated[Path, typer.Argument(help="Tap file (HDF5), LVM or CSV with hits, or CSV with an FRF.")],
+    file: Annotated[
+        Path, typer.Argument(help="Recorded hits or an FRF: tap file, UFF, MAT, LVM, CSV, TDMS, WAV, SEP005.")
+    ],
     band: Annotated[tuple[float, float] | None, typer.Option(help="Only between these frequencies (Hz).")] = None,
     figure: Annotated[
         Path | None, typer.Option(help="Draw FRF, fit and poles to this file (.svg, .png, .pdf).")
@@ -28,6 +31,13 @@ def modes(
         int | None,
         typer.Option(help="Hits that an FRF was averaged from; else inferred from its coherence."),
     ] = None,
+    columns: Columns = "",
+    quantity: Quantity = "",
+    unit: Unit = "",
+    force_unit: ForceUnit = "",
+    rate: Rate = None,
+    response: Response = None,
+    full_scale: FullScale = "",
     accept: Annotated[
         list[str] | None, typer.Option(help="Use hits with this verdict all the same (not-decayed); may be repeated.")
     ] = None,
@@ -51,12 +61,23 @@ def modes(
       lobewatch modes acceleration.lvm
       lobewatch modes tap.h5 --band 1200 2200 --figure modes.png
       lobewatch modes frf.csv --window 0.05 --hit-at 0.01
+      lobewatch modes h.mat --response 2 --unit g/N
     """
     from lobewatch.analysis import Window, modes_of_file
     from lobewatch.show.modes.describe_modes import file_modes_json, file_modes_texts
 
     taken_off = None if window is None else Window(window, window_start, hit_at)
-    found = modes_of_file(file, band, window=taken_off, conjugate=conjugate, averages=averages, accept=accept or ())
+    said = described(
+        columns,
+        full_scale,
+        quantity=quantity,
+        unit=unit,
+        force_unit=force_unit,
+        rate=rate,
+        averages=averages,
+        response=response,
+    )
+    found = modes_of_file(file, band, window=taken_off, conjugate=conjugate, accept=accept or (), said=said)
     if figure is not None:
         from lobewatch.show.figures import save_figure
         from lobewatch.show.figures_modes import modes_figure

@@ -8,22 +8,52 @@ from typing import Annotated
 
 import typer
 
+from lobewatch.commands.describing import (
+    Averages,
+    Columns,
+    ForceUnit,
+    FullScale,
+    Quantity,
+    Rate,
+    Response,
+    Unit,
+    described,
+)
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit, notes
+from lobewatch.show.output import Json
 
 
 def replay(
     machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
-    files: Annotated[list[Path], typer.Argument(help="Recorded hits or FRFs: tap file (HDF5), LVM, CSV.")],
+    files: Annotated[
+        list[Path], typer.Argument(help='Recorded hits or FRFs: files, folders, patterns ("2024/*.mat").')
+    ],
     tool: Annotated[
-        str, typer.Option(help="What was in the spindle; from a tap file, or [tap] tool, where not given.")
+        str, typer.Option(help="What was in the spindle; from the file, or [tap] tool, where not given.")
     ] = "",
     direction: Annotated[
-        str, typer.Option(help="Direction at the tool tip, x or y; from a tap file, or x, where not given.")
+        str, typer.Option(help="Direction at the tool tip, x or y; from the file, or x, where not given.")
     ] = "",
     date: Annotated[
         datetime | None, typer.Option(help="When it was recorded, local time; from the file where not given.")
     ] = None,
+    date_pattern: Annotated[
+        str, typer.Option(help='How the date stands in the names of the files: "%Y%m%d"; with "/" in their paths.')
+    ] = "",
+    columns: Columns = "",
+    quantity: Quantity = "",
+    unit: Unit = "",
+    force_unit: ForceUnit = "",
+    rate: Rate = None,
+    averages: Averages = None,
+    response: Response = None,
+    full_scale: FullScale = "",
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say what would become of each file; store nothing.")
+    ] = False,
+    keep_going: Annotated[
+        bool, typer.Option("--keep-going", help="Store the others where some files cannot be used (exit code 2).")
+    ] = False,
     accept: Annotated[
         list[str] | None,
         typer.Option(help="Take these recordings though they raise this question, by its code; as often as needed."),
@@ -35,38 +65,39 @@ def replay(
 ) -> None:
     """Recorded files through the same pipeline as a live test; each is stored once.
 
-    All files are read and judged before the first one is stored. A recording that is implausible for the machine is
-    stored too, and asked about; --accept answers, at once or later: then with the file of the tap test.
+    All files are read and judged before the first one is stored, in order of their dates. What a file does not say is
+    asked for by the name of an option, never guessed. A recording that is implausible for the machine is stored too,
+    and asked about; --accept answers, at once or later: then with the file of the tap test.
 
     Examples:
 
       lobewatch replay mill-3 acceleration.lvm
-      lobewatch replay mill-3 2024/*.h5 --tool "shrink-fit 20"
+      lobewatch replay mill-3 2024 --dry-run --unit g/N --date-pattern "%Y%m%d"
+      lobewatch replay mill-3 h.mat --columns "frequency=Freq,frf=H:2" --unit m/N --date 2024-05-01
       lobewatch replay mill-3 mill-3/taps/ID.h5 --accept frequency-jump
     """
     from acquisition import Conditions
     from lobewatch.analysis import Logbook
-    from lobewatch.analysis.questions.accepting import not_asked
-    from lobewatch.analysis.questions.asked import checked_codes
-    from lobewatch.show.measurements import measurement_json, measurement_texts, program_texts, programs_json
+    from lobewatch.analysis.replaying.found_files import found_files
+    from lobewatch.commands.replay_steps import show_preview, show_replay
 
-    said = Conditions(temperature_c=temperature, note=note, reclamped=reclamped)
-    logbook = Logbook.open(machine)
-    codes = checked_codes(accept or ())
-    stored = logbook.replay_all(files, date, tool, direction, said)
-    unasked = logbook.accept(stored.tap_ids, codes)
-    for file, tap_id in stored.known.items():
-        notes.print(f"{file.name}: stored already as {tap_id}", markup=False)
-    shown = [logbook.measurement(tap_id) for tap_id in stored.fresh]
-    texts = [text for m in shown for text in measurement_texts(m, logbook)]
-    payload = {
-        "measurements": [measurement_json(m, logbook) for m in shown],
-        "programs": programs_json(logbook.verdicts()) if shown else [],
-        "known": {str(file): tap_id for file, tap_id in stored.known.items()},
-    }
-    payload |= {"accepted": [code for code in codes if code not in unasked], "questions": logbook.questions}
-    texts += [f"accepted: {code}" for code in payload["accepted"]]
-    last = f"{len(shown)} of {len(files)} file(s) stored in {logbook.folder.path}"
-    emit(payload, as_json, *texts, *(program_texts(logbook) if shown else []), last)
-    if unasked:
-        raise ValueError(not_asked(unasked, stored.tap_ids, logbook.questions))
+    said = described(
+        columns,
+        full_scale,
+        quantity=quantity,
+        unit=unit,
+        force_unit=force_unit,
+        rate=rate,
+        averages=averages,
+        response=response,
+        date=date,
+        date_pattern=date_pattern,
+        tool=tool,
+        direction=direction,
+        conditions=Conditions(temperature_c=temperature, note=note, reclamped=reclamped),
+    )
+    logbook, (found, passed) = Logbook.open(machine), found_files(files)
+    if dry_run:
+        show_preview(logbook, found, passed, said, as_json=as_json)
+    else:
+        show_replay(logbook, found, passed, said, accept or (), keep_going=keep_going, as_json=as_json)

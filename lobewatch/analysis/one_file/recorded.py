@@ -6,8 +6,20 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from acquisition import DataError, Frf, Hit, HitFlags, Remark, check_hit, estimate_frf, infer_averages, read_frf
-from acquisition import read_recording as read_file
+from acquisition import (
+    DataError,
+    Description,
+    Fact,
+    Frf,
+    Hit,
+    HitFlags,
+    Remark,
+    check_hit,
+    estimate_frf,
+    infer_averages,
+    look,
+    read_frf,
+)
 from lobewatch.analysis.one_file.own_window import under_own_window, windowed_here
 
 ACCEPTABLE = (
@@ -28,13 +40,18 @@ class Recorded:
     """Of the window that was laid over all of them here (s)."""
     remarks: tuple[Remark, ...] = ()
     """What was done to them."""
+    facts: tuple[Fact, ...] = ()
+    """What is known of the file, and from where."""
 
 
-def recorded(path: Path, accept: Collection[str] = (), averages: int | None = None) -> Recorded:
+def recorded(path: Path, accept: Collection[str], said: Description) -> Recorded:
     """The FRF of a file with its hits, and how many it was averaged from where nobody says: see `modes_of_file`."""
-    accepted, recording = _accepted(accept), read_file(path)
-    if isinstance(recording, Frf):
-        return _with_averages(path, recording, averages)
+    accepted, averages, said = _accepted(accept), said.averages, replace(said, averages=None)
+    found = look(path, said).checked()
+    if found.frf is not None:
+        facts = tuple(fact for fact in found.facts if fact.name != "averages")
+        return replace(_with_averages(path, found.frf, averages), facts=facts)
+    recording = list(found.hits)
     if averages is not None:
         raise ValueError(f"--averages {averages}: {path.name} holds hits, and they are counted; leave it out")
     verdicts = [check_hit(hit) for hit in recording]
@@ -42,14 +59,16 @@ def recorded(path: Path, accept: Collection[str] = (), averages: int | None = No
     refused = sum(bool(verdict) and not verdict & ~accepted for verdict in verdicts)
     if refused:
         text = f"{refused} of {len(recording)} hits are averaged though they were refused"
-        return Recorded(estimate_frf(good), tuple(good), remarks=(Remark("hits-accepted", "", text),))
+        return Recorded(
+            estimate_frf(good), tuple(good), remarks=(Remark("hits-accepted", "", text),), facts=found.facts
+        )
     try:
-        return Recorded(read_frf(path), tuple(good))
+        return Recorded(read_frf(path, said), tuple(good), facts=found.facts)
     except DataError:
         ringing = [hit for hit, verdict in zip(recording, verdicts, strict=True) if verdict == HitFlags.NOT_DECAYED]
         if not ringing:
             raise
-        return _windowed(ringing)
+        return replace(_windowed(ringing), facts=found.facts)
 
 
 def _accepted(codes: Collection[str]) -> HitFlags:

@@ -163,6 +163,7 @@ def file_modes_json(found: FileModes) -> dict[str, Any]:
         "file": str(found.path),
         "n_averages": found.frf.n_averages,
         "usable_band_hz": found.frf.usable_band,
+        "facts": [asdict(fact) for fact in found.facts],
         "modes": [mode_json(mode) for mode in found.fitted],
         "peak_picking": [mode_json(mode) for mode in found.picked],
         "remarks": [asdict(remark) for remark in found.remarks],
@@ -177,6 +178,7 @@ def file_modes_texts(found: FileModes, *, everything: bool = False) -> list[str 
     remarks = remark_lines if everything else short_remark_lines
     return [
         f"{found.path.name}: {frf.n_averages} hit(s) averaged, {lines}{usable}",
+        *_not_in_file(found),
         mode_table(shown),
         summary(found.fitted, everything=everything),
         *reasons(shown),
@@ -185,3 +187,10 @@ def file_modes_texts(found: FileModes, *, everything: bool = False) -> list[str 
         "peak picking (eqs. 28, 29), for comparison:",
         picked_table(found.picked, found.as_recorded),
     ]
+
+
+def _not_in_file(found: FileModes) -> list[str]:
+    """What is known of it by option, or was taken."""
+    words = {"option": "by option", "default": "nobody says, taken"}
+    told = {origin: [f"{one.name} {one.value}" for one in found.facts if one.origin == origin] for origin in words}
+    return [f"{words[origin]}: {'; '.join(texts)}" for origin, texts in told.items() if texts]

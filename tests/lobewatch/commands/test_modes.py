@@ -113,7 +113,7 @@ def test_command_says_where_a_peak_may_be_cut(
     frf = noisy().in_band((1722.0, 4000.0))
     file = tmp_path / "frf.csv"
     table = np.stack([frf.frequency, frf.receptance.real, frf.receptance.imag], axis=1)
-    np.savetxt(file, table, header="Freq Real Imag", comments="")
+    np.savetxt(file, table, header="Freq(Hz) Real(m/N) Imag(m/N)", comments="")
     assert command(monkeypatch, str(file)) == 0
     printed = capsys.readouterr().out
     assert command(monkeypatch, str(file), "--json") == 0
@@ -128,7 +128,7 @@ def test_command_corrects_an_exponential_window_and_draws(
     frf = noisy()
     table = np.stack([frf.frequency, frf.receptance.real, frf.receptance.imag], axis=1)
     file = tmp_path / "frf.csv"
-    np.savetxt(file, table, header="Freq Real Imag", comments="")
+    np.savetxt(file, table, header="Freq(Hz) Real(m/N) Imag(m/N)", comments="")
     assert command(monkeypatch, str(file), "--json") == 0
     plain = json.loads(capsys.readouterr().out)["modes"][1]
     assert [(remark["code"], remark["about"]) for remark in plain["remarks"]] == [("not-driving-point", "1722 Hz")]
@@ -139,7 +139,7 @@ def test_command_corrects_an_exponential_window_and_draws(
     added = 1 / (2 * np.pi * 1722 * 0.1)
     assert plain["damping_ratio"] - corrected["damping_ratio"] == pytest.approx(added, rel=0.01)
     assert picture.stat().st_size > 10_000
-    np.savetxt(file, table * [1, 1, -1], header="Freq Real Imag", comments="")
+    np.savetxt(file, table * [1, 1, -1], header="Freq(Hz) Real(m/N) Imag(m/N)", comments="")
     assert command(monkeypatch, str(file)) == 2
     assert "--conjugate" in capsys.readouterr().err
     assert command(monkeypatch, str(file), "--conjugate", "--json") == 0

@@ -103,7 +103,7 @@ def test_the_time_of_the_hit_is_asked_for_where_only_an_frf_is_there(
     frf = noisy([MODE])
     file = tmp_path / "frf.csv"
     table = np.stack([frf.frequency, frf.receptance.real, frf.receptance.imag], axis=1)
-    np.savetxt(file, table, header="Freq Real Imag", comments="")
+    np.savetxt(file, table, header="Freq(Hz) Real(m/N) Imag(m/N)", comments="")
     code, said = run(monkeypatch, capsys, str(file), "--window", "0.05")
     assert code == 2
     assert "--hit-at" in said
@@ -132,7 +132,7 @@ def test_coherence_of_an_frf_counts_where_its_averages_are_known(
     poor = np.where(np.abs(frf.frequency - 1722) < 100, 0.45, frf.coherence)
     file = tmp_path / "frf.csv"
     table = np.stack([frf.frequency, frf.receptance.real, frf.receptance.imag, poor], axis=1)
-    np.savetxt(file, table, header="Freq Real Imag Coherence", comments="")
+    np.savetxt(file, table, header="Freq(Hz) Real(m/N) Imag(m/N) Coherence", comments="")
     inferred = modes_of_file(file)
     assert "averages-inferred" in codes(inferred.remarks)
     assert inferred.frf.n_averages == pytest.approx(10, abs=3)
@@ -154,7 +154,7 @@ def test_doubtful_modes_stand_below_the_trusted_ones_with_the_reason(
     frf = noisy([Mode(900.0, 0.02, 4e7), MODE])
     file = tmp_path / "frf.csv"
     table = np.stack([frf.frequency, frf.receptance.real, frf.receptance.imag], axis=1)
-    np.savetxt(file, table, header="Freq Real Imag", comments="")
+    np.savetxt(file, table, header="Freq(Hz) Real(m/N) Imag(m/N)", comments="")
     code, said = run(monkeypatch, capsys, str(file), "--band", "890", "4000")
     assert code == 0
     rows = said.splitlines()
@@ -171,7 +171,7 @@ def test_rejected_modes_are_counted_and_shown_with_all(
     frf = noisy([Mode(900.0, 0.4, 2e6), MODE], level=1e-4)
     file = tmp_path / "frf.csv"
     table = np.stack([frf.frequency, frf.receptance.real, frf.receptance.imag], axis=1)
-    np.savetxt(file, table, header="Freq Real Imag", comments="", fmt="%.12e")
+    np.savetxt(file, table, header="Freq(Hz) Real(m/N) Imag(m/N)", comments="", fmt="%.12e")
     said, brief, everything = (run(monkeypatch, capsys, str(file), *more)[1] for more in (["--json"], [], ["--all"]))
     trusts = [mode["trust"] for mode in json.loads(said)["modes"]]
     assert trusts.count("rejected") == 1

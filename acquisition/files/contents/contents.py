@@ -1,0 +1,55 @@
+"""What stands in a recorded file, before it is decided what it means."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, Literal
+
+from numpy.typing import NDArray
+
+Role = Literal[
+    "time", "frequency", "force", "response", "frf", "real", "imag", "magnitude", "phase", "coherence", "ignored", ""
+]
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """One column, channel or function of a file."""
+
+    name: str
+    """As in the file."""
+    values: NDArray[Any]
+    """As in the file, real or complex, shape (n,)."""
+    role: Role = ""
+    """What it is, where the file says so; empty where it does not."""
+    unit: str = ""
+    """As in the file; empty where it does not say. dB of a magnitude; deg or rad of a phase."""
+    quantity: str = ""
+    """What is measured (displacement, velocity, acceleration, force), where the file says so beside the unit."""
+    direction: str = ""
+    """x, y, z or -x, -y, -z; empty where the file does not say."""
+    rate: float | None = None
+    """Samples a second that the file names (Hz)."""
+    record: int = 0
+    """Signals that were recorded together have the same number."""
+    per_full_scale: bool = False
+    """Whether the values are shares of a full scale that the file does not name."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contents:
+    """All of a file."""
+
+    signals: tuple[Signal, ...]
+    """In the order of the file."""
+    averages: int | None = None
+    """Hits that an FRF was averaged from."""
+    created: datetime | None = None
+    """When it was recorded (timezone-aware)."""
+    direction: str = ""
+    """At the tool tip; empty where the file does not say."""
+    tool: str = ""
+    """In the spindle; empty where the file does not say."""
+    notes: tuple[str, ...] = ()
+    """What else should be known of it."""

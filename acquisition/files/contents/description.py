@@ -1,0 +1,50 @@
+"""What a person says of a recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from datetime import datetime
+
+from acquisition.tap import UNSAID, Conditions
+
+_LABELS = ("date", "date_pattern", "tool", "direction", "conditions")
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a person says of a recording; empty or None: nothing. It fills in what the file does not say.
+
+    Where the file says something else that is an error, but for `columns`, which stand in place of its headings.
+    """
+
+    columns: tuple[str, ...] = ()
+    """What the columns are, in their order ("time [s]", "force [N]", "-") or by name ("frf [m/N]=H1", "frf=H:2")."""
+    quantity: str = ""
+    """Of the response: displacement, velocity or acceleration."""
+    unit: str = ""
+    """Of the response (m/s^2, g, um), or of the FRF (m/N, g/N)."""
+    force_unit: str = ""
+    """Of the force (N, lbf)."""
+    rate: float | None = None
+    """Samples a second (Hz)."""
+    averages: int | None = None
+    """Hits that an FRF was averaged from."""
+    response: int | None = None
+    """Which response is meant where there are several, from 1."""
+    full_scale: tuple[float, ...] = ()
+    """Of each channel in its unit, where values are shares of it."""
+    date: datetime | None = None
+    """When it was recorded; of local time where it has no zone."""
+    date_pattern: str = ""
+    """How the date stands in the file's name, as for strptime ("%Y%m%d"); with "/" in its path."""
+    tool: str = ""
+    """In the spindle."""
+    direction: str = ""
+    """At the tool tip, x or y."""
+    conditions: Conditions = UNSAID
+    """What it was taken under."""
+
+    def of_signals(self) -> list[str]:
+        """The options that were given and that say something of the signals in the file."""
+        names = [one.name for one in fields(self) if one.name not in _LABELS]
+        return [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) not in ("", (), None)]

@@ -1,0 +1,55 @@
+"""What is known of a recording and from where, what is missing, and what is wrong: collected, said together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+Origin = Literal["file", "option", "default"]
+
+
+@dataclass(frozen=True)
+class Fact:
+    """Something known of a recording."""
+
+    name: str
+    """What it is about: "sample rate", "unit", ..."""
+    value: str
+    """For people."""
+    origin: Origin
+    """The file, an option, or nobody ("default")."""
+
+
+@dataclass
+class Ledger:
+    """Filled while a file is understood."""
+
+    facts: list[Fact] = field(default_factory=list)
+    """What is known."""
+    missing: list[str] = field(default_factory=list)
+    """What the file does not say, each with the option that says it."""
+    faults: list[str] = field(default_factory=list)
+    """What stands in the way."""
+
+    def know(self, name: str, value: str, origin: Origin = "file") -> None:
+        """A fact."""
+        self.facts.append(Fact(name, value, origin))
+
+    def ask(self, what: str, option: str) -> None:
+        """Something is missing."""
+        self.missing.append(f"{what} ({option})")
+
+    def contradict(self, option: str, said: object, in_file: object) -> None:
+        """An option says other than the file."""
+        self.faults.append(f"{option} {said}: the file says {in_file}; leave the option out")
+
+    @property
+    def is_clean(self) -> bool:
+        """Whether nothing is missing or wrong."""
+        return not self.missing and not self.faults
+
+    def complaint(self) -> str:
+        """All that is missing and wrong; empty where nothing is."""
+        said = ["; ".join(self.faults)] if self.faults else []
+        said += [f"it does not say: {', '.join(self.missing)}"] if self.missing else []
+        return "; ".join(said)

@@ -1,0 +1,99 @@
+"""A recorded file as it is understood: hits or an FRF, where each fact is from, and what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+
+from acquisition.errors import DataError
+from acquisition.files.contents.contents import Contents, Signal
+from acquisition.files.contents.description import Description
+from acquisition.files.contents.ledger import Fact, Ledger
+from acquisition.files.contents.named_columns import named_columns, names_of
+from acquisition.files.contents.settle_frf import COLUMNS_FRF, candidates, settle_frf
+from acquisition.files.contents.settle_hits import COLUMNS_HIT, settle_hits
+from acquisition.frf import Frf
+from acquisition.hit import Hit
+from acquisition.tap import Conditions
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A recorded file, understood as far as it can be."""
+
+    path: Path
+    """Where it was read from."""
+    title: str
+    """What people call its format."""
+    hits: tuple[Hit, ...] = ()
+    """In SI units; empty where it holds only an FRF, or where something is missing or wrong."""
+    frf: Frf | None = None
+    """The FRF that it holds; None where there is none, or where something is missing or wrong."""
+    facts: tuple[Fact, ...] = ()
+    """What is known, each from the file, by option or by default."""
+    complaint: str = ""
+    """What is missing, with the options that say it, and what is wrong; empty where nothing is."""
+    created: datetime | None = None
+    """When it was recorded, where the file says so (timezone-aware)."""
+    tool: str = ""
+    """In the spindle, where the file says so."""
+    direction: str = ""
+    """At the tool tip, where the file says so."""
+    operator: str = ""
+    """Who held the hammer, where the file says so."""
+    device: str = ""
+    """What recorded it, where the file says so."""
+    conditions: Conditions | None = None
+    """What it was taken under; None where it is no tap file of ours."""
+
+    def checked(self) -> Recording:
+        """Itself; DataError with all that is missing or wrong."""
+        if self.complaint:
+            raise DataError(f"{self.path}: {self.complaint}")
+        return self
+
+
+def understood(path: Path, title: str, contents: Contents, said: Description) -> Recording:
+    """Hits where signals over time are all there is, else the FRF."""
+    ledger = Ledger()
+    signals = named_columns(contents.signals, said.columns, ledger) if said.columns else contents.signals
+    contents = replace(contents, signals=signals)
+    frf, hits = None, list[Hit]()
+    if not ledger.faults:
+        if candidates(signals) and any(signal.role == "frequency" for signal in signals):
+            frf = settle_frf(contents, said, ledger)
+            _useless(said, ("rate", "full_scale"), "an FRF", ledger)
+        elif not signals or any(signal.role == "frequency" for signal in signals):
+            ledger.ask(f"what its columns are ({names_of(signals)})", COLUMNS_FRF)
+        elif not _is_over_time(signals):
+            ledger.ask(f"what its columns are ({names_of(signals)})", f"{COLUMNS_HIT}; or {COLUMNS_FRF}")
+        else:
+            hits = settle_hits(contents, said, ledger)
+            _useless(said, ("averages",), "hits, and they are counted", ledger)
+    for note in contents.notes:
+        ledger.know("note", note)
+    return Recording(
+        path,
+        title,
+        tuple(hits),
+        frf,
+        tuple(ledger.facts),
+        ledger.complaint(),
+        contents.created,
+        contents.tool,
+        contents.direction,
+    )
+
+
+def _is_over_time(signals: Sequence[Signal]) -> bool:
+    over_time = any(signal.role in ("time", "force", "response") or signal.rate for signal in signals)
+    return over_time or any(signal.per_full_scale for signal in signals)
+
+
+def _useless(said: Description, names: Sequence[str], what: str, ledger: Ledger) -> None:
+    """Options that say nothing of what the file holds."""
+    for name in names:
+        if getattr(said, name) not in ((), None):
+            ledger.faults.append(f"--{name.replace('_', '-')}: the file holds {what}; leave the option out")

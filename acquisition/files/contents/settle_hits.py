@@ -1,0 +1,164 @@
+"""The hits in what a file holds and what a person adds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from acquisition.files.axis import step_of
+from acquisition.files.contents.contents import Contents, Signal
+from acquisition.files.contents.description import Description
+from acquisition.files.contents.ledger import Ledger
+from acquisition.files.contents.named_columns import names_of
+from acquisition.files.contents.settle_unit import MOTIONS, chosen, force_unit, response_unit
+from acquisition.files.units import STANDARD_GRAVITY, unit_of
+from acquisition.hit import Hit
+
+COLUMNS_HIT = '--columns "time [s],force [N],acceleration [g]", in their order, or each with =NAME'
+"""How hits are named."""
+SAME_RATE = 1e-4
+"""Relative difference of two sample rates that are taken for one: that of a rate with five digits."""
+
+
+def settle_hits(contents: Contents, said: Description, ledger: Ledger) -> list[Hit]:
+    """One hit a record; empty where something is missing or wrong, which the ledger then says."""
+    hits = list[Hit]()
+    for record in dict.fromkeys(signal.record for signal in contents.signals):
+        of_one = Ledger()
+        hit = _hit([signal for signal in contents.signals if signal.record == record], said, of_one)
+        if not of_one.is_clean or hit is None:
+            ledger.missing += of_one.missing
+            ledger.faults += of_one.faults
+            return []
+        ledger.facts += of_one.facts if not hits else []
+        hits.append(hit)
+    return hits
+
+
+def _hit(signals: Sequence[Signal], said: Description, ledger: Ledger) -> Hit | None:
+    signals = _scaled(signals, said, ledger)
+    forces, responses = _by_kind(signals, ledger)
+    rate = _rate(signals, [*forces, *responses], said, ledger)
+    force = forces[0] if len(forces) == 1 else None
+    response = chosen(responses, said.response, "responses", ledger) if responses else None
+    to_newton = force_unit(forces[0], said, ledger) if forces else None
+    unit = response_unit(response or responses[0], said, ledger) if responses else None
+    _doubt_gravity(responses, ledger)
+    if unit is not None and unit[0] != "acceleration":
+        ledger.faults.append(
+            f"its response is a {unit[0]} over time; hits need an acceleration: export the FRF, or the acceleration"
+        )
+    if force is None or response is None or unit is None or to_newton is None or not ledger.is_clean:
+        return None
+    try:
+        return Hit(force.values * to_newton, response.values * unit[1], rate)
+    except ValueError as error:
+        ledger.faults.append(str(error))
+        return None
+
+
+def _by_kind(signals: Sequence[Signal], ledger: Ledger) -> tuple[list[Signal], list[Signal]]:
+    """Forces and responses; what neither unit nor name tells is asked about."""
+    forces = [signal for signal in signals if _kind(signal) == "force"]
+    responses = [signal for signal in signals if _kind(signal) == "response"]
+    unclear = [one for one in signals if not _kind(one) and one.role in ("", "real", "magnitude")]
+    channels = [one for one in signals if one.role != "time"]
+    there = names_of(channels)
+    if len(channels) < 2:
+        ledger.faults.append(f"it holds {there or 'nothing'} over time; a hit needs a force and a response")
+        return [], []
+    if unclear and (not forces or not responses):
+        ledger.ask(f"what its columns are ({there})", COLUMNS_HIT)
+        return forces, responses
+    if len(forces) != 1:
+        count = "no force channel" if not forces else f"{len(forces)} force channels"
+        ledger.faults.append(f"{count} among {there}; one is needed")
+    if not responses:
+        ledger.faults.append(f"no channel of a response among {there}")
+    return forces, responses
+
+
+def _kind(signal: Signal) -> str:
+    """force or response by the role or the unit; empty where neither tells."""
+    unit = unit_of(signal.unit) if signal.unit else None
+    quantity = signal.quantity or (unit.quantity if unit else "")
+    by_quantity = "response" if quantity in MOTIONS else quantity if quantity == "force" else ""
+    return by_quantity or (signal.role if signal.role in ("force", "response") else "")
+
+
+def _rate(signals: Sequence[Signal], used: Sequence[Signal], said: Description, ledger: Ledger) -> float:
+    """Samples a second (Hz); 0 where it is missing or wrong."""
+    if not used:
+        used = signals
+    if len({signal.values.size for signal in used}) > 1:
+        ledger.faults.append(f"its channels differ in length: {names_of(used)}")
+        return 0.0
+    rates = [signal.rate for signal in used if signal.rate is not None]
+    if rates and max(rates) > min(rates) * (1 + SAME_RATE):
+        ledger.faults.append(f"its channels differ in sample rate: {min(rates):g} and {max(rates):g} Hz")
+        return 0.0
+    in_file = rates[0] if rates else _rate_of_axis(signals, used[0].values.size, ledger)
+    return _agreed(in_file, said.rate, ledger)
+
+
+def _rate_of_axis(signals: Sequence[Signal], size: int, ledger: Ledger) -> float | None:
+    """That of the time column; None where there is none whose unit is known."""
+    time = next((one for one in signals if one.role == "time" and one.values.size == size), None)
+    if time is None:
+        return None
+    if size < 8:
+        ledger.faults.append(f"{size} samples; at least 8 are needed")
+        return None
+    step, fault = step_of(np.asarray(time.values, dtype=np.float64))
+    if fault:
+        ledger.faults.append(fault)
+        return None
+    unit = unit_of(time.unit)
+    if unit is None or unit.quantity != "time":
+        return None
+    return 1 / (step * unit.factor)
+
+
+def _agreed(in_file: float | None, said: float | None, ledger: Ledger) -> float:
+    if said is not None and not (np.isfinite(said) and said > 0):
+        ledger.faults.append(f"--rate {said:g}: give the samples a second, > 0 Hz")
+        return 0.0
+    if in_file is not None and said is not None and abs(said / in_file - 1) > 0.01:
+        ledger.contradict("--rate", f"{said:g}", f"{in_file:g} Hz")
+        return 0.0
+    if in_file is not None:
+        ledger.know("sample rate", f"{in_file:.8g} Hz")
+        return in_file
+    if said is not None:
+        ledger.know("sample rate", f"{said:.8g} Hz", "option")
+        return said
+    if not ledger.faults:
+        ledger.ask("its sample rate, or the unit of its time", "--rate 51200")
+    return 0.0
+
+
+def _doubt_gravity(responses: Sequence[Signal], ledger: Ledger) -> None:
+    """A resting sensor that shows 9.8 in a column called g holds m/s^2."""
+    for signal in responses:
+        rest = abs(float(np.median(signal.values))) if signal.values.size else 0.0
+        if signal.unit.lower() == "g" and abs(rest - STANDARD_GRAVITY) < 0.5:
+            ledger.faults.append(
+                f"unit of {signal.name} in doubt (called g, rests at {rest:.2f}, which is gravity in m/s^2)"
+            )
+
+
+def _scaled(signals: Sequence[Signal], said: Description, ledger: Ledger) -> list[Signal]:
+    """Values that are shares of a full scale, in their unit."""
+    shares = [signal for signal in signals if signal.per_full_scale]
+    if not shares:
+        if said.full_scale:
+            ledger.faults.append("--full-scale: its values are no shares of a full scale; leave it out")
+        return list(signals)
+    if len(said.full_scale) != len(shares):
+        ledger.ask(f"the full scale of its {len(shares)} channels, in their order and units", "--full-scale 500,50")
+        return list(signals)
+    ledger.know("full scale", ", ".join(f"{one:g}" for one in said.full_scale), "option")
+    scale = dict(zip((id(signal) for signal in shares), said.full_scale, strict=True))
+    return [replace(one, values=one.values * scale.get(id(one), 1.0)) for one in signals]

@@ -1,0 +1,195 @@
+"""Layouts of MATLAB files that are known: which variables are frequency, FRF, coherence, time, force and response.
+
+Seen in public files: vectors by name (`Freq_domain`, `Hf_chan_2`, `Hf_coh_chan_2`, `Time_chan_1`), matrices of a logger
+(`yspec`, `indata`, `freq`, `npts`, `tfun`), SignalCalc (`H1_2`, `C1_2`, `X1`, `ChanName`, `Unit`), structs of Test.Lab
+(`x_values`, `y_values`), and our own. An FRF is taken before signals over time that stand beside it: it is the average
+of the hits, they are one of them; `--columns` takes them all the same.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.files.contents.contents import Contents, Signal
+from acquisition.files.contents.heading import role_of
+
+_FREQUENCY = re.compile(r"(f|freq\w*|.*_freq\w*|frequenc\w*|hz)", re.IGNORECASE)
+_COHERENCE = re.compile(r".*(coh|gamma)", re.IGNORECASE)
+_NO_FRF = re.compile(r".*(cross|auto|psd|spec)", re.IGNORECASE)
+_RATE = re.compile(r"(fs|samp\w*rate|.*sample_?rate|sampling_?(rate|frequency))", re.IGNORECASE)
+_TIME = re.compile(r"(t|time|time_domain|tim)", re.IGNORECASE)
+
+
+def recognised(variables: Mapping[str, Any]) -> Contents | None:
+    """What the variables of a file mean where they are of a known layout; None where they are of none."""
+    for layout in (_ours, _signal_calc, _test_lab, _logger, _vectors, _over_time):
+        found = layout(variables)
+        if found is not None:
+            return found
+    return None
+
+
+def _ours(v: Mapping[str, Any]) -> Contents | None:
+    """As `lobewatch convert` writes them."""
+    if not isinstance(v.get("written_by"), str) or not v["written_by"].startswith("lobewatch"):
+        return None
+    texts = {name: v[name] if isinstance(v.get(name), str) else "" for name in ("recorded", "direction", "tool")}
+    created = datetime.fromisoformat(texts["recorded"]) if texts["recorded"] else None
+    said = Contents((), created=created, direction=texts["direction"], tool=texts["tool"])
+    if "frf" in v:
+        signals = [Signal("frequency", v["frequency"], "frequency", "Hz"), Signal("frf", v["frf"], "frf", v["unit"])]
+        signals += [Signal("coherence", v["coherence"], "coherence")] if "coherence" in v else []
+        return replace(said, signals=tuple(signals), averages=int(v["averages"]))
+    rate = float(v["sample_rate"])
+    hits = np.atleast_2d(v["force"]), np.atleast_2d(v["acceleration"])
+    signals = []
+    for record, (force, acceleration) in enumerate(zip(*hits, strict=True)):
+        signals += [
+            Signal("force", force, "force", "N", rate=rate, record=record),
+            Signal("acceleration", acceleration, "response", "m/s^2", rate=rate, record=record),
+        ]
+    return replace(said, signals=tuple(signals))
+
+
+def _signal_calc(v: Mapping[str, Any]) -> Contents | None:
+    """SignalCalc: the abscissa stands in the real part of the first column, channel 1 is the hammer."""
+    found = [(name, match[1]) for name in v if (match := re.fullmatch(r"H1_(\d+)", name)) and _is_pairs(v[name])]
+    if not found:
+        return None
+    signals = [Signal("frequency", np.real(v[found[0][0]][:, 0]), "frequency", "Hz")]
+    units, names = _texts(v.get("Unit")), _texts(v.get("ChanName"))
+    for name, channel in found:
+        label = f"{name} {_at(names, channel)}".strip()
+        unit = f"({_at(units, channel)})/({_at(units, '1')})" if _at(units, channel) and _at(units, "1") else ""
+        signals.append(Signal(label, v[name][:, 1], "frf", unit))
+        coherence = v.get(f"C1_{channel}")
+        if coherence is not None and _is_pairs(coherence):
+            signals.append(Signal(f"C1_{channel}", np.real(coherence[:, 1]), "coherence"))
+    averages = re.search(r"(?:averages|num.?avg|navg)\D{0,4}(\d+)", " ".join(_texts(v.get("DP_Info"))), re.IGNORECASE)
+    return Contents(tuple(signals), averages=int(averages[1]) if averages else None)
+
+
+def _is_pairs(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.ndim == 2 and value.shape[1] == 2
+
+
+def _texts(value: Any) -> list[str]:
+    if isinstance(value, str):
+        return [value.strip()]
+    return [str(one).strip() for one in value] if isinstance(value, (list, tuple, np.ndarray)) else []
+
+
+def _at(texts: Sequence[str], channel: str) -> str:
+    return texts[int(channel) - 1] if int(channel) <= len(texts) else ""
+
+
+def _test_lab(v: Mapping[str, Any]) -> Contents | None:
+    """Structs with `x_values` (start_value, increment) and `y_values` (values, quantity with a label)."""
+    signals = list[Signal]()
+    for name, struct in v.items():
+        if isinstance(struct, Mapping) and {"x_values", "y_values"} <= struct.keys():
+            signals += _of_struct(name, struct["x_values"], struct["y_values"], len(signals))
+    return Contents(tuple(signals)) if signals else None
+
+
+def _of_struct(name: str, x: Mapping[str, Any], y: Mapping[str, Any], record: int) -> Iterator[Signal]:
+    values = np.asarray(y["values"])
+    columns = values.reshape(values.shape[0], -1).T
+    unit = str((y.get("quantity") or {}).get("label", ""))
+    step, start = float(x["increment"]), float(x.get("start_value", 0.0))
+    is_frf = np.iscomplexobj(values)
+    if is_frf:
+        yield Signal("frequency", start + step * np.arange(columns.shape[1]), "frequency", "Hz", record=record)
+    for i, column in enumerate(columns, 1):
+        label = name if len(columns) == 1 else f"{name}:{i}"
+        if is_frf:
+            yield Signal(label, column, "frf", unit, record=record)
+        else:
+            yield Signal(label, column, role_of(name, unit), unit, rate=1 / step)
+
+
+def _logger(v: Mapping[str, Any]) -> Contents | None:
+    """`freq` is the sample rate, `npts` the length of the record that `yspec` was made from."""
+    if "freq" not in v or np.ndim(v["freq"]) or not ({"yspec", "indata"} & v.keys()):
+        return None
+    rate = float(v["freq"])
+    if "yspec" in v and "npts" in v and np.iscomplexobj(v["yspec"]):
+        columns = np.atleast_2d(v["yspec"].T)
+        signals = [Signal("frequency", np.arange(columns.shape[1]) * rate / float(v["npts"]), "frequency", "Hz")]
+        with_coherence = bool(v.get("tfun", 0)) and len(columns) == 2
+        signals.append(Signal("yspec:1", columns[0], "frf"))
+        rest = [("coherence", columns[1].real)] if with_coherence else [("frf", one) for one in columns[1:]]
+        signals += [Signal(f"yspec:{i}", one, role) for i, (role, one) in enumerate(rest, 2)]  # type: ignore[arg-type]
+        return Contents(tuple(signals))
+    columns = np.atleast_2d(v["indata"].T)
+    return Contents(tuple(Signal(f"indata:{i}", one, rate=rate) for i, one in enumerate(columns, 1)))
+
+
+def _vectors(v: Mapping[str, Any]) -> Contents | None:
+    """Vectors and matrices of the length of a frequency, complex ones but for coherence; the time signals beside them
+    keep their names and no role, so that `--columns` can have them. Only signals over time: those of its length."""
+    arrays = {name: value for name, value in v.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiuc"}
+    for name, axis in arrays.items():
+        if _FREQUENCY.fullmatch(name) and _rises(axis):
+            frfs = [
+                one for one in _of_length(arrays, axis.size) if np.iscomplexobj(one[1]) and not _NO_FRF.match(one[0])
+            ]
+            if frfs:
+                return Contents(tuple(_frf_signals(arrays, name, frfs)))
+    return None
+
+
+def _frf_signals(
+    arrays: Mapping[str, NDArray[Any]], frequency: str, frfs: Sequence[tuple[str, NDArray[Any]]]
+) -> Iterator[Signal]:
+    yield Signal(frequency, arrays[frequency], "frequency")
+    yield from (Signal(name, values, "frf") for name, values in frfs)
+    n = arrays[frequency].size
+    taken = {frequency, *(name for name, _ in frfs)}
+    for name, values in _of_length(arrays, n):
+        if _COHERENCE.match(name) and not np.iscomplexobj(values):
+            taken.add(name)
+            yield Signal(name, values, "coherence")
+    yield from (
+        Signal(name, values, record=1) for name, values in arrays.items() if values.ndim == 1 and name not in taken
+    )
+
+
+def _over_time(v: Mapping[str, Any]) -> Contents | None:
+    """A time, or a sample rate, and vectors or a matrix of the same length; what they are their names may tell."""
+    arrays = {name: value for name, value in v.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiu"}
+    rate = next((float(v[name]) for name in v if _RATE.fullmatch(name) and _is_number(v[name])), None)
+    axis = next((name for name, value in arrays.items() if _TIME.fullmatch(name) and _rises(value)), None)
+    if rate is None and axis is None:
+        return None
+    n = arrays[axis].size if axis else max((max(value.shape) for value in arrays.values()), default=0)
+    signals = [Signal(axis, arrays[axis], "time")] if axis else []
+    signals += [
+        Signal(name, values, role_of(name, ""), rate=rate) for name, values in _of_length(arrays, n) if name != axis
+    ]
+    return Contents(tuple(signals)) if signals else None
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float, np.number)) and bool(value > 0)
+
+
+def _of_length(arrays: Mapping[str, NDArray[Any]], n: int) -> Iterator[tuple[str, NDArray[Any]]]:
+    """Vectors of a length, and the columns of matrices, which are name:1, name:2, ..."""
+    for name, values in arrays.items():
+        if values.shape == (n,):
+            yield name, values
+        elif values.ndim == 2 and n in values.shape:
+            columns = values.T if values.shape[0] == n else values
+            yield from ((f"{name}:{i}", column) for i, column in enumerate(columns, 1))
+
+
+def _rises(axis: NDArray[Any]) -> bool:
+    return axis.ndim == 1 and axis.size > 1 and not np.iscomplexobj(axis) and bool(np.all(np.diff(axis) > 0))

@@ -1,0 +1,107 @@
+"""MATLAB files, v5 and v7.3: all arrays of numbers in them by name, and what those of known layouts are."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import scipy.io
+
+from acquisition.errors import DataError
+from acquisition.files.contents.contents import Contents, Signal
+from acquisition.files.format import Format
+from acquisition.files.readers.mat_layouts import recognised
+from acquisition.files.unpacked import HARMLESS, RATIO, check_unpacked
+
+_V5 = b"MATLAB 5.0 MAT-file"
+_V73 = b"MATLAB 7.3 MAT-file"
+MOST_COLUMNS = 64
+"""Columns of a matrix that are told one by one."""
+
+
+def read_mat(path: Path) -> Contents:
+    """Its arrays; DataError where it is damaged or unpacks out of proportion."""
+    with path.open("rb") as file:
+        is_hdf5 = file.read(len(_V73)) == _V73
+    variables = _of_v73(path) if is_hdf5 else _of_v5(path)
+    known = recognised(variables)
+    if known is not None:
+        return known
+    return Contents(tuple(_columns(variables)))
+
+
+def _of_v5(path: Path) -> dict[str, Any]:
+    """Variables by name; structs as dictionaries."""
+    size = path.stat().st_size
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            unpacked = sum(16 * math.prod(shape) for _, shape, _ in scipy.io.whosmat(path))
+            if unpacked > max(HARMLESS, RATIO * size):
+                raise DataError(f"{path}: {size / 1e6:.3g} MB that unpack to {unpacked / 1e6:.4g} MB; no tap test does")
+            found = scipy.io.loadmat(path, simplify_cells=True)
+    except DataError:
+        raise
+    except Exception as error:
+        raise DataError(f"{path}: damaged or cut short ({type(error).__name__}: {error}); export it anew") from error
+    return {name: value for name, value in found.items() if not name.startswith("__")}
+
+
+def _of_v73(path: Path) -> dict[str, Any]:
+    """The same of HDF5: arrays transposed, complex numbers as pairs, text as 16-bit codes."""
+    try:
+        with h5py.File(path, "r") as file:
+            check_unpacked(file, path.stat().st_size, path)
+            return {name: _plain(item) for name, item in file.items() if name != "#refs#"}
+    except DataError:
+        raise
+    except Exception as error:
+        raise DataError(f"{path}: damaged or cut short ({type(error).__name__}: {error}); export it anew") from error
+
+
+def _plain(item: Any) -> Any:
+    if isinstance(item, h5py.Group):
+        return {name: _plain(one) for name, one in item.items()}
+    values = item[()]
+    kind = item.attrs.get("MATLAB_class", b"")
+    if item.attrs.get("MATLAB_empty", 0):
+        return np.empty(0)
+    if values.dtype.names == ("real", "imag"):
+        values = values["real"] + 1j * values["imag"]
+    if values.dtype.kind == "O":
+        cells = [_plain(item.file[reference]) for reference in values.ravel()]
+        return cells[0] if len(cells) == 1 else cells
+    if kind == b"char":
+        return "".join(map(chr, values.T.ravel()))
+    squeezed = np.squeeze(values.T)
+    return squeezed[()] if squeezed.ndim == 0 else squeezed
+
+
+def _columns(variables: Mapping[str, Any], prefix: str = "") -> Iterator[Signal]:
+    """Every row of two or more numbers; those of a matrix as name:1, name:2, ..."""
+    for name, value in variables.items():
+        if isinstance(value, Mapping):
+            yield from _columns(value, f"{prefix}{name}.")
+        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiuc":
+            yield from _of_array(f"{prefix}{name}", value)
+
+
+def _of_array(name: str, value: np.ndarray[Any, Any]) -> Iterator[Signal]:
+    if value.ndim == 1 and value.size > 1:
+        yield Signal(name, value)
+    elif value.ndim == 2:
+        tall = value if value.shape[0] >= value.shape[1] else value.T
+        for i, column in enumerate(tall.T[:MOST_COLUMNS], 1):
+            yield Signal(f"{name}:{i}", column)
+
+
+def _is_mat(head: bytes, _path: Path) -> bool:
+    return head.startswith((_V5, _V73))
+
+
+MAT = Format("mat", "MATLAB file", (".mat",), _is_mat, read_mat)

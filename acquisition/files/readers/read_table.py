@@ -1,0 +1,178 @@
+"""Text tables: columns of numbers, with a heading or without, as other programs and spreadsheets write them.
+
+The separator (tab, semicolon, comma, white space) and the decimal comma are found from the rows. Lines before the first
+row are headings; the last of them names columns and units, `time_s,force_N,acceleration_g`, `Time (s);Force [N];Acc
+[m/s^2]`, `Freq (Hz) Real (um/N) Imag (um/N)`, or a line of units stands below the names. Lines that begin with # may
+say `key: value`. Some tap-test programs (.frf) write the heading behind the first row of numbers.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.errors import DataError
+from acquisition.files.contents.contents import Contents, Signal
+from acquisition.files.contents.heading import is_level, is_unit, name_and_unit, role_of
+from acquisition.files.format import Format
+from acquisition.files.readers.text import is_text, text_of
+
+_COMMA_NUMBER = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
+_NOT_FINITE = {"nan", "inf", "-inf", "+inf"}
+
+
+@dataclass
+class Layout:
+    """How the rows of a table are written."""
+
+    separator: str
+    """A pattern."""
+    comma: bool
+    """Whether the decimal sign is a comma."""
+    heading: list[str] = field(default_factory=list)
+    """Words above the columns, or behind the first row; empty where there are none."""
+    keys: dict[str, str] = field(default_factory=dict)
+    """What lines that begin with # say."""
+
+    def words(self, line: str) -> list[str]:
+        """The words of a line."""
+        line = line.strip(" \r\n") if self.separator == "\t" else line.strip()
+        return [word.strip().strip('"') for word in re.split(self.separator, line)]
+
+    def number(self, word: str) -> float:
+        """A word as a number; ValueError where it is none."""
+        return float(word.replace(",", ".") if self.comma else word)
+
+
+def read_table(path: Path) -> Contents:
+    """The columns of a text file; DataError with the line where it is no table."""
+    lines = [(number, line) for number, line in enumerate(text_of(path).splitlines(), 1) if line.strip()]
+    comments = [line.strip()[1:] for _, line in lines if line.lstrip().startswith("#")]
+    lines = [one for one in lines if not one[1].lstrip().startswith("#")]
+    first, layout = _layout(path, lines)
+    layout.keys = {key.strip().lower(): value.strip() for key, _, value in (one.partition(":") for one in comments)}
+    rows = lines[first:]
+    behind = _behind(layout, rows)
+    layout.heading = behind or layout.heading
+    width = len(layout.words(rows[-1][1])) if behind else len(_trimmed(layout, rows[0][1]))
+    if layout.heading and not behind and width != len(layout.heading):
+        raise DataError(f"{path}: line {rows[0][0]}: {width} numbers under {len(layout.heading)} headings")
+    values = _values(path, layout, rows, width)
+    return _contents(path, layout, values)
+
+
+def _layout(path: Path, lines: Sequence[tuple[int, str]]) -> tuple[int, Layout]:
+    """Where the rows begin, how they are written, and the heading above them."""
+    first = next((i for i, (_, line) in enumerate(lines) if _starts_with_number(_dialect([line]), line)), None)
+    if first is not None and len(lines) > max(first, 1):
+        layout = _dialect([line for _, line in lines[first:]])
+        layout.heading = _heading(layout, [line for _, line in lines[:first]])
+        return first, layout
+    if len(lines) < 2:
+        raise DataError(f"{path}: {len(lines)} lines; a heading and rows of numbers are needed")
+    number, line = lines[1]
+    raise DataError(f"{path}: line {number}: {line.strip()[:60]!r} is no row of numbers")
+
+
+def _dialect(rows: Sequence[str]) -> Layout:
+    """How rows are written; the first one with a comma tells what that is."""
+    with_comma = next((row for row in rows if "," in row), "")
+    for separator in ("\t", ";"):
+        if separator in rows[0].strip():
+            return Layout(separator, bool(with_comma))
+    words = with_comma.split()
+    if len(words) > 1 and all(map(_COMMA_NUMBER.fullmatch, words)):
+        return Layout(r"\s+", comma=True)
+    return Layout("," if with_comma else r"\s+", comma=False)
+
+
+def _starts_with_number(layout: Layout, line: str) -> bool:
+    word = layout.words(line)[0]
+    try:
+        layout.number(word)
+    except ValueError:
+        return False
+    return word.lower() not in _NOT_FINITE
+
+
+def _trimmed(layout: Layout, line: str) -> list[str]:
+    """The words of a row without an empty one behind its last separator."""
+    words = layout.words(line)
+    return words[:-1] if len(words) > 1 and not words[-1] else words
+
+
+def _heading(layout: Layout, lines: Sequence[str]) -> list[str]:
+    """The last line above the rows, with the units that stand in a line of their own below it."""
+    if not lines:
+        return []
+    if layout.separator == r"\s+":
+        lines = [re.sub(r"\s+(?=[\[(])", "", line) for line in lines]
+    last = _trimmed(layout, lines[-1])
+    if len(lines) > 1:
+        names, bare = _trimmed(layout, lines[-2]), [word.strip("()[] ") for word in last]
+        if len(names) == len(last) and all(not unit or unit == "-" or is_unit(unit) for unit in bare):
+            return [f"{name} [{unit}]" if unit.strip("-") else name for name, unit in zip(names, bare, strict=True)]
+    return last
+
+
+def _behind(layout: Layout, rows: Sequence[tuple[int, str]]) -> list[str]:
+    """The heading behind the numbers of the first row: a name and a unit for each column, or names only."""
+    words, width = layout.words(rows[0][1]), len(_trimmed(layout, rows[-1][1]))
+    names = [word for word in words[width:] if word]
+    if len(names) == 2 * width:
+        pairs = zip(names[::2], names[1::2], strict=True)
+        return [f"{name} [{unit}]" if is_unit(unit) else name for name, unit in pairs]
+    return names if len(names) == width else []
+
+
+def _values(path: Path, layout: Layout, rows: Sequence[tuple[int, str]], width: int) -> NDArray[np.float64]:
+    """Shape (n_columns, n_rows)."""
+    values = np.empty((len(rows), width))
+    for i, (number, line) in enumerate(rows):
+        words = _trimmed(layout, line)
+        if len(words) != width and not (i == 0 and len(words) > width):
+            under = f"under {width} headings" if layout.heading else f"where the first row has {width}"
+            raise DataError(f"{path}: line {number}: {len(words)} numbers {under}")
+        try:
+            values[i] = [layout.number(word) for word in words[:width]]
+        except ValueError as error:
+            raise DataError(f"{path}: line {number}: {line.strip()[:60]!r} is no row of numbers") from error
+    return values.T
+
+
+def _contents(path: Path, layout: Layout, values: NDArray[np.float64]) -> Contents:
+    headings = [name_and_unit(word) for word in layout.heading] or [("", "")] * len(values)
+    signals = [
+        Signal(name or f"column {i}", row, role_of(name, unit), unit)
+        for i, ((name, unit), row) in enumerate(zip(headings, values, strict=True), 1)
+    ]
+    signals = [_with_level(signal) for signal in signals]
+    said, keys = iter(layout.keys.get(key, "") for key in ("averages", "recorded", "direction", "tool")), layout.keys
+    averages, recorded, direction, tool = said
+    try:
+        created = datetime.fromisoformat(recorded).astimezone() if recorded else None
+        n_averages = int(averages) if averages else None
+    except ValueError as error:
+        raise DataError(f"{path}: {error} (lines that begin with #: {keys})") from error
+    return Contents(tuple(signals), n_averages, created, direction, tool)
+
+
+def _with_level(signal: Signal) -> Signal:
+    """Of a magnitude in "dB re 1 m/N" the unit, of one in dB that."""
+    level = re.fullmatch(r"dB\s*(?:re|ref|rel)\.?\s*1?\s*(.+)", signal.unit, re.IGNORECASE)
+    if is_level(signal.unit):
+        return replace(signal, role="magnitude", unit=f"dB {level[1]}" if level else "dB")
+    return signal
+
+
+def _is_text(head: bytes, _path: Path) -> bool:
+    return is_text(head)
+
+
+TEXT_TABLE = Format("table", "text table", (".csv", ".txt", ".frf", ".dat", ".asc"), _is_text, read_table)

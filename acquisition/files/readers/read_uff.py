@@ -1,0 +1,155 @@
+"""Universal files, data set 58, ASCII and binary: FRFs, coherence and signals over time; units of data set 164.
+
+Source: SDRC Universal File Formats 58, 58b, 151, 164 (University of Cincinnati, SDRL).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from acquisition.errors import DataError
+from acquisition.files.contents.contents import Contents, Role, Signal
+from acquisition.files.format import Format
+from acquisition.files.readers.uff_function import Function, read_function
+
+_MARK = re.compile(rb"\s*-1[ \r]*(?:\n|$)")
+_SYSTEMS = {1: ("m", "N"), 2: ("ft", "lbf"), 3: ("m", "kgf"), 5: ("mm", "mN"), 7: ("in", "lbf"), 9: ("mm", "N")}
+"""Data set 164: code -> units of length and force."""
+_MOTIONS = {8: ("displacement", ""), 11: ("velocity", "/s"), 12: ("acceleration", "/s^2")}
+"""Type of an ordinate -> its quantity, and what stands behind its length."""
+_FORCES = (9, 13)
+_TIME, _FRF, _COHERENCE = 1, 4, 6
+_DATES = ("%d-%b-%y %H:%M:%S", "%d-%b-%Y %H:%M:%S", "%d-%b-%y", "%d-%b-%Y", "%Y-%m-%dT%H:%M:%S%z")
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the data sets of a file hold."""
+
+    functions: Sequence[Function]
+    """Data sets 58, in their order."""
+    system: tuple[str, str] | None
+    """Units of length and force by data set 164."""
+
+
+def read_uff(path: Path) -> Contents:
+    """Its FRFs with their coherence, or its signals over time; DataError with the data set where it is damaged."""
+    found = _found(path, path.read_bytes())
+    frfs = [one for one in found.functions if one.type == _FRF]
+    kinds = sorted({one.type for one in found.functions} - {_TIME, _FRF, _COHERENCE})
+    signals = list(_frf_signals(found, frfs)) if frfs else list(_time_signals(found))
+    if not signals:
+        what = f"functions of type {', '.join(map(str, kinds))}" if kinds else "no data set 58"
+        raise DataError(f"{path}: holds {what}; FRFs (type 4) and signals over time (type 1) are read")
+    first = frfs[0] if frfs else found.functions[0]
+    averages = {one.averages for one in frfs if one.averages}
+    return Contents(
+        tuple(signals),
+        averages=averages.pop() if len(averages) == 1 else None,
+        created=_created(first),
+        direction=_direction(found),
+        tool=first.keys.get("tool", ""),
+        notes=tuple(_notes(frfs)),
+    )
+
+
+def _found(path: Path, content: bytes) -> Found:
+    functions, system, at = list[Function](), None, 0
+    while (opening := _MARK.match(content, at)) is not None:
+        begin = opening.end()
+        kind = content[begin : content.find(b"\n", begin)].split()[:1]
+        if kind and kind[0] in (b"58", b"58b"):
+            function, at = read_function(f"{path}: data set {len(functions) + 1}", content, begin)
+            functions.append(function)
+        else:
+            end = content.find(b"\n    -1", begin)
+            at = len(content) if end < 0 else end + 1
+        closing = _MARK.match(content, at)
+        if closing is None:
+            raise DataError(f"{path}: its last data set has no end (-1); it is cut short or damaged")
+        if kind == [b"164"]:
+            code = re.match(rb"[^\n]*\n\s*(\d+)", content[begin:])
+            system = _SYSTEMS.get(int(code[1])) if code else None
+        at = closing.end()
+    if content[at:].strip():
+        raise DataError(f"{path}: {content[at:].strip()[:20]!r} stands behind its last data set; it is damaged")
+    return Found(functions, system)
+
+
+def _frf_signals(found: Found, frfs: Sequence[Function]) -> Iterator[Signal]:
+    """Each in a record of its own, turned to the positive direction of both axes."""
+    for record, one in enumerate(frfs):
+        unit, quantity = _frf_unit(one, found.system)
+        sign = -1.0 if one.response_direction * one.reference_direction < 0 else 1.0
+        yield Signal("frequency", one.abscissa, "frequency", one.abscissa_axis.unit or "Hz", record=record)
+        yield Signal(one.name, sign * one.values, "frf", unit, quantity, record=record)
+        for other in found.functions:
+            if other.type == _COHERENCE and other.place == one.place and other.values.size == one.values.size:
+                yield Signal(f"coherence of {one.name}", other.values, "coherence", record=record)
+                break
+
+
+def _frf_unit(one: Function, system: tuple[str, str] | None) -> tuple[str, str]:
+    """Unit and quantity of the response, as far as the file tells."""
+    quantity, per_time = _MOTIONS.get(one.ordinate.type, ("", ""))
+    top, below = one.ordinate.unit, one.denominator.unit
+    if not top and system and quantity:
+        top = f"{system[0]}{per_time}"
+    if not below and system and one.denominator.type in _FORCES:
+        below = system[1]
+    return (f"({top})/({below})" if top and below else top), quantity
+
+
+def _time_signals(found: Found) -> Iterator[Signal]:
+    """Channels; where one comes again, the next hit begins."""
+    record, seen = 0, set[tuple[object, ...]]()
+    for one in (function for function in found.functions if function.type == _TIME):
+        if (one.place, one.ordinate.type) in seen:
+            record, seen = record + 1, set()
+        seen.add((one.place, one.ordinate.type))
+        quantity, per_time = _MOTIONS.get(one.ordinate.type, ("force" if one.ordinate.type in _FORCES else "", ""))
+        unit = one.ordinate.unit
+        if not unit and found.system and quantity:
+            unit = found.system[1] if quantity == "force" else f"{found.system[0]}{per_time}"
+        role: Role = "" if not quantity else "force" if quantity == "force" else "response"
+        rate = 1 / one.step if one.step else None
+        yield Signal(one.name, one.values, role, unit, quantity, rate=rate, record=record)
+        if rate is None:
+            yield Signal("time", one.abscissa, "time", one.abscissa_axis.unit or "s", record=record)
+
+
+def _direction(found: Found) -> str:
+    """At the tool tip, where all responses have the same."""
+    responses = {abs(one.response_direction) for one in found.functions if one.ordinate.type in _MOTIONS}
+    return {1: "x", 2: "y", 3: "z"}.get(responses.pop(), "") if len(responses) == 1 else ""
+
+
+def _notes(frfs: Sequence[Function]) -> Iterator[str]:
+    turned = sum(one.response_direction * one.reference_direction < 0 for one in frfs)
+    if turned:
+        yield f"{turned} FRF(s) of opposite directions, turned round"
+    if any(abs(one.response_direction) != abs(one.reference_direction) and one.reference_direction for one in frfs):
+        yield "hit and response differ in direction"
+
+
+def _created(one: Function) -> datetime | None:
+    """The third line, or that of our own files; local time where it has no zone."""
+    text = one.keys.get("recorded") or one.lines[2].strip()
+    for form in _DATES:
+        try:
+            return datetime.strptime(text, form).astimezone()
+        except (ValueError, OverflowError, OSError):
+            continue
+    return None
+
+
+def _is_uff(head: bytes, _path: Path) -> bool:
+    first = head.lstrip(b"\r\n").split(b"\n", 1)[0]
+    return first.strip() == b"-1" and first.startswith(b"    -1")
+
+
+UFF = Format("uff", "universal file, data set 58", (".uff", ".unv", ".uf", ".bunv"), _is_uff, read_uff)

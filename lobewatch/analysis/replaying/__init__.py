@@ -1,0 +1,1 @@
+"""Recorded files as tap tests of a machine: found in folders, dated, understood, shown or stored."""

@@ -1,0 +1,52 @@
+"""The files that a person means: files, folders and patterns."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Sequence
+from pathlib import Path
+
+from acquisition import DataError, known_formats
+
+
+def found_files(places: Sequence[Path | str]) -> tuple[list[Path], list[Path]]:
+    """Each file once, those of a folder and all below it by name, and those of folders that are passed over.
+
+    Passed over is what lies in a folder and has an extension that no known format has; what is named is taken.
+    DataError for a file that is not there, and for a place without any file.
+    """
+    found, passed = dict[Path, None](), list[Path]()
+    for place in places:
+        path = Path(place)
+        if path.is_dir():
+            taken, left = _in_folder(path)
+            found |= dict.fromkeys(taken)
+            passed += left
+        elif path.exists():
+            found[path] = None
+        else:
+            found |= dict.fromkeys(_matching(str(place)))
+    return list(found), passed
+
+
+def _in_folder(folder: Path) -> tuple[list[Path], list[Path]]:
+    files = sorted(file for file in folder.rglob("*") if file.is_file() and not _is_hidden(file.relative_to(folder)))
+    known = {extension for one in known_formats() for extension in one.extensions}
+    taken = [file for file in files if file.suffix.lower() in known]
+    if not taken:
+        kinds = ", ".join(sorted(known))
+        raise DataError(f"{folder}: none of the {len(files)} files in this folder is a recording (looked for {kinds})")
+    return taken, [file for file in files if file.suffix.lower() not in known]
+
+
+def _is_hidden(path: Path) -> bool:
+    return any(part.startswith(".") for part in path.parts)
+
+
+def _matching(pattern: str) -> list[Path]:
+    names = glob.glob(pattern, recursive=True)  # noqa: PTH207 - that of pathlib takes no absolute pattern
+    found = sorted(path for path in map(Path, names) if path.is_file())
+    if not found:
+        what = "no file matches this pattern" if glob.has_magic(pattern) else "there is no such file"
+        raise DataError(f"{pattern}: {what}")
+    return found

@@ -1,0 +1,93 @@
+"""One recorded file as a tap test of a machine."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+from acquisition import (
+    Circumstances,
+    DataError,
+    Description,
+    Fact,
+    Recording,
+    SourceFile,
+    TapTest,
+    average_good,
+    look,
+    new_tap_id,
+    tap_direction,
+)
+from lobewatch.analysis.replaying.dating import checked_time, date_in_name
+from lobewatch.machine import MachineFolder
+
+ASK_DATE = 'when it was recorded (--date 2024-05-01, or --date-pattern "%Y%m%d" for a date in its name)'
+_ASK = "it does not say: "
+
+
+def read_tap_test(folder: MachineFolder, file: Path, said: Description, content: bytes) -> tuple[TapTest, Recording]:
+    """A file as a tap test, and how it was understood; DataError with all that is missing or wrong in it.
+
+    content: its bytes, which become a part of the tap test.
+    """
+    before = file.stat()
+    recording = look(file, said)
+    after = file.stat()
+    if (before.st_size, before.st_mtime_ns) != (after.st_size, after.st_mtime_ns) or after.st_size != len(content):
+        raise DataError(f"{file}: it changes while it is read; wait until it is written")
+    created = _created(file, said, recording.created)
+    if created is None:
+        glue = ", " if _ASK in recording.complaint else f"; {_ASK}" if recording.complaint else _ASK
+        raise DataError(f"{file}: {recording.complaint}{glue}{ASK_DATE}")
+    about = _about(folder, recording.checked(), said, checked_time(file, created))
+    recording = replace(recording, facts=(*recording.facts, *_labels(about, said, recording)))
+    return _tap_test(recording, about, SourceFile(file.name, content)), recording
+
+
+def _created(file: Path, said: Description, in_file: datetime | None) -> datetime | None:
+    if said.date is not None and said.date_pattern:
+        raise ValueError("--date and --date-pattern: give one of them")
+    return date_in_name(file, said.date_pattern) if said.date_pattern else said.date or in_file
+
+
+def _about(folder: MachineFolder, recording: Recording, said: Description, created: datetime) -> Circumstances:
+    try:
+        direction = tap_direction(said.direction or recording.direction or "x")
+    except ValueError as error:
+        if said.direction:
+            raise
+        raise DataError(f"{recording.path}: its {error} (--direction)") from error
+    setup, tool = folder.machine, said.tool or recording.tool or folder.machine.tap.tool
+    conditions = setup.tap.conditions(tool) if recording.conditions is None else recording.conditions
+    return Circumstances(
+        machine=setup.machine.name,
+        created=created,
+        tool=tool,
+        direction=direction,
+        operator=recording.operator,
+        machine_toml=folder.toml.read_text("utf-8"),
+        device=recording.device,
+        conditions=said.conditions.over(conditions),
+    )
+
+
+def _labels(about: Circumstances, said: Description, recording: Recording) -> list[Fact]:
+    by_option = bool(said.date or said.date_pattern)
+    return [
+        Fact("date", f"{about.created:%Y-%m-%d %H:%M}", "option" if by_option else "file"),
+        Fact("tool", about.tool, "option" if said.tool else "file" if recording.tool else "default"),
+        Fact(
+            "direction", about.direction, "option" if said.direction else "file" if recording.direction else "default"
+        ),
+    ]
+
+
+def _tap_test(recording: Recording, about: Circumstances, source: SourceFile) -> TapTest:
+    if recording.frf is not None:
+        return TapTest(new_tap_id(about), about, recording.frf, source=source)
+    try:
+        frf, flags = average_good(recording.hits)
+    except DataError as error:
+        raise DataError(f"{recording.path}: {error}") from error
+    return TapTest(new_tap_id(about), about, frf, recording.hits, flags, source)

@@ -1,0 +1,73 @@
+"""What `lobewatch replay` does once its options are read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from acquisition import DataError, Description
+from lobewatch.analysis import Logbook
+from lobewatch.analysis.questions.accepting import not_asked
+from lobewatch.analysis.questions.asked import checked_codes
+from lobewatch.analysis.replaying.preview import preview_recordings
+from lobewatch.analysis.replaying.store import refusal
+from lobewatch.show.output import emit, notes
+from lobewatch.show.replays.describe_preview import preview_json, preview_summary, preview_texts
+from lobewatch.show.replays.describe_replay import replay_json, replay_texts
+from lobewatch.show.replays.progress_bar import ProgressBar
+
+
+def show_preview(
+    logbook: Logbook, files: Sequence[Path], passed: Sequence[Path], said: Description, *, as_json: bool
+) -> None:
+    """Tell what would become of files; DataError where one of them cannot be used."""
+    with ProgressBar() as progress:
+        previews = preview_recordings(logbook, files, said, progress)
+    payload = {"dry_run": True, "files": [preview_json(one) for one in previews], "passed_over": list(map(str, passed))}
+    emit(payload, as_json, *preview_texts(previews), preview_summary(previews, len(passed)))
+    refused = sum(bool(one.refused) for one in previews)
+    if refused:
+        raise DataError(f"{refused} of {len(files)} file(s) cannot be used as they are; the reasons stand above")
+
+
+def show_replay(
+    logbook: Logbook,
+    files: Sequence[Path],
+    passed: Sequence[Path],
+    said: Description,
+    accept: Sequence[str],
+    *,
+    keep_going: bool,
+    as_json: bool,
+) -> None:
+    """Store files, accept what is asked of them, tell what they say; DataError for those that cannot be used."""
+    codes = checked_codes(accept)
+    with ProgressBar() as progress:
+        stored = logbook.replay_all(files, said, keep_going=keep_going, progress=progress)
+    unasked = logbook.accept(stored.tap_ids, codes)
+    _tell_known(stored.known, len(files))
+    if passed:
+        notes.print(f"passed over: {len(passed)} other files, such as {passed[0].name}", markup=False)
+    with ProgressBar() as progress:
+        shown = []
+        for number, tap_id in enumerate(stored.fresh, 1):
+            progress("measure", number - 1, len(stored.fresh))
+            shown.append(logbook.measurement(tap_id))
+    payload, texts = replay_json(stored, shown, logbook), replay_texts(stored, shown, logbook)
+    payload |= {"accepted": [code for code in codes if code not in unasked], "questions": logbook.questions}
+    texts += [f"accepted: {code}" for code in payload["accepted"]]
+    last = f"{len(shown)} of {len(files)} file(s) stored in {logbook.folder.path}"
+    emit(payload, as_json, *texts, last)
+    if stored.refused:
+        raise DataError(refusal(stored.refused, len(files), stored=True))
+    if unasked:
+        raise ValueError(not_asked(unasked, stored.tap_ids, logbook.questions))
+
+
+def _tell_known(known: Mapping[Path, str], n: int) -> None:
+    """Files that were stored already: each where they are few."""
+    if n > 12 and len(known) > 3:
+        notes.print(f"{len(known)} of {n} files are stored already", markup=False)
+        return
+    for file, tap_id in known.items():
+        notes.print(f"{file.name}: stored already as {tap_id}", markup=False)

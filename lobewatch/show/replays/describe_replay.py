@@ -1,0 +1,63 @@
+"""What recorded files have become, as JSON and as text."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+from rich.table import Table
+
+from lobewatch.analysis import Logbook, Measurement
+from lobewatch.analysis.questions.asked import open_questions
+from lobewatch.analysis.replaying.store import Stored
+from lobewatch.show.measurements import measurement_json, measurement_texts, program_texts, programs_json
+from lobewatch.show.output import table
+
+IN_FULL = 3
+"""So many tap tests are told in full, more of them summed up."""
+
+
+def replay_json(stored: Stored, shown: Sequence[Measurement], logbook: Logbook) -> dict[str, Any]:
+    """All that was stored, known and refused."""
+    return {
+        "measurements": [measurement_json(m, logbook) for m in shown],
+        "programs": programs_json(logbook.verdicts()) if shown else [],
+        "known": {str(file): tap_id for file, tap_id in stored.known.items()},
+        "refused": {str(file): why for file, why in stored.refused.items()},
+        "taken": list(stored.taken),
+    }
+
+
+def replay_texts(stored: Stored, shown: Sequence[Measurement], logbook: Logbook) -> list[str | Table]:
+    """A few tap tests in full, many as their series; then the programs."""
+    texts = (
+        [text for m in shown for text in measurement_texts(m, logbook)] if len(shown) <= IN_FULL else _summed_up(shown)
+    )
+    if stored.taken:
+        texts.append(f"taken where the files do not say: {', '.join(stored.taken)}")
+    return [*texts, *(program_texts(logbook) if shown else [])]
+
+
+def _summed_up(shown: Sequence[Measurement]) -> list[str | Table]:
+    """A line for each tool and direction, and how many were asked what."""
+    series: dict[tuple[str, str], list[Measurement]] = {}
+    for m in shown:
+        series.setdefault((m.tool, m.direction), []).append(m)
+    rows = table("<tool", "<direction", "tests", "<from", "<to", "f_n (Hz)", "zeta (%)", "K (N/um)")
+    for (tool, direction), tests in series.items():
+        modes = [m.followed for m in tests if m.followed is not None]
+        ends = (modes[0], modes[-1]) if modes else ()
+        values = [
+            " .. ".join(text % value for value in values)
+            for text, values in (
+                ("%.1f", [mode.frequency for mode in ends]),
+                ("%.2f", [100 * mode.damping_ratio for mode in ends]),
+                ("%.1f", [mode.stiffness / 1e6 for mode in ends]),
+            )
+        ]
+        days = f"{tests[0].time:%Y-%m-%d}", f"{tests[-1].time:%Y-%m-%d}"
+        rows.add_row(tool, direction, str(len(tests)), *days, *values)
+    asked = Counter(one.code for m in shown for one in open_questions(m.remarks))
+    lines = [f"asked of {count} tests: {code} (lobewatch history says which)" for code, count in asked.items()]
+    return [rows, *lines]

@@ -1,0 +1,213 @@
+"""UFF in binary, MATLAB v5 and v7.3 in several layouts, WAV, TDMS; cut short at any byte."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+import scipy.io.wavfile
+
+from acquisition import DataError, Description, Hit, look, read_frf, read_hits
+from acquisition.files.convert import WRITERS
+from acquisition.files.writers.labels import Labels
+
+F = np.arange(0.0, 100.0, 2.0)
+H = 1e-6 / (1 + 0.2j * F)
+
+
+def uff_with(path: Path, *, binary: bool = False, unit: str = "m/s^2", direction: tuple[int, int] = (1, 1)) -> Path:
+    """An accelerance of H, as the format has it; binary: little endian, double."""
+    pairs = np.stack([H.real, H.imag], axis=1).ravel()
+    body = pairs.astype("<f8").tobytes() if binary else b"\n".join(b"%20.11E" % v for v in pairs) + b"\n"
+    first = f"    58b     1     2{11:12d}{len(body):12d}     0     0           0           0" if binary else "    58"
+    points = "".join(f" {'NONE':10s}{1:10d}{one:4d}" for one in direction)
+    head = [
+        "    -1",
+        first,
+        "Fräse",
+        "NONE",
+        "01-May-24 09:30:00",
+        "NONE",
+        "number of averages: 7",
+        f"{4:5d}{0:10d}{0:5d}{0:10d}{points}",
+        f"{6:10d}{F.size:10d}{1:10d}{0.0:13.5E}{2.0:13.5E}{0.0:13.5E}",
+        f"{18:10d}{0:5d}{0:5d}{0:5d} {'Frequency':20s} {'Hz':20s}",
+        f"{12:10d}{0:5d}{0:5d}{0:5d} {'Acceleration':20s} {unit:20s}",
+        f"{13:10d}{0:5d}{0:5d}{0:5d} {'Force':20s} {'N' if unit != 'NONE' else 'NONE':20s}",
+        f"{0:10d}{0:5d}{0:5d}{0:5d} {'NONE':20s} {'NONE':20s}",
+    ]
+    path.write_bytes("\n".join(head).encode("latin-1") + b"\n" + body + b"    -1\n")
+    return path
+
+
+@pytest.mark.parametrize("binary", [True, False])
+def test_uff_ascii_and_binary_hold_the_same(tmp_path: Path, binary: bool) -> None:
+    found = look(uff_with(tmp_path / "a.uff", binary=binary)).checked()
+    assert found.frf is not None
+    assert found.frf.accelerance == pytest.approx(H[1:], rel=1e-10)
+    assert found.frf.n_averages == 7
+    assert found.direction == "x"
+    assert f"{found.created:%Y-%m-%d}" == "2024-05-01"
+
+
+def test_a_hammer_against_the_axis_turns_the_frf_round(tmp_path: Path) -> None:
+    turned = read_frf(uff_with(tmp_path / "a.uff", direction=(2, -2)))
+    assert turned.accelerance == pytest.approx(-H[1:], rel=1e-10)
+    assert look(tmp_path / "a.uff").direction == "y"
+
+
+def test_uff_without_units_asks_or_takes_its_unit_system(tmp_path: Path) -> None:
+    path = uff_with(tmp_path / "a.uff", unit="NONE")
+    assert "--unit" in look(path).complaint
+    assert "a unit of displacement" in look(path, Description(unit="m/N")).complaint
+    assert read_frf(path, Description(unit="g/N")).accelerance == pytest.approx(9.80665 * H[1:], rel=1e-10)
+    system = (
+        "    -1\n   164\n         9mm, newton                   2\n  1.0D+03  1.0D+00  1.0D+00\n  0.0D+00\n    -1\n"
+    )
+    path.write_bytes(system.encode() + path.read_bytes())
+    assert read_frf(path).accelerance == pytest.approx(1e-3 * H[1:], rel=1e-10)
+
+
+def mat_73(path: Path, variables: dict[str, Any]) -> Path:
+    """A file as MATLAB -v7.3 writes it: HDF5 behind a header of 512 bytes, transposed, complex as pairs."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, value in variables.items():
+            values = np.atleast_2d(value).T
+            if np.iscomplexobj(values):
+                pairs = np.empty(values.shape, [("real", "f8"), ("imag", "f8")])
+                pairs["real"], pairs["imag"] = values.real, values.imag
+                values = pairs
+            file.create_dataset(name, data=values).attrs["MATLAB_class"] = np.bytes_("double")
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512))
+    return path
+
+
+LAYOUTS: list[tuple[dict[str, Any], tuple[str, ...]]] = [
+    ({"freq": F, "frf": H}, ()),
+    ({"f": F, "H": np.stack([H, H], axis=1)}, ("frequency=f", "frf=H:1")),
+    ({"abc": F, "re": H.real, "im": H.imag}, ("frequency=abc", "real=re", "imag=im")),
+]
+
+
+@pytest.mark.parametrize(("variables", "columns"), LAYOUTS)
+@pytest.mark.parametrize("newer", [True, False])
+def test_mat_files_of_any_layout(
+    tmp_path: Path, newer: bool, variables: dict[str, Any], columns: tuple[str, ...]
+) -> None:
+    path = tmp_path / "a.mat"
+    if newer:
+        mat_73(path, variables)
+    else:
+        scipy.io.savemat(path, variables)
+    frf = read_frf(path, Description(columns=columns, unit="m/N"))
+    assert frf.receptance == pytest.approx(H, rel=1e-14)
+    assert frf.frequency == pytest.approx(F)
+
+
+def test_structs_with_their_axis_and_unit(tmp_path: Path) -> None:
+    struct = {
+        "x_values": {"start_value": 0.0, "increment": 2.0, "number_of_values": F.size},
+        "y_values": {"values": H[:, None], "quantity": {"label": "(m/s^2)/N"}},
+    }
+    scipy.io.savemat(tmp_path / "a.mat", {"FRF": struct})
+    frf = read_frf(tmp_path / "a.mat")
+    assert frf.frequency == pytest.approx(F[1:])
+    assert frf.accelerance == pytest.approx(H[1:])
+
+
+def test_signal_calc_has_the_frequency_in_the_first_column(tmp_path: Path) -> None:
+    variables = {f"H1_{i}": np.stack([F + 0j, i * H], axis=1) for i in (2, 3)}
+    variables |= {f"C1_{i}": np.stack([F, np.full(F.size, 0.1 * i)], axis=1) for i in (2, 3)}
+    names = np.array(["hammer", "tip", "nut"], dtype=object)
+    units = np.array(["N", "m/s^2", "g"], dtype=object)
+    scipy.io.savemat(
+        tmp_path / "a.mat", {**variables, "ChanName": names, "Unit": units, "X1": np.stack([F, F], axis=1)}
+    )
+    assert "1 H1_2 tip, 2 H1_3 nut" in look(tmp_path / "a.mat").complaint
+    frf = read_frf(tmp_path / "a.mat", Description(response=2))
+    assert frf.accelerance == pytest.approx(3 * 9.80665 * H[1:])
+    assert frf.coherence == pytest.approx(0.3)
+
+
+def test_vectors_over_time_with_a_rate(tmp_path: Path) -> None:
+    force, acceleration = np.sin(np.arange(50.0)), np.cos(np.arange(50.0))
+    scipy.io.savemat(tmp_path / "a.mat", {"fs": 2048.0, "force": force, "acc": acceleration})
+    assert "--force-unit" in look(tmp_path / "a.mat").complaint
+    (hit,) = read_hits(tmp_path / "a.mat", Description(unit="g", force_unit="lbf"))
+    assert hit.sample_rate == 2048
+    assert hit.force == pytest.approx(force * 4.4482216152605)
+
+
+@pytest.mark.parametrize("kind", [np.int16, np.int32, np.float32])
+def test_wav_by_its_full_scale(tmp_path: Path, kind: type) -> None:
+    shares = np.stack([0.5 * np.sin(np.arange(4000) / 9), 0.25 * np.cos(np.arange(4000) / 7)], axis=1)
+    top = 1 if kind is np.float32 else -float(np.iinfo(kind).min)
+    scipy.io.wavfile.write(tmp_path / "a.wav", 48000, (shares * top).astype(kind))
+    assert (
+        "--full-scale 500,50"
+        in look(tmp_path / "a.wav", Description(columns=("force [N]", "acceleration [g]"))).complaint
+    )
+    said = Description(columns=("force [N]", "acceleration [m/s^2]"), full_scale=(500.0, 50.0))
+    (hit,) = read_hits(tmp_path / "a.wav", said)
+    assert hit.force == pytest.approx(500 * shares[:, 0], abs=500 / 32768)
+    assert hit.acceleration == pytest.approx(50 * shares[:, 1], abs=50 / 32768)
+    assert hit.sample_rate == 48000
+
+
+def test_tdms_with_units_and_without_the_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    path = tmp_path / "a.tdms"
+    channels = [
+        nptdms.ChannelObject("tap", name, np.sin(np.arange(64.0)), {"unit_string": unit, "wf_increment": 1 / 25600})
+        for name, unit in (("Hammer", "N"), ("Tip", "g"))
+    ]
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment(channels)
+    (hit,) = read_hits(path)
+    assert hit.sample_rate == pytest.approx(25600)
+    assert hit.acceleration == pytest.approx(9.80665 * hit.force)
+    monkeypatch.setitem(sys.modules, "nptdms", None)
+    with pytest.raises(DataError, match=r'pip install "lobewatch\[tdms\]"'):
+        look(path)
+
+
+def one_of_each(folder: Path) -> dict[str, Path]:
+    """A small sound file of each format."""
+    generator = np.random.default_rng(1)
+    hit = Hit(generator.normal(size=60), generator.normal(size=60), 1000.0)
+    made = {}
+    for extension, writer in WRITERS.items():
+        made[extension] = folder / f"sound{extension}"
+        made[extension].write_bytes(writer.of_hits([hit], Labels()))
+    made["binary"] = uff_with(folder / "binary.uff", binary=True)
+    made["7.3"] = mat_73(folder / "newer.mat", {"freq": F[:20], "frf": H[:20]})
+    made[".wav"] = folder / "sound.wav"
+    scipy.io.wavfile.write(made[".wav"], 1000, generator.normal(size=(60, 2)).astype(np.float32))
+    return made
+
+
+def test_a_file_that_is_cut_short_is_refused_or_asks_and_never_gives_other_numbers(tmp_path: Path) -> None:
+    for kind, path in one_of_each(tmp_path).items():
+        content, cut = path.read_bytes(), tmp_path / f"cut{path.suffix}"
+        said = (
+            Description(columns=("force [N]", "acceleration [g]"), full_scale=(1, 1))
+            if kind == ".wav"
+            else Description()
+        )
+        whole = look(path, said)
+        for end in {*range(1, len(content) - 2, max(len(content) // 40, 1)), len(content) - 3}:
+            cut.write_bytes(content[:end])
+            try:
+                found = look(cut, said)
+            except DataError:
+                continue
+            if found.complaint or kind == ".csv":
+                continue  # a text table does not say how long it is
+            assert found.frf is None, (kind, end)
+            assert [hit.force.tolist() for hit in found.hits] == [hit.force.tolist() for hit in whole.hits], (kind, end)

@@ -1,0 +1,162 @@
+"""Folders of recordings: dated, explained before they are stored, stored once, one bad file at its own cost."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from acquisition import DataError
+from lobewatch.cli import app
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+F = np.arange(4.0, 4000.0, 4.0)
+
+
+@pytest.fixture
+def shop(shop: Shop) -> Shop:
+    """Without programs, which take their time."""
+    shop.put("")
+    return shop
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
+
+
+def frf(path: Path, frequency: float = 1700.0, heading: str = "Freq (Hz),Real (um/N),Imag (um/N)") -> Path:
+    path.parent.mkdir(exist_ok=True)
+    values = 1e6 / (3.5e7 * (1 - (F / frequency) ** 2 + 0.06j * F / frequency))
+    rows = "".join(f"{f:.6g},{v.real:.9e},{v.imag:.9e}\n" for f, v in zip(F, values, strict=True))
+    path.write_text(f"{heading}\n{rows}", encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Three tests, the newest first by name, a picture, and a hidden file."""
+    made = tmp_path / "Prüfung 2024"
+    for name, frequency in (("a 20240901", 1690.0), ("b 20240501", 1713.0), ("ü 20240701", 1700.0)):
+        frf(made / f"{name}.csv", frequency)
+    (made / "picture.png").write_bytes(b"\x89PNG")
+    (made / ".hidden.csv").write_text("no")
+    return made
+
+
+def taps(shop: Shop) -> list[str]:
+    return [entry.time[:10] for entry in shop.folder.taps()]
+
+
+def test_a_file_without_a_date_is_asked_for_it_with_all_else(shop: Shop, tmp_path: Path) -> None:
+    path = frf(tmp_path / "x.csv", heading="Freq,Real,Imag")
+    with pytest.raises(DataError, match=r"the unit of Real \(--unit, such as .*\), when it was recorded \(--date"):
+        run("replay", shop.path, path)
+    with pytest.raises(
+        DataError, match=r"^[^;]*x\.csv: it does not say: when it was recorded \(--date 2024-05-01, or --da"
+    ):
+        run("replay", shop.path, path, "--unit", "um/N")
+    assert taps(shop) == []
+
+
+def test_a_folder_is_stored_in_order_of_date_once(shop: Shop, folder: Path) -> None:
+    said = run("replay", shop.path, folder, "--date-pattern", "%Y%m%d")
+    assert "3 of 3 file(s) stored" in said.stdout
+    assert "direction x" in said.stdout
+    assert taps(shop) == ["2024-05-01", "2024-07-01", "2024-09-01"]
+    frequencies = [row.frequency.value for row in shop.logbook.history.rows]
+    assert frequencies == pytest.approx([1713, 1700, 1690], rel=1e-3)
+    shutil.copy(folder / "a 20240901.csv", folder / "again 20230101.csv")
+    again = run("replay", shop.path, folder / "*.csv", "--date-pattern", "%Y%m%d")
+    assert "0 of 4 file(s) stored" in again.stdout
+    assert len(taps(shop)) == 3
+
+
+def test_a_dry_run_explains_and_stores_nothing(shop: Shop, folder: Path) -> None:
+    before = sorted(path for path in shop.path.rglob("*") if path.is_file())
+    said = json.loads(run("replay", shop.path, folder, "--date-pattern", "%Y%m%d", "--dry-run", "--json").stdout)
+    assert [one["time"][:10] for one in said["files"]] == ["2024-05-01", "2024-07-01", "2024-09-01"]
+    assert [Path(one).name for one in said["passed_over"]] == ["picture.png"]
+    first = said["files"][0]
+    facts = {fact["name"]: (fact["value"], fact["origin"]) for fact in first["facts"]}
+    assert facts["unit"] == ("um/N (displacement)", "file")
+    assert facts["date"][1] == "option"
+    assert facts["direction"] == ("x", "default")
+    assert first["followed"]["frequency_hz"] == pytest.approx(1713, rel=1e-3)
+    assert [one["questions"] for one in said["files"]] == [[], [], []]
+    text = run("replay", shop.path, folder, "--date-pattern", "%Y%m%d", "--dry-run").stdout
+    assert "3 of 3 file(s) would be stored" in text
+    assert "plausible for this machine" in text
+    assert before == sorted(path for path in shop.path.rglob("*") if path.is_file())
+
+
+def test_a_dry_run_asks_what_the_replay_would_ask(shop: Shop, beam: Path) -> None:
+    shop.edit("band_hz = [1200, 2200]", "band_hz = [1200, 1800]")
+    said = json.loads(run("replay", shop.path, beam, "--dry-run", "--json").stdout)
+    (one,) = said["files"]
+    assert [asked["code"] for asked in one["questions"]] == ["no-mode-in-band"]
+    assert one["hits"] == ["good"]
+
+
+def test_one_bad_file_costs_only_itself_where_it_may(shop: Shop, folder: Path) -> None:
+    bad = folder / "bad 20240801.csv"
+    bad.write_text("Freq (Hz),Real (um/N),Imag (um/N)\n1,2,3\n2,x,3\n")
+    (folder / "empty 20240802.txt").touch()
+    options = ("--date-pattern", "%Y%m%d")
+    with pytest.raises(DataError, match="2 of 5 files cannot be used; nothing is stored; --keep-going") as refused:
+        run("replay", shop.path, folder, *options)
+    assert "line 3: '2,x,3' is no row of numbers" in str(refused.value)
+    assert "the file is empty" in str(refused.value)
+    assert taps(shop) == []
+    with pytest.raises(DataError, match="2 of 5 files cannot be used; the others are stored"):
+        run("replay", shop.path, folder, *options, "--keep-going")
+    assert len(taps(shop)) == 3
+
+
+def test_a_second_response_of_the_same_file_is_another_test(shop: Shop, tmp_path: Path) -> None:
+    path = tmp_path / "two.csv"
+    one = 1 / (3.5e7 * (1 - (F / 1700) ** 2 + 0.06j * F / 1700))
+    table = np.stack([F, one.real, one.imag, 2 * one.real, 2 * one.imag], axis=1)
+    np.savetxt(path, table, delimiter=",", header="Freq (Hz),Real (m/N),Imag,Real (m/N),Imag", comments="")
+    common = ("--date", "2024-05-01")
+    run("replay", shop.path, path, *common, "--response", 1, "--direction", "x")
+    run("replay", shop.path, path, *common, "--response", 2, "--direction", "y")
+    run("replay", shop.path, path, *common, "--response", 2, "--direction", "y")
+    assert [entry.direction for entry in shop.folder.taps()] == ["x", "y"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["nowhere.csv"], "there is no such file"),
+        (["*.nothing"], "no file matches this pattern"),
+        (["empty"], "none of the 0 files in this folder is a recording"),
+        (["x.csv", "--date-pattern", "%Q"], "--date-pattern '%Q': give it with %Y"),
+        (["x.csv", "--date-pattern", "%Y%m%d"], "no date like --date-pattern '%Y%m%d' in 'x.csv'"),
+        (["x.csv", "--date-pattern", "x", "--date", "2024-01-01"], "give one of them"),
+        (["x.csv", "--date", "2024-01-01", "--unit", "furlong"], "--unit furlong: not known as a unit of Real"),
+    ],
+)
+def test_wrong_use_is_one_sentence(
+    shop: Shop, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    frf(tmp_path / "x.csv")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(ValueError, match=re.escape(message)):
+        run("replay", shop.path, *arguments)
+
+
+def test_convert_writes_what_modes_reads(tmp_path: Path) -> None:
+    source = frf(tmp_path / "x.csv")
+    said = run("convert", source, tmp_path / "x.uff", "--date", "2024-05-01", "--direction", "y")
+    assert "universal file, FRF of 999 lines, 12 digits" in said.stdout
+    found = [json.loads(run("modes", path, "--json").stdout)["modes"][0] for path in (source, tmp_path / "x.uff")]
+    assert found[0]["frequency_hz"] == pytest.approx(found[1]["frequency_hz"], rel=1e-8)
+    assert found[0]["stiffness_n_per_m"] == pytest.approx(found[1]["stiffness_n_per_m"], rel=1e-6)

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.commands.describing import (
+from lobewatch.show.output import Json, emit
+from lobewatch.show.replays.describing import (
     Averages,
     Columns,
     ForceUnit,
@@ -19,7 +20,6 @@ from lobewatch.commands.describing import (
     Unit,
     described,
 )
-from lobewatch.show.output import Json, emit
 
 
 def convert(

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.commands.describing import Columns, ForceUnit, FullScale, Quantity, Rate, Response, Unit, described
 from lobewatch.show.output import Json, emit
+from lobewatch.show.replays.describing import Columns, ForceUnit, FullScale, Quantity, Rate, Response, Unit, described
 
 
 def modes(

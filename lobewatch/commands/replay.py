@@ -8,7 +8,9 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.commands.describing import (
+from lobewatch.machine.named_folder import named_folder
+from lobewatch.show.output import Json
+from lobewatch.show.replays.describing import (
     Averages,
     Columns,
     ForceUnit,
@@ -19,8 +21,6 @@ from lobewatch.commands.describing import (
     Unit,
     described,
 )
-from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json
 
 
 def replay(
@@ -79,7 +79,7 @@ def replay(
     from acquisition import Conditions
     from lobewatch.analysis import Logbook
     from lobewatch.analysis.replaying.found_files import found_files
-    from lobewatch.commands.replay_steps import show_preview, show_replay
+    from lobewatch.show.replays.show_replay import show_preview, show_replay
 
     said = described(
         columns,

@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from hypothesis import strategies as st
 from acquisition import DataError, Description, Frf, Hit, TapTest, convert, from_accelerance, look, read_hits, write_tap
 from acquisition.files.convert import WRITERS
 from acquisition.files.writers.labels import Labels
+from acquisition.frf import Quantity
 from acquisition.tap import Circumstances, new_tap_id
 
 NOTHING = Description()
@@ -29,9 +31,10 @@ def frfs(draw: st.DrawFn) -> Frf:
     generator = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
     steps = generator.uniform(0.1, 3, n) if draw(st.booleans()) else np.full(n, draw(st.floats(1e-3, 1e3)))
     frequency = np.cumsum(steps)
-    values = (generator.normal(size=n) + 1j * generator.normal(size=n)) * 10.0 ** draw(st.integers(-12, 3))
+    pairs = generator.normal(size=2 * n) * 10.0 ** draw(st.integers(-12, 3))
+    values = pairs.view(np.complex128)
     coherence = generator.uniform(0, 1, n) if draw(st.booleans()) else None
-    form = draw(st.sampled_from(["receptance", "mobility", "accelerance"]))
+    form = draw(st.sampled_from(get_args(Quantity)))
     made = Frf(frequency, values, coherence, draw(st.integers(1, 99)))
     return (
         replace(made, measured_as=form)
@@ -87,7 +90,8 @@ def test_hits_survive(extension: str, tmp_path: Path) -> None:
 def test_a_tap_file_becomes_each_format(tmp_path: Path) -> None:
     about = Circumstances("mill", WHEN, "cutter", "y")
     frequency = np.arange(4.0, 400.0, 4.0)
-    frf = Frf(frequency, 1e-8 / (1 - (frequency / 200) ** 2 + 0.05j), np.linspace(0.5, 1, frequency.size), 8)
+    values = np.asarray(1e-8 / (1 - (frequency / 200) ** 2 + 0.05j), dtype=np.complex128)
+    frf = Frf(frequency, values, np.linspace(0.5, 1, frequency.size), 8)
     tap = tmp_path / "tap.h5"
     write_tap(tap, TapTest(new_tap_id(about), about, frf))
     for extension in OF_FRF:

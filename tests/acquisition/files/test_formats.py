@@ -135,7 +135,7 @@ def test_a_format_that_fails_on_a_file_is_left_out_or_named(tmp_path: Path, beam
 
 
 def test_recordings_are_told_by_content_whatever_their_name(beam: Path, tmp_path: Path) -> None:
-    assert [one.name for one in known_formats()] == ["tap-file", "lvm", "table"]
+    assert [one.name for one in known_formats()] == ["tap-file", "uff", "mat", "lvm", "tdms", "wav", "sep005", "table"]
     renamed = tmp_path / "beam.csv"
     renamed.write_bytes(beam.read_bytes())
     (hit,) = read_hits(renamed)

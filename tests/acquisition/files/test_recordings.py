@@ -117,7 +117,7 @@ def write(path: Path, text: str) -> Path:
         ("Freq Real(m/N) Imag\n1 2 nan\n2 3 4\n", "not finite"),
         (
             "\x00\x01\x02garbage",
-            r"of no format that is known here; export it as one of these: tap file of lobewatch \(\.h5\), universal file",
+            r"of no format that is known here; export it as one of these: tap file of lobewatch \(\.h5\), univ",
         ),
     ],
 )

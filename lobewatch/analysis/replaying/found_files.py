@@ -13,7 +13,7 @@ def found_files(places: Sequence[Path | str]) -> tuple[list[Path], list[Path]]:
     """Each file once, those of a folder and all below it by name, and those of folders that are passed over.
 
     Passed over is what lies in a folder and has an extension that no known format has; what is named is taken.
-    DataError for a file that is not there, and for a place without any file.
+    DataError for a folder or a pattern without any file; a name is taken as it is, whether or not it is there.
     """
     found, passed = dict[Path, None](), list[Path]()
     for place in places:
@@ -22,7 +22,7 @@ def found_files(places: Sequence[Path | str]) -> tuple[list[Path], list[Path]]:
             taken, left = _in_folder(path)
             found |= dict.fromkeys(taken)
             passed += left
-        elif path.exists():
+        elif path.exists() or not glob.has_magic(str(place)):
             found[path] = None
         else:
             found |= dict.fromkeys(_matching(str(place)))
@@ -47,6 +47,5 @@ def _matching(pattern: str) -> list[Path]:
     names = glob.glob(pattern, recursive=True)  # noqa: PTH207 - that of pathlib takes no absolute pattern
     found = sorted(path for path in map(Path, names) if path.is_file())
     if not found:
-        what = "no file matches this pattern" if glob.has_magic(pattern) else "there is no such file"
-        raise DataError(f"{pattern}: {what}")
+        raise DataError(f"{pattern}: no file matches this pattern")
     return found

@@ -115,4 +115,6 @@ def refusal(refused: Mapping[Path, str], n: int, *, stored: bool = False) -> str
     if len(refused) == n:
         return "\n".join([f"none of the {n} files can be used; nothing is stored", *lines])
     others = "the others are stored" if stored else "nothing is stored; --keep-going stores the others"
+    if len(lines) == 1:
+        return f"{lines[0]} (1 of {n} files; {others})"
     return "\n".join([f"{len(refused)} of {n} files cannot be used; {others}", *lines])

@@ -134,7 +134,6 @@ def test_a_second_response_of_the_same_file_is_another_test(shop: Shop, tmp_path
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["nowhere.csv"], "there is no such file"),
         (["*.nothing"], "no file matches this pattern"),
         (["empty"], "none of the 0 files in this folder is a recording"),
         (["x.csv", "--date-pattern", "%Q"], "--date-pattern '%Q': give it with %Y"),

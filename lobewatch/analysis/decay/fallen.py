@@ -30,7 +30,8 @@ def _tapped(row: Row, name: str) -> Tapped:
     """The temperature counts for the frequency alone: of the others nothing is known beforehand."""
     value: Estimate = getattr(row, name)
     warmth = row.conditions.temperature_c if name == "frequency" else None
-    return Tapped(row.time, value.value, 100 * value.std / value.value, math.nan if warmth is None else warmth)
+    error = 100 * value.std / value.value if math.isfinite(value.std) else math.nan
+    return Tapped(row.time, value.value, error, math.nan if warmth is None else warmth)
 
 
 def start(rows: Sequence[Row], name: str) -> Estimate:

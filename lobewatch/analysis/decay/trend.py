@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -90,7 +91,15 @@ class Trend:
 
 
 def trend_of(series: Sequence[Tapped], now: datetime, events: Sequence[datetime] = ()) -> Trend:
-    """Judge a series, oldest first, one value at least; an event after an alarm ends that alarm."""
+    """Judge a series, oldest first, one value at least; an event after an alarm ends that alarm.
+
+    Foretold from the day of `now` on; the same for all of a day.
+    """
+    return _trend(tuple(series), int(day(now)), tuple(events))
+
+
+@lru_cache(maxsize=1024)
+def _trend(series: tuple[Tapped, ...], today: int, events: tuple[datetime, ...]) -> Trend:
     points = _points(series)
     y = np.array([point.percent for point in points])
     warmth = np.array([point.temperature for point in points])
@@ -102,7 +111,7 @@ def trend_of(series: Sequence[Tapped], now: datetime, events: Sequence[datetime]
             break
         watched = sum(point.time < ended[0] for point in points)
     return Trend(
-        tuple(points), series[0].value, watched, found, watch(-y[watched:], warmth[watched:]), _forecast(points, now)
+        tuple(points), series[0].value, watched, found, watch(-y[watched:], warmth[watched:]), _forecast(points, today)
     )
 
 
@@ -132,12 +141,12 @@ def _point(series: Sequence[Tapped], group: Sequence[int]) -> Point:
     return Point(series[group[0]].time, float(middle), error, float(np.mean(warm)) if warm else math.nan, tuple(group))
 
 
-def _forecast(points: Sequence[Point], now: datetime) -> Forecast | None:
+def _forecast(points: Sequence[Point], today: int) -> Forecast | None:
     dates = np.array([day(point.time) for point in points])
     if dates.size < ENOUGH:
         return None
     y, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
-    return forecast(dates, y, day(now) + HORIZON_DAYS, warmth, day(now))
+    return forecast(dates, y, today + HORIZON_DAYS, warmth, today)
 
 
 def day(time: datetime) -> float:

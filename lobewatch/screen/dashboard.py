@@ -102,6 +102,7 @@ def _row(key: str, name: str, standing: Standing) -> dict[str, Any]:
         "series": worst.name if worst else "",
         "last_tap": standing.last_tap.isoformat() if standing.last_tap else "",
         "days_left": standing.days_left,
+        "reasons": reasons,
         "note": "; ".join(reasons),
         "next_step": standing.next_step,
     }

@@ -1,0 +1,46 @@
+"""lobewatch status."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lobewatch.machine.named_folder import named_folder
+from lobewatch.show.output import Json, emit, results
+
+
+def status(
+    folder: Annotated[
+        Path, typer.Argument(parser=named_folder, help="Machine folder, or a folder of machine folders.")
+    ],
+    due: Annotated[bool, typer.Option("--due", help="Only machines whose tap test is due.")] = False,
+    as_csv: Annotated[bool, typer.Option("--csv", help="A table with commas on stdout instead of text.")] = False,
+    as_json: Json = False,
+) -> None:
+    """How all machines of a folder stand, worst first: light, fall, why, what to do next, when to tap again.
+
+    Exit code 1 where one of them is on alarm, so that a scheduler can tell.
+
+    Examples:
+
+      lobewatch status mills
+      lobewatch status mills --due
+    """
+    from lobewatch.analysis import Light
+    from lobewatch.screen.dashboard import Board, find_machines
+    from lobewatch.show.plant.describe_plant import plant_csv, plant_table
+
+    if as_csv and as_json:
+        raise ValueError("--csv and --json: give one of them")
+    rows = Board(find_machines(folder)).rows()
+    shown = [row for row in rows if not due or row["days_left"] is None or row["days_left"] < 0]
+    if as_csv:
+        results.out(plant_csv(shown), end="", highlight=False)
+    else:
+        lights = [row["light"] for row in rows]
+        counted = ", ".join(f"{lights.count(light)} {light.value}" for light in Light if light in lights)
+        count = f"{len(rows)} machine{'s' if len(rows) > 1 else ''}: {counted}"
+        emit({"machines": shown}, as_json, plant_table(shown), count)
+    raise typer.Exit(int(any(row["light"] is Light.ALARM for row in rows)))

@@ -1,0 +1,1 @@
+"""Many machines at once: a line each, for people and as CSV."""

@@ -1,0 +1,78 @@
+"""All machines of a folder in a list."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import shutil
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from lobewatch.cli import app
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, ["status", *map(str, arguments)], catch_exceptions=False)
+
+
+@pytest.fixture
+def mills(shop: Shop, tmp_path: Path) -> Path:
+    """A good machine tapped just now, a worn one, one never tapped, one whose machine.toml is broken."""
+    shop.put("")
+    new, worn, good, bad = (tmp_path / "mills" / name for name in ("new", "worn", "good", "bad"))
+    shutil.copytree(shop.path, new)
+    shutil.copytree(shop.path, bad)
+    (bad / "machine.toml").write_text("x", "utf-8")
+    shop.tap_both(0.0)
+    shutil.copytree(shop.path, worn)
+    days = (datetime.now(UTC) - shop.start) / timedelta(days=1)
+    shop.tap_both(days - 0.2)
+    shutil.copytree(shop.path, good)
+    shop.path = worn
+    shop.tap_both(days - 0.3, 0.88)
+    return tmp_path / "mills"
+
+
+def test_the_worst_is_first_and_an_alarm_ends_with_1(mills: Path) -> None:
+    told = run(mills, "--json")
+    found = json.loads(told.stdout)["machines"]
+    assert told.exit_code == 1
+    assert [(one["key"], one["light"]) for one in found] == [
+        ("worn", "alarm"),
+        ("bad", "unknown"),
+        ("new", "unknown"),
+        ("good", "good"),
+    ]
+    assert found[0]["fall"] == pytest.approx(12.0, abs=0.01)
+    text = run(mills).stdout
+    assert "4 machines: 1 alarm, 2 unknown, 1 good" in text
+    assert text.index("worn") < text.index("bad") < text.index("new") < text.index("good ")
+
+
+def test_without_an_alarm_it_ends_with_0(mills: Path) -> None:
+    assert run(mills / "good").exit_code == 0
+
+
+def test_due_shows_those_to_be_tapped_alone(mills: Path) -> None:
+    rows = [*csv.DictReader(io.StringIO(run(mills, "--due", "--csv").stdout))]
+    assert [row["key"] for row in rows] == ["bad", "new"]
+    (mills / "good" / "machine.toml").write_text(
+        (mills / "good" / "machine.toml")
+        .read_text("utf-8")
+        .replace("tap_interval_days = 30", "tap_interval_days = 0.1"),
+        "utf-8",
+    )
+    assert "good" in run(mills, "--due").stdout
+
+
+def test_a_folder_without_machines_is_refused(tmp_path: Path) -> None:
+    told = CliRunner().invoke(app, ["status", str(tmp_path)])
+    assert "neither a machine folder nor a folder of them" in str(told.exception)

@@ -42,7 +42,7 @@ def test_every_command_and_option_stands_in_readme() -> None:
         assert f"lobewatch {name}" in README, name
         for option in options:
             assert not option.startswith("--") or f"`{option}" in README or f" {option}" in README, (name, option)
-    mentioned = set(re.findall(r"--[a-z][a-z-]+", re.sub(r"`pip [^`]*`", "", README)))
+    mentioned = set(re.findall(r"--[a-z][a-z0-9-]+", re.sub(r"`pip [^`]*`", "", README)))
     assert mentioned <= {"--debug", "--help"}.union(*known.values())
     assert set(re.findall(r"`lobewatch ([a-z]+)", README)) == {name.split()[0] for name in known}
 

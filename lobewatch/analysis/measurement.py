@@ -12,7 +12,7 @@ from threadpoolctl import threadpool_limits
 
 from acquisition import Remark, TapTest
 from dsm import Calibration, calibrate, modal_stiffness
-from lobewatch.analysis.questions.asked import frequency_jump, no_mode_in_band, other_band
+from lobewatch.analysis.questions.asked import frequency_jump, no_mode_in_band, other_band, stiffness_off_model
 from lobewatch.machine import Machine
 from modal import Believed, Mode, believed, fit_modes, follow, predominant
 
@@ -110,6 +110,9 @@ def _calibrate(
         return None
     doubt = _calibration_doubt(found, followed, last)
     remarks += [] if doubt is None else [doubt]
+    if doubt is None and last is None:
+        there = modal_stiffness(found.spindle, found.mode, machine.tap.position_mm / 1e3)
+        remarks += filter(None, [stiffness_off_model(followed, there)])
     return found if doubt is None else None
 
 

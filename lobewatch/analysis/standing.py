@@ -19,7 +19,7 @@ from lobewatch.analysis.estimate import Estimate
 from lobewatch.analysis.history import History, Row
 from lobewatch.analysis.programs.verdict import Word
 from lobewatch.analysis.questions.accepting import about_questions
-from lobewatch.analysis.questions.clock import about_future
+from lobewatch.analysis.questions.clock import CLOCK_QUESTIONS, about_future
 from lobewatch.machine import Machine
 
 
@@ -51,9 +51,8 @@ LIGHTS = {
     "no-mode-in-band": Light.WARN,
     "no-mode-to-follow": Light.WARN,
     "other-band": Light.WARN,
-    "clock-behind": Light.WARN,
-    "clock-before-release": Light.WARN,
-    "clock-ahead": Light.WARN,
+    "stiffness-off-model": Light.WARN,
+    **dict.fromkeys(CLOCK_QUESTIONS, Light.WARN),
     "tap-in-future": Light.WARN,
     "overdue": Light.WARN,
     "program-unknown": Light.WARN,

@@ -199,7 +199,9 @@ class Machine(Table, frozen=True):
     @property
     def settings_hash(self) -> str:
         """SHA-256 of all that decides what follows from a tap test but for the words on programs."""
-        return _hash("questions", self.mode, self.spindle, self.tool, self.tap.tool, self.tap.position_mm)
+        return _hash(
+            "questions, K against the model", self.mode, self.spindle, self.tool, self.tap.tool, self.tap.position_mm
+        )
 
     @property
     def program_hashes(self) -> dict[str, str]:

@@ -12,10 +12,15 @@ from lobewatch.analysis.questions.clock import CLOCK_QUESTIONS, about_clock
 from lobewatch.machine import Machine, TapEntry
 from modal import Mode
 
-QUESTIONS = ("frequency-jump", "no-mode-in-band", "other-band", "no-mode-to-follow", *CLOCK_QUESTIONS)
+ABOUT_MODES = ("frequency-jump", "no-mode-in-band", "other-band", "no-mode-to-follow", "stiffness-off-model")
+QUESTIONS = (*ABOUT_MODES, *CLOCK_QUESTIONS)
 """Codes of the remarks that ask a person: until each is accepted the test sets no reference, and nothing is good."""
 LARGEST_JUMP = 0.15
 """Relative change of the frequency against the newest test of the series that is asked about, up or down."""
+LARGEST_MISFIT = 4.0
+"""K of the first test of a series over that of the model there, or the inverse, above which it is asked about.
+
+A spindle as it stands is not twice as stiff as its drawing says; the smallest mistake of a unit is 4.4."""
 LEAST_COVERED = 0.9
 """Share of [mode] band_hz that a recording has to cover."""
 
@@ -28,6 +33,19 @@ def frequency_jump(last: Mode, now: Mode) -> Remark | None:
     text = f"f_n {now.frequency:.1f} Hz is {100 * change:+.0f} % off the newest test of the series"
     text += f" ({last.frequency:.1f} Hz): is this the machine, the tool and the direction it is said to be?"
     return Remark("frequency-jump", f"{now.frequency:.0f} Hz", text)
+
+
+def stiffness_off_model(first: Mode, model: float) -> Remark | None:
+    """Asks about the first test of a series whose mode is not one of this spindle; None where it may be.
+
+    model: stiffness (N/m) of the mode of the model that was calibrated to its frequency, where it was tapped.
+    """
+    ratio = first.stiffness / model
+    if 1 / LARGEST_MISFIT <= ratio <= LARGEST_MISFIT:
+        return None
+    text = f"K {first.stiffness / 1e6:.3g} N/um is {ratio:.2g} times that of the model, {model / 1e6:.3g} N/um"
+    text += ": is this the machine of [spindle], are the sensitivities of hammer and accelerometer right?"
+    return Remark("stiffness-off-model", f"{first.frequency:.0f} Hz", text)
 
 
 def no_mode_in_band(modes: Sequence[Mode], machine: Machine) -> Remark:

@@ -91,6 +91,25 @@ def test_a_beam_is_stored_and_never_the_baseline_of_a_mill(shop: Shop, beam: Pat
     assert words(shop) == {Word.STABLE}
 
 
+def test_a_beam_with_a_mode_in_the_band_is_never_silently_the_first_tap(shop: Shop, beam: Path) -> None:
+    said = run("replay", shop.path, beam, "--date", "2026-01-10")
+    assert "question (stiffness-off-model): K 304 N/um is 8.5 times that of the model, 35.9 N/um" in said.stdout
+    shop.tap_both()
+    found = standing(shop)
+    assert (found.light, codes(found)) == ("warn", ["stiffness-off-model"])
+    series = found.series_of("reference", "x")
+    assert series is not None
+    assert series.is_first
+
+
+@pytest.mark.parametrize(("ratio", "asked"), [(1 / 5, True), (1 / 3, False), (3.0, False), (5.0, True)])
+def test_k_of_the_first_tap_is_compared_with_the_model(shop: Shop, ratio: float, asked: bool) -> None:
+    shop.tap(0, 1713.0, stiffness=3.23e7 * ratio)
+    shop.tap(30, 1713.0, stiffness=3.23e7 * ratio)
+    rows = shop.logbook.history.rows
+    assert ["stiffness-off-model" in [one.code for one in row.questions] for row in rows] == [asked, asked]
+
+
 def test_a_beam_between_the_taps_of_a_mill_is_asked_about(shop: Shop, beam: Path) -> None:
     shop.edit("band_hz", "# band_hz")
     shop.tap_both()

@@ -41,8 +41,12 @@ Pair = tuple[Channel, Channel]
 
 @pytest.fixture
 def folder(tmp_path: Path) -> MachineFolder:
+    """Without a model, which would be asked about at these stiffnesses."""
     make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
-    return MachineFolder(tmp_path / "m")
+    found = MachineFolder(tmp_path / "m")
+    text = found.toml.read_text("utf-8")
+    found.toml.write_text(text[: text.index("\n[spindle]\n")], "utf-8")
+    return found
 
 
 def tapped(

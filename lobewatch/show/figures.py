@@ -6,7 +6,8 @@ import io
 from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from textwrap import shorten
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -26,6 +27,7 @@ THEN = "#777777"
 ALARM = "#D55E00"
 GOOD = "#009E73"
 UNKNOWN = "#767676"
+EVENT = "#555555"
 STYLE: dict[Any, Any] = {
     "font.size": 10,
     "axes.grid": True,
@@ -37,6 +39,18 @@ STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "text.parse_math": False,
 }
+
+
+class Marks(NamedTuple):
+    """What stands beside a trend."""
+
+    events: Sequence[tuple[datetime, str]] = ()
+    """What was done, and when."""
+    hollow: Sequence[tuple[datetime, float]] = ()
+    """Values that do not count."""
+
+
+NOTHING_ELSE = Marks()
 
 
 def save_figure(figure: Figure, path: Path) -> None:
@@ -99,6 +113,7 @@ def trend_figure(
     stds: NDArray[np.float64],
     label: str,
     limits: Limits | None = None,
+    marks: Marks = NOTHING_ELSE,
 ) -> Figure:
     """A value over time with its 95 % interval; with limits, where its fall calls for attention."""
     figure, (axes,) = new_axes(1, (8.0, 2.8))
@@ -116,12 +131,26 @@ def trend_figure(
             )
     if len(days) == 1:
         axes.set_xlim(days[0] - 15, days[0] + 15)
+    _add_marks(axes, marks)
     locator = AutoDateLocator()
     axes.xaxis.set_major_locator(locator)
     axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
     axes.set(ylabel=label)
     axes.margins(y=0.12)
     return figure
+
+
+def _add_marks(axes: Axes, marks: Marks) -> None:
+    if marks.hollow:
+        days = date2num([time for time, _ in marks.hollow])
+        axes.plot(days, [value for _, value in marks.hollow], "o", ms=5, mfc="none", mec=NOW)
+    for time, text in marks.events:
+        day = date2num(time)
+        axes.axvline(day, color=EVENT, ls=":", lw=1)
+        place: dict[str, Any] = {"xytext": (2, 2), "textcoords": "offset points", "rotation": 90, "fontsize": 8}
+        axes.annotate(
+            shorten(text, 26, placeholder="…"), (day, 0), xycoords=("data", "axes fraction"), va="bottom", **place
+        )
 
 
 def new_axes(rows: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import jinja2
 import numpy as np
@@ -28,8 +28,9 @@ from lobewatch.analysis.decay.fallen import change_since_start, start
 from lobewatch.analysis.programs.limit_band import limit_band
 from lobewatch.machine import Machine
 from lobewatch.show.advice import Advised, advised, advised_lines, decay_text
-from lobewatch.show.figures import frf_figure, svg, trend_figure
+from lobewatch.show.figures import frf_figure, svg
 from lobewatch.show.figures_lobes import lobes_figure
+from lobewatch.show.history.trends import Picture, trends
 from lobewatch.show.history.under import conditions_texts
 from lobewatch.show.programs.doubts import reading_lines
 from lobewatch.show.verdicts import WORDS, band_text, limit_text, margin_text, turning_text, verdict_text
@@ -42,15 +43,6 @@ CHANGES = (
     ("bearing_stiffness", "bearing stiffness (N/µm)", 1e6),
 )
 """Field of a row, what the table calls it, and the size of its unit."""
-
-
-class Picture(NamedTuple):
-    """A section of the report."""
-
-    heading: str
-    text: str
-    """A sentence below the heading."""
-    svg: str
 
 
 def write_report(logbook: Logbook, path: Path | None = None, tool: str = "", direction: str = "") -> Path:
@@ -90,6 +82,7 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
     entries = {entry.id: entry for entry in logbook.taps}
     now = logbook.folder.read(entries[last.tap_id])
     assembly = logbook.assembly(last.tool)
+    course = trends(logbook, rows)
     programs = [advised(logbook, verdict) for verdict in logbook.verdicts()]
     checked = [one.verdict for one in programs if one.verdict.word is not Word.UNKNOWN]
     return {
@@ -116,9 +109,10 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
         "averages": now.frf.n_averages,
         "figures": [
             *_lobes(logbook, assembly, programs),
-            *_trends(rows, machine),
+            *course.pictures,
             _response(logbook.folder.read(entries[rows[0].tap_id]).frf if len(rows) > 1 else None, now.frf, machine),
         ],
+        "happened": course.happened,
         "limits": machine.limits,
     }
 
@@ -159,23 +153,6 @@ def _lobes(logbook: Logbook, assembly: Assembly, programs: Sequence[Advised]) ->
     marks = [one.verdict for one in same]
     picture = lobes_figure(now.speed_rpm, depths | {assembly.label: now.depth}, marks, "", band, list(advice))
     return [Picture("Stability lobes, then and now" if depths else "Stability lobes", text, svg(picture))]
-
-
-def _trends(rows: Sequence[Row], machine: Machine) -> list[Picture]:
-    """Values over time, where they are known."""
-    found = []
-    for name, heading, unit, scale, text in (
-        ("frequency", "Natural frequency", "Hz", 1.0, "Bars: 95 % interval of each tap alone."),
-        ("bearing_stiffness", "Bearing stiffness", "N/µm", 1e6, "Equivalent stiffness of each bearing in the model."),
-    ):
-        known = [(row.time, getattr(row, name)) for row in rows if getattr(row, name).is_known]
-        if known:
-            values, stds = np.array([estimate for _, estimate in known]).T / scale
-            limits = machine.limits if name == "frequency" else None
-            times = [time for time, _ in known]
-            figure = trend_figure(times, values, stds, f"{heading.lower()} ({unit})", limits)
-            found.append(Picture(heading, text, svg(figure)))
-    return found
 
 
 def _response(first: Frf | None, now: Frf, machine: Machine) -> Picture:

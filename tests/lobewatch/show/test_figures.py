@@ -7,11 +7,12 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
+from matplotlib.dates import date2num
 
 from acquisition import Frf
 from lobewatch.analysis import Verdict, Word
 from lobewatch.machine import Limits, ProgramTable
-from lobewatch.show.figures import frf_figure, new_axes, svg, trend_figure
+from lobewatch.show.figures import Marks, frf_figure, new_axes, svg, trend_figure
 from lobewatch.show.figures_lobes import lobes_figure
 
 TIMES = [datetime(2026, month, 1, tzinfo=UTC) for month in (1, 2, 3)]
@@ -30,6 +31,16 @@ def test_bars_are_the_95_percent_interval() -> None:
     assert isinstance(bars, LineCollection)
     ((low, high),) = [np.asarray(segment)[:, 1] for segment in bars.get_segments()]
     assert (low, high) == pytest.approx((1700 - 3.92, 1700 + 3.92))
+
+
+def test_events_are_lines_with_their_text_and_what_does_not_count_is_hollow() -> None:
+    marks = Marks([(TIMES[1], "bearings greased with the new grease of the maker")], [(TIMES[2], 1600.0)])
+    figure = trend_figure(TIMES, np.full(3, 1700.0), np.full(3, 0.5), "f", None, marks)
+    *_, hollow, event = figure.axes[0].lines
+    assert hollow.get_markerfacecolor() == "none"
+    assert np.asarray(hollow.get_xydata()).tolist() == [[date2num(TIMES[2]), 1600.0]]
+    assert np.asarray(event.get_xdata())[0] == date2num(TIMES[1])
+    assert "bearings greased with the…" in [text.get_text() for text in figure.axes[0].texts]
 
 
 def chattering(name: str) -> Verdict:

@@ -73,6 +73,8 @@ class Row:
     """The first tap test of those that it is compared with: of one tool with one stick-out in one state."""
     conditions: Conditions = UNSAID
     """What it was taken under."""
+    software: str = ""
+    """Name and version of the program that made the row."""
 
     @cached_property
     def questions(self) -> tuple[Remark, ...]:
@@ -100,6 +102,8 @@ class History:
     """One a measurement."""
     baseline: datetime | None = None
     """The newest event from which on all comparing begins anew."""
+    kept: tuple[Row, ...] = ()
+    """Of tap tests whose files cannot be used now, as they were worked out before; they count for nothing."""
 
     @property
     def current(self) -> list[Row]:

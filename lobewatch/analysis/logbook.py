@@ -13,6 +13,7 @@ from acquisition import UNSAID, Conditions, Description, Remark, TapTest
 from lobewatch.analysis.assembling import first_like, or_reason, predicted
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.cache.history_cache import HistoryCache
+from lobewatch.analysis.cache.kept_rows import of_older_versions
 from lobewatch.analysis.cache.worked_out import WorkedOut
 from lobewatch.analysis.damage.usable import Result, UsableTaps
 from lobewatch.analysis.history import History, without_last_word
@@ -59,7 +60,7 @@ class Logbook:
     @property
     def remarks(self) -> list[Remark]:
         """What is to be said of the files themselves."""
-        return [*self.files.remarks, *self._said]
+        return [*self.files.remarks, *self._said, *of_older_versions(self._history)]
 
     @property
     def is_current(self) -> bool:
@@ -219,8 +220,9 @@ class Logbook:
 
     def _up_to_date(self) -> History:
         """The stored rows as far as they still hold, and those that are missing."""
-        history = self._cache.read(self.files.places, self.files.baseline)
-        rows = self._all.with_all(history.rows)
+        lost = {entry.id for entry in self.files.lost}
+        history = self._cache.read(self.files.places, self.files.baseline, lost)
+        rows = self._all.with_all(history.rows, self._cache.others)
         history = replace(history, rows=rows)
         return without_last_word(history) if rows and self.files.doubts() else history
 

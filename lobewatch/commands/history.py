@@ -43,5 +43,6 @@ def history(
         results.out(history_csv(logbook), end="", highlight=False)
     else:
         emit(history_json(logbook), as_json, *history_lines(logbook))
-    for remark in logbook.remarks:
+    kept = [remark for row in logbook.history.kept for remark in row.remarks if remark.code == "row-kept"]
+    for remark in (*logbook.remarks, *kept):
         notes.print(f"note: {remark}", markup=False)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from itertools import takewhile
 
 from acquisition import Remark
+from lobewatch.analysis.cache.kept_rows import kept_aside
 from lobewatch.analysis.columns.stored_row import packed, unpacked
 from lobewatch.analysis.history import History, Row, empty_history
 from lobewatch.analysis.order import Place
@@ -17,6 +18,8 @@ from lobewatch.machine.archive.rows import add_rows, read_rows, write_rows
 
 MOST_DEAD = 1_000_000
 """Bytes of rows that later ones stand for, beyond as many as count, above which the file is written anew."""
+ASIDE = -1
+"""Number of rows that are kept beside the history."""
 
 
 class HistoryCache:
@@ -27,17 +30,27 @@ class HistoryCache:
         self._folder = folder
         self._rows: list[Row] = []
         self._packed: list[bytes] = []
+        self._others: dict[str, Row] = {}
+        self._aside: list[bytes] = []
         self._size = self._length = 0
 
-    def read(self, places: Sequence[Place], baseline: datetime | None) -> History:
+    @property
+    def others(self) -> Mapping[str, Row]:
+        """What was read beside the rows of these settings and this version, by tap test."""
+        return self._others
+
+    def read(self, places: Sequence[Place], baseline: datetime | None, lost: Collection[str] = ()) -> History:
         """The rows of the oldest taps on, as far as they were made with these settings and this version.
 
-        baseline: the newest one.
+        baseline: the newest one; lost: tap tests whose files cannot be used, what is known of them is kept.
         """
         empty = replace(empty_history(self._folder.machine), baseline=baseline)
         self._read(_head(empty))
         pairs = zip(self._rows, places, strict=False)
-        return replace(empty, rows=tuple(row for row, _ in takewhile(lambda pair: _is_of(*pair), pairs)))
+        known = {row.tap_id: row for row in self._rows} | self._others if lost else {}
+        kept = tuple(kept_aside(known[tap_id], empty.software) for tap_id in known if tap_id in lost)
+        valid = tuple(row for row, _ in takewhile(lambda pair: _is_of(*pair), pairs))
+        return replace(empty, rows=valid, kept=kept)
 
     def store(self, history: History) -> list[Remark]:
         """What is new of it, under the lock where that can be had at once; else say so."""
@@ -51,16 +64,23 @@ class HistoryCache:
 
     def _read(self, head: bytes) -> None:
         self._rows, self._packed, self._size, self._length = [], [], 0, 0
+        self._others, self._aside, hashes = {}, [], self._folder.machine.program_hashes
         try:
             found = read_rows(self._folder.history)
-            for content in found.rows[1:] if found.rows[:1] == (head,) else ():
-                number, row = unpacked(content, self._folder.machine.program_hashes)
-                self._rows[number : number + 1] = [row]
-                self._packed[number : number + 1] = [content]
+            is_own = found.rows[:1] == (head,)
+            software = "" if is_own else b"".join(found.rows[:1]).decode().partition(" ")[2]
+            for content in found.rows[1:]:
+                number, row = unpacked(content, hashes, software)
+                if number < 0 or not is_own:
+                    self._others[row.tap_id] = row
+                    self._aside.append(content)
+                else:
+                    self._rows[number : number + 1] = [row]
+                    self._packed[number : number + 1] = [content]
         except (ValueError, OSError):
-            self._rows, self._packed = [], []
+            self._rows, self._packed, self._others = [], [], {}
         else:
-            self._size, self._length = found.size if found.rows[:1] == (head,) else 0, found.length
+            self._size, self._length = found.size if is_own else 0, found.length
 
     def _store(self, history: History) -> None:
         path, hashes = self._folder.history, self._folder.machine.program_hashes
@@ -71,16 +91,19 @@ class HistoryCache:
             for n, row in enumerate(history.rows)
         ]
         fresh = [content for n, content in enumerate(contents) if self._packed[n : n + 1] != [content]]
+        aside = [packed(ASIDE, row, hashes) for row in history.kept]
         most = 2 * sum(map(len, contents)) + MOST_DEAD
         if (
             self._size
+            and aside == self._aside
             and path.exists()
             and self._size + sum(map(len, fresh)) < most
             and contents[len(self._packed) - 1 :]
         ):
             self._length = add_rows(path, self._size, fresh) if fresh else self._length
         else:
-            self._length = write_rows(path, [_head(history), *contents])
+            self._length = write_rows(path, [_head(history), *contents, *aside])
+        self._aside = aside
         self._rows, self._packed, self._size = list(history.rows), contents, self._length
 
 

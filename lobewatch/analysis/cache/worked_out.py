@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from lobewatch.analysis.assembling import Followed, tapped
 from lobewatch.analysis.assembly import Assembly
+from lobewatch.analysis.cache.kept_rows import kept_in_place
 from lobewatch.analysis.history import Row, row_of
 from lobewatch.analysis.measurement import Measurement, measure
 from lobewatch.analysis.order import Place, earlier
 from lobewatch.analysis.questions.asked import answered
-from lobewatch.machine import MachineFolder
+from lobewatch.machine import DamagedTapError, MachineFolder
 
 KEPT = 500
 """Measurements kept in memory, those asked for last."""
@@ -45,10 +46,20 @@ class WorkedOut:
         points = self._followed.before(place, rows)
         return tapped(place, self._places, points, lambda one: self.measured(one, rows))
 
-    def with_all(self, rows: Sequence[Row]) -> tuple[Row, ...]:
-        """These rows, and those of all tap tests after them."""
+    def with_all(self, rows: Sequence[Row], others: Mapping[str, Row]) -> tuple[Row, ...]:
+        """These rows, and those of all tap tests after them.
+
+        others: rows of older versions by tap test, for those that cannot be worked out anew.
+        """
         found = list(rows)
         for place in self._places[len(found) :]:
-            assembly = self.assembled(place, found)
-            found.append(row_of(self.measured(place, found), assembly, place))
+            try:
+                assembly = self.assembled(place, found)
+                found.append(row_of(self.measured(place, found), assembly, place))
+            except DamagedTapError:
+                raise
+            except (ArithmeticError, LookupError, ValueError) as error:
+                if place.entry.id not in others:
+                    raise
+                found.append(kept_in_place(others[place.entry.id], place, error))
         return tuple(found)

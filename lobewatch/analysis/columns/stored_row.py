@@ -37,6 +37,7 @@ class Stored(msgspec.Struct, array_like=True, gc=False):
     y: tuple[Values, ...]
     remarks: tuple[Remark, ...]
     rulings: dict[str, tuple[str, Ruling]]
+    software: str = ""
 
 
 PLAIN = tuple(
@@ -47,7 +48,7 @@ _encode, _decode = msgspec.msgpack.Encoder().encode, msgspec.msgpack.Decoder(Sto
 
 
 def packed(number: int, row: Row, hashes: Mapping[str, str]) -> bytes:
-    """A row at a place from 0 on; hashes: of the programs of machine.toml, by name."""
+    """A row at a place from 0 on, -1 for one that has none; hashes: of the programs of machine.toml, by name."""
     baseline = row.baseline.isoformat() if row.baseline else ""
     rulings = {name: (hashes[name], ruling) for name, ruling in (row.rulings or {}).items()}
     plain = {name: getattr(row, name) for name in PLAIN}
@@ -55,8 +56,11 @@ def packed(number: int, row: Row, hashes: Mapping[str, str]) -> bytes:
     return _encode(Stored(number=number, time=row.time.isoformat(), **others, **plain))
 
 
-def unpacked(content: bytes, hashes: Mapping[str, str]) -> tuple[int, Row]:
-    """Place and row, without rulings on programs that have changed since; ValueError where it is of another make."""
+def unpacked(content: bytes, hashes: Mapping[str, str], software: str = "") -> tuple[int, Row]:
+    """Place and row, without rulings on programs that have changed since; ValueError where it is of another make.
+
+    software: that made a row which does not say so itself; empty for this version.
+    """
     one = _decode(content)
     rulings = {name: ruling for name, (made, ruling) in one.rulings.items() if hashes.get(name) == made}
     return one.number, Row(
@@ -76,6 +80,7 @@ def unpacked(content: bytes, hashes: Mapping[str, str]) -> tuple[int, Row]:
         x=one.x,
         y=one.y,
         rulings=rulings if rulings or not hashes else None,
+        software=one.software or software,
         series=one.series,
         conditions=Conditions.of(one.conditions) if one.conditions else UNSAID,
         baseline=datetime.fromisoformat(one.baseline) if one.baseline else None,

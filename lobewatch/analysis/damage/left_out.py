@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from lobewatch.analysis.assembly import assemble
 from lobewatch.analysis.history import Row, row_of
 from lobewatch.analysis.measurement import measure
 from lobewatch.analysis.order import Place
@@ -27,5 +28,5 @@ def left_out(folder: MachineFolder, excluded: Sequence[TapEntry], rows: Sequence
         if baseline is None or time >= baseline:
             before = [row.mode for row in rows if row.time < time and row.mode is not None]
             said = measure(tap, folder.machine, before[-1] if before else None)
-            found.append(row_of(said, {}, said.remarks, Place(0, entry, None, None, baseline)))
+            found.append(row_of(said, assemble(said, None, {}), Place(0, entry, None, None, baseline)))
     return found

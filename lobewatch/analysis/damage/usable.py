@@ -85,6 +85,12 @@ class UsableTaps:
         return [tap for tap in self._all.taps if tap.excluded]
 
     @property
+    def lost(self) -> Sequence[TapEntry]:
+        """Those whose files cannot be used, but for those that a person has taken out."""
+        found = [*self._all.lost, *(entry for entry, _ in self._left_out.values())]
+        return [entry for entry in found if not entry.excluded]
+
+    @property
     def baseline(self) -> datetime | None:
         """The newest event from which on all comparing begins anew."""
         return max(self._all.baselines, default=None)
@@ -109,8 +115,7 @@ class UsableTaps:
     def doubts(self, tool: str = "") -> tuple[Remark, ...]:
         """Damaged ones (of a tool; "": of any) that are newer than all of their series that can be used."""
         known = {_series(place.entry): _time(place.entry) for place in self.places}
-        lost = [*self._all.lost, *(entry for entry, _ in self._left_out.values())]
-        lost = [one for one in lost if not one.excluded and _time(one) >= (self.baseline or BEFORE_ALL)]
+        lost = [one for one in self.lost if _time(one) >= (self.baseline or BEFORE_ALL)]
         newer = [one for one in lost if tool in ("", one.tool) and _time(one) > known.get(_series(one), BEFORE_ALL)]
         text = "newer than all of its tool and direction that can be used, but its file is damaged"
         return tuple(Remark("newest-damaged", f"tap test {one.id}", text, "tap again") for one in newer)

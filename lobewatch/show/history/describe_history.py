@@ -38,10 +38,11 @@ def event_json(event: Event) -> dict[str, Any]:
 
 
 def history_json(logbook: Logbook) -> dict[str, Any]:
-    """All of it; an excluded tap test has no values."""
+    """All of it; an excluded tap test has no values, those of one that is kept count for nothing."""
     return {
         "machine": logbook.machine.machine.name,
         "taps": [_tap_json(row, logbook) for row in logbook.history.rows],
+        "kept": [_tap_json(row, logbook) for row in logbook.history.kept],
         "excluded": [_excluded_json(tap) for tap in logbook.files.excluded],
         "events": [event_json(event) for event in logbook.files.events],
     }
@@ -82,7 +83,8 @@ def _lines(logbook: Logbook) -> list[dict[str, Any]]:
     found = history_json(logbook)
     events = [one | {"kind": "new baseline" if one["new_baseline"] else "event"} for one in found["events"]]
     excluded = [one | {"kind": "excluded"} for one in found["excluded"]]
-    return sorted([*events, *excluded, *(one | {"kind": "tap"} for one in found["taps"])], key=lambda one: one["time"])
+    taps = [one | {"kind": kind} for kind, name in (("tap", "taps"), ("kept", "kept")) for one in found[name]]
+    return sorted([*events, *excluded, *taps], key=lambda one: one["time"])
 
 
 def _tap_json(row: Row, logbook: Logbook) -> dict[str, Any]:
@@ -91,6 +93,7 @@ def _tap_json(row: Row, logbook: Logbook) -> dict[str, Any]:
         found[name], found[f"{name}_std"] = getattr(row, own)
     found["baseline"] = None if row.baseline is None else _utc(row.baseline)
     found["series"], found["conditions"] = row.series, row.conditions.known
+    found["software"] = row.software or logbook.history.software
     found["questions"] = [one.code for one in row.questions]
     words = row.rulings or {}
     found["verdicts"] = {p.name: words[p.name].word.value for p in logbook.machine.program if p.name in words}

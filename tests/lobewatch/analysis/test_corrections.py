@@ -109,7 +109,7 @@ def test_without_an_excluded_tap_all_is_as_if_it_had_never_been(shop: Shop, tmp_
         assert [getattr(row, name) for name in columns] == [getattr(same, name) for name in columns]
     shown = r"<h2>(What was done|Natural frequency|Bearing stiffness).*?(?=<h2>)"  # where it is told, or drawn hollow
     pages = [re.sub(shown, "", render_report(one, "reference", "x"), flags=re.DOTALL) for one in (mine, never)]
-    assert pages[0] == pages[1]
+    assert pages[0].split() == pages[1].split()
     include(shop.folder, out)
     assert shop.logbook.standing(at) == before
 
@@ -172,7 +172,7 @@ def test_an_old_recording_is_stored_beside_a_new_baseline(shop: Shop, beam: Path
 
 
 def test_the_report_tells_and_draws_events_and_tests_that_do_not_count(shop: Shop) -> None:
-    for month, frequency in enumerate((1713.0, 1650.0, 900.0, 1712.0)):
+    for month, frequency in enumerate((1713.0, 1650.0, 1300.0, 1712.0)):
         shop.tap(30 * month, frequency)
     for tap in shop.folder.taps()[1:3]:
         exclude(shop.folder, tap.id, "not clamped")
@@ -184,7 +184,7 @@ def test_the_report_tells_and_draws_events_and_tests_that_do_not_count(shop: Sho
         "door mended",
         "tap test excluded (not clamped), f_n 1650.0 Hz",
         "belt changed",
-        "tap test excluded (not clamped), f_n 900.0 Hz",
+        "tap test excluded (not clamped), f_n 1300.0 Hz",
     ]
     trend = page[page.index("<h2>Natural frequency") : page.index("<h2>Bearing stiffness")]
     assert "Dotted lines: what was done. Hollow: tests that do not count." in trend

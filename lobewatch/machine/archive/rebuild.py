@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from filelock import FileLock, Timeout
 
@@ -21,6 +22,10 @@ from lobewatch.machine.known_devices import read_known_devices
 
 ASIDE = "damaged"
 """Folder of what was put out of the way."""
+ENTER_AGAIN = (
+    "events, exclusions and accepted questions that stood there are lost: enter them again "
+    "(lobewatch event, exclude, replay --accept)"
+)
 
 
 def rebuild_files(path: Path) -> list[str]:
@@ -39,6 +44,7 @@ def rebuild_files(path: Path) -> list[str]:
         if reading.damage or (fresh and not reading.lines):
             journal.rewrite([*reading.entries, *(entry.line for entry in fresh)])
             told.append(f"{JOURNAL}: written anew with {len(reading.entries) + len(fresh)} lines")
+            told += _lost_lines(reading.entries, len(fresh))
         else:
             for entry in fresh:
                 journal.append(entry.line)
@@ -46,6 +52,18 @@ def rebuild_files(path: Path) -> list[str]:
         told += _go_on_without(path, journal)
         told += [*_machine_file(path), *_devices(path)]
     return told
+
+
+def _lost_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) -> Iterator[str]:
+    """What no copy of the journal tells any more; n_fresh: tap tests that were entered anew in place of their lines."""
+    if not entries:
+        yield f"{JOURNAL}: nothing of it or of its copy could be read; {ENTER_AGAIN}"
+        return
+    numbers = {entry["number"] for entry in entries if "number" in entry}
+    first = sum("number" not in entry for entry in entries) + 1  # lines of old versions
+    missing = sorted(set(range(first, max(numbers, default=0))) - numbers)
+    if len(missing) > n_fresh:
+        yield f"{JOURNAL}: of lines {', '.join(map(str, missing))} neither copy is sound; {ENTER_AGAIN}"
 
 
 @contextlib.contextmanager

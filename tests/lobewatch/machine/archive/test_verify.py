@@ -8,6 +8,7 @@ import shlex
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import msgspec
@@ -15,13 +16,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from acquisition import Hit, HitFlags, SourceFile, TapTest, Trigger, write_hit
+from acquisition import Circumstances, Hit, HitFlags, Remark, SourceFile, TapTest, Trigger, write_hit
 from lobewatch.cli import app
 from lobewatch.machine.archive.rebuild import rebuild_files
 from lobewatch.machine.archive.rows import read_rows, write_rows
 from lobewatch.machine.archive.verify import Verified, verify
+from lobewatch.machine.corrections.correct import add_event, exclude
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import KnownDevice
+from lobewatch.tap.in_progress import begin_tap
 from lobewatch.tap.spool import write_set_up
 
 MakeTap = Callable[..., TapTest]
@@ -101,6 +104,49 @@ def test_damage_is_named_and_what_is_said_to_mend_it_does(what: str, folder: Mac
     assert rebuild_files(folder.path) == []
 
 
+def test_rebuild_says_which_corrections_no_copy_tells_any_more(folder: MachineFolder) -> None:
+    add_event(folder, "belt changed")
+    exclude(folder, "tap_1", "wrong tool")
+    for name in ("journal.jsonl", "journal.copy.jsonl"):
+        lines = (folder.path / name).read_bytes().splitlines(keepends=True)
+        (folder.path / name).write_bytes(b"".join([*lines[:3], b"?" + lines[3], *lines[4:]]))
+    told = " ".join(rebuild_files(folder.path))
+    assert "of lines 4 neither copy is sound; events, exclusions and accepted questions that stood there" in told
+    assert MachineFolder(folder.path).contents().events == ()
+    assert [entry.excluded for entry in MachineFolder(folder.path).taps()] == ["", "wrong tool", ""]
+    remove_journals(folder)
+    assert "nothing of it or of its copy could be read" in " ".join(rebuild_files(folder.path))
+    assert [entry.id for entry in MachineFolder(folder.path).taps()] == NAMES
+
+
+def test_one_sound_copy_has_all_corrections(folder: MachineFolder) -> None:
+    add_event(folder, "belt changed")
+    exclude(folder, "tap_1", "wrong tool")
+    folder.journal.path.write_bytes(folder.journal.path.read_bytes()[:100])
+    assert not any("enter them again" in one for one in rebuild_files(folder.path))
+    assert [event.text for event in MachineFolder(folder.path).contents().events] == ["belt changed"]
+    assert [entry.excluded for entry in MachineFolder(folder.path).taps()] == ["", "wrong tool", ""]
+
+
+def copied(folder: MachineFolder, early: list[str], target: Path, write: Callable[[], object]) -> None:
+    """A copy of the folder, these files of it from before a writing, all others from after."""
+    before = {name: (folder.path / name).read_bytes() for name in early}
+    write()
+    shutil.copytree(folder.path, target)
+    for name, content in before.items():
+        (target / name).write_bytes(content)
+
+
+@pytest.mark.parametrize("early", [["journal.jsonl"], ["journal.copy.jsonl"], ["journal.jsonl", "journal.copy.jsonl"]])
+def test_a_folder_copied_while_a_test_is_saved_is_named_and_mended(
+    early: list[str], folder: MachineFolder, make_tap: MakeTap, tmp_path: Path
+) -> None:
+    copied(folder, early, tmp_path / "copy", lambda: folder.commit(replace(make_tap(3), id="tap_3")))
+    rebuild_files(tmp_path / "copy")
+    assert verify(tmp_path / "copy").damage == ()
+    assert [entry.id for entry in MachineFolder(tmp_path / "copy").taps()] == [*NAMES, "tap_3"]
+
+
 def test_a_lost_tap_put_back_from_a_backup_counts_again(folder: MachineFolder) -> None:
     content = file(folder, 1).read_bytes()
     file(folder, 1).unlink()
@@ -178,6 +224,32 @@ def damaged_somewhere(folder: MachineFolder, chance: random.Random) -> str:
     return path.name
 
 
+def moved_somewhere(folder: MachineFolder, chance: random.Random) -> str:
+    """One file deleted, swapped with another of its folder, or there twice; its name, of a second one that of this."""
+    files = sorted(path for path in folder.path.rglob("*") if path.is_file() and path.name != ".lock")
+    path = chance.choice(files)
+    how = chance.choice(("delete", "swap", "duplicate"))
+    if how == "delete":
+        path.unlink()
+    elif how == "swap":
+        swap(path, chance.choice([other for other in files if other.parent == path.parent]))
+    else:
+        path = Path(shutil.copy(path, path.with_stem(f"{path.stem}_{chance.randrange(10)}")))
+    return path.name
+
+
+def mend(folder: Path, remark: Remark) -> None:
+    """Do what is said."""
+    if "move it away" in remark.cure:
+        (folder / "machine.toml").rename(folder / "machine.toml.old")
+    if "delete this file" in remark.cure + remark.text:
+        (folder / remark.about).unlink()
+    elif "lobewatch rebuild" in remark.cure:
+        rebuild_files(folder)
+    elif "lobewatch tap" in remark.cure:
+        begin_tap(MachineFolder(folder), Circumstances("m", datetime.now(UTC), "reference"))
+
+
 def is_harmless(folder: MachineFolder, results: list[bytes]) -> bool:
     return results_of(folder) == results
 
@@ -202,16 +274,22 @@ def results_of(folder: MachineFolder) -> list[bytes]:
     return [*(found.read(entry).frf.receptance.tobytes() for entry in taps), found.toml.read_bytes()]
 
 
-def one_round(pristine: Path, work: Path, seed: int) -> str:
-    """Damage a copy; "named" or "harmless", else what went wrong."""
+def one_round(
+    pristine: Path, work: Path, seed: int, harm: Callable[[MachineFolder, random.Random], str] = damaged_somewhere
+) -> str:
+    """Damage a copy, and mend it as is said; "named" or "harmless", else what went wrong."""
     shutil.rmtree(work, ignore_errors=True)
     shutil.copytree(pristine, work)
     folder = MachineFolder(work)
     results = results_of(folder)
-    name = damaged_somewhere(folder, random.Random(seed))
+    name = harm(folder, random.Random(seed))
     found: Verified = verify(work)
     if any(name in remark.about for remark in found.remarks):
-        return "named"
+        for remark in found.damage:
+            if remark.about in {one.about for one in verify(work).damage}:
+                mend(work, remark)
+        left = verify(work).damage
+        return f"not mended: {name}, seed {seed}: {left}" if left else "named"
     return "harmless" if is_harmless(folder, results) else f"silent: {name}, seed {seed}"
 
 
@@ -236,6 +314,19 @@ def test_flips_and_cuts_are_named_or_harmless(full: Path, tmp_path: Path) -> Non
     found = [one_round(full, tmp_path / "work", seed) for seed in range(30)]
     assert set(found) <= {"named", "harmless"}
     assert found.count("named") >= 27
+
+
+def test_deletions_swaps_and_copies_are_named_or_harmless(full: Path, tmp_path: Path) -> None:
+    found = [one_round(full, tmp_path / "work", seed, moved_somewhere) for seed in range(12)]
+    assert set(found) <= {"named", "harmless"}
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3600)
+def test_three_hundred_deletions_swaps_and_copies_are_named_or_harmless(full: Path, tmp_path: Path) -> None:
+    found = [one_round(full, tmp_path / "work", seed, moved_somewhere) for seed in range(300)]
+    assert set(found) <= {"named", "harmless"}
+    assert found.count("named") >= 150
 
 
 @pytest.mark.long

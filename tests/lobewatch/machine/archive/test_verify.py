@@ -246,8 +246,12 @@ def mend(folder: Path, remark: Remark) -> None:
         (folder / remark.about).unlink()
     elif "lobewatch rebuild" in remark.cure:
         rebuild_files(folder)
+        (folder / "history.rows").unlink(missing_ok=True)
     elif "lobewatch tap" in remark.cure:
-        begin_tap(MachineFolder(folder), Circumstances("m", datetime.now(UTC), "reference"))
+        tap = begin_tap(MachineFolder(folder), Circumstances("m", datetime.now(UTC), "reference"))
+        assert tap.hits == []
+        old = re.findall(r"hours ago is not gone on with: delete (\S+) where", remark.cure)
+        shutil.rmtree(*old)
 
 
 def is_harmless(folder: MachineFolder, results: list[bytes]) -> bool:

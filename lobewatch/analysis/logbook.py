@@ -17,7 +17,7 @@ from lobewatch.analysis.cache.kept_rows import of_older_versions
 from lobewatch.analysis.cache.worked_out import WorkedOut
 from lobewatch.analysis.damage.usable import Result, UsableTaps
 from lobewatch.analysis.history import History, without_last_word
-from lobewatch.analysis.measurement import Measurement
+from lobewatch.analysis.measurement import Fitted, Measurement
 from lobewatch.analysis.programs.advice import Advice, advise
 from lobewatch.analysis.programs.verdict import Ruling, Verdict, judge
 from lobewatch.analysis.questions.accepting import accept
@@ -45,6 +45,7 @@ class Logbook:
         self._cache = HistoryCache(folder)
         self._history: History | None = None
         self._worked_out: WorkedOut | None = None
+        self._fits: dict[str, Fitted] = {}
         self._verdicts: dict[str | None, dict[str, Verdict]] = {}
 
     @classmethod
@@ -105,10 +106,11 @@ class Logbook:
         return self.measurement(tap_id)
 
     def replay_all(self, files: Sequence[Path], said: Description, **how: Any) -> Stored:
-        """Store recorded files, each once; how: keep_going and progress of `store_recordings`."""
+        """Store recorded files, each once; how: jobs, keep_going and progress of `store_recordings`."""
         with self.folder.locked():
             enter_explained(self.folder)  # else what an interrupted replay has stored would be stored twice
             stored = store_recordings(self.folder, files, said, **how)
+            self._fits |= stored.fits
             self._forget()
         return stored
 
@@ -242,5 +244,5 @@ class Logbook:
     @property
     def _all(self) -> WorkedOut:
         if self._worked_out is None:
-            self._worked_out = WorkedOut(self.folder, self.files.places)
+            self._worked_out = WorkedOut(self.folder, self.files.places, self._fits)
         return self._worked_out

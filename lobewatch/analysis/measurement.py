@@ -48,21 +48,55 @@ class Measurement:
     """What could not be done, and what is in doubt."""
 
 
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """What one tap test says by itself, whatever others said."""
+
+    tap_id: str
+    """Of the tap test."""
+    time: datetime
+    """When it was taken."""
+    tool: str
+    """What was in the spindle."""
+    direction: str
+    """Direction at the tool tip, "x" or "y"."""
+    modes: Sequence[Mode] = ()
+    """All modes found, as measured."""
+    remarks: tuple[Remark, ...] = ()
+    """What is in doubt, and why there are no modes."""
+    failed: bool = False
+    """Whether the fit was not possible at all."""
+
+
 def measure(tap: TapTest, machine: Machine, last: Mode | None = None) -> Measurement:
     """All that follows from one tap test; last: the mode that was followed in the test before."""
+    return measured(fitted(tap, machine), machine, last)
+
+
+def fitted(tap: TapTest, machine: Machine) -> Fitted:
+    """The modes of one tap test: most of the work, and the part that needs no other tap test."""
     about, band = tap.circumstances, other_band(tap.frf, machine)
-    remarks = [band] if band is not None else []
+    remarks = () if band is None else (band,)
     named = (tap.id, about.created, about.tool, about.direction)
     with threadpool_limits(limits=1):
         try:
-            modes = fit_modes(tap.frf, hits=tap.accepted)
+            return Fitted(*named, fit_modes(tap.frf, hits=tap.accepted), remarks)
         except ValueError as error:
             none = Remark("no-modes", "", f"no modes: {error}")
-            return Measurement(*named, remarks=(*remarks, none, no_mode_in_band((), machine)))
+            return Fitted(*named, (), (*remarks, none, no_mode_in_band((), machine)), failed=True)
+
+
+def measured(fit: Fitted, machine: Machine, last: Mode | None) -> Measurement:
+    """What follows from these modes; last: the mode that was followed in the test before."""
+    remarks, modes = [*fit.remarks], fit.modes
+    named = (fit.tap_id, fit.time, fit.tool, fit.direction)
+    if fit.failed:
+        return Measurement(*named, remarks=fit.remarks)
+    with threadpool_limits(limits=1):
         found = believed(_in_band(modes, machine))
         remarks += found.remarks
         followed = _follow(found, modes, machine, remarks, last)
-        calibration = _calibrate(followed, machine, about.tool, remarks, last)
+        calibration = _calibrate(followed, machine, fit.tool, remarks, last)
         at_tip = _modes_at_tip(found, followed, calibration, machine, remarks)
     return Measurement(*named, modes, followed, calibration, at_tip, tuple(remarks))
 

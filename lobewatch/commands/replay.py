@@ -54,6 +54,9 @@ def replay(
     keep_going: Annotated[
         bool, typer.Option("--keep-going", help="Store the others where some files cannot be used (exit code 2).")
     ] = False,
+    jobs: Annotated[
+        int, typer.Option(min=1, max=64, help="Processes that read and fit at once; what they find is the same.")
+    ] = 1,
     accept: Annotated[
         list[str] | None,
         typer.Option(help="Take these recordings though they raise this question, by its code; as often as needed."),
@@ -100,4 +103,4 @@ def replay(
     if dry_run:
         show_preview(logbook, found, passed, said, as_json=as_json)
     else:
-        show_replay(logbook, found, passed, said, accept or (), keep_going=keep_going, as_json=as_json)
+        show_replay(logbook, found, passed, said, accept or (), jobs=jobs, keep_going=keep_going, as_json=as_json)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cached_property
@@ -13,7 +13,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from acquisition import DataError, Remark, TapTest, read_tap, write_tap
-from acquisition.atomic import make_folder
+from acquisition.atomic import make_folder, sync_folder
 from acquisition.errors import NOT_ALLOWED
 from lobewatch.machine.archive.contents import (
     Contents,
@@ -151,6 +151,18 @@ class MachineFolder:
         content = write_tap(path, tap)
         self.journal.append(replace(TapEntry.of(tap, content), asked=tuple(asked)).line)
         shutil.rmtree(self.spool / tap.id, ignore_errors=True)
+
+    def commit_files(self, files: Mapping[Path, TapEntry]) -> None:
+        """Give finished tap files their names in taps/, then enter them together; saved for good when this returns.
+
+        files: where they lie under temporary names, already made to outlast a power cut, on the same disk. To be called
+        under the lock.
+        """
+        self.refuse_damage()
+        for temporary, entry in files.items():
+            temporary.replace(self.path / entry.file)
+        sync_folder(self.path / "taps")
+        self.journal.append(*(entry.line for entry in files.values()))
 
     def accept(self, tap_id: str, code: str) -> None:
         """Write down that a person has accepted what was asked of a tap test; saved for good when this returns."""

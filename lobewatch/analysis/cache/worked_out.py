@@ -9,10 +9,11 @@ from lobewatch.analysis.assembling import Followed, tapped
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.cache.kept_rows import kept_in_place
 from lobewatch.analysis.history import Row, row_of
-from lobewatch.analysis.measurement import Measurement, measure
+from lobewatch.analysis.measurement import Fitted, Measurement, measure, measured
 from lobewatch.analysis.order import Place, earlier
 from lobewatch.analysis.questions.asked import answered
 from lobewatch.machine import DamagedTapError, MachineFolder
+from modal import Mode
 
 KEPT = 500
 """Measurements kept in memory, those asked for last."""
@@ -21,9 +22,9 @@ KEPT = 500
 class WorkedOut:
     """Measurements and assemblies of one machine from its tap files; rows: the history before a place at least."""
 
-    def __init__(self, folder: MachineFolder, places: Sequence[Place]) -> None:
-        """places: all tap tests, oldest first. Nothing is worked out yet."""
-        self._folder, self._places = folder, places
+    def __init__(self, folder: MachineFolder, places: Sequence[Place], fits: Mapping[str, Fitted]) -> None:
+        """places: all tap tests, oldest first; fits: of those that were fitted already. Nothing is worked out yet."""
+        self._folder, self._places, self._fits = folder, places, fits
         self._measurements: dict[str, Measurement] = {}
         self._followed = Followed()
 
@@ -34,12 +35,18 @@ class WorkedOut:
         if found is None:
             before = (rows[number] for number in earlier(place, self._places))
             last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
-            found = measure(self._folder.read(place.entry), self._folder.machine, last)
+            found = self._measured(place, last)
             found = replace(found, remarks=answered((*found.remarks, *place.said), place.entry))
         known[place.entry.id] = found
         if len(known) > KEPT:
             del known[next(iter(known))]
         return found
+
+    def _measured(self, place: Place, last: Mode | None) -> Measurement:
+        fit = self._fits.get(place.entry.id)
+        if fit is not None:
+            return measured(fit, self._folder.machine, last)
+        return measure(self._folder.read(place.entry), self._folder.machine, last)
 
     def assembled(self, place: Place, rows: Sequence[Row]) -> Assembly:
         """The tool of one tap test as it was known then."""

@@ -10,8 +10,9 @@ from pathlib import Path
 from acquisition import DataError, Description, Recording, TapTest
 from lobewatch.analysis.logbook import Logbook
 from lobewatch.analysis.measurement import Measurement, measure
+from lobewatch.analysis.replaying.prepare import reason_of
 from lobewatch.analysis.replaying.read_tap_test import read_tap_test
-from lobewatch.analysis.replaying.store import KnownContents, Progress, reason_of
+from lobewatch.analysis.replaying.store import KnownContents, Progress
 from modal import Mode
 
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from acquisition import DataError, Description, TapTest
-from lobewatch.analysis.replaying.read_tap_test import read_tap_test
+from lobewatch.analysis.measurement import Fitted
+from lobewatch.analysis.replaying.prepare import Prepared, all_prepared, prepared, reason_of, remove_leftovers
 from lobewatch.machine import MachineFolder, TapEntry
 
 Progress = Callable[[str, int, int], None]
@@ -29,6 +30,8 @@ class Stored:
     """Files that cannot be used, and why."""
     taken: Sequence[str] = ()
     """What was taken for granted where files do not say it, each once."""
+    fits: Mapping[str, Fitted] = field(default_factory=dict)
+    """The modes of the new tap tests, by identity."""
 
 
 @dataclass
@@ -64,49 +67,71 @@ def store_recordings(
     files: Sequence[Path],
     said: Description,
     *,
+    jobs: int = 1,
     keep_going: bool = False,
     progress: Progress = lambda _what, _done, _of: None,
 ) -> Stored:
     """Commit recorded files, each once, oldest first; all are read and judged before the first one is stored.
 
     DataError, and nothing is stored, where one cannot be used, with all of these; keep_going: the others are stored.
+    jobs: processes that share the work. To be called under the lock.
     """
-    contents = KnownContents.of(folder.taps())
-    tap_ids, known, fresh, refused = list[str](), dict[Path, str](), list[TapTest](), dict[Path, str]()
-    taken = dict[str, None]()
-    for number, file in enumerate(files, 1):
+    remove_leftovers(folder)
+    digests, refused = _digests(files)
+    contents, todo = KnownContents.of(folder.taps()), dict[str, Path]()
+    ids = {digest: contents.tap_of(digest, said) or "" for digest in digests.values()}
+    for file, digest in digests.items():
+        if not ids[digest]:
+            todo.setdefault(digest, file)
+    try:
+        ready, wrong = _made_ready(folder, todo, said, jobs, alone=len(files) == 1, progress=progress)
+        refused |= {file: wrong[digest] for file, digest in digests.items() if digest in wrong}
+        if refused and not (keep_going and len(refused) < len(files)):
+            raise DataError(refusal({file: refused[file] for file in files if file in refused}, len(files)))
+        ready.sort(key=lambda one: one.created)
+        if ready:
+            folder.commit_files({one.temporary: one.entry for one in ready})
+            progress("store", len(ready), len(ready))
+    finally:
+        remove_leftovers(folder)
+    ids |= {one.digest: one.entry.id for one in ready}
+    used = {file: ids[digests[file]] for file in files if file not in refused}
+    known = {file: tap_id for file, tap_id in used.items() if todo.get(digests[file]) != file}
+    taken = dict.fromkeys(text for one in ready for text in one.taken)
+    fits = {one.entry.id: one.fit for one in ready}
+    return Stored([used[file] for file in files if file in used], known, [*fits], refused, list(taken), fits)
+
+
+def _digests(files: Sequence[Path]) -> tuple[dict[Path, str], dict[Path, str]]:
+    """SHA-256 of each file, and why some cannot be read; the error itself where there is but one."""
+    found, refused = dict[Path, str](), dict[Path, str]()
+    for file in files:
         try:
-            content = file.read_bytes()
-            digest = hashlib.sha256(content).hexdigest()
-            stored = contents.tap_of(digest, said)
-            if stored is None:
-                tap, recording = read_tap_test(folder, file, said, content)
-                fresh.append(tap)
-                told = (fact for fact in recording.facts if fact.origin == "default")
-                taken |= dict.fromkeys(f"{fact.name} {fact.value}" for fact in told)
-                contents.add(digest, tap)
-            else:
-                known[file] = stored
-            tap_ids.append(stored or fresh[-1].id)
-        except (DataError, OSError, ValueError) as error:
+            found[file] = hashlib.sha256(file.read_bytes()).hexdigest()
+        except OSError as error:
             if len(files) == 1:
                 raise
             refused[file] = reason_of(file, error)
-        progress("read", number, len(files))
-    if refused and not (keep_going and tap_ids):
-        raise DataError(refusal(refused, len(files)))
-    fresh.sort(key=lambda tap: tap.circumstances.created)
-    for number, tap in enumerate(fresh, 1):
-        folder.commit(tap)
-        progress("store", number, len(fresh))
-    return Stored(tap_ids, known, [tap.id for tap in fresh], refused, list(taken))
+    return found, refused
 
 
-def reason_of(file: Path, error: Exception) -> str:
-    """An error about a file, without its name."""
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror
-    return str(error).removeprefix(f"{file}: ")
+def _made_ready(
+    folder: MachineFolder, todo: Mapping[str, Path], said: Description, jobs: int, *, alone: bool, progress: Progress
+) -> tuple[list[Prepared], dict[str, str]]:
+    """Files by their digests, made ready; by digest why some cannot be used, the error itself where it stands alone."""
+    if alone:
+        return [prepared(folder, file, said) for file in todo.values()], {}
+    ready, wrong = list[Prepared](), dict[str, str]()
+    results = zip(todo, all_prepared(folder, [*todo.values()], said, jobs), strict=True)
+    for number, (digest, one) in enumerate(results, 1):
+        if isinstance(one, str):
+            wrong[digest] = one
+        elif one.digest != digest:
+            wrong[digest] = "it changes while it is read; wait until it is written"
+        else:
+            ready.append(one)
+        progress("read", number, len(todo))
+    return ready, wrong
 
 
 def refusal(refused: Mapping[Path, str], n: int, *, stored: bool = False) -> str:

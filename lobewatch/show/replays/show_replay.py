@@ -37,13 +37,14 @@ def show_replay(
     said: Description,
     accept: Sequence[str],
     *,
+    jobs: int,
     keep_going: bool,
     as_json: bool,
 ) -> None:
     """Store files, accept what is asked of them, tell what they say; DataError for those that cannot be used."""
     codes = checked_codes(accept)
     with ProgressBar() as progress:
-        stored = logbook.replay_all(files, said, keep_going=keep_going, progress=progress)
+        stored = logbook.replay_all(files, said, jobs=jobs, keep_going=keep_going, progress=progress)
     unasked = logbook.accept(stored.tap_ids, codes)
     _tell_known(stored.known, len(files))
     if passed:

@@ -6,9 +6,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
+from functools import cache
 
 import numpy as np
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from acquisition import Remark, TapTest
 from dsm import Calibration, calibrate, modal_stiffness
@@ -68,6 +69,12 @@ class Fitted:
     """Whether the fit was not possible at all."""
 
 
+@cache
+def _threads() -> ThreadpoolController:
+    """Looking for the libraries takes longer than many a fit."""
+    return ThreadpoolController()
+
+
 def measure(tap: TapTest, machine: Machine, last: Mode | None = None) -> Measurement:
     """All that follows from one tap test; last: the mode that was followed in the test before."""
     return measured(fitted(tap, machine), machine, last)
@@ -78,7 +85,7 @@ def fitted(tap: TapTest, machine: Machine) -> Fitted:
     about, band = tap.circumstances, other_band(tap.frf, machine)
     remarks = () if band is None else (band,)
     named = (tap.id, about.created, about.tool, about.direction)
-    with threadpool_limits(limits=1):
+    with _threads().limit(limits=1):
         try:
             return Fitted(*named, fit_modes(tap.frf, hits=tap.accepted), remarks)
         except ValueError as error:
@@ -92,7 +99,7 @@ def measured(fit: Fitted, machine: Machine, last: Mode | None) -> Measurement:
     named = (fit.tap_id, fit.time, fit.tool, fit.direction)
     if fit.failed:
         return Measurement(*named, remarks=fit.remarks)
-    with threadpool_limits(limits=1):
+    with _threads().limit(limits=1):
         found = believed(_in_band(modes, machine))
         remarks += found.remarks
         followed = _follow(found, modes, machine, remarks, last)

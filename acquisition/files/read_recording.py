@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents
@@ -18,6 +19,7 @@ from acquisition.hit import Hit
 from acquisition.tap import Circumstances
 from acquisition.verdicts.average_good import average_good
 
+Result = TypeVar("Result")
 NOTHING = Description()
 """A person who says nothing."""
 
@@ -29,9 +31,10 @@ def look(path: Path | str, said: Description = NOTHING) -> Recording:
     """
     path = Path(path)
     found = format_of(path)
-    held = _read(found, path)
+    held = _guarded(found, path, lambda: found.read(path))
     if isinstance(held, Contents):
-        return understood(path, found.title, held, said)
+        contents = held
+        return _guarded(found, path, lambda: understood(path, found.title, contents, said))
     about = found.recorded_as(path)
     hits, frf = ((), held) if isinstance(held, Frf) else (tuple(held), None)
     options = said.of_signals()
@@ -69,9 +72,10 @@ def read_recording(path: Path | str, said: Description = NOTHING) -> list[Hit] |
     return list(recording.hits) if recording.frf is None else recording.frf
 
 
-def _read(found: Format, path: Path) -> Contents | list[Hit] | Frf:
+def _guarded(found: Format, path: Path, work: Callable[[], Result]) -> Result:
+    """What some work on a file gives; DataError for whatever goes wrong in it."""
     try:
-        return found.read(path)
+        return work()
     except DataError as error:
         raise DataError(f"{error}{broken_formats()}") from error
     except OSError:

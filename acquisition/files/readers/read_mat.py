@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 import warnings
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,19 +23,38 @@ from acquisition.files.unpacked import HARMLESS, RATIO, check_unpacked
 
 _V5 = b"MATLAB 5.0 MAT-file"
 _V73 = b"MATLAB 7.3 MAT-file"
+PATIENCE = 60.0
+"""Time that reading one file may take (s)."""
 MOST_COLUMNS = 64
 """Columns of a matrix that are told one by one."""
 
 
 def read_mat(path: Path) -> Contents:
     """Its arrays; DataError where it is damaged or unpacks out of proportion."""
-    with path.open("rb") as file:
-        is_hdf5 = file.read(len(_V73)) == _V73
-    variables = _of_v73(path) if is_hdf5 else _of_v5(path)
+    _refuse_crash(path)
+    variables = _variables(path)
     known = recognised(variables)
     if known is not None:
         return known
     return Contents(tuple(_columns(variables)))
+
+
+def _variables(path: Path) -> dict[str, Any]:
+    with path.open("rb") as file:
+        is_hdf5 = file.read(len(_V73)) == _V73
+    return _of_v73(path) if is_hdf5 else _of_v5(path)
+
+
+def _refuse_crash(path: Path) -> None:
+    """DataError where a program that does nothing but read the file ends in a crash, or not at all.
+
+    Neither format has a checksum, and scipy and HDF5 crash on some damaged files.
+    """
+    try:
+        command = [sys.executable, "-m", __name__, str(path)]
+        subprocess.run(command, capture_output=True, timeout=PATIENCE, check=True)
+    except subprocess.SubprocessError as error:
+        raise DataError(f"{path}: damaged: its reader crashes or hangs on it; export it anew") from error
 
 
 def _of_v5(path: Path) -> dict[str, Any]:
@@ -105,3 +127,8 @@ def _is_mat(head: bytes, _path: Path) -> bool:
 
 
 MAT = Format("mat", "MATLAB file", (".mat",), _is_mat, read_mat)
+
+
+if __name__ == "__main__":
+    with suppress(Exception):  # told by the program that asks
+        _variables(Path(sys.argv[1]))

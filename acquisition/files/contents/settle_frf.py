@@ -92,6 +92,11 @@ def _values(candidate: Candidate, ledger: Ledger) -> NDArray[np.complex128] | No
         partner = "imaginary part" if first.role == "real" else "phase"
         ledger.ask(f"the {partner} of {first.name}", '--columns "frequency,real,imag" or "frequency,magnitude,phase"')
         return None
+    if first.role == "real" and second.unit and unit_of(second.unit) != unit_of(first.unit or second.unit):
+        ledger.faults.append(
+            f"{first.name} is in {first.unit!r}, {second.name} in {second.unit!r}; they must be the same"
+        )
+        return None
     if first.role == "real":
         return np.asarray(first.values + 1j * second.values)
     angle = ANGLES.get(second.unit.lower(), "")

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from acquisition import Description
+if TYPE_CHECKING:
+    from acquisition import Description
 
 Columns = Annotated[
     str,
@@ -25,6 +26,8 @@ FullScale = Annotated[str, typer.Option(help='Of each channel of a WAV file, in 
 
 def described(columns: str, full_scale: str, **said: Any) -> Description:
     """What these options say, with other fields of Description; ValueError for a full scale that is no number."""
+    from acquisition import Description  # `--help` does not wait for it
+
     try:
         scales = tuple(float(word) for word in full_scale.split(",")) if full_scale else ()
     except ValueError as error:

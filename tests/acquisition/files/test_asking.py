@@ -172,3 +172,16 @@ def test_text_of_two_bytes_a_character(tmp_path: Path) -> None:
     path = tmp_path / "frf.txt"
     path.write_bytes(("Freq (Hz)\tReal (µm/N)\tImag (µm/N)\n" + rows(F, H.real * 1e6, H.imag * 1e6)).encode("utf-16"))
     assert read_frf(path).receptance == pytest.approx(H, rel=1e-7)
+
+
+def test_mixed_units_and_damaged_numbers_are_refused(tmp_path: Path) -> None:
+    mixed = put(tmp_path / "a.csv", "Freq (Hz),Real (um/N),Imag (m/N)\n" + rows(F, H.real, H.imag, separator=","))
+    assert "Real is in 'um/N', Imag in 'm/N'; they must be the same" in complaint(mixed)
+    volts = put(tmp_path / "b.csv", "Freq (Hz),Real (V/N),Imag (V/N)\n" + rows(F, H.real, H.imag, separator=","))
+    assert "Real is in 'V/N', which is not known here as its unit" in complaint(volts)
+    for spoilt in (F[::-1], np.where(F == 9, F - 1, F), np.where(F == 9, np.nan, F)):
+        path = put(tmp_path / "c.csv", "Freq (Hz),Real (m/N),Imag\n" + rows(spoilt, H.real, H.imag, separator=","))
+        assert "frequency must be finite, >= 0 Hz and strictly rising" in complaint(path)
+    word = put(tmp_path / "d.csv", "Freq (Hz),Real (m/N),Imag\n1,2,3\n2,overflow,3\n3,4,5\n")
+    with pytest.raises(DataError, match=r"d\.csv: line 3: '2,overflow,3' is no row of numbers"):
+        read_recording(word)

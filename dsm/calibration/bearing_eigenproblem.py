@@ -62,7 +62,7 @@ def bearing_eigenproblem(spindle: Spindle, frequency: _Float, group: str | None 
     root = np.sqrt([bearing.stiffness for bearing in bearings])
     forces = np.zeros((model.held.size, root.size))
     forces[dofs, np.arange(root.size)] = root
-    response = np.asarray(np.linalg.solve(model.dense(w2), forces), dtype=np.float64)
+    response = model.solve(model.dense(w2), forces)
     housing = np.diag([bearing.stiffness / bearing.housing_stiffness for bearing in bearings])
     compliance = root[:, np.newaxis] * response[:, dofs] + housing
     values, vectors = np.linalg.eigh((compliance + compliance.swapaxes(1, 2)) / 2)

@@ -5,70 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import chdtrc
 
 from dsm.calibration.calibration import UnreachableFrequencyError
+from dsm.calibration.identifiability import CURE, LEAST_SHARE, identifiability
+from dsm.calibration.least_squares import LIMIT, Measured, Problem, State, minimize
+from dsm.calibration.remark import Remark
 from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
-from dsm.calibration.stiffness_groups import chosen_groups, group_shares, scale_groups
+from dsm.calibration.stiffness_groups import chosen_groups, scale_groups
 from dsm.matrix.frequency_axis import frequency_axis
-from dsm.modes.find_modes import find_modes
 from dsm.modes.natural_frequencies import natural_frequencies
 from dsm.spindle.spindle import Spindle, require_support
 
 _Float = NDArray[np.float64]
 
-LIMIT = math.log(1e6)
-"""Factors are sought between 1e-6 and 1e6."""
 OTHER_STARTS = 8
 """Further starts, about a factor of e around the given one, where that leads to no minimum or to a poor one."""
-LONGEST_STEP = 2.0
-"""Largest change of the logarithm of a factor in one step."""
-CONVERGED = 1e-12
-"""A step that would change no frequency by more than this part of it ends the search."""
-BLURRED = 1e-8
-"""Below this, a step that brings nothing has met rounding, and the search has ended as well."""
-LEAST_SHARE = 0.01
-"""A group with less than this part of the strain energy of every measured mode is reported."""
 WORST_CONDITION = 30.0
 """A larger condition number is reported."""
-UNLIKELY = 1e-3
-"""A chi-square with less probability than this is reported; where there is none, a larger relative residual."""
 NEAR = 0.01
 """Modes nearer to each other than this part of their frequency are reported."""
-
-
-class _Measured(NamedTuple):
-    mode: NDArray[np.int_]
-    frequency: _Float
-    std: _Float | None
-
-    @property
-    def scale(self) -> _Float:
-        """What residuals are divided by: standard errors (Hz); where there are none, the frequencies."""
-        return self.frequency if self.std is None else self.std
-
-
-class _State(NamedTuple):
-    """The model at one choice of factors."""
-
-    log_factor: _Float
-    spindle: Spindle
-    frequency: _Float
-    """Of all modes up to the one beyond the highest measured (Hz)."""
-    share: _Float
-    """Energy shares (n, g) of the measured modes."""
-    residual: _Float
-    """Fitted less measured frequency, scaled, (n,)."""
-    slope: _Float
-    """Derivative of the residual by log_factor, (n, g)."""
-
-    @property
-    def cost(self) -> float:
-        return float(self.residual @ self.residual)
 
 
 def fit_stiffness(
@@ -91,9 +49,12 @@ def fit_stiffness(
     where the given stiffnesses lead to none that fits, a few starts around them are tried and the best is kept. Of
     several solutions that fit, such as the two of a symmetric shaft, it is the first that is found.
 
-    The result warns where modes do not tell the groups apart, lie close together, or do not fit. Raises ValueError for
-    bad frequencies and groups, UnreachableFrequencyError (a ValueError) where no factor from 1e-6 to 1e6 puts a mode
-    where it was measured, StiffnessFitError (an ArithmeticError, with the best estimate) where no minimum is found.
+    The result has remarks where the frequencies leave a stiffness open (identifiability), where modes do not tell the
+    groups apart, lie close together, or do not fit; where it has none, the 95 % intervals are to be believed.
+
+    Raises ValueError for bad frequencies and groups, UnreachableFrequencyError (a ValueError) where no factor from 1e-6
+    to 1e6 puts a mode where it was measured, StiffnessFitError (an ArithmeticError, with the best estimate) where no
+    minimum is found.
     """
     require_support(spindle)
     names = chosen_groups(spindle, groups)
@@ -103,17 +64,18 @@ def fit_stiffness(
             f"{measured.frequency.size} measured mode(s) cannot give the stiffness of {len(names)} groups "
             f"({', '.join(names)}); measure more modes, or name fewer groups"
         )
-    state, found = _search(spindle, names, measured)
-    result = _result(spindle, names, measured, state)
-    if not (found and _fits(state, measured)):
+    problem = Problem(spindle, names, measured)
+    state, found = _search(problem)
+    if not (found and problem.fits(state)):
         with suppress(ArithmeticError):  # factors so far apart may be beyond what can be computed
             _require_reachable(spindle, names, measured)
+    result = _result(problem, state, found)
     if not found:
         raise StiffnessFitError(_why(result), result)
     return result
 
 
-def _check(frequency: ArrayLike, frequency_std: ArrayLike | None, mode: Sequence[int] | None) -> _Measured:
+def _check(frequency: ArrayLike, frequency_std: ArrayLike | None, mode: Sequence[int] | None) -> Measured:
     f = frequency_axis(frequency)
     if np.any(f == 0):
         raise ValueError("frequency=0 Hz is not > 0")
@@ -131,152 +93,87 @@ def _check(frequency: ArrayLike, frequency_std: ArrayLike | None, mode: Sequence
         raise ValueError(
             f"frequency={f[order].tolist()} Hz does not rise with the number of the mode, {numbers[order]}"
         )
-    return _Measured(numbers, f, std)
+    return Measured(numbers, f, std)
 
 
-def _evaluate(spindle: Spindle, names: tuple[str, ...], measured: _Measured, log_factor: _Float) -> _State:
-    factors = np.exp(log_factor).tolist()
-    scaled = scale_groups(spindle, dict(zip(names, factors, strict=True)))
-    modes = find_modes(scaled, int(np.max(measured.mode)) + 1)
-    share = group_shares(scaled, modes, names)[measured.mode - 1]
-    frequency = modes.frequency[measured.mode - 1]
-    return _State(
-        log_factor,
-        scaled,
-        modes.frequency,
-        share,
-        (frequency - measured.frequency) / measured.scale,
-        (frequency / measured.scale / 2)[:, np.newaxis] * share,
-    )
-
-
-def _search(spindle: Spindle, names: tuple[str, ...], measured: _Measured) -> tuple[_State, bool]:
+def _search(problem: Problem) -> tuple[State, bool]:
     """The best state, and whether it is a minimum: that of the given start, or of others where that one is poor."""
-    state, found = _minimize(spindle, names, measured, np.zeros(len(names)))
-    for start in np.random.default_rng(0).normal(size=(OTHER_STARTS, len(names))):
-        if found and _fits(state, measured):
+    size = len(problem.names)
+    state, found = minimize(problem, np.zeros(size))
+    for start in np.random.default_rng(0).normal(size=(OTHER_STARTS, size)):
+        if found and problem.fits(state):
             break
-        other, other_found = _minimize(spindle, names, measured, start)
+        other, other_found = minimize(problem, start)
         if (other_found, -other.cost) > (found, -state.cost):
             state, found = other, other_found
     return state, found
 
 
-def _fits(state: _State, measured: _Measured) -> bool:
-    """Whether the residuals are of the size that is to be expected."""
-    spare = measured.frequency.size - state.log_factor.size
-    if measured.std is None or spare == 0:
-        return float(np.max(np.abs(state.residual * measured.scale / measured.frequency))) < UNLIKELY
-    return float(chdtrc(spare, state.cost)) > UNLIKELY
-
-
-def _minimize(spindle: Spindle, names: tuple[str, ...], measured: _Measured, start: _Float) -> tuple[_State, bool]:
-    """The last state on the way down from a start, and whether it is a minimum."""
-    state = _evaluate(spindle, names, measured, start)
-    damping = 1.0
-    for _ in range(100):
-        change = _change(state, _step(state, 0.0))
-        if change <= CONVERGED:
-            return state, True
-        if np.any(np.abs(state.log_factor) == LIMIT):
-            break
-        log_factor = np.clip(state.log_factor + _step(state, damping), -LIMIT, LIMIT)
-        trial = _evaluate(spindle, names, measured, log_factor)
-        if trial.cost < state.cost:
-            state, damping = trial, max(damping / 10, 1e-15)
-        elif change <= BLURRED:
-            return state, True
-        elif damping > 1e6:
-            break
-        else:
-            damping *= 10
-    return state, False
-
-
-def _step(state: _State, damping: float) -> _Float:
-    """Step of Levenberg and Marquardt; with damping 0 that of Gauss and Newton."""
-    size = state.log_factor.size
-    weight = math.sqrt(damping) * np.linalg.norm(state.slope, 2)
-    matrix = np.vstack([state.slope, weight * np.eye(size)])
-    step = np.linalg.lstsq(matrix, -np.append(state.residual, np.zeros(size)), rcond=None)[0]
-    longest = float(np.max(np.abs(step)))
-    return np.asarray(step * (LONGEST_STEP / longest if damping > 0 and longest > LONGEST_STEP else 1.0))
-
-
-def _change(state: _State, step: _Float) -> float:
-    """Largest relative change of a frequency that a step promises."""
-    return float(np.max(np.abs(state.share @ step))) / 2
-
-
-def _result(spindle: Spindle, names: tuple[str, ...], measured: _Measured, state: _State) -> StiffnessFit:
-    frequency = state.frequency[measured.mode - 1]
+def _result(problem: Problem, state: State, found: bool) -> StiffnessFit:
+    measured = problem.measured
+    covariance = _covariance(problem, state)
+    unsure = identifiability(problem, state, covariance) if found else []
     return StiffnessFit(
-        groups=names,
+        groups=problem.names,
         mode=measured.mode,
         frequency=measured.frequency,
         frequency_std=measured.std,
-        fitted_frequency=frequency,
+        fitted_frequency=state.frequency[measured.mode - 1],
         factor=np.exp(state.log_factor),
-        log_covariance=_covariance(state, measured),
+        log_covariance=covariance,
         energy_share=state.share,
-        warnings=(*_unidentified(names, state), *_close_modes(state, measured), *_misfit(state, measured)),
-        given=spindle,
+        remarks=(*unsure, *_alike(problem, state), *_close_modes(state, measured), *_misfit(problem, state)),
+        given=problem.spindle,
         spindle=state.spindle,
     )
 
 
-def _covariance(state: _State, measured: _Measured) -> _Float | None:
+def _covariance(problem: Problem, state: State) -> _Float | None:
     """(J^T J)^-1, times the variance of the residuals where no standard errors were given."""
-    spare = measured.frequency.size - state.log_factor.size
-    if measured.std is None and spare == 0:
+    given = problem.measured.std is not None
+    if not given and problem.spare == 0:
         return None
     _, values, vectors = np.linalg.svd(state.slope, full_matrices=False)
     root = vectors.T / np.maximum(values, np.finfo(np.float64).eps * values[0])
-    return np.asarray(root @ root.T * (state.cost / spare if measured.std is None else 1.0))
+    return np.asarray(root @ root.T * (1.0 if given else state.cost / problem.spare))
 
 
-def _unidentified(names: tuple[str, ...], state: _State) -> list[str]:
-    cure = "more or other modes are needed to find it"
-    idle = [
-        f"group {name!r} has at most {100 * share:.2g} % of the strain energy of the measured modes; {cure}"
-        for name, share in zip(names, np.max(state.share, axis=0), strict=True)
-        if share < LEAST_SHARE
-    ]
-    if idle:
-        return idle
+def _alike(problem: Problem, state: State) -> list[Remark]:
     condition = float(np.linalg.cond(state.share))
-    if condition <= WORST_CONDITION:
+    if condition <= WORST_CONDITION or np.any(np.max(state.share, axis=0) < LEAST_SHARE):
         return []
     weakest = np.abs(np.linalg.svd(state.share)[2][-1])
-    mixed = ", ".join(repr(name) for name, part in zip(names, weakest, strict=True) if part > 0.3)
-    return [
-        f"the measured modes hardly tell the stiffness of {mixed} (condition number {condition:.2g}): "
-        "more or other modes are needed"
-    ]
+    mixed = ", ".join(name for name, part in zip(problem.names, weakest, strict=True) if part > 0.3)
+    text = f"the measured modes hardly tell their stiffness apart (condition number {condition:.2g})"
+    return [Remark("groups-alike", mixed, text, CURE)]
 
 
-def _close_modes(state: _State, measured: _Measured) -> list[str]:
+def _close_modes(state: State, measured: Measured) -> list[Remark]:
     """Pairs of neighbours with a measured one among them."""
     gap = np.diff(state.frequency) / state.frequency[1:]
     return [
-        f"modes {low} and {low + 1} of the fitted model are {100 * gap[low - 1]:.2g} % apart and exchange "
-        "shapes there: check which of them was measured; standard errors hold for small changes only"
+        Remark(
+            "modes-exchange-shapes",
+            f"modes {low} and {low + 1}",
+            f"they are {100 * gap[low - 1]:.2g} % apart in the fitted model and exchange shapes there: standard errors "
+            "hold for small changes only",
+            "check which of them was measured",
+        )
         for low in range(1, state.frequency.size)
         if gap[low - 1] < NEAR and np.any((measured.mode == low) | (measured.mode == low + 1))
     ]
 
 
-def _misfit(state: _State, measured: _Measured) -> list[str]:
-    if _fits(state, measured):
+def _misfit(problem: Problem, state: State) -> list[Remark]:
+    if problem.fits(state):
         return []
+    measured = problem.measured
     worst = float(np.max(np.abs(state.residual * measured.scale / measured.frequency)))
-    return [
-        f"the frequencies do not fit, by up to {100 * worst:.2g} %: check geometry, mode numbers and standard errors; "
-        "those of the stiffness leave a wrong model out"
-    ]
+    text = f"the frequencies do not fit, by up to {100 * worst:.2g} %; standard errors leave a wrong model out"
+    return [Remark("frequencies-misfit", "", text, "check geometry, mode numbers and standard errors")]
 
 
-def _require_reachable(spindle: Spindle, names: tuple[str, ...], measured: _Measured) -> None:
+def _require_reachable(spindle: Spindle, names: tuple[str, ...], measured: Measured) -> None:
     """Raise UnreachableFrequencyError for a mode measured outside of what the factors can do; all raise all modes."""
     count = int(np.max(measured.mode))
     low, high = (

@@ -77,13 +77,13 @@ def _compliance(spindle: Spindle, w: _Complex, places: Sequence[float], loss_fac
     """Deflections under forces, both at `places` (m), shape (n, n_places, n_places)."""
     model = assemble(spindle, float(np.max(w.real, initial=0.0)) / (2 * np.pi), places)
     dofs = [2 * model.node(place) for place in places]
-    forces = np.zeros((model.held.size, len(dofs)))
+    forces = np.zeros((model.held.size, len(dofs)), dtype=np.complex128)
     forces[dofs, np.arange(len(dofs))] = ~model.held.ravel()[dofs]
     found = np.empty((w.size, len(dofs), len(dofs)), dtype=np.complex128)
     for start in range(0, w.size, CHUNK):
         chunk = slice(start, start + CHUNK)
         matrices = full_matrices(*damped_blocks(model, spindle, w[chunk], loss_factor))
-        found[chunk] = np.linalg.solve(matrices, forces)[:, dofs]
+        found[chunk] = model.solve(matrices, forces)[:, dofs]
     return found
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsm.calibration.plus_minus import plus_minus
+from dsm.calibration.remark import Remark
 from dsm.calibration.stiffness_groups import group_stiffness
 from dsm.spindle.spindle import Spindle
 
@@ -42,7 +43,7 @@ class StiffnessFit:
     """
     energy_share: _Float
     """Share of each group in the strain energy of each mode (-), shape (n, g); twice d ln f / d ln factor."""
-    warnings: tuple[str, ...]
+    remarks: tuple[Remark, ...]
     """What makes the result doubtful, and what to do about it."""
     given: Spindle
     """The spindle as given."""
@@ -140,7 +141,7 @@ class StiffnessFit:
         lines = (
             [] if chi is None else [f"reduced chi-square {chi:.3g}: about 1 where model and standard errors are right"]
         )
-        return [*lines, *(f"warning: {text}" for text in self.warnings)]
+        return [*lines, *(f"warning: {remark}" for remark in self.remarks)]
 
 
 class StiffnessFitError(ArithmeticError):

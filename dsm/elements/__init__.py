@@ -1,13 +1,19 @@
 """Beam elements as power series, and where the nodes are."""
 
-from dsm.elements.beam_series import beam_series
+from dsm.elements.beam_elements import link_elements, number_of_terms, stiffness_elements
 from dsm.elements.element_series import MAX_X, TERMS, element_series
-from dsm.elements.place_nodes import place_nodes
+from dsm.elements.place_nodes import Nodes, place_nodes
+from dsm.elements.transfer_series import POINTS, transfer_series
 
 __all__ = [
     "MAX_X",
+    "POINTS",
     "TERMS",
-    "beam_series",
+    "Nodes",
     "element_series",
+    "link_elements",
+    "number_of_terms",
     "place_nodes",
+    "stiffness_elements",
+    "transfer_series",
 ]

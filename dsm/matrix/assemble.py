@@ -9,11 +9,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.elements.beam_series import beam_series
+from dsm.elements.beam_elements import link_elements, stiffness_elements
 from dsm.elements.place_nodes import place_nodes
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
-from dsm.spindle.sections import sections
+from dsm.spindle.sections import Sections, sections
 from dsm.spindle.spindle import Spindle
 
 _Float = NDArray[np.float64]
@@ -28,16 +28,18 @@ def assemble(
     held: Sequence[Held] = (),
     left_out: Sequence[int] = (),
     spin: float | None = None,
+    links: bool = False,
 ) -> DynamicStiffness:
     """Dynamic stiffness matrix with nodes at segment ends, bearings, masses, joints, `places` (m) and `held` dofs.
 
     Elements longer than the series allows at `top_frequency` (Hz) are split into equal parts. A pinned end is
     held = [(z, 0)], a clamped one [(z, 0), (z, 1)]. left_out: bearings (0 is the first) whose nodes are there without
-    their radial springs. spin (rad/s): a polynomial in w for circular whirl, see DynamicStiffness. Rounding blurs the
-    matrix by the order of 1e-14 EI/l^3 (N/m), l the shortest distance between nodes. The same one is not made twice.
+    their radial springs. spin (rad/s): a polynomial in w for circular whirl, see DynamicStiffness. links: all
+    elements are links, twice the work, for bearings far softer than the shaft. The same one is not made twice.
     Raises ValueError for a place off the shaft.
     """
-    return _assemble(spindle, float(top_frequency), tuple(map(float, places)), tuple(held), tuple(left_out), spin)
+    nodes = tuple(map(float, places))
+    return _assemble(spindle, float(top_frequency), nodes, tuple(held), tuple(left_out), spin, links)
 
 
 @lru_cache(maxsize=32)
@@ -48,21 +50,20 @@ def _assemble(
     held: tuple[Held, ...],
     left_out: tuple[int, ...],
     spin: float | None,
+    links: bool,
 ) -> DynamicStiffness:
+    shaft = sections(spindle)
     wanted = [*_places_of_parts(spindle), *places, *(z for z, _ in held)]
-    pieces = sections(spindle)
-    position, piece = place_nodes(pieces, wanted, spindle.theory, top_frequency, spin)
-    position, series = _with_joints(spindle, position, beam_series(spindle, pieces, piece, np.diff(position), spin))
-    diagonal = np.zeros((3, position.size, series.shape[2]))
-    diagonal[:, :-1] = series[:3]
-    diagonal[:, 1:] += series[:3] * np.array([1, -1, 1])[:, np.newaxis, np.newaxis]
-    coupling = np.stack([series[3], series[4], -series[4], series[5]])
-    free = np.zeros((position.size, 2), dtype=bool)
-    model = DynamicStiffness(position, diagonal, coupling, free, top_frequency, spin)
+    position, segment, short = place_nodes(shaft, wanted, spindle.theory, top_frequency, spin, links)
+    series = _elements(spindle, shaft, position, segment, short, spin)
+    position, series, short = _with_joints(spindle, position, series, short)
+    model = _chain(position, series, short, top_frequency, spin)
     _add_masses(model, spindle)
-    for z, dof in (*_add_springs(model, spindle, left_out), *held):
+    rigid = _add_springs(model, spindle, left_out)
+    model.scale[:] = _scale(model, shaft)
+    for z, dof in (*rigid, *held):
         _hold(model, model.node(z), dof)
-    for values in (position, diagonal, coupling, free):
+    for values in (model.position, model.diagonal, model.coupling, model.held, model.scale):
         values.setflags(write=False)
     return model
 
@@ -72,16 +73,66 @@ def _places_of_parts(spindle: Spindle) -> list[float]:
     return [part.position for part in parts]
 
 
-def _with_joints(spindle: Spindle, position: _Float, series: _Float) -> tuple[_Float, _Float]:
-    """Nodes and element series with an element of no length at each joint."""
+def _elements(
+    spindle: Spindle,
+    shaft: Sections,
+    position: _Float,
+    segment: NDArray[np.int_],
+    short: NDArray[np.bool_],
+    spin: float | None,
+) -> _Float:
+    """Series of all elements, (10, n_elements, n_terms): rows of link_elements where short, else of the others."""
+    found = []
+    for kind, chosen in ((stiffness_elements, ~short), (link_elements, short)):
+        found.append(kind(shaft, spindle.theory, segment[chosen], position[:-1][chosen], position[1:][chosen], spin))
+    series = np.empty((10, segment.size, found[0].shape[2]))
+    series[:, ~short], series[:, short] = found
+    return series
+
+
+def _with_joints(
+    spindle: Spindle, position: _Float, series: _Float, short: NDArray[np.bool_]
+) -> tuple[_Float, _Float, NDArray[np.bool_]]:
+    """Nodes and elements with a link of no length at each joint."""
     for joint in spindle.joints:
         node = int(np.argmin(np.abs(position - joint.position)))
-        element = np.zeros((6, series.shape[2]))
-        k, tilt = joint.stiffness, joint.rotational_stiffness
-        element[:, 0] = k, 0.0, tilt, -k, 0.0, -tilt
+        link = np.zeros((10, series.shape[2]))
+        link[[3, 5], 0] = -1 / joint.stiffness, -1 / joint.rotational_stiffness
+        link[[6, 9], 0] = -1.0
         position = np.insert(position, node, position[node])
-        series = np.insert(series, node, element, axis=1)
-    return position, series
+        series = np.insert(series, node, link, axis=1)
+        short = np.insert(short, node, True)
+    return position, series, short
+
+
+def _chain(
+    position: _Float, series: _Float, short: NDArray[np.bool_], top_frequency: float, spin: float | None
+) -> DynamicStiffness:
+    """Elements put together, with a node of force and moment inside each link."""
+    node = np.arange(position.size) + np.concatenate([[0], np.cumsum(short)])
+    count, terms = node[-1] + 1, series.shape[2]
+    diagonal, coupling = np.zeros((3, count, terms)), np.zeros((4, count - 1, terms))
+    plain, link = node[:-1][~short], node[:-1][short]
+    diagonal[:, node[:-1]] = series[:3]
+    diagonal[:, plain + 1] += series[3:6, ~short]
+    diagonal[:, link + 1] = series[3:6, short]
+    coupling[:, node[:-1]] = series[6:]
+    coupling[0, link + 1, 0] = coupling[3, link + 1, 0] = 1.0
+    places = np.full(count, math.inf)
+    places[node] = position
+    held = np.zeros((count, 2), dtype=bool)
+    return DynamicStiffness(places, diagonal, coupling, held, np.ones(held.size), top_frequency, spin)
+
+
+def _scale(model: DynamicStiffness, shaft: Sections) -> _Float:
+    """One over the root of the stiffness at each dof, at least that of the whole shaft, or of the flexibility."""
+    middle = np.arange(shaft.ends.size - 1)
+    rigidity = float(np.mean(shaft.at(middle, (shaft.ends[1:] + shaft.ends[:-1]) / 2).rigidity))
+    length = float(shaft.ends[-1])
+    sizes = np.maximum(model.diagonal[::2, :, 0], [[rigidity / length**3], [rigidity / length]])
+    link = np.flatnonzero(model.is_link)
+    sizes[:, link] = np.maximum(-model.diagonal[::2, link, 0], 1 / sizes[:, link - 1])
+    return np.asarray(1 / np.sqrt(sizes.T.ravel()))
 
 
 def _add_masses(model: DynamicStiffness, spindle: Spindle) -> None:
@@ -116,3 +167,4 @@ def _hold(model: DynamicStiffness, node: int, dof: int) -> None:
     model.diagonal[2 * dof, node, 0] = 1.0
     model.coupling[2 * dof : 2 * dof + 2, node : node + 1] = 0.0
     model.coupling[[dof, dof + 2], node - 1 : node] = 0.0
+    model.scale[2 * node + dof] = 1.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -26,35 +25,77 @@ class Condensed(NamedTuple):
     """Deflection of the node `start` over t (m)."""
 
 
-def condense(diagonal: _Complex, coupling: _Complex, node: int, start: int | None = None) -> Condensed:
+class _Passed(NamedTuple):
+    """What the nodes before one do to it: stiffness to be added, and how the node before it follows its motion."""
+
+    lost: tuple[_Complex, _Complex, _Complex]
+    """uu, ut, tt to be taken from the stiffness of the node."""
+    follow: tuple[_Complex, _Complex, _Complex, _Complex]
+    """Motion of the node before over that of this one, with changed sign: u/u, u/t, t/u, t/t."""
+
+
+def condense(
+    diagonal: _Complex, coupling: _Complex, is_link: NDArray[np.bool_], node: int, start: int | None = None
+) -> Condensed:
     """Eliminate all nodes but one, from both ends, all frequencies at once.
 
-    diagonal, coupling: blocks of K as in DynamicStiffness.blocks. start: a node not beyond `node` whose deflection is
-    carried along; None: the node itself.
+    diagonal, coupling: blocks of K as in DynamicStiffness.blocks. is_link: which nodes are those of force and moment;
+    each is eliminated together with the node before it, which alone may be free to move (a tip at rest). start: a node
+    not beyond `node` whose deflection is carried along; None: the node itself.
     """
     diagonal, coupling = diagonal.swapaxes(0, 1), coupling.swapaxes(0, 1)
     begin = node if start is None else start
-    left, share_u, share_t = _eliminate(diagonal[:node], coupling[:node], begin)
+    left, share_u, share_t = _eliminate(diagonal[:node], coupling[:node], is_link[:node], begin)
     # From the far end down to the node, where the two sides of a coupling block change places.
     flipped = coupling[: node - diagonal.shape[0] : -1][:, [0, 2, 1, 3]]
-    right, _, _ = _eliminate(diagonal[:node:-1], flipped, flipped.shape[0])
+    right, _, _ = _eliminate(diagonal[:node:-1], flipped, is_link[:node:-1], flipped.shape[0])
     uu, ut, tt = diagonal[node]
     return Condensed(uu - left[0] - right[0], ut - left[1] - right[1], tt - left[2] - right[2], share_u, share_t)
 
 
 def _eliminate(
-    diagonal: Iterable[_Complex], coupling: Iterable[_Complex], start: int
+    diagonal: _Complex, coupling: _Complex, is_link: NDArray[np.bool_], start: int
 ) -> tuple[tuple[_Complex, _Complex, _Complex], _Complex, _Complex]:
     """What the last of the nodes takes from the stiffness of the next; with it, the deflection of node `start`."""
     nothing = np.zeros(1, dtype=np.complex128)
     lost = nothing, nothing, nothing
     share_u, share_t = nothing + 1, nothing
-    for number, ((uu, ut, tt), (c_uu, c_ut, c_tu, c_tt)) in enumerate(zip(diagonal, coupling, strict=True)):
-        a, b, d = uu - lost[0], ut - lost[1], tt - lost[2]
-        determinant = a * d - b * b
-        u_u, u_t = (d * c_uu - b * c_tu) / determinant, (d * c_ut - b * c_tt) / determinant
-        t_u, t_t = (a * c_tu - b * c_uu) / determinant, (a * c_tt - b * c_ut) / determinant
-        lost = c_uu * u_u + c_tu * t_u, c_uu * u_t + c_tu * t_t, c_ut * u_t + c_tt * t_t
+    for number in np.flatnonzero(~is_link):
+        pivot = tuple(own - gone for own, gone in zip(diagonal[number], lost, strict=True))
+        if number + 1 < is_link.size and is_link[number + 1]:
+            passed = _across_link(pivot, coupling[number], diagonal[number + 1], coupling[number + 1])
+        else:
+            passed = _across_element(pivot, coupling[number])
+        lost, (u_u, u_t, t_u, t_t) = passed
         if number >= start:
             share_u, share_t = -(share_u * u_u + share_t * t_u), -(share_u * u_t + share_t * t_t)
     return lost, share_u, share_t
+
+
+def _across_element(pivot: tuple[_Complex, ...], coupling: _Complex) -> _Passed:
+    a, b, d = pivot
+    c_uu, c_ut, c_tu, c_tt = coupling
+    determinant = a * d - b * b
+    u_u, u_t = (d * c_uu - b * c_tu) / determinant, (d * c_ut - b * c_tt) / determinant
+    t_u, t_t = (a * c_tu - b * c_uu) / determinant, (a * c_tt - b * c_ut) / determinant
+    lost = c_uu * u_u + c_tu * t_u, c_uu * u_t + c_tu * t_t, c_ut * u_t + c_tt * t_t
+    return _Passed(lost, (u_u, u_t, t_u, t_t))
+
+
+def _across_link(pivot: tuple[_Complex, ...], near: _Complex, force: _Complex, far: _Complex) -> _Passed:
+    """Solve [A C; C^T D] [q; p] = [0; C2] for each frequency; A may be singular, as at a tip that nothing holds."""
+    a, b, d = (np.broadcast_to(part, near[0].shape) for part in pivot)
+    both = np.array(
+        [
+            [a, b, near[0], near[1]],
+            [b, d, near[2], near[3]],
+            [near[0], near[2], force[0], force[1]],
+            [near[1], near[3], force[1], force[2]],
+        ]
+    )
+    zero = np.zeros_like(a)
+    right = np.array([[zero, zero], [zero, zero], [far[0], far[1]], [far[2], far[3]]])
+    solved = np.moveaxis(np.linalg.solve(np.moveaxis(both, 2, 0), np.moveaxis(right, 2, 0)), 0, 2)
+    (u_u, u_t), (t_u, t_t), (q_u, q_t), (m_u, m_t) = solved
+    lost = far[0] * q_u + far[2] * m_u, far[0] * q_t + far[2] * m_t, far[1] * q_t + far[3] * m_t
+    return _Passed(lost, (u_u, u_t, t_u, t_t))

@@ -14,12 +14,13 @@ def count_below(model: DynamicStiffness, x: NDArray[np.float64]) -> NDArray[np.i
 
     None is missed and double ones count twice. Source: W. H. Wittrick and F. W. Williams, A general algorithm for
     computing natural frequencies of elastic structures, Q. J. Mech. Appl. Math. 24 (1971), with J0 = 0. The pivoting
-    of Bunch and Kaufman and rows scaled to one another keep it right where a part of the shaft is at resonance. Where
-    the shaft spins, those of forward whirl are counted for w > 0: phi^T K(w) phi falls through 0 once, for any phi.
+    of Bunch and Kaufman and rows scaled to one another keep it right where a part of the shaft is at resonance; those
+    of links are taken off. Where the shaft spins, the modes of forward whirl are counted for w > 0: phi^T K(w) phi
+    falls through 0 once, for any phi.
     """
-    scale = 1 / np.sqrt(model.diagonal[[0, 2], :, 0].T.ravel())
-    matrices = model.dense(x) * np.outer(scale, scale)
-    return np.array([_negative_pivots(matrix) for matrix in matrices], dtype=int)
+    matrices = model.dense(x) * np.outer(model.scale, model.scale)
+    of_links = 2 * int(np.sum(model.is_link))
+    return np.array([_negative_pivots(matrix) - of_links for matrix in matrices], dtype=int)
 
 
 def _negative_pivots(matrix: NDArray[np.float64]) -> int:

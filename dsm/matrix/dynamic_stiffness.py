@@ -18,23 +18,33 @@ class DynamicStiffness:
 
     For a shaft that spins it is a polynomial in w, for the circular whirl u exp(i w t) of both planes together. What
     is called `x` below is w^2, or w where it spins. Lumped masses, bearings and joints of no length are in it.
-    Node i has the deflection u_i and the slope t_i = du/dz, in this order. A dof that is held has its row and column
-    replaced by those of the unit matrix: it stays at zero and adds a positive pivot. Exact for w up to that of
-    `top_frequency`, where no element has a clamped natural frequency of its own (J0 = 0 of Wittrick and Williams).
+    Node i has the deflection u_i and the slope t_i = du/dz, in this order. Between two nodes that are very near to each
+    other, or on both sides of a joint, stands a node of force and moment instead: a link, with its flexibility in place
+    of its stiffness, whose rounding would drown all else (link_elements). A dof that is held has its row and column
+    replaced by those of the unit matrix: it stays at zero and adds a positive pivot; a link adds two negative ones.
+    Exact for w up to that of `top_frequency`, where no element has a clamped natural frequency of its own (J0 = 0 of
+    Wittrick and Williams).
     """
 
     position: NDArray[np.float64]
-    """Nodes from the tool tip on (m), shape (n_nodes,)."""
+    """Nodes from the tool tip on (m), shape (n_nodes,); inf for those of force and moment."""
     diagonal: NDArray[np.float64]
     """Coefficients of K(u_i, u_i), K(u_i, t_i), K(t_i, t_i) in powers of x, shape (3, n_nodes, n_terms)."""
     coupling: NDArray[np.float64]
     """The same of K(u_i, u_j), K(u_i, t_j), K(t_i, u_j), K(t_i, t_j), j = i + 1, shape (4, n_nodes - 1, n_terms)."""
     held: NDArray[np.bool_]
     """Dofs that cannot move, shape (n_nodes, 2)."""
+    scale: NDArray[np.float64]
+    """What rows and columns of a full matrix are multiplied by to be of one size, shape (2 n_nodes,)."""
     top_frequency: float
     """Highest frequency of interest (Hz)."""
     spin: float | None = None
     """Speed of rotation (rad/s); forward whirl turns with it. None: the polynomial is one in w^2."""
+
+    @property
+    def is_link(self) -> NDArray[np.bool_]:
+        """Which nodes are those of force and moment, shape (n_nodes,)."""
+        return np.isinf(self.position)
 
     def to_x(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
         """The variable of the polynomial at frequencies (Hz), any shape."""
@@ -64,6 +74,12 @@ class DynamicStiffness:
     def dense(self, x: NDArray[Number], derivative: bool = False) -> NDArray[Number]:
         """K, or dK/dx, as full matrices of shape (n, 2 n_nodes, 2 n_nodes)."""
         return full_matrices(*self.blocks(x, derivative))
+
+    def solve(self, matrices: NDArray[Number], right: NDArray[Number]) -> NDArray[Number]:
+        """Solutions of full matrices times y = right, shape (n, 2 n_nodes, m), rows and columns made of one size."""
+        scale = self.scale[:, np.newaxis]
+        found = np.linalg.solve(matrices * (scale * self.scale), scale * right)
+        return np.asarray(scale * found, dtype=matrices.dtype)
 
     def term(self, power: int) -> NDArray[np.float64]:
         """Coefficient of one power of x in K, a full matrix of shape (2 n_nodes, 2 n_nodes)."""

@@ -2,41 +2,54 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.elements.beam_series import beam_series
-from dsm.spindle.sections import sections
-from dsm.spindle.spindle import Spindle
+from dsm.elements import number_of_terms, transfer_series
+from dsm.spindle.sections import Sections
+from dsm.spindle.spindle import Theory
 
 _Float = NDArray[np.float64]
 
 
+class State(NamedTuple):
+    """Motion and internal forces of modes at places, shape (n_modes, n_places) each."""
+
+    deflection: _Float
+    """u, of the modes' own scale."""
+    slope: _Float
+    """t, rotation of the cross-section."""
+    force: _Float
+    """Shear force Q."""
+    moment: _Float
+    """Bending moment M."""
+
+
 def between_nodes(
-    spindle: Spindle,
+    shaft: Sections,
+    theory: Theory,
     frequency: _Float,
     position: _Float,
     shape: tuple[_Float, _Float],
     places: _Float,
     left: NDArray[np.int_],
-) -> tuple[_Float, _Float]:
-    """Deflection and slope of the modes of a shaft at rest inside its elements, shape (n_modes, n_places) each, exact.
+) -> State:
+    """The modes of a shaft at rest inside its elements, exact.
 
     frequency (Hz), shape (n_modes,); position of the nodes (m) and the shape (deflection, slope) there, (n_modes,
-    n_nodes) each; places (m), shape (n_places,), and the node left of each. A place inside an element of ends 1 and 2
-    divides it into two elements a and b. The forces at the place balance:
-    (K_a22 + K_b11) (u, t) = -K_a21 (u1, t1) - K_b12 (u2, t2).
+    n_nodes) each; places (m), shape (n_places,), and the node left of each. What the element carries from its left node
+    on, (u, t, Q, M)' = T (u1, t1, Q1, M1), must meet (u2, t2) at its right one: B (Q1, M1) = (u2, t2) - A (u1, t1).
     """
-    pieces = sections(spindle)
-    piece = pieces.index_at(places)
-    w2 = (2 * np.pi * frequency) ** 2
-    a, b = (
-        beam_series(spindle, pieces, piece, length) for length in (places - position[left], position[left + 1] - places)
+    start, end = position[left], position[left + 1]
+    segment = shaft.segment_at((start + end) / 2)
+    powers = np.vander((2 * np.pi * frequency) ** 2, number_of_terms(None), increasing=True)
+    whole, part = (
+        np.moveaxis(transfer_series(shaft, theory, segment, start, to, powers.shape[1], None) @ powers.T, 3, 0)
+        for to in (end, places)
     )
-    a, b = (np.moveaxis(series @ np.vander(w2, series.shape[2], increasing=True).T, 2, 1) for series in (a, b))
-    u1, t1, u2, t2 = (values[:, node] for node in (left, left + 1) for values in shape)
-    force = -(a[3] * u1 - a[4] * t1) - (b[3] * u2 + b[4] * t2)
-    moment = -(a[4] * u1 + a[5] * t1) - (-b[4] * u2 + b[5] * t2)
-    uu, ut, tt = a[0] + b[0], b[1] - a[1], a[2] + b[2]
-    determinant = uu * tt - ut * ut
-    return (tt * force - ut * moment) / determinant, (uu * moment - ut * force) / determinant
+    near, far = (np.stack([values[:, node] for values in shape], axis=-1) for node in (left, left + 1))
+    strain = far[..., np.newaxis] - whole[..., :2, :2] @ near[..., np.newaxis]
+    forces = np.linalg.solve(whole[..., :2, 2:], strain)
+    return State(*np.moveaxis((part @ np.concatenate([near[..., np.newaxis], forces], axis=2))[..., 0], 2, 0))

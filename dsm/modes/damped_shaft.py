@@ -80,12 +80,14 @@ class DampedShaft:
         return Damping(np.zeros(len(self.spindle.bearings)), 0.0)
 
     def start(self, number: int) -> DampedMode:
-        """Mode `number` (1 is the lowest) without damping: K(w) phi = 0."""
+        """Mode `number` (1 is the lowest) without damping: K(w) phi = 0, by inverse iteration."""
         w = 2 * np.pi * float(self.undamped[number - 1])
-        values, vectors = np.linalg.eigh(self.model.dense(np.array([w * w]))[0])
-        shape = vectors[:, np.argmin(np.abs(values))].astype(np.complex128)
-        _, by_w = self.matrices(self.none, w)
-        return DampedMode(complex(w), shape / np.sqrt(shape @ by_w @ shape))
+        stiffness, by_w = self.matrices(self.none, w * (1 + OFFSET))
+        shape = np.ones(self.model.held.size, dtype=np.complex128)
+        for _ in range(2):
+            shape = self.model.solve(stiffness, (by_w @ shape)[:, np.newaxis])[:, 0]
+            shape /= np.sqrt(shape @ by_w @ shape)
+        return DampedMode(complex(w), shape)
 
     def matrices(self, damping: Damping, w: complex) -> tuple[_Complex, _Complex]:
         """K(w) and dK/dw, shape (n_dofs, n_dofs) each."""
@@ -137,7 +139,7 @@ class DampedShaft:
             stiffness, by_w = self.matrices(damping, trial)
             if number == 0:
                 foreseen = trial - complex((shape @ stiffness @ shape) / (shape @ by_w @ shape))
-            moved = np.asarray(np.linalg.solve(stiffness, by_w @ shape), dtype=np.complex128)
+            moved = self.model.solve(stiffness, (by_w @ shape)[:, np.newaxis])[:, 0]
             shape = moved / cmath.sqrt(complex(moved @ by_w @ moved))
             last, w = w, trial - complex(shape @ stiffness @ shape)
             if abs(w - last) <= SETTLED * abs(w):

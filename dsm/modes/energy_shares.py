@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.elements.beam_series import beam_series
+from dsm.elements import POINTS
+from dsm.modes.between_nodes import between_nodes
 from dsm.modes.find_modes import find_modes
 from dsm.modes.modes import Modes
 from dsm.spindle.sections import sections
@@ -40,8 +41,7 @@ class EnergyShares:
 def energy_shares(spindle: Spindle, count: int) -> EnergyShares:
     """Strain energy shares of the `count` lowest modes, exact, also of elements long against the wave.
 
-    With phi the shape and K_e the dynamic stiffness of an element, V_e = phi^T (K_e - w^2 dK_e/d(w^2)) phi / 2; the
-    second term is the motion inside the element. Raises ValueError for a count below 1 and a shaft that is not held,
+    Raises ValueError for a count below 1 and a shaft that is not held,
     ArithmeticError where rounding spoils the count of modes.
     """
     require_support(spindle)
@@ -50,24 +50,29 @@ def energy_shares(spindle: Spindle, count: int) -> EnergyShares:
     # Twice the energy of a mode of unit modal mass is w^2.
     segments, bearings, housings, joints = (
         energy / w2[:, np.newaxis]
-        for energy in (_segments(spindle, modes, w2), *_supports(spindle, modes), _joints(spindle, modes))
+        for energy in (_segments(spindle, modes), *_supports(spindle, modes), _joints(spindle, modes))
     )
     return EnergyShares(modes.frequency, segments, bearings, housings, joints)
 
 
-def _segments(spindle: Spindle, modes: Modes, w2: _Float) -> _Float:
-    pieces = sections(spindle)
+def _segments(spindle: Spindle, modes: Modes) -> _Float:
+    """Twice the integral of M^2/EI + Q^2/(kappa G A) along each segment, by Gauss points in each element."""
+    shaft = sections(spindle)
     element = np.flatnonzero(np.diff(modes.position) > 0)
-    piece = pieces.index_at((modes.position[element] + modes.position[element + 1]) / 2)
-    series = beam_series(spindle, pieces, piece, modes.position[element + 1] - modes.position[element])
-    order = np.arange(series.shape[2])
-    k = series @ ((1 - order[:, np.newaxis]) * w2 ** order[:, np.newaxis])
-    u1, t1 = modes.deflection[:, element].T, modes.slope[:, element].T
-    u2, t2 = modes.deflection[:, element + 1].T, modes.slope[:, element + 1].T
-    energy = k[0] * (u1**2 + u2**2) + k[2] * (t1**2 + t2**2) + 2 * k[1] * (u1 * t1 - u2 * t2)
-    energy += 2 * (k[3] * u1 * u2 + k[4] * (u1 * t2 - t1 * u2) + k[5] * t1 * t2)
-    total = np.zeros((len(spindle.segments), w2.size))
-    np.add.at(total, pieces.segment[piece], energy)
+    start, length = modes.position[element], np.diff(modes.position)[element]
+    x, weight = np.polynomial.legendre.leggauss(POINTS)
+    places = (start[:, np.newaxis] + length[:, np.newaxis] * (x + 1) / 2).ravel()
+    left = np.repeat(element, POINTS)
+    shape = modes.deflection, modes.slope
+    state = between_nodes(shaft, spindle.theory, modes.frequency, modes.position, shape, places, left)
+    segment = shaft.segment_at(start + length / 2)
+    section = shaft.at(np.repeat(segment, POINTS), places)
+    density = state.moment**2 / section.rigidity
+    if spindle.theory == "timoshenko":
+        density += state.force**2 / section.shear
+    energy = density.reshape(modes.frequency.size, -1, POINTS) @ weight * length / 2
+    total = np.zeros((len(spindle.segments), modes.frequency.size))
+    np.add.at(total, segment, energy.T)
     return total.T
 
 

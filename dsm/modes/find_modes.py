@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from dsm.matrix.assemble import Held, assemble
 from dsm.matrix.count_below import count_below
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
+from dsm.modes.finite_element_modes import finite_element_modes
 from dsm.modes.modes import Modes
 from dsm.spindle.sections import sections
 from dsm.spindle.spindle import Spindle
@@ -23,6 +24,8 @@ ROUNDING = 1024 * np.finfo(np.float64).eps
 """The same from rounding, relative to |phi|^T |K| |phi| of a mode of unit modal mass."""
 BLURRED = 0.1
 """An interval wider than this part of its w^2 proves nothing worth having."""
+DULL = 1e-6
+"""Where stiffness gives one wider than this, links are taken: the error is some 1e-4 of the interval."""
 
 SETTLED = 1e-8
 """Relative change of x by a step that leaves less than rounding to the next: each step at least squares the error."""
@@ -44,88 +47,77 @@ def find_modes(
 
     Hermite elements give a start, inverse iteration with Newton steps on the exact matrix the modes, and two
     Wittrick-Williams counts the proof that mode n is the n-th; bisection on the count where the proof fails.
-    Frequencies that rounding cannot tell from zero (a free shaft) are 0. spin (rad/s): the modes of forward whirl of a
+    Where rounding of the stiffness blurs the modes of a shaft on soft bearings, links take its place. Frequencies that
+    rounding cannot tell from zero (a free shaft) are 0. spin (rad/s): the modes of forward whirl of a
     supported shaft that spins so fast; of backward whirl with -spin.
 
     Raises ValueError for a count below 1, ArithmeticError where rounding spoils the count.
     """
     if count < 1:
         raise ValueError(f"{count} modes were asked for; at least 1 is needed")
+    wanted = _Wanted(spindle, count, tuple(places), tuple(held), spin)
     try:
-        model, x, shape = _start(spindle, count, places, held, spin)
+        return _solve(wanted, links=False)
+    except _SpoiltError:
+        return _solve(wanted, links=True)
+
+
+class _SpoiltError(ArithmeticError):
+    """Rounding leaves modes in doubt."""
+
+    def __init__(self) -> None:
+        super().__init__(SPOILT)
+
+
+class _Wanted(NamedTuple):
+    """Arguments of find_modes."""
+
+    spindle: Spindle
+    number: int
+    places: Sequence[float]
+    held: Sequence[Held]
+    spin: float | None
+
+
+def _solve(wanted: _Wanted, links: bool) -> Modes:
+    try:
+        model, x, shape = _start(wanted, links)
         width = CERTAINTY * x + ROUNDING * _quadratic(np.abs(model.dense(x)), np.abs(shape))
         x, shape = _refine(model, x, shape, width)
-        _require_sharp(spindle, held, x, width)
+        _require_sharp(wanted, x, width, BLURRED if links else DULL)
         x, shape = _prove(model, x, shape, width)
     except np.linalg.LinAlgError as exc:
-        raise ArithmeticError(SPOILT) from exc
-    return Modes(model.to_frequency(x), model.position, shape[:, ::2], shape[:, 1::2], spindle, spin or 0.0)
+        raise _SpoiltError from exc
+    node = np.flatnonzero(~model.is_link)
+    deflection, slope = shape[:, 2 * node], shape[:, 2 * node + 1]
+    return Modes(model.to_frequency(x), model.position[node], deflection, slope, wanted.spindle, wanted.spin or 0.0)
 
 
-def _start(
-    spindle: Spindle, count: int, places: Sequence[float], held: Sequence[Held], spin: float | None
-) -> tuple[DynamicStiffness, _Float, _Float]:
+def _start(wanted: _Wanted, links: bool) -> tuple[DynamicStiffness, _Float, _Float]:
     """A matrix exact up to the last mode, and the modes of its finite elements."""
+    spindle, count, places, held, spin = wanted
     top = _first_guess(spindle, np.pi * (count + 2))
     for _ in range(8):
-        model = assemble(spindle, top, places, held, spin=spin)
-        x, shape = _finite_element_modes(model, count) if spin is None else _whirling_modes(model, count)
+        model = assemble(spindle, top, places, held, spin=spin, links=links)
+        x, shape = finite_element_modes(model, count)
         highest = float(model.to_frequency(x[-1:])[0])
         if highest <= model.top_frequency:
             return model, x, shape
         top = highest
-    raise ArithmeticError(SPOILT)
+    raise _SpoiltError
 
 
 def _first_guess(spindle: Spindle, phase: float) -> float:
     """Frequency (Hz) at which a wave along the shaft turns by about `phase` (rad); 1/w^2 adds up as in Dunkerley's."""
-    pieces = sections(spindle)
-    bending = float(np.sum(pieces.length * (pieces.mass / pieces.rigidity) ** 0.25)) / phase
+    shaft = sections(spindle)
+    length, middle = np.diff(shaft.ends), (shaft.ends[1:] + shaft.ends[:-1]) / 2
+    section = shaft.at(np.arange(length.size), middle)
+    bending = float(np.sum(length * (section.mass / section.rigidity) ** 0.25)) / phase
     if spindle.theory == "euler-bernoulli":
         return 1 / (2 * np.pi * bending**2)
-    shear = float(np.sum(pieces.length * np.sqrt(pieces.mass / pieces.shear))) / phase
-    rotary = float(np.sum(pieces.length * np.sqrt(pieces.rotary / pieces.rigidity))) / phase
+    shear = float(np.sum(length * np.sqrt(section.mass / section.shear))) / phase
+    rotary = float(np.sum(length * np.sqrt(section.rotary / section.rigidity))) / phase
     return 1 / (2 * np.pi * float(np.sqrt(bending**4 + shear**2 + rotary**2)))
-
-
-def _finite_element_modes(model: DynamicStiffness, count: int) -> tuple[_Float, _Float]:
-    """w^2 (count,) and shapes (count, 2 n_nodes) of the finite elements that terms 0 and 1 of the series are.
-
-    Upper bounds. Solved for 1/(w^2 + shift), so that the lowest are the most exact and a free shaft is no exception.
-    """
-    free = np.flatnonzero(~model.held.ravel())
-    if free.size < count:
-        raise ArithmeticError(f"{count} modes were asked for; the model of this shaft has {free.size}")
-    mass = -model.term(1)[np.ix_(free, free)]
-    shift = 1e-3 * (2 * np.pi * model.top_frequency) ** 2
-    shifted = model.term(0)[np.ix_(free, free)] + shift * mass
-    inverse, vectors = eigh(mass, shifted, subset_by_index=[free.size - count, free.size - 1])
-    shape = np.zeros((count, model.held.size))
-    shape[:, free] = (vectors / np.sqrt(inverse)).T[::-1]
-    return np.maximum(1 / inverse[::-1] - shift, 0.0), shape
-
-
-def _whirling_modes(model: DynamicStiffness, count: int) -> tuple[_Float, _Float]:
-    """The same for a shaft that spins, from terms 0 to 2: K0 + w K1 - w^2 M.
-
-    With y = w x it is diag(K0, M) z = w [[-K1, M], [M, 0]] z, z = (x, y), whose left side is positive definite.
-    """
-    free = np.flatnonzero(~model.held.ravel())
-    terms = [model.term(power)[np.ix_(free, free)] for power in range(3)]
-    stiffness, gyroscopic, mass = terms[0], terms[1], -terms[2]
-    zero = np.zeros_like(mass)
-    right = np.block([[-gyroscopic, mass], [mass, zero]])
-    last = 2 * free.size - 1
-    inverse, vectors = eigh(
-        right, np.block([[stiffness, zero], [zero, mass]]), subset_by_index=[last - count + 1, last]
-    )
-    if inverse[0] <= 0:
-        raise ArithmeticError(f"{count} modes were asked for; the model of this shaft has fewer")
-    shape = np.zeros((count, model.held.size))
-    shape[:, free] = vectors[: free.size].T[::-1]
-    x = 1 / inverse[::-1]
-    inertia = -model.dense(x, derivative=True)
-    return x, shape / np.sqrt(_quadratic(inertia, shape))[:, np.newaxis]
 
 
 def _refine(model: DynamicStiffness, x: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
@@ -143,7 +135,7 @@ def _iterate(model: DynamicStiffness, x: _Float, shape: _Float, width: _Float) -
     """One step beside x, where K is not singular; shapes phi with -phi^T (dK/dx) phi = 1, for w^2 the modal mass."""
     trial = x + width
     stiffness, inertia = model.dense(trial), -model.dense(trial, derivative=True)
-    moved = np.asarray(np.linalg.solve(stiffness, inertia @ shape[..., np.newaxis])[..., 0], dtype=np.float64)
+    moved = model.solve(stiffness, inertia @ shape[..., np.newaxis])[..., 0]
     scaled = moved / np.sqrt(_quadratic(inertia, moved))[:, np.newaxis]
     return trial + _quadratic(stiffness, scaled), scaled
 
@@ -153,13 +145,13 @@ def _quadratic(matrix: _Float, shape: _Float) -> _Float:
     return np.asarray(np.sum(shape * (matrix @ shape[..., np.newaxis])[..., 0], axis=1))
 
 
-def _require_sharp(spindle: Spindle, held: Sequence[Held], x: _Float, width: _Float) -> None:
-    """Raise ArithmeticError where rounding leaves modes in doubt, or takes them for motions without bending."""
+def _require_sharp(wanted: _Wanted, x: _Float, width: _Float, widest: float) -> None:
+    """Raise _SpoiltError where rounding leaves modes in doubt, or takes them for motions without bending."""
     moving = x > width
     still = int(np.sum(~moving))
-    doubtful = still > 0 and still > _motions(spindle, held, float(np.min(width)))
-    if doubtful or np.any(width[moving] > BLURRED * x[moving]):
-        raise ArithmeticError(SPOILT)
+    doubtful = still > 0 and still > _motions(wanted.spindle, wanted.held, float(np.min(width)))
+    if doubtful or np.any(width[moving] > widest * x[moving]):
+        raise _SpoiltError
 
 
 def _motions(spindle: Spindle, held: Sequence[Held], width: float) -> int:
@@ -197,7 +189,7 @@ def _bisect(model: DynamicStiffness, order: NDArray[np.int_], width: _Float) -> 
     low = -width
     high = np.full(order.size, float(model.to_x(np.array(model.top_frequency))))
     if np.any(count_below(model, low) >= order) or np.any(count_below(model, high) < order):
-        raise ArithmeticError(SPOILT)
+        raise _SpoiltError
     while np.any(high - low > width):
         middle = (low + high) / 2
         above = count_below(model, middle) < order

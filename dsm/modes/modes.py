@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsm.modes.between_nodes import between_nodes
+from dsm.spindle.sections import sections
 from dsm.spindle.spindle import SAME_PLACE, Spindle
 
 
@@ -45,9 +46,16 @@ class Modes:
         inside = np.minimum(from_left, from_right) > slack
         if np.any(inside):
             shape = self.deflection, self.slope
-            deflection[:, inside], slope[:, inside] = between_nodes(
-                self.spindle, self.frequency, self.position, shape, places[inside], left[inside]
+            state = between_nodes(
+                sections(self.spindle),
+                self.spindle.theory,
+                self.frequency,
+                self.position,
+                shape,
+                places[inside],
+                left[inside],
             )
+            deflection[:, inside], slope[:, inside] = state.deflection, state.slope
         return replace(self, position=places, deflection=deflection, slope=slope)
 
     def deflection_at(self, position: float) -> NDArray[np.float64]:

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dsm.matrix.assemble import assemble
-from dsm.matrix.condense import condense
-from dsm.matrix.damped_blocks import damped_blocks
+from dsm.matrix.condense_damped import condense_damped
 from dsm.matrix.frequency_axis import frequency_axis
 from dsm.spindle.spindle import Spindle, require_support
 
@@ -19,11 +18,11 @@ def receptance(
     loss_factor: float = 0.0,
     force_position: float | None = None,
 ) -> NDArray[np.complex128]:
-    """Deflection over force (m/N), shape (n,), with all modes in it, of the shaft at rest.
+    """Driving-point or transfer receptance, deflection over force (m/N), shape (n,), of the shaft at rest: all modes.
 
     frequency: (n,) Hz. position: where the deflection is, distance from the tool tip (m). loss_factor eta: all
     stiffness k becomes k (1 + i eta), so that every mode has the damping ratio eta/2; the dampers of the bearings come
-    on top. force_position: where the force is (m); None: at the same place.
+    on top. force_position: where the force is (m); None: at the same place, the driving point.
 
     Raises ValueError for frequencies that are negative or not finite, a loss factor below 0, a position off the
     shaft, and 0 Hz for a shaft that is not held.
@@ -33,9 +32,8 @@ def receptance(
         require_support(spindle)
     places = sorted([position, position if force_position is None else force_position])
     model = assemble(spindle, float(np.max(f, initial=0.0)), places)
-    blocks = damped_blocks(model, spindle, np.asarray(2 * np.pi * f, dtype=np.complex128), loss_factor)
     nodes = [model.node(place) for place in places]
     if np.any(model.held[nodes, 0]):
         return np.zeros(f.size, dtype=np.complex128)
-    k = condense(*blocks, node=nodes[1], start=nodes[0])
+    k = condense_damped(model, spindle, f, loss_factor, node=nodes[1], start=nodes[0])
     return np.asarray((k.share_u * k.tt - k.share_t * k.ut) / (k.uu * k.tt - k.ut * k.ut))

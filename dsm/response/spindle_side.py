@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dsm.matrix.assemble import assemble
-from dsm.matrix.condense import condense
-from dsm.matrix.damped_blocks import damped_blocks
+from dsm.matrix.condense_damped import condense_damped
 from dsm.matrix.frequency_axis import frequency_axis
 from dsm.spindle.attachments import Joint
 from dsm.spindle.cut_spindle import cut_spindle
@@ -50,7 +49,7 @@ def spindle_side(spindle: Spindle, frequency: ArrayLike, position: float, loss_f
     model = assemble(rest, float(np.max(f, initial=0.0)))
     if np.any(model.held[0]):
         raise ValueError(f"position={position} m is held by a rigid bearing; cut the shaft elsewhere")
-    k = condense(*damped_blocks(model, rest, np.asarray(2 * np.pi * f, dtype=np.complex128), loss_factor), node=0)
+    k = condense_damped(model, rest, f, loss_factor, node=0)
     stiffness = (k.uu, k.ut, k.tt)
     if joint is not None:
         stiffness = _through(joint, loss_factor, *stiffness)

@@ -4,7 +4,7 @@ from dsm.spindle.attachments import Bearing, Joint, LumpedMass
 from dsm.spindle.change_tool import change_tool, check_tool
 from dsm.spindle.cut_spindle import cut_spindle
 from dsm.spindle.material import MATERIALS, Material
-from dsm.spindle.sections import Sections, sections
+from dsm.spindle.sections import CrossSection, Sections, sections
 from dsm.spindle.segment import Segment
 from dsm.spindle.spindle import SAME_PLACE, Spindle, Theory, require_support
 
@@ -12,6 +12,7 @@ __all__ = [
     "MATERIALS",
     "SAME_PLACE",
     "Bearing",
+    "CrossSection",
     "Joint",
     "LumpedMass",
     "Material",

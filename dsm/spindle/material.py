@@ -5,8 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dsm.spindle.checks import require_positive
+
+Number = TypeVar("Number", float, NDArray[np.float64])
 
 
 @dataclass(frozen=True)
@@ -37,12 +43,17 @@ class Material:
         return self.youngs_modulus / (2 * self.shear_modulus) - 1
 
     def shear_coefficient(self, bore_over_outer: float) -> float:
-        """Share kappa of a ring's area that carries shear (-); 0 is a full section.
+        """Share kappa of a ring's area that carries shear (-); see shear_coefficient below."""
+        return shear_coefficient(self.poisson_ratio, bore_over_outer)
 
-        Source: G. R. Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech. 33 (1966).
-        """
-        nu, ring = self.poisson_ratio, (1 + bore_over_outer**2) ** 2
-        return 6 * (1 + nu) * ring / ((7 + 6 * nu) * ring + (20 + 12 * nu) * bore_over_outer**2)
+
+def shear_coefficient(poisson_ratio: Number, bore_over_outer: Number) -> Number:
+    """Share kappa of a ring's area that carries shear (-); 0 is a full section.
+
+    Source: G. R. Cowper, The shear coefficient in Timoshenko's beam theory, J. Appl. Mech. 33 (1966).
+    """
+    nu, ring = poisson_ratio, (1 + bore_over_outer**2) ** 2
+    return 6 * (1 + nu) * ring / ((7 + 6 * nu) * ring + (20 + 12 * nu) * bore_over_outer**2)
 
 
 def _isotropic(youngs_modulus: float, density: float, poisson_ratio: float) -> Material:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from dsm.spindle.checks import require_positive
-from dsm.spindle.material import Material
+from dsm.spindle.material import Material, Number
 
 
 @dataclass(frozen=True)
@@ -75,12 +75,12 @@ class Segment:
         _check_bore(where, "", self.bore_diameter, mass_diameter, "mass_diameter")
 
 
-def ring_area(outer_diameter: float, bore_diameter: float) -> float:
+def ring_area(outer_diameter: Number, bore_diameter: Number) -> Number:
     """Area of a ring (m^2), diameters in m."""
     return math.pi * (outer_diameter**2 - bore_diameter**2) / 4
 
 
-def ring_second_moment(outer_diameter: float, bore_diameter: float) -> float:
+def ring_second_moment(outer_diameter: Number, bore_diameter: Number) -> Number:
     """Second moment of area of a ring about a diameter (m^4), diameters in m."""
     return math.pi * (outer_diameter**4 - bore_diameter**4) / 64
 

@@ -14,8 +14,8 @@ from dsm.spindle.segment import Segment, ring_area
 
 Theory = Literal["euler-bernoulli", "timoshenko"]
 
-SAME_PLACE = 1e-6
-"""Places on the shaft nearer to each other than this part of its length count as one."""
+SAME_PLACE = 1e-9
+"""Places on the shaft nearer to each other than this part of its length, as by rounding, count as one."""
 MAX_SEGMENTS = 500
 """More are refused: the work grows with their third power."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from rich.table import Table
@@ -44,7 +45,7 @@ def stiffness_fit_json(fit: StiffnessFit) -> dict[str, Any]:
         "residual_hz": fit.residual,
         "energy_share": fit.energy_share,
         "condition": fit.condition,
-        "warnings": list(fit.warnings),
+        "remarks": [asdict(remark) for remark in fit.remarks],
     }
 
 

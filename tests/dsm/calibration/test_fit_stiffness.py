@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 from dsm import Bearing, Joint, Segment, Spindle, UnreachableFrequencyError, calibrate, natural_frequencies
 from dsm.calibration.fit_stiffness import fit_stiffness
-from dsm.calibration.stiffness_fit import StiffnessFitError
+from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
+from dsm.calibration.stiffness_groups import scale_groups
 
 GEOMETRY = Path(__file__).parents[2] / "data" / "okada_vm500_surrogate.csv"
 BEARING_NODES = {"front": (8, 10, 12), "middle": (16, 17, 18), "rear": (21, 22, 23, 24)}
@@ -50,6 +51,10 @@ def shaft(front: float = 2e8, rear: float = 1e8, housing: float = 4e8, joint: fl
 MODES = natural_frequencies(surrogate(TRUTH), 6)
 
 
+def codes(found: StiffnessFit) -> set[str]:
+    return {remark.code for remark in found.remarks}
+
+
 @pytest.mark.parametrize("start", [0.3, 1.0, 10.0])
 @pytest.mark.parametrize("count", [5, 6])
 def test_truth_is_recovered_from_exact_frequencies(start: float, count: int) -> None:
@@ -60,7 +65,7 @@ def test_truth_is_recovered_from_exact_frequencies(start: float, count: int) -> 
     assert found.residual == pytest.approx(0, abs=1e-8)
     assert found.spindle.joints[0].rotational_stiffness == pytest.approx(7e-4 * TRUTH["holder"], rel=1e-9)
     assert found.factor[2] == pytest.approx(1 / start / 1.2, rel=1e-9)
-    assert not found.warnings
+    assert not found.remarks
     assert natural_frequencies(found.spindle, count) == pytest.approx(MODES[:count], rel=1e-10)
 
 
@@ -103,19 +108,19 @@ def test_one_group_is_what_calibrate_solves(mode: int) -> None:
 
 
 def test_covariance_is_what_noise_makes_of_the_factors() -> None:
-    """120 draws: the size of the errors over that stated scatters by 6.5 %, their correlation by 0.09."""
+    """60 draws: the size of the errors over that stated scatters by 9 %, their correlation by 0.13."""
     truth = shaft()
     exact = natural_frequencies(truth, 4)
     std = np.array([2e-4, 1e-4, 3e-4, 2e-4]) * exact
-    draws = np.random.default_rng(5).normal(size=(120, 4))
+    draws = np.random.default_rng(5).normal(size=(60, 4))
     fits = [fit_stiffness(truth, exact + std * draw, std) for draw in draws]
     stated = fits[0].log_covariance
     assert stated is not None
     errors = np.log([found.factor for found in fits])
     size = np.sqrt(np.diag(stated))
-    assert np.std(errors, axis=0) / size == pytest.approx(1, abs=0.17)
-    assert np.corrcoef(errors.T) == pytest.approx(fits[0].correlation, abs=0.2)
-    assert abs(np.mean(np.abs(errors) < 1.96 * size) - 0.95) < 0.03
+    assert np.std(errors, axis=0) / size == pytest.approx(1, abs=0.25)
+    assert np.corrcoef(errors.T) == pytest.approx(fits[0].correlation, abs=0.3)
+    assert abs(np.mean(np.abs(errors) < 1.96 * size) - 0.95) < 0.05
     assert np.mean([found.reduced_chi_square for found in fits]) == pytest.approx(1, abs=0.3)
 
 
@@ -124,7 +129,7 @@ def test_scatter_stands_in_for_standard_errors_only_where_modes_are_to_spare() -
     exact = natural_frequencies(truth, 6)
     assert fit_stiffness(truth, exact[:3]).log_covariance is None
     assert fit_stiffness(truth, exact[:3]).stiffness_std is None
-    draws = np.random.default_rng(6).normal(size=(40, 6))
+    draws = np.random.default_rng(6).normal(size=(25, 6))
     by_scatter, stated = [], None
     for draw in draws:
         scattered = fit_stiffness(truth, exact * (1 + 1e-4 * draw))
@@ -132,7 +137,7 @@ def test_scatter_stands_in_for_standard_errors_only_where_modes_are_to_spare() -
         assert scattered.log_covariance is not None
         by_scatter.append(np.diag(scattered.log_covariance))
     assert stated is not None
-    assert np.mean(by_scatter, axis=0) / np.diag(stated) == pytest.approx(1, abs=0.35)
+    assert np.mean(by_scatter, axis=0) / np.diag(stated) == pytest.approx(1, abs=0.45)
 
 
 def test_standard_errors_are_not_stretched_by_the_residuals() -> None:
@@ -142,15 +147,15 @@ def test_standard_errors_are_not_stretched_by_the_residuals() -> None:
     assert small.log_covariance is not None
     assert small.log_covariance * 1e4 == pytest.approx(large.log_covariance, rel=1e-4)
     assert small.reduced_chi_square == pytest.approx(1e4 * (large.reduced_chi_square or 0), rel=1e-4)
-    assert any("do not fit" in text for text in small.warnings)
-    assert not any("do not fit" in text for text in large.warnings)
+    assert "frequencies-misfit" in codes(small)
+    assert "frequencies-misfit" not in codes(large)
 
 
 def test_a_group_that_the_modes_do_not_see_is_named_and_keeps_its_estimate() -> None:
     start = surrogate({**TRUTH, "front": 1e9})
     found = fit_stiffness(start, MODES[:2], [1.0, 1.0], groups=["front", "rear"])
     assert np.all(np.isfinite(found.factor))
-    assert any("'rear' has at most 0.9" in text and "more or other modes are needed" in text for text in found.warnings)
+    assert [(remark.code, remark.about) for remark in found.remarks] == [("group-not-felt", "rear")]
     assert found.factor_std is not None
     front, rear = found.factor_std / found.factor
     assert rear > 10 * front
@@ -161,7 +166,7 @@ def test_groups_that_the_modes_cannot_tell_apart_are_named() -> None:
     spindle = Spindle([Segment(0.5, 0.05)], bearings)
     found = fit_stiffness(spindle, natural_frequencies(spindle, 3), [0.1, 0.1, 0.1])
     assert found.condition > 30
-    assert any("'a', 'b'" in text and "condition number" in text for text in found.warnings)
+    assert "a, b" in [remark.about for remark in found.remarks if remark.code == "groups-alike"]
     correlation = found.correlation
     assert correlation is not None
     assert correlation[0, 1] < -0.95
@@ -173,7 +178,7 @@ def test_modes_close_together_are_reported() -> None:
     joint = Joint(0.3, 1e3, 1e-3)
     spindle = Spindle([Segment(0.3, 0.05), Segment(0.3, 0.05)], bearings, joints=[joint])
     found = fit_stiffness(spindle, natural_frequencies(spindle, 2), [1.0, 1.0])
-    assert any("modes 1 and 2" in text and "exchange shapes" in text for text in found.warnings)
+    assert "modes 1 and 2" in [r.about for r in found.remarks if r.code == "modes-exchange-shapes"]
 
 
 def test_report() -> None:
@@ -239,3 +244,54 @@ def test_frequencies_that_exclude_each_other_keep_the_best_estimate() -> None:
         fit_stiffness(spindle, [low, 0.99 * high], groups=["front", "rear"])
     assert error.value.best.factor.shape == (2,)
     assert np.max(np.abs(error.value.best.residual)) > 1
+
+
+def random_shaft(draw: np.random.Generator) -> Spindle:
+    """Two groups of two bearings each, anywhere."""
+    segments = [Segment(*draw.uniform([0.03, 0.04], [0.12, 0.1]).tolist()) for _ in range(int(draw.integers(3, 7)))]
+    places = np.sort(draw.uniform(0.15, 0.95, 4)) * sum(segment.length for segment in segments)
+    stiffness = 10 ** draw.uniform(7.5, 9.5, 2)
+    groups = ("front", "front", "rear", "rear")
+    springs = zip(places, np.repeat(stiffness, 2), groups, strict=True)
+    return Spindle(segments, [Bearing(float(z), float(k), group=group) for z, k, group in springs])
+
+
+def coverage(number: int, modes: int, noise: float) -> tuple[float, int, int, int]:
+    """Share of 95 % intervals without remark that hold the truth, their number, fits with a remark, failed fits."""
+    draw, inside = np.random.default_rng(modes), list[bool]()
+    failed = doubted = 0
+    for _ in range(number):
+        truth = random_shaft(draw)
+        exact = natural_frequencies(truth, modes)
+        measured = exact * (1 + noise * draw.normal(size=modes))
+        away = np.exp(0.7 * draw.normal(size=2))
+        start = scale_groups(truth, dict(zip(("front", "rear"), away.tolist(), strict=True)))
+        try:
+            found = fit_stiffness(start, measured, noise * exact)
+        except (StiffnessFitError, ValueError):
+            failed += 1
+            continue
+        assert found.log_covariance is not None
+        error = np.log(found.factor * away) / np.sqrt(np.diag(found.log_covariance))
+        inside += [] if found.remarks else (np.abs(error) < 1.96).tolist()
+        doubted += bool(found.remarks)
+    return float(np.mean(inside)), len(inside), doubted, failed
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("modes", [2, 3, 4])
+@pytest.mark.parametrize("noise", [3e-4, 3e-3, 1e-2])
+def test_intervals_without_a_remark_hold_the_truth(modes: int, noise: float) -> None:
+    share, _, doubted, failed = coverage(300, modes, noise)
+    assert 0.92 <= share <= 0.98
+    assert doubted + failed < 150
+
+
+def test_a_second_solution_is_told() -> None:
+    """Two modes that fit exactly with half the front and twice the rear stiffness too."""
+    truth = random_shaft(np.random.default_rng(12))
+    exact = natural_frequencies(truth, 2)
+    found = fit_stiffness(scale_groups(truth, {"front": 0.5, "rear": 2.0}), exact, 3e-3 * exact)
+    assert found.factor * [0.5, 2.0] == pytest.approx([0.466, 2.29], abs=0.01)
+    assert [(remark.code, remark.about) for remark in found.remarks] == [("stiffness-ambiguous", "front, rear")]
+    assert "factors 2, 0.5" in str(found.remarks[0])

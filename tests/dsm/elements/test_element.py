@@ -24,7 +24,8 @@ def one_element() -> DynamicStiffness:
     """A free beam of one element with the bending stiffness, mass per length and length above."""
     segment = Segment(LENGTH, 0.1)
     youngs_modulus, density = RIGIDITY / segment.second_moment, MASS / segment.area
-    return assemble(Spindle([segment], [], youngs_modulus, density), 0.0)
+    longest = 4 / LENGTH**2 * math.sqrt(RIGIDITY / MASS) / (2 * math.pi)
+    return assemble(Spindle([segment], [], youngs_modulus, density), longest)
 
 
 def textbook(w2: mpmath.mpf) -> mpmath.matrix:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from acquisition import Frf
 from lobewatch.machine.machine_file import Limits
 from lobewatch.show.output import printable
+from lobewatch.show.trends.course import Course
 
 NOW = "#0072B2"
 THEN = "#777777"
@@ -114,8 +115,12 @@ def trend_figure(
     label: str,
     limits: Limits | None = None,
     marks: Marks = NOTHING_ELSE,
+    course: Course | None = None,
 ) -> Figure:
-    """A value over time with its 95 % interval; with limits, where its fall calls for attention."""
+    """A value over time with its 95 % interval; with limits, where its fall calls for attention.
+
+    limits: in % of the first value of the course, else of the first value.
+    """
     figure, (axes,) = new_axes(1, (8.0, 2.8))
     days = date2num(times)
     axes.errorbar(days, values, yerr=1.96 * np.nan_to_num(stds), fmt="o", ms=4, color=NOW, capsize=2)
@@ -124,13 +129,16 @@ def trend_figure(
             (limits.frequency_warn_percent, THEN, "--"),
             (limits.frequency_alarm_percent, ALARM, "-"),
         ):
-            level = values[0] * (1 - percent / 100)
+            level = (values[0] if course is None else course.line[0]) * (1 - percent / 100)
             axes.axhline(level, color=colour, ls=dashes, lw=1)
             axes.annotate(
                 f"-{percent:g} %", (1, level), xycoords=("axes fraction", "data"), ha="right", va="bottom", color=colour
             )
     if len(days) == 1:
         axes.set_xlim(days[0] - 15, days[0] + 15)
+    if course is not None:
+        axes.plot(course.days, course.line, color=NOW, lw=1)
+        axes.fill_between(course.days_ahead, course.low, course.high, color=NOW, alpha=0.2, lw=0)
     _add_marks(axes, marks)
     locator = AutoDateLocator()
     axes.xaxis.set_major_locator(locator)

@@ -25,6 +25,7 @@ from lobewatch.analysis import (
     lobes_of,
 )
 from lobewatch.analysis.decay.fallen import change_since_start, start
+from lobewatch.analysis.decay.outlook import outlook
 from lobewatch.analysis.programs.limit_band import limit_band
 from lobewatch.machine import Machine
 from lobewatch.show.advice import Advised, advised, advised_lines, decay_text
@@ -33,6 +34,8 @@ from lobewatch.show.figures_lobes import lobes_figure
 from lobewatch.show.history.trends import Picture, trends
 from lobewatch.show.history.under import conditions_texts
 from lobewatch.show.programs.doubts import reading_lines
+from lobewatch.show.trends.dates import ASSUMED
+from lobewatch.show.trends.describe_trend import dates_rows, sentence
 from lobewatch.show.verdicts import WORDS, band_text, limit_text, margin_text, turning_text, verdict_text
 
 LIGHTS = {Light.ALARM: "✗ ALARM", Light.UNKNOWN: "? UNKNOWN", Light.WARN: "! WARNING", Light.GOOD: "✓ GOOD"}
@@ -82,7 +85,8 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
     entries = {entry.id: entry for entry in logbook.taps}
     now = logbook.folder.read(entries[last.tap_id])
     assembly = logbook.assembly(last.tool)
-    course = trends(logbook, rows)
+    course, found = trends(logbook, rows), outlook(logbook)
+    series = found.series(last.tool, last.direction)
     programs = [advised(logbook, verdict) for verdict in logbook.verdicts()]
     checked = [one.verdict for one in programs if one.verdict.word is not Word.UNKNOWN]
     return {
@@ -94,7 +98,10 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
         "n_taps": len(rows),
         "software": logbook.history.software,
         "label": machine.spindle.label if machine.spindle else "",
-        "standing": _standing(logbook.standing()),
+        "standing": _standing(found.standing),
+        "course": None if series.trend is None else sentence(series),
+        "dates": dates_rows(found, series.trend) if series.trend else [],
+        "assumed": ASSUMED,
         "changes": _changes(rows),
         "programs": [_program(one) for one in programs],
         "program_lines": [_whole(line) for one in programs for line in advised_lines(one, machine.speed)],

@@ -9,8 +9,10 @@ import numpy as np
 
 from lobewatch.analysis import Logbook, Row
 from lobewatch.analysis.damage.left_out import left_out
+from lobewatch.analysis.decay.trend import Trend
 from lobewatch.machine.corrections.event import Event
 from lobewatch.show.figures import Marks, svg, trend_figure
+from lobewatch.show.trends.course import course_of
 
 NEAR = 0.15
 """Relative distance from all that counts up to which a value that does not count is drawn."""
@@ -40,7 +42,8 @@ def trends(logbook: Logbook, rows: Sequence[Row]) -> Trends:
     reasons = {entry.id: entry.excluded for entry in logbook.files.excluded}
     told = [(event.time, event_line(event)) for event in logbook.files.events]
     told += [(row.time, _excluded_line(row, reasons[row.tap_id])) for row in out]
-    return Trends(_pictures(logbook, rows, out), [line for _, line in sorted(told)])
+    series = logbook.standing().series_of(rows[-1].tool, rows[-1].direction)
+    return Trends(_pictures(logbook, rows, out, series.trend if series else None), [line for _, line in sorted(told)])
 
 
 def event_line(event: Event) -> str:
@@ -53,7 +56,7 @@ def _excluded_line(row: Row, reason: str) -> str:
     return f"{row.time.astimezone():%Y-%m-%d}: tap test excluded ({reason}){value}"
 
 
-def _pictures(logbook: Logbook, rows: Sequence[Row], out: Sequence[Row]) -> list[Picture]:
+def _pictures(logbook: Logbook, rows: Sequence[Row], out: Sequence[Row], trend: Trend | None) -> list[Picture]:
     found = []
     since = rows[0].time if rows[0].baseline is None else rows[0].baseline
     events = [(event.time, event.text) for event in logbook.files.events if event.time >= since]
@@ -71,6 +74,8 @@ def _pictures(logbook: Logbook, rows: Sequence[Row], out: Sequence[Row]) -> list
             text += " Dotted lines: what was done." if events else ""
             text += " Hollow: tests that do not count." if marks.hollow else ""
             times = [time for time, _ in known]
-            figure = trend_figure(times, values, stds, f"{heading.lower()} ({unit})", limits, marks)
+            course = course_of(trend) if trend is not None and name == "frequency" else None
+            text += " Line: fitted; band: where it goes, 80 %." if course else ""
+            figure = trend_figure(times, values, stds, f"{heading.lower()} ({unit})", limits, marks, course)
             found.append(Picture(heading, text, svg(figure)))
     return found

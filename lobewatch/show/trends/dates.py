@@ -10,12 +10,12 @@ from lobewatch.analysis.decay.trend import Trend, date
 ASSUMED = "Dates hold if the machine is used as before; an acceleration that is not yet visible cannot be foreseen."
 
 
-def dates_text(found: Reached | None, horizon: float) -> str:
-    """For people; horizon: days since 1970 up to which was looked."""
+def dates_text(found: Reached | None, horizon: float, *, seen: bool = True) -> str:
+    """For people; horizon: days since 1970 up to which was looked; seen: whether what is past was tapped, too."""
     if found is None:
         return "history too short"
     if found.probable == -math.inf:
-        return "already"
+        return "already" if seen else "by now, at this rate"
     if found.earliest == math.inf:
         return f"not before {date(horizon):%Y-%m}"
     if found.latest == math.inf:

@@ -58,14 +58,25 @@ def trend_texts(found: Outlook, series: SeriesStanding) -> list[str | Table]:
     trend = series.trend
     if trend is None:
         return [f"{series.name}: no tap test that others can be compared with"]
-    horizon = horizon_of(trend)
     dates = table("~what", "~becomes doubtful", "~is not stable")
-    for name, fate in found.programs.items():
-        dates.add_row(name, dates_text(fate.doubtful, horizon), dates_text(fate.not_stable, horizon))
-    for percent, when in found.limits.items():
-        dates.add_row(f"-{percent:g} % (fixed limit, as in the paper)", "", dates_text(when, horizon))
+    for line in dates_rows(found, trend):
+        dates.add_row(*line)
     others = [f"{one.name}: {_short(one)}" for one in found.standing.series if one is not series]
     return [*chart_lines(trend), sentence(series), dates, ASSUMED, *others]
+
+
+def dates_rows(found: Outlook, trend: Trend) -> list[tuple[str, str, str]]:
+    """What, when it becomes doubtful, when it is not stable: each program, and the fixed limits."""
+    end = horizon_of(trend)
+    rows = [(name, *_fate_texts(fate, end)) for name, fate in found.programs.items()]
+    for percent, when in found.limits.items():
+        rows.append((f"-{percent:g} % (fixed limit, as in the paper)", "", dates_text(when, end)))
+    return rows
+
+
+def _fate_texts(fate: Fate, end: float) -> tuple[str, str]:
+    seen = fate.critical.doubtful == 0, fate.critical.not_stable == 0
+    return dates_text(fate.doubtful, end, seen=seen[0]), dates_text(fate.not_stable, end, seen=seen[1])
 
 
 def sentence(series: SeriesStanding) -> str:

@@ -126,3 +126,12 @@ def test_what_is_not_there_is_refused_in_a_sentence(shop: Shop, options: list[st
 def test_a_machine_that_was_never_tapped_has_no_trend(shop: Shop) -> None:
     told = CliRunner().invoke(app, ["trend", str(shop.path)])
     assert "no tap test yet" in str(told.exception)
+
+
+def test_the_report_says_until_when_and_draws_the_line(worn: Shop) -> None:
+    assert run("report", worn.path).exit_code == 0
+    html = (worn.path / "report.html").read_text("utf-8")
+    assert "<h2>Until when</h2>" in html
+    assert "falling steadily since 2026-01-15" in html
+    assert "-5 % (fixed limit, as in the paper)" in html
+    assert "Line: fitted; band: where it goes, 80 %." in html

@@ -25,7 +25,7 @@ from lobewatch.analysis import (
     lobes_of,
 )
 from lobewatch.analysis.decay.fallen import change_since_start, start
-from lobewatch.analysis.decay.outlook import outlook
+from lobewatch.analysis.decay.outlook import Outlook, outlook
 from lobewatch.analysis.programs.limit_band import limit_band
 from lobewatch.machine import Machine
 from lobewatch.show.advice import Advised, advised, advised_lines, decay_text
@@ -86,7 +86,6 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
     now = logbook.folder.read(entries[last.tap_id])
     assembly = logbook.assembly(last.tool)
     course, found = trends(logbook, rows), outlook(logbook)
-    series = found.series(last.tool, last.direction)
     programs = [advised(logbook, verdict) for verdict in logbook.verdicts()]
     checked = [one.verdict for one in programs if one.verdict.word is not Word.UNKNOWN]
     return {
@@ -99,9 +98,7 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
         "software": logbook.history.software,
         "label": machine.spindle.label if machine.spindle else "",
         "standing": _standing(found.standing),
-        "course": None if series.trend is None else sentence(series),
-        "dates": dates_rows(found, series.trend) if series.trend else [],
-        "assumed": ASSUMED,
+        "until": _until(found, last),
         "changes": _changes(rows),
         "programs": [_program(one) for one in programs],
         "program_lines": [_whole(line) for one in programs for line in advised_lines(one, machine.speed)],
@@ -122,6 +119,14 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
         "happened": course.happened,
         "limits": machine.limits,
     }
+
+
+def _until(found: Outlook, last: Row) -> dict[str, Any] | None:
+    """When programs stop holding; None where no test can be compared with."""
+    series = found.series(last.tool, last.direction)
+    if series.trend is None:
+        return None
+    return {"course": sentence(series), "dates": dates_rows(found, series.trend), "assumed": ASSUMED}
 
 
 def _standing(standing: Standing) -> dict[str, Any]:

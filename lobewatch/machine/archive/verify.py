@@ -24,6 +24,7 @@ from lobewatch.machine.archive.doubtful import read_doubtful
 from lobewatch.machine.archive.journal import COPY, JOURNAL, Journal, Reading, command
 from lobewatch.machine.archive.rows import read_rows
 from lobewatch.machine.archive.tap_entry import TapEntry
+from lobewatch.machine.archive.told import damaged, set_aside
 from lobewatch.machine.archive.verify_spool import about_spool
 from lobewatch.machine.folder import BusyError, MachineFolder
 from lobewatch.machine.known_devices import read_known_devices
@@ -70,7 +71,7 @@ def verify(path: Path) -> Verified:
         cure = (
             f"put it back from a backup; without one, {command('rebuild', path)} takes the copy in the newest tap test"
         )
-        return Verified((Remark("file-damaged", "machine.toml", "is missing beside tap tests", cure),), (), 0)
+        return Verified((damaged("machine.toml", "is missing beside tap tests", cure),), (), 0)
     folder = MachineFolder(path)
     journal = folder.journal
     adopted = enter_explained(folder)
@@ -155,7 +156,7 @@ def _about_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterato
         cure = (
             "correct it; without a way to, move it away: lobewatch rebuild then takes the copy in the newest tap test"
         )
-        yield Remark("file-damaged", "machine.toml", str(error), cure)
+        yield damaged("machine.toml", str(error), cure)
         return
     newest = max(sound, key=lambda entry: entry.time, default=None)
     then = ""
@@ -172,20 +173,20 @@ def _about_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterato
 def _about_history(folder: MachineFolder) -> Iterator[Remark]:
     if folder.history.exists() and read_rows(folder.history).is_damaged:
         cure = f"{command('rebuild', folder.path)} makes it anew, and so does any command that reads it"
-        yield Remark("file-damaged", folder.history.name, "altered since it was written", cure)
+        yield damaged(folder.history.name, "altered since it was written", cure)
 
 
 def _about_devices(folder: MachineFolder) -> Iterator[Remark]:
     try:
         read_known_devices(folder)
     except DataError as error:
-        yield Remark("file-damaged", "daq.json", str(error).removeprefix(f"{folder.path / 'daq.json'}: "))
+        yield damaged("daq.json", str(error).removeprefix(f"{folder.path / 'daq.json'}: "))
 
 
 def _about_others(folder: Path) -> Iterator[Remark]:
     for path in sorted(folder.iterdir()):
         if path.suffix in (".tmp", ".torn", ".damaged") or path.name == "damaged":
-            yield Remark("set-aside", path.name, "left over or set aside", "delete it when you do not need it")
+            yield set_aside(path.name, "left over or set aside", "delete it when you do not need it")
         elif path.name == "report.html":
             yield Remark(
                 "not-verified", path.name, "a report is not verified", command("report", folder) + " writes it anew"

@@ -10,6 +10,7 @@ from pathlib import Path
 from acquisition import Remark, Trigger
 from acquisition.files.seal import is_sealed
 from lobewatch.machine.archive.journal import command
+from lobewatch.machine.archive.told import damaged, set_aside
 
 ALTERED = "altered or cut short since it was written"
 
@@ -33,22 +34,22 @@ def about_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
 def _about_test(folder: Path, path: Path) -> Iterator[Remark]:
     cure = f"put it back from a backup, or {command('tap', folder)} goes on with the others{_or_delete(path)}"
     about = path.relative_to(folder).as_posix()
-    yield from (Remark("file-damaged", f"{about}/{name}", "missing", cure) for name in _missing_hits(path))
+    yield from (damaged(f"{about}/{name}", "missing", cure) for name in _missing_hits(path))
 
 
 def _about_file(folder: Path, path: Path) -> Iterator[Remark]:
     about, tap = path.relative_to(folder).as_posix(), command("tap", folder)
     if path.suffix == ".h5" and not is_sealed(path.read_bytes()):
         cure = f"{tap} sets it aside and goes on with the others{_or_delete(path.parent)}"
-        yield Remark("file-damaged", about, ALTERED, cure)
+        yield damaged(about, ALTERED, cure)
     elif path.name == "setup.json" and not _is_whole_set_up(path):
         cure = f"{tap} sets it aside and chooses the set-up anew{_or_delete(path.parent)}"
-        yield Remark("file-damaged", about, ALTERED, cure)
+        yield damaged(about, ALTERED, cure)
     elif path.suffix == ".tmp":
-        yield Remark("set-aside", about, "half written", f"{tap} removes it")
+        yield set_aside(about, "half written", f"{tap} removes it")
     elif path.suffix == ".damaged":
         cure = "delete it when you do not need it"
-        yield Remark("set-aside", about, "a damaged file of an interrupted test", cure)
+        yield set_aside(about, "a damaged file of an interrupted test", cure)
 
 
 def _or_delete(test: Path) -> str:

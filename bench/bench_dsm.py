@@ -4,9 +4,10 @@
     python3 bench/bench_dsm.py                      (about a minute, most of it ROSS)
     python3 bench/bench_dsm.py --quick              (few repetitions, without ROSS)
 
-Times are medians of repeated runs. "cold": a spindle that was never seen before, so that its matrix has to be made;
-"warm": the same one again; the matrices of the others are made beforehand too. The factors are times over that of the
-first row. An error is the largest relative difference from the exact solution, which the model is.
+Times are medians of the CPU time of repeated runs: other programs on the machine do not change them by much. "cold": a
+spindle that was never seen before, so that its matrix has to be made; "warm": the same one again; the matrices of the
+others are made beforehand too. The factors are times over that of the first row. An error is the largest relative
+difference from the exact solution, which the model is.
 """
 
 from __future__ import annotations
@@ -63,9 +64,9 @@ class Bench:
         work()
         times = []
         for _ in range(repeats or self.repeats):
-            start = time.perf_counter()
+            start = time.process_time()
             work()
-            times.append(time.perf_counter() - start)
+            times.append(time.process_time() - start)
         return median(times)
 
 
@@ -164,9 +165,9 @@ def bench_receptance(bench: Bench, given: Spindle, ross: RossRotor | None) -> No
         found = elements.tip_receptance(STIFFNESS, f, LOSS_FACTOR)
         table.row("1 element a segment, 54 dof, one solve a frequency", seconds, difference(found, exact))
     if ross is not None:
-        start = time.perf_counter()
+        start = time.process_time()
         found = ross.tip_receptance(f)
-        seconds = time.perf_counter() - start
+        seconds = time.process_time() - start
         error = f"median error {np.median(np.abs(found / receptance(given, f) - 1)):.1e}"
         table.row("ROSS, 1 element a segment, undamped (1 run)", seconds, error)
 
@@ -198,9 +199,9 @@ def bench_map(bench: Bench, given: Spindle) -> None:
         return np.array([receptance(changed, f, loss_factor=LOSS_FACTOR) for changed in spindles])
 
     seconds = bench.seconds(lambda: receptance_map(given, f, factors, loss_factor=LOSS_FACTOR), 5)
-    start = time.perf_counter()
+    start = time.process_time()
     exact = one_by_one()
-    rival = time.perf_counter() - start
+    rival = time.process_time() - start
     error = difference(receptance_map(given, f, factors, loss_factor=LOSS_FACTOR), exact)
     table.row("one eigenproblem a frequency", seconds, error)
     table.row("receptance of each (1 run)", rival, "exact")

@@ -10,6 +10,7 @@ import numpy as np
 from dsm.calibration.bearing_eigenproblem import BearingEigenproblem, bearing_eigenproblem, calibrated_bearings
 from dsm.calibration.calibration import Calibration, UnreachableFrequencyError
 from dsm.calibration.stiffness_curve import mean_stiffness
+from dsm.modes.find_modes import MOST_MODES
 from dsm.modes.natural_frequencies import natural_frequencies
 from dsm.spindle.spindle import Spindle
 
@@ -58,8 +59,8 @@ def _check(frequency: float, frequency_std: float | None, mode: int) -> None:
         raise ValueError(f"frequency={frequency} Hz is not a finite number > 0")
     if frequency_std is not None and not (math.isfinite(frequency_std) and frequency_std >= 0):
         raise ValueError(f"frequency_std={frequency_std} Hz is not a finite number >= 0")
-    if mode < 1:
-        raise ValueError(f"mode={mode} is not at least 1, the lowest")
+    if not 1 <= mode <= MOST_MODES:
+        raise ValueError(f"mode={mode} is not a number from 1, the lowest, to {MOST_MODES}")
 
 
 def _sensitivity(problem: BearingEigenproblem, index: int) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -52,6 +53,8 @@ def _assemble(
     spin: float | None,
     links: bool,
 ) -> DynamicStiffness:
+    if spin is not None and spin < 0:
+        return _reversed(_assemble(spindle, top_frequency, places, held, left_out, -spin, links))
     shaft = sections(spindle)
     wanted = [*_places_of_parts(spindle), *places, *(z for z, _ in held)]
     position, segment, short = place_nodes(shaft, wanted, spindle.theory, top_frequency, spin, links)
@@ -66,6 +69,13 @@ def _assemble(
     for values in (model.position, model.diagonal, model.coupling, model.held, model.scale):
         values.setflags(write=False)
     return model
+
+
+def _reversed(model: DynamicStiffness) -> DynamicStiffness:
+    """The same shaft spinning the other way round: speed and frequency change their signs together."""
+    sign = (-1.0) ** np.arange(model.diagonal.shape[2])
+    spin = None if model.spin is None else -model.spin
+    return replace(model, diagonal=sign * model.diagonal, coupling=sign * model.coupling, spin=spin)
 
 
 def _places_of_parts(spindle: Spindle) -> list[float]:

@@ -30,6 +30,9 @@ DULL = 1e-6
 SETTLED = 1e-8
 """Relative change of x by a step that leaves less than rounding to the next: each step at least squares the error."""
 
+MOST_MODES = 100
+"""More are refused: the work grows with their third power."""
+
 SPOILT = (
     "rounding spoils the modes of this shaft; look for segments far too short, thick or thin beside the others, and "
     "for bearings, masses or joints far too close to each other or to the end of a segment"
@@ -51,10 +54,10 @@ def find_modes(
     rounding cannot tell from zero (a free shaft) are 0. spin (rad/s): the modes of forward whirl of a
     supported shaft that spins so fast; of backward whirl with -spin.
 
-    Raises ValueError for a count below 1, ArithmeticError where rounding spoils the count.
+    Raises ValueError for a count outside 1 to MOST_MODES, ArithmeticError where rounding spoils the count.
     """
-    if count < 1:
-        raise ValueError(f"{count} modes were asked for; at least 1 is needed")
+    if not 1 <= count <= MOST_MODES:
+        raise ValueError(f"{count} modes were asked for; 1 to {MOST_MODES} can be: beams say nothing of higher ones")
     wanted = _Wanted(spindle, count, tuple(places), tuple(held), spin)
     try:
         return _solve(wanted, links=False)

@@ -13,6 +13,9 @@ _Float = NDArray[np.float64]
 SUPPORT = 1e6
 """A dof held beside a link: stiffness of the spring that stands for it here, over the largest of the shaft."""
 
+MASSLESS = 1e-4
+"""Where motions have no mass, all get one, this part of the stiffness over the square of the highest frequency."""
+
 
 def finite_element_modes(model: DynamicStiffness, count: int) -> tuple[_Float, _Float]:
     """x (count,) of the lowest modes and shapes phi (count, 2 n_nodes), -phi^T (dK/dx) phi = 1; a start, not exact.
@@ -80,6 +83,8 @@ def _whirling(model: DynamicStiffness, basis: _Float, springs: _Float, count: in
     """
     stiffness, gyroscopic, mass = (_reduced(model, basis, power) for power in range(3))
     stiffness, mass = stiffness + springs, -mass
+    if np.any(model.is_link):  # their far ends have no mass of their own here
+        mass = mass + MASSLESS / (2 * np.pi * model.top_frequency) ** 2 * stiffness
     zero = np.zeros_like(mass)
     right = np.block([[-gyroscopic, mass], [mass, zero]])
     last = 2 * basis.shape[1] - 1

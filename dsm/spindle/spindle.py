@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Literal, get_args
 
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
@@ -62,6 +63,14 @@ class Spindle:
         self._check_parts("mass", self.masses)
         self._check_parts("joint", self.joints)
         self._check_joints()
+
+    def __hash__(self) -> int:
+        """Worked out once: matrices are kept by their spindle."""
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash(tuple(getattr(self, field.name) for field in fields(self)))
 
     @property
     def material(self) -> Material:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import FrozenInstanceError
 
@@ -237,3 +238,21 @@ def test_a_bearing_at_a_rounded_segment_end_makes_no_node_of_its_own() -> None:
 
 def test_no_frequencies_give_no_receptance() -> None:
     assert receptance(SPINDLE, []).shape == (0,)
+
+
+@pytest.mark.parametrize(
+    "ask", [lambda: natural_frequencies(SPINDLE, 400), lambda: calibrate(SPINDLE, 500.0, mode=200)]
+)
+def test_hundreds_of_modes_are_refused(ask: Callable[[], object]) -> None:
+    with pytest.raises(ValueError, match=r"1.* to 100"):
+        ask()
+
+
+def test_a_receptance_of_many_lines_takes_little_memory() -> None:
+    frequency = np.linspace(1.0, 4000.0, 50_000)
+    receptance(SPINDLE, frequency[:10])
+    tracemalloc.start()
+    receptance(SPINDLE, frequency, loss_factor=0.03)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 20e6

@@ -81,7 +81,7 @@ def _misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator[str]:
     known = {entry.sha256: entry for entry in committed.values()}
     found: dict[Path, TapEntry] = {}
     for path in tap_files(folder).values():
-        entry = known.get(hashlib.sha256(path.read_bytes()).hexdigest())
+        entry = known.get(hashlib.sha256(path.read_bytes()).hexdigest()) if _can_be_read(path) else None
         if entry is not None and path != folder / entry.file:
             found[path] = entry
     asides = {_put_aside(folder, path): entry for path, entry in found.items()}
@@ -119,11 +119,20 @@ def _go_on_without(folder: Path, journal: Journal) -> Iterator[str]:
     for name, entry in listed(reading).items():
         if not fault_of(folder, entry):
             continue
-        if (folder / entry.file).exists():
+        if _can_be_read(folder / entry.file):
             _put_aside(folder, folder / entry.file)
         if name not in given_up(reading):
             journal.append({"kind": "lost", "tap": name, "time": datetime.now(UTC).isoformat()})
             yield f"{entry.file}: lost; all goes on without it, and with it again when it is put back from a backup"
+
+
+def _can_be_read(path: Path) -> bool:
+    """What cannot be read just now may be sound, and stays where it is."""
+    try:
+        path.read_bytes()
+    except OSError:
+        return False
+    return True
 
 
 def _machine_file(folder: Path) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import random
 import re
 import shlex
@@ -102,6 +103,24 @@ def test_damage_is_named_and_what_is_said_to_mend_it_does(what: str, folder: Mac
     assert again.damage == ()
     assert [entry.id for entry in MachineFolder(folder.path).taps()] == left
     assert rebuild_files(folder.path) == []
+
+
+def test_a_tap_file_that_cannot_be_read_just_now_stays_where_it_is(
+    folder: MachineFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entry, read = folder.taps()[0], Path.read_bytes
+
+    def failing(path: Path) -> bytes:
+        if path.name == Path(entry.file).name:
+            raise OSError(errno.EIO, "Input/output error")
+        return read(path)
+
+    with monkeypatch.context() as broken:
+        broken.setattr(Path, "read_bytes", failing)
+        rebuild_files(folder.path)
+    assert (folder.path / entry.file).exists()
+    assert entry in MachineFolder(folder.path).taps()
+    assert verify(folder.path).damage == ()
 
 
 def test_rebuild_says_which_corrections_no_copy_tells_any_more(folder: MachineFolder) -> None:

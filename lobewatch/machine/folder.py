@@ -24,7 +24,7 @@ from lobewatch.machine.archive.contents import (
     no_journal,
     tap_files,
 )
-from lobewatch.machine.archive.journal import Journal, command
+from lobewatch.machine.archive.journal import Journal, Reading, command
 from lobewatch.machine.archive.tap_entry import DamagedTapError, TapEntry
 from lobewatch.machine.machine_file import Machine, read_machine
 from lobewatch.machine.named_folder import named_folder
@@ -120,12 +120,13 @@ class MachineFolder:
         """Identities of all tap tests in the journal, whatever has become of their files."""
         return set(listed(self.journal.read()))
 
-    def refuse_damage(self) -> None:
-        """DataError where the journal has to be mended before anything is written here."""
+    def refuse_damage(self) -> Reading:
+        """The journal; DataError where it has to be mended before anything is written here."""
         reading = self.journal.read()
         self.journal.refuse_damage(reading)
         if not reading.lines and any(one.code == "journal-damaged" for one in self.contents().remarks):
             self.journal.refuse_damage(replace(reading, damage=(no_journal(self.path, len(tap_files(self.path))),)))
+        return reading
 
     def read(self, entry: TapEntry) -> TapTest:
         """A tap test, its file checked against the journal before HDF5 sees it; DamagedTapError where it is not so."""
@@ -145,11 +146,11 @@ class MachineFolder:
         asked: what is asked about its time, by code.
         DataError, and nothing is written, where the journal is damaged.
         """
-        self.refuse_damage()
+        reading = self.refuse_damage()
         path = self.path / "taps" / f"{tap.id}.h5"
         make_folder(path.parent)
         content = write_tap(path, tap)
-        self.journal.append(replace(TapEntry.of(tap, content), asked=tuple(asked)).line)
+        self.journal.append(replace(TapEntry.of(tap, content), asked=tuple(asked)).line, reading=reading)
         shutil.rmtree(self.spool / tap.id, ignore_errors=True)
 
     def commit_files(self, files: Mapping[Path, TapEntry]) -> None:
@@ -158,11 +159,11 @@ class MachineFolder:
         files: where they lie under temporary names, already made to outlast a power cut, on the same disk. To be called
         under the lock.
         """
-        self.refuse_damage()
+        reading = self.refuse_damage()
         for temporary, entry in files.items():
             temporary.replace(self.path / entry.file)
         sync_folder(self.path / "taps")
-        self.journal.append(*(entry.line for entry in files.values()))
+        self.journal.append(*(entry.line for entry in files.values()), reading=reading)
 
     def accept(self, tap_id: str, code: str) -> None:
         """Write down that a person has accepted what was asked of a tap test; saved for good when this returns."""

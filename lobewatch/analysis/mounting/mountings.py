@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from datetime import datetime
 
-from acquisition import Conditions, Remark
+from acquisition import UNSAID, Conditions, Remark
 from lobewatch.machine import TapEntry
 
 DIVIDING = {"stick_out_mm": ("stick-out", "{:g} mm"), "state": ("state", "{!r}")}
@@ -31,6 +31,8 @@ class Mountings:
     def place(self, tap: TapEntry) -> tuple[str, tuple[Remark, ...]]:
         """Identity of the first test of the series of a test, and what is to be said of it."""
         found = self._series.setdefault(tap.tool, [])
+        if found and tap.conditions is UNSAID:
+            return found[-1].first.id, ()
         said = [*self._about_drawbar(tap)]
         current = found[-1] if found else None
         mounted = tap.conditions.over(current.known) if current else tap.conditions

@@ -68,16 +68,19 @@ class Journal:
             longer = journal.chain
         damage = [*self._about_journal(journal, copy), *self._about_copy(journal, copy)]
         loose = (*journal.chain, *copy.chain, *journal.loose, *copy.loose) if damage else ()
-        lines = tuple(dict.fromkeys((*longer, *loose)))
+        lines = tuple(dict.fromkeys((*longer, *loose))) if loose else longer
         other = foreign(self.path.parent, lines)
         if other:
             return Reading((), (journal_damage(self.path, other),))
         tidy = copy.there and copy.whole == journal.whole and not (damage or journal.torn or copy.torn)
         return Reading(lines, tuple(damage), journal.torn, tidy)
 
-    def append(self, *entries: Entry) -> None:
-        """One write, one fsync: committed when this returns. DataError, and nothing is written, where it is damaged."""
-        reading = self.read()
+    def append(self, *entries: Entry, reading: Reading | None = None) -> None:
+        """One write, one fsync: committed when this returns. DataError, and nothing is written, where it is damaged.
+
+        reading: of just now, where there is one and nobody else can have written since.
+        """
+        reading = reading or self.read()
         self.refuse_damage(reading)
         if not reading.tidy:
             self._put_right(reading)

@@ -63,7 +63,8 @@ class TapEntry:
     @classmethod
     def from_line(cls, line: dict[str, Any], accepted: tuple[str, ...] = (), excluded: str = "") -> Self:
         """From the line of the journal that `line` has made."""
-        return msgspec.convert({**line, "accepted": accepted, "excluded": excluded}, cls)
+        told = line if line.get("conditions") else {name: value for name, value in line.items() if name != "conditions"}
+        return msgspec.convert({**told, "accepted": accepted, "excluded": excluded}, cls)
 
     @property
     def line(self) -> dict[str, Any]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from dsm.calibration.identifiability import LEAST_SHARE
 from dsm.calibration.plus_minus import plus_minus
+from dsm.calibration.remark import Remark
 from dsm.modes.modal_stiffness import modal_stiffness
 from dsm.modes.natural_frequencies import natural_frequencies
 from dsm.response.static_stiffness import static_stiffness
@@ -57,6 +59,32 @@ class Calibration:
         """Share of the calibrated bearings in the strain energy of the mode (-), 0 to 1."""
         return 2 * self.sensitivity
 
+    @property
+    def preload_left(self) -> tuple[float, float] | None:
+        """Range of the preload over that at the start (-), for ball bearings: (k/k0)^3 and (k/k0)^2, lower one first.
+
+        Hertz's point contact gives stiffness as the third root of the preload (T. A. Harris and M. N. Kotzalas, Rolling
+        Bearing Analysis, 2007); makers' catalogues of angular contact bearings give exponents near one half. Nothing
+        finer is known without the geometry of the bearings. None where one of those calibrated has rollers.
+        """
+        pairs = zip(self.given.bearings, self.spindle.bearings, strict=True)
+        if any(old.rolling_elements == "rollers" and old != new for old, new in pairs):
+            return None
+        low, high = sorted([self.factor**3, self.factor**2])
+        return low, high
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What makes the stiffness doubtful: a mode that feels next to nothing of these bearings."""
+        if self.energy_share >= LEAST_SHARE:
+            return ()
+        text = f"{100 * self.energy_share:.2g} % of the strain energy of mode {self.mode} is in them: they are open"
+        return (
+            Remark(
+                "bearings-not-felt", "bearings", text, "measure another mode; the model may be too soft or too stiff"
+            ),
+        )
+
     @cached_property
     def residual(self) -> float:
         """Natural frequency of the recalibrated spindle, solved anew, less the measured one (Hz)."""
@@ -98,4 +126,9 @@ class Calibration:
             ("modal tip stiffness", f"{modal[0]:.3f} -> {modal[1]:.3f} N/um (start -> calibrated)"),
             ("theory", f"{self.spindle.theory}; an equivalent stiffness: compare it within one model only"),
         ]
+        if self.preload_left is not None:
+            low, high = self.preload_left
+            said = f"{low:.2g} to {high:.2g} of that at the start, if balls roll: (k/k0)^3 and (k/k0)^2, no finer"
+            lines.append(("preload left", said))
+        lines += [("warning", str(remark)) for remark in self.remarks]
         return "\n".join(f"{name:<22}{text}" for name, text in lines)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Literal, get_args
 
 from dsm.spindle.checks import require_not_negative, require_positive
+
+RollingElements = Literal["balls", "rollers"]
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,9 @@ class Bearing:
     group: str = field(default="bearings", kw_only=True)
     """Bearings of one group are calibrated together, in their given ratio; an empty name: known, never calibrated."""
 
+    rolling_elements: RollingElements = field(default="balls", kw_only=True)
+    """What rolls in it; of balls, the stiffness says in which range the preload left lies."""
+
     @property
     def support_stiffness(self) -> float:
         """What the shaft feels of bearing and housing (N/m)."""
@@ -36,6 +42,9 @@ class Bearing:
         """Raise ValueError, beginning with `where`, for what is no bearing."""
         require_positive(where, "stiffness", self.stiffness, "N/m", infinite=True)
         require_not_negative(where, "damping", self.damping, "N s/m")
+        if self.rolling_elements not in get_args(RollingElements):
+            known = ", ".join(get_args(RollingElements))
+            raise ValueError(f"{where}rolling_elements={self.rolling_elements!r} is none of {known}")
         require_not_negative(where, "rotational_stiffness", self.rotational_stiffness, "N m/rad")
         require_positive(where, "housing_stiffness", self.housing_stiffness, "N/m", infinite=True)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Callable, Sequence
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta
 
@@ -60,6 +60,7 @@ class BearingTable(Table, frozen=True):
     rotational_stiffness_n_m_per_rad: NotNegative = 0.0
     housing_stiffness_n_per_um: PositiveOrInfinite = math.inf
     group: str = "bearings"
+    rolling_elements: Literal["balls", "rollers"] = "balls"
 
     def build(self, stiffness_n_per_um: float) -> Bearing:
         """The bearing in SI units; stiffness_n_per_um: where it has none of its own."""
@@ -71,6 +72,7 @@ class BearingTable(Table, frozen=True):
             rotational_stiffness=self.rotational_stiffness_n_m_per_rad,
             housing_stiffness=self.housing_stiffness_n_per_um * 1e6,
             group=self.group,
+            rolling_elements=self.rolling_elements,
         )
 
 

@@ -23,6 +23,8 @@ def calibration_json(calibration: Calibration) -> dict[str, Any]:
         "residual_hz": calibration.residual,
         "factor": calibration.factor,
         "sensitivity": calibration.sensitivity,
+        "preload_left": calibration.preload_left,
+        "remarks": [asdict(remark) for remark in calibration.remarks],
         "energy_share": calibration.energy_share,
         "static_tip_stiffness_n_per_m": calibration.static_stiffness_after,
         "static_tip_stiffness_before_n_per_m": calibration.static_stiffness_before,

@@ -15,7 +15,8 @@ from dsm.elements.place_nodes import place_nodes
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
 from dsm.spindle.sections import Sections, sections
-from dsm.spindle.spindle import Spindle
+from dsm.spindle.segment import Segment
+from dsm.spindle.spindle import Spindle, Theory
 
 _Float = NDArray[np.float64]
 Held = tuple[float, int]
@@ -55,20 +56,38 @@ def _assemble(
 ) -> DynamicStiffness:
     if spin is not None and spin < 0:
         return _reversed(_assemble(spindle, top_frequency, places, held, left_out, -spin, links))
-    shaft = sections(spindle)
-    wanted = [*_places_of_parts(spindle), *places, *(z for z, _ in held)]
-    position, segment, short = place_nodes(shaft, wanted, spindle.theory, top_frequency, spin, links)
-    series = _elements(spindle, shaft, position, segment, short, spin)
-    position, series, short = _with_joints(spindle, position, series, short)
-    model = _chain(position, series, short, top_frequency, spin)
+    wanted = (*_places_of_parts(spindle), *places, *(z for z, _ in held))
+    material = spindle.youngs_modulus, spindle.density, spindle.theory, spindle.shear_modulus
+    bare = _bare(tuple(spindle.segments), material, tuple(spindle.joints), wanted, top_frequency, spin, links)
+    arrays = {name: getattr(bare, name).copy() for name in ("diagonal", "coupling", "held", "scale")}
+    model = replace(bare, **arrays)
     _add_masses(model, spindle)
     rigid = _add_springs(model, spindle, left_out)
-    model.scale[:] = _scale(model, shaft)
+    model.scale[:] = _scale(model, sections(spindle))
     for z, dof in (*rigid, *held):
         _hold(model, model.node(z), dof)
     for values in (model.position, model.diagonal, model.coupling, model.held, model.scale):
         values.setflags(write=False)
     return model
+
+
+@lru_cache(maxsize=32)
+def _bare(
+    segments: tuple[Segment, ...],
+    material: tuple[float, float, Theory, float | None],
+    joints: tuple[Joint, ...],
+    wanted: tuple[float, ...],
+    top_frequency: float,
+    spin: float | None,
+    links: bool,
+) -> DynamicStiffness:
+    """The shaft and its joints alone: what spindles that differ in bearings and masses have in common."""
+    spindle = Spindle(segments, (), *material, joints=joints)
+    shaft = sections(spindle)
+    position, segment, short = place_nodes(shaft, wanted, spindle.theory, top_frequency, spin, links)
+    series = _elements(spindle, shaft, position, segment, short, spin)
+    position, series, short = _with_joints(spindle, position, series, short)
+    return _chain(position, series, short, top_frequency, spin)
 
 
 def _reversed(model: DynamicStiffness) -> DynamicStiffness:

@@ -52,10 +52,9 @@ def whirl_map(spindle: Spindle, speed_rpm: ArrayLike, count: int) -> WhirlMap:
     require_support(spindle)
     speed = _speeds(speed_rpm)
     spins = speed * np.pi / 30
-    forward, backward = (
-        np.reshape([find_modes(spindle, count, spin=sense * spin).frequency for spin in spins], (-1, count)).T
-        for sense in (1.0, -1.0)
-    )
+    # Both senses of a speed one after the other: they share a matrix.
+    found = [[find_modes(spindle, count, spin=sense * spin).frequency for sense in (1.0, -1.0)] for spin in spins]
+    forward, backward = np.moveaxis(np.reshape(found, (-1, 2, count)), 0, 2)
     return WhirlMap(speed, forward, backward, _critical(spindle, speed, forward))
 
 

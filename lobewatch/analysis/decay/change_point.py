@@ -57,6 +57,15 @@ class Watch:
         return self.alarm_at is None and self.scores.size > 0 and bool(self.scores[-1] >= SURE)
 
 
+def calls_for_another(y: Floats, temperature: Floats) -> bool:
+    """Whether the last point of a series (n,) is sure of a fall that the one before it was not."""
+    if y.size < FIRST_JUDGED:
+        return False
+    last = np.arange(max(y.size - 2, FIRST_JUDGED - 1), y.size)
+    sure = [score >= SURE for score, _, _ in _best(base_of(y, temperature), last)]
+    return sure[-1] and not (len(sure) > 1 and sure[0])
+
+
 def watch(y: Floats, temperature: Floats | None = None) -> Watch:
     """Judge a series (n,) point after point.
 

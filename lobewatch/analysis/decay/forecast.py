@@ -73,7 +73,7 @@ class Forecast:
     fitted: Floats
     """Mean of the mixture at the points themselves, shape (n,)."""
     dates: Floats
-    """From now to the horizon, shape (d,)."""
+    """From now to the horizon, shape (d,); where that has passed, all are the horizon."""
     mean: Floats
     """Of each shape at these dates, shape (j, d)."""
     error: Floats
@@ -129,8 +129,9 @@ def forecast(
     at = dates - dates[:1].sum()
     if y.size < ENOUGH or at[-1] <= 0:
         raise ValueError(f"{y.size} points on {np.unique(at).size} dates: a forecast needs {ENOUGH}")
-    start = max(at[-1], now - dates[0])
-    ahead = np.linspace(start, max(min(horizon - dates[0], 3 * at[-1]), start), LOOKS)
+    farthest = 3 * at[-1]
+    start = min(max(at[-1], now - dates[0]), farthest)
+    ahead = np.linspace(start, max(min(horizon - dates[0], farthest), start), LOOKS)
     base = base_of(y, temperature)
     shapes, columns = zip(*_shapes(at, np.concatenate([at, ahead])), strict=True)
     rss, mean, error = base.fit_columns(np.array(columns), at.size)

@@ -82,7 +82,7 @@ def _after(trend: Trend, fall: float, error: float) -> Reached | None:
     """
     if fall == 0:
         return ALREADY
-    if trend.forecast is None:
+    if trend.forecast is None or trend.is_stale:
         return None
     if math.isinf(fall):
         return NEVER
@@ -91,7 +91,7 @@ def _after(trend: Trend, fall: float, error: float) -> Reached | None:
 
 
 def _of_limit(trend: Trend, percent: float) -> Reached | None:
-    if trend.forecast is None:
+    if trend.forecast is None or trend.is_stale:
         return None
     return trend.forecast.reached(trend.start + 100 * math.log1p(-percent / 100))
 

@@ -12,11 +12,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.analysis.decay.change_point import Watch, watch
+from lobewatch.analysis.decay.change_point import Watch, calls_for_another, watch
 from lobewatch.analysis.decay.forecast import ENOUGH, Forecast, forecast
 
 TOGETHER = timedelta(hours=24)
 """Tap tests within so long are one point."""
+MOST = 1000
+"""The newest points, which alone are judged: the work grows with the square of their number."""
 HORIZON_DAYS = 36 * 30.44
 """Nothing is foretold for later."""
 
@@ -67,6 +69,8 @@ class Trend:
     """The same of the mirror image."""
     forecast: Forecast | None
     """Over days since 1970; None below 8 points."""
+    today: int
+    """Day since 1970 that it is judged on."""
 
     @property
     def start(self) -> float:
@@ -78,6 +82,11 @@ class Trend:
         if self.forecast is not None:
             return float(self.forecast.fitted[:ENOUGH].max())
         return max(point.percent for point in self.points[:3])
+
+    @property
+    def is_stale(self) -> bool:
+        """Whether today is farther from its last point than anything is foretold."""
+        return self.forecast is not None and self.today > self.forecast.dates[-1]
 
     @property
     def spread(self) -> float:
@@ -100,7 +109,7 @@ def trend_of(series: Sequence[Tapped], now: datetime, events: Sequence[datetime]
 
 @lru_cache(maxsize=1024)
 def _trend(series: tuple[Tapped, ...], today: int, events: tuple[datetime, ...]) -> Trend:
-    points = _points(series)
+    points = _points(series)[-MOST:]
     y = np.array([point.percent for point in points])
     warmth = np.array([point.temperature for point in points])
     watched = 0
@@ -111,26 +120,31 @@ def _trend(series: tuple[Tapped, ...], today: int, events: tuple[datetime, ...])
             break
         watched = sum(point.time < ended[0] for point in points)
     return Trend(
-        tuple(points), series[0].value, watched, found, watch(-y[watched:], warmth[watched:]), _forecast(points, today)
+        tuple(points),
+        series[0].value,
+        watched,
+        found,
+        watch(-y[watched:], warmth[watched:]),
+        _forecast(points, today),
+        today,
     )
 
 
 def _points(series: Sequence[Tapped]) -> list[Point]:
     """A tap test that was asked for by the one before it is a point of its own: it confirms or clears."""
-    groups: list[list[int]] = []
+    points: list[Point] = []
     for i, tapped in enumerate(series):
-        same_day = bool(groups) and tapped.time - series[groups[-1][0]].time < TOGETHER
-        if same_day and not _asks_again([_point(series, group) for group in groups]):
-            groups[-1].append(i)
+        same_day = bool(points) and tapped.time - points[-1].time < TOGETHER
+        if same_day and not _calls_for_another(points[-MOST:]):
+            points[-1] = _point(series, (*points[-1].taps, i))
         else:
-            groups.append([i])
-    return [_point(series, group) for group in groups]
+            points.append(_point(series, (i,)))
+    return points
 
 
-def _asks_again(points: Sequence[Point]) -> bool:
-    return watch(
-        np.array([point.percent for point in points]), np.array([point.temperature for point in points])
-    ).asks_again
+def _calls_for_another(points: Sequence[Point]) -> bool:
+    y, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
+    return calls_for_another(y, warmth)
 
 
 def _point(series: Sequence[Tapped], group: Sequence[int]) -> Point:

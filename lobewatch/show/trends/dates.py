@@ -13,7 +13,7 @@ ASSUMED = "Dates hold if the machine is used as before; an acceleration that is 
 def dates_text(found: Reached | None, horizon: float, *, seen: bool = True) -> str:
     """For people; horizon: days since 1970 up to which was looked; seen: whether what is past was tapped, too."""
     if found is None:
-        return "history too short"
+        return "history too short or too old"
     if found.probable == -math.inf:
         return "already" if seen else "by now, at this rate"
     if found.earliest == math.inf:

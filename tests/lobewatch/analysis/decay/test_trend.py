@@ -89,3 +89,25 @@ def test_a_short_series_foretells_nothing(n: int) -> None:
     assert found.forecast is None
     assert found.spread == 0.0
     assert found.start == pytest.approx(max(FALLING[:n][:3]))
+
+
+def test_a_machine_that_was_not_tapped_for_long_is_not_foretold() -> None:
+    series = monthly(FALLING)
+    late = trend_of(series, series[-1].time + timedelta(days=3 * 30 * 19))
+    assert late.is_stale
+    assert late.start == pytest.approx(judged(series).start)
+    assert not judged(series).is_stale
+
+
+def test_ten_taps_of_an_hour_tapped_years_ago_are_taken_as_they_are() -> None:
+    found = trend_of([tapped(i / 240, 0.1 * (-1) ** i) for i in range(10)], START + timedelta(days=9000))
+    assert len(found.points) == 1
+    days_apart = [tapped(i * 1.01, 0.1 * (-1) ** i) for i in range(10)]
+    assert trend_of(days_apart, START + timedelta(days=9000)).is_stale
+
+
+def test_of_a_very_long_series_the_newest_thousand_points_are_judged() -> None:
+    steps = np.repeat([0.0, -1.0, -1.0], [12, 600, 600]) + np.tile([0.05, -0.05], 606)
+    found = judged(monthly(steps))
+    assert len(found.points) == 1000
+    assert found.watch.alarm_at is None

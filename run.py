@@ -76,7 +76,7 @@ def make_environment(extras):
 def tests(arguments):
     """Command that runs the tests; all of them where none are chosen, on all cores, with their coverage judged."""
     chosen = [argument for argument in arguments if argument != "--long"]
-    whole = [] if chosen else ["-n", "auto", "--dist", "loadfile", "--cov"]
+    whole = [] if chosen else ["-n", "auto", "--dist", "worksteal", "--cov"]
     every = ["-m", "long or not long", "--timeout", "3600"] if "--long" in arguments else []
     return [PYTHON, "-m", "pytest"] + whole + every + chosen
 

@@ -108,7 +108,7 @@ def test_one_group_is_what_calibrate_solves(mode: int) -> None:
 
 
 def test_covariance_is_what_noise_makes_of_the_factors() -> None:
-    """60 draws: the size of the errors over that stated scatters by 9 %, their correlation by 0.13."""
+    """60 draws: errors over those stated scatter by 9 %, their correlation by 0.13, the mean of chi square by 0.18."""
     truth = shaft()
     exact = natural_frequencies(truth, 4)
     std = np.array([2e-4, 1e-4, 3e-4, 2e-4]) * exact
@@ -121,7 +121,7 @@ def test_covariance_is_what_noise_makes_of_the_factors() -> None:
     assert np.std(errors, axis=0) / size == pytest.approx(1, abs=0.25)
     assert np.corrcoef(errors.T) == pytest.approx(fits[0].correlation, abs=0.3)
     assert abs(np.mean(np.abs(errors) < 1.96 * size) - 0.95) < 0.05
-    assert np.mean([found.reduced_chi_square for found in fits]) == pytest.approx(1, abs=0.3)
+    assert np.mean([found.reduced_chi_square for found in fits]) == pytest.approx(1, abs=0.5)
 
 
 def test_scatter_stands_in_for_standard_errors_only_where_modes_are_to_spare() -> None:

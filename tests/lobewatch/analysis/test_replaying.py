@@ -109,5 +109,5 @@ def test_an_interrupted_replay_is_cleared_away_and_done_again(tmp_path: Path, mo
     assert len(list(taps.iterdir())) == 2
 
 
-def _ended(*_: object) -> None:
+def _ended(*_: object, **__: object) -> None:
     raise KeyboardInterrupt

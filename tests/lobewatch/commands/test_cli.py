@@ -258,7 +258,7 @@ def test_calibrate(run: Run, trial: MachineFolder) -> None:
     refused(run("calibrate", "trial", "--frequency", 1550, *twice), "2 --frequency-std for 1 --frequency")
     refused(run("calibrate", "trial", "--frequency", 1550, "--mode", 1, "--mode", 2), "2 --mode for 1 --frequency")
     refused(run("calibrate", "trial", "--frequency", 1550, "--frequency", 1e9), "puts mode 2 at 1e+09 Hz")
-    refused(run("calibrate", "trial", "--frequency", 1e11), "needs more than 2000 elements")
+    refused(run("calibrate", "trial", "--frequency", 1e11), "needs more than 1000 elements")
     run("init", "plain")
     refused(run("calibrate", "plain", "--frequency", 1550), "no model: add a [spindle] table")
 
@@ -351,7 +351,7 @@ def test_the_demo_finds_the_truth_of_every_tap(run: Run) -> None:
     fallen = dict(re.findall(r"reference, ([xy]): frequency fallen by (\d+\.\d) % since the first test", html))
     for direction, newest, oldest in zip("xy", said["taps"][-2:], said["taps"][:2], strict=True):
         fell = 100 * (1 - newest["truth"]["frequency_hz"] / oldest["truth"]["frequency_hz"])
-        assert float(fallen[direction]) == pytest.approx(fell, abs=0.06)
+        assert float(fallen[direction]) == pytest.approx(fell, abs=0.3), "0.1 % from test to test"
     words = {
         row[1]: re.findall(r"(not stable|stable|doubtful|unknown|not checked)</td>", row[0])
         for row in re.finditer(r"<tr><td>([ABC]):.*?</tr>", html, re.DOTALL)

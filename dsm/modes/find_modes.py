@@ -24,7 +24,7 @@ ROUNDING = 1024 * np.finfo(np.float64).eps
 """The same from rounding, relative to |phi|^T |K| |phi| of a mode of unit modal mass."""
 BLURRED = 0.1
 """An interval wider than this part of its w^2 proves nothing worth having."""
-DULL = 1e-6
+DULL = 1e-5
 """Where stiffness gives one wider than this, links are taken: the error is some 1e-4 of the interval."""
 
 SETTLED = 1e-8

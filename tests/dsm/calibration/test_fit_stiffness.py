@@ -108,20 +108,20 @@ def test_one_group_is_what_calibrate_solves(mode: int) -> None:
 
 
 def test_covariance_is_what_noise_makes_of_the_factors() -> None:
-    """60 draws: errors over those stated scatter by 9 %, their correlation by 0.13, the mean of chi square by 0.18."""
+    """120 draws: the size of the errors over that stated scatters by 6.5 %, their correlation by 0.09."""
     truth = shaft()
     exact = natural_frequencies(truth, 4)
     std = np.array([2e-4, 1e-4, 3e-4, 2e-4]) * exact
-    draws = np.random.default_rng(5).normal(size=(60, 4))
+    draws = np.random.default_rng(5).normal(size=(120, 4))
     fits = [fit_stiffness(truth, exact + std * draw, std) for draw in draws]
     stated = fits[0].log_covariance
     assert stated is not None
     errors = np.log([found.factor for found in fits])
     size = np.sqrt(np.diag(stated))
-    assert np.std(errors, axis=0) / size == pytest.approx(1, abs=0.25)
-    assert np.corrcoef(errors.T) == pytest.approx(fits[0].correlation, abs=0.3)
-    assert abs(np.mean(np.abs(errors) < 1.96 * size) - 0.95) < 0.05
-    assert np.mean([found.reduced_chi_square for found in fits]) == pytest.approx(1, abs=0.5)
+    assert np.std(errors, axis=0) / size == pytest.approx(1, abs=0.17)
+    assert np.corrcoef(errors.T) == pytest.approx(fits[0].correlation, abs=0.2)
+    assert abs(np.mean(np.abs(errors) < 1.96 * size) - 0.95) < 0.03
+    assert np.mean([found.reduced_chi_square for found in fits]) == pytest.approx(1, abs=0.3)
 
 
 def test_scatter_stands_in_for_standard_errors_only_where_modes_are_to_spare() -> None:
@@ -129,7 +129,7 @@ def test_scatter_stands_in_for_standard_errors_only_where_modes_are_to_spare() -
     exact = natural_frequencies(truth, 6)
     assert fit_stiffness(truth, exact[:3]).log_covariance is None
     assert fit_stiffness(truth, exact[:3]).stiffness_std is None
-    draws = np.random.default_rng(6).normal(size=(25, 6))
+    draws = np.random.default_rng(6).normal(size=(40, 6))
     by_scatter, stated = [], None
     for draw in draws:
         scattered = fit_stiffness(truth, exact * (1 + 1e-4 * draw))
@@ -137,7 +137,7 @@ def test_scatter_stands_in_for_standard_errors_only_where_modes_are_to_spare() -
         assert scattered.log_covariance is not None
         by_scatter.append(np.diag(scattered.log_covariance))
     assert stated is not None
-    assert np.mean(by_scatter, axis=0) / np.diag(stated) == pytest.approx(1, abs=0.45)
+    assert np.mean(by_scatter, axis=0) / np.diag(stated) == pytest.approx(1, abs=0.35)
 
 
 def test_standard_errors_are_not_stretched_by_the_residuals() -> None:

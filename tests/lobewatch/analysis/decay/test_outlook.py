@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+from dataclasses import replace
 from datetime import timedelta
 from typing import Any
 
@@ -16,6 +17,8 @@ from typer.testing import CliRunner, Result
 from lobewatch.analysis import Logbook, Word
 from lobewatch.analysis.decay.outlook import outlook
 from lobewatch.analysis.decay.trend import date, day
+from lobewatch.analysis.programs.aging import softening, tolerable_decay
+from lobewatch.analysis.programs.critical import critical_fall
 from lobewatch.cli import app
 
 Shop = Any
@@ -135,3 +138,17 @@ def test_the_report_says_until_when_and_draws_the_line(worn: Shop) -> None:
     assert "falling steadily since 2026-01-15" in html
     assert "-5 % (fixed limit, as in the paper)" in html
     assert "Line: fitted; band: where it goes, 80 %." in html
+
+
+def test_the_error_of_the_critical_fall_is_its_scatter_over_damping_and_stiffness(shop: Shop) -> None:
+    shop.run(("A", 12900, 1.5))
+    shop.tap_both()
+    (found,) = shop.logbook.verdicts()
+    drawn, (stiffness_at, _) = found.drawn, softening(found.assembly)
+    middle, falls = drawn.rows[np.array([0])], []
+    for i in range(1, 13):
+        one = drawn.rows[np.array([i])]
+        rows = replace(middle, damping_ratio=one.damping_ratio, stiffness=one.stiffness)
+        falls.append(tolerable_decay(replace(drawn, rows=rows), 1.5e-3, stiffness_at))
+    assert np.all(np.isfinite(falls))
+    assert critical_fall(found).error == pytest.approx(np.std(falls), rel=0.3)

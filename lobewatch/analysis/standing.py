@@ -13,7 +13,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from acquisition import Remark
-from lobewatch.analysis.decay.fallen import about_fall, about_trend, fall_of, known_rows, trend_in
+from lobewatch.analysis.decay.fallen import about_fall, about_others, about_trend, fall_of, known_rows, trend_in
 from lobewatch.analysis.decay.trend import Trend
 from lobewatch.analysis.estimate import Estimate
 from lobewatch.analysis.history import History, Row
@@ -58,6 +58,7 @@ LIGHTS = {
     "program-unknown": Light.WARN,
     "program-doubtful": Light.WARN,
     "frequency-rose": Light.GOOD,
+    "value-changed": Light.GOOD,
     "one-direction": Light.GOOD,
 }
 """What each reason means, in order of harm."""
@@ -156,7 +157,7 @@ def stand(
     left = machine.machine.tap_interval_days - (now - rows[-1].time) / timedelta(days=1)
     remarks = [remark for one in series for remark in one.remarks]
     remarks += [_of_files(remark) for remark in files if remark.code in LIGHTS]
-    remarks += [asked for row in rows for asked in about_questions(row.tap_id, row.questions, path)]
+    remarks += [asked for row in rows if row.questions for asked in about_questions(row.tap_id, row.questions, path)]
     remarks += [
         *_about_programs(rows, machine),
         *_about_dates(left),
@@ -182,6 +183,7 @@ def _series(
     trend = trend_in(rows, "frequency", now, events)
     remarks = [*_about_loss(name, rows[-1]), *about_fall(name, fall, machine.limits)]
     remarks += about_trend(name, trend, path) if trend else ()
+    remarks += about_others(name, rows, trend)
     return SeriesStanding(rows[-1].tool, rows[-1].direction, rows[-1].time, known[0].time, fall, trend, tuple(remarks))
 
 

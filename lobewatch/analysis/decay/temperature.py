@@ -81,11 +81,11 @@ class Base:
             product -= tail[1 + i] * level[:, i, np.newaxis]
             for j in range(p):
                 square = square - inverse[:, i, j, np.newaxis] * tail[1 + i] * tail[1 + j]
-        return product.astype(np.float64), square
+        return product, square
 
     def _levels(self, n: NDArray[np.intp]) -> tuple[Floats, Floats]:
         """Inverse (r, p, p) of the normal matrix of the base in the first n (r,), and its coefficients (r, p)."""
-        inverse = np.linalg.inv(self._outer[n, 1:, 1:] + self.precision(n))
+        inverse: Floats = np.asarray(np.linalg.inv(self._outer[n, 1:, 1:] + self.precision(n)), np.float64)
         return inverse, (inverse @ self._outer[n, 1:, :1])[..., 0]
 
     def _total(self, n: NDArray[np.intp]) -> Floats:

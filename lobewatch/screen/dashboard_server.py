@@ -24,10 +24,14 @@ from lobewatch.screen.screen_server import add_session
 from lobewatch.screen.web_thread import WebThread
 from lobewatch.show.printer import Watched
 from lobewatch.show.report import render_report
+from lobewatch.show.reporting.page import script_sources
 from lobewatch.tap.spool import interrupted_tests
 
-REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'; sandbox"
-"""A report has its style in it, and no script."""
+REPORT_POLICY = (
+    f"default-src 'none'; style-src 'unsafe-inline'; script-src {script_sources()}; img-src data:; "
+    "frame-ancestors 'none'; sandbox allow-scripts allow-downloads"
+)
+"""A report has its style in it, and runs the scripts of reports alone."""
 
 
 class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

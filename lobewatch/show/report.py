@@ -4,26 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 
-from acquisition import DataError, Frf, Remark, atomic_write, joined
-from acquisition.errors import NOT_ALLOWED
+from acquisition import Frf, Remark, joined
 from dsm import plus_minus
-from lobewatch.analysis import (
-    ABOUT_DIRECTIONS,
-    Assembly,
-    Light,
-    Logbook,
-    Row,
-    Standing,
-    Word,
-    lobes_of,
-)
+from lobewatch.analysis import ABOUT_DIRECTIONS, Assembly, Logbook, Row, Word, lobes_of
 from lobewatch.analysis.decay.fallen import change_since_start, start
 from lobewatch.analysis.decay.outlook import Outlook, outlook
 from lobewatch.analysis.decay.preload import preload_of
@@ -31,15 +19,19 @@ from lobewatch.analysis.programs.limit_band import limit_band
 from lobewatch.machine import Machine
 from lobewatch.show.advice import Advised, advised, advised_lines, decay_text
 from lobewatch.show.figures import frf_figure, svg
-from lobewatch.show.figures_lobes import lobes_figure
+from lobewatch.show.figures_lobes import lobes_figure, waterfall_figure
 from lobewatch.show.history.trends import Picture, trends
 from lobewatch.show.history.under import conditions_texts
 from lobewatch.show.programs.doubts import reading_lines
+from lobewatch.show.reporting.figure_data import lobe_numbers, response_numbers
+from lobewatch.show.reporting.first_screen import first_screen
+from lobewatch.show.reporting.lists import series_lines, tap_lines, tap_numbers
+from lobewatch.show.reporting.lobe_course import LobeCourse, lobe_course
+from lobewatch.show.reporting.page import page, write_page
 from lobewatch.show.trends.dates import ASSUMED
 from lobewatch.show.trends.describe_trend import dates_rows, preload_text, sentence
 from lobewatch.show.verdicts import WORDS, band_text, limit_text, margin_text, turning_text, verdict_text
 
-LIGHTS = {Light.ALARM: "✗ ALARM", Light.UNKNOWN: "? UNKNOWN", Light.WARN: "! WARNING", Light.GOOD: "✓ GOOD"}
 CHANGES = (
     ("frequency", "natural frequency (Hz)", 1.0),
     ("damping_ratio", "damping ratio (%)", 0.01),
@@ -57,21 +49,13 @@ def write_report(logbook: Logbook, path: Path | None = None, tool: str = "", dir
     newest = logbook.newest()
     html = render_report(logbook, tool or newest.tool, direction or newest.direction)
     path = path or logbook.folder.path / "report.html"
-    try:
-        atomic_write(path, html.encode())
-    except OSError as error:
-        if error.errno not in NOT_ALLOWED:
-            raise
-        raise DataError(f"{path}: {error.strerror}; name another file with --out") from error
+    write_page(path, html)
     return path
 
 
 def render_report(logbook: Logbook, tool: str, direction: str) -> str:
     """HTML of one series (tool and direction); ValueError where it holds no tap test."""
-    content = logbook.from_the_rest(lambda: _content_of(logbook, tool, direction))
-    source = resources.files("lobewatch.show").joinpath("report.html").read_text(encoding="utf-8")
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
-    return environment.from_string(source).render(content)
+    return page("report.html", **logbook.from_the_rest(lambda: _content_of(logbook, tool, direction)))
 
 
 def _content_of(logbook: Logbook, tool: str, direction: str) -> dict[str, Any]:
@@ -89,6 +73,8 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
     course, found = trends(logbook, rows), outlook(logbook)
     programs = [advised(logbook, verdict) for verdict in logbook.verdicts()]
     checked = [one.verdict for one in programs if one.verdict.word is not Word.UNKNOWN]
+    cut = next(iter(machine.cuts(assembly.tool)), None)
+    lobes = None if cut is None else lobe_course(cut, rows, assembly, found.standing.series, machine)
     return {
         "name": machine.machine.name,
         "tool": last.tool,
@@ -98,8 +84,11 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
         "n_taps": len(rows),
         "software": logbook.history.software,
         "label": machine.spindle.label if machine.spindle else "",
-        "standing": _standing(found.standing),
+        "first_screen": first_screen(found, programs),
         "until": _until(found, last),
+        "series": series_lines(found.standing),
+        "taps": tap_lines(logbook),
+        "tap_numbers": tap_numbers(logbook),
         "changes": _changes(rows),
         "preload": preload_text(left) if (left := preload_of(rows, machine)) else "",
         "programs": [_program(one) for one in programs],
@@ -114,10 +103,12 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
         "hits": len(now.hits),
         "averages": now.frf.n_averages,
         "figures": [
-            *_lobes(logbook, assembly, programs),
             *course.pictures,
+            *_lobes(logbook, assembly, programs),
+            *_pockets(lobes),
             _response(logbook.folder.read(entries[rows[0].tap_id]).frf if len(rows) > 1 else None, now.frf, machine),
         ],
+        "course": lobes,
         "happened": course.happened,
         "limits": machine.limits,
     }
@@ -129,13 +120,6 @@ def _until(found: Outlook, last: Row) -> dict[str, Any] | None:
     if series.trend is None:
         return None
     return {"course": sentence(series), "dates": dates_rows(found, series.trend), "assumed": ASSUMED}
-
-
-def _standing(standing: Standing) -> dict[str, Any]:
-    """The first line of the report."""
-    reasons = [remark.finding for remark in joined(standing.remarks)]
-    kind = {Light.GOOD: "ok", Light.ALARM: "bad"}.get(standing.light, "doubt")
-    return {"light": LIGHTS[standing.light], "kind": kind, "reasons": reasons, "next_step": standing.next_step}
 
 
 def _remarks(last: Row, assembly: Assembly) -> list[Remark]:
@@ -165,13 +149,26 @@ def _lobes(logbook: Logbook, assembly: Assembly, programs: Sequence[Advised]) ->
     advice = dict.fromkeys(setting for one in same for setting in (one.advice.best, one.advice.here) if setting)
     band = limit_band(now, cut, assembly, machine)
     marks = [one.verdict for one in same]
-    picture = lobes_figure(now.speed_rpm, depths | {assembly.label: now.depth}, marks, "", band, list(advice))
-    return [Picture("Stability lobes, then and now" if depths else "Stability lobes", text, svg(picture))]
+    depths |= {assembly.label: now.depth}
+    picture = lobes_figure(now.speed_rpm, depths, marks, "", band, list(advice))
+    edges = {} if band is None else {"lowest": band.low, "highest": band.high}
+    heading = "Stability lobes, then and now" if len(depths) > 1 else "Stability lobes"
+    return [Picture(heading, text, svg(picture), lobe_numbers(now.speed_rpm, depths | edges))]
+
+
+def _pockets(lobes: LobeCourse | None) -> list[Picture]:
+    """The depths over speed and time: how the pockets move."""
+    if lobes is None or not np.isfinite(lobes.depth).any():
+        return []
+    text = f"Limit of the {lobes.cut} by zero order after each tap test; bright is deep."
+    picture = waterfall_figure(lobes.speed_rpm, lobes.times, lobes.depth)
+    return [Picture("Pockets over time", text, svg(picture))]
 
 
 def _response(first: Frf | None, now: Frf, machine: Machine) -> Picture:
-    picture = frf_figure(first, now, _shown_band(now, machine))
-    return Picture("Frequency response", "Receptance: displacement over force.", svg(picture))
+    shown = _shown_band(now, machine)
+    text, picture = "Receptance: displacement over force.", svg(frf_figure(first, now, shown))
+    return Picture("Frequency response", text, picture, response_numbers(now.in_band(shown)))
 
 
 def _shown_band(frf: Frf, machine: Machine) -> tuple[float, float]:

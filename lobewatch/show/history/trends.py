@@ -12,6 +12,7 @@ from lobewatch.analysis.damage.left_out import left_out
 from lobewatch.analysis.decay.trend import Trend
 from lobewatch.machine.corrections.event import Event
 from lobewatch.show.figures import Marks, svg, trend_figure
+from lobewatch.show.reporting.figure_data import Numbers, value_numbers
 from lobewatch.show.trends.course import course_of
 
 NEAR = 0.15
@@ -25,6 +26,8 @@ class Picture(NamedTuple):
     text: str
     """A sentence below the heading."""
     svg: str
+    numbers: Numbers | None = None
+    """What is drawn."""
 
 
 class Trends(NamedTuple):
@@ -77,5 +80,6 @@ def _pictures(logbook: Logbook, rows: Sequence[Row], out: Sequence[Row], trend: 
             course = course_of(trend) if trend is not None and name == "frequency" else None
             text += " Line: fitted; band: where it goes, 80 %." if course else ""
             figure = trend_figure(times, values, stds, f"{heading.lower()} ({unit})", limits, marks, course)
-            found.append(Picture(heading, text, svg(figure)))
+            numbers = value_numbers(f"{heading.lower()} ({unit})", scale, known, aside, course)
+            found.append(Picture(heading, text, svg(figure), numbers))
     return found

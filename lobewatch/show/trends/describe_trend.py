@@ -63,7 +63,7 @@ def trend_texts(found: Outlook, series: SeriesStanding, preload: PreloadLeft | N
     dates = table("~what", "~becomes doubtful", "~is not stable")
     for line in dates_rows(found, trend):
         dates.add_row(*line)
-    others = [f"{one.name}: {_short(one)}" for one in found.standing.series if one is not series]
+    others = [f"{one.name}: {short_text(one)}" for one in found.standing.series if one is not series]
     left = [] if preload is None else [preload_text(preload)]
     return [*chart_lines(trend), sentence(series), *left, dates, ASSUMED, *others]
 
@@ -93,7 +93,7 @@ def sentence(series: SeriesStanding) -> str:
     if trend is None:
         return f"{series.name}: unknown"
     n = len(trend.points)
-    said = f"{series.name}: {_short(series)} after {n} point{'s' if n > 1 else ''}"
+    said = f"{series.name}: {short_text(series)} after {n} point{'s' if n > 1 else ''}"
     if trend.forecast is None:
         return f"{said}; from 8 points on there is a forecast, from 9 on an alarm"
     shape = _shape(trend.forecast.likeliest, falls=trend.forecast.fitted[-1] < trend.start)
@@ -105,12 +105,13 @@ def rate_text(trend: Trend) -> str:
     rate = trend.rate
     if rate is None:
         return ""
-    digits = max(2, 1 - math.floor(math.log10(max(rate.high - rate.low, 1e-4))))
+    digits = max(2, -math.floor(math.log10(max(rate.high - rate.low, 1e-4))))
     value, low, high = (f"{one:+.{digits}f}" for one in rate)
     return f"{value} % a month now ({low} to {high}, 95 %)"
 
 
-def _short(series: SeriesStanding) -> str:
+def short_text(series: SeriesStanding) -> str:
+    """How far it has fallen, with its standard error."""
     fall = series.fall
     return f"{plus_minus(-fall.value, fall.std)} % since it started" if fall.is_known else "unknown"
 

@@ -1,0 +1,55 @@
+"use strict";
+// Numbers of each figure as a file, and the lobes of every test in turn.
+(function () {
+  const read = (id) => JSON.parse(document.getElementById(id).textContent);
+  const cell = (value) => {
+    const text = value === null ? "" : String(value);
+    return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+  };
+
+  function save(button) {
+    const { heads, lines } = read(button.dataset.numbers);
+    const text = [heads, ...lines].map((line) => line.map(cell).join(",")).join("\n") + "\n";
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([text], { type: "text/csv" }));
+    link.download = `${button.dataset.name}.csv`;
+    link.click();
+    URL.revokeObjectURL(link.href);
+  }
+  for (const button of document.querySelectorAll("button[data-numbers]")) button.addEventListener("click", () => save(button));
+
+  const slider = document.getElementById("lobes-when");
+  if (!slider) return;
+  document.getElementById("lobes-course").hidden = false;
+  const place = document.getElementById("lobes-plot"), said = document.getElementById("lobes-said");
+  const { heads, lines } = read(slider.dataset.numbers);
+  const columns = heads.map((_, i) => lines.map((line) => line[i]));
+  const names = heads.map((head) => head.split(": ")[0]);
+  const now = Number(slider.dataset.now);
+  const finite = columns.slice(1).flat().filter((depth) => depth !== null);
+  const lowest = finite.reduce((least, depth) => Math.min(least, depth), Infinity);
+  const top = Number.isFinite(lowest) ? 6 * lowest : 1;
+  const clipped = columns.map((column, i) => (i ? column.map((depth) => (depth === null ? top : Math.min(depth, top))) : column));
+  const lobes = (chosen) => [clipped[0], clipped[1], clipped[now], clipped[chosen]];
+  const plot = new uPlot({
+    width: place.clientWidth, height: 300, scales: { x: { time: false }, y: { range: [0, top] } },
+    axes: [{ label: "spindle speed (rpm)" }, { label: "limiting depth (mm)" }],
+    series: [
+      { label: "rpm" },
+      { label: `first, ${names[1]}`, stroke: "#777777", dash: [6, 4], width: 1.2 },
+      { label: `now, ${names[now]}`, stroke: "#0072B2", width: 1.6 },
+      { label: "chosen", stroke: "#D55E00", width: 2 },
+    ],
+  }, lobes(Number(slider.value)), place);
+  function choose() {
+    const chosen = Number(slider.value);
+    said.textContent = names[chosen];
+    slider.setAttribute("aria-valuetext", names[chosen]);
+    plot.setData(lobes(chosen));
+  }
+  slider.addEventListener("input", choose);
+  const fit = () => plot.setSize({ width: place.clientWidth, height: 300 });
+  window.addEventListener("resize", fit);
+  window.addEventListener("beforeprint", fit);
+  choose();
+})();

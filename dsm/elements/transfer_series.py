@@ -61,9 +61,9 @@ def transfer_series(
 @cache
 def _quadrature() -> tuple[_Float, _Float, _Float]:
     """Gauss points and weights on 0 to 1, and the matrix that integrates from 0 to each point."""
-    x, weight = np.polynomial.legendre.leggauss(POINTS)
+    point, weight = np.polynomial.legendre.leggauss(POINTS)
     order = np.arange(POINTS)
-    to_legendre = (order[:, np.newaxis] + 0.5) * np.polynomial.legendre.legvander(x, POINTS - 1).T * weight
+    to_legendre = (order[:, np.newaxis] + 0.5) * np.polynomial.legendre.legvander(point, POINTS - 1).T * weight
     integrals = np.polynomial.legendre.legint(np.eye(POINTS), lbnd=-1)
-    running = np.polynomial.legendre.legvander(x, POINTS) @ integrals @ to_legendre
-    return (x + 1) / 2, weight / 2, running / 2
+    running = np.polynomial.legendre.legvander(point, POINTS) @ integrals @ to_legendre
+    return (point + 1) / 2, weight / 2, running / 2

@@ -36,9 +36,10 @@ def assemble(
     """Dynamic stiffness matrix with nodes at segment ends, bearings, masses, joints, `places` (m) and `held` dofs.
 
     Elements longer than the series allows at `top_frequency` (Hz) are split into equal parts. A pinned end is
-    held = [(z, 0)], a clamped one [(z, 0), (z, 1)]. left_out: bearings (0 is the first) whose nodes are there without
-    their radial springs. spin (rad/s): a polynomial in w for circular whirl, see DynamicStiffness. links: all
-    elements are links, twice the work, for bearings far softer than the shaft. The same one is not made twice.
+    held = [(z, 0)], a clamped one [(z, 0), (z, 1)]. left_out: places in (*bearings, *joints) of parts
+    that are taken away but for their nodes: the radial spring of a bearing, both springs of a joint. spin (rad/s): a
+    polynomial in w for circular whirl, see DynamicStiffness. links: all elements are links, twice the work, for
+    bearings far softer than the shaft. The same one is not made twice.
     Raises ValueError for a place off the shaft.
     """
     nodes = tuple(map(float, places))
@@ -64,9 +65,14 @@ def _assemble(
     model = replace(bare, **arrays)
     _add_masses(model, spindle)
     rigid = _add_springs(model, spindle, left_out)
-    model.scale[:] = _scale(model, sections(spindle))
+    model.scale[:] = _scale(model)
     for z, dof in (*rigid, *held):
         _hold(model, model.node(z), dof)
+    for index in left_out:
+        if index >= len(spindle.bearings):  # a link without forces joins nothing
+            link = model.node(spindle.joints[index - len(spindle.bearings)].position) + 1
+            _hold(model, link, 0)
+            _hold(model, link, 1)
     for values in (model.position, model.diagonal, model.coupling, model.held, model.scale):
         values.setflags(write=False)
     return model
@@ -88,7 +94,7 @@ def _bare(
     position, segment, short = place_nodes(shaft, wanted, spindle.theory, top_frequency, spin, links)
     series = _elements(spindle, shaft, position, segment, short, spin)
     position, series, short = _with_joints(spindle, position, series, short)
-    return _chain(position, series, short, top_frequency, spin)
+    return _chain(position, series, short, top_frequency, spin, _least(shaft))
 
 
 def _reversed(model: DynamicStiffness) -> DynamicStiffness:
@@ -136,9 +142,14 @@ def _with_joints(
 
 
 def _chain(
-    position: _Float, series: _Float, short: NDArray[np.bool_], top_frequency: float, spin: float | None
+    position: _Float,
+    series: _Float,
+    short: NDArray[np.bool_],
+    top_frequency: float,
+    spin: float | None,
+    least: tuple[float, float],
 ) -> DynamicStiffness:
-    """Elements put together, with a node of force and moment inside each link."""
+    """Elements put together, with a node of force and moment inside each link; its scale is that of `least` only."""
     node = np.arange(position.size) + np.concatenate([[0], np.cumsum(short)])
     count, terms = node[-1] + 1, series.shape[2]
     diagonal, coupling = np.zeros((3, count, terms)), np.zeros((4, count - 1, terms))
@@ -151,15 +162,21 @@ def _chain(
     places = np.full(count, math.inf)
     places[node] = position
     held = np.zeros((count, 2), dtype=bool)
-    return DynamicStiffness(places, diagonal, coupling, held, np.ones(held.size), top_frequency, spin)
+    scale = np.tile(1 / np.sqrt(least), count)
+    return DynamicStiffness(places, diagonal, coupling, held, scale, top_frequency, spin)
 
 
-def _scale(model: DynamicStiffness, shaft: Sections) -> _Float:
-    """One over the root of the stiffness at each dof, at least that of the whole shaft, or of the flexibility."""
+def _least(shaft: Sections) -> tuple[float, float]:
+    """Stiffness of the whole shaft against deflection (N/m) and slope (N m)."""
     middle = np.arange(shaft.ends.size - 1)
     rigidity = float(np.mean(shaft.at(middle, (shaft.ends[1:] + shaft.ends[:-1]) / 2).rigidity))
     length = float(shaft.ends[-1])
-    sizes = np.maximum(model.diagonal[::2, :, 0], [[rigidity / length**3], [rigidity / length]])
+    return rigidity / length**3, rigidity / length
+
+
+def _scale(model: DynamicStiffness) -> _Float:
+    """One over the root of the stiffness at each dof, at least that of the whole shaft, or of the flexibility."""
+    sizes = np.maximum(model.diagonal[::2, :, 0], model.scale[:2, np.newaxis] ** -2)
     link = np.flatnonzero(model.is_link)
     sizes[:, link] = np.maximum(-model.diagonal[::2, link, 0], 1 / sizes[:, link - 1])
     return np.asarray(1 / np.sqrt(sizes.T.ravel()))
@@ -178,8 +195,8 @@ def _add_masses(model: DynamicStiffness, spindle: Spindle) -> None:
 def _add_springs(model: DynamicStiffness, spindle: Spindle, left_out: Sequence[int]) -> list[Held]:
     """Add the bearings; what they hold rigidly is returned."""
     rigid: list[Held] = []
-    for index, bearing in enumerate(spindle.bearings):
-        node = model.node(bearing.position)
+    nodes = (model.dofs(spindle.bearings) // 2).tolist()
+    for index, (bearing, node) in enumerate(zip(spindle.bearings, nodes, strict=True)):
         model.diagonal[2, node, 0] += bearing.rotational_stiffness
         if index in left_out:
             continue

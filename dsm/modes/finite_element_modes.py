@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
+from dsm.modes.newton_step import quadratic
 
 _Float = NDArray[np.float64]
 
@@ -18,9 +19,10 @@ MASSLESS = 1e-4
 
 
 def finite_element_modes(model: DynamicStiffness, count: int) -> tuple[_Float, _Float]:
-    """x (count,) of the lowest modes and shapes phi (count, 2 n_nodes), -phi^T (dK/dx) phi = 1; a start, not exact.
+    """Eigenvalues (count,) of the lowest modes and shapes phi (count, 2 n_nodes), -phi^T K' phi = 1: a start.
 
-    x is w^2, or w where the shaft spins, of forward whirl. Raises ArithmeticError where the model has fewer modes.
+    An eigenvalue is w^2, or w where the shaft spins, of forward whirl; K' is the derivative of K by it. Raises
+    ArithmeticError where the model has fewer modes.
     """
     basis, springs = _across_links(model)
     if model.spin is None:
@@ -79,7 +81,7 @@ def _at_rest(model: DynamicStiffness, basis: _Float, springs: _Float, count: int
 def _whirling(model: DynamicStiffness, basis: _Float, springs: _Float, count: int) -> tuple[_Float, _Float]:
     """The same for a shaft that spins, from terms 0 to 2: K0 + w K1 - w^2 M.
 
-    With y = w x it is diag(K0, M) z = w [[-K1, M], [M, 0]] z, z = (x, y), whose left side is positive definite.
+    With y = w phi it is diag(K0, M) z = w [[-K1, M], [M, 0]] z, z = (phi, y), whose left side is positive definite.
     """
     stiffness, gyroscopic, mass = (_reduced(model, basis, power) for power in range(3))
     stiffness, mass = stiffness + springs, -mass
@@ -94,7 +96,6 @@ def _whirling(model: DynamicStiffness, basis: _Float, springs: _Float, count: in
     if inverse[0] <= 0:
         raise ArithmeticError(f"{count} modes were asked for; the model of this shaft has fewer")
     shape = (basis @ vectors[: basis.shape[1]]).T[::-1]
-    x = 1 / inverse[::-1]
-    inertia = -model.dense(x, derivative=True)
-    size = np.sum(shape * (inertia @ shape[..., np.newaxis])[..., 0], axis=1)
-    return x, shape / np.sqrt(size)[:, np.newaxis]
+    eigenvalue = 1 / inverse[::-1]
+    size = -quadratic(model.dense(eigenvalue, derivative=True), shape)
+    return eigenvalue, shape / np.sqrt(size)[:, np.newaxis]

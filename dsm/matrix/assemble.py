@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dsm.elements.beam_elements import link_elements, stiffness_elements
 from dsm.elements.place_nodes import place_nodes
+from dsm.elements.whirl_terms import whirl_terms
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
 from dsm.spindle.places import nearest
@@ -20,6 +21,8 @@ from dsm.spindle.segment import Segment
 from dsm.spindle.spindle import Spindle, Theory
 
 _Float = NDArray[np.float64]
+SLOW = 0.25
+"""Speeds below this part of the highest w divide the shaft alike: gyroscopic moments are small beside its inertia."""
 Held = tuple[float, int]
 """A dof that cannot move: position (m), and 0 for the deflection or 1 for the slope."""
 
@@ -60,9 +63,14 @@ def _assemble(
         return _reversed(_assemble(spindle, top_frequency, places, held, left_out, -spin, links))
     wanted = (*_places_of_parts(spindle), *places, *(z for z, _ in held))
     material = spindle.youngs_modulus, spindle.density, spindle.theory, spindle.shear_modulus
-    bare = _bare(tuple(spindle.segments), material, tuple(spindle.joints), wanted, top_frequency, spin, links)
-    arrays = {name: getattr(bare, name).copy() for name in ("diagonal", "coupling", "held", "scale")}
-    model = replace(bare, **arrays)
+    fastest = None if spin is None else fastest_spin(spin, top_frequency)
+    bare = _bare(tuple(spindle.segments), material, tuple(spindle.joints), wanted, top_frequency, fastest, links)
+    diagonal, coupling = (
+        part.copy() if spin is None else whirl_terms(part, spin) for part in (bare.diagonal, bare.coupling)
+    )
+    model = replace(
+        bare, diagonal=diagonal, coupling=coupling, held=bare.held.copy(), scale=bare.scale.copy(), spin=spin
+    )
     _add_masses(model, spindle)
     rigid = _add_springs(model, spindle, left_out)
     model.scale[:] = _scale(model)
@@ -85,16 +93,27 @@ def _bare(
     joints: tuple[Joint, ...],
     wanted: tuple[float, ...],
     top_frequency: float,
-    spin: float | None,
+    fastest: float | None,
     links: bool,
 ) -> DynamicStiffness:
-    """The shaft and its joints alone: what spindles that differ in bearings and masses have in common."""
+    """The shaft and its joints alone: what spindles that differ in bearings and masses have in common.
+
+    fastest: for speeds up to that (rad/s), terms as for whirl_terms; None: for a shaft at rest.
+    """
     spindle = Spindle(segments, (), *material, joints=joints)
     shaft = sections(spindle)
-    position, segment, short = place_nodes(shaft, wanted, spindle.theory, top_frequency, spin, links)
-    series = _elements(spindle, shaft, position, segment, short, spin)
+    position, segment, short = place_nodes(shaft, wanted, spindle.theory, top_frequency, fastest, links)
+    series = _elements(spindle, shaft, position, segment, short, fastest is not None)
     position, series, short = _with_joints(spindle, position, series, short)
-    return _chain(position, series, short, top_frequency, spin, _least(shaft))
+    return _chain(position, series, short, top_frequency, _least(shaft))
+
+
+def fastest_spin(spin: float, top_frequency: float) -> float:
+    """A speed (rad/s) not below this one that others share, and with it nodes and series."""
+    fastest = SLOW * 2 * math.pi * top_frequency
+    while fastest < spin:
+        fastest *= 2
+    return fastest
 
 
 def _reversed(model: DynamicStiffness) -> DynamicStiffness:
@@ -115,12 +134,12 @@ def _elements(
     position: _Float,
     segment: NDArray[np.int_],
     short: NDArray[np.bool_],
-    spin: float | None,
+    apart: bool,
 ) -> _Float:
     """Series of all elements, (10, n_elements, n_terms): rows of link_elements where short, else of the others."""
     found = []
     for kind, chosen in ((stiffness_elements, ~short), (link_elements, short)):
-        found.append(kind(shaft, spindle.theory, segment[chosen], position[:-1][chosen], position[1:][chosen], spin))
+        found.append(kind(shaft, spindle.theory, segment[chosen], position[:-1][chosen], position[1:][chosen], apart))
     series = np.empty((10, segment.size, found[0].shape[2]))
     series[:, ~short], series[:, short] = found
     return series
@@ -146,7 +165,6 @@ def _chain(
     series: _Float,
     short: NDArray[np.bool_],
     top_frequency: float,
-    spin: float | None,
     least: tuple[float, float],
 ) -> DynamicStiffness:
     """Elements put together, with a node of force and moment inside each link; its scale is that of `least` only."""
@@ -163,7 +181,7 @@ def _chain(
     places[node] = position
     held = np.zeros((count, 2), dtype=bool)
     scale = np.tile(1 / np.sqrt(least), count)
-    return DynamicStiffness(places, diagonal, coupling, held, scale, top_frequency, spin)
+    return DynamicStiffness(places, diagonal, coupling, held, scale, top_frequency)
 
 
 def _least(shaft: Sections) -> tuple[float, float]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.matrix.assemble import Held, assemble
+from dsm.matrix.assemble import Held, assemble, fastest_spin
 from dsm.matrix.count_below import count_below
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
-from dsm.modes.finite_element_modes import finite_element_modes
+from dsm.modes.finite_element_modes import finite_element_modes, whirling_modes
 from dsm.modes.modes import Modes
 from dsm.modes.newton_step import newton_step, quadratic
 from dsm.spindle.sections import sections
@@ -33,6 +35,9 @@ SETTLED = 1e-8
 
 MOST_MODES = 100
 """More are refused: the work grows with their third power."""
+
+MORE = 12
+"""Modes at rest beyond those wanted of which modes of whirl are made to begin with."""
 
 SPOILT = (
     "rounding spoils the modes of this shaft; look for segments far too short, thick or thin beside the others, and "
@@ -78,8 +83,8 @@ class _Wanted(NamedTuple):
 
     spindle: Spindle
     number: int
-    places: Sequence[float]
-    held: Sequence[Held]
+    places: tuple[float, ...]
+    held: tuple[Held, ...]
     spin: float | None
 
 
@@ -105,14 +110,38 @@ def _start(wanted: _Wanted, links: bool) -> tuple[DynamicStiffness, _Float, _Flo
     top = _first_guess(spindle, np.pi * (count + 2))
     for _ in range(8):
         model = assemble(spindle, top, places, held, spin=spin, links=links)
-        eigenvalue, shape = finite_element_modes(model, count)
+        eigenvalue, shape = _finite_elements(model, wanted, top, links)
         highest = float(model.to_frequency(eigenvalue[-1:])[0])
         if highest <= model.top_frequency:
             return model, eigenvalue, shape
-        top = highest
+        top = 2.0 ** (math.ceil(4 * math.log2(highest)) / 4)  # the same for speeds near to each other
     raise _SpoiltError
 
 
+def _finite_elements(model: DynamicStiffness, wanted: _Wanted, top: float, links: bool) -> tuple[_Float, _Float]:
+    spindle, count, places, held, spin = wanted
+    if spin is None:
+        return finite_element_modes(model, count)
+    w2, shape = _at_rest(spindle, count + MORE, top, places, held, fastest_spin(abs(spin), top), links)
+    return whirling_modes(model, w2, shape, count)
+
+
+@lru_cache(maxsize=4)
+def _at_rest(
+    spindle: Spindle,
+    count: int,
+    top: float,
+    places: tuple[float, ...],
+    held: tuple[Held, ...],
+    spin: float,
+    links: bool,
+) -> tuple[_Float, _Float]:
+    """What starts the search at all speeds that share nodes with `spin`."""
+    model = assemble(spindle, top, places, held, spin=spin, links=links)
+    return finite_element_modes(model, min(count, int(np.count_nonzero(~model.held[~model.is_link]))))
+
+
+@lru_cache(maxsize=32)
 def _first_guess(spindle: Spindle, phase: float) -> float:
     """Frequency (Hz) at which a wave along the shaft turns by about `phase` (rad); 1/w^2 adds up as in Dunkerley's."""
     shaft = sections(spindle)

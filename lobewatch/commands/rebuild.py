@@ -27,6 +27,7 @@ def rebuild(
     """
     from lobewatch.analysis import Logbook
     from lobewatch.machine.archive.rebuild import rebuild_files
+    from lobewatch.notify.telling import tell
     from lobewatch.show.measurements import remark_json, remark_lines
 
     told = rebuild_files(machine)
@@ -43,3 +44,4 @@ def rebuild(
         made = f"history.rows: made anew from {len(rows)} tap test(s)"
     payload = {"done": told, "tap_tests": len(rows), "remarks": [remark_json(one) for one in logbook.remarks]}
     emit(payload, as_json, *told, *remark_lines(logbook.remarks), made)
+    tell(logbook)

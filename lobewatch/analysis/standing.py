@@ -18,6 +18,7 @@ from lobewatch.analysis.estimate import Estimate
 from lobewatch.analysis.history import History, Row
 from lobewatch.analysis.plant.light import (
     LIGHTS,
+    UNREADABLE,
     Light,
     about_dates,
     all_well,
@@ -89,7 +90,7 @@ class Standing:
 
 def unreadable(reason: str) -> Standing:
     """The standing of a machine whose files cannot be read."""
-    return _of([Remark("unreadable", "", reason)], "Put its files right: the sentence above says which.")
+    return _of([Remark("unreadable", "", reason)], UNREADABLE)
 
 
 def stand(

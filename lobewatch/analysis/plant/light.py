@@ -53,6 +53,9 @@ LIGHTS = {
 }
 """What each reason means, in order of harm."""
 
+UNREADABLE = "Put its files right: the sentence above says which."
+"""What to do about a machine that cannot be read."""
+
 
 def in_order(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
     """Reasons in order of harm."""

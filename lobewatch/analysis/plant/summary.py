@@ -12,6 +12,7 @@ import msgspec
 
 from acquisition import Remark
 from lobewatch.analysis.plant.light import (
+    UNREADABLE,
     Light,
     about_dates,
     days_left,
@@ -125,7 +126,3 @@ class Summary(msgspec.Struct, frozen=True, dict=True):
 def unreadable_summary(name: str, reason: str) -> Summary:
     """Of a machine whose files cannot be read."""
     return Summary(name, (Remark("unreadable", "", reason),), UNREADABLE)
-
-
-UNREADABLE = "Put its files right: the sentence above says which."
-"""What to do about them."""

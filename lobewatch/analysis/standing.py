@@ -21,6 +21,7 @@ from lobewatch.analysis.plant.light import (
     UNREADABLE,
     Light,
     about_dates,
+    about_unreadable,
     all_well,
     days_left,
     in_order,
@@ -90,7 +91,7 @@ class Standing:
 
 def unreadable(reason: str) -> Standing:
     """The standing of a machine whose files cannot be read."""
-    return _of([Remark("unreadable", "", reason)], UNREADABLE)
+    return _of([about_unreadable(reason)], UNREADABLE)
 
 
 def stand(

@@ -57,6 +57,11 @@ UNREADABLE = "Put its files right: the sentence above says which."
 """What to do about a machine that cannot be read."""
 
 
+def about_unreadable(reason: str) -> Remark:
+    """That the files of a machine cannot be read."""
+    return Remark("unreadable", "", reason)
+
+
 def in_order(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
     """Reasons in order of harm."""
     order = list(LIGHTS)

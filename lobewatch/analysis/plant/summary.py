@@ -15,6 +15,7 @@ from lobewatch.analysis.plant.light import (
     UNREADABLE,
     Light,
     about_dates,
+    about_unreadable,
     days_left,
     in_order,
     light_of,
@@ -125,4 +126,4 @@ class Summary(msgspec.Struct, frozen=True, dict=True):
 
 def unreadable_summary(name: str, reason: str) -> Summary:
     """Of a machine whose files cannot be read."""
-    return Summary(name, (Remark("unreadable", "", reason),), UNREADABLE)
+    return Summary(name, (about_unreadable(reason),), UNREADABLE)

@@ -18,6 +18,7 @@ from lobewatch.show.replays.describing import (
     Quantity,
     Rate,
     Response,
+    Sensitivity,
     Unit,
     described,
 )
@@ -48,6 +49,7 @@ def replay(
     averages: Averages = None,
     response: Response = None,
     full_scale: FullScale = "",
+    sensitivity: Sensitivity = "",
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what would become of each file; store nothing.")
     ] = False,
@@ -82,11 +84,13 @@ def replay(
     from acquisition import Conditions
     from lobewatch.analysis import Logbook
     from lobewatch.analysis.replaying.found_files import found_files
+    from lobewatch.notify.telling import telling
     from lobewatch.show.replays.show_replay import show_preview, show_replay
 
     said = described(
         columns,
         full_scale,
+        sensitivity,
         quantity=quantity,
         unit=unit,
         force_unit=force_unit,
@@ -102,5 +106,6 @@ def replay(
     logbook, (found, passed) = Logbook.open(machine), found_files(files)
     if dry_run:
         show_preview(logbook, found, passed, said, as_json=as_json)
-    else:
+        return
+    with telling(logbook):
         show_replay(logbook, found, passed, said, accept or (), jobs=jobs, keep_going=keep_going, as_json=as_json)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated
 
@@ -12,13 +13,18 @@ from lobewatch.show.output import Json, emit, notes
 
 
 def report(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
-    out: Annotated[Path | None, typer.Option(help="The HTML file; MACHINE/report.html where not given.")] = None,
+    machine: Annotated[
+        Path,
+        typer.Argument(parser=named_folder, help="Machine folder with a tap test, or a folder of machine folders."),
+    ],
+    out: Annotated[Path | None, typer.Option(help="The HTML file; report.html in the folder where not given.")] = None,
     tool: Annotated[str, typer.Option(help="The series of this tool; that of the newest test where not given.")] = "",
     direction: Annotated[str, typer.Option(help="x or y; that of the newest test where not given.")] = "",
     as_json: Json = False,
 ) -> None:
     """One HTML file with everything in it: what has changed, which programs still hold, lobes then and now.
+
+    Of a folder of machine folders: a line for each of them, worst first.
 
     Examples:
 
@@ -28,8 +34,22 @@ def report(
     from lobewatch.analysis import Logbook
     from lobewatch.show.report import write_report
 
-    logbook = Logbook.open(machine)
-    path = write_report(logbook, out, tool, direction)
-    for remark in logbook.remarks:
-        notes.print(f"note: {remark}", markup=False)
+    if not (machine / "machine.toml").is_file() and any(machine.glob("*/machine.toml")):
+        if tool or direction:
+            raise ValueError(f"--tool and --direction: name one of the machines in {machine} with them")
+        path = _of_all(machine, out)
+    else:
+        logbook = Logbook.open(machine)
+        path = write_report(logbook, out, tool, direction)
+        for remark in logbook.remarks:
+            notes.print(f"note: {remark}", markup=False)
     emit({"report": str(path)}, as_json, f"report: {path}")
+
+
+def _of_all(folder: Path, out: Path | None) -> Path:
+    from lobewatch.analysis.plant.plant import Plant, find_machines
+    from lobewatch.show.plant.plant_rows import plant_rows
+    from lobewatch.show.reporting.fleet import write_fleet_report
+
+    rows = plant_rows(Plant(find_machines(folder)).standings())
+    return write_fleet_report(rows, folder, out, datetime.now().astimezone())

@@ -62,7 +62,7 @@ def outlook(logbook: Logbook, now: datetime | None = None) -> Outlook:
     return Outlook(
         standing,
         {one.name: _fate(falls[one.name], one.tool, standing.series) for one in logbook.machine.program},
-        {percent: _first(_of_limit(trend, percent) for trend in series) for percent in percents},
+        {percent: _first(of_limit(trend, percent) for trend in series) for percent in percents},
     )
 
 
@@ -99,7 +99,8 @@ def _after(trend: Trend, fall: float, error: float) -> Reached | None:
     return trend.forecast.reached(level, 100 * error / (1 - fall))
 
 
-def _of_limit(trend: Trend, percent: float) -> Reached | None:
+def of_limit(trend: Trend, percent: float) -> Reached | None:
+    """When a series has fallen by so much (%) from where it started; None where it cannot be told."""
     if trend.forecast is None or trend.is_stale:
         return None
     return trend.forecast.reached(trend.start + 100 * math.log1p(-percent / 100))

@@ -7,7 +7,7 @@ from typing import Any
 
 from lobewatch.analysis import Light, Logbook, Row, SeriesStanding, Standing
 from lobewatch.analysis.estimate import Estimate
-from lobewatch.analysis.standing import LIGHTS as HARM
+from lobewatch.analysis.plant.light import LIGHTS as HARM
 from lobewatch.show.reporting.figure_data import Numbers
 from lobewatch.show.reporting.first_screen import KINDS, LIGHTS
 from lobewatch.show.trends.describe_trend import rate_text, short_text

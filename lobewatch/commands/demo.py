@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from lobewatch.show.output import Json, emit, notes
+
+StoryName = Literal["steady", "step", "accelerating", "replaced", "none"]
+MOST_REPLACED = 30
+"""Months of a story whose bearings are replaced: later ones would be replaced in the future."""
 
 
 def demo(
@@ -18,9 +22,14 @@ def demo(
     ] = 24,
     seed: Annotated[int, typer.Option(help="Of the random numbers.")] = 1,
     scatter: Annotated[float, typer.Option(help="Scatter of f_1 by remounting: standard deviation, 0 to 5 %.")] = 0.1,
+    story: Annotated[StoryName, typer.Option(help="What befalls the bearings.")] = "steady",
+    bad_clampings: Annotated[float, typer.Option(help="Share of tests clamped badly: f_1 2 % low, 0 to 50 %.")] = 0.0,
+    temperature: Annotated[
+        float | None, typer.Option(help="Recorded, and swings by so much over the year: 0 to 30 K; f_1 with it.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """A simulated spindle ages over 24 months, tapped in x and y; ends with its report.
+    """A simulated spindle ages over 24 months, tapped in x and y; a forecast beside the truth, a report.
 
     Every test goes through a real serial port (a pseudo-terminal), byte by byte: ten good hits, FRF, HDF5, modes,
     bearing stiffness, stability lobes, history. Before each the tool is remounted, which moves f_1 a little. What was
@@ -29,7 +38,7 @@ def demo(
     Examples:
 
       lobewatch demo
-      lobewatch demo --out trial --taps 6
+      lobewatch demo --out trial --taps 12 --story step --bad-clampings 5
     """
     from rich.progress import Progress
 
@@ -38,20 +47,28 @@ def demo(
     from lobewatch.show.describe_demo import demo_json, demo_texts
     from lobewatch.show.report import write_report
     from lobewatch.tap.demo import age_spindle, compare_with_truth
+    from lobewatch.tap.stories.mounting import Mounting
+    from lobewatch.tap.stories.story import Story, Wear
+    from lobewatch.tap.stories.truth import foretold
 
-    if not 0 <= scatter <= 5:
-        raise ValueError(f"--scatter {scatter:g} is not between 0 and 5 %")
+    if story == "replaced" and taps > MOST_REPLACED:
+        raise ValueError(
+            f"--story replaced takes --taps {MOST_REPLACED} at most, not {taps}: no event is in the future"
+        )
+    mounting = Mounting(scatter / 100, bad_clampings / 100, temperature)
+    mounting.check()
     path = out or _free_name()
     make_machine_folder(path, "surrogate_machine.toml")
     folder = MachineFolder(path)
     with Progress(console=notes, transient=True, disable=not notes.is_terminal) as progress:
-        tests = age_spindle(folder, taps, seed, scatter / 100)
+        tests = age_spindle(folder, taps, seed, mounting.scatter, Story(story), mounting)
         taken = list(progress.track(tests, total=2 * taps, description="tap tests"))
         progress.add_task("history", total=None)
         logbook = Logbook(folder)
         found = compare_with_truth(logbook, taken)
+        told = foretold(logbook, Wear.of(folder, taps, Story(story)))
         report = write_report(logbook)
-    emit(demo_json(found, report), as_json, *demo_texts(found, scatter / 100, report))
+    emit(demo_json(found, told, report), as_json, *demo_texts(found, told, mounting.scatter, report))
 
 
 def _free_name() -> Path:

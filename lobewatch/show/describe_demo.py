@@ -9,8 +9,11 @@ from typing import Any
 
 from rich.table import Table
 
+from lobewatch.analysis.decay.trend import date
 from lobewatch.show.output import table
+from lobewatch.show.trends.dates import dates_json, dates_text
 from lobewatch.tap.demo import DemoTap, SpindleState
+from lobewatch.tap.stories.truth import Foretold
 
 KEYS = ("frequency_hz", "damping_ratio", "stiffness_n_per_m", "bearing_stiffness_n_per_m")
 """Names of the figures of a SpindleState in JSON ..."""
@@ -20,9 +23,14 @@ COLUMNS = (("f_1 Hz", 1.0, 2), ("zeta %", 0.01, 3), ("K N/um", 1e6, 3), ("k_b N/
 """Heading, size of the unit and decimals."""
 
 
-def demo_json(taps: Sequence[DemoTap], report: Path) -> dict[str, Any]:
-    """All tap tests."""
-    return {"taps": [_entry(tap) for tap in taps], "report": str(report)}
+def demo_json(taps: Sequence[DemoTap], told: Sequence[Foretold], report: Path) -> dict[str, Any]:
+    """All tap tests, and the forecast beside the truth."""
+    forecast = {one.what: {**dates_json(one.reached), "truth": _date(one.truth)} for one in told}
+    return {"taps": [_entry(tap) for tap in taps], "forecast": forecast, "report": str(report)}
+
+
+def _date(days: float | None) -> str | None:
+    return None if days is None else f"{date(days):%Y-%m-%d}"
 
 
 def _entry(tap: DemoTap) -> dict[str, Any]:
@@ -34,8 +42,8 @@ def _json(state: SpindleState) -> dict[str, float]:
     return dict(zip(KEYS, astuple(state), strict=True))
 
 
-def demo_texts(taps: Sequence[DemoTap], scatter: float, report: Path) -> list[str | Table]:
-    """All tap tests for people, with the worst errors; scatter of f_1 from test to test as a share of it (-)."""
+def demo_texts(taps: Sequence[DemoTap], told: Sequence[Foretold], scatter: float, report: Path) -> list[str | Table]:
+    """Tap tests, worst errors, and the forecast beside the truth, for people; scatter: of f_1, as a share of it."""
     in_x = [tap for tap in taps if tap.plan.direction == "x"]
     first, last = in_x[0], in_x[-1]
     found = last.found.relative_to(first.found).stiffness
@@ -46,8 +54,14 @@ def demo_texts(taps: Sequence[DemoTap], scatter: float, report: Path) -> list[st
         _table(taps),
         "worst error: " + ", ".join(_worst(taps)),
         f"K over the whole demo, in x: {100 * found:+.2f} % found, {100 * true:+.2f} % true",
+        *([] if not told else ["Foretold after the last test, and what the emulated spindle does if it goes on so:"]),
+        *(f"{one.what}: {dates_text(one.reached, one.horizon, seen=False)}; true {_truth(one)}" for one in told),
         f"report: {report}",
     ]
+
+
+def _truth(one: Foretold) -> str:
+    return _date(one.truth) or "never, or not for years"
 
 
 def _table(taps: Sequence[DemoTap]) -> Table:

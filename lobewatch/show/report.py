@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from acquisition import Frf, Remark, joined
+from acquisition import Frf, Remark, TapTest, joined
 from dsm import plus_minus
 from lobewatch.analysis import ABOUT_DIRECTIONS, Assembly, Logbook, Row, Word, lobes_of
 from lobewatch.analysis.decay.fallen import change_since_start, start
@@ -53,26 +54,25 @@ def write_report(logbook: Logbook, path: Path | None = None, tool: str = "", dir
     return path
 
 
-def render_report(logbook: Logbook, tool: str, direction: str) -> str:
-    """HTML of one series (tool and direction); ValueError where it holds no tap test."""
-    return page("report.html", **logbook.from_the_rest(lambda: _content_of(logbook, tool, direction)))
+def render_report(logbook: Logbook, tool: str, direction: str, now: datetime | None = None) -> str:
+    """HTML of one series (tool and direction); ValueError where it holds no tap test. now: None for the clock's."""
+    return page("report.html", **logbook.from_the_rest(lambda: _content_of(logbook, tool, direction, now)))
 
 
-def _content_of(logbook: Logbook, tool: str, direction: str) -> dict[str, Any]:
+def _content_of(logbook: Logbook, tool: str, direction: str, now: datetime | None) -> dict[str, Any]:
     rows = logbook.history.series(tool, direction)
     if not rows:
         raise ValueError(f"{logbook.folder.path}: no tap test with tool {tool!r} in direction {direction!r} yet")
-    return _content(logbook, rows)
+    return _content(logbook, rows, outlook(logbook, now))
 
 
-def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
+def _content(logbook: Logbook, rows: Sequence[Row], found: Outlook) -> dict[str, Any]:
     machine, last = logbook.machine, rows[-1]
     entries = {entry.id: entry for entry in logbook.taps}
     now = logbook.folder.read(entries[last.tap_id])
     assembly = logbook.assembly(last.tool)
-    course, found = trends(logbook, rows), outlook(logbook)
+    course = trends(logbook, rows, found.standing)
     programs = [advised(logbook, verdict) for verdict in logbook.verdicts()]
-    checked = [one.verdict for one in programs if one.verdict.word is not Word.UNKNOWN]
     cut = next(iter(machine.cuts(assembly.tool)), None)
     lobes = None if cut is None else lobe_course(cut, rows, assembly, found.standing.series, machine)
     return {
@@ -84,24 +84,16 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
         "n_taps": len(rows),
         "software": logbook.history.software,
         "label": machine.spindle.label if machine.spindle else "",
-        "first_screen": first_screen(found, programs),
+        "first_screen": first_screen(found, programs, machine),
         "until": _until(found, last),
         "series": series_lines(found.standing),
         "taps": tap_lines(logbook),
         "tap_numbers": tap_numbers(logbook),
         "changes": _changes(rows),
         "preload": preload_text(left) if (left := preload_of(rows, machine)) else "",
-        "programs": [_program(one) for one in programs],
-        "program_lines": [_whole(line) for one in programs for line in advised_lines(one, machine.speed)],
-        "program_method": checked[0].method if checked else "",
-        "program_doubt": [*map(_whole, reading_lines(checked, machine))],
+        **_programs(programs, machine),
         "remarks": [str(remark) for remark in _remarks(last, assembly)],
-        "modes": _modes(last),
-        "said": [*filter(None, [now.circumstances.operator]), *conditions_texts(last.conditions)],
-        "tap_id": now.id,
-        "good": len(now.accepted),
-        "hits": len(now.hits),
-        "averages": now.frf.n_averages,
+        **_newest(now, last),
         "figures": [
             *course.pictures,
             *_lobes(logbook, assembly, programs),
@@ -111,6 +103,28 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
         "course": lobes,
         "happened": course.happened,
         "limits": machine.limits,
+    }
+
+
+def _programs(programs: Sequence[Advised], machine: Machine) -> dict[str, Any]:
+    """The table of programs and what stands below it."""
+    checked = [one.verdict for one in programs if one.verdict.word is not Word.UNKNOWN]
+    return {
+        "programs": [_program(one) for one in programs],
+        "program_lines": [_whole(line) for one in programs for line in advised_lines(one, machine.speed)],
+        "program_method": checked[0].method if checked else "",
+        "program_doubt": [*map(_whole, reading_lines(checked, machine))],
+    }
+
+
+def _newest(tap: TapTest, row: Row) -> dict[str, Any]:
+    """What is said of the newest test."""
+    return {
+        "modes": _modes(row),
+        "said": [*filter(None, [tap.circumstances.operator]), *conditions_texts(row.conditions)],
+        "tap_id": tap.id,
+        "good": len(tap.accepted),
+        "hits": len(tap.hits),
     }
 
 

@@ -5,26 +5,29 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import astuple, dataclass
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from acquisition import Circumstances, DataError, Structure, TapDirection
-from dsm import Spindle, calibrate, natural_frequencies
+from acquisition import UNSAID, Circumstances, Conditions, DataError, Structure, TapDirection
+from dsm import Spindle
 from lobewatch.analysis import Logbook, Measurement
 from lobewatch.machine import MachineFolder
+from lobewatch.machine.corrections.correct import add_event
 from lobewatch.tap.connection import Connector
-from lobewatch.tap.emulated_spindle import device_in_step, emulated_structure, with_bearing_stiffness
+from lobewatch.tap.emulated_spindle import device_in_step, emulated_structure
 from lobewatch.tap.hit_loop import HitLoop, Wishes
 from lobewatch.tap.in_progress import begin_tap
 from lobewatch.tap.judged_hits import JudgedHits
 from lobewatch.tap.phases import Phases
 from lobewatch.tap.publisher import Publisher
 from lobewatch.tap.state import TapState, Word
+from lobewatch.tap.stories.mounting import Mounting, remounted
+from lobewatch.tap.stories.story import Story, Wear
 
-FALL = 0.10
-"""Fall of the first natural frequency over the demo."""
+SCATTERS = Mounting()
+"""Tests that differ by their scatter alone."""
 DIRECTIONS: dict[TapDirection, int] = {"x": 0, "y": 30}
 """Of the tests of a month, and the minute of the hour at which each is taken."""
 
@@ -59,6 +62,8 @@ class PlannedTap:
     """What the hammer meets."""
     truth: SpindleState
     """The same in four figures."""
+    conditions: Conditions = UNSAID
+    """What is said of the test."""
 
 
 @dataclass(frozen=True)
@@ -81,27 +86,46 @@ class DemoTap:
     """What the pipeline made of the hits."""
 
 
-def plan_taps(folder: MachineFolder, months: int, random: np.random.Generator, scatter: float) -> list[PlannedTap]:
-    """Tap tests in x and y every month, while all bearings lose stiffness; the tool is remounted before each test.
+def plan_taps(
+    folder: MachineFolder,
+    months: int,
+    random: np.random.Generator,
+    scatter: float,
+    story: Story = Story.STEADY,
+    mounting: Mounting = SCATTERS,
+) -> list[PlannedTap]:
+    """Tap tests in x and y every month of a story; the tool is remounted before each test.
 
-    scatter: standard deviation of f_1 from test to test, as a share of it (-): every test has bearings whose stiffness
-    puts f_1 where remounting has moved it. DataError where machine.toml has no spindle.
+    scatter: standard deviation of f_1 from test to test, as a share of it (-), in place of that of `mounting`: every
+    test has bearings whose stiffness puts f_1 where remounting has moved it. DataError without [spindle].
     """
-    worn, plans = _worn(folder, months), []
-    for (month, spindle), shifts in zip(enumerate(worn), random.normal(scale=scatter, size=(months, 2)), strict=True):
-        frequency = float(natural_frequencies(spindle, 1)[0])
-        for (direction, minute), shift in zip(DIRECTIONS.items(), shifts, strict=True):
+    wear, mounting = Wear.of(folder, months, story), mounting._replace(scatter=scatter)
+    shifts, warmth = mounting.shifts(months, len(DIRECTIONS), random), mounting.temperatures(months)
+    plans = []
+    for month in range(months):
+        spindle = wear.spindle(month)
+        under = UNSAID if warmth is None else Conditions(temperature_c=round(float(warmth[month]), 1))
+        for (direction, minute), shift in zip(DIRECTIONS.items(), shifts[month].tolist(), strict=True):
             date = datetime(2024 + month // 12, month % 12 + 1, 15, 9, minute, tzinfo=UTC)
-            remounted = calibrate(spindle, (1 + shift) * frequency).spindle
-            plans.append(_plan(folder, date, direction, remounted))
+            plans.append(_plan(folder, date, direction, remounted(spindle, shift), under))
     return plans
 
 
-def age_spindle(folder: MachineFolder, months: int, seed: int, scatter: float) -> Iterator[TakenTap]:
+def age_spindle(
+    folder: MachineFolder,
+    months: int,
+    seed: int,
+    scatter: float,
+    story: Story = Story.STEADY,
+    mounting: Mounting = SCATTERS,
+) -> Iterator[TakenTap]:
     """Take the tap tests of `plan_taps`, each through a real serial port (a pseudo-terminal)."""
     random = np.random.default_rng(seed)
-    plans = plan_taps(folder, months, random, scatter)
-    for plan, hammering in zip(plans, random.spawn(len(plans)), strict=True):
+    plans = plan_taps(folder, months, random, scatter, story, mounting)
+    replaced = Wear.of(folder, months, story).replaced_at
+    for number, (plan, hammering) in enumerate(zip(plans, random.spawn(len(plans)), strict=True)):
+        if replaced is not None and number == len(DIRECTIONS) * replaced:
+            add_event(folder, "bearings replaced", plan.date - timedelta(days=1), new_baseline=True)
         yield TakenTap(plan, _take(folder, plan, hammering))
 
 
@@ -113,28 +137,20 @@ def compare_with_truth(logbook: Logbook, taken: Iterable[TakenTap]) -> list[Demo
     return [DemoTap(tap.plan, _found(logbook.measurement(tap.id))) for tap in taken]
 
 
-def _worn(folder: MachineFolder, months: int) -> list[Spindle]:
-    """Bearings that lose the same share of their stiffness every month, until f_1 has fallen by FALL."""
-    table = folder.machine.spindle
-    if table is None:
-        raise DataError(f"{folder.toml}: no model to age: add a [spindle] table")
-    new = table.build()
-    fresh = table.bearing_stiffness_n_per_um * 1e6
-    worn = calibrate(new, (1 - FALL) * float(natural_frequencies(new, 1)[0])).bearing_stiffness
-    return [with_bearing_stiffness(new, k) for k in np.geomspace(fresh, worn, months)]
-
-
-def _plan(folder: MachineFolder, date: datetime, direction: TapDirection, spindle: Spindle) -> PlannedTap:
+def _plan(
+    folder: MachineFolder, date: datetime, direction: TapDirection, spindle: Spindle, under: Conditions
+) -> PlannedTap:
     damping = folder.machine.spindle.damping_ratio if folder.machine.spindle else 0.0
     structure = emulated_structure(spindle, damping)
     truth = (structure.frequency[0], damping, structure.stiffness[0], spindle.bearings[0].stiffness)
-    return PlannedTap(date, direction, structure, SpindleState(*map(float, truth)))
+    return PlannedTap(date, direction, structure, SpindleState(*map(float, truth)), under)
 
 
 def _take(folder: MachineFolder, plan: PlannedTap, random: np.random.Generator) -> str:
     """Take and commit one tap test as a session without a person does; its id."""
     machine, toml = folder.machine, folder.toml.read_text("utf-8")
-    about = Circumstances(machine.machine.name, plan.date, machine.tap.tool, plan.direction, "the demo", toml)
+    where = machine.machine.name, plan.date, machine.tap.tool, plan.direction
+    about = Circumstances(*where, "the demo", toml, conditions=plan.conditions)
     publisher = Publisher(TapState(0, Word.CHECKING, "", wanted=machine.tap.hits), time.monotonic)
     with device_in_step(plan.structure, random) as open_device, threadpool_limits(limits=1), folder.locked():
         hits = JudgedHits(begin_tap(folder, about, resume=False), machine)

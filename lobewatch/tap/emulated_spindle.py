@@ -111,15 +111,22 @@ class _SourceInStep(TapsSource):
 
 
 def emulate_machine(
-    folder: MachineFolder, driver: Driver, seed: int = 1, *, realtime: bool = True, tcp: bool = False
+    folder: MachineFolder,
+    driver: Driver,
+    seed: int = 1,
+    *,
+    realtime: bool = True,
+    tcp: bool = False,
+    spindle: Spindle | None = None,
 ) -> EmulatedMachine:
     """Somebody taps the spindle of a machine, again and again, on a device of this kind.
 
-    DataError where machine.toml has no spindle, or lacks the sensors of a device that does not describe them itself.
+    spindle: in place of that of machine.toml, of the same damping. DataError where machine.toml has no spindle, or
+    lacks the sensors of a device that does not describe them itself.
     """
     if driver.emulate is None:
         raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
-    structure, random = _structure(folder), np.random.default_rng(seed)
+    structure, random = _structure(folder, spindle), np.random.default_rng(seed)
     bench = Bench(
         lambda rate: HammeredStructure(structure, rate, random, Hammering()),
         _inputs(folder, driver),
@@ -131,11 +138,11 @@ def emulate_machine(
     return EmulatedMachine(driver.emulate(bench), float(structure.frequency[0]), float(structure.stiffness[0]))
 
 
-def _structure(folder: MachineFolder) -> Structure:
+def _structure(folder: MachineFolder, other: Spindle | None) -> Structure:
     spindle = folder.machine.spindle
     if spindle is None:
         raise DataError(f"{folder.toml}: no model to emulate: add a [spindle] table (or use lobewatch init --example)")
-    return emulated_structure(spindle.build(), spindle.damping_ratio, folder.machine.tap.position_mm / 1e3)
+    return emulated_structure(other or spindle.build(), spindle.damping_ratio, folder.machine.tap.position_mm / 1e3)
 
 
 def _inputs(folder: MachineFolder, driver: Driver) -> tuple[SensorInput, ...]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lobewatch.analysis import Logbook, Row
+from lobewatch.analysis import Logbook, Row, Standing
 from lobewatch.analysis.damage.left_out import left_out
 from lobewatch.analysis.decay.trend import Trend
 from lobewatch.machine.corrections.event import Event
@@ -39,13 +39,13 @@ class Trends(NamedTuple):
     """A line for each event of the machine and each test that does not count, oldest first."""
 
 
-def trends(logbook: Logbook, rows: Sequence[Row]) -> Trends:
+def trends(logbook: Logbook, rows: Sequence[Row], standing: Standing) -> Trends:
     """Of the rows of one series, oldest first."""
     out = left_out(logbook.folder, logbook.files.excluded, rows)
     reasons = {entry.id: entry.excluded for entry in logbook.files.excluded}
     told = [(event.time, event_line(event)) for event in logbook.files.events]
     told += [(row.time, _excluded_line(row, reasons[row.tap_id])) for row in out]
-    series = logbook.standing().series_of(rows[-1].tool, rows[-1].direction)
+    series = standing.series_of(rows[-1].tool, rows[-1].direction)
     return Trends(_pictures(logbook, rows, out, series.trend if series else None), [line for _, line in sorted(told)])
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from datetime import datetime, timedelta
+from datetime import timedelta
 from typing import Any
 
 from acquisition import joined
 from lobewatch.analysis import Light, SeriesStanding, Standing, Word
 from lobewatch.analysis.decay.outlook import Fate, Outlook
+from lobewatch.machine import Machine
 from lobewatch.show.advice import Advised
 from lobewatch.show.programs.settings import rpm
 from lobewatch.show.trends.dates import dates_text, horizon_of
@@ -23,13 +24,13 @@ FEW = 3
 """Reasons on the first screen; the others stand below it."""
 
 
-def first_screen(found: Outlook, programs: Sequence[Advised]) -> dict[str, Any]:
+def first_screen(found: Outlook, programs: Sequence[Advised], machine: Machine) -> dict[str, Any]:
     """What the first screen shows, as the template takes it."""
     return {
         **light_of(found.standing),
         "changed": [_changed(one) for one in found.standing.series],
         "programs": [_program(one, found) for one in programs],
-        "tap": _tap(found.standing),
+        "tap": _tap(found.standing, machine),
     }
 
 
@@ -90,9 +91,9 @@ def instead_text(one: Advised) -> str:
     return " or ".join(dict.fromkeys(told)) or "no safe speed: another tool"
 
 
-def _tap(standing: Standing) -> str:
+def _tap(standing: Standing, machine: Machine) -> str:
     left, last = standing.days_left, standing.last_tap
     if left is None or last is None:
         return "now: it was never tapped"
-    due = (datetime.now(last.tzinfo) + timedelta(days=left)).date()
+    due = f"{last + timedelta(days=math.floor(machine.machine.tap_interval_days)):%Y-%m-%d}"
     return f"now: overdue since {due}" if left < 0 else f"by {due}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -49,12 +49,14 @@ def worn(shop: Shop) -> Shop:
 
 def test_a_report_says_first_what_matters_and_holds_its_numbers(worn: Shop) -> None:
     logbook = worn.logbook
-    html = render_report(logbook, "reference", "x")
+    now = logbook.history.rows[-1].time + timedelta(days=1)
+    html = render_report(logbook, "reference", "x", now)
     first = html[html.index('<div class="first">') : html.index("<h2")]
-    light = {"alarm": "✗ ALARM", "warn": "! WARNING"}[logbook.standing().light]
-    for said in (light, "falling since 2026-01-", " % a month now (", "A &lt;1&gt;", "Tap next now: overdue since"):
+    standing = logbook.standing(now)
+    light = {"alarm": "✗ ALARM", "warn": "! WARNING"}[standing.light]
+    for said in (light, "falling since 2026-01-", " % a month now (", "A &lt;1&gt;", "Tap next by 2026-07-14"):
         assert said in first, said
-    assert logbook.standing().next_step in unescape(first)
+    assert standing.next_step in unescape(first)
     assert re.search(r"<td>(not stable|doubtful) (between|not before) .*?</td><td>", first)
     heads, lines = numbers(html, "natural-frequency")
     assert heads[:3] == ["what", "date", "natural frequency (Hz)"]
@@ -62,7 +64,7 @@ def test_a_report_says_first_what_matters_and_holds_its_numbers(worn: Shop) -> N
     assert [line[2] for line in tests[:2]] == pytest.approx([1713.5, 1713.0 * 0.9967], abs=0.05)
     assert {line[0] for line in lines} == {"test", "fitted", "forecast"}
     heads, lines = numbers(html, "stability-lobes-over-time")
-    assert len(heads) == 1 + 11 + 2  # every test, and two forecasts
+    assert len(heads) == 1 + 11 + 1  # every test, and where it will be in six months
     lobes = np.array([[np.nan if depth is None else depth for depth in line] for line in lines])
     pockets = [lobes[np.nanargmax(np.where(lobes[:, 0] < 15000, depth, 0)), 0] for depth in lobes.T[1:]]
     assert pockets[0] > pockets[10] > pockets[-1]  # the deepest pocket moves down with the frequency, and goes on to

@@ -17,7 +17,7 @@ from lobewatch.analysis.estimate import UNKNOWN, Estimate
 from lobewatch.analysis.measurement import Measurement
 from lobewatch.analysis.order import Place
 from lobewatch.analysis.programs.verdict import Ruling
-from lobewatch.analysis.questions.asked import open_questions
+from lobewatch.analysis.questions.asked import accepted_codes, open_questions
 from lobewatch.machine import Machine
 from modal import Mode
 
@@ -81,6 +81,11 @@ class Row:
         """What nobody has answered yet; until then it is no reference for other tests."""
         return open_questions(self.remarks)
 
+    @cached_property
+    def accepted(self) -> frozenset[str]:
+        """Codes of the questions that were answered."""
+        return accepted_codes(self.remarks)
+
     @property
     def mode(self) -> Mode | None:
         """The mode followed, without its errors; None where it was not found."""
@@ -105,7 +110,7 @@ class History:
     kept: tuple[Row, ...] = ()
     """Of tap tests whose files cannot be used now, as they were worked out before; they count for nothing."""
 
-    @property
+    @cached_property
     def current(self) -> list[Row]:
         """Those since the baseline, of each tool with the stick-out and in the state of its newest."""
         since = [row for row in self.rows if row.baseline == self.baseline]

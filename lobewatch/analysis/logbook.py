@@ -197,8 +197,9 @@ class Logbook:
     @property
     def calibrated(self) -> Measurement | None:
         """The newest measurement that the bearings of the model could be found from; None where there is none."""
-        known = [row for row in self.history.current if row.bearing_stiffness.is_known and not row.questions]
-        return self.measurement(known[-1].tap_id) if known else None
+        rows = reversed(self.history.current)
+        newest = next((row for row in rows if not row.questions and row.bearing_stiffness.is_known), None)
+        return None if newest is None else self.measurement(newest.tap_id)
 
     def from_the_rest(self, work: Callable[[], Result]) -> Result:
         """What some work gives; where it meets a damaged tap file, all of it again without that."""

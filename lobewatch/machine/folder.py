@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
 
+import msgspec
 from filelock import FileLock, Timeout
 
 from acquisition import DataError, Remark, TapTest, read_tap, write_tap
@@ -150,7 +151,8 @@ class MachineFolder:
         path = self.path / "taps" / f"{tap.id}.h5"
         make_folder(path.parent)
         content = write_tap(path, tap)
-        self.journal.append(replace(TapEntry.of(tap, content), asked=tuple(asked)).line, reading=reading)
+        entry = msgspec.structs.replace(TapEntry.of(tap, content), asked=tuple(asked))
+        self.journal.append(entry.line, reading=reading)
         shutil.rmtree(self.spool / tap.id, ignore_errors=True)
 
     def commit_files(self, files: Mapping[Path, TapEntry]) -> None:

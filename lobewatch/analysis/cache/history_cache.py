@@ -12,7 +12,6 @@ from lobewatch.analysis.cache.kept_rows import kept_aside
 from lobewatch.analysis.columns.stored_row import packed, unpacked
 from lobewatch.analysis.history import History, Row, empty_history
 from lobewatch.analysis.order import Place
-from lobewatch.analysis.questions.asked import accepted_codes
 from lobewatch.machine import BusyError, MachineFolder
 from lobewatch.machine.archive.rows import add_rows, read_rows, write_rows
 
@@ -114,5 +113,5 @@ def _head(history: History) -> bytes:
 def _is_of(row: Row, place: Place) -> bool:
     """Whether a row was made of this tap test, with all that was accepted of it, since the same baseline."""
     tap = place.entry
-    made = row.tap_id, row.baseline, row.series, accepted_codes(row.remarks)
-    return made == (tap.id, place.baseline, place.series, set(tap.accepted))
+    made = row.tap_id, row.baseline, row.series, row.accepted
+    return made == (tap.id, place.baseline, place.series, frozenset(tap.accepted))

@@ -114,6 +114,8 @@ class UsableTaps:
 
     def doubts(self, tool: str = "") -> tuple[Remark, ...]:
         """Damaged ones (of a tool; "": of any) that are newer than all of their series that can be used."""
+        if not self.lost:
+            return ()
         known = {_series(place.entry): _time(place.entry) for place in self.places}
         lost = [one for one in self.lost if _time(one) >= (self.baseline or BEFORE_ALL)]
         newer = [one for one in lost if tool in ("", one.tool) and _time(one) > known.get(_series(one), BEFORE_ALL)]

@@ -7,6 +7,7 @@ Effects of Machine Tool Spindle Decay on the Stability Lobe Diagram, Shock and V
 from dsm.calibration import (
     Calibration,
     DampingCalibration,
+    PreloadLeft,
     StiffnessFit,
     StiffnessFitError,
     UnreachableDampingError,
@@ -15,6 +16,7 @@ from dsm.calibration import (
     calibrate_damping,
     fit_stiffness,
     plus_minus,
+    preload_left,
     receptance_map,
     stiffness_curve,
 )
@@ -54,6 +56,7 @@ __all__ = [
     "LumpedMass",
     "Material",
     "Modes",
+    "PreloadLeft",
     "Segment",
     "Spindle",
     "SpindleSide",
@@ -81,6 +84,7 @@ __all__ = [
     "modes_at",
     "natural_frequencies",
     "plus_minus",
+    "preload_left",
     "receptance",
     "receptance_map",
     "spindle_side",

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.channel import SensorInput
+from acquisition.dataq.digital_clock import CLOCK_BIT
 from acquisition.dataq.protocol import (
     DEC,
     DECA,
@@ -44,6 +45,8 @@ class DataqTraits:
     """Lines end with CR NUL, not with CR alone."""
     digital_word: int = 0x7F00
     """What the digital inputs give: pulled up where nothing is connected."""
+    clock_hz: float | None = None
+    """Frequency of a square wave on digital input 0 (Hz)."""
     bits: int = 16
     """Resolution; the lower bits of each word are 0. The devices have fewer than 16 at high rates."""
     scanned: bool = False
@@ -220,15 +223,22 @@ class DataqEmulator(EmulatorThread):
         """The next words, shape (count, length of the scan list)."""
         step = len(self._scan_list) if self._traits.scanned else 1
         values = self._signal(self._scan * step, count * step)
-        self._scan += count
         words = np.zeros((count, len(self._scan_list)), "<i2")
         for position, code in enumerate(self._scan_list):
             number, gain = code & 0xF, code >> 8
             if number == DIGITAL_INPUTS:
-                words[:, position] = self._traits.digital_word
+                words[:, position] = self._digital_words(count)
             elif number in self._inputs:
                 row, one = self._inputs[number]
                 bits = self._traits.bits
                 channel = replace(one.channel, full_scale=self._ranges[gain], adc_bits=bits)
                 words[:, position] = channel.encode(values[row, position % step :: step]) << 16 - bits
+        self._scan += count
+        return words
+
+    def _digital_words(self, count: int) -> NDArray[np.int16]:
+        words = np.full(count, self._traits.digital_word, "<i2")
+        if self._traits.clock_hz:
+            halves = (self._scan + np.arange(count)) * (2 * self._traits.clock_hz / self._rate)
+            words[halves.astype(int) % 2 == 1] &= ~CLOCK_BIT
         return words

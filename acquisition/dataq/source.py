@@ -51,21 +51,28 @@ class DataqSource:
     """It tells of no faults."""
 
     def __init__(
-        self, port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None, digital_word: bool = True
+        self,
+        port: str,
+        inputs: Sequence[SensorInput],
+        sample_rate: float | None = None,
+        digital_word: bool = True,
+        *,
+        digital_clock: bool = False,
     ) -> None:
         """Open a port: a device name or socket://host:port. The rate is the nearest the device has (Hz).
 
-        digital_word scans the digital inputs too, whose word shows when bytes are lost. Raises DeviceError where there
-        is no port or no such device, ValueError for inputs, ranges and rates it does not have.
+        digital_word scans the digital inputs too, whose word shows when bytes are lost; digital_clock: a square wave
+        on digital input 0 shows the loss of whole scans, too. Raises DeviceError where there is no port or no such
+        device, ValueError for inputs, ranges and rates it does not have.
         """
         check_inputs(inputs)
         self.channels = tuple(one.channel for one in inputs)
-        self.loss_detection = "digital word" if digital_word else "none"
+        self.loss_detection = "digital word" + " and clock" * digital_clock if digital_word else "none"
         self.events: deque[Event] = deque()
         """It tells of no events."""
         self.status = DataqStatus.STOPPED
         self.overflows = 0
-        self._decoder = ScanDecoder(len(inputs), digital_word)
+        self._decoder = ScanDecoder(len(inputs), digital_word, digital_clock)
         self._next_scan = self._overruns = 0
         self._heard = 0.0
         self._link = SerialLink(port)

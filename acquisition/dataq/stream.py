@@ -1,7 +1,8 @@
 """From the bare byte stream of a DATAQ device to scans; what is missing is found by the word of the digital inputs.
 
 That word stands last in each scan and holds still; its low byte is always 0. Bytes that are lost move everything that
-follows, and another word appears in its place: the stream is then read on from where the word is found again.
+follows, and another word appears in its place: the stream is then read on from where the word is found again. A loss of
+whole scans moves nothing; a square wave on a digital input shows it by a period that is too short.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.dataq.digital_clock import CLOCK_BIT, DigitalClock
 from acquisition.dataq.protocol import OVERFLOW, USB_PACKET
 
 HELD_BACK = 32
@@ -23,9 +25,11 @@ Piece = tuple[NDArray[np.int32], int]
 class ScanDecoder:
     """Cuts a byte stream into scans."""
 
-    def __init__(self, n_channels: int, digital_word: bool) -> None:
-        """digital_word: each scan ends with the word of the digital inputs."""
+    def __init__(self, n_channels: int, digital_word: bool, clock: bool = False) -> None:
+        """digital_word: each scan ends with the word of the digital inputs; clock: its input 0 has a square wave."""
         self._n_channels, self._checked = n_channels, digital_word
+        self._clock = DigitalClock() if clock else None
+        self._steady = ~CLOCK_BIT if clock else -1
         self._scan_bytes = 2 * (n_channels + digital_word)
         self.begin()
 
@@ -35,6 +39,7 @@ class ScanDecoder:
         self._word: int | None = None
         self._in_place = False
         self._lost = lost
+        self._begin_clock()
 
     def feed(self, data: bytes) -> list[Piece]:
         """The scans that these bytes complete."""
@@ -65,16 +70,28 @@ class ScanDecoder:
             return count
         if not self._in_place:
             return 0
-        wrong = np.flatnonzero(self._digital_words(0, count) != self._word)
+        wrong = np.flatnonzero(self._digital_words(0, count) & self._steady != self._word)
         self._in_place = wrong.size == 0
         return count if self._in_place else int(wrong[0])
 
     def _take(self, count: int) -> Piece:
+        count, missing = self._until_gap(count)
         size = count * self._scan_bytes
         words = np.frombuffer(self._bytes[:size], "<i2").reshape(count, -1)
         self._bytes = self._bytes[size:]
-        lost, self._lost = self._lost, 0
+        lost, self._lost = self._lost, missing
         return words[:, : self._n_channels].T.astype(np.int32), lost
+
+    def _until_gap(self, count: int) -> tuple[int, int]:
+        """How many of the next scans come before a gap that the clock shows, and how many are missing there."""
+        if self._clock is None:
+            return count, 0
+        high = self._digital_words(0, count) & CLOCK_BIT != 0
+        until, missing = self._clock.until_gap(high)
+        if until:
+            return until, missing
+        self._lost += missing
+        return self._clock.until_gap(high)
 
     def _find_word(self) -> None:
         """Put the next scan at the head of the bytes in hand; where it cannot be told, give one up."""
@@ -83,11 +100,16 @@ class ScanDecoder:
             self._bytes = self._bytes[self._scan_bytes :]
             self._lost += 1
             return
-        word = int(self._digital_words(shift, 1)[0])
+        word = int(self._digital_words(shift, 1)[0]) & self._steady
         if shift or word == self._word:  # not a new word in the old place: the next scan may be made of two
             self._lost += (shift + self._scan_bytes + self._missing_bytes(shift)) // self._scan_bytes
             self._bytes = self._bytes[shift + self._scan_bytes :]
         self._word, self._in_place = word, True
+        self._begin_clock()
+
+    def _begin_clock(self) -> None:
+        if self._clock:
+            self._clock.begin()
 
     def _shift(self) -> int | None:
         """Bytes to the next scan: the known word counts first, then a new one in the old place, then anywhere."""
@@ -99,7 +121,7 @@ class ScanDecoder:
         return next(iter(known or steady), None)
 
     def _steady_word(self, shift: int) -> int | None:
-        words = self._digital_words(shift, WINDOW)
+        words = self._digital_words(shift, WINDOW) & self._steady
         first = int(words[0])
         return first if first & 0x80FF == 0 and np.all(words == first) else None
 

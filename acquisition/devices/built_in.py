@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from acquisition.ports import SerialLink
     from acquisition.source import Device, DeviceIdentity
 
+CLOCK = 1000.0
+"""Of an emulated generator (Hz)."""
+
 
 def _open_taps(port: str, settings: DeviceSettings) -> Device:
     from acquisition.taps import TapsSource
@@ -27,6 +30,8 @@ def _probe_taps(link: SerialLink) -> DeviceIdentity | None:
 def _check_taps(settings: DeviceSettings) -> None:
     if not settings.loss_detection:
         raise ValueError("loss_detection=false: a TAPS/1 device always numbers its scans; leave the key out")
+    if settings.digital_clock:
+        raise ValueError("digital_clock=true: a TAPS/1 device numbers its scans and needs no clock; leave the key out")
 
 
 def _emulate_taps(bench: Bench) -> EmulatorThread:
@@ -40,7 +45,9 @@ def _emulate_taps(bench: Bench) -> EmulatorThread:
 def _open_dataq(port: str, settings: DeviceSettings) -> Device:
     from acquisition.dataq import DataqSource
 
-    return DataqSource(port, settings.inputs, settings.sample_rate, digital_word=settings.loss_detection)
+    return DataqSource(
+        port, settings.inputs, settings.sample_rate, settings.loss_detection, digital_clock=settings.digital_clock
+    )
 
 
 def _probe_dataq(link: SerialLink) -> DeviceIdentity | None:
@@ -53,13 +60,16 @@ def _check_dataq(settings: DeviceSettings) -> None:
     from acquisition.dataq import check_inputs
 
     check_inputs(settings.inputs)
+    if settings.digital_clock and not settings.loss_detection:
+        raise ValueError("digital_clock=true: the clock stands in the digital word; leave out loss_detection=false")
 
 
 def _emulate_dataq(bench: Bench) -> EmulatorThread:
     """Where a skew is given for an input, the device converts its inputs one after the other."""
     from acquisition.dataq import DataqEmulator, DataqTraits
 
-    traits = DataqTraits(scanned=any(one.channel.skew for one in bench.inputs))
+    skewed = any(one.channel.skew for one in bench.inputs)
+    traits = DataqTraits(scanned=skewed, clock_hz=CLOCK if bench.digital_clock else None)
     return DataqEmulator(bench.signal_at, bench.inputs, realtime=bench.realtime, tcp=bench.tcp, traits=traits)
 
 

@@ -23,6 +23,8 @@ class DeviceSettings:
     """The sensors of a device that does not describe them itself."""
     loss_detection: bool = True
     """Whether lost scans are to be found."""
+    digital_clock: bool = False
+    """Whether a square wave on digital input 0 shows the loss of whole scans."""
 
 
 @dataclass(frozen=True)

@@ -23,3 +23,5 @@ class Bench:
     """False sends as fast as the host reads."""
     tcp: bool = False
     """On a TCP port of this computer instead of a pseudo-terminal."""
+    digital_clock: bool = False
+    """A square wave is on digital input 0."""

@@ -5,6 +5,7 @@ from dsm.calibration.calibrate_damping import DampingCalibration, UnreachableDam
 from dsm.calibration.calibration import Calibration, UnreachableFrequencyError
 from dsm.calibration.fit_stiffness import fit_stiffness
 from dsm.calibration.plus_minus import plus_minus
+from dsm.calibration.preload_left import PreloadLeft, preload_left
 from dsm.calibration.receptance_map import receptance_map
 from dsm.calibration.stiffness_curve import stiffness_curve
 from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
@@ -12,6 +13,7 @@ from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
 __all__ = [
     "Calibration",
     "DampingCalibration",
+    "PreloadLeft",
     "StiffnessFit",
     "StiffnessFitError",
     "UnreachableDampingError",
@@ -20,6 +22,7 @@ __all__ = [
     "calibrate_damping",
     "fit_stiffness",
     "plus_minus",
+    "preload_left",
     "receptance_map",
     "stiffness_curve",
 ]

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from dsm.calibration.bearing_eigenproblem import calibrated_bearings
 from dsm.calibration.plus_minus import plus_minus
-from dsm.modes.damped_modes import given_damping
-from dsm.modes.damped_shaft import DampedMode, DampedShaft, Damping
+from dsm.modes.damped_shaft import DampedMode, DampedShaft
 from dsm.spindle.spindle import Spindle
+from dsm.spindle.supports import Damping, given_damping
 
 _Float = NDArray[np.float64]
 
@@ -134,7 +134,7 @@ def calibrate_damping(
     """
     _check(damping_ratio, damping_ratio_std, mode)
     chosen = calibrated_bearings(spindle, group)
-    given = given_damping(spindle, loss_factor)
+    given = given_damping(spindle.bearings, loss_factor)
     fixed = given.viscous.copy()
     fixed[chosen] = 0.0
     shaft = DampedShaft.of(spindle, mode)

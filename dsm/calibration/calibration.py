@@ -7,6 +7,7 @@ from functools import cached_property
 
 from dsm.calibration.identifiability import LEAST_SHARE
 from dsm.calibration.plus_minus import plus_minus
+from dsm.calibration.preload_left import PreloadLeft, preload_left
 from dsm.calibration.remark import Remark
 from dsm.modes.modal_stiffness import modal_stiffness
 from dsm.modes.natural_frequencies import natural_frequencies
@@ -60,18 +61,10 @@ class Calibration:
         return 2 * self.sensitivity
 
     @property
-    def preload_left(self) -> tuple[float, float] | None:
-        """Range of the preload over that at the start (-), for ball bearings: (k/k0)^3 and (k/k0)^2, lower one first.
-
-        Hertz's point contact gives stiffness as the third root of the preload (T. A. Harris and M. N. Kotzalas, Rolling
-        Bearing Analysis, 2007); makers' catalogues of angular contact bearings give exponents near one half. Nothing
-        finer is known without the geometry of the bearings. None where one of those calibrated has rollers.
-        """
+    def preload_left(self) -> PreloadLeft | None:
+        """Range of the preload over that at the start (-) in the calibrated bearings; see preload_left."""
         pairs = zip(self.given.bearings, self.spindle.bearings, strict=True)
-        if any(old.rolling_elements == "rollers" and old != new for old, new in pairs):
-            return None
-        low, high = sorted([self.factor**3, self.factor**2])
-        return low, high
+        return preload_left([new for old, new in pairs if old != new] or self.spindle.bearings, self.factor)
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
@@ -127,8 +120,6 @@ class Calibration:
             ("theory", f"{self.spindle.theory}; an equivalent stiffness: compare it within one model only"),
         ]
         if self.preload_left is not None:
-            low, high = self.preload_left
-            said = f"{low:.2g} to {high:.2g} of that at the start, if balls roll: (k/k0)^3 and (k/k0)^2, no finer"
-            lines.append(("preload left", said))
+            lines.append(("preload left", str(self.preload_left)))
         lines += [("warning", str(remark)) for remark in self.remarks]
         return "\n".join(f"{name:<22}{text}" for name, text in lines)

@@ -85,7 +85,7 @@ class Problem(NamedTuple):
         measured, factors = self.measured, np.exp(log_factor).tolist()
         scaled = scale_groups(self.spindle, dict(zip(self.names, factors, strict=True)))
         modes = find_modes(scaled, int(np.max(measured.mode)) + 1)
-        share = group_shares(scaled, modes, self.names)[measured.mode - 1]
+        share = group_shares(modes, self.names)[measured.mode - 1]
         frequency = modes.frequency[measured.mode - 1]
         return State(
             log_factor,

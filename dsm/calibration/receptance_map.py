@@ -15,6 +15,7 @@ from dsm.matrix.dynamic_stiffness import full_matrices
 from dsm.matrix.frequency_axis import frequency_axis
 from dsm.spindle.attachments import Bearing
 from dsm.spindle.spindle import Spindle, require_support
+from dsm.spindle.supports import given_damping, supports
 
 _Float = NDArray[np.float64]
 _Complex = NDArray[np.complex128]
@@ -75,6 +76,7 @@ def _checked(factor: ArrayLike) -> _Float:
 
 def _compliance(spindle: Spindle, w: _Complex, places: Sequence[float], loss_factor: float) -> _Complex:
     """Deflections under forces, both at `places` (m), shape (n, n_places, n_places)."""
+    damping = given_damping(spindle.bearings, loss_factor)
     model = assemble(spindle, float(np.max(w.real, initial=0.0)) / (2 * np.pi), places)
     dofs = [2 * model.node(place) for place in places]
     forces = np.zeros((model.held.size, len(dofs)), dtype=np.complex128)
@@ -82,7 +84,7 @@ def _compliance(spindle: Spindle, w: _Complex, places: Sequence[float], loss_fac
     found = np.empty((w.size, len(dofs), len(dofs)), dtype=np.complex128)
     for start in range(0, w.size, CHUNK):
         chunk = slice(start, start + CHUNK)
-        matrices = full_matrices(*damped_blocks(model, spindle, w[chunk], loss_factor))
+        matrices = full_matrices(*damped_blocks(model, spindle, w[chunk], damping))
         found[chunk] = model.solve(matrices, forces)[:, dofs]
     return found
 
@@ -90,20 +92,11 @@ def _compliance(spindle: Spindle, w: _Complex, places: Sequence[float], loss_fac
 def _across_springs(
     bearings: Sequence[Bearing], compliance: _Complex, w: _Complex, loss_factor: float
 ) -> tuple[_Complex, _Complex]:
-    """s and p of the formula above, shape (n, n_bearings) each.
-
-    Of the motion x of the shaft, the share a = 1/(1 + k/h) goes into a bearing of stiffness k and the rest into its
-    housing of stiffness h. A pair of forces across the spring moves the shaft with the share a, the housing as a/h.
-    """
-    complexity = 1 + 1j * loss_factor
-    stiffness, damping, housing = np.array([(b.stiffness, b.damping, b.housing_stiffness) for b in bearings]).T
-    softness = 1 / housing / complexity
-    share = 1 / (1 + (complexity * stiffness + 1j * w[:, np.newaxis] * damping) * softness)
-    weight = np.sqrt(stiffness) * share
-    matrix = weight[:, :, np.newaxis] * compliance[:, 1:, 1:] * weight[:, np.newaxis]
-    each = np.arange(len(bearings))
-    matrix[:, each, each] += stiffness * share * softness
+    """s and p of the formula above, shape (n, n_bearings) each."""
+    held = supports(bearings, w, given_damping(bearings, loss_factor))
+    root = np.sqrt([bearing.stiffness for bearing in bearings])
+    matrix = np.outer(root, root) * held.across(compliance[:, 1:, 1:])
     values, vectors = np.linalg.eig(matrix)
-    elongation = (weight * compliance[:, 1:, 0])[..., np.newaxis]
+    elongation = (root * held.share * compliance[:, 1:, 0])[..., np.newaxis]
     products = (vectors.swapaxes(1, 2) @ elongation) * np.linalg.solve(vectors, elongation)
     return values, products[..., 0]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsm.modes.modes import Modes
+from dsm.modes.spring_energy import spring_energy
 from dsm.spindle.attachments import Bearing, Joint
 from dsm.spindle.spindle import Spindle
 
@@ -57,24 +58,14 @@ def group_stiffness(spindle: Spindle, group: str) -> float:
     return math.fsum(values) / len(values)
 
 
-def group_shares(spindle: Spindle, modes: Modes, groups: Sequence[str]) -> _Float:
-    """Share of each group in the strain energy of each mode (-), shape (n_modes, n_groups); d ln w^2 / d ln factor.
-
-    With unit modal mass, u the deflection at a bearing of stiffness k that feels as k_s = k/(1 + k/k_housing), and
-    du, dt the steps of deflection and slope across a joint: (k_s u)^2/k and k du^2 + k_t dt^2, over w^2.
-    """
-    energy = np.zeros((modes.frequency.size, len(groups)))
-    for bearing in spindle.bearings:
-        if bearing.group in groups:
-            force = bearing.support_stiffness * modes.deflection_at(bearing.position)
-            energy[:, groups.index(bearing.group)] += force**2 / bearing.stiffness
-    for joint in spindle.joints:
-        if joint.group in groups:
-            node = int(np.argmin(np.abs(modes.position - joint.position)))
-            step = modes.deflection[:, node + 1] - modes.deflection[:, node]
-            tilt = modes.slope[:, node + 1] - modes.slope[:, node]
-            energy[:, groups.index(joint.group)] += joint.stiffness * step**2 + joint.rotational_stiffness * tilt**2
-    return np.asarray(energy / (2 * np.pi * modes.frequency[:, np.newaxis]) ** 2)
+def group_shares(modes: Modes, groups: Sequence[str]) -> _Float:
+    """Share of each group in the strain energy of each mode (-), shape (n_modes, n_groups); d ln w^2 / d ln factor."""
+    radial, _, _, joints = spring_energy(modes)
+    found = np.zeros((modes.frequency.size, len(groups)))
+    for part, energy in zip(_parts(modes.spindle), np.hstack([radial, joints]).T, strict=True):
+        if part.group in groups:
+            found[:, groups.index(part.group)] += energy
+    return np.asarray(found / (2 * np.pi * modes.frequency[:, np.newaxis]) ** 2)
 
 
 def _parts(spindle: Spindle) -> tuple[Bearing | Joint, ...]:

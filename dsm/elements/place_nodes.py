@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsm.elements.element_series import MAX_X, POLE
+from dsm.spindle.places import SAME_PLACE
 from dsm.spindle.sections import Sections
-from dsm.spindle.spindle import SAME_PLACE, Theory
+from dsm.spindle.spindle import Theory
 
 MAX_ELEMENTS = 1000
 """More are refused: the work grows with their third power."""

@@ -14,6 +14,7 @@ from dsm.elements.beam_elements import link_elements, stiffness_elements
 from dsm.elements.place_nodes import place_nodes
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
+from dsm.spindle.places import nearest
 from dsm.spindle.sections import Sections, sections
 from dsm.spindle.segment import Segment
 from dsm.spindle.spindle import Spindle, Theory
@@ -124,7 +125,7 @@ def _with_joints(
 ) -> tuple[_Float, _Float, NDArray[np.bool_]]:
     """Nodes and elements with a link of no length at each joint."""
     for joint in spindle.joints:
-        node = int(np.argmin(np.abs(position - joint.position)))
+        node = nearest(position, joint.position)
         link = np.zeros((10, series.shape[2]))
         link[[3, 5], 0] = -1 / joint.stiffness, -1 / joint.rotational_stiffness
         link[[6, 9], 0] = -1.0

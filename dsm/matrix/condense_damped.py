@@ -9,6 +9,7 @@ from dsm.matrix.condense import Condensed, condense
 from dsm.matrix.damped_blocks import damped_blocks
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
 from dsm.spindle.spindle import Spindle
+from dsm.spindle.supports import given_damping
 
 CHUNK = 1024
 """Frequencies whose blocks are in memory at a time: 2 MB for 30 nodes, and faster than all at once."""
@@ -25,14 +26,15 @@ def condense_damped(
 ) -> Condensed:
     """All of a shaft that does not spin condensed to one node, dynamically, exact at each frequency (Hz), shape (n,).
 
-    loss_factor: as for damped_blocks. node and start: as for condense. extra: stiffness uu, ut, tt that something else
-    adds at the last node, shape (3, n).
+    loss_factor: of all stiffness, see Damping; below 0 a ValueError. node and start: as for condense. extra: stiffness
+    uu, ut, tt that something else adds at the last node, shape (3, n).
     """
+    damping = given_damping(spindle.bearings, loss_factor)
     w = np.asarray(2 * np.pi * frequency, dtype=np.complex128)
     found = np.empty((5, w.size), dtype=np.complex128)
     for first in range(0, w.size, CHUNK):
         chunk = slice(first, first + CHUNK)
-        diagonal, coupling = damped_blocks(model, spindle, w[chunk], loss_factor)
+        diagonal, coupling = damped_blocks(model, spindle, w[chunk], damping)
         if extra is not None:
             diagonal[:, -1] += extra[:, chunk]
         for row, value in zip(found, condense(diagonal, coupling, model.is_link, node, start), strict=True):

@@ -9,6 +9,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from dsm.spindle.places import nearest
+
 Number = TypeVar("Number", np.float64, np.complex128)
 
 
@@ -57,7 +59,7 @@ class DynamicStiffness:
 
     def node(self, position: float) -> int:
         """Index of the node nearest to a position (m)."""
-        return int(np.argmin(np.abs(self.position - position)))
+        return nearest(self.position, position)
 
     def blocks(self, x: NDArray[Number], derivative: bool = False) -> tuple[NDArray[Number], NDArray[Number]]:
         """Values of diagonal (3, n_nodes, n) and coupling (4, n_nodes - 1, n) at x, shape (n,), in SI units.

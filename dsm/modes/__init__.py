@@ -1,8 +1,8 @@
 """Natural modes, none missed: frequencies, shapes, energy, damping, whirl."""
 
 from dsm.modes.critical_speed import critical_speed
-from dsm.modes.damped_modes import DampedModes, damped_modes, given_damping
-from dsm.modes.damped_shaft import DampedMode, DampedShaft, Damping
+from dsm.modes.damped_modes import DampedModes, damped_modes
+from dsm.modes.damped_shaft import DampedMode, DampedShaft
 from dsm.modes.energy_shares import EnergyShares, energy_shares
 from dsm.modes.find_modes import find_modes
 from dsm.modes.modal_stiffness import modal_stiffness
@@ -16,7 +16,6 @@ __all__ = [
     "DampedMode",
     "DampedModes",
     "DampedShaft",
-    "Damping",
     "EnergyShares",
     "Modes",
     "WhirlMap",
@@ -24,7 +23,6 @@ __all__ = [
     "damped_modes",
     "energy_shares",
     "find_modes",
-    "given_damping",
     "modal_stiffness",
     "mode_shapes",
     "modes_at",

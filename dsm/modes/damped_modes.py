@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.modes.damped_shaft import DampedShaft, Damping
+from dsm.modes.damped_shaft import DampedShaft
 from dsm.spindle.spindle import Spindle
+from dsm.spindle.supports import given_damping
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,16 +33,9 @@ def damped_modes(spindle: Spindle, count: int, loss_factor: float = 0.0) -> Damp
     Raises ValueError for a count below 1, a shaft that is not held and a loss factor below 0, ArithmeticError for a
     mode that does not oscillate any more.
     """
-    target = given_damping(spindle, loss_factor)
+    target = given_damping(spindle.bearings, loss_factor)
     shaft = DampedShaft.of(spindle, count)
     modes = [shaft.follow(number, shaft.start(number), shaft.none, target) for number in range(1, count + 1)]
     return DampedModes(
         np.array([abs(mode.w) / (2 * np.pi) for mode in modes]), np.array([mode.damping_ratio for mode in modes])
     )
-
-
-def given_damping(spindle: Spindle, loss_factor: float) -> Damping:
-    """The dampers of the bearings with a loss factor, which is checked."""
-    if not (math.isfinite(loss_factor) and loss_factor >= 0):
-        raise ValueError(f"loss_factor={loss_factor} is not a finite number >= 0")
-    return Damping(np.array([bearing.damping for bearing in spindle.bearings]), loss_factor)

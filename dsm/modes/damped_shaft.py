@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsm.matrix.assemble import assemble
-from dsm.matrix.dynamic_stiffness import DynamicStiffness
+from dsm.matrix.damped_blocks import damped_blocks
+from dsm.matrix.dynamic_stiffness import DynamicStiffness, full_matrices
 from dsm.modes.natural_frequencies import natural_frequencies
 from dsm.spindle.spindle import Spindle, require_support
+from dsm.spindle.supports import Damping, supports
 
 _Float = NDArray[np.float64]
 _Complex = NDArray[np.complex128]
@@ -29,15 +31,6 @@ FORESEEN = 0.2
 """Largest miss of the prediction of first order, in parts of the predicted change; steps that miss more are halved."""
 SMALLEST_STEP = 2.0**-16
 """Part of the whole change of damping; where smaller steps are needed, the mode is lost."""
-
-
-class Damping(NamedTuple):
-    """Damping of a spindle, apart from its stiffness."""
-
-    viscous: _Float
-    """Dampers of the bearings (N s/m), shape (n_bearings,)."""
-    loss_factor: float
-    """Loss factor eta of shaft, bearings, housing and joints (-)."""
 
 
 class DampedMode(NamedTuple):
@@ -91,21 +84,25 @@ class DampedShaft:
 
     def matrices(self, damping: Damping, w: complex) -> tuple[_Complex, _Complex]:
         """K(w) and dK/dw, shape (n_dofs, n_dofs) each."""
-        complexity = 1 + 1j * damping.loss_factor
-        x = np.array([w * w / complexity], dtype=np.complex128)
-        stiffness = complexity * self.model.dense(x)[0]
-        by_w = 2 * w * self.model.dense(x, derivative=True)[0]
-        dof, felt, slope = self._supports(damping, w)
-        undamped = complexity * np.array([self.spindle.bearings[i].support_stiffness for i in self._movable()])
-        stiffness[dof, dof] += felt - undamped
-        by_w[dof, dof] += 1j * damping.viscous[self._movable()] * slope
+        at = np.array([w], dtype=np.complex128)
+        stiffness, by_w = (
+            full_matrices(*damped_blocks(self.model, self.spindle, at, damping, derivative))[0]
+            for derivative in (False, True)
+        )
         return stiffness, by_w
 
     def by_damper(self, damping: Damping, mode: DampedMode) -> _Complex:
         """dw/dc of the mode for the damper c of each bearing (rad/s per N s/m), shape (n_bearings,)."""
-        dof, _, slope = self._supports(damping, mode.w)
-        change = np.zeros(len(self.spindle.bearings), dtype=np.complex128)
-        change[self._movable()] = -1j * mode.w * slope * mode.shape[dof] ** 2
+        bearings = self.spindle.bearings
+        movable = [index for index, bearing in enumerate(bearings) if np.isfinite(bearing.stiffness)]
+        held = supports(
+            [bearings[index] for index in movable],
+            np.array([mode.w]),
+            Damping(damping.viscous[movable], damping.loss_factor),
+        )
+        dof = [2 * self.model.node(bearings[index].position) for index in movable]
+        change = np.zeros(len(bearings), dtype=np.complex128)
+        change[movable] = -1j * mode.w * held.slope[0] * mode.shape[dof] ** 2
         return change
 
     def follow(self, number: int, mode: DampedMode, old: Damping, new: Damping) -> DampedMode:
@@ -146,16 +143,3 @@ class DampedShaft:
                 close = abs(w - foreseen) <= FORESEEN * abs(foreseen - mode.w) + SETTLED * abs(w)
                 return DampedMode(w, shape) if close and w.real > OSCILLATES * abs(w) else None
         return None
-
-    def _movable(self) -> list[int]:
-        """Indices of the bearings that are not rigid, and so have a damper."""
-        return [index for index, bearing in enumerate(self.spindle.bearings) if np.isfinite(bearing.stiffness)]
-
-    def _supports(self, damping: Damping, w: complex) -> tuple[list[int], _Complex, _Complex]:
-        """Of each movable bearing: its dof, the stiffness felt, and the derivative of that by the bearing's own."""
-        bearings = [self.spindle.bearings[index] for index in self._movable()]
-        complexity = 1 + 1j * damping.loss_factor
-        own = complexity * np.array([bearing.stiffness for bearing in bearings])
-        own = own + 1j * w * damping.viscous[self._movable()]
-        share = 1 / (1 + own / complexity * np.array([1 / bearing.housing_stiffness for bearing in bearings]))
-        return [2 * self.model.node(bearing.position) for bearing in bearings], own * share, share**2

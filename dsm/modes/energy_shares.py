@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,7 @@ from dsm.elements import POINTS
 from dsm.modes.between_nodes import between_nodes
 from dsm.modes.find_modes import find_modes
 from dsm.modes.modes import Modes
+from dsm.modes.spring_energy import spring_energy
 from dsm.spindle.sections import sections
 from dsm.spindle.spindle import Spindle, require_support
 
@@ -48,11 +48,9 @@ def energy_shares(spindle: Spindle, count: int) -> EnergyShares:
     modes = find_modes(spindle, count)
     w2 = (2 * np.pi * modes.frequency) ** 2
     # Twice the energy of a mode of unit modal mass is w^2.
-    segments, bearings, housings, joints = (
-        energy / w2[:, np.newaxis]
-        for energy in (_segments(spindle, modes), *_supports(spindle, modes), _joints(spindle, modes))
-    )
-    return EnergyShares(modes.frequency, segments, bearings, housings, joints)
+    radial, tilting, housings, joints = spring_energy(modes)
+    parts = _segments(spindle, modes), radial + tilting, housings, joints
+    return EnergyShares(modes.frequency, *(energy / w2[:, np.newaxis] for energy in parts))
 
 
 def _segments(spindle: Spindle, modes: Modes) -> _Float:
@@ -74,27 +72,3 @@ def _segments(spindle: Spindle, modes: Modes) -> _Float:
     total = np.zeros((len(spindle.segments), modes.frequency.size))
     np.add.at(total, segment, energy.T)
     return total.T
-
-
-def _supports(spindle: Spindle, modes: Modes) -> tuple[_Float, _Float]:
-    """Bearings and housings: of two springs in series the one of stiffness k takes force^2/k."""
-    bearings, housings = np.zeros((2, modes.frequency.size, len(spindle.bearings)))
-    for index, bearing in enumerate(spindle.bearings):
-        node = int(np.argmin(np.abs(modes.position - bearing.position)))
-        bearings[:, index] = bearing.rotational_stiffness * modes.slope[:, node] ** 2
-        if math.isfinite(bearing.support_stiffness):
-            squared_force = (bearing.support_stiffness * modes.deflection[:, node]) ** 2
-            bearings[:, index] += squared_force / bearing.stiffness
-            housings[:, index] = squared_force / bearing.housing_stiffness
-    return bearings, housings
-
-
-def _joints(spindle: Spindle, modes: Modes) -> _Float:
-    """A joint stands between two nodes at one place."""
-    energy = np.zeros((modes.frequency.size, len(spindle.joints)))
-    for index, joint in enumerate(spindle.joints):
-        node = int(np.argmin(np.abs(modes.position - joint.position)))
-        shift = modes.deflection[:, node + 1] - modes.deflection[:, node]
-        kink = modes.slope[:, node + 1] - modes.slope[:, node]
-        energy[:, index] = joint.stiffness * shift**2 + joint.rotational_stiffness * kink**2
-    return energy

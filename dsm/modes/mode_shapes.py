@@ -7,7 +7,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from dsm.modes.find_modes import find_modes
 from dsm.modes.modes import Modes
-from dsm.spindle.spindle import SAME_PLACE, Spindle
+from dsm.spindle.places import SAME_PLACE
+from dsm.spindle.spindle import Spindle
 
 
 def mode_shapes(spindle: Spindle, count: int, places: ArrayLike | None = None) -> Modes:

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsm.modes.between_nodes import between_nodes
+from dsm.spindle.places import SAME_PLACE, nearest
 from dsm.spindle.sections import sections
-from dsm.spindle.spindle import SAME_PLACE, Spindle
+from dsm.spindle.spindle import Spindle
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +29,10 @@ class Modes:
     """The shaft they belong to."""
     spin: float = 0.0
     """Speed at which it spins (rad/s)."""
+
+    def node(self, position: float) -> int:
+        """Index of the place of these modes nearest to a position (m); at a joint that of the side of the tool tip."""
+        return nearest(self.position, position)
 
     def at(self, places: NDArray[np.float64]) -> Modes:
         """The same modes at other places on the shaft (m, shape (n,)), exact; a place next to a node has its values.

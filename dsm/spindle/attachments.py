@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal, get_args
+from typing import Literal, TypeVar, get_args
+
+import numpy as np
+from numpy.typing import NDArray
 
 from dsm.spindle.checks import require_not_negative, require_positive
 
+Stiffness = TypeVar("Stiffness", float, NDArray[np.complex128])
 RollingElements = Literal["balls", "rollers"]
+
+
+def shaft_share(stiffness: Stiffness, softness: Stiffness) -> Stiffness:
+    """Part of the motion of the shaft that goes into a bearing of a stiffness (N/m), not into its housing (m/N)."""
+    return 1 / (1 + stiffness * softness)
 
 
 @dataclass(frozen=True)
@@ -36,7 +45,7 @@ class Bearing:
         """What the shaft feels of bearing and housing (N/m)."""
         if math.isinf(self.stiffness):
             return self.housing_stiffness
-        return self.stiffness / (1 + self.stiffness / self.housing_stiffness)
+        return self.stiffness * shaft_share(self.stiffness, 1 / self.housing_stiffness)
 
     def check(self, where: str) -> None:
         """Raise ValueError, beginning with `where`, for what is no bearing."""

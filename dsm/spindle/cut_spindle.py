@@ -9,8 +9,9 @@ from typing import TypeVar
 import numpy as np
 
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
+from dsm.spindle.places import SAME_PLACE, nearest
 from dsm.spindle.segment import Segment
-from dsm.spindle.spindle import SAME_PLACE, Spindle
+from dsm.spindle.spindle import Spindle
 
 Part = TypeVar("Part", Bearing, LumpedMass, Joint)
 
@@ -25,8 +26,8 @@ def cut_spindle(spindle: Spindle, position: float) -> tuple[Spindle, Joint | Non
     if not 0 <= position < spindle.length - slack:
         raise ValueError(f"position={position} m leaves no spindle; cut it between 0 and {spindle.length:g} m")
     ends = np.cumsum([0.0, *(segment.length for segment in spindle.segments)])
-    nearest = float(ends[np.argmin(np.abs(ends - position))])
-    cut = nearest if abs(nearest - position) <= slack else float(position)
+    end = float(ends[nearest(ends, position)])
+    cut = end if abs(end - position) <= slack else float(position)
     at_cut = [joint for joint in spindle.joints if abs(joint.position - cut) <= slack]
     rest = replace(
         spindle,

@@ -11,12 +11,11 @@ from typing import Literal, get_args
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
 from dsm.spindle.checks import require_positive
 from dsm.spindle.material import STEEL, Material
+from dsm.spindle.places import SAME_PLACE
 from dsm.spindle.segment import Segment, ring_area
 
 Theory = Literal["euler-bernoulli", "timoshenko"]
 
-SAME_PLACE = 1e-9
-"""Places on the shaft nearer to each other than this part of its length, as by rounding, count as one."""
 MAX_SEGMENTS = 500
 """More are refused: the work grows with their third power."""
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eig, eigh
 
 from dsm.elements.element_series import MAX_X
+from dsm.spindle.places import nearest
 from dsm.spinning.beam import Dof, SpinningBeam
 from dsm.spinning.chain import SpinningChain
 
@@ -97,7 +98,7 @@ def _assemble(beam: SpinningBeam, top: float, fineness: float) -> SpinningChain:
 
 
 def _index(position: _Float, place: float, dof: Dof) -> int:
-    return 4 * int(np.argmin(np.abs(position - place))) + OFFSET[dof]
+    return 4 * nearest(position, place) + OFFSET[dof]
 
 
 def _hermite_modes(chain: SpinningChain, count: int, spin: float, top: float) -> tuple[_Float, _Float]:

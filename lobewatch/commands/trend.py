@@ -29,6 +29,7 @@ def trend(
     """
     from lobewatch.analysis import Light, Logbook
     from lobewatch.analysis.decay.outlook import outlook
+    from lobewatch.analysis.decay.preload import preload_of
     from lobewatch.show.trends.describe_trend import trend_csv, trend_json, trend_texts
 
     if as_csv and as_json:
@@ -39,7 +40,9 @@ def trend(
     if as_csv:
         results.out(trend_csv(series), end="", highlight=False)
     else:
-        emit(trend_json(found, series), as_json, *([] if as_json else trend_texts(found, series)))
+        preload = preload_of(logbook.history.series(series.tool, series.direction), logbook.machine)
+        texts = [] if as_json else trend_texts(found, series, preload)
+        emit(trend_json(found, series, preload), as_json, *texts)
     for remark in [*found.standing.remarks, *logbook.remarks]:
         notes.print(f"note: {remark}", markup=False)
     raise typer.Exit(int(found.standing.light is Light.ALARM))

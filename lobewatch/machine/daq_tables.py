@@ -72,6 +72,7 @@ class Daq(Table, frozen=True):
     driver: str = "taps"
     sample_rate_hz: Positive | None = None
     loss_detection: bool = True
+    digital_clock: bool = False
     accept_measured_rate: bool = False
     calibration_interval_months: Positive = 12.0
     channel: tuple[ChannelTable, ...] = ()
@@ -84,4 +85,4 @@ class Daq(Table, frozen=True):
     def settings(self) -> DeviceSettings:
         """What is asked of the device, in SI units."""
         inputs = tuple(channel.build() for channel in self.channel)
-        return DeviceSettings(self.sample_rate_hz, inputs, self.loss_detection)
+        return DeviceSettings(self.sample_rate_hz, inputs, self.loss_detection, self.digital_clock)

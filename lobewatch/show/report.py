@@ -26,6 +26,7 @@ from lobewatch.analysis import (
 )
 from lobewatch.analysis.decay.fallen import change_since_start, start
 from lobewatch.analysis.decay.outlook import Outlook, outlook
+from lobewatch.analysis.decay.preload import preload_of
 from lobewatch.analysis.programs.limit_band import limit_band
 from lobewatch.machine import Machine
 from lobewatch.show.advice import Advised, advised, advised_lines, decay_text
@@ -35,7 +36,7 @@ from lobewatch.show.history.trends import Picture, trends
 from lobewatch.show.history.under import conditions_texts
 from lobewatch.show.programs.doubts import reading_lines
 from lobewatch.show.trends.dates import ASSUMED
-from lobewatch.show.trends.describe_trend import dates_rows, sentence
+from lobewatch.show.trends.describe_trend import dates_rows, preload_text, sentence
 from lobewatch.show.verdicts import WORDS, band_text, limit_text, margin_text, turning_text, verdict_text
 
 LIGHTS = {Light.ALARM: "✗ ALARM", Light.UNKNOWN: "? UNKNOWN", Light.WARN: "! WARNING", Light.GOOD: "✓ GOOD"}
@@ -100,6 +101,7 @@ def _content(logbook: Logbook, rows: Sequence[Row]) -> dict[str, Any]:
         "standing": _standing(found.standing),
         "until": _until(found, last),
         "changes": _changes(rows),
+        "preload": preload_text(left) if (left := preload_of(rows, machine)) else "",
         "programs": [_program(one) for one in programs],
         "program_lines": [_whole(line) for one in programs for line in advised_lines(one, machine.speed)],
         "program_method": checked[0].method if checked else "",

@@ -126,6 +126,7 @@ def emulate_machine(
         SAMPLE_RATE,
         realtime,
         tcp,
+        folder.machine.daq.digital_clock,
     )
     return EmulatedMachine(driver.emulate(bench), float(structure.frequency[0]), float(structure.stiffness[0]))
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.table import Table
 
-from dsm import plus_minus
+from dsm import PreloadLeft, plus_minus
 from lobewatch.analysis import SeriesStanding
 from lobewatch.analysis.decay.forecast import Shape
 from lobewatch.analysis.decay.outlook import Fate, Outlook
@@ -19,8 +19,8 @@ from lobewatch.show.trends.chart import chart_lines
 from lobewatch.show.trends.dates import ASSUMED, dates_json, dates_text, horizon_of
 
 
-def trend_json(found: Outlook, series: SeriesStanding) -> dict[str, Any]:
-    """Points, score, alarm, light, forecast; percents are 100 ln of the frequency over that of the first test."""
+def trend_json(found: Outlook, series: SeriesStanding, preload: PreloadLeft | None) -> dict[str, Any]:
+    """Points, score, alarm, light, preload, forecast; percents are 100 ln of the frequency over that of the first."""
     trend = series.trend
     return {
         "tool": series.tool,
@@ -31,6 +31,7 @@ def trend_json(found: Outlook, series: SeriesStanding) -> dict[str, Any]:
         "light": found.standing.light.value,
         "fall_percent": series.fall.value,
         "fall_std_percent": series.fall.std,
+        "preload_left": preload,
         "forecast": {
             **{name: _fate_json(fate) for name, fate in found.programs.items()},
             **{f"{percent:g} %": {"reached": dates_json(when)} for percent, when in found.limits.items()},
@@ -53,7 +54,7 @@ def trend_csv(series: SeriesStanding) -> str:
     return written.getvalue()
 
 
-def trend_texts(found: Outlook, series: SeriesStanding) -> list[str | Table]:
+def trend_texts(found: Outlook, series: SeriesStanding, preload: PreloadLeft | None) -> list[str | Table]:
     """Chart, sentence and table."""
     trend = series.trend
     if trend is None:
@@ -62,7 +63,13 @@ def trend_texts(found: Outlook, series: SeriesStanding) -> list[str | Table]:
     for line in dates_rows(found, trend):
         dates.add_row(*line)
     others = [f"{one.name}: {_short(one)}" for one in found.standing.series if one is not series]
-    return [*chart_lines(trend), sentence(series), dates, ASSUMED, *others]
+    left = [] if preload is None else [preload_text(preload)]
+    return [*chart_lines(trend), sentence(series), *left, dates, ASSUMED, *others]
+
+
+def preload_text(preload: PreloadLeft) -> str:
+    """What is left of the preload."""
+    return f"preload left: {preload}"
 
 
 def dates_rows(found: Outlook, trend: Trend) -> list[tuple[str, str, str]]:

@@ -375,3 +375,25 @@ def test_a_port_in_use_is_refused_with_the_cure(emulated: Make) -> None:
         pytest.raises(DeviceError, match="another program uses it"),
     ):
         DataqSource(device.port, INPUTS, RATE)
+
+
+def test_a_clock_shows_the_loss_of_whole_scans(emulated: Make, signal_at: SignalAt) -> None:
+    """Three packets, 32 scans, in the middle of a hit: neither the digital word alone nor the rate shows them."""
+    crossing = int(np.argmax(expected(signal_at, 20_480)[0] * INPUTS[0].channel.scale > 20))
+    for clock, told in ((False, HitFlags.OK), (True, HitFlags.LOST_SCANS)):
+        with (
+            emulated(drop_at=6 * (crossing + 300), drop_bytes=192, clock_hz=700.0 if clock else None) as device,
+            DataqSource(device.port, INPUTS, RATE, digital_clock=clock) as source,
+        ):
+            assert source.loss_detection == ("digital word and clock" if clock else "digital word")
+            source.start()
+            hits = list(islice(capture_hits(source, TRIGGER), 2))
+        assert [check_hit(hit) for hit in hits] == [told, HitFlags.OK]
+        assert hits[0].lost_scans in ((32, 31, 33) if clock else (0,))
+
+
+def test_a_clock_that_is_not_there_is_told(emulated: Make) -> None:
+    with emulated() as device, DataqSource(device.port, INPUTS, RATE, digital_clock=True) as source:
+        source.start()
+        with pytest.raises(DeviceError, match="digital input 0 of the DAQ has no even square wave"):
+            take(source, 5000)

@@ -94,6 +94,12 @@ def test_a_dataq_device_needs_its_sensors_and_a_taps_device_its_loss_detection()
         parse_machine(HEAD + '[daq]\ndriver = "dataq"\n')
     with pytest.raises(DataError, match="daq: loss_detection=false: a TAPS/1 device always numbers its scans"):
         parse_machine(HEAD + "[daq]\nloss_detection = false\n")
+    with pytest.raises(DataError, match="daq: digital_clock=true: a TAPS/1 device numbers its scans"):
+        parse_machine(HEAD + "[daq]\ndigital_clock = true\n")
+    clock = HEAD + DAQ.replace('driver = "dataq"', 'driver = "dataq"\ndigital_clock = true')
+    assert parse_machine(clock).daq.settings.digital_clock
+    with pytest.raises(DataError, match="daq: digital_clock=true: the clock stands in the digital word"):
+        parse_machine(clock.replace("digital_clock", "loss_detection = false\ndigital_clock"))
 
 
 def test_the_driver_of_a_package_checks_its_own_settings(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
+from dsm import calibrate
 from lobewatch.analysis import Logbook, Word
 from lobewatch.analysis.decay.outlook import outlook
 from lobewatch.analysis.decay.trend import date, day
@@ -138,6 +139,35 @@ def test_the_report_says_until_when_and_draws_the_line(worn: Shop) -> None:
     assert "falling steadily since 2026-01-15" in html
     assert "-5 % (fixed limit, as in the paper)" in html
     assert "Line: fitted; band: where it goes, 80 %." in html
+
+
+def preload_in_trend(shop: Shop) -> list[float] | None:
+    """Of direction x, as `lobewatch trend --json` has it."""
+    found: list[float] | None = json.loads(run("trend", shop.path, "--direction", "x", "--json").stdout)["preload_left"]
+    return found
+
+
+def test_trend_and_report_state_the_preload_left(shop: Shop) -> None:
+    for days, share in ((0, 1.0), (30, 0.98)):
+        shop.tap(days, 1713.0 * share)
+    model = shop.folder.machine.model("reference")
+    new, worn = (calibrate(model, 1713.0 * share).bearing_stiffness for share in (1.0, 0.98))
+    assert preload_in_trend(shop) == pytest.approx([(worn / new) ** 3, (worn / new) ** 2], rel=1e-3)
+    said = f"preload left: {(worn / new) ** 3:.2g} to {(worn / new) ** 2:.2g} of that at the start, if balls roll"
+    assert said in " ".join(run("trend", shop.path).stdout.split())
+    run("report", shop.path)
+    assert f"P{said[1:]}" in (shop.path / "report.html").read_text("utf-8")
+
+
+def test_nothing_is_said_of_the_preload_of_rollers_or_of_a_single_test(shop: Shop) -> None:
+    shop.tap(0, 1713.0)
+    assert preload_in_trend(shop) is None
+    shop.edit("{ position_mm = 617 }", '{ position_mm = 617, rolling_elements = "rollers" }')
+    shop.tap(30, 1680.0)
+    assert preload_in_trend(shop) is None
+    assert "preload" not in run("trend", shop.path).stdout
+    run("report", shop.path)
+    assert "reload left" not in (shop.path / "report.html").read_text("utf-8")
 
 
 def test_the_error_of_the_critical_fall_is_its_scatter_over_damping_and_stiffness(shop: Shop) -> None:

@@ -87,12 +87,17 @@ class Row:
         return accepted_codes(self.remarks)
 
     @property
+    def followed(self) -> Values:
+        """The mode followed; NaN where it was not found."""
+        return self.frequency.value, self.damping_ratio.value, self.stiffness.value, self.phase_deg.value
+
+    @property
     def mode(self) -> Mode | None:
         """The mode followed, without its errors; None where it was not found."""
         if not self.frequency.is_known:
             return None
-        phase = self.phase_deg.value
-        return Mode(self.frequency.value, self.damping_ratio.value, self.stiffness.value, phase_deg=phase)
+        frequency, damping_ratio, stiffness, phase = self.followed
+        return Mode(frequency, damping_ratio, stiffness, phase_deg=phase)
 
 
 @dataclass(frozen=True, eq=False)

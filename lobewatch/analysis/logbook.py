@@ -83,8 +83,12 @@ class Logbook:
 
     def commit(self, tap: TapTest, now: datetime | None = None) -> None:
         """Add a tap test; saved for good when this returns. now: of a live test, whose time is then asked about."""
-        self.folder.commit(tap, clock_questions(tap.circumstances.created, now, self.folder.taps()))
-        self._forget()
+        if not self.is_current:
+            self._forget()
+        entry = self.folder.commit(tap, clock_questions(tap.circumstances.created, now, self.taps))
+        self.files.add(entry)
+        self._forget_results()
+        self._mark = self.folder.mark
 
     def replay(
         self,

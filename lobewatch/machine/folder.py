@@ -141,7 +141,7 @@ class MachineFolder:
             told = str(error).removeprefix(f"{path}: ")
             raise DamagedTapError(Remark("tap-unreadable", entry.file, told), entry, self.path) from error
 
-    def commit(self, tap: TapTest, asked: Sequence[str] = ()) -> None:
+    def commit(self, tap: TapTest, asked: Sequence[str] = ()) -> TapEntry:
         """Write the tap file, then its journal line; saved for good when this returns.
 
         asked: what is asked about its time, by code.
@@ -154,6 +154,7 @@ class MachineFolder:
         entry = msgspec.structs.replace(TapEntry.of(tap, content), asked=tuple(asked))
         self.journal.append(entry.line, reading=reading)
         shutil.rmtree(self.spool / tap.id, ignore_errors=True)
+        return entry
 
     def commit_files(self, files: Mapping[Path, TapEntry]) -> None:
         """Give finished tap files their names in taps/, then enter them together; saved for good when this returns.

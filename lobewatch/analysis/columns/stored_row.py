@@ -11,7 +11,7 @@ import msgspec
 
 from acquisition import UNSAID, Conditions, Remark
 from lobewatch.analysis.estimate import Estimate
-from lobewatch.analysis.history import Row, Values
+from lobewatch.analysis.history import ESTIMATES, Row, Values
 from lobewatch.analysis.programs.verdict import Ruling
 from lobewatch.analysis.questions.asked import QUESTIONS
 
@@ -46,17 +46,18 @@ PLAIN = tuple(
     name for name in Stored.__struct_fields__ if name not in ("number", "time", "baseline", "conditions", "rulings")
 )
 """Fields that are in a row just so."""
-NOW = ("tap_id", "tool", "direction", "series", "frequency", "static_tip_stiffness", "modal_tip_stiffness")
+NOW = ("tap_id", "tool", "direction", "series", "static_tip_stiffness", "modal_tip_stiffness")
 """Fields that are decoded at once, besides those that are made of text."""
-LATER = (*(name for name in PLAIN if name not in (*NOW, "software")), "conditions", "rulings")
+LATER = ("modes", "x", "y", "remarks", "conditions", "rulings")
 """Fields that few ask for."""
+_KINDS: dict[str, Any] = dict.fromkeys(ESTIMATES, tuple[float, float]) | dict.fromkeys(LATER, msgspec.Raw)
 _Brief = msgspec.defstruct(
     "_Brief",
-    [(name, msgspec.Raw if name in LATER else kind) for name, kind in get_type_hints(Stored).items()],
+    [(name, _KINDS.get(name, kind)) for name, kind in get_type_hints(Stored).items()],
     array_like=True,
     gc=False,
 )
-"""A row with those as they lie there."""
+"""A row with those as they lie there, estimates as numbers."""
 _encode, _decode = msgspec.msgpack.Encoder().encode, msgspec.msgpack.Decoder(Stored).decode
 _put = object.__setattr__
 _decode_brief: Callable[[bytes], Any] = msgspec.msgpack.Decoder(_Brief).decode
@@ -79,11 +80,26 @@ class _Later:
         return found[self._name]
 
 
+class _Estimated:
+    """A value with its error, made where it is asked for."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __get__(self, row: StoredRow, kind: type | None = None) -> Estimate:
+        """Found in the row itself from then on."""
+        found = Estimate(*getattr(row.brief, self._name))
+        _put(row, self._name, found)
+        return found
+
+
 class StoredRow(Row):
     """A row as it was read: in each value as it was stored, most of them decoded when one is asked for."""
 
+    brief: Any = None
+    """What was decoded at once; None in a row that `dataclasses.replace` has made of it."""
     content: bytes = b""
-    """As it lies there; empty in a row that `dataclasses.replace` has made of it."""
+    """As it lies there; empty in such a row."""
     hashes: Mapping[str, str] = {}
     """Of the programs of machine.toml."""
 
@@ -92,9 +108,23 @@ class StoredRow(Row):
         """As of any row; its remarks are decoded where there can be any among them."""
         return super().questions if not self.content or _asks(self.content) else ()
 
+    @property
+    def followed(self) -> Values:
+        """As of any row; no estimates are made for it."""
+        one = self.brief
+        if one is None:
+            return super().followed
+        return one.frequency[0], one.damping_ratio[0], one.stiffness[0], one.phase_deg[0]
+
+    def __repr__(self) -> str:
+        """As of any row: equal ones read alike."""
+        return Row.__name__ + super().__repr__().removeprefix(type(self).__name__)
+
 
 for _name in LATER:
     setattr(StoredRow, _name, _Later(_name))
+for _name in ESTIMATES:
+    setattr(StoredRow, _name, _Estimated(_name))
 
 
 def packed(number: int, row: Row, hashes: Mapping[str, str]) -> bytes:
@@ -118,12 +148,22 @@ def unpacked(content: bytes, hashes: Mapping[str, str], software: str = "") -> t
     _put(row, "time", datetime.fromisoformat(one.time))
     _put(row, "baseline", datetime.fromisoformat(one.baseline) if one.baseline else None)
     _put(row, "software", one.software or software)
+    _put(row, "brief", one)
     _put(row, "content", content)
     _put(row, "hashes", hashes)
     if REMARKED not in content:
         _put(row, "questions", ())
         _put(row, "accepted", NONE)
     return one.number, row
+
+
+def is_of_this_make(content: bytes) -> bool:
+    """Whether all of a row can be decoded, not only what `unpacked` does at once."""
+    try:
+        _decode(content)
+    except ValueError:
+        return False
+    return True
 
 
 def _asks(content: bytes) -> bool:

@@ -6,7 +6,7 @@ import errno
 import hashlib
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -33,6 +33,12 @@ class Contents:
     """What is wrong."""
     events: tuple[Event, ...] = ()
     """What was done to the machine, oldest first."""
+    lines: int = 0
+    """Of the journal."""
+
+    def with_one_more(self, entry: TapEntry) -> Contents:
+        """The same with a tap test that was just committed, and nothing else since."""
+        return replace(self, taps=_oldest_first([*self.taps, entry]), lines=self.lines + 1)
 
     @property
     def baselines(self) -> list[datetime]:
@@ -63,7 +69,7 @@ def contents_of(folder: Path, reading: Reading) -> Contents:
     else:
         cure = f"{command('verify', folder)} says what it is and what to do"
         remarks += [unlisted(path, "not in the journal, does not count", cure) for path in extra]
-    return Contents(_oldest_first(taps), _oldest_first(lost), tuple(remarks), events)
+    return Contents(_oldest_first(taps), _oldest_first(lost), tuple(remarks), events, len(reading.lines))
 
 
 def listed(reading: Reading) -> dict[str, TapEntry]:

@@ -42,11 +42,11 @@ from acquisition import (
 )
 from lobewatch import Logbook
 from lobewatch.analysis.measurement import fitted
+from lobewatch.analysis.plant.plant import Plant
 from lobewatch.machine import TapEntry
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.machine_file import parse_machine
 from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.screen.dashboard import Board
 from modal import Mode, synthesize
 
 BEGIN = datetime(2016, 1, 1, tzinfo=UTC)
@@ -137,9 +137,9 @@ def opened(path: Path) -> None:
     _ = Logbook(MachineFolder(path)).history  # brought up to date
     told("opening without new tap tests", lambda: Logbook(MachineFolder(path)).history)
     told("opening and standing", lambda: Logbook(MachineFolder(path)).standing())
-    board = Board({"m": MachineFolder(path)})
-    told("dashboard, first look", board.rows)
-    told("dashboard, nothing has changed", board.rows)
+    plant = Plant({"m": path})
+    told("dashboard, first look", plant.standings)
+    told("dashboard, nothing has changed", plant.standings)
     for command in (["check"], ["lobes"], ["history"]):
         words = [sys.executable, "-m", "lobewatch.cli", *command, str(path)]
         told(" ".join(command), partial(subprocess.run, words, check=False, stdout=subprocess.DEVNULL))

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.calibration.bearing_eigenproblem import calibrated_bearings
 from dsm.calibration.plus_minus import plus_minus
+from dsm.calibration.stiffness_groups import calibrated_bearings
 from dsm.modes.damped_shaft import DampedMode, DampedShaft
 from dsm.spindle.spindle import Spindle
 from dsm.spindle.supports import Damping, given_damping

@@ -9,6 +9,7 @@ from dsm.calibration.identifiability import LEAST_SHARE
 from dsm.calibration.plus_minus import plus_minus
 from dsm.calibration.preload_left import PreloadLeft, preload_left
 from dsm.calibration.remark import Remark
+from dsm.calibration.stiffness_groups import scale_parts
 from dsm.modes.modal_stiffness import modal_stiffness
 from dsm.modes.natural_frequencies import natural_frequencies
 from dsm.response.static_stiffness import static_stiffness
@@ -52,8 +53,13 @@ class Calibration:
     """d ln f / d ln k of the mode after calibration, 0 to 1/2 (-): half these bearings' share of its strain energy."""
     given: Spindle
     """The spindle as given."""
-    spindle: Spindle
-    """The recalibrated spindle."""
+    parts: tuple[int, ...]
+    """What was calibrated: places in (*bearings, *joints)."""
+
+    @cached_property
+    def spindle(self) -> Spindle:
+        """The recalibrated spindle."""
+        return scale_parts(self.given, self.parts, self.factor)
 
     @property
     def energy_share(self) -> float:

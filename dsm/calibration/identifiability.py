@@ -28,7 +28,7 @@ TOLERANCE = 0.1
 NOT_WORSE = 6.0
 """A second solution counts where its sum of squares is larger by less than this."""
 SHARP = 1e-6
-"""An interval narrower than this, as of computed frequencies, is not looked at."""
+"""Intervals and distances smaller than this, as of computed frequencies, are not looked at."""
 LITTLE_SHARE = 0.1
 """Below this part of the strain energy of every measured mode, stiffness far from what was found is tried."""
 LEAST_SHARE = 0.01
@@ -74,7 +74,7 @@ def _second_solution(problem: Problem, best: State, log_covariance: _Float | Non
         except ArithmeticError:
             continue
         away = np.abs(other.log_factor - best.log_factor)
-        if other.cost - best.cost < NOT_WORSE * variance and np.max(away) > 4 * math.sqrt(width[-1]):
+        if other.cost - best.cost < NOT_WORSE * variance and np.max(away) > max(4 * math.sqrt(width[-1]), SHARP):
             factors = ", ".join(f"{math.exp(value):.3g}" for value in other.log_factor)
             text = f"another solution fits as well: factors {factors}"
             return [Remark("stiffness-ambiguous", ", ".join(problem.names), text, CURE)]

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dsm.calibration.bearing_eigenproblem import calibrated_bearings
+from dsm.calibration.stiffness_groups import calibrated_bearings
 from dsm.matrix.assemble import assemble
 from dsm.matrix.damped_blocks import damped_blocks
 from dsm.matrix.dynamic_stiffness import full_matrices

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from dsm.calibration.bearing_eigenproblem import calibrated_bearings
 from dsm.calibration.stiffness_factor import stiffness_factor
+from dsm.calibration.stiffness_groups import calibrated_parts, parts_stiffness
 from dsm.spindle.spindle import Spindle
 
 
@@ -22,10 +20,5 @@ def stiffness_curve(
     frequencies that are not > 0, and as calibrate for the bearings. Figure 8 of Gaber & Hashemi, Shock and Vibration,
     2015, is such a curve.
     """
-    return mean_stiffness(spindle, group) * stiffness_factor(spindle, frequency, mode, group)
-
-
-def mean_stiffness(spindle: Spindle, group: str | None = None) -> float:
-    """Mean stiffness of the bearings of a group (N/m); None: of all that have one."""
-    chosen = calibrated_bearings(spindle, group)
-    return math.fsum(spindle.bearings[index].stiffness for index in chosen) / len(chosen)
+    mean = parts_stiffness(spindle, calibrated_parts(spindle, group))
+    return mean * stiffness_factor(spindle, frequency, mode, group)

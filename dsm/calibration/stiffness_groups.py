@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,49 @@ from dsm.spindle.attachments import Bearing, Joint
 from dsm.spindle.spindle import Spindle
 
 _Float = NDArray[np.float64]
-_Part = TypeVar("_Part", Bearing, Joint)
+_Part = Bearing | Joint
+
+
+def calibrated_parts(spindle: Spindle, group: str | None) -> list[int]:
+    """Places in (*bearings, *joints) of what has one common factor: all parts of a group.
+
+    None: all bearings with a group; joints stay as given, as one factor cannot tell their wear from that of bearings.
+    Raises ValueError where there is none, and for a rigid bearing.
+    """
+    if group is None:
+        return calibrated_bearings(spindle)
+    joints = [number for number, part in enumerate(_parts(spindle)) if part.group == group and isinstance(part, Joint)]
+    if joints and not any(bearing.group == group for bearing in spindle.bearings):
+        return joints
+    return calibrated_bearings(spindle, group) + joints
+
+
+def calibrated_bearings(spindle: Spindle, group: str | None = None) -> list[int]:
+    """Indices (0 is the first) of the bearings of a group; None: of all but those of no group."""
+    chosen = [
+        index
+        for index, bearing in enumerate(spindle.bearings)
+        if (bearing.group if group is None else bearing.group == group)
+    ]
+    if not chosen:
+        known = ", ".join(sorted({repr(part.group) for part in _parts(spindle) if part.group})) or "none"
+        wanted = "with a group" if group is None else f"of group {group!r}"
+        raise ValueError(f"there is no bearing {wanted} to calibrate; groups of this spindle: {known}")
+    for index in chosen:
+        _require_spring(spindle, index, "or the group '' to leave it rigid")
+    return chosen
+
+
+def scale_parts(spindle: Spindle, chosen: Sequence[int], factor: float) -> Spindle:
+    """The spindle with bearing stiffnesses, and both stiffnesses of joints, times a factor; see calibrated_parts."""
+    parts = [_times(part, factor if index in chosen else 1.0) for index, part in enumerate(_parts(spindle))]
+    return _with_parts(spindle, parts)
+
+
+def parts_stiffness(spindle: Spindle, chosen: Sequence[int]) -> float:
+    """Mean radial stiffness of parts (N/m)."""
+    parts = _parts(spindle)
+    return math.fsum(parts[index].stiffness for index in chosen) / len(chosen)
 
 
 def chosen_groups(spindle: Spindle, groups: Sequence[str] | None) -> tuple[str, ...]:
@@ -34,28 +75,20 @@ def chosen_groups(spindle: Spindle, groups: Sequence[str] | None) -> tuple[str, 
             raise ValueError(f"group {name!r} is none of this spindle; its groups: {listed}")
         if names.count(name) > 1:
             raise ValueError(f"group {name!r} is named {names.count(name)} times; name it once")
-    for number, bearing in enumerate(spindle.bearings, 1):
-        if bearing.group in names and math.isinf(bearing.stiffness):
-            raise ValueError(
-                f"bearing {number}: stiffness=inf cannot be calibrated; give a finite one to start from, "
-                f"or leave its group {bearing.group!r} out"
-            )
+    for index, bearing in enumerate(spindle.bearings):
+        if bearing.group in names:
+            _require_spring(spindle, index, f"or leave its group {bearing.group!r} out")
     return names
 
 
 def scale_groups(spindle: Spindle, factors: Mapping[str, float]) -> Spindle:
     """The spindle with bearing stiffnesses, and both stiffnesses of joints, times the factor of their group."""
-    joints = [
-        replace(joint, rotational_stiffness=joint.rotational_stiffness * factors.get(joint.group, 1.0))
-        for joint in _scaled(spindle.joints, factors)
-    ]
-    return replace(spindle, bearings=_scaled(spindle.bearings, factors), joints=joints)
+    return _with_parts(spindle, [_times(part, factors.get(part.group, 1.0)) for part in _parts(spindle)])
 
 
 def group_stiffness(spindle: Spindle, group: str) -> float:
     """Mean radial stiffness of the bearings and joints of a group (N/m)."""
-    values = [part.stiffness for part in _parts(spindle) if part.group == group]
-    return math.fsum(values) / len(values)
+    return parts_stiffness(spindle, [index for index, part in enumerate(_parts(spindle)) if part.group == group])
 
 
 def group_shares(modes: Modes, groups: Sequence[str]) -> _Float:
@@ -72,5 +105,23 @@ def _parts(spindle: Spindle) -> tuple[Bearing | Joint, ...]:
     return (*spindle.bearings, *spindle.joints)
 
 
-def _scaled(parts: Sequence[_Part], factors: Mapping[str, float]) -> list[_Part]:
-    return [replace(part, stiffness=part.stiffness * factors.get(part.group, 1.0)) for part in parts]
+def _times(part: _Part, factor: float) -> _Part:
+    if factor == 1.0:
+        return part
+    if isinstance(part, Bearing):
+        return replace(part, stiffness=part.stiffness * factor)
+    tilting = part.rotational_stiffness * factor
+    return replace(part, stiffness=part.stiffness * factor, rotational_stiffness=tilting)
+
+
+def _with_parts(spindle: Spindle, parts: Sequence[Bearing | Joint]) -> Spindle:
+    bearings = [part for part in parts if isinstance(part, Bearing)]
+    return replace(spindle, bearings=bearings, joints=[part for part in parts if isinstance(part, Joint)])
+
+
+def _require_spring(spindle: Spindle, index: int, otherwise: str) -> None:
+    """Raise ValueError for a rigid bearing, which no factor changes."""
+    if math.isinf(spindle.bearings[index].stiffness):
+        raise ValueError(
+            f"bearing {index + 1}: stiffness=inf cannot be calibrated; give a finite one to start from, {otherwise}"
+        )

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from dsm.elements import matrix_series
 from dsm.elements.element_series import TERMS, element_series
 from dsm.elements.transfer_series import transfer_series
+from dsm.elements.whirl_terms import number_of_terms
 from dsm.spindle.sections import Sections
 from dsm.spindle.spindle import Theory
 
@@ -15,36 +16,31 @@ _Float = NDArray[np.float64]
 _Indices = NDArray[np.int_]
 
 
-def number_of_terms(spin: float | None) -> int:
-    """Terms kept of each series."""
-    return TERMS if spin is None else 2 * TERMS - 1
-
-
 def stiffness_elements(
-    shaft: Sections, theory: Theory, segment: _Indices, start: _Float, end: _Float, spin: float | None = None
+    shaft: Sections, theory: Theory, segment: _Indices, start: _Float, end: _Float, apart: bool = False
 ) -> _Float:
     """Dynamic stiffness of elements as series, shape (10, n, n_terms); arguments as for transfer_series.
 
     With u, t of both ends the rows are k(u1,u1), k(u1,t1), k(t1,t1); k(u2,u2), k(u2,t2), k(t2,t2); k(u1,u2), k(u1,t2),
     k(t1,u2), k(t1,t2).
     """
-    found = np.zeros((10, segment.size, number_of_terms(spin)))
+    found = np.zeros((10, segment.size, number_of_terms(apart)))
     plain = ~shaft.is_cone[segment] & (theory == "euler-bernoulli")
     if np.any(plain):
         section = shaft.at(segment[plain], start[plain])
         series = element_series(section.rigidity, section.mass, (end - start)[plain])
         mirror = np.array([1, -1, 1])[:, np.newaxis, np.newaxis]
         rows = np.concatenate([series[:3], mirror * series[:3], series[3:5], -series[4:5], series[5:]])
-        found[:, plain, :: 1 if spin is None else 2] = rows
+        found[:, plain, :: TERMS if apart else 1] = rows
     if not np.all(plain):
         rest = ~plain
-        transfer = transfer_series(shaft, theory, segment[rest], start[rest], end[rest], found.shape[2], spin)
+        transfer = transfer_series(shaft, theory, segment[rest], start[rest], end[rest], apart)
         found[:, rest] = _by_stiffness(transfer)
     return found
 
 
 def link_elements(
-    shaft: Sections, theory: Theory, segment: _Indices, start: _Float, end: _Float, spin: float | None = None
+    shaft: Sections, theory: Theory, segment: _Indices, start: _Float, end: _Float, apart: bool = False
 ) -> _Float:
     """Short elements as series that lose nothing however short they are, shape (10, n, n_terms); arguments as above.
 
@@ -53,8 +49,8 @@ def link_elements(
     rows are S(u,u), S(u,t), S(t,t); -F(Q,Q), -F(Q,M), -F(M,M); -H^T(u,Q), -H^T(u,M), -H^T(t,Q), -H^T(t,M).
     """
     if segment.size == 0:
-        return np.zeros((10, 0, number_of_terms(spin)))
-    transfer = transfer_series(shaft, theory, segment, start, end, number_of_terms(spin), spin)
+        return np.zeros((10, 0, number_of_terms(apart)))
+    transfer = transfer_series(shaft, theory, segment, start, end, apart)
     _, b, c, d = _quarters(transfer)
     lever = matrix_series.inverse(d)  # H^T
     flexibility = matrix_series.product(b, lever)

@@ -10,21 +10,42 @@ _Float = NDArray[np.float64]
 
 def product(a: _Float, b: _Float) -> _Float:
     """A B."""
-    found = np.zeros_like(b)
-    for power in np.flatnonzero(a.any(axis=(0, 1, 2))):
-        rest = b.shape[-1] - power
-        found[..., power:] += np.einsum("eij,ejkn->eikn", a[..., power], b[..., :rest])
-    return found
+    near, far = _terms_outside(a), _terms_outside(b)
+    found = np.zeros_like(far)
+    for power in _present(near):
+        found[:, :, power:] += _times(near[:, :, power, np.newaxis], far[:, :, : far.shape[2] - power])
+    return _terms_last(found)
 
 
 def inverse(a: _Float) -> _Float:
     """A^-1, where term 0 has an inverse."""
-    first = a[..., 0]
-    (p, q), (r, s) = np.moveaxis(first, 0, 2)
-    inverted = np.moveaxis(np.array([[s, -q], [-r, p]]) / (p * s - q * r), 2, 0)
-    found = np.zeros_like(a)
-    found[..., 0] = inverted
-    for power in range(1, a.shape[-1]):
-        known = np.einsum("eijn,ejkn->eik", a[..., 1 : power + 1], found[..., power - 1 :: -1])
-        found[..., power] = -inverted @ known
-    return found
+    given = _terms_outside(a)
+    (p, q), (r, s) = given[:, :, :1]
+    inverted = np.array([[s, -q], [-r, p]]) / (p * s - q * r)
+    found, rest = np.zeros_like(given), np.zeros_like(given)
+    rest[0, 0, 0] = rest[1, 1, 0] = 1.0
+    for power in range(given.shape[2]):
+        if not np.any(rest[:, :, power]):
+            continue
+        found[:, :, power, np.newaxis] = _times(inverted, rest[:, :, power, np.newaxis])
+        known = _times(given[:, :, 1 : given.shape[2] - power], found[:, :, power, np.newaxis])
+        rest[:, :, power + 1 :] -= known
+    return _terms_last(found)
+
+
+def _times(a: _Float, b: _Float) -> _Float:
+    """Products of matrices, shape (2, 2, ...)."""
+    return np.asarray(a[:, :1] * b[:1] + a[:, 1:] * b[1:])
+
+
+def _present(terms: _Float) -> NDArray[np.int_]:
+    return np.flatnonzero(terms.any(axis=(0, 1, 3)))
+
+
+def _terms_outside(series: _Float) -> _Float:
+    """Shape (2, 2, n_terms, n)."""
+    return np.ascontiguousarray(series.transpose(1, 2, 3, 0))
+
+
+def _terms_last(terms: _Float) -> _Float:
+    return np.ascontiguousarray(terms.transpose(3, 0, 1, 2))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dsm.elements.beam_elements import link_elements, stiffness_elements
 from dsm.elements.place_nodes import place_nodes
+from dsm.elements.whirl_terms import whirl_terms
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
 from dsm.spindle.places import nearest
@@ -20,6 +21,8 @@ from dsm.spindle.segment import Segment
 from dsm.spindle.spindle import Spindle, Theory
 
 _Float = NDArray[np.float64]
+SLOW = 0.25
+"""Speeds below this part of the highest w divide the shaft alike: gyroscopic moments are small beside its inertia."""
 Held = tuple[float, int]
 """A dof that cannot move: position (m), and 0 for the deflection or 1 for the slope."""
 
@@ -36,9 +39,10 @@ def assemble(
     """Dynamic stiffness matrix with nodes at segment ends, bearings, masses, joints, `places` (m) and `held` dofs.
 
     Elements longer than the series allows at `top_frequency` (Hz) are split into equal parts. A pinned end is
-    held = [(z, 0)], a clamped one [(z, 0), (z, 1)]. left_out: bearings (0 is the first) whose nodes are there without
-    their radial springs. spin (rad/s): a polynomial in w for circular whirl, see DynamicStiffness. links: all
-    elements are links, twice the work, for bearings far softer than the shaft. The same one is not made twice.
+    held = [(z, 0)], a clamped one [(z, 0), (z, 1)]. left_out: places in (*bearings, *joints) of parts
+    that are taken away but for their nodes: the radial spring of a bearing, both springs of a joint. spin (rad/s): a
+    polynomial in w for circular whirl, see DynamicStiffness. links: all elements are links, twice the work, for
+    bearings far softer than the shaft. The same one is not made twice.
     Raises ValueError for a place off the shaft.
     """
     nodes = tuple(map(float, places))
@@ -59,14 +63,24 @@ def _assemble(
         return _reversed(_assemble(spindle, top_frequency, places, held, left_out, -spin, links))
     wanted = (*_places_of_parts(spindle), *places, *(z for z, _ in held))
     material = spindle.youngs_modulus, spindle.density, spindle.theory, spindle.shear_modulus
-    bare = _bare(tuple(spindle.segments), material, tuple(spindle.joints), wanted, top_frequency, spin, links)
-    arrays = {name: getattr(bare, name).copy() for name in ("diagonal", "coupling", "held", "scale")}
-    model = replace(bare, **arrays)
+    fastest = None if spin is None else fastest_spin(spin, top_frequency)
+    bare = _bare(tuple(spindle.segments), material, tuple(spindle.joints), wanted, top_frequency, fastest, links)
+    diagonal, coupling = (
+        part.copy() if spin is None else whirl_terms(part, spin) for part in (bare.diagonal, bare.coupling)
+    )
+    model = replace(
+        bare, diagonal=diagonal, coupling=coupling, held=bare.held.copy(), scale=bare.scale.copy(), spin=spin
+    )
     _add_masses(model, spindle)
     rigid = _add_springs(model, spindle, left_out)
-    model.scale[:] = _scale(model, sections(spindle))
+    model.scale[:] = _scale(model)
     for z, dof in (*rigid, *held):
         _hold(model, model.node(z), dof)
+    for index in left_out:
+        if index >= len(spindle.bearings):  # a link without forces joins nothing
+            link = model.node(spindle.joints[index - len(spindle.bearings)].position) + 1
+            _hold(model, link, 0)
+            _hold(model, link, 1)
     for values in (model.position, model.diagonal, model.coupling, model.held, model.scale):
         values.setflags(write=False)
     return model
@@ -79,16 +93,27 @@ def _bare(
     joints: tuple[Joint, ...],
     wanted: tuple[float, ...],
     top_frequency: float,
-    spin: float | None,
+    fastest: float | None,
     links: bool,
 ) -> DynamicStiffness:
-    """The shaft and its joints alone: what spindles that differ in bearings and masses have in common."""
+    """The shaft and its joints alone: what spindles that differ in bearings and masses have in common.
+
+    fastest: for speeds up to that (rad/s), terms as for whirl_terms; None: for a shaft at rest.
+    """
     spindle = Spindle(segments, (), *material, joints=joints)
     shaft = sections(spindle)
-    position, segment, short = place_nodes(shaft, wanted, spindle.theory, top_frequency, spin, links)
-    series = _elements(spindle, shaft, position, segment, short, spin)
+    position, segment, short = place_nodes(shaft, wanted, spindle.theory, top_frequency, fastest, links)
+    series = _elements(spindle, shaft, position, segment, short, fastest is not None)
     position, series, short = _with_joints(spindle, position, series, short)
-    return _chain(position, series, short, top_frequency, spin)
+    return _chain(position, series, short, top_frequency, _least(shaft))
+
+
+def fastest_spin(spin: float, top_frequency: float) -> float:
+    """A speed (rad/s) not below this one that others share, and with it nodes and series."""
+    fastest = SLOW * 2 * math.pi * top_frequency
+    while fastest < spin:
+        fastest *= 2
+    return fastest
 
 
 def _reversed(model: DynamicStiffness) -> DynamicStiffness:
@@ -109,12 +134,12 @@ def _elements(
     position: _Float,
     segment: NDArray[np.int_],
     short: NDArray[np.bool_],
-    spin: float | None,
+    apart: bool,
 ) -> _Float:
     """Series of all elements, (10, n_elements, n_terms): rows of link_elements where short, else of the others."""
     found = []
     for kind, chosen in ((stiffness_elements, ~short), (link_elements, short)):
-        found.append(kind(shaft, spindle.theory, segment[chosen], position[:-1][chosen], position[1:][chosen], spin))
+        found.append(kind(shaft, spindle.theory, segment[chosen], position[:-1][chosen], position[1:][chosen], apart))
     series = np.empty((10, segment.size, found[0].shape[2]))
     series[:, ~short], series[:, short] = found
     return series
@@ -136,9 +161,13 @@ def _with_joints(
 
 
 def _chain(
-    position: _Float, series: _Float, short: NDArray[np.bool_], top_frequency: float, spin: float | None
+    position: _Float,
+    series: _Float,
+    short: NDArray[np.bool_],
+    top_frequency: float,
+    least: tuple[float, float],
 ) -> DynamicStiffness:
-    """Elements put together, with a node of force and moment inside each link."""
+    """Elements put together, with a node of force and moment inside each link; its scale is that of `least` only."""
     node = np.arange(position.size) + np.concatenate([[0], np.cumsum(short)])
     count, terms = node[-1] + 1, series.shape[2]
     diagonal, coupling = np.zeros((3, count, terms)), np.zeros((4, count - 1, terms))
@@ -151,15 +180,21 @@ def _chain(
     places = np.full(count, math.inf)
     places[node] = position
     held = np.zeros((count, 2), dtype=bool)
-    return DynamicStiffness(places, diagonal, coupling, held, np.ones(held.size), top_frequency, spin)
+    scale = np.tile(1 / np.sqrt(least), count)
+    return DynamicStiffness(places, diagonal, coupling, held, scale, top_frequency)
 
 
-def _scale(model: DynamicStiffness, shaft: Sections) -> _Float:
-    """One over the root of the stiffness at each dof, at least that of the whole shaft, or of the flexibility."""
+def _least(shaft: Sections) -> tuple[float, float]:
+    """Stiffness of the whole shaft against deflection (N/m) and slope (N m)."""
     middle = np.arange(shaft.ends.size - 1)
     rigidity = float(np.mean(shaft.at(middle, (shaft.ends[1:] + shaft.ends[:-1]) / 2).rigidity))
     length = float(shaft.ends[-1])
-    sizes = np.maximum(model.diagonal[::2, :, 0], [[rigidity / length**3], [rigidity / length]])
+    return rigidity / length**3, rigidity / length
+
+
+def _scale(model: DynamicStiffness) -> _Float:
+    """One over the root of the stiffness at each dof, at least that of the whole shaft, or of the flexibility."""
+    sizes = np.maximum(model.diagonal[::2, :, 0], model.scale[:2, np.newaxis] ** -2)
     link = np.flatnonzero(model.is_link)
     sizes[:, link] = np.maximum(-model.diagonal[::2, link, 0], 1 / sizes[:, link - 1])
     return np.asarray(1 / np.sqrt(sizes.T.ravel()))
@@ -178,8 +213,8 @@ def _add_masses(model: DynamicStiffness, spindle: Spindle) -> None:
 def _add_springs(model: DynamicStiffness, spindle: Spindle, left_out: Sequence[int]) -> list[Held]:
     """Add the bearings; what they hold rigidly is returned."""
     rigid: list[Held] = []
-    for index, bearing in enumerate(spindle.bearings):
-        node = model.node(bearing.position)
+    nodes = (model.dofs(spindle.bearings) // 2).tolist()
+    for index, (bearing, node) in enumerate(zip(spindle.bearings, nodes, strict=True)):
         model.diagonal[2, node, 0] += bearing.rotational_stiffness
         if index in left_out:
             continue

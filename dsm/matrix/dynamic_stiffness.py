@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import TypeVar
+from functools import cached_property, lru_cache
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.spindle.places import nearest
+from dsm.spindle.places import nearest, nearest_each
 
 Number = TypeVar("Number", np.float64, np.complex128)
+
+
+class _Placed(Protocol):
+    """A part of a spindle."""
+
+    @property
+    def position(self) -> float:
+        """Distance from the tool tip (m)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,7 +28,7 @@ class DynamicStiffness:
     """Stiffness matrix K of a chain of beam elements, a polynomial in w^2 (w the angular frequency, rad/s).
 
     For a shaft that spins it is a polynomial in w, for the circular whirl u exp(i w t) of both planes together. What
-    is called `x` below is w^2, or w where it spins. Lumped masses, bearings and joints of no length are in it.
+    is called eigenvalue below is w^2, or w where it spins. Lumped masses, bearings and joints of no length are in it.
     Node i has the deflection u_i and the slope t_i = du/dz, in this order. Between two nodes that are very near to each
     other, or on both sides of a joint, stands a node of force and moment instead: a link, with its flexibility in place
     of its stiffness, whose rounding would drown all else (link_elements). A dof that is held has its row and column
@@ -31,7 +40,7 @@ class DynamicStiffness:
     position: NDArray[np.float64]
     """Nodes from the tool tip on (m), shape (n_nodes,); inf for those of force and moment."""
     diagonal: NDArray[np.float64]
-    """Coefficients of K(u_i, u_i), K(u_i, t_i), K(t_i, t_i) in powers of x, shape (3, n_nodes, n_terms)."""
+    """Coefficients of K(u_i, u_i), K(u_i, t_i), K(t_i, t_i) in powers of the eigenvalue, (3, n_nodes, n_terms)."""
     coupling: NDArray[np.float64]
     """The same of K(u_i, u_j), K(u_i, t_j), K(t_i, u_j), K(t_i, t_j), j = i + 1, shape (4, n_nodes - 1, n_terms)."""
     held: NDArray[np.bool_]
@@ -48,34 +57,74 @@ class DynamicStiffness:
         """Which nodes are those of force and moment, shape (n_nodes,)."""
         return np.isinf(self.position)
 
-    def to_x(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+    @cached_property
+    def link_pivots(self) -> int:
+        """Negative pivots that belong to links: two each, but for forces that are held at zero."""
+        return int(np.count_nonzero(~self.held[self.is_link]))
+
+    def to_eigenvalue(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
         """The variable of the polynomial at frequencies (Hz), any shape."""
         w = 2 * np.pi * frequency
         return np.asarray(w if self.spin is not None else w * w)
 
-    def to_frequency(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_frequency(self, eigenvalue: NDArray[np.float64]) -> NDArray[np.float64]:
         """Frequencies (Hz) at values of the variable, any shape."""
-        return np.asarray((x if self.spin is not None else np.sqrt(x)) / (2 * np.pi))
+        return np.asarray((eigenvalue if self.spin is not None else np.sqrt(eigenvalue)) / (2 * np.pi))
 
     def node(self, position: float) -> int:
         """Index of the node nearest to a position (m)."""
         return nearest(self.position, position)
 
-    def blocks(self, x: NDArray[Number], derivative: bool = False) -> tuple[NDArray[Number], NDArray[Number]]:
-        """Values of diagonal (3, n_nodes, n) and coupling (4, n_nodes - 1, n) at x, shape (n,), in SI units.
+    def dofs(self, parts: Sequence[_Placed]) -> NDArray[np.int_]:
+        """Indices of the deflections of the nodes of parts in a full matrix, shape (n,)."""
+        if not parts:
+            return np.zeros(0, dtype=int)
+        return 2 * nearest_each(self.position, [part.position for part in parts])
 
-        x may be complex or negative. With `derivative`, those of dK/dx.
+    def blocks(self, eigenvalue: NDArray[Number], derivative: bool = False) -> tuple[NDArray[Number], NDArray[Number]]:
+        """Values of diagonal (3, n_nodes, n) and coupling (4, n_nodes - 1, n), in SI units, at eigenvalues (n,).
+
+        These may be complex or negative. With `derivative`, those of dK by the eigenvalue.
         """
-        powers = np.vander(x, self.diagonal.shape[2], increasing=True).T
-        if derivative:
-            order = np.arange(1, powers.shape[0])
-            powers = order[:, np.newaxis] * powers[:-1]
-            return self.diagonal[..., 1:] @ powers, self.coupling[..., 1:] @ powers
+        powers = self._powers(eigenvalue, derivative)
         return self.diagonal @ powers, self.coupling @ powers
 
-    def dense(self, x: NDArray[Number], derivative: bool = False) -> NDArray[Number]:
-        """K, or dK/dx, as full matrices of shape (n, 2 n_nodes, 2 n_nodes)."""
-        return full_matrices(*self.blocks(x, derivative))
+    def dense(self, eigenvalue: NDArray[Number], derivative: bool = False) -> NDArray[Number]:
+        """K, or its derivative by the eigenvalue, as full matrices of shape (n, 2 n_nodes, 2 n_nodes)."""
+        return full_matrices(*self.blocks(eigenvalue, derivative))
+
+    def scaled(self, eigenvalue: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+        """K at each eigenvalue, rows and columns times `scale`, in Fortran's order; the lower half, 0 above it."""
+        place, coefficients = self._lower
+        found = np.zeros((eigenvalue.size, self.scale.size**2))
+        found[:, place] = (coefficients @ self._powers(eigenvalue)).T
+        return [matrix.reshape(self.scale.size, -1).T for matrix in found]
+
+    def slope_of(self, eigenvalue: NDArray[np.float64], shape: NDArray[np.float64]) -> NDArray[np.float64]:
+        """phi^T K' phi at each eigenvalue (n,), K' its derivative, of a motion phi = `scale` times shape."""
+        place, coefficients = self._lower
+        column, row = np.divmod(place, self.scale.size)
+        twice = np.where(row == column, 1.0, 2.0) * shape[row] * shape[column]
+        return np.asarray((twice @ coefficients) @ self._powers(eigenvalue, derivative=True))
+
+    @cached_property
+    def _lower(self) -> tuple[NDArray[np.int_], NDArray[np.float64]]:
+        """Places in the flattened matrix, columns one after the other, and scaled coefficients of its lower half."""
+        rows, columns = _lower_half(self.position.size)
+        terms = self.diagonal.shape[2]
+        coefficients = np.concatenate([self.diagonal.reshape(-1, terms), self.coupling.reshape(-1, terms)])
+        coefficients *= (self.scale[rows] * self.scale[columns])[:, np.newaxis]
+        return columns * self.scale.size + rows, coefficients
+
+    def _powers(self, eigenvalue: NDArray[Number], derivative: bool = False) -> NDArray[Number]:
+        """Powers of each eigenvalue, or their derivatives, shape (n_terms, n)."""
+        powers = np.empty((self.diagonal.shape[2], eigenvalue.size), dtype=eigenvalue.dtype)
+        powers[0], powers[1:] = 1.0, eigenvalue
+        np.multiply.accumulate(powers, out=powers)
+        if derivative:
+            powers[1:] = np.arange(1, powers.shape[0])[:, np.newaxis] * powers[:-1]
+            powers[0] = 0.0
+        return powers
 
     def solve(self, matrices: NDArray[Number], right: NDArray[Number]) -> NDArray[Number]:
         """Solutions of full matrices times y = right, shape (n, 2 n_nodes, m), rows and columns made of one size."""
@@ -84,7 +133,7 @@ class DynamicStiffness:
         return np.asarray(scale * found, dtype=matrices.dtype)
 
     def term(self, power: int) -> NDArray[np.float64]:
-        """Coefficient of one power of x in K, a full matrix of shape (2 n_nodes, 2 n_nodes)."""
+        """Coefficient of one power of the eigenvalue in K, a full matrix of shape (2 n_nodes, 2 n_nodes)."""
         return np.asarray(
             full_matrices(self.diagonal[..., power : power + 1], self.coupling[..., power : power + 1])[0]
         )
@@ -97,6 +146,17 @@ def full_matrices(diagonal: NDArray[Number], coupling: NDArray[Number]) -> NDArr
     matrices = np.zeros((uu.shape[1], size * size), dtype=uu.dtype)
     matrices[:, _entries(uu.shape[0])] = np.concatenate([uu, ut, ut, tt, *coupling, *coupling]).T
     return matrices.reshape(-1, size, size)
+
+
+@lru_cache(maxsize=32)
+def _lower_half(n_nodes: int) -> tuple[NDArray[np.int_], NDArray[np.int_]]:
+    """Rows and columns of the blocks on and below the diagonal, in the order of diagonal and coupling."""
+    u = 2 * np.arange(n_nodes)
+    left, right = u[:-1], u[1:]
+    pairs = [(u, u), (u + 1, u), (u + 1, u + 1)]
+    pairs += [(right, left), (right + 1, left), (right, left + 1), (right + 1, left + 1)]
+    rows, columns = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    return rows, columns
 
 
 @lru_cache(maxsize=32)

@@ -44,10 +44,9 @@ def between_nodes(
     """
     start, end = position[left], position[left + 1]
     segment = shaft.segment_at((start + end) / 2)
-    powers = np.vander((2 * np.pi * frequency) ** 2, number_of_terms(None), increasing=True)
+    powers = np.vander((2 * np.pi * frequency) ** 2, number_of_terms(apart=False), increasing=True)
     whole, part = (
-        np.moveaxis(transfer_series(shaft, theory, segment, start, to, powers.shape[1], None) @ powers.T, 3, 0)
-        for to in (end, places)
+        np.moveaxis(transfer_series(shaft, theory, segment, start, to) @ powers.T, 3, 0) for to in (end, places)
     )
     near, far = (np.stack([values[:, node] for values in shape], axis=-1) for node in (left, left + 1))
     strain = far[..., np.newaxis] - whole[..., :2, :2] @ near[..., np.newaxis]

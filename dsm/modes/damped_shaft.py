@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,6 +12,7 @@ from dsm.matrix.assemble import assemble
 from dsm.matrix.damped_blocks import damped_blocks
 from dsm.matrix.dynamic_stiffness import DynamicStiffness, full_matrices
 from dsm.modes.natural_frequencies import natural_frequencies
+from dsm.modes.newton_step import newton_step
 from dsm.spindle.spindle import Spindle, require_support
 from dsm.spindle.supports import Damping, supports
 
@@ -78,9 +78,13 @@ class DampedShaft:
         stiffness, by_w = self.matrices(self.none, w * (1 + OFFSET))
         shape = np.ones(self.model.held.size, dtype=np.complex128)
         for _ in range(2):
-            shape = self.model.solve(stiffness, (by_w @ shape)[:, np.newaxis])[:, 0]
-            shape /= np.sqrt(shape @ by_w @ shape)
+            _, shape = self._step(w, stiffness, by_w, shape)
         return DampedMode(complex(w), shape)
+
+    def _step(self, trial: complex, stiffness: _Complex, by_w: _Complex, shape: _Complex) -> tuple[complex, _Complex]:
+        at = np.array([trial], dtype=np.complex128)
+        w, moved, energy = newton_step(at, stiffness[np.newaxis], by_w[np.newaxis], shape[np.newaxis], self.model.solve)
+        return complex(w[0]), moved[0] / np.sqrt(energy[0])
 
     def matrices(self, damping: Damping, w: complex) -> tuple[_Complex, _Complex]:
         """K(w) and dK/dw, shape (n_dofs, n_dofs) each."""
@@ -136,9 +140,7 @@ class DampedShaft:
             stiffness, by_w = self.matrices(damping, trial)
             if number == 0:
                 foreseen = trial - complex((shape @ stiffness @ shape) / (shape @ by_w @ shape))
-            moved = self.model.solve(stiffness, (by_w @ shape)[:, np.newaxis])[:, 0]
-            shape = moved / cmath.sqrt(complex(moved @ by_w @ moved))
-            last, w = w, trial - complex(shape @ stiffness @ shape)
+            last, (w, shape) = w, self._step(trial, stiffness, by_w, shape)
             if abs(w - last) <= SETTLED * abs(w):
                 close = abs(w - foreseen) <= FORESEEN * abs(foreseen - mode.w) + SETTLED * abs(w)
                 return DampedMode(w, shape) if close and w.real > OSCILLATES * abs(w) else None

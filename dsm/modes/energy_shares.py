@@ -58,8 +58,8 @@ def _segments(spindle: Spindle, modes: Modes) -> _Float:
     shaft = sections(spindle)
     element = np.flatnonzero(np.diff(modes.position) > 0)
     start, length = modes.position[element], np.diff(modes.position)[element]
-    x, weight = np.polynomial.legendre.leggauss(POINTS)
-    places = (start[:, np.newaxis] + length[:, np.newaxis] * (x + 1) / 2).ravel()
+    point, weight = np.polynomial.legendre.leggauss(POINTS)
+    places = (start[:, np.newaxis] + length[:, np.newaxis] * (point + 1) / 2).ravel()
     left = np.repeat(element, POINTS)
     shape = modes.deflection, modes.slope
     state = between_nodes(shaft, spindle.theory, modes.frequency, modes.position, shape, places, left)

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.matrix.assemble import Held, assemble
+from dsm.matrix.assemble import Held, assemble, fastest_spin
 from dsm.matrix.count_below import count_below
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
-from dsm.modes.finite_element_modes import finite_element_modes
+from dsm.modes.finite_element_modes import finite_element_modes, whirling_modes
 from dsm.modes.modes import Modes
+from dsm.modes.newton_step import newton_step, quadratic
 from dsm.spindle.sections import sections
 from dsm.spindle.spindle import Spindle
 
@@ -28,10 +31,13 @@ DULL = 1e-5
 """Where stiffness gives one wider than this, links are taken: the error is some 1e-4 of the interval."""
 
 SETTLED = 1e-8
-"""Relative change of x by a step that leaves less than rounding to the next: each step at least squares the error."""
+"""Relative change by a step that leaves less than rounding to the next: each step at least squares the error."""
 
 MOST_MODES = 100
 """More are refused: the work grows with their third power."""
+
+MORE = 12
+"""Modes at rest beyond those wanted of which modes of whirl are made to begin with."""
 
 SPOILT = (
     "rounding spoils the modes of this shaft; look for segments far too short, thick or thin beside the others, and "
@@ -77,23 +83,25 @@ class _Wanted(NamedTuple):
 
     spindle: Spindle
     number: int
-    places: Sequence[float]
-    held: Sequence[Held]
+    places: tuple[float, ...]
+    held: tuple[Held, ...]
     spin: float | None
 
 
 def _solve(wanted: _Wanted, links: bool) -> Modes:
     try:
-        model, x, shape = _start(wanted, links)
-        width = CERTAINTY * x + ROUNDING * _quadratic(np.abs(model.dense(x)), np.abs(shape))
-        x, shape = _refine(model, x, shape, width)
-        _require_sharp(wanted, x, width, BLURRED if links else DULL)
-        x, shape = _prove(model, x, shape, width)
+        model, eigenvalue, shape = _start(wanted, links)
+        width = CERTAINTY * eigenvalue + ROUNDING * quadratic(np.abs(model.dense(eigenvalue)), np.abs(shape))
+        eigenvalue, shape = _refine(model, eigenvalue, shape, width)
+        _require_sharp(wanted, eigenvalue, width, BLURRED if links else DULL)
+        eigenvalue, shape = _prove(model, eigenvalue, shape, width)
     except np.linalg.LinAlgError as exc:
         raise _SpoiltError from exc
     node = np.flatnonzero(~model.is_link)
     deflection, slope = shape[:, 2 * node], shape[:, 2 * node + 1]
-    return Modes(model.to_frequency(x), model.position[node], deflection, slope, wanted.spindle, wanted.spin or 0.0)
+    return Modes(
+        model.to_frequency(eigenvalue), model.position[node], deflection, slope, wanted.spindle, wanted.spin or 0.0
+    )
 
 
 def _start(wanted: _Wanted, links: bool) -> tuple[DynamicStiffness, _Float, _Float]:
@@ -102,14 +110,38 @@ def _start(wanted: _Wanted, links: bool) -> tuple[DynamicStiffness, _Float, _Flo
     top = _first_guess(spindle, np.pi * (count + 2))
     for _ in range(8):
         model = assemble(spindle, top, places, held, spin=spin, links=links)
-        x, shape = finite_element_modes(model, count)
-        highest = float(model.to_frequency(x[-1:])[0])
+        eigenvalue, shape = _finite_elements(model, wanted, top, links)
+        highest = float(model.to_frequency(eigenvalue[-1:])[0])
         if highest <= model.top_frequency:
-            return model, x, shape
-        top = highest
+            return model, eigenvalue, shape
+        top = 2.0 ** (math.ceil(4 * math.log2(highest)) / 4)  # the same for speeds near to each other
     raise _SpoiltError
 
 
+def _finite_elements(model: DynamicStiffness, wanted: _Wanted, top: float, links: bool) -> tuple[_Float, _Float]:
+    spindle, count, places, held, spin = wanted
+    if spin is None:
+        return finite_element_modes(model, count)
+    w2, shape = _at_rest(spindle, count + MORE, top, places, held, fastest_spin(abs(spin), top), links)
+    return whirling_modes(model, w2, shape, count)
+
+
+@lru_cache(maxsize=4)
+def _at_rest(
+    spindle: Spindle,
+    count: int,
+    top: float,
+    places: tuple[float, ...],
+    held: tuple[Held, ...],
+    spin: float,
+    links: bool,
+) -> tuple[_Float, _Float]:
+    """What starts the search at all speeds that share nodes with `spin`."""
+    model = assemble(spindle, top, places, held, spin=spin, links=links)
+    return finite_element_modes(model, min(count, int(np.count_nonzero(~model.held[~model.is_link]))))
+
+
+@lru_cache(maxsize=32)
 def _first_guess(spindle: Spindle, phase: float) -> float:
     """Frequency (Hz) at which a wave along the shaft turns by about `phase` (rad); 1/w^2 adds up as in Dunkerley's."""
     shaft = sections(spindle)
@@ -123,37 +155,31 @@ def _first_guess(spindle: Spindle, phase: float) -> float:
     return 1 / (2 * np.pi * float(np.sqrt(bending**4 + shear**2 + rotary**2)))
 
 
-def _refine(model: DynamicStiffness, x: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
+def _refine(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
     """Inverse iteration with a Newton step each, all modes at once; sorted."""
     for _ in range(8):
-        previous = x
-        x, shape = _iterate(model, x, shape, width)
-        if np.all(np.abs(x - previous) <= SETTLED * x):
+        previous = eigenvalue
+        eigenvalue, shape = _iterate(model, eigenvalue, shape, width)
+        if np.all(np.abs(eigenvalue - previous) <= SETTLED * eigenvalue):
             break
-    order = np.argsort(x)
-    return x[order], shape[order]
+    order = np.argsort(eigenvalue)
+    return eigenvalue[order], shape[order]
 
 
-def _iterate(model: DynamicStiffness, x: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
-    """One step beside x, where K is not singular; shapes phi with -phi^T (dK/dx) phi = 1, for w^2 the modal mass."""
-    trial = x + width
-    stiffness, inertia = model.dense(trial), -model.dense(trial, derivative=True)
-    moved = model.solve(stiffness, inertia @ shape[..., np.newaxis])[..., 0]
-    scaled = moved / np.sqrt(_quadratic(inertia, moved))[:, np.newaxis]
-    return trial + _quadratic(stiffness, scaled), scaled
+def _iterate(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
+    """One step from beside each eigenvalue; shapes phi with -phi^T K' phi = 1, for w^2 the modal mass."""
+    trial = eigenvalue + width
+    stiffness, slope = model.dense(trial), model.dense(trial, derivative=True)
+    found, moved, energy = newton_step(trial, stiffness, slope, shape, model.solve)
+    return found, moved / np.sqrt(-energy)[:, np.newaxis]
 
 
-def _quadratic(matrix: _Float, shape: _Float) -> _Float:
-    """phi^T A phi of each mode, shape (n_modes,)."""
-    return np.asarray(np.sum(shape * (matrix @ shape[..., np.newaxis])[..., 0], axis=1))
-
-
-def _require_sharp(wanted: _Wanted, x: _Float, width: _Float, widest: float) -> None:
+def _require_sharp(wanted: _Wanted, eigenvalue: _Float, width: _Float, widest: float) -> None:
     """Raise _SpoiltError where rounding leaves modes in doubt, or takes them for motions without bending."""
-    moving = x > width
+    moving = eigenvalue > width
     still = int(np.sum(~moving))
     doubtful = still > 0 and still > _motions(wanted.spindle, wanted.held, float(np.min(width)))
-    if doubtful or np.any(width[moving] > widest * x[moving]):
+    if doubtful or np.any(width[moving] > widest * eigenvalue[moving]):
         raise _SpoiltError
 
 
@@ -168,29 +194,29 @@ def _motions(spindle: Spindle, held: Sequence[Held], width: float) -> int:
     return 2 - int(np.linalg.matrix_rank(hindered) if hindered else 0)
 
 
-def _prove(model: DynamicStiffness, x: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
+def _prove(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, width: _Float) -> tuple[_Float, _Float]:
     """The same modes where each is the one it should be; the others found anew by counting."""
-    x = np.where(x > width, x, 0.0)
-    missed = ~_certified(model, x, width)
+    eigenvalue = np.where(eigenvalue > width, eigenvalue, 0.0)
+    missed = ~_certified(model, eigenvalue, width)
     if np.any(missed):
         width = width[missed]
         proved = _bisect(model, np.flatnonzero(missed) + 1, width)
         nearby, shape[missed] = _iterate(model, proved, shape[missed], width)
-        x[missed] = np.clip(nearby, np.maximum(proved - width, 0.0), proved + width)
-    return x, shape
+        eigenvalue[missed] = np.clip(nearby, np.maximum(proved - width, 0.0), proved + width)
+    return eigenvalue, shape
 
 
-def _certified(model: DynamicStiffness, x: _Float, width: _Float) -> NDArray[np.bool_]:
-    """For mode n: whether fewer than n modes lie below x - width, and n or more below x + width."""
-    below, up_to = count_below(model, np.concatenate([x - width, x + width])).reshape(2, -1)
-    order = np.arange(1, x.size + 1)
+def _certified(model: DynamicStiffness, eigenvalue: _Float, width: _Float) -> NDArray[np.bool_]:
+    """For mode n: whether fewer than n modes lie below eigenvalue - width, and n or more below eigenvalue + width."""
+    below, up_to = count_below(model, np.concatenate([eigenvalue - width, eigenvalue + width])).reshape(2, -1)
+    order = np.arange(1, eigenvalue.size + 1)
     return np.asarray((below < order) & (order <= up_to))
 
 
 def _bisect(model: DynamicStiffness, order: NDArray[np.int_], width: _Float) -> _Float:
-    """x of the modes with these numbers (1 is the first), each within its width, by counting alone."""
+    """eigenvalue of the modes with these numbers (1 is the first), each within its width, by counting alone."""
     low = -width
-    high = np.full(order.size, float(model.to_x(np.array(model.top_frequency))))
+    high = np.full(order.size, float(model.to_eigenvalue(np.array(model.top_frequency))))
     if np.any(count_below(model, low) >= order) or np.any(count_below(model, high) < order):
         raise _SpoiltError
     while np.any(high - low > width):

@@ -7,25 +7,51 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
+from dsm.modes.newton_step import quadratic
 
 _Float = NDArray[np.float64]
 
 SUPPORT = 1e6
 """A dof held beside a link: stiffness of the spring that stands for it here, over the largest of the shaft."""
 
-MASSLESS = 1e-4
-"""Where motions have no mass, all get one, this part of the stiffness over the square of the highest frequency."""
-
 
 def finite_element_modes(model: DynamicStiffness, count: int) -> tuple[_Float, _Float]:
-    """x (count,) of the lowest modes and shapes phi (count, 2 n_nodes), -phi^T (dK/dx) phi = 1; a start, not exact.
+    """w^2 (count,) of the lowest modes at rest and their shapes phi (count, 2 n_nodes), phi^T M phi = 1: upper bounds.
 
-    x is w^2, or w where the shaft spins, of forward whirl. Raises ArithmeticError where the model has fewer modes.
+    Solved for 1/(w^2 + shift): the lowest are the most exact, and a free shaft is no exception. Raises ArithmeticError
+    where the model has fewer modes.
     """
     basis, springs = _across_links(model)
-    if model.spin is None:
-        return _at_rest(model, basis, springs, count)
-    return _whirling(model, basis, springs, count)
+    size = basis.shape[1]
+    if size < count:
+        raise ArithmeticError(f"{count} modes were asked for; the model of this shaft has {size}")
+    mass = -_reduced(model, basis, 1 if model.spin is None else 2)
+    shift = 1e-3 * (2 * np.pi * model.top_frequency) ** 2
+    shifted = _reduced(model, basis, 0) + springs + shift * mass
+    inverse, vectors = eigh(mass, shifted, subset_by_index=[size - count, size - 1])
+    shape = (basis @ (vectors / np.sqrt(inverse))).T[::-1]
+    return np.maximum(1 / inverse[::-1] - shift, 0.0), shape
+
+
+def whirling_modes(model: DynamicStiffness, w2: _Float, shape: _Float, count: int) -> tuple[_Float, _Float]:
+    """w (count,) of the lowest modes of forward whirl of a shaft that spins and shapes phi, -phi^T K' phi = 1: a start.
+
+    Made of the modes at rest above, of the same nodes: K0 + w K1 - w^2 M has K0 = diag(w2) and M = I for them. With
+    y = w z it is diag(K0, I) (z, y) = w [[-K1, I], [I, 0]] (z, y), whose left side is positive definite. Raises
+    LinAlgError where it is not.
+    """
+    if np.any(w2 <= 0):
+        raise np.linalg.LinAlgError("a shaft that nothing holds")
+    gyroscopic = _reduced(model, shape.T, 1)
+    n, still = w2.size, np.sqrt(w2)
+    scaled = np.zeros((2 * n, 2 * n))
+    scaled[:n, :n] = -gyroscopic / np.outer(still, still)
+    scaled[:n, n:] = scaled[n:, :n] = np.diag(1 / still)
+    inverse, vectors = np.linalg.eigh(scaled)
+    last = slice(-1, -count - 1, -1)
+    w, found = 1 / inverse[last], (vectors[:n, last] / still[:, np.newaxis]).T @ shape
+    size = -quadratic(model.dense(w, derivative=True), found)
+    return w, found / np.sqrt(size)[:, np.newaxis]
 
 
 def _across_links(model: DynamicStiffness) -> tuple[_Float, _Float]:
@@ -61,40 +87,3 @@ def _reduced(model: DynamicStiffness, basis: _Float, power: int) -> _Float:
     """A term of K for the independent motions; forces of links do no work here."""
     moving = np.repeat(~model.is_link, 2)
     return np.asarray(basis[moving].T @ model.term(power)[np.ix_(moving, moving)] @ basis[moving])
-
-
-def _at_rest(model: DynamicStiffness, basis: _Float, springs: _Float, count: int) -> tuple[_Float, _Float]:
-    """Upper bounds, solved for 1/(w^2 + shift): the lowest are the most exact, and a free shaft is no exception."""
-    size = basis.shape[1]
-    if size < count:
-        raise ArithmeticError(f"{count} modes were asked for; the model of this shaft has {size}")
-    mass = -_reduced(model, basis, 1)
-    shift = 1e-3 * (2 * np.pi * model.top_frequency) ** 2
-    shifted = _reduced(model, basis, 0) + springs + shift * mass
-    inverse, vectors = eigh(mass, shifted, subset_by_index=[size - count, size - 1])
-    shape = (basis @ (vectors / np.sqrt(inverse))).T[::-1]
-    return np.maximum(1 / inverse[::-1] - shift, 0.0), shape
-
-
-def _whirling(model: DynamicStiffness, basis: _Float, springs: _Float, count: int) -> tuple[_Float, _Float]:
-    """The same for a shaft that spins, from terms 0 to 2: K0 + w K1 - w^2 M.
-
-    With y = w x it is diag(K0, M) z = w [[-K1, M], [M, 0]] z, z = (x, y), whose left side is positive definite.
-    """
-    stiffness, gyroscopic, mass = (_reduced(model, basis, power) for power in range(3))
-    stiffness, mass = stiffness + springs, -mass
-    if np.any(model.is_link):  # their far ends have no mass of their own here
-        mass = mass + MASSLESS / (2 * np.pi * model.top_frequency) ** 2 * stiffness
-    zero = np.zeros_like(mass)
-    right = np.block([[-gyroscopic, mass], [mass, zero]])
-    last = 2 * basis.shape[1] - 1
-    inverse, vectors = eigh(
-        right, np.block([[stiffness, zero], [zero, mass]]), subset_by_index=[last - count + 1, last]
-    )
-    if inverse[0] <= 0:
-        raise ArithmeticError(f"{count} modes were asked for; the model of this shaft has fewer")
-    shape = (basis @ vectors[: basis.shape[1]]).T[::-1]
-    x = 1 / inverse[::-1]
-    inertia = -model.dense(x, derivative=True)
-    size = np.sum(shape * (inertia @ shape[..., np.newaxis])[..., 0], axis=1)
-    return x, shape / np.sqrt(size)[:, np.newaxis]

@@ -68,11 +68,11 @@ class Sections:
 @lru_cache(maxsize=32)
 def sections(spindle: Spindle) -> Sections:
     """The cross-sections of a spindle."""
-    rows = []
+    rows, common = [], spindle.material
     for segment in spindle.segments:
         (outer, bore), (end_outer, end_bore) = segment.diameters_at(0.0), segment.diameters_at(1.0)
         heavy = (outer, end_outer) if segment.mass_diameter is None else 2 * (segment.mass_diameter,)
-        material = segment.material or spindle.material
+        material = segment.material or common
         constants = material.youngs_modulus, material.density, material.shear_modulus, material.poisson_ratio
         rows.append((segment.length, outer, end_outer, bore, end_bore, *heavy, *constants))
     table = np.array(rows).T

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eig, eigh
 
 from dsm.elements.element_series import MAX_X
+from dsm.modes.newton_step import newton_step, quadratic
 from dsm.spindle.places import nearest
 from dsm.spinning.beam import Dof, SpinningBeam
 from dsm.spinning.chain import SpinningChain
@@ -143,11 +144,9 @@ def _refine(chain: SpinningChain, w: _Float, shape: _Float, spin: float) -> tupl
     for _ in range(8):
         previous, trial = w, w + width
         stiffness, slope = chain.matrices(trial, spin)
-        moved = np.linalg.solve(stiffness, slope @ shape[..., np.newaxis])[..., 0]
-        energy = -np.einsum("mi,mij,mj->m", moved, slope, moved)
-        shape, sign = moved / np.sqrt(np.abs(energy))[:, np.newaxis], np.sign(energy)
-        w = np.abs(trial + sign * np.einsum("mi,mij,mj->m", shape, stiffness, shape))
-        rounding = ROUNDING * np.einsum("mi,mij,mj->m", np.abs(shape), np.abs(stiffness), np.abs(shape))
+        w, moved, energy = newton_step(trial, stiffness, slope, shape, np.linalg.solve)
+        w, sign, shape = np.abs(w), np.sign(-energy), moved / np.sqrt(np.abs(energy))[:, np.newaxis]
+        rounding = ROUNDING * quadratic(np.abs(stiffness), np.abs(shape))
         width = CERTAINTY * w + rounding
         if np.all(np.abs(w - previous) <= 1e-12 * w + rounding):
             break

@@ -14,8 +14,9 @@ from .model_picture import ModelPicture, model_picture
 from .model_state import ModelState, first_critical_speed, model_frf, model_state
 from .model_summary import ModelMode, ModelSummary, model_summary
 from .one_file.recorded_window import Window
+from .plant.light import Light
 from .programs import Advice, Setting, Verdict, Word
-from .standing import Light, SeriesStanding, Standing, unreadable
+from .standing import SeriesStanding, Standing, unreadable
 
 __all__ = [
     "ABOUT_DIRECTIONS",

@@ -19,6 +19,7 @@ from lobewatch.analysis.damage.usable import Result, UsableTaps
 from lobewatch.analysis.history import History, without_last_word
 from lobewatch.analysis.measurement import Fitted, Measurement
 from lobewatch.analysis.programs.advice import Advice, advise
+from lobewatch.analysis.programs.critical import is_missing, ruling_of
 from lobewatch.analysis.programs.verdict import Ruling, Verdict, judge
 from lobewatch.analysis.questions.accepting import accept
 from lobewatch.analysis.questions.clock import clock_questions
@@ -154,13 +155,13 @@ class Logbook:
         judged |= {table.name: judge(table, known[table.tool], self.machine) for table in missing}
         return [judged[table.name] for table in tables]
 
-    def rulings(self, tap_id: str) -> Mapping[str, Ruling]:
-        """Word and limit of every program as they were after a tap test; the history keeps them once asked for."""
+    def rulings(self, tap_id: str, falls: bool = False) -> Mapping[str, Ruling]:
+        """Word, limit and critical `falls` of every program after a tap test; the history keeps what was asked for."""
         number, rows = self.files.place(tap_id).number, list(self.history.rows)
         found = dict(rows[number].rulings or {})
-        names = [table.name for table in self.machine.program if table.name not in found]
+        names = [one.name for one in self.machine.program if is_missing(found.get(one.name), falls)]
         if names or rows[number].rulings is None:
-            found |= {one.program.name: one.ruling for one in self.verdicts(tap_id, names)}
+            found |= {one.program.name: ruling_of(one, falls) for one in self.verdicts(tap_id, names)}
             found = {table.name: found[table.name] for table in self.machine.program}
             rows[number] = replace(rows[number], rulings=found)
             self._history = replace(self.history, rows=tuple(rows))

@@ -7,60 +7,31 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
-from datetime import datetime, timedelta
-from enum import StrEnum
+from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 
 from acquisition import Remark
-from lobewatch.analysis.decay.fallen import about_fall, about_trend, fall_of, known_rows, trend_in
+from lobewatch.analysis.decay.fallen import about_fall, about_others, about_trend, fall_of, known_rows, trend_in
 from lobewatch.analysis.decay.trend import Trend
 from lobewatch.analysis.estimate import Estimate
 from lobewatch.analysis.history import History, Row
+from lobewatch.analysis.plant.light import (
+    LIGHTS,
+    UNREADABLE,
+    Light,
+    about_dates,
+    about_unreadable,
+    all_well,
+    days_left,
+    in_order,
+    light_of,
+    next_step,
+    of_files,
+)
 from lobewatch.analysis.programs.verdict import Word
 from lobewatch.analysis.questions.accepting import about_questions
-from lobewatch.analysis.questions.clock import CLOCK_QUESTIONS, about_future
 from lobewatch.machine import Machine
-
-
-class Light(StrEnum):
-    """Worst first."""
-
-    ALARM = "alarm"
-    UNKNOWN = "unknown"
-    """Damaged, unreadable or never tapped: nothing can be said."""
-    WARN = "warn"
-    GOOD = "good"
-
-
-LIGHTS = {
-    "frequency-alarm": Light.ALARM,
-    "decay": Light.ALARM,
-    "program-not-stable": Light.ALARM,
-    "unreadable": Light.UNKNOWN,
-    "never-tapped": Light.UNKNOWN,
-    "journal-damaged": Light.WARN,
-    "tap-damaged": Light.WARN,
-    "tap-unreadable": Light.WARN,
-    "tap-unlisted": Light.WARN,
-    "file-damaged": Light.WARN,
-    "frequency-warn": Light.WARN,
-    "decay-doubtful": Light.WARN,
-    "frequency-jump": Light.WARN,
-    "mode-lost": Light.WARN,
-    "no-mode-in-band": Light.WARN,
-    "no-mode-to-follow": Light.WARN,
-    "other-band": Light.WARN,
-    "stiffness-off-model": Light.WARN,
-    **dict.fromkeys(CLOCK_QUESTIONS, Light.WARN),
-    "tap-in-future": Light.WARN,
-    "overdue": Light.WARN,
-    "program-unknown": Light.WARN,
-    "program-doubtful": Light.WARN,
-    "frequency-rose": Light.GOOD,
-    "one-direction": Light.GOOD,
-}
-"""What each reason means, in order of harm."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +82,7 @@ class Standing:
     @property
     def light(self) -> Light:
         """That of the worst reason."""
-        return LIGHTS[self.remarks[0].code] if self.remarks else Light.GOOD
+        return light_of(self.remarks)
 
     def series_of(self, tool: str, direction: str) -> SeriesStanding | None:
         """How one series stands; None where there is none."""
@@ -120,16 +91,7 @@ class Standing:
 
 def unreadable(reason: str) -> Standing:
     """The standing of a machine whose files cannot be read."""
-    return _of([Remark("unreadable", "", reason)], "Put its files right: the sentence above says which.")
-
-
-def with_files(found: Standing, damage: Sequence[Remark]) -> Standing:
-    """The same with what else was found damaged in the folder."""
-    known = {(remark.code, remark.about) for remark in found.remarks}
-    new = [_of_files(remark) for remark in damage if (remark.code, remark.about) not in known]
-    if not new:
-        return found
-    return _of([*found.remarks, *new], found.next_step, found.series, found.last_tap, found.days_left)
+    return _of([about_unreadable(reason)], UNREADABLE)
 
 
 def stand(
@@ -153,25 +115,23 @@ def stand(
         return _of([Remark("never-tapped", "", f"no tap test {since}", cure)])
     pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
     series = [_series(history.series(*pair), machine, now, path, events) for pair in pairs]
-    left = machine.machine.tap_interval_days - (now - rows[-1].time) / timedelta(days=1)
+    newest, interval = rows[-1], machine.machine.tap_interval_days
     remarks = [remark for one in series for remark in one.remarks]
-    remarks += [_of_files(remark) for remark in files if remark.code in LIGHTS]
-    remarks += [asked for row in rows for asked in about_questions(row.tap_id, row.questions, path)]
+    remarks += [of_files(remark) for remark in files if remark.code in LIGHTS]
+    remarks += [asked for row in rows if row.questions for asked in about_questions(row.tap_id, row.questions, path)]
     remarks += [
         *_about_programs(rows, machine),
-        *_about_dates(left),
-        *about_future(rows[-1].tap_id, rows[-1].time, now, path),
+        *about_dates(newest.tap_id, newest.time, interval, now, path),
         *_about_directions(rows),
     ]
-    due = rows[-1].time + timedelta(days=math.floor(machine.machine.tap_interval_days))
     series.sort(key=lambda one: -one.fall.value if one.fall.is_known else math.inf)
-    return _of(remarks, f"All is well: tap again by {due:%Y-%m-%d}.", tuple(series), rows[-1].time, left)
+    left = days_left(newest.time, interval, now)
+    return _of(remarks, all_well(newest.time, interval), tuple(series), newest.time, left)
 
 
 def _of(remarks: Sequence[Remark], well: str = "", *others: object) -> Standing:
-    order = list(LIGHTS)
-    worst = sorted(remarks, key=lambda remark: order.index(remark.code))
-    return Standing(tuple(worst), worst[0].cure if worst and worst[0].cure else well, *others)  # type: ignore[arg-type]
+    worst = in_order(remarks)
+    return Standing(worst, next_step(worst, well), *others)  # type: ignore[arg-type]
 
 
 def _series(
@@ -182,6 +142,7 @@ def _series(
     trend = trend_in(rows, "frequency", now, events)
     remarks = [*_about_loss(name, rows[-1]), *about_fall(name, fall, machine.limits)]
     remarks += about_trend(name, trend, path) if trend else ()
+    remarks += about_others(name, rows, trend)
     return SeriesStanding(rows[-1].tool, rows[-1].direction, rows[-1].time, known[0].time, fall, trend, tuple(remarks))
 
 
@@ -189,11 +150,6 @@ def _about_loss(name: str, newest: Row) -> Iterator[Remark]:
     if not newest.frequency.is_known:
         cure = "Tap again: the mode that is followed was not found in the newest test."
         yield Remark("mode-lost", name, "the newest test does not show the mode followed", cure)
-
-
-def _of_files(remark: Remark) -> Remark:
-    """With a cure that can be the next step."""
-    return replace(remark, cure=f"{remark.about}: {remark.cure or remark.text}.")
 
 
 def _about_programs(rows: Sequence[Row], machine: Machine) -> Iterator[Remark]:
@@ -210,13 +166,6 @@ def _about_programs(rows: Sequence[Row], machine: Machine) -> Iterator[Remark]:
         elif ruling.word is Word.DOUBTFUL:
             cure = tap or "See with lobewatch check what would settle it, and where to go until then."
             yield Remark("program-doubtful", name, ruling.word.value, cure)
-
-
-def _about_dates(days_left: float) -> Iterator[Remark]:
-    if days_left < 0:
-        days = math.ceil(-days_left)
-        text = f"the next tap test is overdue by {days} day{'s' if days > 1 else ''}"
-        yield Remark("overdue", "", text, "Take the tap test that is due.")
 
 
 def _about_directions(rows: Sequence[Row]) -> Iterator[Remark]:

@@ -32,17 +32,20 @@ def event(
       lobewatch event mill-3 "coolant pump replaced" --date 2026-11-02T14:30:00
       lobewatch event mill-3 --withdraw e2
     """
+    from lobewatch.analysis import Logbook
     from lobewatch.machine import MachineFolder
     from lobewatch.machine.corrections.correct import add_event, withdraw_event
+    from lobewatch.notify.telling import telling
     from lobewatch.show.history.describe_history import event_json, event_text
 
     folder = MachineFolder(machine)
     if withdraw and (text or date or new_baseline):
         raise ValueError(f"--withdraw {withdraw}: takes neither TEXT nor --date nor --new-baseline; leave them out")
-    if withdraw:
-        gone = withdraw_event(folder, withdraw)
-        emit({"withdrawn": event_json(gone)}, as_json, f"withdrawn {event_text(gone)}")
-        return
-    found = add_event(folder, text, date, new_baseline)
-    next_step = ["tap next: all tests after it are compared with the first of them"] if new_baseline else []
-    emit({"event": event_json(found)}, as_json, f"saved {event_text(found)}", *next_step)
+    with telling(Logbook(folder)):
+        if withdraw:
+            gone = withdraw_event(folder, withdraw)
+            emit({"withdrawn": event_json(gone)}, as_json, f"withdrawn {event_text(gone)}")
+            return
+        found = add_event(folder, text, date, new_baseline)
+        next_step = ["tap next: all tests after it are compared with the first of them"] if new_baseline else []
+        emit({"event": event_json(found)}, as_json, f"saved {event_text(found)}", *next_step)

@@ -25,10 +25,12 @@ def exclude(
 
       lobewatch exclude mill-3 20261102T0914 --reason "wrong tool in the spindle"
     """
-    from lobewatch.machine import MachineFolder
+    from lobewatch.analysis import Logbook
     from lobewatch.machine.corrections.correct import exclude as take_out
+    from lobewatch.notify.telling import telling
 
-    folder = MachineFolder(machine)
-    found = take_out(folder, tap, reason)
-    payload = {"excluded": found.id, "reason": reason}
-    emit(payload, as_json, f"excluded {found.id}", f"back with: lobewatch include {folder.path} {found.id}")
+    logbook = Logbook.open(machine)
+    with telling(logbook):
+        found = take_out(logbook.folder, tap, reason)
+        payload = {"excluded": found.id, "reason": reason}
+        emit(payload, as_json, f"excluded {found.id}", f"back with: lobewatch include {machine} {found.id}")

@@ -22,8 +22,11 @@ def include(
 
       lobewatch include mill-3 20261102T0914
     """
-    from lobewatch.machine import MachineFolder
+    from lobewatch.analysis import Logbook
     from lobewatch.machine.corrections.correct import include as take_back
+    from lobewatch.notify.telling import telling
 
-    found = take_back(MachineFolder(machine), tap)
-    emit({"included": found.id}, as_json, f"included {found.id}: it counts again")
+    logbook = Logbook.open(machine)
+    with telling(logbook):
+        found = take_back(logbook.folder, tap)
+        emit({"included": found.id}, as_json, f"included {found.id}: it counts again")

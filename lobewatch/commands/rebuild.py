@@ -27,6 +27,7 @@ def rebuild(
     """
     from lobewatch.analysis import Logbook
     from lobewatch.machine.archive.rebuild import rebuild_files
+    from lobewatch.notify.telling import tell
     from lobewatch.show.measurements import remark_json, remark_lines
 
     told = rebuild_files(machine)
@@ -37,7 +38,10 @@ def rebuild(
         logbook.rulings(row.tap_id)
         if number % 10 == 0:
             notes.print(f"{number} of {len(rows)} tap tests")
+    if any(one.code == "history-in-memory" for one in logbook.remarks):
+        made = "history.rows: not made anew (see above); the next command that can write makes it"
+    else:
+        made = f"history.rows: made anew from {len(rows)} tap test(s)"
     payload = {"done": told, "tap_tests": len(rows), "remarks": [remark_json(one) for one in logbook.remarks]}
-    emit(
-        payload, as_json, *told, *remark_lines(logbook.remarks), f"history.rows: made anew from {len(rows)} tap test(s)"
-    )
+    emit(payload, as_json, *told, *remark_lines(logbook.remarks), made)
+    tell(logbook)

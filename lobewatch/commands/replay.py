@@ -82,6 +82,7 @@ def replay(
     from acquisition import Conditions
     from lobewatch.analysis import Logbook
     from lobewatch.analysis.replaying.found_files import found_files
+    from lobewatch.notify.telling import telling
     from lobewatch.show.replays.show_replay import show_preview, show_replay
 
     said = described(
@@ -102,5 +103,6 @@ def replay(
     logbook, (found, passed) = Logbook.open(machine), found_files(files)
     if dry_run:
         show_preview(logbook, found, passed, said, as_json=as_json)
-    else:
+        return
+    with telling(logbook):
         show_replay(logbook, found, passed, said, accept or (), jobs=jobs, keep_going=keep_going, as_json=as_json)

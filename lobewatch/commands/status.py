@@ -10,6 +10,9 @@ import typer
 from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit, results
 
+FOR_THE_PAGE = ("points", "limits")
+"""What only the dashboard draws; lobewatch trend and lobewatch export tell it in full."""
+
 
 def status(
     folder: Annotated[
@@ -28,13 +31,14 @@ def status(
       lobewatch status mills
       lobewatch status mills --due
     """
-    from lobewatch.analysis import Light
-    from lobewatch.screen.dashboard import Board, find_machines
-    from lobewatch.show.plant.describe_plant import plant_csv, plant_table
+    from lobewatch.analysis.plant.light import Light
+    from lobewatch.analysis.plant.plant import Plant, find_machines
+    from lobewatch.show.plant.describe_plant import plant_csv, plant_text
+    from lobewatch.show.plant.plant_rows import plant_rows
 
     if as_csv and as_json:
         raise ValueError("--csv and --json: give one of them")
-    rows = Board(find_machines(folder)).rows()
+    rows = plant_rows(Plant(find_machines(folder)).standings())
     shown = [row for row in rows if not due or row["days_left"] is None or row["days_left"] < 0]
     if as_csv:
         results.out(plant_csv(shown), end="", highlight=False)
@@ -42,5 +46,6 @@ def status(
         lights = [row["light"] for row in rows]
         counted = ", ".join(f"{lights.count(light)} {light.value}" for light in Light if light in lights)
         count = f"{len(rows)} machine{'s' if len(rows) > 1 else ''}: {counted}"
-        emit({"machines": shown}, as_json, plant_table(shown), count)
+        told = [{name: value for name, value in row.items() if name not in FOR_THE_PAGE} for row in shown]
+        emit({"machines": told}, as_json, "" if as_json else plant_text(shown, results.width), count)
     raise typer.Exit(int(any(row["light"] is Light.ALARM for row in rows)))

@@ -51,6 +51,7 @@ def tap(
     from lobewatch.analysis import Logbook
     from lobewatch.analysis.questions.accepting import not_asked
     from lobewatch.machine import MachineFolder
+    from lobewatch.notify.telling import tell
     from lobewatch.show.measurements import measurement_json, measurement_texts, program_texts, programs_json
     from lobewatch.show.printer import TapPrinter
     from lobewatch.show.terminal_screen import TerminalScreen
@@ -81,3 +82,4 @@ def tap(
         notes.print(not_asked(session.unasked, [done.id], logbook.questions), markup=False)
     payload = measurement_json(found, logbook) | {"programs": programs_json(logbook.verdicts())}
     emit(payload, as_json, *measurement_texts(found, logbook), *program_texts(logbook))
+    tell(logbook)

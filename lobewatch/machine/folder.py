@@ -28,6 +28,7 @@ from lobewatch.machine.archive.contents import (
 from lobewatch.machine.archive.journal import Journal, Reading, command
 from lobewatch.machine.archive.tap_entry import DamagedTapError, TapEntry
 from lobewatch.machine.machine_file import Machine, read_machine
+from lobewatch.machine.mark import mark_of
 from lobewatch.machine.named_folder import named_folder
 
 
@@ -79,9 +80,7 @@ class MachineFolder:
     @property
     def mark(self) -> tuple[int, ...]:
         """Changes with machine.toml, the journal, and the names in taps/."""
-        watched = (self.toml, self.journal.path, self.journal.copy, self.path / "taps")
-        found = [path.stat() for path in watched if path.exists()]
-        return tuple(number for one in found for number in (one.st_mtime_ns, one.st_size, one.st_ino))
+        return mark_of(self.path)
 
     @cached_property
     def _lock(self) -> FileLock:

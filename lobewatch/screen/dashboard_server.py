@@ -15,16 +15,16 @@ from aiohttp import web
 
 from acquisition import DataError, TapDirection
 from lobewatch.analysis import Logbook
+from lobewatch.analysis.plant.plant import Plant, find_machines
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.screen.dashboard import Board, find_machines
 from lobewatch.screen.guard import MAY_ALTER, OPEN, WATCH
 from lobewatch.screen.live_tests import LiveTest
+from lobewatch.screen.machine_list import machine_list
 from lobewatch.screen.pages import add_pages
 from lobewatch.screen.screen_server import add_session
 from lobewatch.screen.web_thread import WebThread
 from lobewatch.show.printer import Watched
 from lobewatch.show.report import render_report
-from lobewatch.tap.spool import interrupted_tests
 
 REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'none'; sandbox"
 """A report has its style in it, and no script."""
@@ -58,10 +58,10 @@ class DashboardServer(WebThread):
         self._machines = find_machines(Path(path))
         self._tests: dict[str, LiveTest] = {}
         self._reports: dict[str, tuple[str, str]] = {}
-        self._board = Board(self._machines)
-        self._board.rows()
+        self._plant = Plant(self._machines)
+        self._plant.standings()
         self._end = threading.Event()
-        self._verifier = threading.Thread(target=self._board.verify_until, args=(self._end,), daemon=True)
+        self._verifier = threading.Thread(target=self._plant.verify_until, args=(self._end,), daemon=True)
         add_pages(self.application, {"/": "dashboard.html", "/tap/{machine}/": "screen.html"})
         add_session(self.application, "/tap/{machine}/", self._find_test)
         router = self.application.router
@@ -92,7 +92,7 @@ class DashboardServer(WebThread):
         key = request.match_info["machine"]
         if key not in self._machines:
             raise web.HTTPNotFound(text="there is no such machine")
-        return key, MachineFolder(self._machines[key].path)
+        return key, MachineFolder(self._machines[key])
 
     def _find_test(self, request: web.Request) -> Watched:
         """The newest of a machine: a page that has watched one to its end sees the next."""
@@ -102,11 +102,10 @@ class DashboardServer(WebThread):
         return test
 
     async def _list(self, request: web.Request) -> web.Response:
-        rows = await asyncio.to_thread(self._board.rows)
         running = {key for key, test in self._tests.items() if test.running}
-        begun = await asyncio.to_thread(lambda: {key: _interrupted(folder) for key, folder in self._machines.items()})
-        machines = [row | {"running": row["key"] in running, "interrupted": begun[row["key"]]} for row in rows]
-        return web.json_response({"machines": machines, "may_alter": request[MAY_ALTER]})
+        known = request.query.get("known", "")
+        body = await asyncio.to_thread(machine_list, self._plant, running, request[MAY_ALTER], known)
+        return web.Response(body=body, content_type="application/json")
 
     async def _start(self, request: web.Request) -> web.Response:
         key, folder = self._find_machine(request)
@@ -132,13 +131,6 @@ class DashboardServer(WebThread):
             raise web.HTTPNotFound(text="this report is gone; open it from the list of machines")
         self.door.trust(request)
         return web.Response(text=html, content_type="text/html", headers={"Content-Security-Policy": REPORT_POLICY})
-
-
-def _interrupted(folder: MachineFolder) -> dict[str, int]:
-    try:
-        return interrupted_tests(MachineFolder(folder.path))
-    except (OSError, ValueError):
-        return {}  # the row says what is wrong
 
 
 def _render(folder: MachineFolder) -> str:

@@ -64,8 +64,11 @@ results = Terminal(highlight=False, soft_wrap=True, emoji=False, width=max(Conso
 def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
     """One JSON object (numbers that are not finite become null), or the texts and tables."""
     if as_json:
-        exact = json.dumps(_finite(payload), allow_nan=False, indent=2, ensure_ascii=False)
-        results.print(JSONHighlighter()(CONTROL.sub(_escaped, exact)), no_wrap=True, soft_wrap=True)
+        exact = CONTROL.sub(_escaped, json.dumps(_finite(payload), allow_nan=False, indent=2, ensure_ascii=False))
+        if results.is_terminal:
+            results.print(JSONHighlighter()(exact), no_wrap=True, soft_wrap=True)
+        else:
+            results.out(exact, highlight=False)
         return
     for text in texts:
         least = text.least_width if isinstance(text, Cells) else 0

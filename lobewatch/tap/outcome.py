@@ -5,8 +5,8 @@ from __future__ import annotations
 from acquisition import joined
 from dsm import plus_minus
 from lobewatch.analysis import Logbook, Measurement, SeriesStanding
+from lobewatch.analysis.plant.light import LIGHTS
 from lobewatch.analysis.questions.asked import open_questions
-from lobewatch.analysis.standing import LIGHTS
 from lobewatch.tap.state import Outcome
 
 

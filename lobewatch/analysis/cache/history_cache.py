@@ -8,6 +8,7 @@ from datetime import datetime
 from itertools import takewhile, zip_longest
 
 from acquisition import Remark
+from acquisition.errors import system_failure
 from lobewatch.analysis.cache.kept_rows import kept_aside
 from lobewatch.analysis.columns.stored_row import is_of_this_make, packed, unpacked
 from lobewatch.analysis.history import History, Row, empty_history
@@ -59,7 +60,8 @@ class HistoryCache:
             with self._folder.locked():
                 self._store(history)
         except (BusyError, OSError) as error:
-            text = f"not brought up to date on the disk, worked out in memory: {error}"
+            reason = system_failure(error) if isinstance(error, OSError) else str(error)
+            text = f"not brought up to date on the disk, worked out in memory: {reason}"
             return [Remark("history-in-memory", self._folder.history.name, text)]
         return []
 

@@ -6,7 +6,7 @@ Technology 35(4), with hinges beside the steps, one-sided.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -25,6 +25,7 @@ ROWS = 64
 
 Floats = NDArray[np.float64]
 Kind = Literal["step", "slope"]
+KINDS: tuple[Kind, ...] = ("step", "slope")
 
 
 class Fall(NamedTuple):
@@ -57,52 +58,93 @@ class Watch:
         return self.alarm_at is None and self.scores.size > 0 and bool(self.scores[-1] >= SURE)
 
 
+class Found(NamedTuple):
+    """The likeliest change in the points up to one of them."""
+
+    score: float
+    """How ill a steady series fits, as a quantile of the normal distribution."""
+    kind: Kind
+    """See Fall."""
+    point: int
+    """See Fall."""
+
+
 def calls_for_another(y: Floats, temperature: Floats) -> bool:
     """Whether the last point of a series (n,) is sure of a fall that the one before it was not."""
     if y.size < FIRST_JUDGED:
         return False
     last = np.arange(max(y.size - 2, FIRST_JUDGED - 1), y.size)
-    sure = [score >= SURE for score, _, _ in _best(base_of(y, temperature), last)]
+    sure = [found.score >= SURE for found in _best(base_of(y, temperature), last)[0]]
     return sure[-1] and not (len(sure) > 1 and sure[0])
 
 
+def newest_change(y: Floats) -> Fall | None:
+    """The fall, or with a negative size the rise, that the last two points (n,) are both sure of; None without one."""
+    if y.size <= FIRST_JUDGED:
+        return None
+    base = base_of(y)
+    for sign, found in zip((1, -1), _best(base, np.arange(y.size - 2, y.size)), strict=True):
+        if all(one.score >= SURE for one in found):
+            fall = _fall(base, found[-1], sign)
+            return fall._replace(size=sign * fall.size)
+    return None
+
+
 def watch(y: Floats, temperature: Floats | None = None) -> Watch:
-    """Judge a series (n,) point after point.
+    """Judge a series (n,) point after point: whether it falls.
 
     temperature: of the spindle (K or degC) at each point, NaN where it was not recorded; its influence is fitted along.
     """
-    base = base_of(y, temperature)
-    starts = range(FIRST_JUDGED - 1, y.size, ROWS)
-    best = [one for start in starts for one in _best(base, np.arange(start, min(start + ROWS, y.size)))]
-    scores = np.full(y.size, np.nan)
-    scores[FIRST_JUDGED - 1 :] = [score for score, _, _ in best]
+    return watch_both(y, temperature)[0]
+
+
+def watch_both(y: Floats, temperature: Floats | None = None) -> tuple[Watch, Watch]:
+    """The same, and of the mirror image: whether it rises."""
+    base, falls, rises = base_of(y, temperature), list[Found](), list[Found]()
+    for start in range(FIRST_JUDGED - 1, y.size, ROWS):
+        fallen, risen = _best(base, np.arange(start, min(start + ROWS, y.size)))
+        falls += fallen
+        rises += risen
+    return _watch(base, falls, 1), _watch(base, rises, -1)
+
+
+def _watch(base: Base, best: Sequence[Found], sign: int) -> Watch:
+    """sign: 1 for falls, -1 for rises."""
+    scores = np.full(base.y.size, np.nan)
+    scores[FIRST_JUDGED - 1 :] = [found.score for found in best]
     with np.errstate(invalid="ignore"):
         sure = scores >= SURE
     twice = np.flatnonzero(sure[1:] & sure[:-1]) + 1
     if not twice.size:
         return Watch(scores, None, None)
     at = int(twice[0])
-    _, kind, point = best[at - FIRST_JUDGED + 1]
-    return Watch(scores, at, _fall(base, kind, point))
+    return Watch(scores, at, _fall(base, best[at - FIRST_JUDGED + 1], sign))
 
 
-def _best(base: Base, last: NDArray[np.intp]) -> Iterator[tuple[float, Kind, int]]:
-    """Score, kind and index of the likeliest fall in the points up to each of these."""
+def _best(base: Base, last: NDArray[np.intp]) -> tuple[list[Found], list[Found]]:
+    """The likeliest fall, and the likeliest rise, in the points up to each of these."""
     n = last[:, np.newaxis] + 1
     k = np.arange(last[-1] + 1)
-    t = {}
-    for kind, allowed in (("step", (k >= 2) & (k <= n - 2)), ("slope", (k >= 1) & (k <= n - 3))):
-        beta, error = base.fit_change(kind, n, k)
-        t[kind] = np.where(allowed, -beta / error, -np.inf)
-    for row, index in enumerate(last):
-        likeliest: Kind = "step" if t["step"][row].max() >= t["slope"][row].max() else "slope"
-        point = int(np.argmax(t[likeliest][row]))
-        yield -float(ndtri(stdtr(index - 1, -t[likeliest][row, point]))), likeliest, point
+    allowed = {"step": (k >= 2) & (k <= n - 2), "slope": (k >= 1) & (k <= n - 3)}
+    lean = {kind: np.where(allowed[kind], base.lean(kind, n, k), np.nan) for kind in KINDS}
+    return _likeliest(base, n[:, 0], lean, -1), _likeliest(base, n[:, 0], lean, 1)
 
 
-def _fall(base: Base, kind: Kind, point: int) -> Fall:
-    n = base.y.size
-    beta, error = base.fit_change(kind, np.array([[n]]), np.array([point]))
+def _likeliest(base: Base, n: NDArray[np.intp], lean: Mapping[Kind, Floats], sign: int) -> list[Found]:
+    """The likeliest change of a sign in the first n (r,); lean: of each kind at each point, NaN where not allowed."""
+    rows = np.arange(n.size)
+    points = {kind: np.nanargmax(sign * lean[kind], axis=1) for kind in KINDS}
+    t = {kind: base.t_of(sign * lean[kind][rows, points[kind]], n) for kind in KINDS}
+    scores = -ndtri(stdtr(n - 2, -np.maximum(t["step"], t["slope"])))
+    kinds: list[Kind] = ["step" if fell else "slope" for fell in (t["step"] >= t["slope"]).tolist()]
+    return [
+        Found(score, kind, int(points[kind][row]))
+        for row, (score, kind) in enumerate(zip(scores.tolist(), kinds, strict=True))
+    ]
+
+
+def _fall(base: Base, found: Found, sign: int) -> Fall:
+    n, kind, point = base.y.size, found.kind, found.point
+    beta, error = base.fit_change(kind, n, point)
     length = n - 1 - point if kind == "slope" else 1
-    half_width = float(error[0, 0]) * length * float(stdtrit(n - 2, 0.975))
-    return Fall(kind, point, -float(beta[0, 0]) * length, half_width)
+    return Fall(kind, point, -sign * beta * length, error * length * float(stdtrit(n - 2, 0.975)))

@@ -8,11 +8,17 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 
+import numpy as np
+
 from acquisition import Remark
-from lobewatch.analysis.decay.trend import Tapped, Trend, trend_of
+from lobewatch.analysis.decay.change_point import newest_change
+from lobewatch.analysis.decay.trend import Tapped, Trend, points_of, trend_of
 from lobewatch.analysis.estimate import UNKNOWN, Estimate
 from lobewatch.analysis.history import Row
 from lobewatch.machine import Limits
+
+OTHERS = {"damping_ratio": "damping ratio", "stiffness": "stiffness K", "bearing_stiffness": "bearing stiffness"}
+"""Fields of a row that are watched beside the frequency, and what they are called."""
 
 
 def known_rows(rows: Sequence[Row], name: str) -> list[Row]:
@@ -44,10 +50,10 @@ def start(rows: Sequence[Row], name: str) -> Estimate:
         return UNKNOWN
     first: Estimate = getattr(known[0], name)
     found = trend_in(rows, name, known[-1].time)
-    if found is None or (found.forecast is None and name != "frequency"):
+    if found is None or (found.past is None and name != "frequency"):
         return first
     value = found.first * math.exp(found.start / 100)
-    return Estimate(value, first.std if found.forecast is None else value * found.spread / 100)
+    return Estimate(value, first.std if found.past is None else value * found.spread / 100)
 
 
 def change_since_start(rows: Sequence[Row], name: str) -> Estimate:
@@ -95,6 +101,25 @@ def about_trend(name: str, trend: Trend, path: Path | str = "MACHINE") -> Iterat
         rise = trend.rise.fall
         text = f"frequency rose by {_relative(-rise.size, rise.half_width)}: assembly changed?"
         yield Remark("frequency-rose", name, text, f"If so: {event} --new-baseline")
+
+
+def about_others(name: str, rows: Sequence[Row], trend: Trend | None) -> Iterator[Remark]:
+    """What the watch over damping ratio, stiffness and bearing stiffness has found: remarks alone.
+
+    trend: of the frequency; where that has changed, the bearing stiffness that follows from it says nothing more.
+    """
+    known = trend is not None and (trend.watch.fall or trend.rise.fall)
+    for field, word in OTHERS.items():
+        if known and field == "bearing_stiffness":
+            continue
+        taps = [_tapped(row, field) for row in known_rows(rows, field) if getattr(row, field).value > 0]
+        points = points_of(taps) if taps else ()
+        change = newest_change(np.array([point.percent for point in points]))
+        if change is not None:
+            since = f"{points[change.point].time:%Y-%m-%d}"
+            verbs = ("fell", "falling") if change.size > 0 else ("rose", "rising")
+            how = f"{verbs[0]} at once before" if change.kind == "step" else f"has been {verbs[1]} since"
+            yield Remark("value-changed", name, f"{word} {how} {since}, by {_relative(change.size, change.half_width)}")
 
 
 def _relative(fall: float, half_width: float) -> str:

@@ -7,15 +7,16 @@ numbers.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtr
+from scipy.special import stdtr, stdtrit
 
-from lobewatch.analysis.decay.temperature import base_of
+from lobewatch.analysis.decay.temperature import Fits, base_of
 
 ENOUGH = 8
 """Points from which on anything is foretold."""
@@ -30,6 +31,10 @@ LOOKS = 241
 
 LIGHTEST = 1e-7
 """Weight beside the heaviest below which a shape is left out."""
+STEP = 1e-6
+"""Of the span, over which a rate is taken."""
+SURELY = (0.025, 0.975)
+"""Probabilities of the interval of a rate."""
 HALVINGS = 40
 """Of the range in which a quantile is looked for."""
 
@@ -47,6 +52,10 @@ class Shape(NamedTuple):
     """Date from which on it falls, or on which it fell."""
     accelerates: bool = False
     """Of a curve; else it slows down."""
+    rate: float = 0.0
+    """Of an exponential curve, over the span of the series; 0 of others."""
+    power: float = 0.0
+    """Of a power curve; 0 of others."""
 
 
 class Reached(NamedTuple):
@@ -58,6 +67,17 @@ class Reached(NamedTuple):
     """At 50 %."""
     latest: float
     """At 90 %."""
+
+
+class Rate(NamedTuple):
+    """How fast a series changes at its last point, in its unit for one of its dates."""
+
+    value: float
+    """Mean of the mixture; negative where it falls."""
+    low: float
+    """2.5 % quantile."""
+    high: float
+    """97.5 % quantile."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,33 +146,99 @@ def forecast(
     temperature: at each point (K or degC), NaN where it was not recorded; now: if that is later than the last point.
     ValueError below 8 points and without a span.
     """
+    return past(dates, y, temperature).ahead(horizon, now)
+
+
+@dataclass(frozen=True, eq=False)
+class Past:
+    """A series with all shapes that it allows fitted to it: what of a forecast does not hang on the day it is made."""
+
+    shapes: tuple[Shape, ...]
+    """As in Forecast, the dates counted from the first point on."""
+    weight: Floats
+    """As in Forecast."""
+    spread: float
+    """As in Forecast."""
+    fitted: Floats
+    """As in Forecast."""
+    fits: Fits
+    """Of the shapes."""
+    dates: Floats
+    """Of the points, shape (n,)."""
+    first: float
+    """Value of the first point."""
+
+    def ahead(self, horizon: float, now: float = -np.inf) -> Forecast:
+        """What may become of it until a date; now: if that is later than the last point."""
+        begin, span = float(self.dates[0]), float(self.dates[-1] - self.dates[0])
+        start = min(max(span, now - begin), 3 * span)
+        at = np.linspace(start, max(min(horizon - begin, 3 * span), start), LOOKS)
+        mean, error = self.fits.at(np.array([_course(shape, at, span) for shape in self.shapes]))
+        moved = tuple(shape._replace(start=shape.start + begin) for shape in self.shapes)
+        fits = self.fits
+        return Forecast(
+            moved, self.weight, self.spread, self.fitted, begin + at, mean + self.first, error, fits.freedom
+        )
+
+    @property
+    def rate(self) -> Rate:
+        """How fast it changes at its last point."""
+        span = float(self.dates[-1] - self.dates[0])
+        near = np.array([_course(shape, np.array([span - STEP * span, span]), span) for shape in self.shapes])
+        rate, error = self.fits.rate(np.diff(near)[:, 0] / (STEP * span))
+        low, high = (_quantile(self.weight, rate, error, self.fits.freedom, p) for p in SURELY)
+        return Rate(float(self.weight @ rate), low, high)
+
+
+def past(dates: Floats, y: Floats, temperature: Floats | None = None) -> Past:
+    """Fit all shapes to a series; arguments and errors as those of `forecast`."""
     at = dates - dates[:1].sum()
     if y.size < ENOUGH or at[-1] <= 0:
         raise ValueError(f"{y.size} points on {np.unique(at).size} dates: a forecast needs {ENOUGH}")
-    farthest = 3 * at[-1]
-    start = min(max(at[-1], now - dates[0]), farthest)
-    ahead = np.linspace(start, max(min(horizon - dates[0], farthest), start), LOOKS)
-    base = base_of(y, temperature)
-    shapes, columns = zip(*_shapes(at, np.concatenate([at, ahead])), strict=True)
-    rss, mean, error = base.fit_columns(np.array(columns), at.size)
-    kinds = np.array([shape.kind for shape in shapes])
-    share = {kind: np.log(np.sum(kinds == kind)) + np.log(y.size) / 2 * (kind != "none") for kind in KINDS}
-    log = -base.freedom / 2 * np.log(rss) - [share[kind] for kind in kinds]
+    shapes = [*_shapes(at)]
+    columns = np.array([_course(shape, at, float(at[-1])) for shape in shapes])
+    fits = base_of(y, temperature).fit_columns(columns)
+    counts = Counter(shape.kind for shape in shapes)
+    share = {kind: np.log(counts[kind]) + np.log(y.size) / 2 * (kind != "none") for kind in counts}
+    log = -fits.freedom / 2 * np.log(fits.rss) - [share[shape.kind] for shape in shapes]
     weight = np.exp(log - log.max())
     kept = np.flatnonzero(weight > LIGHTEST)
-    weight = weight[kept] / weight[kept].sum()
-    moved = tuple(shapes[j]._replace(start=shapes[j].start + float(dates[0])) for j in kept)
-    spread = float(np.sqrt(weight @ rss[kept] / base.freedom))
-    past, mean = np.split(mean[kept] + y[0], [at.size], axis=1)
-    return Forecast(moved, weight, spread, weight @ past, dates[0] + ahead, mean, error[kept, at.size :], base.freedom)
+    weight, fits = weight[kept] / weight[kept].sum(), fits.some(kept)
+    spread = float(np.sqrt(weight @ fits.rss / fits.freedom))
+    fitted = fits.mixed(weight, columns[kept]) + y[0]
+    return Past(tuple(shapes[j] for j in kept), weight, spread, fitted, fits, dates, float(y[0]))
 
 
-def _shapes(at: Floats, all_dates: Floats) -> Iterator[tuple[Shape, Floats]]:
-    """All that are tried, and how each runs over all dates; both count from the first point on."""
-    span = at[-1]
-    yield Shape("none", 0.0), np.zeros(all_dates.size)
-    yield Shape("line", 0.0), all_dates
-    yield from ((Shape("slope", float(one)), np.maximum(all_dates - one, 0.0)) for one in at[1:-3])
-    yield from ((Shape("step", float(one)), (all_dates >= one).astype(np.float64)) for one in at[2:-1])
-    yield from ((Shape("curve", 0.0, rate > 0), np.expm1(rate * all_dates / span)) for rate in RATES)
-    yield from ((Shape("curve", 0.0, True), (all_dates / span) ** power) for power in POWERS)
+def _quantile(weight: Floats, middle: Floats, error: Floats, freedom: int, p: float) -> float:
+    """Of a mixture of Student's t, where an error of 0 is a value that is certain."""
+    reach = stdtrit(freedom, 1 - LIGHTEST) * error
+    low, high = float((middle - reach).min()), float((middle + reach).max())
+    for _ in range(HALVINGS):
+        value = (low + high) / 2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            below = np.where(error > 0, stdtr(freedom, (value - middle) / error), middle <= value)
+        low, high = (value, high) if weight @ below < p else (low, value)
+    return high
+
+
+def _shapes(at: Floats) -> Iterator[Shape]:
+    """All that are tried; dates count from the first point on."""
+    yield Shape("none", 0.0)
+    yield Shape("line", 0.0)
+    yield from (Shape("slope", one) for one in at[1:-3].tolist())
+    yield from (Shape("step", one) for one in at[2:-1].tolist())
+    yield from (Shape("curve", 0.0, rate > 0, rate=rate) for rate in RATES)
+    yield from (Shape("curve", 0.0, True, power=power) for power in POWERS)
+
+
+def _course(shape: Shape, at: Floats, span: float) -> Floats:
+    """How a shape runs over dates that count from the first point on; span: of the series."""
+    if shape.kind == "none":
+        return np.zeros(at.size)
+    if shape.kind == "step":
+        return (at >= shape.start).astype(np.float64)
+    if shape.rate:
+        return np.asarray(np.expm1(shape.rate * at / span))
+    if shape.power:
+        return np.asarray((at / span) ** shape.power)
+    return np.maximum(at - shape.start, 0.0) if shape.kind == "slope" else at

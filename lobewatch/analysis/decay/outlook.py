@@ -11,8 +11,8 @@ from acquisition import DataError
 from lobewatch.analysis.decay.forecast import Reached
 from lobewatch.analysis.decay.trend import Trend
 from lobewatch.analysis.logbook import Logbook
-from lobewatch.analysis.programs.critical import CriticalFall, critical_fall
-from lobewatch.analysis.programs.verdict import Verdict
+from lobewatch.analysis.programs.critical import critical_fall
+from lobewatch.analysis.programs.verdict import CriticalFall
 from lobewatch.analysis.standing import SeriesStanding, Standing
 
 ALREADY = Reached(-math.inf, -math.inf, -math.inf)
@@ -58,18 +58,27 @@ def outlook(logbook: Logbook, now: datetime | None = None) -> Outlook:
     fixed = logbook.machine.limits
     percents = (fixed.frequency_warn_percent, fixed.frequency_alarm_percent)
     series = [one.trend for one in standing.series if one.trend is not None]
+    falls = logbook.from_the_rest(lambda: _critical_falls(logbook))
     return Outlook(
         standing,
-        {one.program.name: _fate(one, standing.series) for one in logbook.verdicts()},
-        {percent: _first(_of_limit(trend, percent) for trend in series) for percent in percents},
+        {one.name: _fate(falls[one.name], one.tool, standing.series) for one in logbook.machine.program},
+        {percent: _first(of_limit(trend, percent) for trend in series) for percent in percents},
     )
 
 
-def _fate(found: Verdict, series: Sequence[SeriesStanding]) -> Fate:
-    critical = critical_fall(found)
-    if found.assembly is None or math.isnan(critical.not_stable):
+def _critical_falls(logbook: Logbook) -> Mapping[str, CriticalFall]:
+    """By program; kept in the history where there is a tap test to keep them with."""
+    history = logbook.history
+    if not history.current:
+        return {one.program.name: critical_fall(one) for one in logbook.verdicts()}
+    kept = logbook.rulings(history.rows[-1].tap_id, falls=True)
+    return {name: ruling.critical for name, ruling in kept.items() if ruling.critical is not None}
+
+
+def _fate(critical: CriticalFall, tool: str, series: Sequence[SeriesStanding]) -> Fate:
+    if math.isnan(critical.not_stable):
         return Fate(critical, None, None)
-    own = [one for one in series if one.tool == found.assembly.tool] or series
+    own = [one for one in series if one.tool == tool] or series
     trends = [one.trend for one in own if one.trend is not None]
     doubtful = _first(_after(trend, critical.doubtful, 0.0) for trend in trends)
     return Fate(critical, doubtful, _first(_after(trend, critical.not_stable, critical.error) for trend in trends))
@@ -90,7 +99,8 @@ def _after(trend: Trend, fall: float, error: float) -> Reached | None:
     return trend.forecast.reached(level, 100 * error / (1 - fall))
 
 
-def _of_limit(trend: Trend, percent: float) -> Reached | None:
+def of_limit(trend: Trend, percent: float) -> Reached | None:
+    """When a series has fallen by so much (%) from where it started; None where it cannot be told."""
     if trend.forecast is None or trend.is_stale:
         return None
     return trend.forecast.reached(trend.start + 100 * math.log1p(-percent / 100))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,58 +42,132 @@ class Base:
             known[:, 1, 1] = np.maximum(squares[n] / (2 * (n - 1)), TINY) / STEEL**2
         return known
 
-    def fit_change(self, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> tuple[Floats, Floats]:
-        """Size and standard error of a "step" or "slope" (a point) from each point k (m,) on in the first n (r, 1).
+    def lean(self, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> Floats:
+        """Root of the sum of squares that a "step" or "slope" from each point k (m,) on explains in the first n (r, 1).
 
-        Shape (r, m) each; without meaning where k leaves no points before or after the change.
+        With the sign of the change; shape (r, m). Without meaning where k leaves no points before or after the change.
         """
-        rows = n[:, 0]
-        values = np.column_stack([self.y, self.columns])
-        length, tail = n - k, _sums(values)[n] - _sums(values)[k]
-        square: NDArray[np.float64] = length.astype(np.float64)
-        if kind == "slope":
-            moments = _sums(np.arange(self.y.size)[:, np.newaxis] * values)
-            tail = moments[n] - moments[k] - k[:, np.newaxis] * tail
-            square = (length - 1.0) * length * (2 * length - 1.0) / 6
-        outer = _sums(np.einsum("ni,nj->nij", values, values))[rows]
-        gram = outer[:, 1:, 1:] + self.precision(rows)
-        level = np.linalg.solve(gram, outer[:, 1:, :1])
-        product = tail[..., 0] - (tail[..., 1:] @ level)[..., 0]
-        square = square - (tail[..., 1:] @ np.linalg.inv(gram) * tail[..., 1:]).sum(axis=-1)
-        total = outer[:, 0, 0] - (outer[:, 0, 1:] * level[..., 0]).sum(axis=1)
+        product, square = self._change(kind, n, k)
         with np.errstate(invalid="ignore", divide="ignore"):
-            size = product / square
-            left = np.maximum(
-                total[:, np.newaxis] - size * product, LEAST * total[:, np.newaxis] + np.finfo(float).tiny
-            )
-            return np.nan_to_num(size), np.sqrt(np.nan_to_num(left / (n - 2) / square, nan=1.0))
+            return np.asarray(product / np.sqrt(square))
+
+    def t_of(self, lean: Floats, n: NDArray[np.intp]) -> Floats:
+        """Student's t of changes that explain so much in the first n, shape (r,) each."""
+        total = self._total(n)
+        left = np.maximum(total - lean**2, LEAST * total + np.finfo(float).tiny)
+        return np.asarray(lean / np.sqrt(left / (n - 2)))
+
+    def fit_change(self, kind: str, n: int, k: int) -> tuple[float, float]:
+        """Size and standard error of a "step" or "slope" (a point) from a point k on in the first n."""
+        until = np.array([n])
+        product, square = (float(one[0, 0]) for one in self._change(kind, until[:, np.newaxis], np.array([k])))
+        size, total = product / square, float(self._total(until)[0])
+        left = max(total - size * product, LEAST * total + np.finfo(float).tiny)
+        return size, float(np.sqrt(left / (n - 2) / square))
+
+    def _change(self, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> tuple[Floats, Floats]:
+        """Of the column of a change with the series and with itself, what the base leaves of both."""
+        sums, length = self._sums, n - k
+        tail: Floats = sums[:, n] - sums[:, k][:, np.newaxis]
+        square: Floats = length.astype(np.float64)
+        if kind == "slope":
+            moments = self._moments
+            tail = moments[:, n] - moments[:, k][:, np.newaxis] - k * tail
+            square = (length - 1.0) * length * (2 * length - 1.0) / 6
+        inverse, level = self._levels(n[:, 0])
+        p = self.columns.shape[1]
+        product = tail[0].copy()
+        for i in range(p):
+            product -= tail[1 + i] * level[:, i, np.newaxis]
+            for j in range(p):
+                square = square - inverse[:, i, j, np.newaxis] * tail[1 + i] * tail[1 + j]
+        return product, square
+
+    def _levels(self, n: NDArray[np.intp]) -> tuple[Floats, Floats]:
+        """Inverse (r, p, p) of the normal matrix of the base in the first n (r,), and its coefficients (r, p)."""
+        inverse: Floats = np.asarray(np.linalg.inv(self._outer[n, 1:, 1:] + self.precision(n)), np.float64)
+        return inverse, (inverse @ self._outer[n, 1:, :1])[..., 0]
+
+    def _total(self, n: NDArray[np.intp]) -> Floats:
+        """Sum of squares that the base leaves in the first n, shape (r,)."""
+        return np.asarray(self._outer[n, 0, 0] - (self._outer[n, 0, 1:] * self._levels(n)[1]).sum(axis=1))
+
+    @cached_property
+    def _values(self) -> Floats:
+        return np.column_stack([self.y, self.columns])
+
+    @cached_property
+    def _sums(self) -> Floats:
+        return _summed(self._values).T
+
+    @cached_property
+    def _moments(self) -> Floats:
+        return _summed(np.arange(self.y.size)[:, np.newaxis] * self._values).T
+
+    @cached_property
+    def _outer(self) -> Floats:
+        return _summed(np.einsum("ni,nj->nij", self._values, self._values))
 
     @property
     def freedom(self) -> int:
         """Degrees of freedom once a shape is fitted: the temperature costs none, its influence is known beforehand."""
         return self.y.size - 2
 
-    def fit_columns(self, columns: Floats, n: int) -> tuple[Floats, Floats, Floats]:
-        """Sum of squares (j,) that each column (j, n + d) leaves in the first n, its mean and its error in all.
-
-        Mean and error of shape (j, n + d), at the mean temperature.
-        """
-        inner = columns[:, :n]
-        gram = np.linalg.inv(self.columns.T @ self.columns + self.precision(np.array([n]))[0])
+    def fit_columns(self, columns: Floats) -> Fits:
+        """Each of some columns (j, n) fitted beside the base, one at a time."""
+        gram = np.linalg.inv(self.columns.T @ self.columns + self.precision(np.array([self.y.size]))[0])
         level = gram @ self.columns.T @ self.y
-        leaning = inner @ self.columns @ gram
-        product = inner @ (self.y - self.columns @ level)
-        square = (inner**2).sum(axis=1) - (leaning * (inner @ self.columns)).sum(axis=1)
+        crossed = columns @ self.columns
+        leaning = crossed @ gram
+        product = columns @ (self.y - self.columns @ level)
+        square = np.einsum("jn,jn->j", columns, columns) - (leaning * crossed).sum(axis=1)
         square = np.where(square > 0, square, np.inf)
         total = self.y @ (self.y - self.columns @ level)
         size = product / square
         rss = np.maximum(total - size * product, LEAST * total + np.finfo(float).tiny)
-        away = columns - leaning[:, :1]
-        variance = (gram[0, 0] + away**2 / square[:, np.newaxis]) * (rss / self.freedom)[:, np.newaxis]
-        return rss, level[0] + size[:, np.newaxis] * away, np.sqrt(variance)
+        return Fits(rss, size, square, leaning[:, 0], float(level[0]), float(gram[0, 0]), self.freedom)
 
 
-def _sums(values: Floats) -> Floats:
+class Fits(NamedTuple):
+    """Columns fitted one at a time."""
+
+    rss: Floats
+    """Sum of squares that each leaves, shape (j,)."""
+    size: Floats
+    """Of each, shape (j,)."""
+    square: Floats
+    """Of each, what the base leaves of it, shape (j,)."""
+    leaning: Floats
+    """Of each on the level of the base, shape (j,)."""
+    level: float
+    """Of the base, at the mean temperature."""
+    flat: float
+    """Variance of the level, that of a point being 1."""
+    freedom: int
+    """Degrees of freedom."""
+
+    def some(self, which: NDArray[np.intp]) -> Fits:
+        """Some of the columns."""
+        rss, size, square, leaning = (one[which] for one in self[:4])
+        return Fits(rss, size, square, leaning, self.level, self.flat, self.freedom)
+
+    def at(self, columns: Floats) -> tuple[Floats, Floats]:
+        """Mean and standard error of the series where the columns have other values (j, d), shape (j, d) each."""
+        away = columns - self.leaning[:, np.newaxis]
+        variance = (self.flat + away**2 / self.square[:, np.newaxis]) * (self.rss / self.freedom)[:, np.newaxis]
+        return self.level + self.size[:, np.newaxis] * away, np.sqrt(variance)
+
+    def mixed(self, weight: Floats, columns: Floats) -> Floats:
+        """The means alone, each with its weight (j,), shape (d,)."""
+        sizes = weight * self.size
+        return np.asarray(self.level * weight.sum() - sizes @ self.leaning + sizes @ columns)
+
+    def rate(self, slopes: Floats) -> tuple[Floats, Floats]:
+        """How fast the series changes, and the standard error of that, where the columns do so (j,)."""
+        return self.size * slopes, np.abs(slopes) * np.sqrt(self.rss / self.freedom / self.square)
+
+
+def _summed(values: Floats) -> Floats:
     return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
 
 

@@ -6,20 +6,23 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from statistics import median
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.analysis.decay.change_point import Watch, calls_for_another, watch
-from lobewatch.analysis.decay.forecast import ENOUGH, Forecast, forecast
+from lobewatch.analysis.decay.change_point import Watch, calls_for_another, watch_both
+from lobewatch.analysis.decay.forecast import ENOUGH, Forecast, Past, Rate, past
 
 TOGETHER = timedelta(hours=24)
 """Tap tests within so long are one point."""
 MOST = 1000
 """The newest points, which alone are judged: the work grows with the square of their number."""
-HORIZON_DAYS = 36 * 30.44
+MONTH = 30.44
+"""Days."""
+HORIZON_DAYS = 36 * MONTH
 """Nothing is foretold for later."""
 
 Floats = NDArray[np.float64]
@@ -61,16 +64,44 @@ class Trend:
     """Oldest first; one at least."""
     first: float
     """The value that the percents are of: that of the first tap test."""
-    watched: int
-    """Point from which on it is watched: the first after the event that ended the last alarm."""
-    watch: Watch
-    """Of the points from there on."""
-    rise: Watch
-    """The same of the mirror image."""
-    forecast: Forecast | None
-    """Over days since 1970; None below 8 points."""
+    past: Past | None
+    """The shapes that it allows, over days since 1970; None below 8 points."""
     today: int
     """Day since 1970 that it is judged on."""
+    events: tuple[datetime, ...] = ()
+    """An event after an alarm ends that alarm."""
+
+    @property
+    def watched(self) -> int:
+        """Point from which on it is watched: the first after the event that ended the last alarm."""
+        return self._judged[0]
+
+    @property
+    def watch(self) -> Watch:
+        """Of the points from there on."""
+        return self._judged[1]
+
+    @property
+    def rise(self) -> Watch:
+        """The same of the mirror image."""
+        return self._judged[2]
+
+    @cached_property
+    def _judged(self) -> tuple[int, Watch, Watch]:
+        points, watched = self.points, 0
+        y, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
+        while True:
+            fall, rise = watch_both(y[watched:], warmth[watched:])
+            at = None if fall.alarm_at is None else points[watched + fall.alarm_at].time
+            ended = [] if at is None else [event for event in self.events if event > at]
+            if not ended:
+                return watched, fall, rise
+            watched = sum(point.time < ended[0] for point in points)
+
+    @cached_property
+    def forecast(self) -> Forecast | None:
+        """Over days since 1970; None below 8 points."""
+        return None if self.past is None else self.past.ahead(self.today + HORIZON_DAYS, self.today)
 
     @property
     def start(self) -> float:
@@ -79,8 +110,8 @@ class Trend:
         A first test clamped badly must not hide a fall for ever, and a mean of the first ones would hide that of a
         spindle that falls from the beginning.
         """
-        if self.forecast is not None:
-            return float(self.forecast.fitted[:ENOUGH].max())
+        if self.past is not None:
+            return float(self.past.fitted[:ENOUGH].max())
         return max(point.percent for point in self.points[:3])
 
     @property
@@ -91,7 +122,12 @@ class Trend:
     @property
     def spread(self) -> float:
         """Standard deviation from point to point around the fitted line (%); 0 while it is not known."""
-        return 0.0 if self.forecast is None else self.forecast.spread
+        return 0.0 if self.past is None else self.past.spread
+
+    @property
+    def rate(self) -> Rate | None:
+        """Change in % a month now, with its 95 % interval; None below 8 points."""
+        return None if self.past is None else Rate(*(MONTH * one for one in self.past.rate))
 
     @property
     def fallen_since(self) -> datetime | None:
@@ -104,30 +140,27 @@ def trend_of(series: Sequence[Tapped], now: datetime, events: Sequence[datetime]
 
     Foretold from the day of `now` on; the same for all of a day.
     """
-    return _trend(tuple(series), int(day(now)), tuple(events))
+    points = points_of(series)
+    return Trend(points, series[0].value, _past(points), int(day(now)), tuple(events))
+
+
+def points_of(series: Sequence[Tapped]) -> tuple[Point, ...]:
+    """The newest points of a series, oldest first."""
+    return _newest_points(tuple(series))
 
 
 @lru_cache(maxsize=1024)
-def _trend(series: tuple[Tapped, ...], today: int, events: tuple[datetime, ...]) -> Trend:
-    points = _points(series)[-MOST:]
-    y = np.array([point.percent for point in points])
-    warmth = np.array([point.temperature for point in points])
-    watched = 0
-    while True:
-        found = watch(y[watched:], warmth[watched:])
-        ended = [] if found.alarm_at is None else [at for at in events if at > points[watched + found.alarm_at].time]
-        if not ended:
-            break
-        watched = sum(point.time < ended[0] for point in points)
-    return Trend(
-        tuple(points),
-        series[0].value,
-        watched,
-        found,
-        watch(-y[watched:], warmth[watched:]),
-        _forecast(points, today),
-        today,
-    )
+def _newest_points(series: tuple[Tapped, ...]) -> tuple[Point, ...]:
+    return tuple(_points(series)[-MOST:])
+
+
+@lru_cache(maxsize=1024)
+def _past(points: tuple[Point, ...]) -> Past | None:
+    """Of the same points the same, whatever the day and the events."""
+    if len(points) < ENOUGH:
+        return None
+    y, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
+    return past(np.array([day(point.time) for point in points]), y, warmth)
 
 
 def _points(series: Sequence[Tapped]) -> list[Point]:
@@ -149,18 +182,10 @@ def _calls_for_another(points: Sequence[Point]) -> bool:
 
 def _point(series: Sequence[Tapped], group: Sequence[int]) -> Point:
     percents = [100 * math.log(series[i].value / series[0].value) for i in group]
-    middle = np.median(percents) if len(group) > 2 else np.mean(percents)
+    middle = median(percents)  # of two their mean
     error = math.sqrt(sum(series[i].error ** 2 for i in group)) / len(group)
     warm = [series[i].temperature for i in group if math.isfinite(series[i].temperature)]
-    return Point(series[group[0]].time, float(middle), error, float(np.mean(warm)) if warm else math.nan, tuple(group))
-
-
-def _forecast(points: Sequence[Point], today: int) -> Forecast | None:
-    dates = np.array([day(point.time) for point in points])
-    if dates.size < ENOUGH:
-        return None
-    y, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
-    return forecast(dates, y, today + HORIZON_DAYS, warmth, today)
+    return Point(series[group[0]].time, middle, error, sum(warm) / len(warm) if warm else math.nan, tuple(group))
 
 
 def day(time: datetime) -> float:

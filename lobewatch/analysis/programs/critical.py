@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from lobewatch.analysis.programs.aging import FALLS, StiffnessAt, aged, softening, tolerable_decay
 from lobewatch.analysis.programs.drawn import Drawn
-from lobewatch.analysis.programs.verdict import Verdict, Word
+from lobewatch.analysis.programs.verdict import CriticalFall, Ruling, Verdict, Word
 
 STEP = 0.0125
 """Of the fall, at which all draws are looked at."""
@@ -20,17 +19,6 @@ HALVINGS = 4
 """Between the two looks at which the first of them chatters."""
 NEIGHBOURS = 12
 """Draws of damping and stiffness that the error of the fall comes from."""
-
-
-class CriticalFall(NamedTuple):
-    """Falls of the frequency of today, relative; 0 where the word has changed already, inf where none changes it."""
-
-    doubtful: float
-    """Up to which it stays stable; NaN where it could not be checked."""
-    not_stable: float
-    """Up to which it stays stable in the middle of the doubt; NaN where it could not be checked."""
-    error: float
-    """Standard error of the latter, by damping and stiffness as they scatter from tap test to tap test."""
 
 
 def critical_fall(found: Verdict) -> CriticalFall:
@@ -46,6 +34,16 @@ def critical_fall(found: Verdict) -> CriticalFall:
     return CriticalFall(
         min(first, last), last, _error(found.drawn, depth, last, stiffness_at) if last < math.inf else 0.0
     )
+
+
+def ruling_of(found: Verdict, falls: bool) -> Ruling:
+    """What the history keeps of a verdict; falls: with the critical ones, which take as long as the verdict itself."""
+    return found.ruling._replace(critical=critical_fall(found)) if falls else found.ruling
+
+
+def is_missing(ruling: Ruling | None, falls: bool) -> bool:
+    """Whether a program has to be judged to know its ruling; falls: with the critical ones."""
+    return ruling is None or (falls and ruling.critical is None)
 
 
 def _first_doubt(drawn: Drawn, depth: float, last: float, stiffness_at: StiffnessAt) -> float:

@@ -38,6 +38,17 @@ class Word(StrEnum):
     """It could not be checked; a remark says why."""
 
 
+class CriticalFall(NamedTuple):
+    """Falls of the frequency of today, relative; 0 where the word has changed already, inf where none changes it."""
+
+    doubtful: float
+    """Up to which it stays stable; NaN where it could not be checked."""
+    not_stable: float
+    """Up to which it stays stable in the middle of the doubt; NaN where it could not be checked."""
+    error: float
+    """Standard error of the latter, by damping and stiffness as they scatter from tap test to tap test."""
+
+
 class Ruling(NamedTuple):
     """What the history keeps of a verdict."""
 
@@ -45,6 +56,8 @@ class Ruling(NamedTuple):
     """See Word."""
     limit: float
     """Deepest stable depth at the program's speed in the middle of the doubt (m); NaN where it is not known."""
+    critical: CriticalFall | None = None
+    """How far the frequency may fall; None where nobody has asked yet."""
 
     @property
     def stable(self) -> bool | None:

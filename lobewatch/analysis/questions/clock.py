@@ -6,9 +6,12 @@ import shlex
 from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from acquisition import Remark
-from lobewatch.machine import TapEntry
+
+if TYPE_CHECKING:  # else each look at a plant would wait for what reads tap files
+    from lobewatch.machine import TapEntry
 
 BEHIND, TOO_OLD, AHEAD = CLOCK_QUESTIONS = ("clock-behind", "clock-before-release", "clock-ahead")
 """Codes, as they stand in the journal line of the test."""

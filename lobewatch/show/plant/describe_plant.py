@@ -1,31 +1,32 @@
-"""How the machines of a folder stand."""
+"""How the machines of a folder stand, for the terminal and as CSV; hundreds of them in no time."""
 
 from __future__ import annotations
 
 import csv
 import io
 import math
-from collections.abc import Mapping, Sequence
+import textwrap
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
-from rich.table import Table
+from rich.cells import cell_len
 
-from dsm import plus_minus
-from lobewatch.show.output import table
+from lobewatch.show.output import printable
 
 COLUMNS = ("key", "name", "light", "fall", "fall_std", "series", "last_tap", "days_left", "note", "next_step")
 """Keys of a row of the dashboard, in the order of the CSV."""
+HEADINGS = ("folder", "machine", "light", "fallen (%)", "last tap", "limit ahead", "why", "next")
+NARROWEST = 24
+"""Of the last two columns, which are broken to fit."""
 
 
-def plant_table(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """A line a machine, with its worst reason."""
-    made = table("~folder", "~machine", "<light", "fallen (%)", "~last tap", "~why", "~next")
-    for row in rows:
-        first, *others = row["reasons"] or [""]
-        why = f"{first} (and {len(others)} more)" if others else first
-        made.add_row(row["key"], row["name"], row["light"].value, _fallen(row), _due(row), why, row["next_step"])
-    return made
+def plant_text(rows: Sequence[Mapping[str, Any]], width: int) -> str:
+    """A line a machine, with its worst reason; more where texts do not fit into the width."""
+    lines = [HEADINGS, *map(_cells, rows)]
+    widths = [max(cell_len(line[i]) for line in lines) for i in range(len(HEADINGS) - 2)]
+    left = max((width - sum(widths) - 2 * len(widths) - 2) // 2, NARROWEST)
+    return "\n".join(text for line in lines for text in _broken(line, [*widths, left, left]))
 
 
 def plant_csv(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -37,10 +38,37 @@ def plant_csv(rows: Sequence[Mapping[str, Any]]) -> str:
     return written.getvalue()
 
 
+def limit_text(ahead: Mapping[str, Any] | None) -> str:
+    """The fixed limit that is reached next: "5 %: 2026-11 to 2027-02"; empty where nothing can be foretold."""
+    if ahead is None:
+        return ""
+    first, last = ahead["p10"], ahead["p90"]
+    when = f"not before {(first or ahead['foretold_to'])[:7]}" if last is None else f"{first[:7]} to {last[:7]}"
+    return f"{ahead['percent']:g} %: {when}"
+
+
+def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
+    first, *others = row["reasons"] or [""]
+    why = f"{first} (and {len(others)} more)" if others else first
+    ahead = limit_text(row["next_limit"])
+    cells = row["key"], row["name"], row["light"].value, _fallen(row), _due(row), ahead, why, row["next_step"]
+    return tuple(printable(cell).replace("\n", " ").replace("\t", " ") for cell in cells)
+
+
+def _broken(cells: Sequence[str], widths: Sequence[int]) -> Iterator[str]:
+    why, step = (textwrap.wrap(text, widths[-1], break_long_words=False, break_on_hyphens=False) for text in cells[-2:])
+    for i in range(max(len(why), len(step), 1)):
+        parts = [
+            *(cells[:-2] if i == 0 else [""] * (len(cells) - 2)),
+            *(one[i] if i < len(one) else "" for one in (why, step)),
+        ]
+        yield "  ".join(part + " " * (wide - cell_len(part)) for part, wide in zip(parts, widths, strict=True)).rstrip()
+
+
 def _fallen(row: Mapping[str, Any]) -> str:
     if row["fall"] is None:
         return ""
-    return plus_minus(row["fall"], math.nan if row["fall_std"] is None else row["fall_std"])
+    return f"{row['fall']:.2f}" + ("" if row["fall_std"] is None else f" ± {row['fall_std']:.2f}")
 
 
 def _due(row: Mapping[str, Any]) -> str:

@@ -32,6 +32,7 @@ def trend_json(found: Outlook, series: SeriesStanding, preload: PreloadLeft | No
         "fall_percent": series.fall.value,
         "fall_std_percent": series.fall.std,
         "preload_left": preload,
+        "rate_percent_per_month": None if trend is None or trend.rate is None else trend.rate._asdict(),
         "forecast": {
             **{name: _fate_json(fate) for name, fate in found.programs.items()},
             **{f"{percent:g} %": {"reached": dates_json(when)} for percent, when in found.limits.items()},
@@ -96,7 +97,17 @@ def sentence(series: SeriesStanding) -> str:
     if trend.forecast is None:
         return f"{said}; from 8 points on there is a forecast, from 9 on an alarm"
     shape = _shape(trend.forecast.likeliest, falls=trend.forecast.fitted[-1] < trend.start)
-    return f"{said}; {shape}; scatter {trend.spread:.2f} %, score {_score(trend)}"
+    return f"{said}; {shape}; scatter {trend.spread:.2f} %, score {_score(trend)}; {rate_text(trend)}"
+
+
+def rate_text(trend: Trend) -> str:
+    """Change in % a month at the last point, with its 95 % interval; empty below 8 points."""
+    rate = trend.rate
+    if rate is None:
+        return ""
+    digits = max(2, 1 - math.floor(math.log10(max(rate.high - rate.low, 1e-4))))
+    value, low, high = (f"{one:+.{digits}f}" for one in rate)
+    return f"{value} % a month now ({low} to {high}, 95 %)"
 
 
 def _short(series: SeriesStanding) -> str:

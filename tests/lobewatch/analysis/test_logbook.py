@@ -27,12 +27,13 @@ from lobewatch import Logbook
 from lobewatch.analysis import Advice, Assembly, Measurement, Verdict, Word, compare_lobes, measure
 from lobewatch.analysis.cache.history_cache import HistoryCache
 from lobewatch.analysis.charts import Dynamics, Method
+from lobewatch.analysis.plant.plant import Plant
 from lobewatch.analysis.programs.verdict import as_program, verdict
 from lobewatch.cli import app
 from lobewatch.machine import Machine, MachineFolder, ProgramTable
 from lobewatch.machine.archive.rows import read_rows, write_rows
 from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.screen.dashboard import Board
+from lobewatch.show.plant.plant_rows import plant_rows
 from lobewatch.show.report import render_report
 from lobewatch.show.verdicts import WORDS
 from lobewatch.tap.outcome import outcome_of
@@ -196,7 +197,7 @@ def test_one_program_has_one_word_in_every_place(shop: Shop, path: Path, program
     outcome = outcome_of(logbook, logbook.measurement(logbook.newest().id))
     assert any(f"{name}: {word}." in text for text in outcome.texts)
     assert (outcome.light, "lobewatch check" in outcome.next_step) == (light, True)
-    (row,) = Board({"m": MachineFolder(path)}).rows()
+    (row,) = plant_rows(Plant({"m": path}).standings())
     assert (f"{name}: {word}" in row["note"], row["light"]) == (True, light)
     (told,) = json.loads(run("check", path, "--json").stdout)["programs"]
     assert told == checked
@@ -396,7 +397,7 @@ def test_a_damaged_tap_is_called_so_and_no_wrong_word_is_kept(path: Path) -> Non
     rest = Logbook.open(path)
     assert rest.rulings(rest.taps[0].id) == {one.program.name: one.ruling for one in rest.verdicts()}
     assert {found.word for found in rest.verdicts()} <= {Word.DOUBTFUL, Word.NOT_STABLE}
-    (row,) = Board({"m": MachineFolder(path)}).rows()
+    (row,) = plant_rows(Plant({"m": path}).standings())
     assert "bytes, not" in row["note"]
     (path / "taps" / f"{logbook.taps[1].id}.h5").write_bytes(sound)
     assert [ruling.word for ruling in Logbook.open(path).rulings(logbook.taps[1].id).values()] == expected
@@ -405,9 +406,9 @@ def test_a_damaged_tap_is_called_so_and_no_wrong_word_is_kept(path: Path) -> Non
 def test_a_machine_that_disappears_does_not_hide_the_others(path: Path, tmp_path: Path) -> None:
     make_machine_folder(tmp_path / "n", "surrogate_machine.toml")
     tap(path, 0, 1713.0)
-    board = Board({name: MachineFolder(tmp_path / name) for name in ("m", "n")})
+    plant = Plant({name: tmp_path / name for name in ("m", "n")})
     (tmp_path / "n" / "machine.toml").unlink()
-    assert {row["key"]: row["light"] for row in board.rows()} == {"n": "unknown", "m": "warn"}
+    assert {row["key"]: row["light"] for row in plant_rows(plant.standings())} == {"n": "unknown", "m": "warn"}
 
 
 def test_a_lost_mode_does_not_hide_an_alarm(path: Path) -> None:

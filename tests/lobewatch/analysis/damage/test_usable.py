@@ -10,9 +10,9 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from lobewatch.analysis import Logbook, Word
+from lobewatch.analysis.plant.plant import Plant
 from lobewatch.cli import app
-from lobewatch.machine import MachineFolder
-from lobewatch.screen.dashboard import Board
+from lobewatch.show.plant.plant_rows import plant_rows
 from lobewatch.show.report import render_report
 from lobewatch.tap.outcome import outcome_of
 
@@ -57,7 +57,7 @@ def test_an_old_one_is_left_out_and_said(tapped: Shop) -> None:
     (program,) = logbook.verdicts()
     assert program.limit * 1e3 == pytest.approx(sound[0]["limit_mm"])
     assert bad.name in render_report(logbook, "reference", "x")
-    (row,) = Board({"m": MachineFolder(tapped.path)}).rows()
+    (row,) = plant_rows(Plant({"m": tapped.path}).standings())
     assert bad.name in row["note"]
     outcome = outcome_of(logbook, logbook.measurement(logbook.taps[-1].id))
     assert sum(bad.name in text for text in outcome.texts) == 1

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 from scipy.stats import t as students
 
-from lobewatch.analysis.decay.change_point import SURE, watch
+from lobewatch.analysis.decay.change_point import SURE, newest_change, watch, watch_both
 
 Floats = NDArray[np.float64]
 
@@ -69,6 +69,25 @@ def falling(y: Floats, change: Floats) -> float:
 
 def test_a_rise_is_no_fall() -> None:
     assert watch(-FALLING).alarm_at is None
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_fall_and_rise_are_mirror_images(sign: int) -> None:
+    falls, rises = watch_both(sign * FALLING)
+    one, other = (falls, rises) if sign > 0 else (rises, falls)
+    np.testing.assert_allclose(one.scores, watch(FALLING).scores, rtol=1e-9)
+    assert one.fall is not None
+    assert one.fall.size == pytest.approx(1.62, abs=0.1)
+    assert other.fall is None
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_newest_change_has_the_sign_of_a_fall_and_wants_two_points(sign: int) -> None:
+    assert [n for n in range(21) if newest_change(sign * FALLING[:n]) is not None] == list(range(15, 21))
+    found = newest_change(sign * FALLING)
+    assert found is not None
+    assert (found.kind, found.point) == ("slope", 10)
+    assert sign * found.size == pytest.approx(1.62, abs=0.1)
 
 
 def test_size_and_interval_of_a_known_step() -> None:

@@ -73,6 +73,36 @@ def test_the_date_is_that_of_the_critical_fall_on_the_line(worn: Shop) -> None:
     assert paper.probable - day(worn.start) == pytest.approx(years_of_five_percent, rel=0.1)
 
 
+def test_critical_falls_are_worked_out_once_and_kept(worn: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = outlook(worn.logbook).programs["A"]
+
+    def again(*_: object) -> None:
+        raise AssertionError("judged again")
+
+    monkeypatch.setattr("lobewatch.analysis.logbook.judge", again)
+    assert outlook(worn.logbook).programs["A"] == first
+    worn.edit("depth_mm = 1.5", "depth_mm = 1.4")
+    with pytest.raises(AssertionError, match="judged again"):
+        outlook(worn.logbook)
+
+
+def test_a_change_of_damping_and_stiffness_is_a_remark(shop: Shop) -> None:
+    shop.put("")
+    for i in range(14):
+        shop.tap(
+            15.0 * i,
+            1713.0 + (-1) ** i,
+            damping_ratio=0.029 * (1 + 0.002 * (-1) ** i) * (1.2 if i > 8 else 1),
+            stiffness=3.5e7 * (1 + 0.002 * (-1) ** i) * (0.9 if i > 9 else 1),
+        )
+    found = shop.logbook.standing(shop.logbook.history.rows[-1].time)
+    said = [str(remark) for remark in found.remarks if remark.code == "value-changed"]
+    assert found.light == "good"
+    assert any("damping ratio rose at once before 2026-05-30, by 19." in one for one in said)
+    assert any("stiffness K fell at once before 2026-06-14, by 10." in one for one in said)
+    assert not any("bearing" in one for one in said)
+
+
 def test_a_short_history_foretells_nothing(shop: Shop) -> None:
     shop.tap_both()
     shop.run(("A", 12900, 1.5))
@@ -94,6 +124,9 @@ def test_trend_in_json(worn: Shop) -> None:
     assert found["alarm"]["kind"] == "slope"
     assert found["light"] == Logbook.open(worn.path).standing().light
     assert told.exit_code == int(found["light"] == "alarm") == 1
+    rate = found["rate_percent_per_month"]
+    assert rate["low"] < rate["value"] < rate["high"] < 0
+    assert rate["value"] == pytest.approx(100 * np.log(0.97) / 150 * 30.44, rel=0.05)
     assert set(found["forecast"]) == {"A", "5 %", "10 %"}
     assert set(found["forecast"]["A"]) == {"doubtful", "not stable"}
     assert set(found["forecast"]["5 %"]["reached"]) == {"p10", "p50", "p90"}

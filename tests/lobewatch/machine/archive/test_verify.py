@@ -232,6 +232,18 @@ def test_the_history_is_rebuilt_with_equal_arrays(tmp_path: Path, shop: object) 
     assert len(before) == 4
 
 
+def test_a_history_that_could_not_be_stored_is_not_said_to_be_made(
+    folder: MachineFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device", "m/history.rows")
+
+    monkeypatch.setattr("lobewatch.analysis.cache.history_cache.write_rows", full)
+    said = CliRunner().invoke(app, ["rebuild", str(folder.path)], catch_exceptions=False)
+    assert "worked out in memory: m/history.rows: No space left on device; make room on that disk\n" in said.output
+    assert said.stdout.endswith("history.rows: not made anew (see above); the next command that can write makes it\n")
+
+
 def damaged_somewhere(folder: MachineFolder, chance: random.Random) -> str:
     """One flipped bit or one cut in one file; its name."""
     files = sorted(path for path in folder.path.rglob("*") if path.is_file() and path.name != ".lock")

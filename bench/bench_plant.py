@@ -1,0 +1,125 @@
+"""What a plant costs: the standing of many machines, fresh and made anew, and their export.
+
+    python bench/bench_plant.py [--machines 100] [--taps 720] [--keep FOLDER]
+
+CPU time of whole processes, start included. Each machine has its own scatter; the tap files, which no plant view opens
+but for the proof of the newest, are links to those of the first. Costs grow with the number of machines: what stands
+below for 500 is counted up from the number that was measured, and said to be.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import resource
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id, write_tap
+from lobewatch.analysis import Estimate, History, Logbook
+from lobewatch.analysis.cache.history_cache import HistoryCache
+from lobewatch.analysis.order import Place
+from lobewatch.machine.archive.tap_entry import TapEntry
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
+from modal import Mode, synthesize
+
+LINES = np.arange(8.0, 4000.0, 8.0)
+PLANT = 500
+"""Machines that are counted up to."""
+
+
+def make_plant(path: Path, machines: int, taps: int) -> None:
+    """Machines of so many tap tests each, x and y in turn, the newest of today; their histories as if worked out."""
+    first, small = path / "mill-000", path.parent / "two-taps"
+    _make_machine(first, taps)
+    _make_machine(small, 2)
+    history = Logbook.open(small).history
+    shutil.rmtree(small)
+    for number in range(machines):
+        folder = path / f"mill-{number:03d}"
+        if number:
+            shutil.copytree(first, folder, copy_function=_link)
+        HistoryCache(MachineFolder(folder)).store(_scattered(history, Logbook.open(folder).files.places, number))
+
+
+def _scattered(history: History, places: Sequence[Place], seed: int) -> History:
+    """Rows like those of two tap tests, with 0.3 % of scatter and a fall of its own."""
+    random, rows = np.random.default_rng(seed), history.rows
+    falls = np.linspace(0.0, random.uniform(0.0, 3.0), len(places))
+    shares = np.exp((random.normal(scale=0.3, size=len(places)) - falls) / 100).tolist()
+    found = []
+    for place, share in zip(places, shares, strict=True):
+        row, time = rows[place.number % 2], datetime.fromisoformat(place.entry.time)
+        frequency = Estimate(row.frequency.value * share, 0.2)
+        rulings = rows[-1].rulings if place is places[-1] else None
+        found.append(
+            replace(row, tap_id=place.entry.id, time=time, series=place.series, frequency=frequency, rulings=rulings)
+        )
+    return replace(history, rows=tuple(found))
+
+
+def _link(source: str, target: str) -> str:
+    """Tap files are never rewritten: a link is as good as a copy."""
+    if source.endswith(".h5"):
+        os.link(source, target)
+        return target
+    return shutil.copy2(source, target)
+
+
+def _make_machine(path: Path, taps: int) -> None:
+    make_machine_folder(path, "surrogate_machine.toml")
+    folder, text = MachineFolder(path), (path / "machine.toml").read_text("utf-8")
+    (path / "taps").mkdir()
+    modes = [Mode(1713.0, 0.029, 3.5e7), Mode(2900.0, 0.02, 9e7), Mode(3400.0, 0.02, 1.2e8)]
+    frf, entries = from_accelerance(LINES, synthesize(modes, LINES).accelerance), {}
+    for number in range(taps):
+        when = datetime.now(UTC) - timedelta(days=0.1 + 5.0 * (taps - 1 - number))
+        about = Circumstances("mill", when, "reference", "y" if number % 2 else "x", "", text)
+        tap = TapTest(new_tap_id(about), about, frf)
+        temporary = path / f"{tap.id}.tmp"
+        entries[temporary] = TapEntry.of(tap, write_tap(temporary, tap))
+    folder.commit_files(entries)
+
+
+def cpu_of(*arguments: object) -> float:
+    """CPU time of one command (s)."""
+    program = [sys.executable, "-m", "lobewatch.cli", *map(str, arguments)]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(program, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--machines", type=int, default=100)
+    parser.add_argument("--taps", type=int, default=720)
+    parser.add_argument("--keep", type=Path)
+    wanted = parser.parse_args()
+    with threadpool_limits(1), TemporaryDirectory() as scratch:
+        plant = wanted.keep or Path(scratch, "plant")
+        if not plant.exists():
+            make_plant(plant, wanted.machines, wanted.taps)
+        for standing in plant.glob("*/standing.json"):
+            standing.unlink()
+        print(f"Python {platform.python_version()}, {os.cpu_count()} cores, {wanted.machines} machines x {wanted.taps}")
+        start, more = cpu_of("status", plant / "mill-000", "--json"), PLANT / wanted.machines
+        for name in ("made anew", "fresh"):
+            cost = cpu_of("status", plant)
+            print(f"  status, standings {name:10s} {cost:6.2f} s, of {PLANT} {start + (cost - start) * more:6.2f} s")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,87 @@
+"""From the standing of a machine to its summary."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime
+
+import numpy as np
+
+from lobewatch.analysis.decay.outlook import of_limit
+from lobewatch.analysis.decay.trend import Trend, day
+from lobewatch.analysis.logbook import Logbook
+from lobewatch.analysis.plant.light import all_well
+from lobewatch.analysis.plant.standing_file import write_standing
+from lobewatch.analysis.plant.summary import Ahead, Course, Summary
+from lobewatch.analysis.standing import SeriesStanding, Standing
+from lobewatch.machine import BusyError, Limits
+from lobewatch.machine.mark import mark_of
+
+MOST = 60
+"""Points kept of a series."""
+OF_THE_DATE = ("overdue", "tap-in-future")
+"""Reasons that `Summary.at` adds."""
+
+
+def summarise(logbook: Logbook, now: datetime | None = None) -> Summary:
+    """Of a machine, kept beside it where its lock can be had; what `Logbook.standing` raises."""
+    now = now or datetime.now(UTC)
+    found = _summary(logbook, logbook.standing(now))
+    mark = mark_of(logbook.folder.path, found.newest_file)
+    if logbook.is_current:
+        try:
+            with logbook.folder.locked():
+                write_standing(logbook.folder.path, found, mark, now)
+        except (BusyError, OSError):
+            pass  # it is made anew by the next who asks
+    return found
+
+
+def _summary(logbook: Logbook, standing: Standing) -> Summary:
+    machine, rows, last = logbook.machine, logbook.history.current, standing.last_tap
+    interval = machine.machine.tap_interval_days
+    return Summary(
+        name=machine.machine.name,
+        remarks=tuple(remark for remark in standing.remarks if remark.code not in OF_THE_DATE),
+        otherwise=standing.next_step if last is None else all_well(last, interval),
+        path=str(logbook.folder.path),
+        interval_days=interval,
+        has_port=bool(machine.daq.port),
+        newest=rows[-1].tap_id if last is not None else "",
+        last_tap="" if last is None else last.isoformat(),
+        programs={name: one.word.value for name, one in (rows[-1].rulings or {}).items()} if rows else {},
+        series=tuple(_course(one, machine.limits) for one in standing.series),
+    )
+
+
+def _course(one: SeriesStanding, limits: Limits) -> Course:
+    trend, fall = one.trend, one.fall
+    percents = limits.frequency_warn_percent, limits.frequency_alarm_percent
+    return Course(
+        name=one.name,
+        tool=one.tool,
+        direction=one.direction,
+        fall=fall.value if fall.is_known else None,
+        fall_std=fall.std if fall.is_known and math.isfinite(fall.std) else None,
+        frequency=None if trend is None else trend.first * math.exp(trend.points[-1].percent / 100),
+        alarm=trend.watch.fall.kind if trend is not None and trend.watch.fall is not None else "",
+        points=() if trend is None else tuple(_thinned(trend)),
+        limits=() if trend is None else tuple(_ahead(trend, percent) for percent in percents),
+    )
+
+
+def _thinned(trend: Trend) -> Iterator[tuple[float, float]]:
+    """Means of neighbours where there are many; the newest as it is."""
+    found = np.array([(day(point.time), point.percent - trend.start) for point in trend.points])
+    parts: Sequence[np.ndarray] = np.array_split(found[:-1], min(MOST - 1, max(len(found) - 1, 1)))
+    for at, percent in [*(part.mean(axis=0).tolist() for part in parts if part.size), found[-1].tolist()]:
+        yield round(at, 1), round(percent, 3)
+
+
+def _ahead(trend: Trend, percent: float) -> Ahead:
+    found = of_limit(trend, percent)
+    if found is None or trend.forecast is None:
+        return Ahead(percent)
+    first, middle, last = (None if one == math.inf else round(max(one, float(trend.today)), 1) for one in found)
+    return Ahead(percent, first, middle, last, round(float(trend.forecast.dates[-1]), 1))

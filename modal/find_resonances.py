@@ -136,11 +136,11 @@ def _peaks_at_all_scales(frf: Frf, least: float = 0.0) -> list[_Peak]:
 
     least: height of the mobility below which none is looked at (m/s/N).
     """
-    noise = mobility_noise(frf)
+    noise, mobility = mobility_noise(frf), frf.mobility
     found: list[_Peak] = []
     longest = max(1, frf.frequency.size // 16)
     for length in SCALES[longest >= SCALES]:
-        mean = _running_mean(frf.mobility, length)
+        mean = _running_mean(mobility, length)
         gain = (2 * length**2 + 1) / (3 * length**3)
         rms = np.sqrt(gain * np.maximum(_running_mean(noise**2, length), 0.0))
         for new in _peaks(frf, mean, rms, least):
@@ -169,17 +169,19 @@ def _is_as_high(new: _Peak, old: _Peak) -> bool:
 def _peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.float64], least: float) -> list[_Peak]:
     size = np.abs(mobility)
     decibel = 20 * np.log10(np.maximum(size, 1e-12 * size.max()))
-    between_valleys = np.pad(decibel, 1, constant_values=np.min(decibel))
+    valley = [np.min(decibel)]
+    between_valleys = np.concatenate((valley, decibel, valley))
     floor = 20 * np.log10(np.maximum(NOISE_MULTIPLE * noise, max(least, 1e-12 * size.max())))
-    tops, found = find_peaks(between_valleys, height=np.pad(floor, 1), prominence=PROMINENCE_DB)
+    tops, found = find_peaks(between_valleys, height=np.concatenate(([0.0], floor, [0.0])), prominence=PROMINENCE_DB)
     tops -= 1
     rise = size[tops] * (1 - 10 ** (-found["prominences"] / 20))
     high = tops[(rise > NOISE_MULTIPLE * noise[tops]) & (tops > 0) & (tops < size.size - 1)]
-    return [_peak(frf, mobility, int(top), float(noise[top])) for top in high]
+    return [_peak(frf, mobility, size, int(top), float(noise[top])) for top in high]
 
 
-def _peak(frf: Frf, mobility: NDArray[np.complex128], top: int, noise: float) -> _Peak:
-    size, f = np.abs(mobility), frf.frequency
+def _peak(frf: Frf, mobility: NDArray[np.complex128], size: NDArray[np.float64], top: int, noise: float) -> _Peak:
+    """size: of the mobility."""
+    f = frf.frequency
     below, above = _lines_down(size[top::-1]), _lines_down(size[top:])
     low, high = top - int(np.ceil(below)), top + int(np.ceil(above))
     lower, upper = np.interp([top - below, top + above], np.arange(f.size), f)

@@ -9,6 +9,7 @@ from pathlib import Path
 from acquisition.atomic import atomic_write
 from acquisition.errors import DataError
 from acquisition.files.contents.description import Description
+from acquisition.files.contents.exponential import window_text
 from acquisition.files.contents.recording import Recording
 from acquisition.files.read_recording import look, read_frf
 from acquisition.files.writers.labels import Labels
@@ -79,6 +80,7 @@ def convert(path: Path | str, out: Path | str, said: Description, *, hits: bool 
         said.direction or recording.direction,
         said.tool or recording.tool,
         path.name,
+        window_text(recording.window),
     )
     if writer.of_frf is not None and not hits:
         frf = recording.frf or read_frf(path, said)

@@ -6,6 +6,7 @@ Built in memory, then temporary name + fsync + rename: a file of this name is al
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import io
 from collections.abc import Sequence
@@ -30,6 +31,8 @@ from acquisition.tap import Circumstances, Conditions, SourceFile, TapTest
 
 FORMAT = "lobewatch-tap"
 VERSION = 1
+CHUNK = 1_000_000
+"""Bytes of a replayed file that are packed together."""
 PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
 
 
@@ -44,13 +47,19 @@ def tap_content(tap: TapTest) -> bytes:
     """The bytes of the file of a tap test."""
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
-        file.attrs.update(format=FORMAT, version=VERSION, software=f"lobewatch {version('lobewatch')}", id=tap.id)
+        file.attrs.update(format=FORMAT, version=VERSION, software=_software(), id=tap.id)
         _write_circumstances(file, tap.circumstances)
         _write_raw(file, tap.hits, tap.flags)
         _write_frf(file, as_written(tap).frf, np.float32 if tap.hits else np.float64)
         if tap.source is not None:
             _write_source(file, tap.source)
     return sealed(memory.getvalue())
+
+
+@functools.cache
+def _software() -> str:
+    """Reading the metadata of the package takes as long as writing an FRF."""
+    return f"lobewatch {version('lobewatch')}"
 
 
 def as_written(tap: TapTest) -> TapTest:
@@ -226,7 +235,11 @@ def _read_frf(file: h5py.File) -> Frf:
 
 
 def _write_source(file: h5py.File, source: SourceFile) -> None:
-    stored = file.create_dataset("source", data=np.frombuffer(source.content, np.uint8), **PACKED)
+    content = np.frombuffer(source.content, np.uint8)
+    chunks = (min(max(content.size, 1), CHUNK),)
+    stored = file.create_dataset(
+        "source", data=content, chunks=chunks, compression="gzip", compression_opts=1, fletcher32=True
+    )
     digest = hashlib.sha256(source.content).hexdigest()
     stored.attrs.update(name=source.name, sha256=digest, units="byte")
 

@@ -27,6 +27,9 @@ STANDARD_GRAVITY = 9.80665
 POUND_FORCE = 4.4482216152605
 """N per lbf."""
 
+VOLTS = {"v": 1.0, "volt": 1.0, "volts": 1.0, "mv": 1e-3, "uv": 1e-6, "µv": 1e-6}
+"""V per unit of a voltage as it is written in lower case: no sensor's quantity, and no part of other units."""
+
 QUANTITIES: dict[Dimension, Measured] = {
     (0, 1, 0): "time",
     (0, -1, 0): "frequency",

@@ -1,6 +1,7 @@
 """From a stream of scans to single hits, and what a hit is made of: rest, pulse, ringing, window."""
 
 from acquisition.hits.capture_hits import HitSearch, Trigger, capture_hits, input_channels
+from acquisition.hits.hits_in_record import hits_in_record
 from acquisition.hits.pulse import Pulse, baseline, find_pulse, samples_before
 from acquisition.hits.ring_down import ring_down
 from acquisition.hits.windowed_force import windowed_force
@@ -12,6 +13,7 @@ __all__ = [
     "baseline",
     "capture_hits",
     "find_pulse",
+    "hits_in_record",
     "input_channels",
     "ring_down",
     "samples_before",

@@ -12,7 +12,7 @@ from acquisition import Description, Fact, Frf, Remark, windowed_receptance
 from dsm import plus_minus
 from lobewatch.analysis.one_file.own_window import ringing_modes_windowed, without_own_window
 from lobewatch.analysis.one_file.recorded import recorded
-from lobewatch.analysis.one_file.recorded_window import Window
+from lobewatch.analysis.one_file.recorded_window import Window, window_over
 from modal import (
     Extraction,
     Mode,
@@ -63,10 +63,11 @@ def modes_of_file(
 ) -> FileModes:
     """Modes between two frequencies (Hz), with standard errors over the hits where the file holds three or more.
 
-    window: exponential window on the response, to be corrected. conjugate: the file holds the complex conjugate of
-    response over force. accept: verdicts on hits ("not-decayed") that do not count. said: what the file does not say;
-    the hits that an FRF was averaged from are inferred where nobody says. What still rings when the record ends gets an
-    exponential window, which is corrected: all hits where none is good otherwise, else the modes that do.
+    window: exponential window on the response, to be corrected; else that which the file names. conjugate: the file
+    holds the complex conjugate of response over force. accept: verdicts on hits ("not-decayed") that do not count.
+    said: what the file does not say; the hits that an FRF was averaged from are inferred where nobody says. What
+    still rings when the record ends gets an exponential window, which is corrected: all hits where none is good
+    otherwise, else the modes that do.
 
     Raises ValueError for a window whose hit is not known or comes before it, averages that no coherence belongs to, and
     verdicts that cannot be accepted.
@@ -74,6 +75,7 @@ def modes_of_file(
     made = recorded(path, accept, said or Description())
     frf = replace(made.frf, receptance=made.frf.receptance.conj()) if conjugate else made.frf
     hits = () if conjugate else made.hits
+    window = window_over(made.named_window, window)
     delay = None if window is None else window.delay(made.hits)
     frf = frf if window is None else windowed_receptance(frf, window.time_constant)
     state = extract([frf], band)

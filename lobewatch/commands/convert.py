@@ -17,6 +17,7 @@ from lobewatch.show.replays.describing import (
     Quantity,
     Rate,
     Response,
+    Sensitivity,
     Unit,
     described,
 )
@@ -34,6 +35,7 @@ def convert(
     averages: Averages = None,
     response: Response = None,
     full_scale: FullScale = "",
+    sensitivity: Sensitivity = "",
     date: Annotated[datetime | None, typer.Option(help="When it was recorded, where the file does not say.")] = None,
     direction: Annotated[str, typer.Option(help="Direction at the tool tip, where the file does not say.")] = "",
     as_json: Json = False,
@@ -55,6 +57,7 @@ def convert(
     said = described(
         columns,
         full_scale,
+        sensitivity,
         quantity=quantity,
         unit=unit,
         force_unit=force_unit,

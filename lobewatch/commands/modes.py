@@ -8,7 +8,17 @@ from typing import Annotated
 import typer
 
 from lobewatch.show.output import Json, emit
-from lobewatch.show.replays.describing import Columns, ForceUnit, FullScale, Quantity, Rate, Response, Unit, described
+from lobewatch.show.replays.describing import (
+    Columns,
+    ForceUnit,
+    FullScale,
+    Quantity,
+    Rate,
+    Response,
+    Sensitivity,
+    Unit,
+    described,
+)
 
 
 def modes(
@@ -20,7 +30,8 @@ def modes(
         Path | None, typer.Option(help="Draw FRF, fit and poles to this file (.svg, .png, .pdf).")
     ] = None,
     window: Annotated[
-        float | None, typer.Option(help="Time constant (s) of an exponential window on the response, to be corrected.")
+        float | None,
+        typer.Option(help="Time constant (s) of an exponential window on the response, where the file names none."),
     ] = None,
     window_start: Annotated[float, typer.Option(help="When that window begins (s from the record's start).")] = 0.0,
     hit_at: Annotated[
@@ -38,6 +49,7 @@ def modes(
     rate: Rate = None,
     response: Response = None,
     full_scale: FullScale = "",
+    sensitivity: Sensitivity = "",
     accept: Annotated[
         list[str] | None, typer.Option(help="Use hits with this verdict all the same (not-decayed); may be repeated.")
     ] = None,
@@ -66,10 +78,12 @@ def modes(
     from lobewatch.analysis import Window, modes_of_file
     from lobewatch.show.modes.describe_modes import file_modes_json, file_modes_texts
 
-    taken_off = None if window is None else Window(window, window_start, hit_at)
+    of_window = window is not None or hit_at is not None or window_start != 0
+    taken_off = Window(float("nan") if window is None else window, window_start, hit_at) if of_window else None
     said = described(
         columns,
         full_scale,
+        sensitivity,
         quantity=quantity,
         unit=unit,
         force_unit=force_unit,

@@ -18,6 +18,7 @@ from lobewatch.show.replays.describing import (
     Quantity,
     Rate,
     Response,
+    Sensitivity,
     Unit,
     described,
 )
@@ -48,6 +49,7 @@ def replay(
     averages: Averages = None,
     response: Response = None,
     full_scale: FullScale = "",
+    sensitivity: Sensitivity = "",
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what would become of each file; store nothing.")
     ] = False,
@@ -88,6 +90,7 @@ def replay(
     said = described(
         columns,
         full_scale,
+        sensitivity,
         quantity=quantity,
         unit=unit,
         force_unit=force_unit,

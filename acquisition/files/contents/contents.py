@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Literal
@@ -51,5 +53,17 @@ class Contents:
     """At the tool tip; empty where the file does not say."""
     tool: str = ""
     """In the spindle; empty where the file does not say."""
+    machines: tuple[str, ...] = ()
+    """What was tapped, each name once, where the file says so."""
+    window: str = ""
+    """Over the response, as the file names it; empty where it does not."""
     notes: tuple[str, ...] = ()
     """What else should be known of it."""
+
+
+def distinct(names: Iterable[str]) -> tuple[str, ...]:
+    """Names that differ in more than a number, each once: "hit 1" and "hit 2" are one; empty ones are none."""
+    found: dict[str, str] = {}
+    for name in names:
+        found.setdefault(re.sub(r"[\d\s_.#-]+", "", name).lower(), name)
+    return tuple(name for plain, name in found.items() if plain)

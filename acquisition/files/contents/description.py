@@ -33,6 +33,8 @@ class Description:
     """Which response is meant where there are several, from 1."""
     full_scale: tuple[float, ...] = ()
     """Of each channel in its unit, where values are shares of it."""
+    sensitivity: tuple[str, ...] = ()
+    """Of each channel in volts: "2.25 mV/N", "10.2 mV/g"."""
     date: datetime | None = None
     """When it was recorded; of local time where it has no zone."""
     date_pattern: str = ""

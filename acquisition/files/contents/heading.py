@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from acquisition.files.contents.contents import Role
-from acquisition.files.units import unit_of
+from acquisition.files.units import VOLTS, unit_of
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.+?)\s*[\])]")
 _SPLIT_OFF = re.compile(r"^(.+?)_(.+)$")
@@ -59,8 +59,8 @@ def name_and_unit(heading: str) -> tuple[str, str]:
 
 
 def is_unit(text: str) -> bool:
-    """Whether it is a unit that is known, of an angle or of a level (dB), too."""
-    return unit_of(text) is not None or text.lower() in ANGLES or is_level(text)
+    """Whether it is a unit that is known, of an angle, of a level (dB) or of a voltage, too."""
+    return unit_of(text) is not None or text.lower() in ANGLES | VOLTS or is_level(text)
 
 
 def is_level(unit: str) -> bool:

@@ -10,6 +10,7 @@ from pathlib import Path
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.contents.description import Description
+from acquisition.files.contents.exponential import time_constant_of
 from acquisition.files.contents.ledger import Fact, Ledger
 from acquisition.files.contents.named_columns import named_columns, names_of
 from acquisition.files.contents.settle_frf import COLUMNS_FRF, candidates, settle_frf
@@ -47,6 +48,9 @@ class Recording:
     """What recorded it, where the file says so."""
     conditions: Conditions | None = None
     """What it was taken under; None where it is no tap file of ours."""
+    window: float | None = None
+    """Time constant (s) of the exponential window over the response that the file names; NaN where it does not say how
+    its window falls, None where there is none."""
 
     def checked(self) -> Recording:
         """Itself; DataError with all that is missing or wrong."""
@@ -64,7 +68,7 @@ def understood(path: Path, title: str, contents: Contents, said: Description) ->
     if not ledger.faults:
         if candidates(signals) and any(signal.role == "frequency" for signal in signals):
             frf = settle_frf(contents, said, ledger)
-            _useless(said, ("rate", "full_scale"), "an FRF", ledger)
+            _useless(said, ("rate", "full_scale", "sensitivity"), "an FRF", ledger)
         elif not signals or any(signal.role == "frequency" for signal in signals):
             ledger.ask(f"what its columns are ({names_of(signals)})", COLUMNS_FRF)
         elif not _is_over_time(signals):
@@ -72,6 +76,10 @@ def understood(path: Path, title: str, contents: Contents, said: Description) ->
         else:
             hits = settle_hits(contents, said, ledger)
             _useless(said, ("averages",), "hits, and they are counted", ledger)
+    if len(contents.machines) > 1:
+        ledger.faults.append(f"it holds {', '.join(contents.machines)}, not one machine; export each by itself")
+    if contents.window:
+        ledger.know("window", contents.window)
     for note in contents.notes:
         ledger.know("note", note)
     return Recording(
@@ -84,6 +92,7 @@ def understood(path: Path, title: str, contents: Contents, said: Description) ->
         contents.created,
         contents.tool,
         contents.direction,
+        window=time_constant_of(contents.window),
     )
 
 

@@ -11,10 +11,13 @@ from acquisition.files.axis import step_of
 from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.contents.description import Description
 from acquisition.files.contents.ledger import Ledger
+from acquisition.files.contents.motion import hit_of_motion
 from acquisition.files.contents.named_columns import names_of
+from acquisition.files.contents.sensitivity import in_sensor_units
 from acquisition.files.contents.settle_unit import MOTIONS, chosen, force_unit, response_unit
 from acquisition.files.units import STANDARD_GRAVITY, unit_of
 from acquisition.hit import Hit
+from acquisition.hits.hits_in_record import hits_in_record
 
 COLUMNS_HIT = '--columns "time [s],force [N],acceleration [g]", in their order, or each with =NAME'
 """How hits are named."""
@@ -23,7 +26,7 @@ SAME_RATE = 1e-4
 
 
 def settle_hits(contents: Contents, said: Description, ledger: Ledger) -> list[Hit]:
-    """One hit a record; empty where something is missing or wrong, which the ledger then says."""
+    """Those of each record; empty where something is missing or wrong, which the ledger then says."""
     hits = list[Hit]()
     for record in dict.fromkeys(signal.record for signal in contents.signals):
         of_one = Ledger()
@@ -33,12 +36,19 @@ def settle_hits(contents: Contents, said: Description, ledger: Ledger) -> list[H
             ledger.faults += of_one.faults
             return []
         ledger.facts += of_one.facts if not hits else []
-        hits.append(hit)
+        found = hits_in_record(hit)
+        if len(found) > 1:
+            ledger.know("hits", f"{len(found)} in one record, each of {found[0].force.size} samples")
+        hits += found
     return hits
 
 
 def _hit(signals: Sequence[Signal], said: Description, ledger: Ledger) -> Hit | None:
-    signals = _scaled(signals, said, ledger)
+    scaled = in_sensor_units(_scaled(signals, said, ledger), said, ledger)
+    if scaled is None:
+        _rate(signals, (), said, ledger)
+        return None
+    signals = scaled
     forces, responses = _by_kind(signals, ledger)
     rate = _rate(signals, [*forces, *responses], said, ledger)
     force = forces[0] if len(forces) == 1 else None
@@ -46,17 +56,16 @@ def _hit(signals: Sequence[Signal], said: Description, ledger: Ledger) -> Hit | 
     to_newton = force_unit(forces[0], said, ledger) if forces else None
     unit = response_unit(response or responses[0], said, ledger) if responses else None
     _doubt_gravity(responses, ledger)
-    if unit is not None and unit[0] != "acceleration":
-        ledger.faults.append(
-            f"its response is a {unit[0]} over time; hits need an acceleration: export the FRF, or the acceleration"
-        )
     if force is None or response is None or unit is None or to_newton is None or not ledger.is_clean:
         return None
     try:
-        return Hit(force.values * to_newton, response.values * unit[1], rate)
+        hit = hit_of_motion(force.values * to_newton, response.values * unit[1], rate, unit[0])
     except ValueError as error:
         ledger.faults.append(str(error))
         return None
+    if unit[0] != "acceleration":
+        ledger.know("note", f"its {unit[0]} is differentiated")
+    return hit
 
 
 def _by_kind(signals: Sequence[Signal], ledger: Ledger) -> tuple[list[Signal], list[Signal]]:

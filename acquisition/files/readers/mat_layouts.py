@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.contents.heading import role_of
+from acquisition.files.readers.mat_window import window_of
 
 _FREQUENCY = re.compile(r"(f|freq\w*|.*_freq\w*|frequenc\w*|hz)", re.IGNORECASE)
 _COHERENCE = re.compile(r".*(coh|gamma)", re.IGNORECASE)
@@ -32,7 +33,7 @@ def recognised(variables: Mapping[str, Any]) -> Contents | None:
     for layout in (_ours, _signal_calc, _test_lab, _logger, _vectors, _over_time):
         found = layout(variables)
         if found is not None:
-            return found
+            return replace(found, window=window_of(variables))
     return None
 
 

@@ -21,7 +21,8 @@ _SEPARATORS = {"Tab": "\t", "Comma": ",", "Semicolon": ";"}
 
 def read_lvm(path: Path) -> Contents:
     """The channels of every segment; DataError with the place where it fails."""
-    lines = path.read_text(encoding="latin-1").splitlines()
+    text = path.read_text(encoding="latin-1")
+    lines = text.splitlines()
     ends = [i for i, line in enumerate(lines) if line.startswith(_END)]
     if len(ends) < 2:
         raise DataError(f"{path}: LVM file with {len(ends)} of at least 2 header ends; is it cut short?")
@@ -33,6 +34,8 @@ def read_lvm(path: Path) -> Contents:
         for number, places in enumerate(zip(ends, ends[1:], starts[1:], strict=False))
         for signal in _segment(path, lines, places, head, number)
     ]
+    if not text.endswith("\n"):
+        raise DataError(f"{path}: its last line has no end, so digits may be missing; the file is cut short")
     return Contents(tuple(signals), created=_created(head))
 
 

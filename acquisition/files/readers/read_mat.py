@@ -19,6 +19,7 @@ from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.format import Format
 from acquisition.files.readers.mat_layouts import recognised
+from acquisition.files.readers.mat_window import window_of
 from acquisition.files.unpacked import HARMLESS, RATIO, check_unpacked
 
 _V5 = b"MATLAB 5.0 MAT-file"
@@ -36,7 +37,7 @@ def read_mat(path: Path) -> Contents:
     known = recognised(variables)
     if known is not None:
         return known
-    return Contents(tuple(_columns(variables)))
+    return Contents(tuple(_columns(variables)), window=window_of(variables))
 
 
 def _variables(path: Path) -> dict[str, Any]:

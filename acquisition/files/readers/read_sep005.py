@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.errors import DataError
-from acquisition.files.contents.contents import Contents, Signal
+from acquisition.files.contents.contents import Contents, Signal, distinct
 from acquisition.files.contents.heading import role_of
 from acquisition.files.format import Format
 
@@ -53,6 +53,7 @@ def contents_of(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
         created=_time(first.get("start_timestamp")),
         direction=str(first.get("direction", "")),
         tool=str(first.get("tool", "")),
+        machines=distinct(groups),
     )
 
 

@@ -38,7 +38,9 @@ class Layout:
     heading: list[str] = field(default_factory=list)
     """Words above the columns, or behind the first row; empty where there are none."""
     keys: dict[str, str] = field(default_factory=dict)
-    """What lines that begin with # say."""
+    """What lines that begin with # say, the last of each."""
+    machines: tuple[str, ...] = ()
+    """All machines that these lines name."""
 
     def words(self, line: str) -> list[str]:
         """The words of a line."""
@@ -56,7 +58,9 @@ def read_table(path: Path) -> Contents:
     comments = [line.strip()[1:] for _, line in lines if line.lstrip().startswith("#")]
     lines = [one for one in lines if not one[1].lstrip().startswith("#")]
     first, layout = _layout(path, lines)
-    layout.keys = {key.strip().lower(): value.strip() for key, _, value in (one.partition(":") for one in comments)}
+    said = [(key.strip().lower(), value.strip()) for key, _, value in (one.partition(":") for one in comments)]
+    layout.keys = dict(said)
+    layout.machines = tuple(dict.fromkeys(value for key, value in said if key == "machine" and value))
     rows = lines[first:]
     behind = _behind(layout, rows)
     layout.heading = behind or layout.heading
@@ -176,7 +180,8 @@ def _contents(path: Path, layout: Layout, values: NDArray[np.float64]) -> Conten
         n_averages = int(averages) if averages else None
     except ValueError as error:
         raise DataError(f"{path}: {error} (lines that begin with #: {keys})") from error
-    return Contents(tuple(signals), n_averages, created, direction, tool)
+    window = keys.get("window", "")
+    return Contents(tuple(signals), n_averages, created, direction, tool, layout.machines, window)
 
 
 def _with_level(signal: Signal) -> Signal:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from acquisition.errors import DataError
-from acquisition.files.contents.contents import Contents, Signal
+from acquisition.files.contents.contents import Contents, Signal, distinct
 from acquisition.files.contents.heading import name_and_unit, role_of
 from acquisition.files.format import Format
 
@@ -24,11 +25,12 @@ def read_tdms(path: Path) -> Contents:
     try:
         file = TdmsFile.read(path)
         groups = file.groups()
-        signals = [signal for i, group in enumerate(groups) for signal in _signals(group.channels(), i)]
+        held = [list(_signals(group.channels(), i)) for i, group in enumerate(groups)]
+        machines = distinct(group.name for group, signals in zip(groups, held, strict=True) if signals)
         created = [_start(channel) for group in groups for channel in group.channels()]
     except Exception as error:
         raise DataError(f"{path}: damaged or cut short ({type(error).__name__}: {error}); export it anew") from error
-    return Contents(tuple(signals), created=next(filter(None, created), None))
+    return Contents(tuple(chain.from_iterable(held)), created=next(filter(None, created), None), machines=machines)
 
 
 def _signals(channels: list[Any], record: int) -> Iterator[Signal]:

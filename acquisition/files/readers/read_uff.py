@@ -14,6 +14,7 @@ from pathlib import Path
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Role, Signal
 from acquisition.files.format import Format
+from acquisition.files.readers.text import decoded
 from acquisition.files.readers.uff_function import Function, read_function
 
 _MARK = re.compile(rb"\s*-1[ \r]*(?:\n|$)")
@@ -34,6 +35,8 @@ class Found:
     """Data sets 58, in their order."""
     system: tuple[str, str] | None
     """Units of length and force by data set 164."""
+    models: tuple[str, ...]
+    """Names of data sets 151, each once."""
 
 
 def read_uff(path: Path) -> Contents:
@@ -53,12 +56,14 @@ def read_uff(path: Path) -> Contents:
         created=_created(first),
         direction=_direction(found),
         tool=first.keys.get("tool", ""),
+        machines=found.models,
+        window=next((one.window for one in (frfs or found.functions) if one.window), ""),
         notes=tuple(_notes(frfs)),
     )
 
 
 def _found(path: Path, content: bytes) -> Found:
-    functions, system, at = list[Function](), None, 0
+    functions, system, models, at = list[Function](), None, dict[str, None](), 0
     while (opening := _MARK.match(content, at)) is not None:
         begin = opening.end()
         kind = content[begin : content.find(b"\n", begin)].split()[:1]
@@ -68,6 +73,10 @@ def _found(path: Path, content: bytes) -> Found:
         else:
             end = content.find(b"\n    -1", begin)
             at = len(content) if end < 0 else end + 1
+        if kind == [b"151"]:
+            named = re.match(rb"[^\n]*\n([^\n]*)", content[begin : begin + 400])
+            name = decoded(named[1]).strip() if named else ""
+            models |= {name: None} if name not in ("", "NONE") else {}
         closing = _MARK.match(content, at)
         if closing is None:
             raise DataError(f"{path}: its last data set has no end (-1); it is cut short or damaged")
@@ -77,7 +86,7 @@ def _found(path: Path, content: bytes) -> Found:
         at = closing.end()
     if content[at:].strip():
         raise DataError(f"{path}: {content[at:].strip()[:20]!r} stands behind its last data set; it is damaged")
-    return Found(functions, system)
+    return Found(functions, system, tuple(models))
 
 
 def _frf_signals(found: Found, frfs: Sequence[Function]) -> Iterator[Signal]:

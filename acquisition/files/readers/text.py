@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import codecs
+import re
 from pathlib import Path
 
 _WIDE = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+_NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eEdD][+-]?\d+)?"
+_TWO_NUMBERS = re.compile(rf"^[\W_]*?{_NUMBER}[ \t;,]+{_NUMBER}(?![.\w])", re.MULTILINE)
+HEAD = 65536
+"""Bytes of a file that tell whether it has numbers."""
 
 
 def text_of(path: Path) -> str:
@@ -27,3 +32,17 @@ def decoded(content: bytes) -> str:
 def is_text(head: bytes) -> bool:
     """Whether these first bytes can be those of a text."""
     return head.startswith(_WIDE) or b"\x00" not in head
+
+
+def is_prose(path: Path) -> bool:
+    """Whether a file is a text in which no line begins with two numbers, as notes that lie beside recordings.
+
+    The first 64 kB are looked at; no file that is empty or cannot be read is prose.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD)
+    except OSError:
+        return False
+    text = head.decode("utf-16", errors="ignore") if head.startswith(_WIDE) else decoded(head)
+    return bool(text.strip()) and is_text(head) and _TWO_NUMBERS.search(text) is None

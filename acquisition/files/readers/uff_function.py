@@ -69,6 +69,12 @@ class Function:
         )
         return int(said) if said.strip().isdigit() else None
 
+    @property
+    def window(self) -> str:
+        """Over the response, where the identification names one."""
+        said = re.search(r"(?i)\b(?:response )?window\s*[:=]\s*([^;]+)", "; ".join(self.lines))
+        return said[1].strip() if said else ""
+
 
 def read_function(place: str, content: bytes, begin: int) -> tuple[Function, int]:
     """The data set whose first line begins there, and where its values end; place: for errors."""

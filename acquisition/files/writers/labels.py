@@ -23,6 +23,8 @@ class Labels:
     """In the spindle."""
     name: str = "tap test"
     """For people."""
+    window: str = "none"
+    """Over the response, as it was read: "exponential 0.05 s"."""
 
     @property
     def plain_tool(self) -> str:

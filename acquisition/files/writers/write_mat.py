@@ -41,6 +41,7 @@ def _mat(variables: dict[str, Any], labels: Labels) -> bytes:
         "recorded": labels.created.isoformat() if labels.created else "",
         "direction": labels.direction,
         "tool": labels.tool,
+        "window": labels.window,
     }
     made = io.BytesIO()
     scipy.io.savemat(made, said | variables, oned_as="column")

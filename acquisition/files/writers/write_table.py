@@ -37,6 +37,7 @@ def _table(columns: dict[str, NDArray[np.float64]], labels: Labels, averages: in
         "recorded": labels.created.isoformat() if labels.created else "",
         "direction": labels.direction,
         "tool": labels.plain_tool,
+        "window": labels.window.replace("none", ""),
         "averages": "" if averages is None else str(averages),
     }
     lines = [f"# {key}: {value}" for key, value in said.items() if value]

@@ -34,7 +34,7 @@ def uff_of_frf(frf: Frf, labels: Labels) -> bytes:
     values, _ = as_measured(frf)
     ordinate = _ORDINATES[frf.measured_as]
     axis = _Axis(frf.frequency, (18, "Frequency", "Hz"))
-    said = f"averages={frf.n_averages};window=none"
+    said = f"averages={frf.n_averages}"
     sets = [_function(4, axis, values, (ordinate, _FORCE), labels, said)]
     if frf.coherence is not None:
         sets.append(_function(6, axis, frf.coherence, (_NONE, _NONE), labels, said))
@@ -47,7 +47,7 @@ def uff_of_hits(hits: Sequence[Hit], labels: Labels) -> bytes:
     for number, hit in enumerate(hits, 1):
         axis = _Axis(np.arange(hit.force.size) / hit.sample_rate, _OVER_TIME, 1 / hit.sample_rate)
         for values, ordinate in ((hit.force, _FORCE), (hit.acceleration, _ORDINATES["accelerance"])):
-            sets.append(_function(1, axis, values, (ordinate, _NONE), labels, f"hit={number};window=none"))
+            sets.append(_function(1, axis, values, (ordinate, _NONE), labels, f"hit={number}"))
     return _file(sets, labels)
 
 
@@ -72,9 +72,9 @@ def _function(
     """One data set 58."""
     node = {"x": 1, "y": 2, "z": 3}.get(labels.direction, 0)
     exact = f"step={axis.step!r};start={float(axis.values[0])!r};" if axis.is_even else ""
-    recorded = f"recorded={labels.created.isoformat()}" if labels.created else ""
+    recorded = f"window={labels.window}" + (f";recorded={labels.created.isoformat()}" if labels.created else "")
     stamp = f"{labels.created:%d-%b-%y %H:%M:%S}" if labels.created else "NONE"
-    lines = [f"{58:6d}", labels.name, exact + said, stamp, recorded or "NONE", f"tool={labels.plain_tool}"]
+    lines = [f"{58:6d}", labels.name, exact + said, stamp, recorded, f"tool={labels.plain_tool}"]
     lines[1:6] = [_line(text) for text in lines[1:6]]
     point = f" {'NONE':10s}{1:10d}{node:4d}"
     lines.append(f"{kind:5d}{0:10d}{0:5d}{0:10d}{point}{point}")

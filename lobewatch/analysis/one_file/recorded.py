@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -42,6 +42,8 @@ class Recorded:
     """What was done to them."""
     facts: tuple[Fact, ...] = ()
     """What is known of the file, and from where."""
+    named_window: float | None = None
+    """Time constant (s) of the window over the response that the file names; NaN where it does not say how it falls."""
 
 
 def recorded(path: Path, accept: Collection[str], said: Description) -> Recorded:
@@ -50,25 +52,26 @@ def recorded(path: Path, accept: Collection[str], said: Description) -> Recorded
     found = look(path, said).checked()
     if found.frf is not None:
         facts = tuple(fact for fact in found.facts if fact.name != "averages")
-        return replace(_with_averages(path, found.frf, averages), facts=facts)
-    recording = list(found.hits)
+        return replace(_with_averages(path, found.frf, averages), facts=facts, named_window=found.window)
     if averages is not None:
         raise ValueError(f"--averages {averages}: {path.name} holds hits, and they are counted; leave it out")
+    return replace(_averaged(path, found.hits, accepted, said), facts=found.facts, named_window=found.window)
+
+
+def _averaged(path: Path, recording: Sequence[Hit], accepted: HitFlags, said: Description) -> Recorded:
     verdicts = [check_hit(hit) for hit in recording]
     good = [hit for hit, verdict in zip(recording, verdicts, strict=True) if not verdict & ~accepted]
     refused = sum(bool(verdict) and not verdict & ~accepted for verdict in verdicts)
     if refused:
         text = f"{refused} of {len(recording)} hits are averaged though they were refused"
-        return Recorded(
-            estimate_frf(good), tuple(good), remarks=(Remark("hits-accepted", "", text),), facts=found.facts
-        )
+        return Recorded(estimate_frf(good), tuple(good), remarks=(Remark("hits-accepted", "", text),))
     try:
-        return Recorded(read_frf(path, said), tuple(good), facts=found.facts)
+        return Recorded(read_frf(path, said), tuple(good))
     except DataError:
         ringing = [hit for hit, verdict in zip(recording, verdicts, strict=True) if verdict == HitFlags.NOT_DECAYED]
         if not ringing:
             raise
-        return replace(_windowed(ringing), facts=found.facts)
+        return _windowed(ringing)
 
 
 def _accepted(codes: Collection[str]) -> HitFlags:

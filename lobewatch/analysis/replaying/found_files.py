@@ -7,12 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from acquisition import DataError, known_formats
+from acquisition.files.readers.text import is_prose
 
 
 def found_files(places: Sequence[Path | str]) -> tuple[list[Path], list[Path]]:
     """Each file once, those of a folder and all below it by name, and those of folders that are passed over.
 
-    Passed over is what lies in a folder and has an extension that no known format has; what is named is taken.
+    Passed over is what lies in a folder and has an extension that no known format has, or is a text without a row of
+    numbers; what is named is taken.
     DataError for a folder or a pattern without any file; a name is taken as it is, whether or not it is there.
     """
     found, passed = dict[Path, None](), list[Path]()
@@ -32,11 +34,12 @@ def found_files(places: Sequence[Path | str]) -> tuple[list[Path], list[Path]]:
 def _in_folder(folder: Path) -> tuple[list[Path], list[Path]]:
     files = sorted(file for file in folder.rglob("*") if file.is_file() and not _is_hidden(file.relative_to(folder)))
     known = {extension for one in known_formats() for extension in one.extensions}
-    taken = [file for file in files if file.suffix.lower() in known]
+    taken = [file for file in files if file.suffix.lower() in known and not is_prose(file)]
     if not taken:
         kinds = ", ".join(sorted(known))
         raise DataError(f"{folder}: none of the {len(files)} files in this folder is a recording (looked for {kinds})")
-    return taken, [file for file in files if file.suffix.lower() not in known]
+    left = set(files).difference(taken)
+    return taken, [file for file in files if file in left]
 
 
 def _is_hidden(path: Path) -> bool:

@@ -19,6 +19,7 @@ from acquisition import (
     new_tap_id,
     tap_direction,
 )
+from acquisition.files.contents.exponential import window_text
 from lobewatch.analysis.replaying.dating import checked_time, date_in_name
 from lobewatch.machine import MachineFolder
 
@@ -40,9 +41,19 @@ def read_tap_test(folder: MachineFolder, file: Path, said: Description, content:
     if created is None:
         glue = ", " if _ASK in recording.complaint else f"; {_ASK}" if recording.complaint else _ASK
         raise DataError(f"{file}: {recording.complaint}{glue}{ASK_DATE}")
-    about = _about(folder, recording.checked(), said, checked_time(file, created))
+    _refuse_window(recording.checked())
+    about = _about(folder, recording, said, checked_time(file, created))
     recording = replace(recording, facts=(*recording.facts, *_labels(about, said, recording)))
     return _tap_test(recording, about, SourceFile(file.name, content)), recording
+
+
+def _refuse_window(recording: Recording) -> None:
+    """A tap test keeps no window, and its damping would pass for that of the spindle."""
+    if recording.window is not None:
+        raise DataError(
+            f"{recording.path}: the response is under a window ({window_text(recording.window)}), which adds damping; "
+            "export it without; lobewatch modes takes an exponential one off"
+        )
 
 
 def _created(file: Path, said: Description, in_file: datetime | None) -> datetime | None:

@@ -8,8 +8,7 @@ from typing import Any
 
 from rich.table import Table
 
-from lobewatch.analysis import Logbook, Measurement
-from lobewatch.analysis.questions.asked import open_questions
+from lobewatch.analysis import Logbook, Row
 from lobewatch.analysis.replaying.store import Stored
 from lobewatch.show.measurements import measurement_json, measurement_texts, program_texts, programs_json
 from lobewatch.show.output import table
@@ -18,35 +17,37 @@ IN_FULL = 3
 """So many tap tests are told in full, more of them summed up."""
 
 
-def replay_json(stored: Stored, shown: Sequence[Measurement], logbook: Logbook) -> dict[str, Any]:
-    """All that was stored, known and refused."""
+def replay_json(stored: Stored, logbook: Logbook) -> dict[str, Any]:
+    """All that was stored, with the lobes of each, known and refused."""
     return {
-        "measurements": [measurement_json(m, logbook) for m in shown],
-        "programs": programs_json(logbook.verdicts()) if shown else [],
+        "measurements": [measurement_json(logbook.measurement(tap_id), logbook) for tap_id in stored.fresh],
+        "programs": programs_json(logbook.verdicts()) if stored.fresh else [],
         "known": {str(file): tap_id for file, tap_id in stored.known.items()},
         "refused": {str(file): why for file, why in stored.refused.items()},
         "taken": list(stored.taken),
     }
 
 
-def replay_texts(stored: Stored, shown: Sequence[Measurement], logbook: Logbook) -> list[str | Table]:
+def replay_texts(stored: Stored, logbook: Logbook) -> list[str | Table]:
     """A few tap tests in full, many as their series; then the programs."""
-    texts = (
-        [text for m in shown for text in measurement_texts(m, logbook)] if len(shown) <= IN_FULL else _summed_up(shown)
-    )
+    fresh = set(stored.fresh)
+    if len(fresh) <= IN_FULL:
+        texts = [text for tap_id in stored.fresh for text in measurement_texts(logbook.measurement(tap_id), logbook)]
+    else:
+        texts = _summed_up([row for row in logbook.history.rows if row.tap_id in fresh])
     if stored.taken:
         texts.append(f"taken where the files do not say: {', '.join(stored.taken)}")
-    return [*texts, *(program_texts(logbook) if shown else [])]
+    return [*texts, *(program_texts(logbook) if fresh else [])]
 
 
-def _summed_up(shown: Sequence[Measurement]) -> list[str | Table]:
+def _summed_up(shown: Sequence[Row]) -> list[str | Table]:
     """A line for each tool and direction, and how many were asked what."""
-    series: dict[tuple[str, str], list[Measurement]] = {}
-    for m in shown:
-        series.setdefault((m.tool, m.direction), []).append(m)
+    series: dict[tuple[str, str], list[Row]] = {}
+    for row in shown:
+        series.setdefault((row.tool, row.direction), []).append(row)
     rows = table("<tool", "<direction", "tests", "<from", "<to", "f_n (Hz)", "zeta (%)", "K (N/um)")
     for (tool, direction), tests in series.items():
-        modes = [m.followed for m in tests if m.followed is not None]
+        modes = [row.mode for row in tests if row.mode is not None]
         ends = (modes[0], modes[-1]) if modes else ()
         values = [
             " .. ".join(text % value for value in values)
@@ -58,6 +59,6 @@ def _summed_up(shown: Sequence[Measurement]) -> list[str | Table]:
         ]
         days = f"{tests[0].time:%Y-%m-%d}", f"{tests[-1].time:%Y-%m-%d}"
         rows.add_row(tool, direction, str(len(tests)), *days, *values)
-    asked = Counter(one.code for m in shown for one in open_questions(m.remarks))
+    asked = Counter(one.code for row in shown for one in row.questions)
     lines = [f"asked of {count} tests: {code} (lobewatch history says which)" for code, count in asked.items()]
     return [rows, *lines]

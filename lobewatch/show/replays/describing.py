@@ -22,9 +22,10 @@ Rate = Annotated[float | None, typer.Option(help="Samples a second (Hz).")]
 Averages = Annotated[int | None, typer.Option(help="Hits that an FRF was averaged from; 1 where nobody says.")]
 Response = Annotated[int | None, typer.Option(help="Which of several responses, from 1.")]
 FullScale = Annotated[str, typer.Option(help='Of each channel of a WAV file, in its unit: "500,50".')]
+Sensitivity = Annotated[str, typer.Option(help='Of each channel in volts: "2.25 mV/N,10.2 mV/g".')]
 
 
-def described(columns: str, full_scale: str, **said: Any) -> Description:
+def described(columns: str, full_scale: str, sensitivity: str = "", **said: Any) -> Description:
     """What these options say, with other fields of Description; ValueError for a full scale that is no number."""
     from acquisition import Description  # `--help` does not wait for it
 
@@ -32,4 +33,8 @@ def described(columns: str, full_scale: str, **said: Any) -> Description:
         scales = tuple(float(word) for word in full_scale.split(",")) if full_scale else ()
     except ValueError as error:
         raise ValueError(f'--full-scale {full_scale}: give a number for each channel, as in "500,50"') from error
-    return Description(tuple(word.strip() for word in columns.split(",")) if columns else (), full_scale=scales, **said)
+    return Description(_words(columns), full_scale=scales, sensitivity=_words(sensitivity), **said)
+
+
+def _words(text: str) -> tuple[str, ...]:
+    return tuple(word.strip() for word in text.split(",")) if text else ()

@@ -49,15 +49,12 @@ def show_replay(
     _tell_known(stored.known, len(files))
     if passed:
         notes.print(f"passed over: {len(passed)} other files, such as {passed[0].name}", markup=False)
-    with ProgressBar() as progress:
-        shown = []
-        for number, tap_id in enumerate(stored.fresh, 1):
-            progress("measure", number - 1, len(stored.fresh))
-            shown.append(logbook.measurement(tap_id))
-    payload, texts = replay_json(stored, shown, logbook), replay_texts(stored, shown, logbook)
-    payload |= {"accepted": [code for code in codes if code not in unasked], "questions": logbook.questions}
-    texts += [f"accepted: {code}" for code in payload["accepted"]]
-    last = f"{len(shown)} of {len(files)} file(s) stored in {logbook.folder.path}"
+    accepted = [code for code in codes if code not in unasked]
+    payload = {}
+    if as_json:
+        payload = replay_json(stored, logbook) | {"accepted": accepted, "questions": logbook.questions}
+    texts = [] if as_json else [*replay_texts(stored, logbook), *(f"accepted: {code}" for code in accepted)]
+    last = f"{len(stored.fresh)} of {len(files)} file(s) stored in {logbook.folder.path}"
     emit(payload, as_json, *texts, last)
     if stored.refused:
         raise DataError(refusal(stored.refused, len(files), stored=True))

@@ -151,8 +151,8 @@ def test_a_truncated_lvm_is_refused(beam: Path, tmp_path: Path) -> None:
 
 def test_an_lvm_in_an_unknown_unit_or_without_force_is_refused(beam: Path, tmp_path: Path) -> None:
     text = beam.read_text(encoding="latin-1")
-    with pytest.raises(DataError, match="Force is in 'Volts', which is not known here as its unit"):
-        read_hits(write(tmp_path / "a.lvm", text.replace("Newtons", "Volts")))
+    with pytest.raises(DataError, match="Force is in 'Pascal', which is not known here as its unit"):
+        read_hits(write(tmp_path / "a.lvm", text.replace("Newtons", "Pascal")))
     with pytest.raises(DataError, match="no force channel among"):
         read_hits(write(tmp_path / "b.lvm", text.replace("Newtons", "g").replace("Force", "Top")))
 

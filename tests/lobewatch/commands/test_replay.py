@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from datetime import date, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from acquisition import DataError
+from acquisition import DataError, Description, Recording, look
+from lobewatch.analysis.replaying.store import store_recordings
 from lobewatch.cli import app
 
 Shop = Any
@@ -117,6 +119,84 @@ def test_one_bad_file_costs_only_itself_where_it_may(shop: Shop, folder: Path) -
     with pytest.raises(DataError, match="2 of 5 files cannot be used; the others are stored"):
         run("replay", shop.path, folder, *options, "--keep-going")
     assert len(taps(shop)) == 3
+
+
+def test_notes_beside_recordings_are_passed_over_and_refused_by_name(shop: Shop, folder: Path) -> None:
+    notes = folder / "Notizen Fräser.txt"
+    notes.write_text("3 Schläge, harte Spitze\n24.05.2024\n", encoding="utf-8")
+    said = run("replay", shop.path, folder, "--date-pattern", "%Y%m%d", "--dry-run", "--json").stdout
+    assert [Path(one).name for one in json.loads(said)["passed_over"]] == [notes.name, "picture.png"]
+    stored = run("replay", shop.path, folder, "--date-pattern", "%Y%m%d")
+    assert "passed over: 2 other files, such as Notizen" in stored.stderr
+    with pytest.raises(DataError, match=r"Notizen Fräser\.txt: line 2: '24\.05\.2024' is no row of numbers"):
+        run("replay", shop.path, notes, "--date", "2024-05-24")
+
+
+def test_a_directory_that_is_called_like_a_file_is_a_folder(shop: Shop, folder: Path) -> None:
+    (folder / "d 20240101.csv").mkdir()
+    assert "3 of 3 file(s) stored" in run("replay", shop.path, folder, "--date-pattern", "%Y%m%d").stdout
+    with pytest.raises(DataError, match=r"d 20240101\.csv: none of the 0 files in this folder is a recording"):
+        run("replay", shop.path, folder / "d 20240101.csv", "--date-pattern", "%Y%m%d")
+
+
+def test_one_bad_file_of_201_costs_only_itself(shop: Shop, tmp_path: Path) -> None:
+    lines = np.arange(1600.0, 1800.0, 40.0)
+    for number in range(200):
+        values = 1e6 / (3.5e7 * (1 - (lines / (1713 - 0.1 * number)) ** 2 + 0.06j * lines / 1713))
+        rows = "".join(f"{f:g},{v.real:.6e},{v.imag:.6e}\n" for f, v in zip(lines, values, strict=True))
+        day = date(2024, 1, 1) + timedelta(days=number)
+        (tmp_path / f"{day}.csv").write_text(f"Freq (Hz),Real (um/N),Imag (um/N)\n{rows}")
+    bad = tmp_path / "2024-12-24.csv"
+    bad.write_text("Freq (Hz),Real (um/N),Imag (um/N)\n1,2,3\n2,x,3\n")
+    files, said = sorted(tmp_path.glob("*.csv")), Description(date_pattern="%Y-%m-%d")
+    with shop.folder.locked():
+        stored = store_recordings(shop.folder, files, said, keep_going=True)
+    assert (len(stored.fresh), [*stored.refused]) == (200, [bad])
+    assert "line 3: '2,x,3' is no row of numbers" in stored.refused[bad]
+    assert len(taps(shop)) == 200
+
+
+@pytest.mark.parametrize("length", [-1, 1])
+def test_a_file_that_changes_while_it_is_read_is_refused(
+    shop: Shop, folder: Path, monkeypatch: pytest.MonkeyPatch, length: int
+) -> None:
+    growing, wait = folder / "a 20240901.csv", "it changes while it is read; wait until it is written"
+
+    def looked(path: Path, said: Description) -> Recording:
+        found = look(path, said)
+        if path == growing:
+            content = path.read_bytes()
+            path.write_bytes(content + b"8,1,1\n" if length > 0 else content[:-1])
+        return found
+
+    monkeypatch.setattr("lobewatch.analysis.replaying.read_tap_test.look", looked)
+    with pytest.raises(DataError, match=f"{growing.name}: {wait}"):
+        run("replay", shop.path, growing, "--date-pattern", "%Y%m%d")
+    with pytest.raises(DataError, match=f"{growing.name}: {wait} .1 of 3 files; the others are stored"):
+        run("replay", shop.path, folder, "--date-pattern", "%Y%m%d", "--keep-going")
+    assert taps(shop) == ["2024-05-01", "2024-07-01"]
+
+
+def test_a_window_is_refused_by_a_replay_and_taken_off_by_modes(shop: Shop, tmp_path: Path) -> None:
+    plain = frf(tmp_path / "plain.csv")
+    windowed = tmp_path / "window.csv"
+    windowed.write_text("# window: exponential 0.02 s\n" + plain.read_text())
+    with pytest.raises(DataError, match=r"under a window \(exponential 0.02 s\), which adds damping"):
+        run("replay", shop.path, windowed, "--date", "2024-05-01")
+    said, ours = ("--hit-at", "0", "--json"), ("--window", "0.02", "--hit-at", "0", "--json")
+    found = [
+        json.loads(run("modes", path, *words).stdout)["modes"][0]["damping_ratio"]
+        for path, words in ((windowed, said), (plain, ours), (plain, ("--json",)))
+    ]
+    assert found[0] == found[1]
+    assert found[2] - found[0] == pytest.approx(1 / (0.02 * 2 * np.pi * 1700), rel=1e-2)
+    with pytest.raises(ValueError, match=r"--window 0\.05: the file says 0\.02 s; leave the option out"):
+        run("modes", windowed, "--window", "0.05", "--hit-at", "0")
+    with pytest.raises(ValueError, match="the file names no window; add --window"):
+        run("modes", plain, "--hit-at", "0")
+    windowed.write_text(windowed.read_text().replace(" 0.02 s", ""))
+    with pytest.raises(ValueError, match="does not say how that falls"):
+        run("modes", windowed, "--hit-at", "0")
 
 
 def test_a_second_response_of_the_same_file_is_another_test(shop: Shop, tmp_path: Path) -> None:

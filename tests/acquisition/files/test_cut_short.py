@@ -1,0 +1,118 @@
+"""Files of every format, cut at any byte: refused, asked about, or the same numbers; never others, never a crash."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+import nptdms
+import numpy as np
+import pytest
+import scipy.io.wavfile
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from acquisition import Circumstances, DataError, Description, Frf, Hit, TapTest, look, new_tap_id, write_tap
+from acquisition.files.convert import WRITERS
+from acquisition.files.writers.labels import Labels
+
+RANDOM = np.random.default_rng(1)
+HIT = Hit(RANDOM.normal(size=40), RANDOM.normal(size=40), 1000.0)
+F = np.arange(2.0, 42.0)
+FRF = Frf(F, np.asarray(1e-6 / (1 + 0.1j * F), np.complex128), np.full(F.size, 0.9), 5)
+LVM = (
+    "LabVIEW Measurement\t\nSeparator\tTab\nX_Columns\tOne\n***End_of_Header***\t\nChannels\t2\t\nSamples\t40\t40\n"
+    "Y_Unit_Label\tN\tg\nDelta_X\t0.001\t0.001\n***End_of_Header***\t\t\nX_Value\tForce\tAcceleration\tComment\n"
+)
+
+
+def lvm(path: Path) -> None:
+    rows = zip(np.arange(40) / 1000, HIT.force, HIT.acceleration, strict=True)
+    path.write_text(LVM + "".join("\t".join(f"{value:.6f}" for value in row) + "\n" for row in rows))
+
+
+def tdms(path: Path) -> None:
+    pairs = (("Hammer", "N", HIT.force), ("Tip", "g", HIT.acceleration))
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment(
+            [
+                nptdms.ChannelObject("tap", name, values, {"unit_string": unit, "wf_increment": 1e-3})
+                for name, unit, values in pairs
+            ]
+        )
+
+
+def wav(path: Path) -> None:
+    scipy.io.wavfile.write(path, 1000, np.column_stack([HIT.force, HIT.acceleration]).astype(np.float32))
+
+
+def tap_file(path: Path) -> None:
+    about = Circumstances("m", datetime(2024, 5, 1, tzinfo=UTC), "reference")
+    write_tap(path, TapTest(new_tap_id(about), about, FRF))
+
+
+def of_hits(extension: str) -> Callable[[Path], None]:
+    def made(path: Path) -> None:
+        path.write_bytes(WRITERS[extension].of_hits([HIT], Labels()))
+
+    return made
+
+
+def of_frf(extension: str) -> Callable[[Path], None]:
+    write = WRITERS[extension].of_frf
+    assert write is not None
+
+    def made(path: Path) -> None:
+        path.write_bytes(write(FRF, Labels()))
+
+    return made
+
+
+MADE: dict[str, Callable[[Path], None]] = {
+    "hit.lvm": lvm,
+    "hit.tdms": tdms,
+    "hit.wav": wav,
+    "hit.uff": of_hits(".uff"),
+    "frf.uff": of_frf(".uff"),
+    "hit.csv": of_hits(".csv"),
+    "frf.csv": of_frf(".csv"),
+    "hit.json": of_hits(".json"),
+    "tap.h5": tap_file,
+}
+SAID = {"hit.wav": Description(columns=("force [N]", "acceleration [g]"), full_scale=(1, 1))}
+
+
+@pytest.mark.parametrize("name", MADE)
+def test_a_file_cut_at_any_byte_gives_no_other_numbers(tmp_path: Path, name: str) -> None:
+    MADE[name](tmp_path / name)
+    content, cut, said = (tmp_path / name).read_bytes(), tmp_path / f"cut {name}", SAID.get(name, Description())
+    whole = look(tmp_path / name, said).checked()
+
+    @settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+    @given(st.integers(0, len(content) - 1) | st.integers(len(content) - 12, len(content) - 1))
+    def check(end: int) -> None:
+        cut.write_bytes(content[:end])
+        try:
+            found = look(cut, said)
+        except DataError:
+            return
+        if not found.complaint:
+            assert_begins(found.frf, whole.frf, may_be_shorter=name.endswith(".csv"))
+            for one, other in zip(found.hits, whole.hits, strict=True):
+                n = one.force.size
+                assert n == 40 or name.endswith(".csv")
+                last = n - 1 if name.endswith(".csv") else n  # a digit less of the last one cannot be seen
+                assert one.force[:last].tolist() == other.force[:last].tolist()
+                assert one.acceleration[:last].tolist() == other.acceleration[:last].tolist()
+
+    check()
+
+
+def assert_begins(found: Frf | None, whole: Frf | None, *, may_be_shorter: bool) -> None:
+    assert (found is None) == (whole is None)
+    if found is not None and whole is not None:
+        n = found.frequency.size
+        assert n == whole.frequency.size or may_be_shorter
+        last = n - 1 if may_be_shorter else n
+        assert found.receptance[:last].tolist() == whole.receptance[:last].tolist()

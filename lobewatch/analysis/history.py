@@ -122,6 +122,22 @@ class History:
         newest = {row.tool: row.series for row in since}
         return [row for row in since if row.series == newest[row.tool]]
 
+    @property
+    def newest_calibrated(self) -> Row | None:
+        """The newest that the bearings of the model were found from, without open questions."""
+        rows = reversed(self.current)
+        return next((row for row in rows if not row.questions and row.bearing_stiffness.is_known), None)
+
+    @property
+    def questions(self) -> dict[str, tuple[str, ...]]:
+        """Codes of what is asked and not answered, by tap test."""
+        return {row.tap_id: tuple(one.code for one in row.questions) for row in self.rows if row.questions}
+
+    def with_rulings(self, number: int, rulings: Mapping[str, Ruling]) -> History:
+        """The same with the word on every program after one of its rows."""
+        row = replace(self.rows[number], rulings=rulings)
+        return replace(self, rows=(*self.rows[:number], row, *self.rows[number + 1 :]))
+
     def series(self, tool: str, direction: str) -> list[Row]:
         """Those of one tool and direction, oldest first."""
         return [row for row in self.current if (row.tool, row.direction) == (tool, direction)]

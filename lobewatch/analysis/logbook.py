@@ -86,8 +86,8 @@ class Logbook:
         """Add a tap test; saved for good when this returns. now: of a live test, whose time is then asked about."""
         if not self.is_current:
             self._forget()
-        entry = self.folder.commit(tap, clock_questions(tap.circumstances.created, now, self.taps))
-        self.files.add(entry)
+        asked = clock_questions(tap.circumstances.created, now, self.taps)
+        self.files.add(self.folder.commit(tap, asked))
         self._forget_results()
         self._mark = self.folder.mark
 
@@ -157,16 +157,14 @@ class Logbook:
 
     def rulings(self, tap_id: str, falls: bool = False) -> Mapping[str, Ruling]:
         """Word, limit and critical `falls` of every program after a tap test; the history keeps what was asked for."""
-        number, rows = self.files.place(tap_id).number, list(self.history.rows)
-        found = dict(rows[number].rulings or {})
+        known = self.history.rows[number := self.files.place(tap_id).number].rulings
+        found = dict(known or {})
         names = [one.name for one in self.machine.program if is_missing(found.get(one.name), falls)]
-        if names or rows[number].rulings is None:
+        if names or known is None:
             found |= {one.program.name: ruling_of(one, falls) for one in self.verdicts(tap_id, names)}
             found = {table.name: found[table.name] for table in self.machine.program}
-            rows[number] = replace(rows[number], rulings=found)
-            self._history = replace(self.history, rows=tuple(rows))
-            kept = without_last_word(self._history) if self.files.doubts() else self._history
-            said = self._cache.store(kept)
+            self._history = self.history.with_rulings(number, found)
+            said = self._cache.store(without_last_word(self._history) if self.files.doubts() else self._history)
             self._said += [remark for remark in said if remark not in self._said]
         return found
 
@@ -190,7 +188,7 @@ class Logbook:
     @property
     def questions(self) -> Mapping[str, tuple[str, ...]]:
         """Codes of what is asked and not answered, by tap test; what --accept takes."""
-        return {row.tap_id: tuple(one.code for one in row.questions) for row in self.history.rows if row.questions}
+        return self.history.questions
 
     def accept(self, tap_ids: Sequence[str], codes: Sequence[str]) -> list[str]:
         """Accept what is asked of these tap tests, for good; the codes that none of them asks."""
@@ -202,8 +200,7 @@ class Logbook:
     @property
     def calibrated(self) -> Measurement | None:
         """The newest measurement that the bearings of the model could be found from; None where there is none."""
-        rows = reversed(self.history.current)
-        newest = next((row for row in rows if not row.questions and row.bearing_stiffness.is_known), None)
+        newest = self.history.newest_calibrated
         return None if newest is None else self.measurement(newest.tap_id)
 
     def from_the_rest(self, work: Callable[[], Result]) -> Result:
@@ -230,9 +227,8 @@ class Logbook:
         """The stored rows as far as they still hold, and those that are missing."""
         lost = {entry.id for entry in self.files.lost}
         history = self._cache.read(self.files.places, self.files.baseline, lost)
-        rows = self._all.with_all(history.rows, self._cache.others)
-        history = replace(history, rows=rows)
-        return without_last_word(history) if rows and self.files.doubts() else history
+        history = replace(history, rows=self._all.with_all(history.rows, self._cache.others))
+        return without_last_word(history) if history.rows and self.files.doubts() else history
 
     def _assembly(self, tool: str | None, until: str | None) -> Assembly:
         known = self.files.until(until)

@@ -48,7 +48,7 @@ PLAIN = tuple(
 """Fields that are in a row just so."""
 NOW = ("tap_id", "tool", "direction", "series", "static_tip_stiffness", "modal_tip_stiffness")
 """Fields that are decoded at once, besides those that are made of text."""
-LATER = ("modes", "x", "y", "remarks", "conditions", "rulings")
+LATER = ("modes", "x", "y", "remarks", "rulings")
 """Fields that few ask for."""
 _KINDS: dict[str, Any] = dict.fromkeys(ESTIMATES, tuple[float, float]) | dict.fromkeys(LATER, msgspec.Raw)
 _Brief = msgspec.defstruct(
@@ -93,6 +93,16 @@ class _Estimated:
         return found
 
 
+class _Conditioned:
+    """What it was taken under, checked where it is asked for."""
+
+    def __get__(self, row: StoredRow, kind: type | None = None) -> Conditions:
+        """Found in the row itself from then on."""
+        found = Conditions.of(row.brief.conditions)
+        _put(row, "conditions", found)
+        return found
+
+
 class StoredRow(Row):
     """A row as it was read: in each value as it was stored, most of them decoded when one is asked for."""
 
@@ -121,10 +131,9 @@ class StoredRow(Row):
         return Row.__name__ + super().__repr__().removeprefix(type(self).__name__)
 
 
-for _name in LATER:
-    setattr(StoredRow, _name, _Later(_name))
-for _name in ESTIMATES:
-    setattr(StoredRow, _name, _Estimated(_name))
+_LAZY: dict[str, object] = {name: _Later(name) for name in LATER} | {name: _Estimated(name) for name in ESTIMATES}
+for _name, _field in (_LAZY | {"conditions": _Conditioned()}).items():
+    setattr(StoredRow, _name, _field)
 
 
 def packed(number: int, row: Row, hashes: Mapping[str, str]) -> bytes:
@@ -151,6 +160,8 @@ def unpacked(content: bytes, hashes: Mapping[str, str], software: str = "") -> t
     _put(row, "brief", one)
     _put(row, "content", content)
     _put(row, "hashes", hashes)
+    if not one.conditions:
+        _put(row, "conditions", UNSAID)
     if REMARKED not in content:
         _put(row, "questions", ())
         _put(row, "accepted", NONE)
@@ -173,6 +184,5 @@ def _asks(content: bytes) -> bool:
 def _later(content: bytes, hashes: Mapping[str, str]) -> dict[str, Any]:
     one = _decode(content)
     rulings = {name: ruling for name, (made, ruling) in one.rulings.items() if hashes.get(name) == made}
-    conditions = Conditions.of(one.conditions) if one.conditions else UNSAID
-    made = {"conditions": conditions, "rulings": rulings if rulings or not hashes else None}
+    made = {"rulings": rulings if rulings or not hashes else None}
     return made | {name: getattr(one, name) for name in LATER if name not in made}

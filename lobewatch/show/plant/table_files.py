@@ -78,7 +78,7 @@ def _filled(lines: Iterable[TapLine], base: sqlite3.Connection) -> Iterator[tupl
             series[key] = len(series) + 1
             told = series[key], machines[line.folder], line.series, line.tool, line.direction
             base.execute("INSERT INTO series VALUES (?, ?, ?, ?, ?)", told)
-        yield series[key], line[2], line[3], line[-1], *map(_short, line[first:-1])
+        yield series[key], line[2], line[3], line[-1], *map(_short, line[first:-1])  # type: ignore[arg-type]
 
 
 def _short(value: float) -> float:

@@ -10,6 +10,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+import duckdb
 import pytest
 from typer.testing import CliRunner, Result
 
@@ -79,7 +80,6 @@ def test_sqlite_has_the_same_in_a_view(mills: Path) -> None:
 
 
 def test_parquet_is_read_by_duckdb(mills: Path) -> None:
-    duckdb = pytest.importorskip("duckdb")
     run(mills, mills / "fleet.parquet")
     with closing(duckdb.connect()) as base:
         query = (

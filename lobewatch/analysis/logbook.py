@@ -111,7 +111,7 @@ class Logbook:
         return self.measurement(tap_id)
 
     def replay_all(self, files: Sequence[Path], said: Description, **how: Any) -> Stored:
-        """Store recorded files, each once; how: jobs, keep_going and progress of `store_recordings`."""
+        """Store recorded files, each once; how: workers, keep_going and progress of `store_recordings`."""
         with self.folder.locked():
             enter_explained(self.folder)  # else what an interrupted replay has stored would be stored twice
             stored = store_recordings(self.folder, files, said, **how)

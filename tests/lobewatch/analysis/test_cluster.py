@@ -9,11 +9,13 @@ from pathlib import Path
 
 import pytest
 from distributed import Client, LocalCluster
+from typer.testing import CliRunner
 
 from acquisition import DataError, Description
 from lobewatch import Logbook
 from lobewatch.analysis.workers.shared import Workers, shared
 from lobewatch.analysis.workers.software import SOFTWARE
+from lobewatch.cli import app
 from lobewatch.machine.new_folder import make_machine_folder
 from tests.lobewatch.analysis.test_replaying import text_files, values
 
@@ -63,6 +65,27 @@ def test_a_replay_on_a_cluster_finds_the_same_though_a_worker_is_killed(cluster:
     assert len(found[0]) == 8
     assert found[0] == found[1]
     assert refused[0] == refused[1] == {files[4]: "line 3: '2,x,3' is no row of numbers"}
+
+
+def test_a_folder_of_machines_is_rebuilt_on_a_cluster_as_it_was(cluster: LocalCluster, tmp_path: Path) -> None:
+    files, plant = text_files(tmp_path / "files", 2), tmp_path / "mills"
+    for name, n_programs in (("a", 1), ("b", 0)):
+        make_machine_folder(plant / name, "surrogate_machine.toml")
+        toml = plant / name / "machine.toml"
+        toml.write_text("[[program]]".join(toml.read_text().split("[[program]]")[: 1 + n_programs]))
+        Logbook.open(plant / name).replay_all(files[: 1 + n_programs], SAID)
+    histories = []
+    for options in ([], ["--scheduler", cluster.scheduler_address]):
+        said = CliRunner().invoke(app, ["rebuild", str(plant), *options], catch_exceptions=False).stdout
+        assert "a: history.rows: made anew from 2 tap test(s)" in said
+        assert "2 of 2 machines rebuilt" in said
+        histories.append([repr(row) for name in ("a", "b") for row in Logbook.open(plant / name).history.rows])
+    assert len(histories[0]) == 3
+    assert "rulings=None" not in histories[0][0]
+    assert histories[0] == histories[1]
+    (plant / "b" / "machine.toml").write_text("[machine")
+    with pytest.raises(DataError, match=r"1 of 2 machines cannot be rebuilt\n.*machine\.toml"):
+        CliRunner().invoke(app, ["rebuild", str(plant)], catch_exceptions=False)
 
 
 def test_what_a_cluster_cannot_do_is_one_sentence(cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
 from collections.abc import Callable, Collection, Sequence
 
@@ -53,8 +54,9 @@ class Followed:
         return {"x": [], "y": [], **found}
 
     def _add(self, number: int, row: Row) -> None:
-        if row.mode is not None and not row.questions:
-            self._points.setdefault(row.series, {}).setdefault(row.direction, []).append(_point(row, row.mode))
+        values = row.followed
+        if math.isfinite(values[0]) and not row.questions:
+            self._points.setdefault(row.series, {}).setdefault(row.direction, []).append(Point(row.time, *values))
             self._numbers.setdefault(row.series, {}).setdefault(row.direction, []).append(number)
 
 
@@ -102,5 +104,5 @@ def first_like(
     return None
 
 
-def _point(one: Row | Measurement, mode: Mode) -> Point:
+def _point(one: Measurement, mode: Mode) -> Point:
     return Point(one.time, mode.frequency, mode.damping_ratio, mode.stiffness, mode.phase_deg)

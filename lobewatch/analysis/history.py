@@ -17,7 +17,7 @@ from lobewatch.analysis.estimate import UNKNOWN, Estimate
 from lobewatch.analysis.measurement import Measurement
 from lobewatch.analysis.order import Place
 from lobewatch.analysis.programs.verdict import Ruling
-from lobewatch.analysis.questions.asked import open_questions
+from lobewatch.analysis.questions.asked import accepted_codes, open_questions
 from lobewatch.machine import Machine
 from modal import Mode
 
@@ -81,13 +81,23 @@ class Row:
         """What nobody has answered yet; until then it is no reference for other tests."""
         return open_questions(self.remarks)
 
+    @cached_property
+    def accepted(self) -> frozenset[str]:
+        """Codes of the questions that were answered."""
+        return accepted_codes(self.remarks)
+
+    @property
+    def followed(self) -> Values:
+        """The mode followed; NaN where it was not found."""
+        return self.frequency.value, self.damping_ratio.value, self.stiffness.value, self.phase_deg.value
+
     @property
     def mode(self) -> Mode | None:
         """The mode followed, without its errors; None where it was not found."""
         if not self.frequency.is_known:
             return None
-        phase = self.phase_deg.value
-        return Mode(self.frequency.value, self.damping_ratio.value, self.stiffness.value, phase_deg=phase)
+        frequency, damping_ratio, stiffness, phase = self.followed
+        return Mode(frequency, damping_ratio, stiffness, phase_deg=phase)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,12 +115,28 @@ class History:
     kept: tuple[Row, ...] = ()
     """Of tap tests whose files cannot be used now, as they were worked out before; they count for nothing."""
 
-    @property
+    @cached_property
     def current(self) -> list[Row]:
         """Those since the baseline, of each tool with the stick-out and in the state of its newest."""
         since = [row for row in self.rows if row.baseline == self.baseline]
         newest = {row.tool: row.series for row in since}
         return [row for row in since if row.series == newest[row.tool]]
+
+    @property
+    def newest_calibrated(self) -> Row | None:
+        """The newest that the bearings of the model were found from, without open questions."""
+        rows = reversed(self.current)
+        return next((row for row in rows if not row.questions and row.bearing_stiffness.is_known), None)
+
+    @property
+    def questions(self) -> dict[str, tuple[str, ...]]:
+        """Codes of what is asked and not answered, by tap test."""
+        return {row.tap_id: tuple(one.code for one in row.questions) for row in self.rows if row.questions}
+
+    def with_rulings(self, number: int, rulings: Mapping[str, Ruling]) -> History:
+        """The same with the word on every program after one of its rows."""
+        row = replace(self.rows[number], rulings=rulings)
+        return replace(self, rows=(*self.rows[:number], row, *self.rows[number + 1 :]))
 
     def series(self, tool: str, direction: str) -> list[Row]:
         """Those of one tool and direction, oldest first."""

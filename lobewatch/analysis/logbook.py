@@ -42,12 +42,12 @@ class Logbook:
         self.files = UsableTaps(folder)
         """What the folder holds, and what was done to the machine."""
         self._said: list[Remark] = []
-        self._mark = folder.mark
-        self._cache = HistoryCache(folder)
+        self._mark, self._cache = folder.mark, HistoryCache(folder)
         self._history: History | None = None
         self._worked_out: WorkedOut | None = None
-        self._fits: dict[str, Fitted] = {}
-        self._verdicts: dict[str | None, dict[str, Verdict]] = {}
+        self.fits: dict[str, Fitted] = {}
+        self.judged: dict[str | None, dict[str, Verdict]] = {}
+        """By tap test: its modes, and the verdict on each program as it was then, where others have worked them out."""
 
     @classmethod
     def open(cls, path: Path | str) -> Self:
@@ -84,8 +84,12 @@ class Logbook:
 
     def commit(self, tap: TapTest, now: datetime | None = None) -> None:
         """Add a tap test; saved for good when this returns. now: of a live test, whose time is then asked about."""
-        self.folder.commit(tap, clock_questions(tap.circumstances.created, now, self.folder.taps()))
-        self._forget()
+        if not self.is_current:
+            self._forget()
+        asked = clock_questions(tap.circumstances.created, now, self.taps)
+        self.files.add(self.folder.commit(tap, asked))
+        self._forget_results()
+        self._mark = self.folder.mark
 
     def replay(
         self,
@@ -107,11 +111,11 @@ class Logbook:
         return self.measurement(tap_id)
 
     def replay_all(self, files: Sequence[Path], said: Description, **how: Any) -> Stored:
-        """Store recorded files, each once; how: jobs, keep_going and progress of `store_recordings`."""
+        """Store recorded files, each once; how: workers, keep_going and progress of `store_recordings`."""
         with self.folder.locked():
             enter_explained(self.folder)  # else what an interrupted replay has stored would be stored twice
             stored = store_recordings(self.folder, files, said, **how)
-            self._fits |= stored.fits
+            self.fits |= stored.fits
             self._forget()
         return stored
 
@@ -143,7 +147,7 @@ class Logbook:
         tables = [table for table in self.machine.program if names is None or table.name in names]
         rows = self.history.rows
         until = rows[-1].tap_id if until is None and self.history.current else until
-        judged = self._verdicts.setdefault(until, {})
+        judged = self.judged.setdefault(until, {})
         missing = [table for table in tables if table.name not in judged]
         known = {
             tool: or_reason(partial(self.assembly, tool, until)) for tool in dict.fromkeys(one.tool for one in missing)
@@ -153,16 +157,14 @@ class Logbook:
 
     def rulings(self, tap_id: str, falls: bool = False) -> Mapping[str, Ruling]:
         """Word, limit and critical `falls` of every program after a tap test; the history keeps what was asked for."""
-        number, rows = self.files.place(tap_id).number, list(self.history.rows)
-        found = dict(rows[number].rulings or {})
+        known = self.history.rows[number := self.files.place(tap_id).number].rulings
+        found = dict(known or {})
         names = [one.name for one in self.machine.program if is_missing(found.get(one.name), falls)]
-        if names or rows[number].rulings is None:
+        if names or known is None:
             found |= {one.program.name: ruling_of(one, falls) for one in self.verdicts(tap_id, names)}
             found = {table.name: found[table.name] for table in self.machine.program}
-            rows[number] = replace(rows[number], rulings=found)
-            self._history = replace(self.history, rows=tuple(rows))
-            kept = without_last_word(self._history) if self.files.doubts() else self._history
-            said = self._cache.store(kept)
+            self._history = self.history.with_rulings(number, found)
+            said = self._cache.store(without_last_word(self._history) if self.files.doubts() else self._history)
             self._said += [remark for remark in said if remark not in self._said]
         return found
 
@@ -186,7 +188,7 @@ class Logbook:
     @property
     def questions(self) -> Mapping[str, tuple[str, ...]]:
         """Codes of what is asked and not answered, by tap test; what --accept takes."""
-        return {row.tap_id: tuple(one.code for one in row.questions) for row in self.history.rows if row.questions}
+        return self.history.questions
 
     def accept(self, tap_ids: Sequence[str], codes: Sequence[str]) -> list[str]:
         """Accept what is asked of these tap tests, for good; the codes that none of them asks."""
@@ -198,8 +200,8 @@ class Logbook:
     @property
     def calibrated(self) -> Measurement | None:
         """The newest measurement that the bearings of the model could be found from; None where there is none."""
-        known = [row for row in self.history.current if row.bearing_stiffness.is_known and not row.questions]
-        return self.measurement(known[-1].tap_id) if known else None
+        newest = self.history.newest_calibrated
+        return None if newest is None else self.measurement(newest.tap_id)
 
     def from_the_rest(self, work: Callable[[], Result]) -> Result:
         """What some work gives; where it meets a damaged tap file, all of it again without that."""
@@ -212,7 +214,7 @@ class Logbook:
         self._mark = self.folder.mark
 
     def _forget_results(self) -> None:
-        self._history, self._worked_out, self._verdicts = None, None, {}
+        self._history, self._worked_out, self.judged = None, None, {}
 
     def _known_history(self) -> History:
         if self._history is None:
@@ -225,9 +227,8 @@ class Logbook:
         """The stored rows as far as they still hold, and those that are missing."""
         lost = {entry.id for entry in self.files.lost}
         history = self._cache.read(self.files.places, self.files.baseline, lost)
-        rows = self._all.with_all(history.rows, self._cache.others)
-        history = replace(history, rows=rows)
-        return without_last_word(history) if rows and self.files.doubts() else history
+        history = replace(history, rows=self._all.with_all(history.rows, self._cache.others))
+        return without_last_word(history) if history.rows and self.files.doubts() else history
 
     def _assembly(self, tool: str | None, until: str | None) -> Assembly:
         known = self.files.until(until)
@@ -245,5 +246,5 @@ class Logbook:
     @property
     def _all(self) -> WorkedOut:
         if self._worked_out is None:
-            self._worked_out = WorkedOut(self.folder, self.files.places, self._fits)
+            self._worked_out = WorkedOut(self.folder, self.files.places, self.fits)
         return self._worked_out

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from datetime import datetime
+
+import msgspec
 
 from acquisition import Remark
 from lobewatch.analysis.mounting.mountings import Mountings
 from lobewatch.machine import TapEntry
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(msgspec.Struct, frozen=True, gc=False):
     """One tap test among all of a machine."""
 
     number: int
@@ -33,19 +33,23 @@ class Place:
 
 def places(taps: Sequence[TapEntry], baselines: Sequence[datetime] = ()) -> list[Place]:
     """taps, baselines: oldest first."""
-    newest: dict[tuple[str, str], int] = {}
+    newest: dict[str, dict[str, int]] = {}
     mountings, found = Mountings(), list[Place]()
     for i, tap in enumerate(taps):
-        time = datetime.fromisoformat(tap.time)
-        baseline = next((one for one in reversed(baselines) if one <= time), None)
+        baseline = _before(tap, baselines) if baselines else None
         if found and found[-1].baseline != baseline:
             newest, mountings = {}, Mountings()
         series, said = mountings.place(tap)
-        others = [j for (one, direction), j in newest.items() if one == series and direction != tap.direction]
-        before, other = newest.get((series, tap.direction)), max(others, default=None)
-        found.append(Place(i, tap, before, other, baseline, series, said))
-        newest[series, tap.direction] = i
+        mine = newest.setdefault(series, {})
+        other = max((j for direction, j in mine.items() if direction != tap.direction), default=None)
+        found.append(Place(i, tap, mine.get(tap.direction), other, baseline, series, said))
+        mine[tap.direction] = i
     return found
+
+
+def _before(tap: TapEntry, baselines: Sequence[datetime]) -> datetime | None:
+    time = datetime.fromisoformat(tap.time)
+    return next((one for one in reversed(baselines) if one <= time), None)
 
 
 def earlier(place: Place, among: Sequence[Place]) -> Iterator[int]:

@@ -48,7 +48,9 @@ def scatter_of(series: Sequence[Point]) -> Scatter | None:
     """From the steps between neighbours, so that a slow fall does not count; None below 8 tap tests."""
     if len(series) < ENOUGH:
         return None
-    steps = np.diff([(*np.log(point[1:4]), point.phase_deg) for point in series], axis=0)
+    values = np.array([point[1:] for point in series])
+    values[:, :3] = np.log(values[:, :3])
+    steps = np.diff(values, axis=0)
     width = np.std(steps, axis=0, ddof=1) / np.sqrt(2) * t.ppf(0.975, len(steps) - 1)
     return Scatter(*width.tolist())
 

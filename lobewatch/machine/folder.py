@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
 
+import msgspec
 from filelock import FileLock, Timeout
 
 from acquisition import DataError, Remark, TapTest, read_tap, write_tap
@@ -139,7 +140,7 @@ class MachineFolder:
             told = str(error).removeprefix(f"{path}: ")
             raise DamagedTapError(Remark("tap-unreadable", entry.file, told), entry, self.path) from error
 
-    def commit(self, tap: TapTest, asked: Sequence[str] = ()) -> None:
+    def commit(self, tap: TapTest, asked: Sequence[str] = ()) -> TapEntry:
         """Write the tap file, then its journal line; saved for good when this returns.
 
         asked: what is asked about its time, by code.
@@ -149,8 +150,10 @@ class MachineFolder:
         path = self.path / "taps" / f"{tap.id}.h5"
         make_folder(path.parent)
         content = write_tap(path, tap)
-        self.journal.append(replace(TapEntry.of(tap, content), asked=tuple(asked)).line, reading=reading)
+        entry = msgspec.structs.replace(TapEntry.of(tap, content), asked=tuple(asked))
+        self.journal.append(entry.line, reading=reading)
         shutil.rmtree(self.spool / tap.id, ignore_errors=True)
+        return entry
 
     def commit_files(self, files: Mapping[Path, TapEntry]) -> None:
         """Give finished tap files their names in taps/, then enter them together; saved for good when this returns.

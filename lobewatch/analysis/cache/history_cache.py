@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
-from itertools import takewhile
+from itertools import takewhile, zip_longest
 
 from acquisition import Remark
 from acquisition.errors import system_failure
 from lobewatch.analysis.cache.kept_rows import kept_aside
-from lobewatch.analysis.columns.stored_row import packed, unpacked
+from lobewatch.analysis.columns.stored_row import is_of_this_make, packed, unpacked
 from lobewatch.analysis.history import History, Row, empty_history
 from lobewatch.analysis.order import Place
-from lobewatch.analysis.questions.asked import accepted_codes
 from lobewatch.machine import BusyError, MachineFolder
 from lobewatch.machine.archive.rows import add_rows, read_rows, write_rows
 
@@ -34,6 +33,7 @@ class HistoryCache:
         self._others: dict[str, Row] = {}
         self._aside: list[bytes] = []
         self._size = self._length = 0
+        self._stamp: tuple[int, ...] | None = None
 
     @property
     def others(self) -> Mapping[str, Row]:
@@ -46,7 +46,8 @@ class HistoryCache:
         baseline: the newest one; lost: tap tests whose files cannot be used, what is known of them is kept.
         """
         empty = replace(empty_history(self._folder.machine), baseline=baseline)
-        self._read(_head(empty))
+        if self._stamp is None or self._stamp != self._stamp_now:
+            self._read(_head(empty))
         pairs = zip(self._rows, places, strict=False)
         known = {row.tap_id: row for row in self._rows} | self._others if lost else {}
         kept = tuple(kept_aside(known[tap_id], empty.software) for tap_id in known if tap_id in lost)
@@ -64,11 +65,23 @@ class HistoryCache:
             return [Remark("history-in-memory", self._folder.history.name, text)]
         return []
 
+    @property
+    def _stamp_now(self) -> tuple[int, ...] | None:
+        """Another one where somebody else has written the file; None where there is none."""
+        try:
+            found = self._folder.history.stat()
+        except OSError:
+            return None
+        return found.st_size, found.st_mtime_ns, found.st_ino
+
     def _read(self, head: bytes) -> None:
+        self._stamp = self._stamp_now
         self._rows, self._packed, self._size, self._length = [], [], 0, 0
         self._others, self._aside, hashes = {}, [], self._folder.machine.program_hashes
         try:
             found = read_rows(self._folder.history)
+            if found.rows[1:] and not is_of_this_make(found.rows[-1]):
+                raise ValueError("rows of another make")
             is_own = found.rows[:1] == (head,)
             software = "" if is_own else b"".join(found.rows[:1]).decode().partition(" ")[2]
             for content in found.rows[1:]:
@@ -86,13 +99,14 @@ class HistoryCache:
 
     def _store(self, history: History) -> None:
         path, hashes = self._folder.history, self._folder.machine.program_hashes
-        if path.exists() and path.stat().st_size != self._length:
+        if self._stamp_now != self._stamp and self._stamp_now is not None:
             self._read(_head(history))  # another program has written
         contents = [
             self._packed[n] if n < len(self._rows) and self._rows[n] is row else packed(n, row, hashes)
             for n, row in enumerate(history.rows)
         ]
-        fresh = [content for n, content in enumerate(contents) if self._packed[n : n + 1] != [content]]
+        known = zip_longest(contents, self._packed[: len(contents)])
+        fresh = [content for content, there in known if content is not there and content != there]
         aside = [packed(ASIDE, row, hashes) for row in history.kept]
         most = 2 * sum(map(len, contents)) + MOST_DEAD
         if (
@@ -107,6 +121,7 @@ class HistoryCache:
             self._length = write_rows(path, [_head(history), *contents, *aside])
         self._aside = aside
         self._rows, self._packed, self._size = list(history.rows), contents, self._length
+        self._stamp = self._stamp_now
 
 
 def _head(history: History) -> bytes:
@@ -116,5 +131,5 @@ def _head(history: History) -> bytes:
 def _is_of(row: Row, place: Place) -> bool:
     """Whether a row was made of this tap test, with all that was accepted of it, since the same baseline."""
     tap = place.entry
-    made = row.tap_id, row.baseline, row.series, accepted_codes(row.remarks)
-    return made == (tap.id, place.baseline, place.series, set(tap.accepted))
+    made = row.tap_id, row.baseline, row.series, row.accepted
+    return made == (tap.id, place.baseline, place.series, frozenset(tap.accepted))

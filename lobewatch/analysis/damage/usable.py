@@ -114,6 +114,8 @@ class UsableTaps:
 
     def doubts(self, tool: str = "") -> tuple[Remark, ...]:
         """Damaged ones (of a tool; "": of any) that are newer than all of their series that can be used."""
+        if not self.lost:
+            return ()
         known = {_series(place.entry): _time(place.entry) for place in self.places}
         lost = [one for one in self.lost if _time(one) >= (self.baseline or BEFORE_ALL)]
         newer = [one for one in lost if tool in ("", one.tool) and _time(one) > known.get(_series(one), BEFORE_ALL)]
@@ -134,6 +136,14 @@ class UsableTaps:
                     forget()
         finally:
             self._works = False
+
+    def add(self, entry: TapEntry) -> None:
+        """A tap test that was just committed; where anybody else has written since, all is looked at again."""
+        reading = self._folder.journal.read()
+        if self._contents is None or reading.damage or len(reading.lines) != self._contents.lines + 1:
+            self.forget()
+        else:
+            self._contents, self._places = self._contents.with_one_more(entry), None
 
     def forget(self) -> None:
         """Look again."""

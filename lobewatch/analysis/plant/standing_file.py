@@ -46,7 +46,7 @@ def read_standing(folder: Path, now: datetime) -> Summary | None:
         age = now - datetime.fromisoformat(found.made)
     except (OSError, ValueError, TypeError):
         return None
-    if (found.make, found.software, found.mark) != (MAKE, _software(), mark_of(folder, found.summary.newest_file)):
+    if (found.make, found.software, found.mark) != (MAKE, software(), mark_of(folder, found.summary.newest_file)):
         return None
     named = found.summary.path
     if not timedelta(0) <= age < KEPT or (named != str(folder) and found.summary.speaks_of(named)):
@@ -59,7 +59,7 @@ def write_standing(folder: Path, summary: Summary, mark: tuple[int, ...], now: d
 
     OSError where it cannot be written.
     """
-    body = _encode(_File(MAKE, _software(), mark, now.isoformat(), summary))
+    body = _encode(_File(MAKE, software(), mark, now.isoformat(), summary))
     atomic_write(folder / STANDING, _head(body) + body[1:])
 
 
@@ -69,5 +69,6 @@ def _head(body: bytes) -> bytes:
 
 
 @cache
-def _software() -> str:
+def software() -> str:
+    """Version of this program."""
     return version("lobewatch")

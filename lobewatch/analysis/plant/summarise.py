@@ -50,6 +50,7 @@ def _summary(logbook: Logbook, standing: Standing) -> Summary:
         has_port=bool(machine.daq.port),
         newest=rows[-1].tap_id if last is not None else "",
         last_tap="" if last is None else last.isoformat(),
+        tap_tests=len(logbook.history.rows),
         programs={name: one.word.value for name, one in (rows[-1].rulings or {}).items()} if rows else {},
         series=tuple(_course(one, machine.limits) for one in standing.series),
     )

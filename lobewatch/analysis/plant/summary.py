@@ -94,6 +94,8 @@ class Summary(msgspec.Struct, frozen=True, dict=True):
     """Identity of the newest tap test; empty where there is none."""
     last_tap: str = ""
     """When that was (ISO 8601)."""
+    tap_tests: int = 0
+    """Rows of the history."""
     programs: dict[str, str] = {}
     """The word on each program."""
     series: tuple[Course, ...] = ()

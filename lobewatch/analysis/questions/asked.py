@@ -15,6 +15,8 @@ from modal import Mode
 ABOUT_MODES = ("frequency-jump", "no-mode-in-band", "other-band", "no-mode-to-follow", "stiffness-off-model")
 QUESTIONS = (*ABOUT_MODES, *CLOCK_QUESTIONS)
 """Codes of the remarks that ask a person: until each is accepted the test sets no reference, and nothing is good."""
+ACCEPTED = "accepted"
+"""Code of the remark that tells of an answer."""
 LARGEST_JUMP = 0.15
 """Relative change of the frequency against the newest test of the series that is asked about, up or down."""
 LARGEST_MISFIT = 4.0
@@ -74,7 +76,7 @@ def answered(remarks: Iterable[Remark], tap: TapEntry) -> tuple[Remark, ...]:
     accepted = tap.accepted
     remarks = (*remarks, *(about_clock(code, tap.time) for code in tap.asked))
     asked = {remark.code: str(remark) for remark in remarks}
-    told = [Remark("accepted", code, asked.get(code, "asked no longer")) for code in accepted]
+    told = [Remark(ACCEPTED, code, asked.get(code, "asked no longer")) for code in accepted]
     return (*(remark for remark in remarks if remark.code not in accepted), *told)
 
 
@@ -83,9 +85,9 @@ def open_questions(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
     return tuple(remark for remark in remarks if remark.code in QUESTIONS)
 
 
-def accepted_codes(remarks: Iterable[Remark]) -> set[str]:
+def accepted_codes(remarks: Iterable[Remark]) -> frozenset[str]:
     """Codes of the questions that were answered."""
-    return {remark.about for remark in remarks if remark.code == "accepted"}
+    return frozenset(remark.about for remark in remarks if remark.code == ACCEPTED)
 
 
 def checked_codes(codes: Iterable[str]) -> list[str]:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
 from acquisition import Remark
 from lobewatch.machine.archive.doubtful import read_doubtful
 from lobewatch.machine.archive.journal import JOURNAL, Reading, command, journal_damage
-from lobewatch.machine.archive.tap_entry import TapEntry
+from lobewatch.machine.archive.tap_entry import TapEntry, tap_entries
 from lobewatch.machine.corrections.event import Event, events_of
 from lobewatch.machine.corrections.exclusion import reasons_of
 
@@ -33,6 +33,12 @@ class Contents:
     """What is wrong."""
     events: tuple[Event, ...] = ()
     """What was done to the machine, oldest first."""
+    lines: int = 0
+    """Of the journal."""
+
+    def with_one_more(self, entry: TapEntry) -> Contents:
+        """The same with a tap test that was just committed, and nothing else since."""
+        return replace(self, taps=_oldest_first([*self.taps, entry]), lines=self.lines + 1)
 
     @property
     def baselines(self) -> list[datetime]:
@@ -44,14 +50,15 @@ def contents_of(folder: Path, reading: Reading) -> Contents:
     """What the journal and taps/ say together; reading: of the journal."""
     committed = listed(reading)
     remarks, taps, lost = [*reading.damage], list[TapEntry](), list[TapEntry]()
-    events = events_of(reading.entries)
+    events = events_of(reading.others)
     sizes, without, proved = _sizes(folder), given_up(reading), 0
-    for entry in sorted(committed.values(), key=_time, reverse=True):
+    for entry in reversed(_oldest_first(committed.values())):
         proved += entry.size
         wrong = "" if sizes.get(entry.id) == entry.size and proved > PROVED_BYTES else fault_of(folder, entry)
         (lost if wrong else taps).append(entry)
         if wrong:
             remarks.append(about_lost(folder, entry, wrong, entry.id in without))
+    taps.reverse()
     extra = [folder / "taps" / f"{name}.h5" for name in sorted(sizes.keys() - committed.keys())]
     missing = not reading.lines and not reading.damage and any(_is_unexplained(folder, path) for path in extra)
     if missing:
@@ -62,22 +69,21 @@ def contents_of(folder: Path, reading: Reading) -> Contents:
     else:
         cure = f"{command('verify', folder)} says what it is and what to do"
         remarks += [unlisted(path, "not in the journal, does not count", cure) for path in extra]
-    return Contents(_oldest_first(taps), _oldest_first(lost), tuple(remarks), events)
+    return Contents(_oldest_first(taps), _oldest_first(lost), tuple(remarks), events, len(reading.lines))
 
 
 def listed(reading: Reading) -> dict[str, TapEntry]:
     """The tap tests of the journal by identity."""
-    accepted: dict[str, list[str]] = {}
-    entries = reading.entries
-    excluded = reasons_of(entries)
-    for line in entries:
+    accepted: dict[str, tuple[str, ...]] = {}
+    excluded = reasons_of(reading.others)
+    for line in reading.others:
         if line["kind"] == "accept":
-            accepted.setdefault(line["tap"], []).append(line["code"])
-    return {
-        line["id"]: TapEntry.from_line(line, tuple(accepted.get(line["id"], ())), excluded.get(line["id"], ""))
-        for line in entries
-        if line["kind"] == "tap"
-    }
+            accepted[line["tap"]] = (*accepted.get(line["tap"], ()), line["code"])
+    found = {entry.id: entry for entry in tap_entries(reading.taps, accepted, excluded)}
+    for line in reading.others:
+        if line["kind"] == "tap":
+            found[line["id"]] = TapEntry.from_line(line, accepted.get(line["id"], ()), excluded.get(line["id"], ""))
+    return found
 
 
 def _sizes(folder: Path) -> dict[str, int]:
@@ -86,7 +92,7 @@ def _sizes(folder: Path) -> dict[str, int]:
         return {}
     with os.scandir(folder / "taps") as found:
         files = [one for one in found if one.name.endswith(".h5") and not one.name.startswith(".")]
-        return {one.name.removesuffix(".h5"): one.stat().st_size for one in files}
+        return {one.name[:-3]: one.stat().st_size for one in files}
 
 
 def tap_files(folder: Path) -> Mapping[str, Path]:
@@ -150,10 +156,10 @@ def unlisted(path: Path, text: str, cure: str) -> Remark:
 
 def given_up(reading: Reading) -> set[str]:
     """Tap tests that `lobewatch rebuild` went on without."""
-    return {line["tap"] for line in reading.entries if line["kind"] == "lost"}
+    return {line["tap"] for line in reading.others if line["kind"] == "lost"}
 
 
-def _oldest_first(entries: list[TapEntry]) -> tuple[TapEntry, ...]:
+def _oldest_first(entries: Iterable[TapEntry]) -> tuple[TapEntry, ...]:
     return tuple(sorted(entries, key=_time))
 
 

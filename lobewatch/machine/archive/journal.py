@@ -12,7 +12,7 @@ import hashlib
 import json
 import os
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -23,6 +23,7 @@ from acquisition import DataError, Remark
 from acquisition.atomic import atomic_write, sync_folder
 from lobewatch.machine.archive.foreign import foreign
 from lobewatch.machine.archive.journal_text import Entry, JournalText, crc_of, scan
+from lobewatch.machine.archive.tap_entry import TAP_LINE
 
 JOURNAL = "journal.jsonl"
 COPY = "journal.copy.jsonl"
@@ -46,8 +47,22 @@ class Reading:
     @cached_property
     def entries(self) -> list[Entry]:
         """The lines as JSON objects."""
-        found: list[Entry] = msgspec.json.decode(b"[" + b",".join(self.lines) + b"]")
-        return found
+        return _decoded(self.lines)
+
+    @cached_property
+    def taps(self) -> list[bytes]:
+        """Those that `tap_entries` reads."""
+        return [line for line in self.lines if line.startswith(TAP_LINE)]
+
+    @cached_property
+    def others(self) -> list[Entry]:
+        """All others as JSON objects."""
+        return _decoded(line for line in self.lines if not line.startswith(TAP_LINE))
+
+
+def _decoded(lines: Iterable[bytes]) -> list[Entry]:
+    found: list[Entry] = msgspec.json.decode(b"[" + b",".join(lines) + b"]")
+    return found
 
 
 class Journal:

@@ -20,8 +20,8 @@ def export(
 ) -> None:
     """All tap tests of all machines as one table, a line each, for other programs: SQLite, CSV, Parquet.
 
-    The same again gives the same bytes. Excluded tap tests are left out. A machine that cannot be read is named, with exit
-    code 2; the others are written. Parquet is written by DuckDB (pip install "lobewatch[fleet]").
+    The same again gives the same bytes. Excluded tap tests are left out. One that cannot be read is named, and the
+    exit code is 2. Parquet is written by DuckDB (pip install "lobewatch[fleet]").
 
     Examples:
 

@@ -10,7 +10,7 @@ import typer
 from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit, results
 
-FOR_THE_PAGE = ("points", "limits")
+FOR_THE_PAGE = ("points", "limits", "why")
 """What only the dashboard draws; lobewatch trend and lobewatch export tell it in full."""
 
 

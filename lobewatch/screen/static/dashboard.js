@@ -1,8 +1,17 @@
 import { ask } from "./link.js";
+import { drawCourse } from "./course.js";
 
 const REFRESH_MS = 5000;
-const WORDS = { good: "✓ GOOD", warn: "! WARNING", alarm: "✗ ALARM", unknown: "? UNKNOWN" };
+const WORDS = { alarm: "✗ ALARM", unknown: "? UNKNOWN", warn: "! WARNING", good: "✓ GOOD" };
+const FILTERS = { all: "All", ...WORDS, due: "To be tapped" };
 const at = (id) => document.getElementById(id);
+const isDue = ({ days_left: left }) => left === null || left < 0;
+const made = (tag, settings) => Object.assign(document.createElement(tag), settings);
+
+const shown = new Map(); // by machine: what stands on the page as text, its element
+const failed = new Map(); // by machine: what went wrong with its buttons
+let list = { version: "", machines: [], may_alter: false };
+let filter = sessionStorage.getItem("filter") in FILTERS ? sessionStorage.getItem("filter") : "all";
 
 function fail(text) {
   at("error").textContent = text;
@@ -14,62 +23,123 @@ function fallText({ fall, fall_std: std, series }) {
   if (std === 0) return `${series}: first test, nothing to compare it with yet`;
   const digits = std === null ? 2 : Math.min(Math.max(1 - Math.floor(Math.log10(std)), 1), 4);
   const error = std === null ? "" : ` ± ${std.toFixed(digits)}`;
-  return `${series}: frequency ${fall >= 0 ? "fallen" : "risen"} by ${Math.abs(fall).toFixed(digits)}${error} % since the first test`;
+  return `${series}: frequency ${fall >= 0 ? "fallen" : "risen"} by ${Math.abs(fall).toFixed(digits)}${error} % since the first tests`;
 }
 
 function dueText({ last_tap: last, days_left: left }) {
-  if (!last) return ["", ""];
-  const days = left < 0 ? Math.ceil(-left) : Math.round(left);
+  if (!last) return "";
+  const days = left < 0 ? Math.ceil(-left) : Math.floor(left);
   const many = `${days} day${days === 1 ? "" : "s"}`;
-  return [`last tap test ${last.slice(0, 10)}`, left < 0 ? `overdue by ${many}` : `next due in ${many}`];
+  if (left < 0) return `overdue by ${many}`;
+  return days ? `due in ${many}` : "due today";
 }
 
-// The address that an action leads to is opened; what went wrong stands on the page.
-async function go(button, path, body) {
-  fail("");
+function limitText({ next_limit: ahead }) {
+  if (!ahead) return "";
+  const months = (day) => Math.max(Math.round((new Date(day) - Date.now()) / 2.63e9), 0);
+  if (!ahead.p90) return `${ahead.percent} %: not within ${months(ahead.p10 ?? ahead.foretold_to)} months`;
+  return `${ahead.percent} % in ${months(ahead.p10)} to ${months(ahead.p90)} months`;
+}
+
+// The address that an action leads to is opened; what went wrong stands where the finger was.
+async function go(button, key, path, body) {
+  const say = (text) => {
+    failed.set(key, text);
+    const place = shown.get(key).element.querySelector(".failed");
+    place.textContent = text;
+    place.hidden = !text;
+  };
+  say("");
   button.disabled = true;
-  await ask(path, "POST", body).then(({ url }) => location.assign(url), (error) => fail(error.message));
+  await ask(path, "POST", body).then(({ url }) => location.assign(url), (error) => say(error.message));
   button.disabled = false;
 }
 
-function row(machine, mayAlter) {
+function addStarts(item, machine, path) {
+  const { key, running, interrupted } = machine;
+  for (const button of item.querySelectorAll(".start")) {
+    const { direction } = button.dataset;
+    if (running) button.textContent = "Watch the test";
+    button.hidden = running ? direction === "y" : !list.may_alter || !machine.has_port;
+    if (running) button.addEventListener("click", () => location.assign(`/tap/${encodeURIComponent(key)}/`));
+    else button.addEventListener("click", () => go(button, key, `${path}/start`, { direction }));
+  }
+  for (const [direction, count] of Object.entries(running || !list.may_alter || !machine.has_port ? {} : interrupted)) {
+    const anew = made("button", { type: "button", className: "anew", textContent: `Begin ${direction} anew` });
+    anew.addEventListener("click", () => go(anew, key, `${path}/start`, { direction, resume: false }));
+    item.querySelector(`.start[data-direction=${direction}]`).after(anew);
+    item.querySelector(".next").append(` An interrupted test in ${direction} has ${count} hit${count === 1 ? "" : "s"}: START ${direction} goes on with it.`);
+  }
+}
+
+function row(machine) {
   const item = at("machine").content.cloneNode(true).firstElementChild;
   const part = (name) => item.querySelector(`.${name}`);
-  const path = `/machines/${encodeURIComponent(machine.key)}`;
-  item.dataset.key = machine.key;
+  const { key } = machine;
+  const path = `/machines/${encodeURIComponent(key)}`;
+  item.dataset.key = key;
   part("light").dataset.light = machine.light;
   part("light").textContent = WORDS[machine.light];
   part("name").textContent = machine.name;
+  part("reason").textContent = machine.why || fallText(machine);
   part("fall").textContent = fallText(machine);
   part("note").textContent = machine.note;
   part("next").textContent = machine.next_step;
-  const [last, due] = dueText(machine);
-  part("dates").append(last, document.createElement("br"), Object.assign(document.createElement("span"), { textContent: due, className: machine.days_left < 0 ? "overdue" : "" }));
+  part("port").textContent = machine.has_port || machine.light === "unknown" ? "" : "START needs the port of the DAQ: port in [daq] of machine.toml.";
+  part("limit").textContent = limitText(machine);
+  part("due").textContent = dueText(machine);
+  part("due").classList.toggle("overdue", isDue(machine));
+  part("due").title = machine.last_tap ? `last tap test ${machine.last_tap.slice(0, 10)}` : "";
+  drawCourse(part("course"), machine);
   part("report").disabled = !machine.last_tap;
-  part("report").addEventListener("click", ({ target }) => go(target, `${path}/report`));
-  for (const button of item.querySelectorAll(".start")) {
-    if (machine.running) button.textContent = "Watch the test";
-    button.hidden = machine.running ? button.dataset.direction === "y" : !mayAlter;
-    if (mayAlter) button.addEventListener("click", ({ target }) => go(target, `${path}/start`, { direction: target.dataset.direction }));
-    else button.addEventListener("click", () => location.assign(`/tap/${encodeURIComponent(machine.key)}/`));
-  }
-  for (const [direction, count] of Object.entries(machine.running || !mayAlter ? {} : machine.interrupted)) {
-    const anew = Object.assign(document.createElement("button"), { type: "button", className: "anew", textContent: `Begin ${direction} anew` });
-    anew.addEventListener("click", () => go(anew, `${path}/start`, { direction, resume: false }));
-    item.querySelector(`.start[data-direction=${direction}]`).after(anew);
-    part("next").append(` An interrupted test in ${direction} has ${count} hit${count === 1 ? "" : "s"}: START ${direction} goes on with it.`);
-  }
+  part("report").addEventListener("click", ({ target }) => go(target, key, `${path}/report`));
+  part("failed").textContent = failed.get(key) ?? "";
+  part("failed").hidden = !failed.get(key);
+  addStarts(item, machine, path);
   return item;
 }
 
-let shown = "";
+// Only what has changed is made anew: a line that is open, or has the focus, stays.
+function show() {
+  for (const machine of list.machines) {
+    const text = JSON.stringify([machine, list.may_alter]);
+    const old = shown.get(machine.key);
+    if (old?.text === text) continue;
+    const element = row(machine);
+    element.querySelector("details").open = old?.element.querySelector("details").open ?? false;
+    shown.set(machine.key, { text, element });
+  }
+  const wanted = list.machines.filter((one) => filter === "all" || one.light === filter || (filter === "due" && isDue(one)));
+  const elements = wanted.map(({ key }) => shown.get(key).element);
+  const present = [...at("machines").children];
+  if (elements.length !== present.length || elements.some((one, i) => one !== present[i])) at("machines").replaceChildren(...elements);
+  at("none").hidden = !list.machines.length || elements.length > 0;
+  showFilter();
+}
+
+function showFilter() {
+  const count = (name) => list.machines.filter((one) => name === "all" || one.light === name || (name === "due" && isDue(one))).length;
+  for (const [name, word] of Object.entries(FILTERS)) {
+    const id = `filter-${name}`;
+    if (!at(id)) {
+      const button = made("button", { type: "button", id });
+      button.addEventListener("click", () => {
+        filter = name;
+        sessionStorage.setItem("filter", name);
+        show();
+      });
+      at("filter").append(button);
+    }
+    at(id).textContent = `${word} ${count(name)}`;
+    at(id).setAttribute("aria-pressed", String(filter === name));
+  }
+}
 
 async function refresh() {
   try {
-    const { machines, may_alter: mayAlter } = await ask("machines");
-    const text = JSON.stringify(machines.map((one) => ({ ...one, days_left: Math.round(one.days_left) })));
-    if (text !== shown) at("machines").replaceChildren(...machines.map((one) => row(one, mayAlter)));
-    shown = text;
+    const answer = await ask(`machines?known=${list.version}`);
+    if (answer.machines) list = answer;
+    show();
     if (at("error").dataset.lost) fail("");
     delete at("error").dataset.lost;
   } catch (error) {

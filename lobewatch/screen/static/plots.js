@@ -14,8 +14,9 @@ let shown = { pulse: [0, 1], frequency: [0, 1], receptance: [0.001, 1] };
 const charts = {};
 
 const line = (stroke, dash) => ({ stroke, dash, width: 2, points: { show: false } });
-const axis = (size, label) => ({ label, size, labelSize: 18, labelFont: FONT, font: FONT, stroke: INK, grid: GRID, ticks: GRID });
-const decade = (values) => values.map((v) => (v !== null && Math.abs(Math.log10(v) % 1) < 1e-6 ? String(v) : ""));
+const axis = (size, label) => ({ label, size, labelSize: 16, labelFont: FONT, font: FONT, stroke: INK, grid: GRID, ticks: GRID });
+const isDecade = (v) => v !== null && Math.abs(Math.log10(v) % 1) < 1e-6;
+const decade = (values) => values.map((v) => (isDecade(v) ? String(v) : ""));
 
 function chart(name, { x, range, xRange, series, log = false, draw = () => {} }) {
   const figure = document.getElementById(name);
@@ -28,7 +29,7 @@ function chart(name, { x, range, xRange, series, log = false, draw = () => {} })
       legend: { show: false },
       cursor: { show: false },
       scales: { x: { time: false, range: xRange }, y: { distr: log ? 3 : 1, range } },
-      axes: [axis(30, x), { ...axis(56), ...(log && { filter: (_, splits) => splits, values: (_, v) => decade(v) }) }],
+      axes: [axis(30, x), { ...axis(56), ...(log && { filter: (_, splits) => splits.map((v) => (isDecade(v) ? v : null)), values: (_, v) => decade(v) }) }],
       series: [{}, ...series],
       hooks: { drawClear: [draw] },
     },

@@ -24,7 +24,8 @@ def plant_row(one: Standings) -> dict[str, Any]:
     """Of one machine."""
     summary, dated = one.summary, one.dated
     worst = summary.series[0] if summary.series else None
-    reasons = [r.finding for r in joined(r for r in dated.remarks if r.code not in SHOWN_APART)]
+    told = joined(dated.remarks)
+    reasons = [one.finding for one in told if one.code not in SHOWN_APART]
     return {
         "key": one.key,
         "name": summary.name,
@@ -36,6 +37,7 @@ def plant_row(one: Standings) -> dict[str, Any]:
         "days_left": dated.days_left,
         "reasons": reasons,
         "note": "; ".join(reasons),
+        "why": "; ".join(one.finding for one in told if one.code != "overdue"),
         "next_step": dated.next_step,
         "next_limit": next_limit(summary.series),
         "has_port": summary.has_port,

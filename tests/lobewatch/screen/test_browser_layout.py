@@ -90,3 +90,12 @@ def test_the_curves_are_drawn(browser: Browser, session: Session, server: Screen
     session.hit()
     browser.see("text", "GOOD")
     browser.wait(lambda: browser.ask(blue) > 200)
+
+
+def test_curves_are_legible_on_a_low_screen(browser: Browser, session: Session, server: ScreenServer) -> None:
+    session.hit()
+    browser.open(server.url, (1280, 657))
+    browser.see("text", "GOOD")
+    heights = "[...document.querySelectorAll('#plots .u-over')].map((one) => one.getBoundingClientRect().height)"
+    browser.wait(lambda: len(browser.ask(heights)) == 5 and min(browser.ask(heights)) >= 110)
+    assert browser.ask("document.documentElement.scrollHeight") == 657

@@ -1,0 +1,141 @@
+"""The dashboard in a real browser: twelve machines on one screen, filters, buttons and what goes wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from selenium.webdriver.common.by import By
+
+from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.screen import DashboardServer
+from modal import Mode, synthesize
+
+Browser = Any
+"""Chromium on one page: Browser of conftest.py."""
+LINES = [4.0 * line for line in range(1, 1000)]
+
+
+def tap(path: Path, days_ago: float, frequency: float, direction: TapDirection = "x") -> None:
+    """A tap test without noise."""
+    about = Circumstances("m", datetime.now(UTC) - timedelta(days=days_ago), "reference", direction)
+    frf = synthesize([Mode(frequency, 0.029, 3.5e7)], LINES)
+    MachineFolder(path).commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
+
+
+def machine(path: Path, daq: str = "") -> None:
+    """The example machine without its programs."""
+    toml = make_machine_folder(path, "surrogate_machine.toml")
+    text = toml.read_text("utf-8")
+    begin, end = text.index("[[program]]"), text.index("# The spindle of the example")
+    toml.write_text((text[:begin] + text[end:]).replace("[daq]\n", f"[daq]\n{daq}\n"), "utf-8")
+
+
+@pytest.fixture(scope="module")
+def mills(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Ten never tapped, one fallen by 7 %, one good and overdue; the good one alone names a port."""
+    path = tmp_path_factory.mktemp("plant")
+    for number in range(10):
+        machine(path / f"new-{number}")
+    machine(path / "worn")
+    machine(path / "well", 'port = "/dev/nothing-here"')
+    for days_ago, share in ((60, 1.0), (30, 0.97), (1, 0.93)):
+        tap(path / "worn", days_ago, 1713.0 * share)
+    tap(path / "well", 40, 1713.0)
+    tap(path / "well", 39, 1690.0, "y")
+    return path
+
+
+@pytest.fixture
+def dashboard(mills: Path) -> Iterator[DashboardServer]:
+    with DashboardServer(mills) as running:
+        yield running
+
+
+def keys(browser: Browser) -> list[str]:
+    return [row.get_attribute("data-key") for row in browser.driver.find_elements(By.CSS_SELECTOR, "#machines li")]
+
+
+def row(browser: Browser, key: str) -> Any:
+    return browser.driver.find_element(By.CSS_SELECTOR, f"#machines li[data-key={key}]")
+
+
+def test_twelve_machines_fit_one_desktop_screen(browser: Browser, dashboard: DashboardServer) -> None:
+    browser.open(dashboard.url, (1280, 657))
+    browser.wait(lambda: len(keys(browser)) == 12)
+    assert keys(browser)[-1] in ("well", "worn")
+    assert browser.ask("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") == [1280, 657]
+    for key in keys(browser):
+        for part in ("light", "about", "actions"):
+            box = row(browser, key).find_element(By.CLASS_NAME, part).rect
+            assert 0 < box["y"] < box["y"] + box["height"] <= 657, (key, part)
+    assert "overdue by 10 days" in row(browser, "well").text
+    assert "frequency fallen by 7.0 % since the first tests" in row(browser, "worn").text
+    assert "due in 28 days" in row(browser, "worn").text
+    course = row(browser, "worn").find_element(By.CLASS_NAME, "course")
+    assert course.get_attribute("aria-label") == "frequency -7.26 % since the start, limit -10 %"
+    line, path = (course.find_element(By.TAG_NAME, name).rect for name in ("line", "path"))
+    assert path["y"] < path["y"] + path["height"] < line["y"]
+
+
+@pytest.mark.parametrize("size", [(768, 1024), (390, 800)])
+def test_nothing_is_beside_a_narrower_screen(
+    browser: Browser, dashboard: DashboardServer, size: tuple[int, int]
+) -> None:
+    browser.open(dashboard.url, size)
+    browser.wait(lambda: len(keys(browser)) == 12)
+    assert browser.ask("document.documentElement.scrollWidth") <= size[0]
+    assert row(browser, "worn").find_element(By.CLASS_NAME, "report").rect["height"] >= 44
+
+
+def test_a_click_shows_one_light_or_those_to_be_tapped(browser: Browser, dashboard: DashboardServer) -> None:
+    browser.open(dashboard.url)
+    browser.see("filter", "? UNKNOWN 10")
+    browser.part("filter-warn").click()
+    browser.wait(lambda: sorted(keys(browser)) == ["well", "worn"])
+    browser.part("filter-due").click()
+    browser.wait(lambda: len(keys(browser)) == 11)
+    assert "worn" not in keys(browser)
+    browser.part("filter-alarm").click()
+    browser.see("none", "No machine of this kind.")
+    browser.driver.refresh()
+    browser.wait(lambda: browser.part("filter-alarm").get_attribute("aria-pressed") == "true")
+    browser.part("filter-all").click()
+    browser.wait(lambda: len(keys(browser)) == 12)
+
+
+def test_start_is_there_where_a_port_is_and_its_error_in_its_line(
+    opened: Browser, dashboard: DashboardServer, mills: Path
+) -> None:
+    opened.open(dashboard.url)
+    opened.wait(lambda: len(keys(opened)) == 12)
+    starts = opened.driver.find_elements(By.CSS_SELECTOR, ".start")
+    assert sum(one.is_displayed() for one in starts) == 2
+    toml = mills / "well" / "machine.toml"
+    text = toml.read_text("utf-8")
+    try:
+        toml.write_text(text.replace('port = "/dev/nothing-here"', ""), "utf-8")
+        row(opened, "well").find_element(By.CSS_SELECTOR, ".start[data-direction=x]").click()
+        opened.wait(lambda: "no port in [daq]" in row(opened, "well").text)
+        opened.wait(lambda: opened.ask("document.querySelectorAll('.start:not([hidden])').length") == 0)
+        assert "no port in [daq]" in row(opened, "well").text
+        assert not opened.part("error").is_displayed()
+    finally:
+        toml.write_text(text, "utf-8")
+    opened.complaints()
+
+
+def test_a_line_opens_with_all_reasons_and_stays_open(browser: Browser, dashboard: DashboardServer) -> None:
+    browser.open(dashboard.url)
+    browser.wait(lambda: len(keys(browser)) == 12)
+    row(browser, "worn").find_element(By.TAG_NAME, "summary").click()
+    browser.wait(lambda: "Tap again to be sure" in row(browser, "worn").text)
+    assert "START needs the port of the DAQ" in row(browser, "worn").text
+    browser.part("filter-warn").click()
+    browser.wait(lambda: len(keys(browser)) == 2)
+    assert "Tap again to be sure" in row(browser, "worn").text

@@ -20,6 +20,7 @@ from acquisition import (
     tap_direction,
 )
 from acquisition.files.contents.exponential import window_text
+from acquisition.files.tap_recording import is_all_in
 from lobewatch.analysis.replaying.dating import checked_time, date_in_name
 from lobewatch.machine import MachineFolder
 
@@ -30,7 +31,7 @@ _ASK = "it does not say: "
 def read_tap_test(folder: MachineFolder, file: Path, said: Description, content: bytes) -> tuple[TapTest, Recording]:
     """A file as a tap test, and how it was understood; DataError with all that is missing or wrong in it.
 
-    content: its bytes, which become a part of the tap test.
+    content: its bytes, which become a part of the tap test where that does not hold all of it anyway.
     """
     before = file.stat()
     recording = look(file, said)
@@ -44,7 +45,8 @@ def read_tap_test(folder: MachineFolder, file: Path, said: Description, content:
     _refuse_window(recording.checked())
     about = _about(folder, recording, said, checked_time(file, created))
     recording = replace(recording, facts=(*recording.facts, *_labels(about, said, recording)))
-    return _tap_test(recording, about, SourceFile(file.name, content)), recording
+    source = SourceFile(file.name, content)
+    return _tap_test(recording, about, source.without_content if is_all_in(file, recording.hits) else source), recording
 
 
 def _refuse_window(recording: Recording) -> None:

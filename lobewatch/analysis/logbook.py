@@ -42,12 +42,12 @@ class Logbook:
         self.files = UsableTaps(folder)
         """What the folder holds, and what was done to the machine."""
         self._said: list[Remark] = []
-        self._mark = folder.mark
-        self._cache = HistoryCache(folder)
+        self._mark, self._cache = folder.mark, HistoryCache(folder)
         self._history: History | None = None
         self._worked_out: WorkedOut | None = None
-        self._fits: dict[str, Fitted] = {}
-        self._verdicts: dict[str | None, dict[str, Verdict]] = {}
+        self.fits: dict[str, Fitted] = {}
+        self.judged: dict[str | None, dict[str, Verdict]] = {}
+        """By tap test: its modes, and the verdict on each program as it was then, where others have worked them out."""
 
     @classmethod
     def open(cls, path: Path | str) -> Self:
@@ -111,11 +111,11 @@ class Logbook:
         return self.measurement(tap_id)
 
     def replay_all(self, files: Sequence[Path], said: Description, **how: Any) -> Stored:
-        """Store recorded files, each once; how: jobs, keep_going and progress of `store_recordings`."""
+        """Store recorded files, each once; how: workers, keep_going and progress of `store_recordings`."""
         with self.folder.locked():
             enter_explained(self.folder)  # else what an interrupted replay has stored would be stored twice
             stored = store_recordings(self.folder, files, said, **how)
-            self._fits |= stored.fits
+            self.fits |= stored.fits
             self._forget()
         return stored
 
@@ -147,7 +147,7 @@ class Logbook:
         tables = [table for table in self.machine.program if names is None or table.name in names]
         rows = self.history.rows
         until = rows[-1].tap_id if until is None and self.history.current else until
-        judged = self._verdicts.setdefault(until, {})
+        judged = self.judged.setdefault(until, {})
         missing = [table for table in tables if table.name not in judged]
         known = {
             tool: or_reason(partial(self.assembly, tool, until)) for tool in dict.fromkeys(one.tool for one in missing)
@@ -214,7 +214,7 @@ class Logbook:
         self._mark = self.folder.mark
 
     def _forget_results(self) -> None:
-        self._history, self._worked_out, self._verdicts = None, None, {}
+        self._history, self._worked_out, self.judged = None, None, {}
 
     def _known_history(self) -> History:
         if self._history is None:
@@ -246,5 +246,5 @@ class Logbook:
     @property
     def _all(self) -> WorkedOut:
         if self._worked_out is None:
-            self._worked_out = WorkedOut(self.folder, self.files.places, self._fits)
+            self._worked_out = WorkedOut(self.folder, self.files.places, self.fits)
         return self._worked_out

@@ -8,40 +8,34 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit, notes
+from lobewatch.show.output import Json
 
 
 def rebuild(
-    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    machine: Annotated[
+        Path, typer.Argument(parser=named_folder, help="Machine folder, or a folder of machine folders.")
+    ],
+    jobs: Annotated[
+        int, typer.Option(min=1, max=64, help="Processes that work at once; what they find is the same.")
+    ] = 1,
+    scheduler: Annotated[
+        str, typer.Option(help="Address of a Dask scheduler whose workers work, such as tcp://10.0.0.5:8786.")
+    ] = "",
     as_json: Json = False,
 ) -> None:
     """The history anew from the tap tests, and the journal where that is damaged; nothing is deleted.
 
     What is damaged is put into a folder named damaged. Tap files that were renamed or swapped get their names back,
     whole ones that are in no journal are entered. A tap test whose file is lost is gone on without; put back from a
-    backup, it counts again.
+    backup, it counts again. Of a folder of machines each is rebuilt; one that cannot be costs only itself.
 
     Examples:
 
       lobewatch rebuild mill-3
+      lobewatch rebuild mills --scheduler tcp://10.0.0.5:8786
     """
-    from lobewatch.analysis import Logbook
-    from lobewatch.machine.archive.rebuild import rebuild_files
+    from lobewatch.analysis.workers.shared import Workers
     from lobewatch.notify.telling import tell
-    from lobewatch.show.measurements import remark_json, remark_lines
+    from lobewatch.show.rebuilds.show_rebuild import show_rebuild
 
-    told = rebuild_files(machine)
-    logbook = Logbook.open(machine)
-    logbook.folder.history.unlink(missing_ok=True)
-    rows = logbook.history.rows
-    for number, row in enumerate(rows, 1):
-        logbook.rulings(row.tap_id)
-        if number % 10 == 0:
-            notes.print(f"{number} of {len(rows)} tap tests")
-    if any(one.code == "history-in-memory" for one in logbook.remarks):
-        made = "history.rows: not made anew (see above); the next command that can write makes it"
-    else:
-        made = f"history.rows: made anew from {len(rows)} tap test(s)"
-    payload = {"done": told, "tap_tests": len(rows), "remarks": [remark_json(one) for one in logbook.remarks]}
-    emit(payload, as_json, *told, *remark_lines(logbook.remarks), made)
-    tell(logbook)
+    show_rebuild(machine, Workers(jobs, scheduler), tell, as_json=as_json)

@@ -59,6 +59,9 @@ def replay(
     jobs: Annotated[
         int, typer.Option(min=1, max=64, help="Processes that read and fit at once; what they find is the same.")
     ] = 1,
+    scheduler: Annotated[
+        str, typer.Option(help="Address of a Dask scheduler whose workers read and fit, such as tcp://10.0.0.5:8786.")
+    ] = "",
     accept: Annotated[
         list[str] | None,
         typer.Option(help="Take these recordings though they raise this question, by its code; as often as needed."),
@@ -84,6 +87,7 @@ def replay(
     from acquisition import Conditions
     from lobewatch.analysis import Logbook
     from lobewatch.analysis.replaying.found_files import found_files
+    from lobewatch.analysis.workers.shared import Workers
     from lobewatch.notify.telling import telling
     from lobewatch.show.replays.show_replay import show_preview, show_replay
 
@@ -103,9 +107,10 @@ def replay(
         direction=direction,
         conditions=Conditions(temperature_c=temperature, note=note, reclamped=reclamped),
     )
+    workers = Workers(jobs, scheduler)
     logbook, (found, passed) = Logbook.open(machine), found_files(files)
     if dry_run:
         show_preview(logbook, found, passed, said, as_json=as_json)
         return
     with telling(logbook):
-        show_replay(logbook, found, passed, said, accept or (), jobs=jobs, keep_going=keep_going, as_json=as_json)
+        show_replay(logbook, found, passed, said, accept or (), workers=workers, keep_going=keep_going, as_json=as_json)

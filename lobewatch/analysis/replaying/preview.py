@@ -10,9 +10,9 @@ from pathlib import Path
 from acquisition import DataError, Description, Recording, TapTest
 from lobewatch.analysis.logbook import Logbook
 from lobewatch.analysis.measurement import Measurement, measure
-from lobewatch.analysis.replaying.prepare import reason_of
-from lobewatch.analysis.replaying.read_tap_test import read_tap_test
+from lobewatch.analysis.replaying.read_tap_test import Setup, read_tap_test
 from lobewatch.analysis.replaying.store import KnownContents, Progress
+from lobewatch.analysis.replaying.worked_out import reason_of
 from modal import Mode
 
 
@@ -66,7 +66,7 @@ def _read(logbook: Logbook, file: Path, said: Description, contents: KnownConten
         known = contents.tap_of(digest, said)
         if known is not None:
             return Preview(file, known)
-        tap, recording = read_tap_test(logbook.folder, file, said, content)
+        tap, recording = read_tap_test(Setup.of(logbook.folder), file, said, content)
     except (DataError, OSError, ValueError) as error:
         return Preview(file, refused=reason_of(file, error))
     contents.add(digest, tap)

@@ -9,11 +9,15 @@ from pathlib import Path
 
 from acquisition import DataError, Description, TapTest
 from lobewatch.analysis.measurement import Fitted
-from lobewatch.analysis.replaying.prepare import Prepared, all_prepared, prepared, reason_of, remove_leftovers
+from lobewatch.analysis.replaying.prepare import Prepared, all_prepared, prepared, remove_leftovers
+from lobewatch.analysis.replaying.worked_out import reason_of
+from lobewatch.analysis.workers.shared import Workers
 from lobewatch.machine import MachineFolder, TapEntry
 
 Progress = Callable[[str, int, int], None]
 """Told what is done ("read", "store"), how many of it are, and of how many."""
+
+HERE = Workers()
 
 
 @dataclass(frozen=True)
@@ -67,14 +71,14 @@ def store_recordings(
     files: Sequence[Path],
     said: Description,
     *,
-    jobs: int = 1,
+    workers: Workers = HERE,
     keep_going: bool = False,
     progress: Progress = lambda _what, _done, _of: None,
 ) -> Stored:
     """Commit recorded files, each once, oldest first; all are read and judged before the first one is stored.
 
     DataError, and nothing is stored, where one cannot be used, with all of these; keep_going: the others are stored.
-    jobs: processes that share the work. To be called under the lock.
+    workers: who reads and fits; what they find is the same. To be called under the lock.
     """
     remove_leftovers(folder)
     digests, refused = _digests(files)
@@ -84,7 +88,7 @@ def store_recordings(
         if not ids[digest]:
             todo.setdefault(digest, file)
     try:
-        ready, wrong = _made_ready(folder, todo, said, jobs, alone=len(files) == 1, progress=progress)
+        ready, wrong = _made_ready(folder, todo, said, workers, alone=len(files) == 1, progress=progress)
         refused |= {file: wrong[digest] for file, digest in digests.items() if digest in wrong}
         if refused and not (keep_going and len(refused) < len(files)):
             raise DataError(refusal({file: refused[file] for file in files if file in refused}, len(files)))
@@ -116,13 +120,19 @@ def _digests(files: Sequence[Path]) -> tuple[dict[Path, str], dict[Path, str]]:
 
 
 def _made_ready(
-    folder: MachineFolder, todo: Mapping[str, Path], said: Description, jobs: int, *, alone: bool, progress: Progress
+    folder: MachineFolder,
+    todo: Mapping[str, Path],
+    said: Description,
+    workers: Workers,
+    *,
+    alone: bool,
+    progress: Progress,
 ) -> tuple[list[Prepared], dict[str, str]]:
     """Files by their digests, made ready; by digest why some cannot be used, the error itself where it stands alone."""
-    if alone:
+    if alone and not workers.scheduler:
         return [prepared(folder, file, said) for file in todo.values()], {}
     ready, wrong = list[Prepared](), dict[str, str]()
-    results = zip(todo, all_prepared(folder, [*todo.values()], said, jobs), strict=True)
+    results = zip(todo, all_prepared(folder, [*todo.values()], said, workers), strict=True)
     for number, (digest, one) in enumerate(results, 1):
         if isinstance(one, str):
             wrong[digest] = one

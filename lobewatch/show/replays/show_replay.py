@@ -11,6 +11,7 @@ from lobewatch.analysis.questions.accepting import not_asked
 from lobewatch.analysis.questions.asked import checked_codes
 from lobewatch.analysis.replaying.preview import preview_recordings
 from lobewatch.analysis.replaying.store import refusal
+from lobewatch.analysis.workers.shared import Workers
 from lobewatch.show.output import emit, notes
 from lobewatch.show.replays.describe_preview import preview_json, preview_summary, preview_texts
 from lobewatch.show.replays.describe_replay import replay_json, replay_texts
@@ -37,14 +38,14 @@ def show_replay(
     said: Description,
     accept: Sequence[str],
     *,
-    jobs: int,
+    workers: Workers,
     keep_going: bool,
     as_json: bool,
 ) -> None:
     """Store files, accept what is asked of them, tell what they say; DataError for those that cannot be used."""
     codes = checked_codes(accept)
     with ProgressBar() as progress:
-        stored = logbook.replay_all(files, said, jobs=jobs, keep_going=keep_going, progress=progress)
+        stored = logbook.replay_all(files, said, workers=workers, keep_going=keep_going, progress=progress)
     unasked = logbook.accept(stored.tap_ids, codes)
     _tell_known(stored.known, len(files))
     if passed:

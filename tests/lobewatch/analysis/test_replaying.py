@@ -28,6 +28,7 @@ from acquisition import (
 )
 from lobewatch import Logbook
 from lobewatch.analysis import Row
+from lobewatch.analysis.workers.shared import Workers
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from modal import Mode, synthesize
@@ -97,7 +98,7 @@ def test_several_processes_find_the_same_and_leave_nothing_behind(tmp_path: Path
     for jobs in (1, 2):
         make_machine_folder(tmp_path / str(jobs), "surrogate_machine.toml")
         logbook = Logbook.open(tmp_path / str(jobs))
-        stored = logbook.replay_all(files, Description(date_pattern="%Y-%m-%d"), jobs=jobs)
+        stored = logbook.replay_all(files, Description(date_pattern="%Y-%m-%d"), workers=Workers(jobs))
         assert len(stored.fresh) == len(files)
         found.append([*map(values, logbook.history.rows)])
         names = {path.name for path in (tmp_path / str(jobs) / "taps").iterdir()}

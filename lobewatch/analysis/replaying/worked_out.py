@@ -1,0 +1,101 @@
+"""What one recorded file becomes, worked out from its bytes alone: by this process or by any other, on any computer."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from dataclasses import dataclass
+from datetime import datetime
+from functools import lru_cache
+from pathlib import Path
+from typing import Self
+
+from acquisition import DataError, Description
+from acquisition.files.tap_file import as_written, tap_content
+from lobewatch.analysis.measurement import Fitted, fitted
+from lobewatch.analysis.replaying.read_tap_test import Setup, read_tap_test
+from lobewatch.machine import MachineFolder, TapEntry
+from lobewatch.machine.machine_file import parse_machine
+
+
+@dataclass(frozen=True)
+class WorkedOut:
+    """One file."""
+
+    digest: str
+    """SHA-256 of the file."""
+    content: bytes
+    """Its tap file."""
+    entry: TapEntry
+    """Of that."""
+    created: datetime
+    """When it was recorded."""
+    fit: Fitted
+    """The modes in it."""
+    taken: tuple[str, ...]
+    """What was taken for granted where the file does not say it."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One file, with all that another computer has to know of it."""
+
+    file: Path
+    """Where it lies, from the root on."""
+    content: bytes
+    """All of it."""
+    said: Description
+    """What a person says of it."""
+    machine_toml: str
+    """The machine that it is of."""
+    fault: str = ""
+    """Why it cannot be read."""
+
+    @classmethod
+    def of(cls, file: Path, said: Description, machine_toml: str) -> Self:
+        """Read now."""
+        try:
+            return cls(file.absolute(), file.read_bytes(), said, machine_toml)
+        except OSError as error:
+            return cls(file.absolute(), b"", said, machine_toml, reason_of(file, error))
+
+
+def work_out_file(folder: MachineFolder, file: Path, said: Description) -> WorkedOut:
+    """A file where it lies; DataError, OSError or ValueError where it cannot be used."""
+    return _of(Setup.of(folder), file, said, file.read_bytes(), file)
+
+
+def work_out(asked: Asked) -> WorkedOut | str:
+    """A file from its bytes, or why it cannot be used."""
+    if asked.fault:
+        return asked.fault
+    with tempfile.TemporaryDirectory(prefix="lobewatch-") as work:
+        at = Path(work) / asked.file.name
+        at.write_bytes(asked.content)
+        try:
+            return _of(_setup(asked.machine_toml), asked.file, asked.said, asked.content, at)
+        except (DataError, OSError, ValueError) as error:
+            return reason_of(at, error).replace(str(at), str(asked.file)).removeprefix(f"{asked.file}: ")
+
+
+def reason_of(file: Path, error: Exception) -> str:
+    """An error about a file, without its name."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return str(error).removeprefix(f"{file}: ")
+
+
+def _of(setup: Setup, file: Path, said: Description, content: bytes, at: Path) -> WorkedOut:
+    """at: where the content lies."""
+    tap, recording = read_tap_test(setup, file, said, content, at)
+    told = tuple(f"{fact.name} {fact.value}" for fact in recording.facts if fact.origin == "default")
+    packed = tap_content(tap)
+    fit = fitted(as_written(tap), setup.machine)
+    digest = hashlib.sha256(content).hexdigest()
+    return WorkedOut(digest, packed, TapEntry.of(tap, packed), tap.circumstances.created, fit, told)
+
+
+@lru_cache(maxsize=4)
+def _setup(machine_toml: str) -> Setup:
+    """Read once in a process."""
+    return Setup(parse_machine(machine_toml), machine_toml)

@@ -1,0 +1,1 @@
+"""Rebuilt machines for people: what was mended, and how far it is."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import secrets
 from collections.abc import Mapping
@@ -99,7 +100,19 @@ class SourceFile:
     name: str
     """Its name, without folder."""
     content: bytes
-    """Its bytes."""
+    """Its bytes; none where it was a live tap test of ours, all of whose hits the replayed one holds."""
+    digest: str = ""
+    """Its SHA-256 where the bytes are not kept."""
+
+    @property
+    def sha256(self) -> str:
+        """Of its bytes, kept or not."""
+        return self.digest or hashlib.sha256(self.content).hexdigest()
+
+    @property
+    def without_content(self) -> Self:
+        """Its name and its SHA-256 alone."""
+        return replace(self, content=b"", digest=self.sha256)
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from acquisition import (
     Channel,
     Circumstances,
+    Description,
     Frf,
     HammeredStructure,
     Hammering,
@@ -174,6 +175,10 @@ def ten_hits() -> None:
         print(f"{len(hits)} hits of 2 x 16384: {len(write_tap(path, tap)) / 1e3:.0f} kB")
         for _ in range(3):
             told("read and fitted", lambda: fitted(read_tap(path), machine))
+        other = Path(work) / "m"
+        make_machine_folder(other, "surrogate_machine.toml")
+        replayed = Logbook(MachineFolder(other)).replay_all([path], Description()).tap_ids[0]
+        print(f"replayed from that file: {(other / 'taps' / f'{replayed}.h5').stat().st_size / 1e3:.0f} kB")
 
 
 def main() -> None:

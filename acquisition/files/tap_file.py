@@ -236,15 +236,14 @@ def _read_frf(file: h5py.File) -> Frf:
 
 def _write_source(file: h5py.File, source: SourceFile) -> None:
     content = np.frombuffer(source.content, np.uint8)
-    chunks = (min(max(content.size, 1), CHUNK),)
-    stored = file.create_dataset(
-        "source", data=content, chunks=chunks, compression="gzip", compression_opts=1, fletcher32=True
-    )
-    digest = hashlib.sha256(source.content).hexdigest()
-    stored.attrs.update(name=source.name, sha256=digest, units="byte")
+    packed = {"chunks": (min(content.size, CHUNK),), "compression": "gzip", "compression_opts": 1, "fletcher32": True}
+    stored = file.create_dataset("source", data=content, **packed if content.size else {})
+    stored.attrs.update(name=source.name, sha256=source.sha256, units="byte")
 
 
 def _read_source(file: h5py.File) -> SourceFile | None:
     if "source" not in file:
         return None
-    return SourceFile(str(file["source"].attrs["name"]), file["source"][()].tobytes())
+    stored = file["source"]
+    content = stored[()].tobytes()
+    return SourceFile(str(stored.attrs["name"]), content, "" if content else str(stored.attrs["sha256"]))

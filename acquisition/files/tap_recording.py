@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from acquisition.files.format import Format
@@ -20,6 +21,15 @@ def read_tap_recording(path: Path) -> list[Hit] | Frf:
     hits, _, flags = read_tap_hits(path)
     kept = [hit for hit, flag in zip(hits, flags, strict=True) if not flag & _BEYOND_THE_SIGNALS]
     return kept or read_tap(path).frf
+
+
+def is_all_in(path: Path, hits: Sequence[Hit]) -> bool:
+    """Whether a file is a live tap test of ours, and hits read from it are all of its hits: no signal is lost without
+    the file."""
+    if not hits or not path.read_bytes().startswith(MAGIC):
+        return False
+    tap = read_tap(path)
+    return tap.source is None and len(tap.hits) == len(hits)
 
 
 def _is_hdf5(head: bytes, _path: Path) -> bool:

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dsm.calibration.calibration import UnreachableFrequencyError
-from dsm.calibration.identifiability import CURE, LEAST_SHARE, identifiability
-from dsm.calibration.least_squares import LIMIT, Measured, Problem, State, minimize
+from dsm.calibration.identifiability import CURE, FARTHEST, LEAST_SHARE, identifiability
+from dsm.calibration.least_squares import LIMIT, Problem, State, minimize
+from dsm.calibration.measured import check_measured
 from dsm.calibration.remark import Remark
 from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
 from dsm.calibration.stiffness_groups import chosen_groups, scale_groups
-from dsm.matrix.frequency_axis import frequency_axis
 from dsm.modes.natural_frequencies import natural_frequencies
 from dsm.spindle.spindle import Spindle, require_support
 
@@ -23,6 +23,8 @@ _Float = NDArray[np.float64]
 
 OTHER_STARTS = 8
 """Further starts, about a factor of e around the given one, where that leads to no minimum or to a poor one."""
+BACK = (0.0, 0.1, 0.2, 0.4, 0.7, 1.0)
+"""Parts of the way to where an unfelt stiffness has run off, at which it is tried to stay."""
 WORST_CONDITION = 30.0
 """A larger condition number is reported."""
 NEAR = 0.01
@@ -30,18 +32,25 @@ NEAR = 0.01
 
 
 def fit_stiffness(
-    spindle: Spindle,
+    spindle: Spindle | Sequence[Spindle],
     frequency: ArrayLike,
     frequency_std: ArrayLike | None = None,
     mode: Sequence[int] | None = None,
     groups: Sequence[str] | None = None,
+    shaft: Sequence[int] | None = None,
+    start: Sequence[float] | None = None,
 ) -> StiffnessFit:
     """Scale each group of bearings and joints by a factor of its own, so that modes have their measured frequencies.
 
-    frequency: (n,) Hz. frequency_std: their standard errors (n,) Hz, the weights; None: all count by their relative
-    error. mode: their numbers (n,), 1 is the lowest; None: 1 to n. groups: names of bearing and joint groups, no more
-    than n; None: all. A bearing keeps its stiffness against tilting and that of its housing; a joint has both of its
-    stiffnesses scaled. One group and one mode are what `calibrate` solves without iteration.
+    spindle: one, or several with the same bearings and joints, such as one spindle with two tools: a group has the
+    same factor in all of them. frequency: (n,) Hz. frequency_std: their standard errors (n,) Hz, the weights; None: all
+    count by their relative error. mode: their numbers (n,), 1 is the lowest; None: 1 to n. groups: names of bearing and
+    joint groups, no more than n; None: all. shaft: which of the spindles each was measured on (n,), 0 is the first;
+    None: the first. start: factors to begin the search with (g,), and no others; None: 1, and others where
+    that leads to none that fits.
+
+    A bearing keeps its stiffness against tilting and that of its housing; a joint has both of its stiffnesses scaled,
+    or each by itself (`Joint.rotational_group`). One group and one mode are what `calibrate` solves without iteration.
 
     Least squares in the logarithms of the factors by Levenberg and Marquardt, with d ln f / d ln factor = half the
     group's share of the strain energy. Modes keep their number, never their shape: every step solves for certified
@@ -56,57 +65,57 @@ def fit_stiffness(
     to 1e6 puts a mode where it was measured, StiffnessFitError (an ArithmeticError, with the best estimate) where no
     minimum is found.
     """
-    require_support(spindle)
-    names = chosen_groups(spindle, groups)
-    measured = _check(frequency, frequency_std, mode)
+    spindles = (spindle,) if isinstance(spindle, Spindle) else tuple(spindle)
+    for one in spindles:
+        require_support(one)
+    names = chosen_groups(spindles, groups)
+    measured = check_measured(len(spindles), frequency, frequency_std, mode, shaft)
     if measured.frequency.size < len(names):
         raise ValueError(
             f"{measured.frequency.size} measured mode(s) cannot give the stiffness of {len(names)} groups "
             f"({', '.join(names)}); measure more modes, or name fewer groups"
         )
-    problem = Problem(spindle, names, measured)
-    state, found = _search(problem)
+    problem = Problem(spindles, names, measured)
+    state, found = _search(problem, None if start is None else np.log(start))
     if not (found and problem.fits(state)):
         with suppress(ArithmeticError):  # factors so far apart may be beyond what can be computed
-            _require_reachable(spindle, names, measured)
+            _require_reachable(problem)
     result = _result(problem, state, found)
     if not found:
         raise StiffnessFitError(_why(result), result)
     return result
 
 
-def _check(frequency: ArrayLike, frequency_std: ArrayLike | None, mode: Sequence[int] | None) -> Measured:
-    f = frequency_axis(frequency)
-    if np.any(f == 0):
-        raise ValueError("frequency=0 Hz is not > 0")
-    std = None if frequency_std is None else np.atleast_1d(np.asarray(frequency_std, dtype=np.float64))
-    if std is not None and (std.shape != f.shape or not np.all(np.isfinite(std) & (std > 0))):
-        raise ValueError(
-            f"frequency_std={frequency_std!r} is not one finite number > 0 (Hz) for each of {f.size} modes"
-        )
-    numbers = np.arange(1, f.size + 1) if mode is None else np.atleast_1d(np.asarray(mode))
-    whole = numbers.shape == f.shape and numbers.dtype.kind in "iu"
-    if not whole or np.any(numbers < 1) or np.unique(numbers).size < f.size:
-        raise ValueError(f"mode={mode} is not one number from 1 (the lowest) for each of {f.size} modes, all different")
-    order = np.argsort(numbers)
-    if np.any(np.diff(f[order]) <= 0):
-        raise ValueError(
-            f"frequency={f[order].tolist()} Hz does not rise with the number of the mode, {numbers[order]}"
-        )
-    return Measured(numbers, f, std)
-
-
-def _search(problem: Problem) -> tuple[State, bool]:
+def _search(problem: Problem, begin: _Float | None) -> tuple[State, bool]:
     """The best state, and whether it is a minimum: that of the given start, or of others where that one is poor."""
     size = len(problem.names)
-    state, found = minimize(problem, np.zeros(size))
+    state, found = minimize(problem, np.zeros(size) if begin is None else begin)
+    if not found:
+        state, found = _without_unfelt(problem, state)
     for start in np.random.default_rng(0).normal(size=(OTHER_STARTS, size)):
-        if found and problem.fits(state):
+        if begin is not None or (found and problem.fits(state)):
             break
         other, other_found = minimize(problem, start)
         if (other_found, -other.cost) > (found, -state.cost):
             state, found = other, other_found
     return state, found
+
+
+def _without_unfelt(problem: Problem, state: State) -> tuple[State, bool]:
+    """A fit with the factors that have run off at what was given, or as near to it as the frequencies allow.
+
+    That is the end of a stiffness which next to nothing is felt of. State and False where none is, or nothing fits.
+    """
+    away = np.flatnonzero(np.abs(state.log_factor) == LIMIT)
+    if away.size == 0 or np.max(state.share[:, away]) >= LEAST_SHARE:
+        return state, False
+    for part in BACK:
+        start = state.log_factor.copy()
+        start[away] *= part
+        other, found = minimize(problem, start, away.tolist())
+        if found and problem.fits(other):
+            return other, True
+    return state, False
 
 
 def _result(problem: Problem, state: State, found: bool) -> StiffnessFit:
@@ -118,50 +127,76 @@ def _result(problem: Problem, state: State, found: bool) -> StiffnessFit:
         mode=measured.mode,
         frequency=measured.frequency,
         frequency_std=measured.std,
-        fitted_frequency=state.frequency[measured.mode - 1],
+        fitted_frequency=state.fitted,
         factor=np.exp(state.log_factor),
         log_covariance=covariance,
         energy_share=state.share,
-        remarks=(*unsure, *_alike(problem, state), *_close_modes(state, measured), *_misfit(problem, state)),
-        given=problem.spindle,
-        spindle=state.spindle,
+        remarks=(*unsure, *_alike(problem, state), *_close_modes(problem, state), *_misfit(problem, state)),
+        shaft=measured.shaft,
+        given=problem.spindles,
+        spindles=state.spindles,
     )
 
 
 def _covariance(problem: Problem, state: State) -> _Float | None:
-    """(J^T J)^-1, times the variance of the residuals where no standard errors were given."""
+    """(J^T J)^-1, times the variance of the residuals where no standard errors were given.
+
+    A group that is not felt, known to a factor of 30 at best, counts as known to that and independent of all others.
+    """
     given = problem.measured.std is not None
     if not given and problem.spare == 0:
         return None
-    _, values, vectors = np.linalg.svd(state.slope, full_matrices=False)
+    variance = 1.0 if given else state.cost / problem.spare
+    covariance = variance * _inverse(state.slope)
+    felt = (np.max(state.share, axis=0) >= LEAST_SHARE) | (np.diag(covariance) < FARTHEST**2)
+    if np.all(felt):
+        return covariance
+    limited = np.diag(np.full(felt.size, FARTHEST**2))
+    if np.any(felt):
+        limited[np.ix_(felt, felt)] = variance * _inverse(state.slope[:, felt])
+    return limited
+
+
+def _inverse(slope: _Float) -> _Float:
+    """(J^T J)^-1, large where J is singular."""
+    _, values, vectors = np.linalg.svd(slope, full_matrices=False)
     root = vectors.T / np.maximum(values, np.finfo(np.float64).eps * values[0])
-    return np.asarray(root @ root.T * (1.0 if given else state.cost / problem.spare))
+    return np.asarray(root @ root.T)
 
 
 def _alike(problem: Problem, state: State) -> list[Remark]:
-    condition = float(np.linalg.cond(state.share))
-    if condition <= WORST_CONDITION or np.any(np.max(state.share, axis=0) < LEAST_SHARE):
+    """Groups that change the frequencies in the same ratio, however much they do."""
+    if np.any(np.max(state.share, axis=0) < LEAST_SHARE):
         return []
-    weakest = np.abs(np.linalg.svd(state.share)[2][-1])
+    ratio = state.share / np.linalg.norm(state.share, axis=0)
+    condition = float(np.linalg.cond(ratio))
+    if condition <= WORST_CONDITION:
+        return []
+    weakest = np.abs(np.linalg.svd(ratio)[2][-1])
     mixed = ", ".join(name for name, part in zip(problem.names, weakest, strict=True) if part > 0.3)
     text = f"the measured modes hardly tell their stiffness apart (condition number {condition:.2g})"
     return [Remark("groups-alike", mixed, text, CURE)]
 
 
-def _close_modes(state: State, measured: Measured) -> list[Remark]:
+def _close_modes(problem: Problem, state: State) -> list[Remark]:
     """Pairs of neighbours with a measured one among them."""
-    gap = np.diff(state.frequency) / state.frequency[1:]
-    return [
-        Remark(
-            "modes-exchange-shapes",
-            f"modes {low} and {low + 1}",
-            f"they are {100 * gap[low - 1]:.2g} % apart in the fitted model and exchange shapes there: standard errors "
-            "hold for small changes only",
-            "check which of them was measured",
-        )
-        for low in range(1, state.frequency.size)
-        if gap[low - 1] < NEAR and np.any((measured.mode == low) | (measured.mode == low + 1))
-    ]
+    measured = problem.measured
+    remarks = []
+    for number, frequency in enumerate(state.frequency):
+        gap, seen = np.diff(frequency) / frequency[1:], measured.mode[measured.shaft == number]
+        where = f" of spindle {number + 1}" if len(state.frequency) > 1 else ""
+        remarks += [
+            Remark(
+                "modes-exchange-shapes",
+                f"modes {low} and {low + 1}{where}",
+                f"they are {100 * gap[low - 1]:.2g} % apart in the fitted model and exchange shapes there: standard "
+                "errors hold for small changes only",
+                "check which of them was measured",
+            )
+            for low in range(1, frequency.size)
+            if gap[low - 1] < NEAR and np.any((seen == low) | (seen == low + 1))
+        ]
+    return remarks
 
 
 def _misfit(problem: Problem, state: State) -> list[Remark]:
@@ -173,20 +208,21 @@ def _misfit(problem: Problem, state: State) -> list[Remark]:
     return [Remark("frequencies-misfit", "", text, "check geometry, mode numbers and standard errors")]
 
 
-def _require_reachable(spindle: Spindle, names: tuple[str, ...], measured: Measured) -> None:
+def _require_reachable(problem: Problem) -> None:
     """Raise UnreachableFrequencyError for a mode measured outside of what the factors can do; all raise all modes."""
-    count = int(np.max(measured.mode))
-    low, high = (
-        natural_frequencies(scale_groups(spindle, dict.fromkeys(names, math.exp(end))), count)
-        for end in (-LIMIT, LIMIT)
-    )
-    for number, frequency in zip(measured.mode, measured.frequency, strict=True):
-        reachable = float(low[number - 1]), float(high[number - 1])
-        if not reachable[0] < frequency < reachable[1]:
+    measured, names = problem.measured, problem.names
+    ends = np.empty((2, measured.mode.size))
+    for number, spindle in enumerate(problem.spindles):
+        here = measured.shaft == number
+        for row, end in enumerate((-LIMIT, LIMIT)):
+            scaled = scale_groups(spindle, dict.fromkeys(names, math.exp(end)))
+            ends[row, here] = natural_frequencies(scaled, int(np.max(measured.mode[here])))[measured.mode[here] - 1]
+    for mode, frequency, low, high in zip(measured.mode, measured.frequency, *ends.tolist(), strict=True):
+        if not low < frequency < high:
             raise UnreachableFrequencyError(
-                f"no stiffness of {', '.join(names)} puts mode {number} at {frequency:g} Hz: it lies between "
-                f"{reachable[0]:.1f} and {reachable[1]:.1f} Hz; check the geometry, and which mode was measured",
-                reachable,
+                f"no stiffness of {', '.join(names)} puts mode {mode} at {frequency:g} Hz: it lies between "
+                f"{low:.1f} and {high:.1f} Hz; check the geometry, and which mode was measured",
+                (low, high),
             )
 
 

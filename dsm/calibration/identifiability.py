@@ -70,7 +70,7 @@ def _second_solution(problem: Problem, best: State, log_covariance: _Float | Non
     variance = best.cost / problem.spare if problem.measured.std is None else 1.0
     for step in (-1.2, -0.5, 0.5, 1.2):
         try:
-            other, _ = minimize(problem, best.log_factor + step * direction, None, _tolerance(problem, best))
+            other, _ = minimize(problem, best.log_factor + step * direction, (), _tolerance(problem, best))
         except ArithmeticError:
             continue
         away = np.abs(other.log_factor - best.log_factor)
@@ -96,28 +96,33 @@ def _open(problem: Problem, best: State, log_covariance: _Float, index: int, far
     if problem.measured.std is None:
         variance = best.cost / problem.spare
         rise = float(stdtrit(problem.spare, (1 + CONFIDENCE) / 2)) ** 2
+    unknown = np.flatnonzero(np.diag(log_covariance) >= FARTHEST**2).tolist()
     half, limit = math.sqrt(rise * float(log_covariance[index, index])), variance * rise
     if not half < FARTHEST:
         return f"its standard error is a factor of {math.exp(min(half, 50.0)):.3g} either way"
     if half < SHARP:
         return ""
-    along = half * log_covariance[:, index] / log_covariance[index, index]
+    along = np.clip(half * log_covariance[:, index] / log_covariance[index, index], -FARTHEST, FARTHEST)
     try:
-        return _one_side(problem, best, index, -along, limit, far) or _one_side(problem, best, index, along, limit, far)
+        sides = (_one_side(problem, best, index, unknown, way, limit, far) for way in (-along, along))
+        return next(filter(None, sides), "")
     except ArithmeticError:
         return "its interval reaches where the model cannot be solved"
 
 
-def _one_side(problem: Problem, best: State, index: int, along: _Float, limit: float, far: bool) -> str:
-    """The same for one side of the interval, which ends `along` from the factors found."""
+def _one_side(
+    problem: Problem, best: State, index: int, unknown: list[int], along: _Float, limit: float, far: bool
+) -> str:
+    """The same for one side of the interval, which ends `along` from the factors found; unknown: groups that stay."""
     end = problem.evaluate(best.log_factor + along)
     if not SOFT < (end.cost - best.cost) / limit < HARD:
-        end, _ = minimize(problem, end.log_factor, index, _tolerance(problem, best))
+        end, _ = minimize(problem, end.log_factor, [index, *unknown], _tolerance(problem, best))
     ratio = (end.cost - best.cost) / limit
     if not SOFT < ratio < HARD:
         said = "better" if ratio <= SOFT else "worse"
         return f"at {math.exp(along[index]):.4g} times what was found the fit is {said} than its standard error says"
-    for place, cost in _beyond(problem, best, end, index, 1 if along[index] > 0 else -1) if far else ():
+    side = 1 if along[index] > 0 else -1
+    for place, cost in _beyond(problem, best, end, index, unknown, side) if far else ():
         if cost - best.cost < limit:
             return (
                 f"the frequencies fit {math.exp(math.copysign(place, along[index])):.3g} times what was found as well"
@@ -130,7 +135,9 @@ def _tolerance(problem: Problem, best: State) -> float:
     return TOLERANCE * error * float(np.min(problem.measured.scale / problem.measured.frequency))
 
 
-def _beyond(problem: Problem, best: State, end: State, index: int, side: int) -> Iterator[tuple[float, float]]:
+def _beyond(
+    problem: Problem, best: State, end: State, index: int, unknown: list[int], side: int
+) -> Iterator[tuple[float, float]]:
     """Distances from the factor found (logarithm) beyond an end of its interval, and the least cost there."""
     half = abs(float(end.log_factor[index] - best.log_factor[index]))
     to_start = -side * float(best.log_factor[index])
@@ -140,7 +147,7 @@ def _beyond(problem: Problem, best: State, end: State, index: int, side: int) ->
         start = state.log_factor.copy()
         start[index] = best.log_factor[index] + side * place
         try:
-            state, _ = minimize(problem, start, index, _tolerance(problem, best))
+            state, _ = minimize(problem, start, [index, *unknown], _tolerance(problem, best))
         except ArithmeticError:
             return
         yield place, state.cost

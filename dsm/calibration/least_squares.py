@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from dsm.calibration.measured import Measured
 from dsm.calibration.stiffness_groups import group_shares, scale_groups
 from dsm.modes.find_modes import find_modes
 from dsm.spindle.spindle import Spindle
@@ -27,31 +29,17 @@ UNLIKELY = 1e-3
 """A chi-square with less probability than this is reported; where there is none, a larger relative residual."""
 
 
-class Measured(NamedTuple):
-    """What was measured."""
-
-    mode: NDArray[np.int_]
-    """Numbers of the modes, shape (n,); 1 is the lowest."""
-    frequency: _Float
-    """Hz, shape (n,)."""
-    std: _Float | None
-    """Standard errors (Hz), shape (n,); None where not given."""
-
-    @property
-    def scale(self) -> _Float:
-        """What residuals are divided by: standard errors (Hz); where there are none, the frequencies."""
-        return self.frequency if self.std is None else self.std
-
-
 class State(NamedTuple):
     """The model at one choice of factors."""
 
     log_factor: _Float
     """Logarithms of the factors (-), shape (g,)."""
-    spindle: Spindle
-    """The spindle scaled by them."""
-    frequency: _Float
-    """Of all modes up to the one beyond the highest measured (Hz)."""
+    spindles: tuple[Spindle, ...]
+    """The spindles scaled by them."""
+    frequency: tuple[_Float, ...]
+    """Of all modes of each spindle up to the one beyond the highest measured (Hz)."""
+    fitted: _Float
+    """Of the measured modes (Hz), (n,)."""
     share: _Float
     """Energy shares (n, g) of the measured modes."""
     residual: _Float
@@ -68,8 +56,8 @@ class State(NamedTuple):
 class Problem(NamedTuple):
     """Which factors are sought from which frequencies."""
 
-    spindle: Spindle
-    """As given."""
+    spindles: tuple[Spindle, ...]
+    """As given; those of one group have the same factor in all of them."""
     names: tuple[str, ...]
     """Groups, each with a factor."""
     measured: Measured
@@ -82,36 +70,35 @@ class Problem(NamedTuple):
 
     def evaluate(self, log_factor: _Float) -> State:
         """The model with these factors; certified modes."""
-        measured, factors = self.measured, np.exp(log_factor).tolist()
-        scaled = scale_groups(self.spindle, dict(zip(self.names, factors, strict=True)))
-        modes = find_modes(scaled, int(np.max(measured.mode)) + 1)
-        share = group_shares(modes, self.names)[measured.mode - 1]
-        frequency = modes.frequency[measured.mode - 1]
-        return State(
-            log_factor,
-            scaled,
-            modes.frequency,
-            share,
-            (frequency - measured.frequency) / measured.scale,
-            (frequency / measured.scale / 2)[:, np.newaxis] * share,
-        )
+        measured, factors = self.measured, dict(zip(self.names, np.exp(log_factor).tolist(), strict=True))
+        scaled = tuple(scale_groups(spindle, factors) for spindle in self.spindles)
+        fitted, share = np.empty(measured.mode.size), np.empty((measured.mode.size, len(self.names)))
+        known = []
+        for number, spindle in enumerate(scaled):
+            here = measured.shaft == number
+            wanted = measured.mode[here] - 1
+            modes = find_modes(spindle, int(np.max(wanted)) + 2)
+            known.append(modes.frequency)
+            fitted[here], share[here] = modes.frequency[wanted], group_shares(modes, self.names)[wanted]
+        residual, slope = (fitted - measured.frequency) / measured.scale, fitted / measured.scale / 2
+        return State(log_factor, scaled, tuple(known), fitted, share, residual, slope[:, np.newaxis] * share)
 
     def fits(self, state: State) -> bool:
         """Whether the residuals are of the size that is to be expected."""
         measured = self.measured
-        if measured.std is None or self.spare == 0:
+        if measured.std is None:
             return float(np.max(np.abs(state.residual * measured.scale / measured.frequency))) < UNLIKELY
-        return float(chdtrc(self.spare, state.cost)) > UNLIKELY
+        return float(chdtrc(max(self.spare, 1), state.cost)) > UNLIKELY
 
 
 def minimize(
-    problem: Problem, start: _Float, fixed: int | None = None, converged: float = CONVERGED
+    problem: Problem, start: _Float, fixed: int | Sequence[int] = (), converged: float = CONVERGED
 ) -> tuple[State, bool]:
     """The last state on the way down from a start by Levenberg and Marquardt, and whether it is a minimum.
 
-    fixed: the index of a factor that stays; None: all vary. converged: the change of frequencies that ends it.
+    fixed: indices of factors that stay. converged: the change of frequencies that ends it.
     """
-    free = np.flatnonzero(np.arange(start.size) != (-1 if fixed is None else fixed))
+    free = np.flatnonzero(~np.isin(np.arange(start.size), fixed))
     state = problem.evaluate(start)
     if free.size == 0:
         return state, True
@@ -120,7 +107,7 @@ def minimize(
         change = float(np.max(np.abs(state.share @ _step(state, free, 0.0)))) / 2
         if change <= converged:
             return state, True
-        if np.any(np.abs(state.log_factor) == LIMIT):
+        if np.any(np.abs(state.log_factor[free]) == LIMIT):
             break
         trial = problem.evaluate(np.clip(state.log_factor + _step(state, free, damping), -LIMIT, LIMIT))
         if trial.cost < state.cost:

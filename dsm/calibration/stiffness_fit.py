@@ -9,18 +9,21 @@ from numpy.typing import NDArray
 
 from dsm.calibration.plus_minus import plus_minus
 from dsm.calibration.remark import Remark
-from dsm.calibration.stiffness_groups import group_stiffness
+from dsm.calibration.stiffness_groups import group_stiffness, is_tilting, scale_groups
 from dsm.spindle.spindle import Spindle
 
 _Float = NDArray[np.float64]
 
+OPEN = ("group-not-felt", "stiffness-ambiguous")
+"""Codes of the remarks that leave a stiffness open."""
+
 
 @dataclass(frozen=True, eq=False)
 class StiffnessFit:
-    """A spindle whose groups of bearings and joints, each scaled by a factor, put modes at measured frequencies.
+    """Spindles whose groups of bearings and joints, each scaled by a factor, put modes at measured frequencies.
 
-    n modes, g groups. Standard errors are of first order in those of the frequencies. They hold for the logarithm of
-    a factor too: an error of 10 % is 0.1 there. Printed, it is a report.
+    n modes, g groups, one spindle or several that share them. Standard errors are of first order in those of the
+    frequencies. They hold for the logarithm of a factor too: an error of 10 % is 0.1 there. Printed, it is a report.
     """
 
     groups: tuple[str, ...]
@@ -45,10 +48,32 @@ class StiffnessFit:
     """Share of each group in the strain energy of each mode (-), shape (n, g); twice d ln f / d ln factor."""
     remarks: tuple[Remark, ...]
     """What makes the result doubtful, and what to do about it."""
-    given: Spindle
-    """The spindle as given."""
-    spindle: Spindle
-    """The fitted spindle."""
+    shaft: NDArray[np.int_]
+    """Which spindle each mode was measured on, shape (n,); 0 is the first."""
+    given: tuple[Spindle, ...]
+    """The spindles as given."""
+    spindles: tuple[Spindle, ...]
+    """The fitted spindles."""
+
+    @property
+    def spindle(self) -> Spindle:
+        """The fitted spindle, the first of several."""
+        return self.spindles[0]
+
+    def applied_to(self, spindle: Spindle) -> Spindle:
+        """A spindle with the stiffnesses that the fit started from, its groups scaled by the factors found."""
+        return scale_groups(spindle, dict(zip(self.groups, self.factor.tolist(), strict=True)))
+
+    @property
+    def open_groups(self) -> frozenset[str]:
+        """Groups whose stiffness the measured modes leave open, as the remarks say."""
+        about = [remark.about for remark in self.remarks if remark.code in OPEN]
+        return frozenset(name for one in about for name in ([one] if one in self.groups else self.groups))
+
+    @property
+    def misfits(self) -> bool:
+        """Whether the frequencies do not fit one another, far beyond their errors."""
+        return any(remark.code == "frequencies-misfit" for remark in self.remarks)
 
     @property
     def residual(self) -> _Float:
@@ -66,9 +91,11 @@ class StiffnessFit:
     def stiffness(self) -> _Float:
         """Mean radial stiffness of the parts of each group after the fit (N/m), shape (g,).
 
+        Of a group of stiffnesses against tilting alone it is their mean (N m/rad).
+
         An equivalent number of this model: compare it only with others of the same geometry and beam theory.
         """
-        return np.array([group_stiffness(self.spindle, group) for group in self.groups])
+        return np.array([group_stiffness(self.spindles, group) for group in self.groups])
 
     @property
     def stiffness_std(self) -> _Float | None:
@@ -108,11 +135,12 @@ class StiffnessFit:
         width = max(map(len, self.groups))
         lines = []
         for index, (group, factor, stiffness) in enumerate(zip(self.groups, self.factor, self.stiffness, strict=True)):
+            scale, unit = (1.0, "N m/rad") if is_tilting(self.spindles, group) else (1e6, "N/um")
             std = None if self.stiffness_std is None else float(self.stiffness_std[index])
-            lines.append(
-                f"stiffness {group:{width}}  {plus_minus(stiffness, std, 1e6, 'N/um', percent=True)} each on average, "
-                f"start {stiffness / factor / 1e6:.5g} N/um: factor {factor:.5f}"
-            )
+            start = f"start {stiffness / factor / scale:.5g} {unit}"
+            found = f"{plus_minus(stiffness, std, scale, unit, percent=True)} each on average"
+            said = f"open, {start}" if group in self.open_groups else f"{found}, {start}: factor {factor:.5f}"
+            lines.append(f"stiffness {group:{width}}  {said}")
         return lines
 
     def _correlation_lines(self) -> list[str]:
@@ -125,7 +153,9 @@ class StiffnessFit:
         ]
 
     def _mode_lines(self) -> list[str]:
-        lines = ["mode  measured, fitted less measured, share of each group in the strain energy"]
+        several = len(self.spindles) > 1
+        head = "spindle, mode" if several else "mode"
+        lines = [f"{head}  measured, fitted less measured, share of each group in the strain energy"]
         for index, number in enumerate(self.mode):
             std = None if self.frequency_std is None else float(self.frequency_std[index])
             shares = ", ".join(
@@ -133,7 +163,8 @@ class StiffnessFit:
                 for group, share in zip(self.groups, self.energy_share[index], strict=True)
             )
             measured = plus_minus(float(self.frequency[index]), std, unit="Hz", percent=True)
-            lines.append(f"{number:4d}  {measured}, {self.residual[index]:+.2g} Hz, {shares}")
+            place = f"{self.shaft[index] + 1:7d}, {number:4d}" if several else f"{number:4d}"
+            lines.append(f"{place}  {measured}, {self.residual[index]:+.2g} Hz, {shares}")
         return lines
 
     def _notes(self) -> list[str]:

@@ -50,8 +50,8 @@ def calibrated_bearings(spindle: Spindle, group: str | None = None) -> list[int]
 
 def scale_parts(spindle: Spindle, chosen: Sequence[int], factor: float) -> Spindle:
     """The spindle with bearing stiffnesses, and both stiffnesses of joints, times a factor; see calibrated_parts."""
-    parts = [_times(part, factor if index in chosen else 1.0) for index, part in enumerate(_parts(spindle))]
-    return _with_parts(spindle, parts)
+    factors = [factor if index in chosen else 1.0 for index, _ in enumerate(_parts(spindle))]
+    return _with_parts(spindle, [_times(part, one, one) for part, one in zip(_parts(spindle), factors, strict=True)])
 
 
 def parts_stiffness(spindle: Spindle, chosen: Sequence[int]) -> float:
@@ -60,12 +60,12 @@ def parts_stiffness(spindle: Spindle, chosen: Sequence[int]) -> float:
     return math.fsum(parts[index].stiffness for index in chosen) / len(chosen)
 
 
-def chosen_groups(spindle: Spindle, groups: Sequence[str] | None) -> tuple[str, ...]:
-    """The groups to calibrate; None: all that the spindle has, bearings first, in order of appearance.
+def chosen_groups(spindles: Sequence[Spindle], groups: Sequence[str] | None) -> tuple[str, ...]:
+    """The groups to calibrate; None: all that the spindles have, bearings first, in order of appearance.
 
     Raises ValueError for a group that is not there or named twice, for none, and for one with a rigid bearing.
     """
-    known = tuple(dict.fromkeys(part.group for part in _parts(spindle) if part.group))
+    known = tuple(dict.fromkeys(name for spindle in spindles for name in _names(spindle) if name))
     names = known if groups is None else tuple(groups)
     listed = ", ".join(map(repr, known)) or "none"
     if not names:
@@ -75,43 +75,75 @@ def chosen_groups(spindle: Spindle, groups: Sequence[str] | None) -> tuple[str, 
             raise ValueError(f"group {name!r} is none of this spindle; its groups: {listed}")
         if names.count(name) > 1:
             raise ValueError(f"group {name!r} is named {names.count(name)} times; name it once")
-    for index, bearing in enumerate(spindle.bearings):
-        if bearing.group in names:
-            _require_spring(spindle, index, f"or leave its group {bearing.group!r} out")
+    for spindle in spindles:
+        for index, bearing in enumerate(spindle.bearings):
+            if bearing.group in names:
+                _require_spring(spindle, index, f"or leave its group {bearing.group!r} out")
     return names
 
 
 def scale_groups(spindle: Spindle, factors: Mapping[str, float]) -> Spindle:
     """The spindle with bearing stiffnesses, and both stiffnesses of joints, times the factor of their group."""
-    return _with_parts(spindle, [_times(part, factors.get(part.group, 1.0)) for part in _parts(spindle)])
+
+    def scaled(part: _Part) -> _Part:
+        tilting = factors.get(_tilting(part), 1.0) if isinstance(part, Joint) else 1.0
+        return _times(part, factors.get(part.group, 1.0), tilting)
+
+    return _with_parts(spindle, [scaled(part) for part in _parts(spindle)])
 
 
-def group_stiffness(spindle: Spindle, group: str) -> float:
-    """Mean radial stiffness of the bearings and joints of a group (N/m)."""
-    return parts_stiffness(spindle, [index for index, part in enumerate(_parts(spindle)) if part.group == group])
+def group_stiffness(spindles: Sequence[Spindle], group: str) -> float:
+    """Mean radial stiffness of the bearings and joints of a group (N/m), in the first of the spindles that has it.
+
+    Of a group of stiffnesses against tilting alone it is their mean (N m/rad); see is_tilting.
+    """
+    for spindle in spindles:
+        chosen = [index for index, part in enumerate(_parts(spindle)) if part.group == group]
+        if chosen:
+            return parts_stiffness(spindle, chosen)
+        tilting = [joint.rotational_stiffness for joint in spindle.joints if joint.rotational_group == group]
+        if tilting:
+            return math.fsum(tilting) / len(tilting)
+    raise ValueError(f"group {group!r} is none of these spindles")
+
+
+def is_tilting(spindles: Sequence[Spindle], group: str) -> bool:
+    """Whether a group holds nothing but stiffnesses against tilting."""
+    return all(part.group != group for spindle in spindles for part in _parts(spindle))
 
 
 def group_shares(modes: Modes, groups: Sequence[str]) -> _Float:
     """Share of each group in the strain energy of each mode (-), shape (n_modes, n_groups); d ln w^2 / d ln factor."""
-    radial, _, _, joints = spring_energy(modes)
+    energy = spring_energy(modes)
     found = np.zeros((modes.frequency.size, len(groups)))
-    for part, energy in zip(_parts(modes.spindle), np.hstack([radial, joints]).T, strict=True):
-        if part.group in groups:
-            found[:, groups.index(part.group)] += energy
+    springs = np.hstack([energy.radial, energy.shifts, energy.kinks]).T
+    names = [*(part.group for part in _parts(modes.spindle)), *map(_tilting, modes.spindle.joints)]
+    for name, each in zip(names, springs, strict=True):
+        if name in groups:
+            found[:, groups.index(name)] += each
     return np.asarray(found / (2 * np.pi * modes.frequency[:, np.newaxis]) ** 2)
+
+
+def _tilting(joint: Joint) -> str:
+    """Group of its stiffness against tilting."""
+    return joint.rotational_group or joint.group
+
+
+def _names(spindle: Spindle) -> list[str]:
+    joints = [name for joint in spindle.joints for name in (joint.group, joint.rotational_group)]
+    return [*(bearing.group for bearing in spindle.bearings), *joints]
 
 
 def _parts(spindle: Spindle) -> tuple[Bearing | Joint, ...]:
     return (*spindle.bearings, *spindle.joints)
 
 
-def _times(part: _Part, factor: float) -> _Part:
-    if factor == 1.0:
+def _times(part: _Part, factor: float, tilting: float) -> _Part:
+    if factor == tilting == 1.0:
         return part
     if isinstance(part, Bearing):
         return replace(part, stiffness=part.stiffness * factor)
-    tilting = part.rotational_stiffness * factor
-    return replace(part, stiffness=part.stiffness * factor, rotational_stiffness=tilting)
+    return replace(part, stiffness=part.stiffness * factor, rotational_stiffness=part.rotational_stiffness * tilting)
 
 
 def _with_parts(spindle: Spindle, parts: Sequence[Bearing | Joint]) -> Spindle:

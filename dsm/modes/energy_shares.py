@@ -48,8 +48,9 @@ def energy_shares(spindle: Spindle, count: int) -> EnergyShares:
     modes = find_modes(spindle, count)
     w2 = (2 * np.pi * modes.frequency) ** 2
     # Twice the energy of a mode of unit modal mass is w^2.
-    radial, tilting, housings, joints = spring_energy(modes)
-    parts = _segments(spindle, modes), radial + tilting, housings, joints
+    springs = spring_energy(modes)
+    bearings, joints = springs.radial + springs.tilting, springs.shifts + springs.kinks
+    parts = _segments(spindle, modes), bearings, springs.housings, joints
     return EnergyShares(modes.frequency, *(energy / w2[:, np.newaxis] for energy in parts))
 
 

@@ -22,8 +22,10 @@ class SpringEnergy(NamedTuple):
     """Their stiffness against tilting, shape (n_modes, n_bearings)."""
     housings: _Float
     """Housings behind them, shape (n_modes, n_bearings); 0 where rigid."""
-    joints: _Float
-    """Joints, both springs together, shape (n_modes, n_joints)."""
+    shifts: _Float
+    """Radial springs of the joints, shape (n_modes, n_joints)."""
+    kinks: _Float
+    """Their stiffness against tilting, shape (n_modes, n_joints)."""
 
 
 def spring_energy(modes: Modes) -> SpringEnergy:
@@ -37,15 +39,15 @@ def spring_energy(modes: Modes) -> SpringEnergy:
             squared_force = (bearing.support_stiffness * modes.deflection[:, node]) ** 2
             radial[:, index] = squared_force / bearing.stiffness
             housings[:, index] = squared_force / bearing.housing_stiffness
-    return SpringEnergy(radial, tilting, housings, _joints(modes))
+    return SpringEnergy(radial, tilting, housings, *_joints(modes))
 
 
-def _joints(modes: Modes) -> _Float:
+def _joints(modes: Modes) -> tuple[_Float, _Float]:
     """A joint stands between two nodes at one place."""
-    energy = np.zeros((modes.frequency.size, len(modes.spindle.joints)))
+    shifts, kinks = np.zeros((2, modes.frequency.size, len(modes.spindle.joints)))
     for index, joint in enumerate(modes.spindle.joints):
         node = modes.node(joint.position)
         shift = modes.deflection[:, node + 1] - modes.deflection[:, node]
         kink = modes.slope[:, node + 1] - modes.slope[:, node]
-        energy[:, index] = joint.stiffness * shift**2 + joint.rotational_stiffness * kink**2
-    return energy
+        shifts[:, index], kinks[:, index] = joint.stiffness * shift**2, joint.rotational_stiffness * kink**2
+    return shifts, kinks

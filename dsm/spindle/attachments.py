@@ -95,6 +95,8 @@ class Joint:
     """Stiffness against tilting between its two sides (N m/rad)."""
     group: str = field(default="", kw_only=True)
     """Name under which its two stiffnesses are calibrated together; empty: known, never calibrated."""
+    rotational_group: str = field(default="", kw_only=True)
+    """Name under which fit_stiffness finds that against tilting by itself; empty: with the radial one."""
 
     def check(self, where: str) -> None:
         """Raise ValueError, beginning with `where`, for what is no joint."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -16,7 +16,9 @@ def calibrate(
     machine: Annotated[
         Path, typer.Argument(parser=named_folder, help="Machine folder with a [spindle] in its machine.toml.")
     ],
-    frequency: Annotated[list[float], typer.Option(help="Measured natural frequency (Hz); may be repeated.")],
+    frequency: Annotated[
+        list[float] | None, typer.Option(help="Measured natural frequency (Hz); may be repeated.")
+    ] = None,
     frequency_std: Annotated[list[float] | None, typer.Option(help="Its standard error (Hz); one for each.")] = None,
     mode: Annotated[
         list[int] | None,
@@ -28,18 +30,32 @@ def calibrate(
     damping_ratio: Annotated[
         float | None, typer.Option(help="Measured damping ratio (-) of the first of these modes: finds dampers too.")
     ] = None,
+    tool: Annotated[
+        list[str] | None, typer.Option(help="From its newest tap test instead; two at least find joints and bearings.")
+    ] = None,
+    direction: Annotated[str | None, typer.Option(help="Of these tap tests, x or y; else that of the newest.")] = None,
     as_json: Json = False,
 ) -> None:
-    """Bearing stiffness for measured natural frequencies; nothing is stored.
+    """Stiffness of bearings and joints for measured natural frequencies; nothing is stored.
 
-    One frequency scales all bearings alike. Several find a factor for each group of bearings and joints.
+    One frequency scales all bearings alike. Several find a factor for each group of bearings and joints. Two tools or
+    more, tapped, find the joint between tool and spindle and the bearings together; what to write into machine.toml
+    is printed. Exit code 1 where the tools do not fit one spindle.
 
     Examples:
 
       lobewatch calibrate trial --frequency 1550 --frequency-std 0.4
       lobewatch calibrate trial --frequency 1550 --mode 1 --damping-ratio 0.03 --json
       lobewatch calibrate trial --frequency 1550 --frequency 2600 --group front --group rear
+      lobewatch calibrate mill-3 --tool "end mill 12" --tool "end mill 12 long"
     """
+    if tool:
+        given = {"--frequency": frequency, "--frequency-std": frequency_std, "--group": group}
+        _refuse_beside_tools({**given, "--damping-ratio": damping_ratio})
+        _from_tools(machine, tool, direction, mode or [], as_json=as_json)
+        return
+    if not frequency or direction is not None:
+        raise ValueError("give the measured --frequency, or two --tool or more, with a --direction where it matters")
     from lobewatch.analysis import calibrate_model
     from lobewatch.machine import MachineFolder
     from lobewatch.show.describe import model_calibration_json, model_calibration_texts
@@ -49,6 +65,22 @@ def calibrate(
         MachineFolder(machine).machine, frequency, frequency_std or [], mode or [], group or [], damping_ratio
     )
     emit(model_calibration_json(found), as_json, *model_calibration_texts(found))
+
+
+def _refuse_beside_tools(given: Mapping[str, object]) -> None:
+    named = [option for option, value in given.items() if value is not None and value != []]
+    if named:
+        raise ValueError(f"--tool and {', '.join(named)}: the tap tests say it; give one or the other")
+
+
+def _from_tools(machine: Path, tools: Sequence[str], direction: str | None, mode: Sequence[int], as_json: bool) -> None:
+    from lobewatch.analysis import Logbook
+    from lobewatch.analysis.joints.tools_calibration import calibrate_tools
+    from lobewatch.show.joints.describe_tools import tools_json, tools_texts
+
+    found = calibrate_tools(Logbook.open(machine), tools, direction, mode)
+    emit(tools_json(found), as_json, *tools_texts(found))
+    raise typer.Exit(int(found.fit.misfits))
 
 
 def _check_counts(frequencies: int, stds: Sequence[float], modes: Sequence[int]) -> None:

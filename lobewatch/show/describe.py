@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
 from rich.table import Table
 
 from dsm import Calibration, DampingCalibration, StiffnessFit
@@ -34,13 +35,14 @@ def calibration_json(calibration: Calibration) -> dict[str, Any]:
 
 
 def stiffness_fit_json(fit: StiffnessFit) -> dict[str, Any]:
-    """Several stiffnesses from several modes."""
+    """Several stiffnesses from several modes; null for one that is open. Of tilting it is N m/rad."""
+    known = [group not in fit.open_groups for group in fit.groups]
     return {
         "groups": list(fit.groups),
         "factor": fit.factor,
         "factor_std": fit.factor_std,
-        "stiffness_n_per_m": fit.stiffness,
-        "stiffness_n_per_m_std": fit.stiffness_std,
+        "stiffness_n_per_m": np.where(known, fit.stiffness, np.nan),
+        "stiffness_n_per_m_std": None if fit.stiffness_std is None else np.where(known, fit.stiffness_std, np.nan),
         "correlation": fit.correlation,
         "mode": fit.mode,
         "frequency_hz": fit.frequency,

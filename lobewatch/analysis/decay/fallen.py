@@ -69,7 +69,7 @@ def fall_of(rows: Sequence[Row]) -> Estimate:
     """Fall of the frequency (%) to the newest test, or where that is in question, to another if that fell farther."""
     known = [row for row in rows if row.frequency.is_known] or rows
     sure = known_rows(rows, "frequency")
-    changes = [change_since_start(some, "frequency") for some in (known, sure) if some]
+    changes = [change_since_start(some, "frequency") for some in ([known] if sure == known else [known, sure]) if some]
     change = min(changes, key=lambda one: one.value)
     return Estimate(-change.value + 0.0, change.std)
 

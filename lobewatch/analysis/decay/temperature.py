@@ -171,6 +171,12 @@ def _summed(values: Floats) -> Floats:
     return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
 
 
+def may_count(temperature: Floats) -> bool:
+    """Whether it counts in any part of a series."""
+    known = temperature[np.isfinite(temperature)]
+    return known.size >= ENOUGH and bool(np.ptp(known) >= SPAN)
+
+
 def base_of(y: Floats, temperature: Floats | None = None) -> Base:
     """The base of a series (n,), the temperature in it only where enough of it is known over a wide enough span."""
     columns = np.ones((y.size, 1))

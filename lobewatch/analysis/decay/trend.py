@@ -5,19 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from functools import cached_property, lru_cache
-from statistics import median
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.analysis.decay.change_point import Watch, calls_for_another, watch_both
+from lobewatch.analysis.decay.change_point import Watch, watch_both
 from lobewatch.analysis.decay.forecast import ENOUGH, Forecast, Past, Rate, past
+from lobewatch.analysis.decay.together import Series, together
 
-TOGETHER = timedelta(hours=24)
-"""Tap tests within so long are one point."""
 MOST = 1000
 """The newest points, which alone are judged: the work grows with the square of their number."""
 MONTH = 30.44
@@ -151,7 +149,19 @@ def points_of(series: Sequence[Tapped]) -> tuple[Point, ...]:
 
 @lru_cache(maxsize=1024)
 def _newest_points(series: tuple[Tapped, ...]) -> tuple[Point, ...]:
-    return tuple(_points(series)[-MOST:])
+    times, values, errors, temperatures = zip(*series, strict=True)
+    percents = [100 * math.log(value / values[0]) for value in values]
+    own = Series(times, percents, temperatures)
+    return tuple(
+        Point(
+            times[first],
+            own.percent((first, end)),
+            math.sqrt(sum(error**2 for error in errors[first:end])) / (end - first),
+            own.temperature((first, end)),
+            tuple(range(first, end)),
+        )
+        for first, end in together(own, MOST)[-MOST:]
+    )
 
 
 @lru_cache(maxsize=1024)
@@ -161,31 +171,6 @@ def _past(points: tuple[Point, ...]) -> Past | None:
         return None
     y, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
     return past(np.array([day(point.time) for point in points]), y, warmth)
-
-
-def _points(series: Sequence[Tapped]) -> list[Point]:
-    """A tap test that was asked for by the one before it is a point of its own: it confirms or clears."""
-    points: list[Point] = []
-    for i, tapped in enumerate(series):
-        same_day = bool(points) and tapped.time - points[-1].time < TOGETHER
-        if same_day and not _calls_for_another(points[-MOST:]):
-            points[-1] = _point(series, (*points[-1].taps, i))
-        else:
-            points.append(_point(series, (i,)))
-    return points
-
-
-def _calls_for_another(points: Sequence[Point]) -> bool:
-    y, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
-    return calls_for_another(y, warmth)
-
-
-def _point(series: Sequence[Tapped], group: Sequence[int]) -> Point:
-    percents = [100 * math.log(series[i].value / series[0].value) for i in group]
-    middle = median(percents)  # of two their mean
-    error = math.sqrt(sum(series[i].error ** 2 for i in group)) / len(group)
-    warm = [series[i].temperature for i in group if math.isfinite(series[i].temperature)]
-    return Point(series[group[0]].time, middle, error, sum(warm) / len(warm) if warm else math.nan, tuple(group))
 
 
 def day(time: datetime) -> float:

@@ -113,7 +113,7 @@ def _modes(assembly: Assembly, given: DoubtTable) -> dict[str, Floats]:
         made = {"prediction": np.array([_of_prediction(mode, given) for mode in (*x, *y)])}
     else:
         sides = (("x", len(x)), ("y", len(y)))
-        clamping = [np.tile(_scatter(assembly, side, given), (count, 1)) for side, count in sides]
+        clamping = [np.tile(scatter_in(assembly, side, given), (count, 1)) for side, count in sides]
         clamping = [widths * [1, 1, 1, np.pi / 180] for widths in clamping]
         made = {"tap": np.array([_error(mode) for mode in (*x, *y)]), "clamping": np.vstack(clamping)}
     if len(assembly.directions) == 1:
@@ -123,8 +123,8 @@ def _modes(assembly: Assembly, given: DoubtTable) -> dict[str, Floats]:
     return made
 
 
-def _scatter(assembly: Assembly, side: str, given: DoubtTable) -> Scatter:
-    """What machine.toml says, else the series itself, else the default."""
+def scatter_in(assembly: Assembly, side: str, given: DoubtTable) -> Scatter:
+    """Scatter of the tap tests of a tool in a direction: what machine.toml says, else the series, else the default."""
     known = side if side in assembly.directions else assembly.directions[0]
     found = assembly.scatter(known) or SCATTER
     asked = (given.frequency_percent, given.damping_percent, given.stiffness_percent)

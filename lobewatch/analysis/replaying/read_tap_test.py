@@ -21,6 +21,7 @@ from acquisition import (
     tap_direction,
 )
 from acquisition.files.contents.exponential import window_text
+from acquisition.files.tap_recording import is_all_in
 from lobewatch.analysis.replaying.dating import checked_time, date_in_name
 from lobewatch.machine import Machine, MachineFolder
 
@@ -47,7 +48,8 @@ def read_tap_test(
 ) -> tuple[TapTest, Recording]:
     """A file as a tap test, and how it was understood; DataError with all that is missing or wrong in it.
 
-    content: its bytes, which become a part of the tap test; at: where these lie, if not at `file`.
+    content: its bytes, which become a part of the tap test where that does not hold all of it anyway; at: where these
+    lie, if not at `file`.
     """
     at = file if at is None else at
     before = at.stat()
@@ -62,7 +64,8 @@ def read_tap_test(
     _refuse_window(recording.checked())
     about = _about(setup, recording, said, checked_time(file, created))
     recording = replace(recording, facts=(*recording.facts, *_labels(about, said, recording)))
-    return _tap_test(recording, about, SourceFile(file.name, content)), recording
+    source = SourceFile(file.name, content)
+    return _tap_test(recording, about, source.without_content if is_all_in(at, recording.hits) else source), recording
 
 
 def _refuse_window(recording: Recording) -> None:

@@ -56,7 +56,7 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     def of(cls, tap: TapTest, content: bytes) -> Self:
         """content: of its file."""
         about = tap.circumstances
-        source = hashlib.sha256(tap.source.content).hexdigest() if tap.source else ""
+        source = tap.source.sha256 if tap.source else ""
         digest = hashlib.sha256(content).hexdigest()
         named = about.created.isoformat(), about.tool, about.direction
         return cls(tap.id, digest, len(content), *named, source, about.conditions)

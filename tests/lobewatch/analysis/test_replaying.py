@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -16,12 +17,14 @@ from acquisition import (
     DataError,
     Description,
     HammeredStructure,
+    HitFlags,
     SimulatedSource,
     TapTest,
     Trigger,
     average_good,
     capture_hits,
     new_tap_id,
+    write_tap,
 )
 from lobewatch import Logbook
 from lobewatch.analysis import Row
@@ -71,6 +74,23 @@ def test_a_live_test_replayed_gives_equal_modes_and_words(
         assert repr(mine) == repr(its)
     assert values(shop.logbook.history.rows[-1]) == values(other.history.rows[-1])
     assert other.history.rows[-1].rulings
+    assert keeps_source(other, path) == b""
+    taken_back = replace(live, id=new_tap_id(about), flags=(HitFlags.UNDONE, *flags[1:]))
+    write_tap(tmp_path / "taken back.h5", taken_back)
+    other.replay(tmp_path / "taken back.h5")
+    assert keeps_source(other, tmp_path / "taken back.h5") == (tmp_path / "taken back.h5").read_bytes()
+
+
+def keeps_source(logbook: Logbook, file: Path) -> bytes:
+    """What the tap test that a file was replayed to keeps of its bytes; the file is known again by its SHA-256."""
+    tap_id = logbook.replay_all([file], Description()).known[file]
+    entry = next(tap for tap in logbook.taps if tap.id == tap_id)
+    source = logbook.folder.read(entry).source
+    assert source is not None
+    assert (source.name, source.sha256) == (file.name, hashlib.sha256(file.read_bytes()).hexdigest())
+    if not source.content:
+        assert entry.size < 1.05 * file.stat().st_size
+    return source.content
 
 
 def test_several_processes_find_the_same_and_leave_nothing_behind(tmp_path: Path) -> None:

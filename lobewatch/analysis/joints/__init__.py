@@ -1,0 +1,1 @@
+"""Joints and bearings together, from the newest tap tests of several tools."""

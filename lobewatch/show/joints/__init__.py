@@ -1,0 +1,1 @@
+"""Joints and bearings found from several tools, for people and as JSON."""

@@ -1,6 +1,7 @@
 """CPU time, wall time and memory of replays and of long archives: python bench/bench_replay.py [--help].
 
-bench_replay.py replay [FILES]      1000 recorded FRFs of 4097 lines as text, replayed with --jobs 1 and 2
+bench_replay.py replay [FILES]      1000 recorded FRFs of 4097 lines as text, replayed with --jobs 1 and 2; beside the
+                                    peers where these are installed (python -m pip install -e ".[bench]")
 bench_replay.py archive FOLDER [N]  makes a folder of 10 000 small tap tests, 500 at a time
 bench_replay.py open FOLDER         what a folder costs when it is opened, added to, checked, shown
 bench_replay.py tap                 size and CPU time of one tap test of ten hits of 2 x 16384 samples
@@ -8,19 +9,24 @@ bench_replay.py tap                 size and CPU time of one tap test of ten hit
 
 from __future__ import annotations
 
+import contextlib
+import io
 import resource
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from bench_lobes import textbook
 from numpy.typing import NDArray
 
 from acquisition import (
@@ -53,6 +59,8 @@ from modal import Mode, synthesize
 BEGIN = datetime(2016, 1, 1, tzinfo=UTC)
 SHORT = np.linspace(1202.0, 2198.0, 250)
 LONG = np.linspace(0.1, 6400.1, 4097)
+PEERS = 10
+"""Files that the peers are given: each takes them seconds."""
 BATCH = 500
 """Tap tests stored and analysed together."""
 
@@ -80,20 +88,59 @@ def told(what: str, work: Callable[[], object]) -> None:
 
 def replay(count: int = 1000) -> None:
     with tempfile.TemporaryDirectory() as work:
-        files = Path(work) / "files"
-        files.mkdir()
-        for number in range(count):
-            h = frf(number, count, LONG).receptance
-            day = BEGIN + timedelta(days=number)
-            head = "Freq (Hz),Real (m/N),Imag (m/N)"
-            columns = np.column_stack((LONG, h.real, h.imag))
-            np.savetxt(files / f"{day:%Y-%m-%d}.csv", columns, "%.9e", ",", header=head, comments="")
-        for jobs in ("1", "2"):
-            machine = Path(work) / jobs
+        for name, number in (("one", 1), ("all", count)):
+            text_files(Path(work) / name, number)
+        for name, jobs in (("one", "1"), ("all", "1"), ("all", "2")):
+            machine = Path(work) / f"{name} {jobs}"
             make_machine_folder(machine, "surrogate_machine.toml")
-            told(
-                f"replay of {count} FRFs of {LONG.size} lines, --jobs {jobs}", partial(_replayed, machine, files, jobs)
-            )
+            number = 1 if name == "one" else count
+            what = f"replay of {number} FRFs of {LONG.size} lines, --jobs {jobs}"
+            told(what, partial(_replayed, machine, Path(work) / name, jobs))
+        peers(sorted((Path(work) / "all").iterdir())[:PEERS])
+
+
+def text_files(folder: Path, count: int) -> None:
+    folder.mkdir()
+    for number in range(count):
+        h = frf(number, count, LONG).receptance
+        day = BEGIN + timedelta(days=number)
+        head = "Freq (Hz),Real (m/N),Imag (m/N)"
+        columns = np.column_stack((LONG, h.real, h.imag))
+        np.savetxt(folder / f"{day:%Y-%m-%d}.csv", columns, "%.9e", ",", header=head, comments="")
+
+
+def peers(files: Sequence[Path]) -> None:
+    """What others do with the same files, step by step; nothing is stored, checked or compared with what was before."""
+    try:
+        import pyFRF
+        from sdypy import EMA
+    except ImportError:
+        print('the peers are not installed: python -m pip install -e ".[bench]"')
+        return
+    hits = np.random.default_rng(1).standard_normal((2, 10, 2 * (LONG.size - 1)))
+    told("numpy.loadtxt, a file", lambda: np.loadtxt(files[0], delimiter=",", skiprows=1))
+    told("pyFRF, H1 and coherence of ten hits of 2 x 8192, were they hits", lambda: _averaged(pyFRF, hits))
+    told(f"numpy.loadtxt and sdypy-EMA of order 60, {len(files)} files", partial(_modes, EMA, files))
+    both = [Mode(900.0, 0.03, 8e7), Mode(1713.0, 0.03, 3.5e7)]
+    speeds, depths = np.array([6200.0]), np.linspace(1e-4, 5e-3, 20)
+    told("semi-discretisation loop, a program at 20 depths", lambda: textbook(both, both, speeds, depths))
+
+
+def _averaged(library: Any, hits: NDArray[np.float64]) -> None:
+    found = library.FRF(12800, hits[0], hits[1], exc_type="f", resp_type="a", frf_estimator="H1")
+    found.get_H1(), found.get_coherence()
+
+
+def _modes(library: Any, files: Sequence[Path]) -> None:
+    for file in files:
+        f, real, imag = np.loadtxt(file, delimiter=",", skiprows=1).T
+        with contextlib.redirect_stderr(io.StringIO()), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            receptance = (real + 1j * imag)[None]
+            model = library.Model(receptance, f, lower=50, upper=6000, pol_order_high=60, frf_form="receptance")
+            model.get_poles(show_progress=False)
+            model.select_closest_poles([900.0, 1713.0, 3000.0])
+            model.get_constants()
 
 
 def _replayed(machine: Path, files: Path, jobs: str) -> None:

@@ -19,6 +19,13 @@ def status(
         Path, typer.Argument(parser=named_folder, help="Machine folder, or a folder of machine folders.")
     ],
     due: Annotated[bool, typer.Option("--due", help="Only machines whose tap test is due.")] = False,
+    to_notify: Annotated[
+        bool,
+        typer.Option("--notify", help="Send all of it by MQTT to the brokers that [notify] of machine.toml names."),
+    ] = False,
+    prometheus: Annotated[
+        Path | None, typer.Option(help="Write all of it into this file too, for the textfile collector of Prometheus.")
+    ] = None,
     as_csv: Annotated[bool, typer.Option("--csv", help="A table with commas on stdout instead of text.")] = False,
     as_json: Json = False,
 ) -> None:
@@ -38,7 +45,8 @@ def status(
 
     if as_csv and as_json:
         raise ValueError("--csv and --json: give one of them")
-    rows = plant_rows(Plant(find_machines(folder)).standings())
+    found = Plant(find_machines(folder)).standings()
+    rows = plant_rows(found)
     shown = [row for row in rows if not due or row["days_left"] is None or row["days_left"] < 0]
     if as_csv:
         results.out(plant_csv(shown), end="", highlight=False)
@@ -48,4 +56,13 @@ def status(
         count = f"{len(rows)} machine{'s' if len(rows) > 1 else ''}: {counted}"
         told = [{name: value for name, value in row.items() if name not in FOR_THE_PAGE} for row in shown]
         emit({"machines": told}, as_json, "" if as_json else plant_text(shown, results.width), count)
+    if prometheus is not None:
+        from acquisition.atomic import atomic_write
+        from lobewatch.notify.prometheus import prometheus_text
+
+        atomic_write(prometheus, prometheus_text(found).encode())
+    if to_notify:
+        from lobewatch.notify.telling import notify
+
+        notify(found)
     raise typer.Exit(int(any(row["light"] is Light.ALARM for row in rows)))

@@ -7,8 +7,9 @@ from .doubt_table import DoubtTable
 from .drive import drive_limit
 from .folder import BusyError, MachineFolder
 from .known_devices import checked_rate, has_clock, known_rate, use_rate
-from .machine_file import REFERENCE_CUT, Limits, Machine, SpeedRange, TapSetup
+from .machine_file import REFERENCE_CUT, Machine
 from .new_folder import make_machine_folder
+from .setup_tables import Limits, SpeedRange, TapSetup
 
 __all__ = [
     "REFERENCE_CUT",

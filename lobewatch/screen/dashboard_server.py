@@ -17,6 +17,7 @@ from acquisition import DataError, TapDirection
 from lobewatch.analysis import Logbook
 from lobewatch.analysis.plant.plant import Plant, find_machines
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.notify.prometheus import CONTENT_TYPE, prometheus_text
 from lobewatch.screen.guard import MAY_ALTER, OPEN, WATCH
 from lobewatch.screen.live_tests import LiveTest
 from lobewatch.screen.machine_list import machine_list
@@ -70,6 +71,7 @@ class DashboardServer(WebThread):
         add_session(self.application, "/tap/{machine}/", self._find_test)
         router = self.application.router
         router.add_get("/machines", self._list)
+        router.add_get("/metrics", self._metrics)
         router.add_post("/machines/{machine}/start", self._start)
         router.add_post("/machines/{machine}/report", self._write_report, name=f"{WATCH}report")
         router.add_get("/report/{machine}/{key}", self._report, name=f"{OPEN}report")
@@ -110,6 +112,10 @@ class DashboardServer(WebThread):
         known = request.query.get("known", "")
         body = await asyncio.to_thread(machine_list, self._plant, running, request[MAY_ALTER], known)
         return web.Response(body=body, content_type="application/json")
+
+    async def _metrics(self, _: web.Request) -> web.Response:
+        text = prometheus_text(await asyncio.to_thread(self._plant.standings))
+        return web.Response(body=text.encode(), headers={"Content-Type": CONTENT_TYPE})
 
     async def _start(self, request: web.Request) -> web.Response:
         key, folder = self._find_machine(request)

@@ -6,7 +6,9 @@ import threading
 from dataclasses import replace
 
 from acquisition import DataError, TapDirection
+from lobewatch.analysis import Logbook
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.notify.telling import tell
 from lobewatch.tap.plan_session import plan_session
 from lobewatch.tap.session import TapStopped
 from lobewatch.tap.state import TapState, Word
@@ -19,6 +21,7 @@ class LiveTest:
         """Begin, or go on with an interrupted test; DataError where machine.toml names no port."""
         if not folder.machine.daq.port:
             raise DataError(f"{folder.toml}: no port in [daq]; write port there, as lobewatch tap --port takes it")
+        self._folder = folder
         self._session = plan_session(folder, direction=direction, resume=resume)
         self._end: TapState | None = None
         self._thread = threading.Thread(target=self._run, name="tap test", daemon=True)
@@ -49,6 +52,7 @@ class LiveTest:
     def _run(self) -> None:
         try:
             self._session.run()
+            tell(Logbook.open(self._folder.path))
         except TapStopped:
             state = self._session.state
             reason = f"Stopped with {state.good} good hits: START goes on with them."

@@ -19,7 +19,7 @@ from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
 
 from acquisition import Frf
-from lobewatch.machine.machine_file import Limits
+from lobewatch.machine.setup_tables import Limits
 from lobewatch.show.output import printable
 from lobewatch.show.trends.course import Course
 

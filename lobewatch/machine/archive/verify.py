@@ -38,6 +38,7 @@ OURS = (
     "history.rows",
     "daq.json",
     "standing.json",
+    "unsent.json",
     "report.html",
     ".lock",
     "taps",

@@ -103,3 +103,8 @@ def test_what_a_cluster_cannot_do_is_one_sentence(cluster: LocalCluster, monkeyp
         DataError, match=r"a worker has lobewatch .*, here is lobewatch .*, numpy 1\.0, .* the same on all"
     ):
         [*shared(abs, [-1], workers)]
+
+
+def test_a_process_that_is_ended_from_outside_is_one_sentence() -> None:
+    with pytest.raises(DataError, match="one of the 2 processes was ended from outside; nothing is stored; try again"):
+        [*shared(os._exit, [1, 1], Workers(2))]

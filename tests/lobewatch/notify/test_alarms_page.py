@@ -1,0 +1,52 @@
+"""docs/alarms.md: its commands, keys and names exist."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from datetime import UTC, datetime
+from pathlib import Path
+
+import msgspec
+import pytest
+import typer
+
+from lobewatch.analysis.plant.light import Light
+from lobewatch.analysis.plant.plant import Standings
+from lobewatch.analysis.plant.summary import Dated, Summary
+from lobewatch.cli import app
+from lobewatch.machine.machine_file import parse_machine
+from lobewatch.notify.message import message_of
+from lobewatch.notify.prometheus import FAMILIES
+
+PAGE = (Path(__file__).parents[3] / "docs" / "alarms.md").read_text("utf-8")
+BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```", PAGE, flags=re.DOTALL | re.MULTILINE)
+COMMANDS = re.findall(r"lobewatch ((?:status|trend|check|verify|serve)\b[^`>|\n]*)", PAGE)
+
+
+@pytest.mark.parametrize("line", COMMANDS)
+def test_each_command_is_understood(line: str) -> None:
+    group = typer.main.get_command(app)
+    assert isinstance(group, typer.core.TyperGroup)
+    name, *words = shlex.split(line)
+    options = {option for parameter in group.commands[name].params for option in parameter.opts}
+    assert {word for word in words if word.startswith("-")} <= options
+
+
+def test_there_is_a_line_for_cron_and_one_for_systemd() -> None:
+    assert [kind for kind, _ in BLOCKS] == ["cron", "ini", "ini", "toml", "yaml", "yaml"]
+    assert all("lobewatch status" in BLOCKS[number][1] for number in (0, 1))
+
+
+def test_the_table_for_machine_toml_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LOBEWATCH_MQTT_PASSWORD", "secret")
+    broker = parse_machine(f'[machine]\nname = "m"\n{BLOCKS[3][1]}').notify.broker
+    assert broker == ("mqtt", "broker.example", 1883, "lobewatch", "secret", "plant")
+
+
+def test_each_key_of_a_message_and_each_family_is_explained() -> None:
+    summary = Summary("m", (), "tap")
+    one = Standings("m", Path("m"), summary, Dated(Light.GOOD, (), "tap", None))
+    keys = msgspec.json.decode(message_of(one, datetime(2026, 1, 1, tzinfo=UTC)))
+    rows = [line.split("|")[1] for line in PAGE.splitlines() if line.startswith("| `")]
+    assert {*keys, *FAMILIES} <= {name for row in rows for name in re.findall(r"`(\w+)`", row)}

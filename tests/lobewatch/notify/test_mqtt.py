@@ -1,0 +1,130 @@
+"""Standings by MQTT, to a real broker: there, away, killed, refusing, silent."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from paho.mqtt import subscribe
+from typer.testing import CliRunner, Result
+
+from acquisition import DataError
+from lobewatch.cli import app
+from lobewatch.machine.machine_file import parse_machine
+from lobewatch.machine.notify_table import broker_of
+from lobewatch.notify import mqtt
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+Mosquitto = Any
+"""Of conftest.py."""
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
+
+
+def received(broker: Mosquitto, topic: str, **how: Any) -> Any:
+    ask: Any = subscribe.simple
+    return ask(topic, qos=1, hostname="127.0.0.1", port=broker.port, **how)
+
+
+@pytest.fixture
+def mill(shop: Shop, mosquitto: Mosquitto) -> Path:
+    """Tapped two days ago, fallen by 12 %; it tells the broker."""
+    shop.put("")
+    days = (datetime.now(shop.start.tzinfo) - shop.start) / timedelta(days=1)
+    shop.tap_both(days - 40)
+    shop.tap_both(days - 2, 0.88)
+    shop.edit("[limits]", f'[notify]\nmqtt = "{mosquitto.address}/hall/1"\n\n[limits]')
+    return Path(shop.path)
+
+
+def test_a_command_that_alters_a_machine_tells_how_it_stands(mill: Path, mosquitto: Mosquitto) -> None:
+    mosquitto.start()
+    assert run("event", mill, "oiled").exit_code == 0
+    told = received(mosquitto, "hall/1/m/standing")
+    assert (told.retain, told.qos) == (True, 1)
+    found = json.loads(told.payload)
+    assert (found["machine"], found["light"], found["is_overdue"]) == ("m", "alarm", False)
+    assert found["fall_percent"] == pytest.approx(12.0, abs=0.05)
+    assert found["reasons"][0]["code"] == "frequency-alarm"
+    assert json.loads(received(mosquitto, "hall/1/sender").payload) == {"sender": "done"}
+    assert not (mill / "unsent.json").exists()
+
+
+def test_what_a_killed_broker_was_not_told_goes_with_the_next_command(mill: Path, mosquitto: Mosquitto) -> None:
+    shutil.copytree(mill, mill.parent / "n")
+    mosquitto.start()
+    assert run("event", mill, "oiled").exit_code == 0
+    mosquitto.kill()
+    begun = time.monotonic()
+    told = run("event", mill, "bearings looked at")
+    assert told.exit_code == 0
+    assert "nobody was told by MQTT" in told.stderr
+    assert time.monotonic() - begun < 20
+    assert json.loads((mill / "unsent.json").read_text())["topic"] == "hall/1/m/standing"
+    mosquitto.start()
+    assert run("event", mill.parent / "n", "oiled").exit_code == 0
+    assert json.loads(received(mosquitto, "hall/1/n/standing").payload)["folder"] == "n"
+    assert json.loads(received(mosquitto, "hall/1/m/standing").payload)["folder"] == "m"
+    assert not (mill / "unsent.json").exists()
+
+
+def test_a_wrong_password_is_said_and_fails_nothing(
+    mill: Path, mosquitto: Mosquitto, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mosquitto.start("lobewatch", "right-one")
+    toml = mill / "machine.toml"
+    toml.write_text(toml.read_text("utf-8").replace("mqtt://", "mqtt://lobewatch@"), "utf-8")
+    monkeypatch.setenv("LOBEWATCH_MQTT_PASSWORD", "wrong-one")
+    told = run("event", mill, "oiled")
+    assert (told.exit_code, "refuses (Not authorized)" in told.stderr) == (0, True)
+    assert "wrong-one" not in told.stderr + (mill / "unsent.json").read_text()
+    monkeypatch.setenv("LOBEWATCH_MQTT_PASSWORD", "right-one")
+    assert run("status", mill, "--notify").exit_code == 1  # it is on alarm
+    known = {"username": "lobewatch", "password": "right-one"}
+    assert json.loads(received(mosquitto, "hall/1/m/standing", auth=known).payload)["light"] == "alarm"
+
+
+def test_a_sender_that_breaks_off_leaves_its_last_will(mosquitto: Mosquitto) -> None:
+    mosquitto.start()
+    program = (
+        "import os, sys; from lobewatch.machine.notify_table import broker_of; from lobewatch.notify import mqtt\n"
+        "mqtt.connected(broker_of(sys.argv[1])); os._exit(1)"
+    )
+    subprocess.run([sys.executable, "-c", program, mosquitto.address], check=False)
+    assert json.loads(received(mosquitto, "lobewatch/sender").payload) == {"sender": "lost"}
+    mqtt.send(broker_of(mosquitto.address), {"lobewatch/a/standing": b"{}"})
+    assert json.loads(received(mosquitto, "lobewatch/sender").payload) == {"sender": "done"}
+
+
+def test_a_silent_broker_is_waited_for_a_few_seconds_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mqtt, "PATIENCE", 0.3)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"mqtt://127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(DataError, match=r"does not answer within 0\.3 s"):
+            mqtt.send(broker_of(address), {"a": b"{}"})
+
+
+@pytest.mark.parametrize(
+    "address", ["mqtt://", "http://host", "mqtt://host:99999", "mqtt://host/a/#", "host", "mqtt://me:secret@/x"]
+)
+def test_what_is_no_address_is_refused_without_telling_the_password(address: str) -> None:
+    with pytest.raises(DataError, match="is no address of a broker; give mqtt://HOST") as refused:
+        parse_machine(f'[machine]\nname = "m"\n[notify]\nmqtt = "{address}"\n')
+    assert "secret" not in str(refused.value)
+
+
+def test_user_password_port_and_prefix_stand_in_the_address() -> None:
+    found = broker_of("mqtts://me:p%40ss@broker.example/hall/")
+    assert found == ("mqtts", "broker.example", 8883, "me", "p@ss", "hall")
+    assert "p@ss" not in found.address

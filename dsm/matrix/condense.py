@@ -84,7 +84,8 @@ def _across_element(pivot: tuple[_Complex, ...], coupling: _Complex) -> _Passed:
 
 def _across_link(pivot: tuple[_Complex, ...], near: _Complex, force: _Complex, far: _Complex) -> _Passed:
     """Solve [A C; C^T D] [q; p] = [0; C2] for each frequency; A may be singular, as at a tip that nothing holds."""
-    a, b, d = (np.broadcast_to(part, near[0].shape) for part in pivot)
+    shape = near[0].shape
+    a, b, d = (part if part.shape == shape else np.broadcast_to(part, shape) for part in pivot)
     both = np.array(
         [
             [a, b, near[0], near[1]],
@@ -95,7 +96,7 @@ def _across_link(pivot: tuple[_Complex, ...], near: _Complex, force: _Complex, f
     )
     zero = np.zeros_like(a)
     right = np.array([[zero, zero], [zero, zero], [far[0], far[1]], [far[2], far[3]]])
-    solved = np.moveaxis(np.linalg.solve(np.moveaxis(both, 2, 0), np.moveaxis(right, 2, 0)), 0, 2)
+    solved = np.linalg.solve(both.transpose(2, 0, 1), right.transpose(2, 0, 1)).transpose(1, 2, 0)
     (u_u, u_t), (t_u, t_t), (q_u, q_t), (m_u, m_t) = solved
     lost = far[0] * q_u + far[2] * m_u, far[0] * q_t + far[2] * m_t, far[1] * q_t + far[3] * m_t
     return _Passed(lost, (u_u, u_t, t_u, t_t))

@@ -55,7 +55,7 @@ def rebuild_history(logbook: Logbook, workers: Workers, progress: Progress = lam
     for number, (tap_id, verdicts) in enumerate(_all_judged(logbook, tap_ids, toml, workers), 1):
         logbook.judged.setdefault(tap_id, verdicts)
         logbook.rulings(tap_id)
-        del logbook.judged[tap_id]
+        logbook.judged.pop(tap_id, None)
         progress(number, len(tap_ids))
     return len(tap_ids)
 

@@ -240,7 +240,7 @@ def bench_map(bench: Bench, given: Spindle) -> None:
 def bench_whirl(bench: Bench, given: Spindle) -> None:
     """Whirl frequencies over speed."""
     speeds = np.linspace(0.0, 20000.0, bench.speeds)
-    table = Table(f"{MODES} forward and backward whirl frequencies at {speeds.size} speeds, {given.theory}")
+    table = Table(f"Whirl map, {given.theory}: {MODES} forward and backward frequencies at {speeds.size} speeds")
     fresh = never_seen(given, Bench(5, 0, 0, 0))
     table.row("this model, each certified, cold", bench.seconds(lambda: whirl_map(fresh(), speeds, MODES), 5))
 

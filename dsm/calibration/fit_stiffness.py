@@ -56,7 +56,8 @@ def fit_stiffness(
     group's share of the strain energy. Modes keep their number, never their shape: every step solves for certified
     modes, and where two come close (veering) they exchange shapes while their numbers stay. Veering makes local minima:
     where the given stiffnesses lead to none that fits, a few starts around them are tried and the best is kept. Of
-    several solutions that fit, such as the two of a symmetric shaft, it is the first that is found.
+    several solutions that fit, such as the two of a symmetric shaft, it is the first that is found, unless another fits
+    better by more than 95 % intervals allow.
 
     The result has remarks where the frequencies leave a stiffness open (identifiability), where modes do not tell the
     groups apart, lie close together, or do not fit; where it has none, the 95 % intervals are to be believed.

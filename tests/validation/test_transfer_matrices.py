@@ -6,11 +6,13 @@ EI t' = M, kappa G A (u' - t) = Q, Q' = -m w^2 u, M' = -Q - rho I w^2 t. Nothing
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+import mpmath
 import numpy as np
 import pytest
-from transfer_matrices import determinant, exact_receptance
+from mpmath import mpf
 
 from dsm import (
     Bearing,
@@ -26,6 +28,95 @@ from dsm import (
     static_stiffness,
 )
 from dsm.modes.find_modes import find_modes
+
+DIGITS = 50
+
+
+def determinant(spindle: Spindle, frequency: float) -> mpf:
+    """0 at a natural frequency (Hz) of the shaft with free ends."""
+    with mpmath.workdps(DIGITS):
+        end, _ = _along(spindle, frequency, math.inf)
+        return end[2, 0] * end[3, 1] - end[2, 1] * end[3, 0]
+
+
+def exact_receptance(spindle: Spindle, frequency: float, position: float) -> mpf:
+    """Driving-point receptance (m/N) at a frequency (Hz) and a place (m), undamped."""
+    with mpmath.workdps(DIGITS):
+        end, before = _along(spindle, frequency, position)
+        beyond = end * before**-1
+        ends = mpmath.matrix([[end[2, 0], end[2, 1]], [end[3, 0], end[3, 1]]])
+        tip = mpmath.lu_solve(ends, mpmath.matrix([beyond[2, 2], beyond[3, 2]]))
+        return before[0, 0] * tip[0] + before[0, 1] * tip[1]
+
+
+def _along(spindle: Spindle, frequency: float, position: float) -> tuple[mpmath.matrix, mpmath.matrix]:
+    """Transfer matrices from the tip to the far end, and to a place."""
+    w2 = (2 * mpmath.pi * mpf(frequency)) ** 2
+    ends = [mpf(0)]
+    for segment in spindle.segments:
+        ends.append(ends[-1] + mpf(segment.length))
+    places = {
+        *ends,
+        *(mpf(part.position) for part in spindle.bearings),
+        *(mpf(mass.position) for mass in spindle.masses),
+    }
+    places |= {mpf(joint.position) for joint in spindle.joints} | ({mpf(position)} - {mpf("inf")})
+    stops = sorted(places)
+    total = before = mpmath.eye(4)
+    for place, following in zip(stops, [*stops[1:], None], strict=True):
+        total = _parts(spindle, place, w2) * total
+        before = total if place == position else before
+        if following is not None:
+            index = max(i for i, end in enumerate(ends[:-1]) if end <= place)
+            total = _uniform(spindle, spindle.segments[index], following - place, w2) * total
+    return total, before
+
+
+def _parts(spindle: Spindle, place: mpf, w2: mpf) -> mpmath.matrix:
+    """What bearings, masses and joints at one place do; none of them meet there."""
+    matrix = mpmath.eye(4)
+    for bearing in spindle.bearings:
+        if bearing.position == place:
+            matrix[2, 0] += 1 / (1 / mpf(bearing.stiffness) + 1 / mpf(bearing.housing_stiffness))
+            matrix[3, 1] += mpf(bearing.rotational_stiffness)
+    for mass in spindle.masses:
+        if mass.position == place:
+            matrix[2, 0] -= mpf(mass.mass) * w2
+            matrix[3, 1] -= mpf(mass.diametral_inertia) * w2
+    for joint in spindle.joints:
+        if joint.position == place:
+            matrix[0, 2], matrix[1, 3] = 1 / mpf(joint.stiffness), 1 / mpf(joint.rotational_stiffness)
+    return matrix
+
+
+def _uniform(spindle: Spindle, segment: Segment, length: mpf, w2: mpf) -> mpmath.matrix:
+    """exp(A L) as a power series, rows and columns scaled to one size."""
+    material = segment.material or spindle.material
+    outer, bore = mpf(segment.outer_diameter), mpf(segment.bore_diameter)
+    area, second = mpmath.pi * (outer**2 - bore**2) / 4, mpmath.pi * (outer**4 - bore**4) / 64
+    rigidity, density = mpf(material.youngs_modulus) * second, mpf(material.density)
+    soft, turning = mpf(0), mpf(0)
+    if spindle.theory == "timoshenko":
+        nu, ring = mpf(material.youngs_modulus) / (2 * mpf(material.shear_modulus)) - 1, (1 + (bore / outer) ** 2) ** 2
+        kappa = 6 * (1 + nu) * ring / ((7 + 6 * nu) * ring + (20 + 12 * nu) * (bore / outer) ** 2)
+        soft, turning = 1 / (kappa * mpf(material.shear_modulus) * area), density * second * w2
+    rows = [[0, 1, soft, 0], [0, 0, 0, 1 / rigidity], [-density * area * w2, 0, 0, 0], [0, -turning, -1, 0]]
+    size = [mpf(1), 1 / length, rigidity / length**3, rigidity / length**2]
+    slope = mpmath.matrix(4, 4)
+    for i in range(4):
+        for j in range(4):
+            slope[i, j] = rows[i][j] * length * size[j] / size[i]
+    found = term = mpmath.eye(4)
+    for order in range(1, 300):
+        term = term * slope / order
+        found = found + term
+        if max(abs(value) for value in term) < mpf(10) ** (-DIGITS - 2):
+            break
+    for i in range(4):
+        for j in range(4):
+            found[i, j] *= size[i] / size[j]
+    return found
+
 
 SEGMENTS = [Segment(0.12, 0.04), Segment(0.2, 0.07, 0.02), Segment(0.15, 0.06, 0.02)]
 F = 500.0
@@ -104,3 +195,71 @@ def test_shapes_between_nodes_are_those_of_nodes_there(theory: Theory) -> None:
     sign = np.sign(between.deflection[:, :1] * nodes.deflection[:, :1])
     assert between.deflection == pytest.approx(sign * nodes.deflection, abs=1e-7)
     assert between.slope == pytest.approx(sign * nodes.slope, abs=1e-6)
+
+
+MODES = 6
+CLOSEST = 2e-9
+"""Least distance between two parts over the length of the shaft."""
+
+
+def random_spindle(draw: np.random.Generator) -> Spindle:
+    """Two to eight segments, two to six bearings, up to two masses and two joints; half of them beside others."""
+    segments = [
+        Segment(float(10 ** draw.uniform(-2.5, -0.8)), outer, float(draw.choice([0.0, 0.3, 0.7])) * outer)
+        for outer in 10 ** draw.uniform(-1.6, -0.8, int(draw.integers(2, 9)))
+    ]
+    ends = np.cumsum([0.0, *(segment.length for segment in segments)])
+    taken = ends.tolist()
+
+    def place() -> float:
+        while True:
+            z = float(draw.uniform(0.0, ends[-1]))
+            if draw.random() < 0.5:
+                z = float(draw.choice(taken)) + float(draw.choice([-1, 1]) * 10 ** draw.uniform(-8.5, -3))
+            if 0 <= z <= ends[-1] and np.min(np.abs(np.array(taken) - z)) > CLOSEST * ends[-1]:
+                taken.append(z)
+                return z
+
+    bearings = [
+        Bearing(
+            place(),
+            float(10 ** draw.uniform(6, 10)),
+            housing_stiffness=float(draw.choice([np.inf, 10 ** draw.uniform(7, 10)])),
+            rotational_stiffness=float(draw.choice([0.0, 10 ** draw.uniform(2, 6)])),
+        )
+        for _ in range(int(draw.integers(2, 7)))
+    ]
+    masses = [LumpedMass(place(), *(10 ** draw.uniform([-2, -6], [1, -2])).tolist()) for _ in range(draw.integers(3))]
+    joints = [Joint(place(), *(10 ** draw.uniform([7, 4], [10, 7])).tolist()) for _ in range(draw.integers(3))]
+    theory: Theory = "timoshenko" if draw.random() < 0.5 else "euler-bernoulli"
+    return Spindle(segments, bearings, theory=theory, masses=masses, joints=joints)
+
+
+def refused_and_missed(number: int, checked: int, seed: int) -> tuple[int, int]:
+    """How many of `number` spindles are refused, and how many of the first `checked` have modes too few or too many.
+
+    The determinant changes its sign at each mode and nowhere else: signs half-way between modes alternate.
+    """
+    draw, refused, missed = np.random.default_rng(seed), 0, 0
+    for index in range(number):
+        spindle = random_spindle(draw)
+        try:
+            frequency = natural_frequencies(spindle, MODES)
+            static_stiffness(spindle)
+        except ArithmeticError:
+            refused += 1
+            continue
+        if index < checked:
+            between = np.sqrt(np.append(frequency[0] / 4, frequency[:-1]) * frequency)
+            signs = [float(np.sign(float(determinant(spindle, float(f))))) for f in between]
+            missed += bool(np.any(np.diff(signs) == 0))
+    return refused, missed
+
+
+def test_twenty_random_spindles() -> None:
+    assert refused_and_missed(20, 2, 7) == (0, 0)
+
+
+@pytest.mark.long
+def test_fifteen_hundred_random_spindles() -> None:
+    assert refused_and_missed(1500, 100, 8) == (0, 0)

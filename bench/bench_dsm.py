@@ -4,10 +4,12 @@
     python3 bench/bench_dsm.py                      (about a minute, most of it ROSS)
     python3 bench/bench_dsm.py --quick              (few repetitions, without ROSS)
 
-Times are medians of the CPU time of repeated runs: other programs on the machine do not change them by much. "cold": a
-spindle that was never seen before, so that its matrix has to be made; "warm": the same one again; the matrices of the
-others are made beforehand too. The factors are times over that of the first row. An error is the largest relative
-difference from the exact solution, which the model is.
+Times are medians of the CPU time of repeated runs: other programs on the machine do not change them by much, though
+they share its caches. "cold": a spindle that was never seen before, so that its matrix has to be made, with other
+bearings than one that was or with another geometry too; "warm": the same one again; the matrices of the others are made
+beforehand too. The factors are times over that of the first row. An error is the largest relative difference from the
+exact solution, which the model is. The row of LAPACK alone tells what the machine can do: other machines are compared
+by the factors to it.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from typing import Any
 import numpy as np
 import scipy
 from dsm_peers import Complex, FiniteElements, Float, RossRotor, import_ross, refine
+from scipy.linalg.lapack import dsyevd, dsytrf, dsytrs
 from threadpoolctl import threadpool_limits
 
 from dsm import (
@@ -37,6 +40,7 @@ from dsm import (
     receptance,
     receptance_map,
     spindle_side,
+    whirl_map,
 )
 from lobewatch.machine.machine_file import read_machine
 
@@ -58,6 +62,7 @@ class Bench:
     repeats: int
     frequencies: int
     factors: int
+    speeds: int
 
     def seconds(self, work: Callable[[], Any], repeats: int | None = None) -> float:
         """Median time of a run."""
@@ -93,11 +98,32 @@ def spindle(theory: Theory) -> Spindle:
     return replace(built, bearings=[replace(b, stiffness=STIFFNESS) for b in built.bearings], theory=theory)
 
 
-def never_seen(given: Spindle, bench: Bench) -> Callable[[], Spindle]:
-    """Hands out spindles made beforehand that differ in the last digits."""
+def never_seen(
+    given: Spindle, bench: Bench, change: Callable[[Spindle, float], Spindle] | None = None
+) -> Callable[[], Spindle]:
+    """Hands out spindles made beforehand that differ in the last digits, in their bearings or as `change` says."""
     factors = 1 + 1e-12 * np.arange(1, bench.repeats + 2)
-    spindles = iter([scaled(given, factor) for factor in factors])
+    spindles = iter([(change or scaled)(given, factor) for factor in factors])
     return lambda: next(spindles)
+
+
+def stretched(given: Spindle, factor: float) -> Spindle:
+    """With longer segments."""
+    return replace(given, segments=[replace(part, length=float(factor) * part.length) for part in given.segments])
+
+
+def least_work(given: Spindle) -> Callable[[], Any]:
+    """Factor of a matrix of a node a segment end, one solution a bearing, eigenvalues of the compliance there."""
+    size, bearings = 2 * len(given.segments) + 2, len(given.bearings)
+    matrix = np.asfortranarray(np.diag(np.full(size, 2.0)) - np.eye(size, k=1) - np.eye(size, k=-1))
+    forces = np.asfortranarray(np.eye(size, bearings))
+
+    def work() -> None:
+        factor, pivots, _ = dsytrf(matrix, lower=1)
+        solved, _ = dsytrs(factor, pivots, forces, lower=1)
+        dsyevd(solved[:bearings])
+
+    return work
 
 
 def scaled(given: Spindle, factor: float) -> Spindle:
@@ -120,7 +146,11 @@ def bench_calibration(bench: Bench, given: Spindle) -> None:
     exact = calibrate(given, MEASURED)
     table, fresh = Table(f"Calibration to {MEASURED:g} Hz, {given.theory}"), never_seen(given, bench)
     table.row("this model, warm", bench.seconds(lambda: calibrate(given, MEASURED)), "exact")
-    table.row("this model, cold", bench.seconds(lambda: calibrate(fresh(), MEASURED)), "exact")
+    table.row("this model, other bearings, cold", bench.seconds(lambda: calibrate(fresh(), MEASURED)), "exact")
+    shapes = never_seen(given, bench, stretched)
+    table.row("this model, another geometry, cold", bench.seconds(lambda: calibrate(shapes(), MEASURED)), "exact")
+    table.row("this model, warm, and its spindle", bench.seconds(lambda: calibrate(given, MEASURED).spindle), "exact")
+    table.row("LAPACK alone: factor, solve, eigenvalues", bench.seconds(least_work(given)))
     print(f"  {'':<52}solved anew, the frequency is off by {abs(exact.residual) / MEASURED:.0e}")
     if given.theory != "euler-bernoulli":
         return
@@ -207,12 +237,20 @@ def bench_map(bench: Bench, given: Spindle) -> None:
     table.row("receptance of each (1 run)", rival, "exact")
 
 
+def bench_whirl(bench: Bench, given: Spindle) -> None:
+    """Whirl frequencies over speed."""
+    speeds = np.linspace(0.0, 20000.0, bench.speeds)
+    table = Table(f"Whirl map, {given.theory}: {MODES} forward and backward frequencies at {speeds.size} speeds")
+    fresh = never_seen(given, Bench(5, 0, 0, 0))
+    table.row("this model, each certified, cold", bench.seconds(lambda: whirl_map(fresh(), speeds, MODES), 5))
+
+
 def main() -> None:
     """Print all tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--quick", action="store_true", help="few repetitions, without ROSS")
     quick = parser.parse_args().quick
-    bench = Bench(3, 50, 10) if quick else Bench(100, 1000, 1000)
+    bench = Bench(3, 50, 10, 10) if quick else Bench(100, 1000, 1000, 100)
     ross = None if quick else import_ross()
     with threadpool_limits(1):
         cpu = platform.processor() or platform.machine()
@@ -228,6 +266,7 @@ def main() -> None:
             bench_receptance(bench, given, rotor)
             bench_map(bench, given)
             bench_tools(bench, given)
+            bench_whirl(bench, given)
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dsm.calibration.calibration import UnreachableFrequencyError
-from dsm.calibration.identifiability import CURE, FARTHEST, LEAST_SHARE, identifiability
+from dsm.calibration.identifiability import CURE, FARTHEST, LEAST_SHARE, Allowed, identifiability, rival_solution
 from dsm.calibration.least_squares import LIMIT, Problem, State, minimize
 from dsm.calibration.measured import check_measured
 from dsm.calibration.remark import Remark
@@ -56,7 +56,8 @@ def fit_stiffness(
     group's share of the strain energy. Modes keep their number, never their shape: every step solves for certified
     modes, and where two come close (veering) they exchange shapes while their numbers stay. Veering makes local minima:
     where the given stiffnesses lead to none that fits, a few starts around them are tried and the best is kept. Of
-    several solutions that fit, such as the two of a symmetric shaft, it is the first that is found.
+    several solutions that fit, such as the two of a symmetric shaft, it is the first that is found, unless another fits
+    better by more than 95 % intervals allow.
 
     The result has remarks where the frequencies leave a stiffness open (identifiability), where modes do not tell the
     groups apart, lie close together, or do not fit; where it has none, the 95 % intervals are to be believed.
@@ -77,10 +78,11 @@ def fit_stiffness(
         )
     problem = Problem(spindles, names, measured)
     state, found = _search(problem, None if start is None else np.log(start))
+    state, rival = _better(problem, state) if found else (state, None)
     if not (found and problem.fits(state)):
         with suppress(ArithmeticError):  # factors so far apart may be beyond what can be computed
             _require_reachable(problem)
-    result = _result(problem, state, found)
+    result = _result(problem, state, found, rival)
     if not found:
         raise StiffnessFitError(_why(result), result)
     return result
@@ -118,10 +120,20 @@ def _without_unfelt(problem: Problem, state: State) -> tuple[State, bool]:
     return state, False
 
 
-def _result(problem: Problem, state: State, found: bool) -> StiffnessFit:
+def _better(problem: Problem, state: State) -> tuple[State, State | None]:
+    """The solution, or a rival that fits better by more than 95 % intervals allow; with it what rival is left."""
+    for _ in range(OTHER_STARTS):
+        rival = rival_solution(problem, state, _covariance(problem, state))
+        if rival is None or rival.cost + Allowed.of(problem, rival).limit > state.cost:
+            break
+        state = rival
+    return state, rival
+
+
+def _result(problem: Problem, state: State, found: bool, rival: State | None) -> StiffnessFit:
     measured = problem.measured
     covariance = _covariance(problem, state)
-    unsure = identifiability(problem, state, covariance) if found else []
+    unsure = identifiability(problem, state, rival, covariance) if found else []
     return StiffnessFit(
         groups=problem.names,
         mode=measured.mode,

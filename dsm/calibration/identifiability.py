@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
+from scipy.special import ndtr, ndtri, stdtrit
 
 from dsm.calibration.least_squares import Problem, State, minimize
 from dsm.calibration.remark import Remark
@@ -21,12 +22,12 @@ FARTHEST = math.log(30.0)
 """An interval wider than this, in the logarithm of the factor, is none."""
 STEPS = 0.2, 0.5, 1.0, 1.7, 2.5, 3.4
 """Distances beyond the interval of first order, in the logarithm of the factor, at which that is done."""
-SOFT, HARD = 0.55, 1.8
-"""The cost at both ends of the interval of first order, over what it should have risen by."""
+LEAST_HELD = 1 - 2 * (1 - CONFIDENCE)
+"""What an interval must hold by the likelihood."""
+NEARLY = 0.8
+"""Ends at which the sum of squares rises by this part of what it should, or more, are as good as those of S(v)."""
 TOLERANCE = 0.1
 """Other factors are found anew until a step would change no frequency by more than this part of the least error."""
-NOT_WORSE = 6.0
-"""A second solution counts where its sum of squares is larger by less than this."""
 SHARP = 1e-6
 """Intervals and distances smaller than this, as of computed frequencies, are not looked at."""
 LITTLE_SHARE = 0.1
@@ -36,16 +37,38 @@ LEAST_SHARE = 0.01
 CURE = "measure more or other modes, or leave the group out"
 
 
-def identifiability(problem: Problem, best: State, log_covariance: _Float | None) -> list[Remark]:
+class Allowed(NamedTuple):
+    """By how much a sum of squares may exceed the least one with a factor still inside its 95 % interval."""
+
+    variance: float
+    """Of the scaled residuals: 1, or from their scatter where no standard errors were given."""
+    rise: float
+    """Student's t^2."""
+
+    @classmethod
+    def of(cls, problem: Problem, best: State) -> Allowed:
+        """For a fit with a covariance."""
+        given = problem.measured.std is not None
+        variance = 1.0 if given else best.cost / problem.spare
+        return cls(variance, float(stdtrit(math.inf if given else problem.spare, (1 + CONFIDENCE) / 2)) ** 2)
+
+    @property
+    def limit(self) -> float:
+        """The excess."""
+        return self.variance * self.rise
+
+
+def identifiability(problem: Problem, best: State, rival: State | None, log_covariance: _Float | None) -> list[Remark]:
     """Remarks on groups whose factor the frequencies leave open.
 
     For each group the least sum of squares over all other factors, S(v), belongs to the logarithm v of its own. The
     interval of first order holds where S - S_min reaches Student's t^2 (times the variance of the residuals where no
     standard errors were given) at its ends, and stays above beyond them (D. J. Venzon and S. H. Moolgavkar, A method
-    for computing profile-likelihood-based confidence intervals, Appl. Statist. 37, 1988). Beyond them S is followed,
-    through the given stiffness (v = 0), half-way to it and up to a factor of 30, where the group has little energy in
-    all measured modes at what was found, at what was given, or half-way. A second solution, such as that of a nearly
-    symmetric shaft, is looked for along the direction that is known least. Without a covariance there is nothing to
+    for computing profile-likelihood-based confidence intervals, Appl. Statist. 37, 1988). With the signed roots of
+    S - S_min as normal deviates, the rises at its ends say how often it holds the truth: not twice as often wrong as it
+    says is good enough. Beyond them S is followed, through the given stiffness (v = 0), half-way to it and up to a
+    factor of 30, where the group has little energy in all measured modes at what was found, at what was given, or
+    half-way. rival: another solution that fits as well (see rival_solution). Without a covariance there is nothing to
     compare with, and the energy shares decide alone.
     """
     felt = _felt(problem, best)
@@ -58,27 +81,31 @@ def identifiability(problem: Problem, best: State, log_covariance: _Float | None
         elif log_covariance is not None:
             text = _open(problem, best, log_covariance, index, felt[index] < LITTLE_SHARE)
             found += [Remark("stiffness-ambiguous", name, text, CURE)] if text else []
-    return found or _second_solution(problem, best, log_covariance)
+    if not found and rival is not None:
+        factors = ", ".join(f"{math.exp(value):.3g}" for value in rival.log_factor)
+        text = f"another solution fits as well: factors {factors}"
+        found = [Remark("stiffness-ambiguous", ", ".join(problem.names), text, CURE)]
+    return found
 
 
-def _second_solution(problem: Problem, best: State, log_covariance: _Float | None) -> list[Remark]:
-    """Other factors that fit as well, far outside the intervals of those that were found."""
+def rival_solution(problem: Problem, best: State, log_covariance: _Float | None) -> State | None:
+    """The best other minimum, far outside the intervals of the factors found, whose sum of squares they do not exclude.
+
+    Such as that of a nearly symmetric shaft; it is looked for along the direction that is known least. It may fit
+    better than what was found.
+    """
     if log_covariance is None or best.log_factor.size == 1:
-        return []
+        return None
     width, vectors = np.linalg.eigh(log_covariance)
     direction = vectors[:, -1] / np.max(np.abs(vectors[:, -1]))
-    variance = best.cost / problem.spare if problem.measured.std is None else 1.0
+    far, worst = max(4 * math.sqrt(width[-1]), SHARP), best.cost + Allowed.of(problem, best).limit
+    rivals = []
     for step in (-1.2, -0.5, 0.5, 1.2):
-        try:
+        with suppress(ArithmeticError):
             other, _ = minimize(problem, best.log_factor + step * direction, (), _tolerance(problem, best))
-        except ArithmeticError:
-            continue
-        away = np.abs(other.log_factor - best.log_factor)
-        if other.cost - best.cost < NOT_WORSE * variance and np.max(away) > max(4 * math.sqrt(width[-1]), SHARP):
-            factors = ", ".join(f"{math.exp(value):.3g}" for value in other.log_factor)
-            text = f"another solution fits as well: factors {factors}"
-            return [Remark("stiffness-ambiguous", ", ".join(problem.names), text, CURE)]
-    return []
+            if other.cost < worst and np.max(np.abs(other.log_factor - best.log_factor)) > far:
+                rivals.append(other)
+    return min(rivals, key=lambda state: state.cost, default=None)
 
 
 def _felt(problem: Problem, best: State) -> _Float:
@@ -92,41 +119,39 @@ def _felt(problem: Problem, best: State) -> _Float:
 
 def _open(problem: Problem, best: State, log_covariance: _Float, index: int, far: bool) -> str:
     """What is wrong with the interval of one factor, in words; empty where nothing is."""
-    variance, rise = 1.0, float(stdtrit(math.inf, (1 + CONFIDENCE) / 2)) ** 2
-    if problem.measured.std is None:
-        variance = best.cost / problem.spare
-        rise = float(stdtrit(problem.spare, (1 + CONFIDENCE) / 2)) ** 2
-    unknown = np.flatnonzero(np.diag(log_covariance) >= FARTHEST**2).tolist()
-    half, limit = math.sqrt(rise * float(log_covariance[index, index])), variance * rise
+    allowed = Allowed.of(problem, best)
+    half = math.sqrt(allowed.rise * float(log_covariance[index, index]))
     if not half < FARTHEST:
         return f"its standard error is a factor of {math.exp(min(half, 50.0)):.3g} either way"
     if half < SHARP:
         return ""
     along = np.clip(half * log_covariance[:, index] / log_covariance[index, index], -FARTHEST, FARTHEST)
+    fixed = [index, *np.flatnonzero(np.diag(log_covariance) >= FARTHEST**2).tolist()]
     try:
-        sides = (_one_side(problem, best, index, unknown, way, limit, far) for way in (-along, along))
-        return next(filter(None, sides), "")
+        ends = [problem.evaluate(best.log_factor + side * along) for side in (-1, 1)]
+        if not all(NEARLY < (end.cost - best.cost) / allowed.limit < 1 / NEARLY for end in ends):
+            ends = [minimize(problem, end.log_factor, fixed, _tolerance(problem, best))[0] for end in ends]
+        held = _held([(end.cost - best.cost) / allowed.limit for end in ends])
+        if held < LEAST_HELD:
+            return f"its interval of first order, a factor of {math.exp(half):.4g} either way, holds {100 * held:.0f} %"
+        return _elsewhere(problem, best, fixed, ends, allowed.limit) if far else ""
     except ArithmeticError:
         return "its interval reaches where the model cannot be solved"
 
 
-def _one_side(
-    problem: Problem, best: State, index: int, unknown: list[int], along: _Float, limit: float, far: bool
-) -> str:
-    """The same for one side of the interval, which ends `along` from the factors found; unknown: groups that stay."""
-    end = problem.evaluate(best.log_factor + along)
-    if not SOFT < (end.cost - best.cost) / limit < HARD:
-        end, _ = minimize(problem, end.log_factor, [index, *unknown], _tolerance(problem, best))
-    ratio = (end.cost - best.cost) / limit
-    if not SOFT < ratio < HARD:
-        said = "better" if ratio <= SOFT else "worse"
-        return f"at {math.exp(along[index]):.4g} times what was found the fit is {said} than its standard error says"
-    side = 1 if along[index] > 0 else -1
-    for place, cost in _beyond(problem, best, end, index, unknown, side) if far else ():
-        if cost - best.cost < limit:
-            return (
-                f"the frequencies fit {math.exp(math.copysign(place, along[index])):.3g} times what was found as well"
-            )
+def _held(rises: Sequence[float]) -> float:
+    """How often an interval holds the truth at whose ends the sum of squares rises by so many times what it should."""
+    outside = (1 - CONFIDENCE) / 2
+    deviates = [-float(ndtri(outside)) * math.sqrt(max(rise, 0.0)) for rise in rises]
+    return float(1 - ndtr(-deviates[0]) - ndtr(-deviates[1]))
+
+
+def _elsewhere(problem: Problem, best: State, fixed: Sequence[int], ends: Sequence[State], limit: float) -> str:
+    """Where beyond its ends the first fixed factor fits as well, in words; empty where it does not."""
+    for side, end in zip((-1, 1), ends, strict=True):
+        for place, cost in _beyond(problem, best, end, fixed, side):
+            if cost - best.cost < limit:
+                return f"the frequencies fit {math.exp(side * place):.3g} times what was found as well"
     return ""
 
 
@@ -136,9 +161,10 @@ def _tolerance(problem: Problem, best: State) -> float:
 
 
 def _beyond(
-    problem: Problem, best: State, end: State, index: int, unknown: list[int], side: int
+    problem: Problem, best: State, end: State, fixed: Sequence[int], side: int
 ) -> Iterator[tuple[float, float]]:
     """Distances from the factor found (logarithm) beyond an end of its interval, and the least cost there."""
+    index = fixed[0]
     half = abs(float(end.log_factor[index] - best.log_factor[index]))
     to_start = -side * float(best.log_factor[index])
     places = {half + step for step in STEPS} | {share * to_start for share in (0.5, 1.0)}
@@ -147,7 +173,7 @@ def _beyond(
         start = state.log_factor.copy()
         start[index] = best.log_factor[index] + side * place
         try:
-            state, _ = minimize(problem, start, [index, *unknown], _tolerance(problem, best))
+            state, _ = minimize(problem, start, fixed, _tolerance(problem, best))
         except ArithmeticError:
             return
         yield place, state.cost

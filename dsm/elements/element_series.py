@@ -31,9 +31,10 @@ def element_series(
     small x.
     """
     z_per_w2 = mass_per_length * length**4 / bending_stiffness
-    force = np.multiply.outer(_unit_series(), bending_stiffness / length**3).swapaxes(1, 2)
-    slopes = np.array([0, 1, 2, 0, 1, 2])[:, np.newaxis, np.newaxis]
-    return np.asarray(force * np.vander(z_per_w2, TERMS, increasing=True) * length[:, np.newaxis] ** slopes)
+    force = bending_stiffness / length**3
+    sizes = np.stack([force, force * length, force * length**2])
+    powers = np.vander(z_per_w2, TERMS, increasing=True)
+    return np.asarray(sizes[[0, 1, 2, 0, 1, 2], :, np.newaxis] * powers * _unit_series()[:, np.newaxis])
 
 
 @cache

@@ -54,13 +54,13 @@ def place_nodes(
     segment = shaft.segment_at((nodes[:-1] + nodes[1:]) / 2)
     size = _size(shaft, segment, nodes, theory, top_frequency, spin)
     longest = LONGEST_LINK if links else 1.0
-    parts = np.clip(np.ceil(size / longest * (1 - 1e-12)), 1, MAX_ELEMENTS + 1).astype(int)
-    if np.sum(parts) > MAX_ELEMENTS:
+    parts = np.ceil(size / longest * (1 - 1e-12)).clip(1, MAX_ELEMENTS + 1).astype(int)
+    if parts.sum() > MAX_ELEMENTS:
         raise ArithmeticError(
             f"{top_frequency:.4g} Hz needs more than {MAX_ELEMENTS} elements: ask for lower frequencies and modes, "
             "and look for segments far too thin or soft, and for wrong units"
         )
-    if np.any(parts > 1):
+    if parts.max() > 1:
         split = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(nodes[:-1], nodes[1:], parts, strict=True)]
         nodes = np.append(np.concatenate(split), nodes[-1])
     return Nodes(nodes, np.repeat(segment, parts), np.repeat(links | (size < SHORT), parts))
@@ -70,13 +70,13 @@ def _at_parts(shaft: Sections, wanted: Sequence[float]) -> _Float:
     """Nodes at ends of segments, inside steep cones and at the wanted places; places that are the same count once."""
     ends = shaft.ends
     slack = SAME_PLACE * ends[-1]
-    nodes = np.sort(np.concatenate([ends, _inside_cones(shaft)]))
-    for place in wanted:
-        if not -slack <= place <= ends[-1] + slack:
-            raise ValueError(f"position={place} m is off the shaft, which spans 0 to {ends[-1]:g} m")
-        if np.min(np.abs(nodes - place)) > slack:
-            nodes = np.sort(np.append(nodes, place))
-    return nodes
+    nodes, places = np.append(ends, _inside_cones(shaft)), np.sort(wanted)
+    off = places[~((places >= -slack) & (places <= ends[-1] + slack))]
+    if off.size:
+        raise ValueError(f"position={off[0]} m is off the shaft, which spans 0 to {ends[-1]:g} m")
+    apart = np.abs(places[:, np.newaxis] - nodes).min(axis=1, initial=np.inf) > slack
+    apart[1:] &= np.diff(places) > slack
+    return np.sort(np.append(nodes, places[apart]))
 
 
 def _inside_cones(shaft: Sections) -> _Float:
@@ -103,12 +103,12 @@ def _size(
     w = 2 * np.pi * top_frequency
     length = np.diff(nodes)
     ends = shaft.at(segment, np.stack([nodes[:-1], nodes[1:]]))
-    mass, rotary = np.max(ends.mass, axis=0), np.max(ends.rotary, axis=0)
-    rigidity, shear = np.min(ends.rigidity, axis=0), np.min(ends.shear, axis=0)
+    mass, rigidity = ends.mass.max(axis=0), ends.rigidity.min(axis=0)
     bending = length**4 * mass / rigidity * w * w / POLE
     rest = np.zeros_like(length)
     if theory == "timoshenko":
         whirl = w * w + 2 * w * abs(spin or 0.0)
+        rotary, shear = ends.rotary.max(axis=0), ends.shear.min(axis=0)
         rest = (mass / shear * w * w + rotary / rigidity * whirl) * (length / np.pi) ** 2
     allowed = MAX_X**4 / POLE
     return np.asarray(np.sqrt((rest + np.sqrt(rest**2 + 4 * allowed * bending)) / (2 * allowed)))

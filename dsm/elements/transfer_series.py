@@ -34,9 +34,10 @@ def transfer_series(
     place, weight, running = _quadrature()
     length = (end - start)[:, np.newaxis, np.newaxis]
     section = shaft.at(segment[:, np.newaxis], start[:, np.newaxis] + place * length[..., 0])
-    rigidity, mass, rotary, shear = (part[..., np.newaxis] for part in section)
-    flexible = theory == "timoshenko"
-    softness, turning = (1 / shear, rotary) if flexible else (0 * shear, 0 * rotary)
+    rigidity, mass = section.rigidity[..., np.newaxis], section.mass[..., np.newaxis]
+    softness, turning = np.zeros((2, *rigidity.shape))
+    if theory == "timoshenko":
+        softness, turning = 1 / section.shear[..., np.newaxis], section.rotary[..., np.newaxis]
     terms, back = number_of_terms(apart), (TERMS, TERMS + 1) if apart else (1, 1)
     found = np.zeros((terms, segment.size, 4, 4))
     nothing = np.zeros((segment.size, POINTS, 4))

@@ -15,8 +15,9 @@ from dsm.elements.place_nodes import place_nodes
 from dsm.elements.whirl_terms import whirl_terms
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
 from dsm.spindle.attachments import Bearing, Joint, LumpedMass
+from dsm.spindle.material import Material
 from dsm.spindle.places import nearest
-from dsm.spindle.sections import Sections, sections
+from dsm.spindle.sections import Sections, sections_of
 from dsm.spindle.segment import Segment
 from dsm.spindle.spindle import Spindle, Theory
 
@@ -62,9 +63,17 @@ def _assemble(
     if spin is not None and spin < 0:
         return _reversed(_assemble(spindle, top_frequency, places, held, left_out, -spin, links))
     wanted = (*_places_of_parts(spindle), *places, *(z for z, _ in held))
-    material = spindle.youngs_modulus, spindle.density, spindle.theory, spindle.shear_modulus
     fastest = None if spin is None else fastest_spin(spin, top_frequency)
-    bare = _bare(tuple(spindle.segments), material, tuple(spindle.joints), wanted, top_frequency, fastest, links)
+    bare = _bare(
+        tuple(spindle.segments),
+        spindle.material,
+        spindle.theory,
+        tuple(spindle.joints),
+        wanted,
+        top_frequency,
+        fastest,
+        links,
+    )
     diagonal, coupling = (
         part.copy() if spin is None else whirl_terms(part, spin) for part in (bare.diagonal, bare.coupling)
     )
@@ -89,7 +98,8 @@ def _assemble(
 @lru_cache(maxsize=32)
 def _bare(
     segments: tuple[Segment, ...],
-    material: tuple[float, float, Theory, float | None],
+    material: Material,
+    theory: Theory,
     joints: tuple[Joint, ...],
     wanted: tuple[float, ...],
     top_frequency: float,
@@ -100,11 +110,10 @@ def _bare(
 
     fastest: for speeds up to that (rad/s), terms as for whirl_terms; None: for a shaft at rest.
     """
-    spindle = Spindle(segments, (), *material, joints=joints)
-    shaft = sections(spindle)
-    position, segment, short = place_nodes(shaft, wanted, spindle.theory, top_frequency, fastest, links)
-    series = _elements(spindle, shaft, position, segment, short, fastest is not None)
-    position, series, short = _with_joints(spindle, position, series, short)
+    shaft = sections_of(segments, material)
+    position, segment, short = place_nodes(shaft, wanted, theory, top_frequency, fastest, links)
+    series = _elements(theory, shaft, position, segment, short, fastest is not None)
+    position, series, short = _with_joints(joints, position, series, short)
     return _chain(position, series, short, top_frequency, _least(shaft))
 
 
@@ -129,7 +138,7 @@ def _places_of_parts(spindle: Spindle) -> list[float]:
 
 
 def _elements(
-    spindle: Spindle,
+    theory: Theory,
     shaft: Sections,
     position: _Float,
     segment: NDArray[np.int_],
@@ -139,17 +148,17 @@ def _elements(
     """Series of all elements, (10, n_elements, n_terms): rows of link_elements where short, else of the others."""
     found = []
     for kind, chosen in ((stiffness_elements, ~short), (link_elements, short)):
-        found.append(kind(shaft, spindle.theory, segment[chosen], position[:-1][chosen], position[1:][chosen], apart))
+        found.append(kind(shaft, theory, segment[chosen], position[:-1][chosen], position[1:][chosen], apart))
     series = np.empty((10, segment.size, found[0].shape[2]))
     series[:, ~short], series[:, short] = found
     return series
 
 
 def _with_joints(
-    spindle: Spindle, position: _Float, series: _Float, short: NDArray[np.bool_]
+    joints: Sequence[Joint], position: _Float, series: _Float, short: NDArray[np.bool_]
 ) -> tuple[_Float, _Float, NDArray[np.bool_]]:
     """Nodes and elements with a link of no length at each joint."""
-    for joint in spindle.joints:
+    for joint in joints:
         node = nearest(position, joint.position)
         link = np.zeros((10, series.shape[2]))
         link[[3, 5], 0] = -1 / joint.stiffness, -1 / joint.rotational_stiffness

@@ -1,4 +1,4 @@
-"""Block elimination along the shaft: the stiffness at one node."""
+"""Dynamic condensation: block elimination along the shaft, the stiffness at one node."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ class SpindleSide:
 
 
 def spindle_side(spindle: Spindle, frequency: ArrayLike, position: float, loss_factor: float = 0.0) -> SpindleSide:
-    """All of a spindle beyond `position` from its tool tip (m), exactly condensed to the place of the cut.
+    """All of a spindle beyond `position` from its tool tip (m), by dynamic condensation to the place of the cut.
 
     frequency: (n,) Hz. loss_factor: as for receptance. A bearing, a mass or a joint where the spindle is cut counts as
     part of it; all that is nearer to the tip falls away. Raises ValueError as receptance does, for a cut off the shaft,

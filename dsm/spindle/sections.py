@@ -2,32 +2,54 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import NamedTuple
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm.spindle.material import shear_coefficient
-from dsm.spindle.segment import ring_area, ring_second_moment
+from dsm.spindle.material import Material, shear_coefficient
+from dsm.spindle.segment import Segment, ring_area, ring_second_moment
 from dsm.spindle.spindle import Spindle
 
 _Float = NDArray[np.float64]
 _Indices = NDArray[np.int_]
 
 
-class CrossSection(NamedTuple):
-    """What a beam is made of at some places; all of one shape."""
+@dataclass(frozen=True, eq=False)
+class CrossSection:
+    """What a beam is made of at some places; all of one shape, worked out when asked for."""
 
-    rigidity: _Float
-    """Bending stiffness EI (N m^2)."""
-    mass: _Float
-    """Mass per length (kg/m)."""
-    rotary: _Float
-    """Moment of inertia about a diameter per length, rho I (kg m)."""
-    shear: _Float
-    """Shear stiffness kappa G A (N)."""
+    outer: _Float
+    """Outer diameter (m)."""
+    bore: _Float
+    """Diameter of the bore (m)."""
+    heavy: _Float
+    """Outer diameter of the mass (m)."""
+    material: _Float
+    """Young's modulus (Pa), density (kg/m^3), shear modulus (Pa) and Poisson's ratio (-), shape (4, ...)."""
+
+    @property
+    def rigidity(self) -> _Float:
+        """Bending stiffness EI (N m^2)."""
+        return np.asarray(self.material[0] * ring_second_moment(self.outer, self.bore))
+
+    @property
+    def mass(self) -> _Float:
+        """Mass per length (kg/m)."""
+        return np.asarray(self.material[1] * ring_area(self.heavy, self.bore))
+
+    @property
+    def rotary(self) -> _Float:
+        """Moment of inertia about a diameter per length, rho I (kg m)."""
+        return np.asarray(self.material[1] * ring_second_moment(self.heavy, self.bore))
+
+    @property
+    def shear(self) -> _Float:
+        """Shear stiffness kappa G A (N)."""
+        coefficient = shear_coefficient(self.material[3], self.bore / self.outer)
+        return np.asarray(coefficient * self.material[2] * ring_area(self.outer, self.bore))
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,35 +63,37 @@ class Sections:
     material: _Float
     """Young's modulus (Pa), density (kg/m^3), shear modulus (Pa) and Poisson's ratio (-), shape (4, n_segments)."""
 
-    @property
+    @cached_property
     def is_cone(self) -> NDArray[np.bool_]:
         """Which segments have a diameter that changes, shape (n_segments,)."""
-        return np.asarray(np.any(self.diameters[::2] != self.diameters[1::2], axis=0))
+        return np.asarray((self.diameters[::2] != self.diameters[1::2]).any(axis=0))
 
     def segment_at(self, position: _Float) -> _Indices:
         """Index of the segment at each position from the tool tip (m), any shape; 0 is the first."""
         return np.asarray(np.searchsorted(self.ends[1:-1], position))
 
     def at(self, segment: _Indices, position: _Float) -> CrossSection:
-        """The cross-sections of segments at positions (m), shapes that go together."""
-        start, length = self.ends[segment], self.ends[segment + 1] - self.ends[segment]
-        share = (position - start) / length
-        first, last = self.diameters[::2, segment], self.diameters[1::2, segment]
-        outer, bore, heavy = (near + share * (far - near) for near, far in zip(first, last, strict=True))
-        modulus, density, shear_modulus, poisson = self.material[:, segment]
-        return CrossSection(
-            modulus * ring_second_moment(outer, bore),
-            density * ring_area(heavy, bore),
-            density * ring_second_moment(heavy, bore),
-            shear_coefficient(poisson, bore / outer) * shear_modulus * ring_area(outer, bore),
-        )
+        """The cross-sections of segments at positions (m), in the shape of these."""
+        segment = np.broadcast_to(segment, position.shape)
+        outer, bore, heavy = self.diameters[::2, segment]
+        if self.is_cone.any():
+            start, length = self.ends[segment], self.ends[segment + 1] - self.ends[segment]
+            share = (position - start) / length
+            far = self.diameters[1::2, segment]
+            outer, bore, heavy = (a + share * (b - a) for a, b in zip((outer, bore, heavy), far, strict=True))
+        return CrossSection(outer, bore, heavy, self.material[:, segment])
 
 
 @lru_cache(maxsize=32)
 def sections(spindle: Spindle) -> Sections:
     """The cross-sections of a spindle."""
-    rows, common = [], spindle.material
-    for segment in spindle.segments:
+    return sections_of(spindle.segments, spindle.material)
+
+
+def sections_of(segments: Sequence[Segment], common: Material) -> Sections:
+    """Those of segments, some of them of the common material."""
+    rows = []
+    for segment in segments:
         (outer, bore), (end_outer, end_bore) = segment.diameters_at(0.0), segment.diameters_at(1.0)
         heavy = (outer, end_outer) if segment.mass_diameter is None else 2 * (segment.mass_diameter,)
         material = segment.material or common

@@ -71,13 +71,13 @@ class Spindle:
     def _hash(self) -> int:
         return hash(tuple(getattr(self, field.name) for field in fields(self)))
 
-    @property
+    @cached_property
     def material(self) -> Material:
         """Material of segments without one of their own."""
         shear = self.youngs_modulus / 2.6 if self.shear_modulus is None else self.shear_modulus
         return Material(self.youngs_modulus, self.density, shear)
 
-    @property
+    @cached_property
     def length(self) -> float:
         """Length of the shaft (m)."""
         return math.fsum(segment.length for segment in self.segments)

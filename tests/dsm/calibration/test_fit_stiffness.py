@@ -295,3 +295,28 @@ def test_a_second_solution_is_told() -> None:
     assert found.factor * [0.5, 2.0] == pytest.approx([0.466, 2.29], abs=0.01)
     assert [(remark.code, remark.about) for remark in found.remarks] == [("stiffness-ambiguous", "front, rear")]
     assert "factors 2, 0.5" in str(found.remarks[0])
+
+
+def test_a_solution_that_fits_much_better_is_taken() -> None:
+    """Here the given stiffnesses lead to a minimum 30 standard errors away that fits, but not half as well."""
+    draw = np.random.default_rng(4)
+    for _ in range(169):
+        truth, noise, away = random_shaft(draw), draw.normal(size=4), np.exp(0.7 * draw.normal(size=2))
+    exact = natural_frequencies(truth, 4)
+    start = scale_groups(truth, dict(zip(("front", "rear"), away.tolist(), strict=True)))
+    found = fit_stiffness(start, exact * (1 + 3e-3 * noise), 3e-3 * exact)
+    assert found.log_covariance is not None
+    assert np.all(np.abs(np.log(found.factor * away)) < 2 * np.sqrt(np.diag(found.log_covariance)))
+    assert not found.remarks
+
+
+def test_an_interval_that_holds_too_little_is_told() -> None:
+    """Close to veering the sum of squares rises by half of what it should at one end."""
+    draw = np.random.default_rng(902)
+    for _ in range(191):
+        truth, noise, away = random_shaft(draw), draw.normal(size=4), np.exp(0.7 * draw.normal(size=2))
+    exact = natural_frequencies(truth, 4)
+    start = scale_groups(truth, dict(zip(("front", "rear"), away.tolist(), strict=True)))
+    found = fit_stiffness(start, exact * (1 + 3e-3 * noise), 3e-3 * exact)
+    assert codes(found) == {"stiffness-ambiguous"}
+    assert "holds 49 %" in str(found.remarks[0])

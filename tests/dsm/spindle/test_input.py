@@ -42,6 +42,7 @@ SPINDLE = Spindle(PARTS, BEARINGS)
         (Segment(0.1, 0.05, 0.05), r"segment 3: bore_diameter=0\.05 m is not .* outer_diameter=0\.05"),
         (Segment(0.1, 0.05, -0.01), r"segment 3: bore_diameter=-0\.01"),
         (Segment(0.1, 0.05, math.nan), "segment 3: bore_diameter=nan"),
+        (Segment(0.0, 0.05, end_outer_diameter=0.04), r"segment 3: length=0\.0 is not a finite number > 0 \(m\)"),
         (Segment(0.1, 0.05, end_outer_diameter=0.0), r"segment 3: end_outer_diameter=0\.0 is not a finite number > 0"),
         (Segment(0.1, 0.05, end_outer_diameter=math.nan), "segment 3: end_outer_diameter=nan"),
         (
@@ -73,6 +74,7 @@ def test_segments_are_refused_by_number(segment: Segment, message: str) -> None:
         (Bearing(-0.1, 1e8), r"bearing 3: position=-0\.1 m"),
         (Bearing(math.nan, 1e8), "bearing 3: position=nan"),
         (Bearing(0.4, 1e8), r"bearing 3: position=0\.4 m is that of bearing 2"),
+        (Bearing(0.4 + 1e-13, 1e8), r"bearing 3: position=0\.4.* m is that of bearing 2; put both into"),
         (Bearing(0.2, 0.0), r"bearing 3: stiffness=0\.0 .* \(N/m\)"),
         (Bearing(0.2, math.nan), "bearing 3: stiffness=nan"),
         (Bearing(0.2, 1e8, damping=-1.0), r"bearing 3: damping=-1\.0 .* \(N s/m\)"),
@@ -234,6 +236,15 @@ def test_a_bearing_at_a_rounded_segment_end_makes_no_node_of_its_own() -> None:
     exact = Spindle(thirds, [Bearing(0.0, 1e8), Bearing(0.1 + 0.1 + 0.1, 1e8)])
     rounded = Spindle(thirds, [Bearing(0.0, 1e8), Bearing(0.3, 1e8)])
     assert natural_frequencies(rounded, 3) == pytest.approx(natural_frequencies(exact, 3), rel=1e-12)
+
+
+@pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
+@pytest.mark.parametrize("apart", [1e-9, 8e-9, 1e-7])
+def test_bearings_nanometres_apart_are_one_of_both_stiffnesses(apart: float, theory: Theory) -> None:
+    close = Spindle(PARTS, [Bearing(0.2, 1e8), Bearing(0.2 + apart, 2e8), Bearing(0.4, 1e8)], theory=theory)
+    one = Spindle(PARTS, [Bearing(0.2, 3e8), Bearing(0.4, 1e8)], theory=theory)
+    assert natural_frequencies(close, 4) == pytest.approx(natural_frequencies(one, 4), rel=20 * apart)
+    assert static_stiffness(close) == pytest.approx(static_stiffness(one), rel=20 * apart)
 
 
 def test_no_frequencies_give_no_receptance() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import timedelta
 
 import numpy as np
@@ -20,7 +20,7 @@ from dsm import (
     modes_at,
     predict_mode,
 )
-from lobewatch.analysis.joints.groupings import Grouping
+from lobewatch.analysis.joints.groupings import Grouping, divided, merged
 from lobewatch.analysis.joints.known_modes import MODES, KnownModes, known_modes
 from lobewatch.analysis.joints.matching import nearest
 from lobewatch.analysis.joints.tapped_tools import TappedTool, tapped_tools
@@ -39,7 +39,7 @@ class ToolsCalibration:
     fit: StiffnessFit
     """The stiffness of bearings and joints."""
     predicted: dict[str, PredictedMode]
-    """The softest mode at the tip of each tool that was not fitted to, by its name."""
+    """The softest mode at the tip of each tool that was not fitted to, by its name; empty where factors are shared."""
     joints: tuple[Joint, ...]
     """What to write into machine.toml, as found; empty where that would be no improvement."""
     left_out: dict[str, tuple[float, ...]]
@@ -74,10 +74,10 @@ def calibrate_tools(
         machine.spindle.label if machine.spindle else "",
         tuple(taps),
         fit,
-        dict(_predictions(machine, fit, grouping, tools)),
-        _to_enter(fit, grouping(machine.model(machine.tap.tool))),
+        dict(_predictions(machine, fit, grouping, tools)) if grouping is divided else {},
+        _to_enter(fit, grouping, machine.model(machine.tap.tool)),
         dict(_left_out(known)),
-        tuple(_apart(taps, machine)),
+        (*_shared(known), *_apart(taps, machine)),
     )
 
 
@@ -93,10 +93,13 @@ def _predictions(
             yield name, predict_mode(fit, spindle, softest + 1)
 
 
-def _to_enter(fit: StiffnessFit, drawn: Spindle) -> tuple[Joint, ...]:
+def _to_enter(fit: StiffnessFit, grouping: Grouping, drawn: Spindle) -> tuple[Joint, ...]:
     """All joints of machine.toml as found; none where the tools do not fit one spindle, or no joint is felt."""
-    names = {name for joint in drawn.joints for name in (joint.group, joint.rotational_group) if name}
-    return () if fit.misfits or names & {*fit.groups} <= fit.open_groups else tuple(fit.applied_to(drawn).joints)
+    found = fit.applied_to(grouping(drawn)).joints
+    names = {name for joint in found for name in (joint.group, joint.rotational_group) if name}
+    if fit.misfits or names & {*fit.groups} <= fit.open_groups:
+        return ()
+    return tuple(replace(one, group=old.group) for one, old in zip(found, drawn.joints, strict=True))
 
 
 def _left_out(known: KnownModes) -> Iterator[tuple[str, tuple[float, ...]]]:
@@ -105,6 +108,15 @@ def _left_out(known: KnownModes) -> Iterator[tuple[str, tuple[float, ...]]]:
         left = [mode.frequency for mode in nearest(tap) if not any(mode is one for one in counted)]
         if left:
             yield tap.tool, tuple(left)
+
+
+def _shared(known: KnownModes) -> Iterator[Remark]:
+    """Fewer factors than stiffnesses."""
+    if known.grouping is not divided:
+        shared = "all bearings share a factor, and " if known.grouping is merged else ""
+        text = f"{known.fit.mode.size} modes are too few: {shared}all stiffnesses of the joint keep their given ratio; "
+        cure = "measure more modes: a wider [mode] band_hz, a harder hammer tip"
+        yield Remark("factors-shared", "", f"{text}other tools are not predicted", cure)
 
 
 def _apart(taps: Sequence[TappedTool], machine: Machine) -> Iterator[Remark]:

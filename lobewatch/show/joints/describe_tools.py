@@ -47,7 +47,9 @@ def tools_texts(found: ToolsCalibration) -> list[str | Table]:
 
 def _to_enter(found: ToolsCalibration) -> list[str]:
     if found.joints:
-        return ["for [spindle] of machine.toml:", *_joint_lines(found.joints)]
+        unsure = ", ".join(sorted(found.fit.open_groups))
+        said = f" (open: {unsure}; good only together with the others)" if unsure else ""
+        return [f"for [spindle] of machine.toml{said}:", *_joint_lines(found.joints)]
     return [NOT_FIT if found.fit.misfits else OPEN]
 
 

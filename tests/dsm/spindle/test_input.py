@@ -36,6 +36,7 @@ SPINDLE = Spindle(PARTS, BEARINGS)
     ("segment", "message"),
     [
         (Segment(0.0, 0.05), r"segment 3: length=0\.0 is not a finite number > 0 \(m\)"),
+        (Segment(0.0, 0.05, end_outer_diameter=0.06), r"segment 3: length=0\.0 is not a finite number > 0 \(m\)"),
         (Segment(math.nan, 0.05), "segment 3: length=nan"),
         (Segment(0.1, -0.05), r"segment 3: outer_diameter=-0\.05"),
         (Segment(0.1, math.inf), "segment 3: outer_diameter=inf"),

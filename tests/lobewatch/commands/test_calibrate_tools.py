@@ -119,6 +119,19 @@ def test_tools_of_two_spindles_are_told_and_nothing_is_to_be_entered(tmp_path: P
     assert "joints = [" not in told.stdout
 
 
+def test_too_few_modes_share_factors_and_predict_nothing(tmp_path: Path) -> None:
+    made = machine(tmp_path / "m")
+    toml = made.path / "machine.toml"
+    toml.write_text(toml.read_text("utf-8").replace("[300, 5800]", "[300, 2000]"), "utf-8")
+    for day, tool in enumerate(("reference", LONG), 1):
+        tap(MachineFolder(made.path), tool, day)
+    found = json.loads(two(MachineFolder(made.path), "--json").stdout)
+    assert found["groups"] == ["bearings", "holder"]
+    assert [one["code"] for one in found["remarks"]] == ["factors-shared"]
+    assert found["predicted"] == {}
+    assert found["residual_hz"] == pytest.approx([0, 0], abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

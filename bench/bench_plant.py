@@ -16,9 +16,11 @@ import resource
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -101,6 +103,23 @@ def cpu_of(*arguments: object) -> float:
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
+def told(name: str, machines: int, work: Callable[[Path], float], plant: Path, rounds: int) -> None:
+    """A line: all machines, one machine, and what follows for a whole plant; the least of some rounds."""
+    everything, one = (min(work(path) for _ in range(rounds)) for path in (plant, plant / "mill-000"))
+    whole = one + (everything - one) / (machines - 1) * (PLANT - 1)
+    print(f"  {name:30s} {machines} machines {everything:6.2f} s, one {one:5.2f} s, so {PLANT} machines {whole:6.2f} s")
+
+
+def made_anew(path: Path) -> float:
+    for standing in path.rglob("standing.json"):
+        standing.unlink()
+    return cpu_of("status", path)
+
+
+def exported(table: Path, path: Path) -> float:
+    return cpu_of("export", path, table)
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -109,16 +128,22 @@ def main() -> None:
     parser.add_argument("--keep", type=Path)
     wanted = parser.parse_args()
     with threadpool_limits(1), TemporaryDirectory() as scratch:
-        plant = wanted.keep or Path(scratch, "plant")
+        plant, n = wanted.keep or Path(scratch, "plant"), wanted.machines
         if not plant.exists():
-            make_plant(plant, wanted.machines, wanted.taps)
-        for standing in plant.glob("*/standing.json"):
-            standing.unlink()
-        print(f"Python {platform.python_version()}, {os.cpu_count()} cores, {wanted.machines} machines x {wanted.taps}")
-        start, more = cpu_of("status", plant / "mill-000", "--json"), PLANT / wanted.machines
-        for name in ("made anew", "fresh"):
-            cost = cpu_of("status", plant)
-            print(f"  status, standings {name:10s} {cost:6.2f} s, of {PLANT} {start + (cost - start) * more:6.2f} s")
+            make_plant(plant, n, wanted.taps)
+        print(f"Python {platform.python_version()}, {os.cpu_count()} cores, {n} machines x {wanted.taps}")
+        told("status, standings made anew", n, made_anew, plant, 1)
+        cpu_of("status", plant)
+        told("status, standings fresh", n, partial(cpu_of, "status"), plant, 3)
+        for kind in ("sqlite", "csv", "parquet"):
+            table = Path(scratch, f"fleet.{kind}")
+            told(f"export to {kind}", n, partial(exported, table), plant, 3)
+            cpu_of("export", plant, table)
+            size = table.stat().st_size / n
+            print(f"    {size / wanted.taps:.0f} bytes a tap test, of {PLANT} machines {size * PLANT / 1e6:.0f} MB")
+        begun = time.process_time()
+        sum(range(10_000_000))
+        print(f"  for comparison: ten million additions in Python {time.process_time() - begun:.2f} s")
 
 
 if __name__ == "__main__":

@@ -225,9 +225,9 @@ class Logbook:
 
     def _up_to_date(self) -> History:
         """The stored rows as far as they still hold, and those that are missing."""
-        lost = {entry.id for entry in self.files.lost}
-        history = self._cache.read(self.files.places, self.files.baseline, lost)
-        history = replace(history, rows=self._all.with_all(history.rows, self._cache.others))
+        history = self._cache.read(self.files)
+        rows = self._all.with_all(history.rows, self._cache.others, self._cache.behind)
+        history = replace(history, rows=rows)
         return without_last_word(history) if history.rows and self.files.doubts() else history
 
     def _assembly(self, tool: str | None, until: str | None) -> Assembly:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from datetime import datetime
 from itertools import takewhile, zip_longest
 
 from acquisition import Remark
 from acquisition.errors import system_failure
 from lobewatch.analysis.cache.kept_rows import kept_aside
+from lobewatch.analysis.cache.still_holding import StillHolding, is_of
 from lobewatch.analysis.columns.stored_row import is_of_this_make, packed, unpacked
+from lobewatch.analysis.damage.usable import UsableTaps
 from lobewatch.analysis.history import History, Row, empty_history
-from lobewatch.analysis.order import Place
 from lobewatch.machine import BusyError, MachineFolder
 from lobewatch.machine.archive.rows import add_rows, read_rows, write_rows
 
@@ -34,25 +34,29 @@ class HistoryCache:
         self._aside: list[bytes] = []
         self._size = self._length = 0
         self._stamp: tuple[int, ...] | None = None
+        self.behind: StillHolding | None = None
+        """Of what was read behind the rows that `read` gave; None where that is nothing."""
 
     @property
     def others(self) -> Mapping[str, Row]:
         """What was read beside the rows of these settings and this version, by tap test."""
         return self._others
 
-    def read(self, places: Sequence[Place], baseline: datetime | None, lost: Collection[str] = ()) -> History:
+    def read(self, files: UsableTaps) -> History:
         """The rows of the oldest taps on, as far as they were made with these settings and this version.
 
-        baseline: the newest one; lost: tap tests whose files cannot be used, what is known of them is kept.
+        What is known of tap tests whose files cannot be used is kept.
         """
-        empty = replace(empty_history(self._folder.machine), baseline=baseline)
+        empty, lost = empty_history(self._folder.machine), {entry.id for entry in files.lost}
         if self._stamp is None or self._stamp != self._stamp_now:
             self._read(_head(empty))
-        pairs = zip(self._rows, places, strict=False)
+        pairs = zip(self._rows, files.places, strict=False)
         known = {row.tap_id: row for row in self._rows} | self._others if lost else {}
         kept = tuple(kept_aside(known[tap_id], empty.software) for tap_id in known if tap_id in lost)
-        valid = tuple(row for row, _ in takewhile(lambda pair: _is_of(*pair), pairs))
-        return replace(empty, rows=valid, kept=kept)
+        valid = tuple(row for row, _ in takewhile(lambda pair: is_of(*pair), pairs))
+        changed = len(valid) < min(len(self._rows), len(files.places))
+        self.behind = StillHolding(self._rows, files.by_id, files.baselines) if changed else None
+        return replace(empty, baseline=files.baseline, rows=valid, kept=kept)
 
     def store(self, history: History) -> list[Remark]:
         """What is new of it, under the lock where that can be had at once; else say so."""
@@ -126,10 +130,3 @@ class HistoryCache:
 
 def _head(history: History) -> bytes:
     return f"{history.settings_hash} {history.software}".encode()
-
-
-def _is_of(row: Row, place: Place) -> bool:
-    """Whether a row was made of this tap test, with all that was accepted of it, since the same baseline."""
-    tap = place.entry
-    made = row.tap_id, row.baseline, row.series, row.accepted
-    return made == (tap.id, place.baseline, place.series, frozenset(tap.accepted))

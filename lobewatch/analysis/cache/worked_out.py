@@ -8,6 +8,7 @@ from dataclasses import replace
 from lobewatch.analysis.assembling import Followed, tapped
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.cache.kept_rows import kept_in_place
+from lobewatch.analysis.cache.still_holding import StillHolding
 from lobewatch.analysis.history import Row, row_of
 from lobewatch.analysis.measurement import Fitted, Measurement, measure, measured
 from lobewatch.analysis.order import Place, earlier
@@ -53,13 +54,20 @@ class WorkedOut:
         points = self._followed.before(place, rows)
         return tapped(place, self._places, points, lambda one: self.measured(one, rows))
 
-    def with_all(self, rows: Sequence[Row], others: Mapping[str, Row]) -> tuple[Row, ...]:
+    def with_all(
+        self, rows: Sequence[Row], others: Mapping[str, Row], behind: StillHolding | None = None
+    ) -> tuple[Row, ...]:
         """These rows, and those of all tap tests after them.
 
-        others: rows of older versions by tap test, for those that cannot be worked out anew.
+        others: rows of older versions by tap test, for those that cannot be worked out anew; behind: of those that may
+        not have to be.
         """
         found = list(rows)
         for place in self._places[len(found) :]:
+            held = behind.row(place, self._places, found) if behind is not None else None
+            if held is not None:
+                found.append(held)
+                continue
             try:
                 assembly = self.assembled(place, found)
                 found.append(row_of(self.measured(place, found), assembly, place))
@@ -69,4 +77,6 @@ class WorkedOut:
                 if place.entry.id not in others:
                     raise
                 found.append(kept_in_place(others[place.entry.id], place, error))
+            if behind is not None:
+                behind.note(found[-1])
         return tuple(found)

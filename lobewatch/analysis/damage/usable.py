@@ -91,6 +91,16 @@ class UsableTaps:
         return [entry for entry in found if not entry.excluded]
 
     @property
+    def by_id(self) -> dict[str, TapEntry]:
+        """All of the journal, whatever became of them."""
+        return {entry.id: entry for entry in (*self._all.taps, *self._all.lost)}
+
+    @property
+    def baselines(self) -> list[datetime]:
+        """The events from which on all comparing begins anew, oldest first."""
+        return self._all.baselines
+
+    @property
     def baseline(self) -> datetime | None:
         """The newest event from which on all comparing begins anew."""
         return max(self._all.baselines, default=None)

@@ -186,7 +186,7 @@ def test_one_program_has_one_word_in_every_place(shop: Shop, path: Path, program
     ruling = (logbook.history.rows[-1].rulings or {})[name]
     assert ruling.word is word
     assert ruling.limit == pytest.approx(checked["limit_mm"] / 1e3)
-    stored = HistoryCache(logbook.folder).read(logbook.files.places, None).rows[-1]
+    stored = HistoryCache(logbook.folder).read(logbook.files).rows[-1]
     assert [one.word for one in (stored.rulings or {}).values()] == [word]
     html = render_report(logbook, "reference", "x")
     assert f"{name}: {word}" in html[: html.index("<table>")]
@@ -333,7 +333,7 @@ def test_another_depth_analyses_nothing_and_keeps_the_words_on_other_programs(pa
     assert len(before.rulings or ()) == len(Logbook.open(path).machine.program) == 3
     (path / "machine.toml").write_text(re.sub(r"(?m)^depth_mm = [0-9.]+", "depth_mm = 0.01", text, count=1))
     logbook = Logbook.open(path)
-    (kept,) = HistoryCache(logbook.folder).read(logbook.files.places, None).rows
+    (kept,) = HistoryCache(logbook.folder).read(logbook.files).rows
     changed, *others = [table.name for table in logbook.machine.program]
     assert {name: (before.rulings or {})[name] for name in others} == kept.rulings
     assert logbook.rulings(before.tap_id)[changed].word is not Word.NOT_STABLE

@@ -74,11 +74,12 @@ def make_environment(extras):
 
 
 def tests(arguments):
-    """Command that runs the tests; all of them where none are chosen, on all cores, with their coverage judged."""
+    """Command that runs the tests; all where none are chosen, on all cores; with the long ones, their coverage is judged."""
     chosen = [argument for argument in arguments if argument != "--long"]
-    whole = [] if chosen else ["-n", "auto", "--dist", "worksteal", "--cov"]
+    whole = [] if chosen else ["-n", "auto", "--dist", "worksteal"]
     every = ["-m", "long or not long", "--timeout", "3600"] if "--long" in arguments else []
-    return [PYTHON, "-m", "pytest"] + whole + every + chosen
+    judged = ["--cov"] if every and whole else []
+    return [PYTHON, "-m", "pytest"] + whole + every + judged + chosen
 
 
 def main():

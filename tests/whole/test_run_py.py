@@ -124,10 +124,10 @@ def test_a_lock_that_does_not_fit_gives_way_to_what_pyproject_allows(
     [
         ([], ["lobewatch.cli", "demo"]),
         (["modes", "x.lvm"], ["lobewatch.cli", "modes", "x.lvm"]),
-        (["test"], ["pytest", "-n", "auto", "--dist", "worksteal", "--cov"]),
+        (["test"], ["pytest", "-n", "auto", "--dist", "worksteal"]),
         (
             ["test", "--long"],
-            ["pytest", "-n", "auto", "--dist", "worksteal", "--cov", "-m", "long or not long", "--timeout", "3600"],
+            ["pytest", "-n", "auto", "--dist", "worksteal", "-m", "long or not long", "--timeout", "3600", "--cov"],
         ),
         (["test", "tests/dsm", "--long"], ["pytest", "-m", "long or not long", "--timeout", "3600", "tests/dsm"]),
     ],

@@ -38,7 +38,7 @@ def tap_test() -> TapTest:
     ringing = np.exp(-2 * np.pi * 1722 * 0.029 * time_) * np.sin(2 * np.pi * 1722 * time_)
     hits = []
     for _ in range(HITS):
-        values = [250 * pulse, 900 * ringing, *random.normal(scale=[[0.1], [2.0]], size=(2, SCANS))]
+        values = np.stack([250 * pulse, 900 * ringing]) + random.normal(scale=[[0.1], [2.0]], size=(2, SCANS))
         codes = np.stack([channel.encode(one) for channel, one in zip(CHANNELS, values, strict=True)])
         hits.append(Hit.from_codes(codes, CHANNELS, RATE, 1024))
     about = Circumstances("m", datetime.now(UTC), "reference")

@@ -44,6 +44,7 @@ def demo(
 
     from lobewatch.analysis import Logbook
     from lobewatch.machine import MachineFolder, make_machine_folder
+    from lobewatch.notify.telling import telling
     from lobewatch.show.describe_demo import demo_json, demo_texts
     from lobewatch.show.report import write_report
     from lobewatch.tap.demo import age_spindle, compare_with_truth
@@ -67,7 +68,8 @@ def demo(
         logbook = Logbook(folder)
         found = compare_with_truth(logbook, taken)
         told = foretold(logbook, Wear.of(folder, taps, Story(story)))
-        report = write_report(logbook)
+        with telling(logbook):
+            report = write_report(logbook)
     emit(demo_json(found, told, report), as_json, *demo_texts(found, told, mounting.scatter, report))
 
 

@@ -52,6 +52,7 @@ def make_plant(path: Path, machines: int, taps: int) -> None:
         folder = path / f"mill-{number:03d}"
         if number:
             shutil.copytree(first, folder, copy_function=_link)
+            (folder / "history.rows").unlink()
         HistoryCache(MachineFolder(folder)).store(_scattered(history, Logbook.open(folder).files.places, number))
 
 

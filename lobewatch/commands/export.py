@@ -15,7 +15,7 @@ def export(
     folder: Annotated[
         Path, typer.Argument(parser=named_folder, help="Machine folder, or a folder of machine folders.")
     ],
-    file: Annotated[Path, typer.Argument(help="What to write: its ending is .sqlite, .csv or .parquet.")],
+    file: Annotated[Path, typer.Argument(help="What to write: its ending is .sqlite, .csv, .csv.gz or .parquet.")],
     as_json: Json = False,
 ) -> None:
     """All tap tests of all machines as one table, a line each, for other programs: SQLite, CSV, Parquet.
@@ -29,11 +29,11 @@ def export(
       lobewatch export mills fleet.csv
     """
     from lobewatch.analysis.plant.plant import find_machines
-    from lobewatch.analysis.plant.tap_table import all_lines
+    from lobewatch.analysis.plant.tap_table import all_tables
     from lobewatch.show.plant.table_files import write_table
 
     machines, damaged = find_machines(folder), dict[str, str]()
-    count = write_table(all_lines(machines, damaged), file)
+    count = write_table(all_tables(machines, damaged), file)
     for key, reason in damaged.items():
         notes.print(f"left out {key}: {reason}", markup=False)
     payload = {"file": str(file), "machines": len(machines) - len(damaged), "tap_tests": count, "left_out": damaged}

@@ -99,6 +99,12 @@ class Shop:
         self.tap(days + 0.1, 1690.0 * share, "y")
 
 
+@pytest.fixture(scope="session")
+def new_shop() -> type[Shop]:
+    """For what several tests of a file look at."""
+    return Shop
+
+
 @pytest.fixture
 def shop(tmp_path: Path) -> Shop:
     """A machine that runs the safe slots, not tapped yet."""

@@ -1,18 +1,39 @@
-"""One line a tap test of all machines, straight from the bytes of their histories."""
+"""The tap tests of machines as columns, straight from the bytes of their histories."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+import struct
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
+from itertools import chain
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from lobewatch.analysis.plant.standing_file import read_standing, software
 from lobewatch.analysis.plant.summary import Summary
 from lobewatch.machine.archive.rows import read_rows
+
+NUMBERS = (
+    "frequency_hz",
+    "frequency_hz_std",
+    "damping_ratio",
+    "damping_ratio_std",
+    "stiffness_n_per_m",
+    "stiffness_n_per_m_std",
+    "bearing_stiffness_n_per_m",
+    "bearing_stiffness_n_per_m_std",
+    "static_tip_stiffness_n_per_m",
+    "modal_tip_stiffness_n_per_m",
+    "temperature_c",
+)
+"""Of the mode followed, where it was tapped, each with its standard error; mean of the recalibrated bearings, likewise;
+of the recalibrated model; of the spindle."""
 
 
 class _Code(msgspec.Struct, gc=False):
@@ -27,106 +48,98 @@ class _Stored(msgspec.Struct, array_like=True, gc=False):
     time: datetime
     tool: str
     direction: str
-    baseline: str
+    baseline: msgspec.Raw
     series: str
     conditions: dict[str, Any]
-    frequency: tuple[float, float]
-    damping_ratio: tuple[float, float]
-    stiffness: tuple[float, float]
+    frequency: list[float]
+    damping_ratio: list[float]
+    stiffness: list[float]
     phase_deg: msgspec.Raw
-    bearing_stiffness: tuple[float, float]
+    bearing_stiffness: list[float]
     static_tip_stiffness: float
     modal_tip_stiffness: float
     modes: msgspec.Raw
     x: msgspec.Raw
     y: msgspec.Raw
-    remarks: tuple[_Code, ...]
+    remarks: list[_Code]
 
 
-class TapLine(NamedTuple):
-    """One tap test; numbers that are not known are NaN, texts empty."""
+class TapTable(NamedTuple):
+    """The tap tests of one machine that count, oldest first."""
 
     folder: str
-    """Name of the folder of its machine."""
+    """Name of the folder of the machine."""
     machine: str
-    """Name of its machine."""
-    tap_id: str
-    """Its identity."""
-    time: float
-    """When it was taken (s since 1970)."""
-    tool: str
-    """What was in the spindle."""
-    direction: str
-    """Direction at the tool tip, "x" or "y"."""
-    series: int
-    """Which of its machine it is compared with, from 1 on."""
-    frequency_hz: float
-    """Of the mode followed."""
-    frequency_hz_std: float
-    """Its standard error."""
-    damping_ratio: float
-    """Of the mode followed."""
-    damping_ratio_std: float
-    """Its standard error."""
-    stiffness_n_per_m: float
-    """Of the mode followed, where it was tapped."""
-    stiffness_n_per_m_std: float
-    """Its standard error."""
-    bearing_stiffness_n_per_m: float
-    """Mean of the recalibrated bearings."""
-    bearing_stiffness_n_per_m_std: float
-    """Its standard error."""
-    static_tip_stiffness_n_per_m: float
-    """Of the recalibrated model."""
-    modal_tip_stiffness_n_per_m: float
-    """Of the recalibrated model."""
-    temperature_c: float
-    """Of the spindle."""
-    remarks: str
-    """Codes of what is in doubt, with blanks between."""
+    """Name of the machine."""
+    series: Sequence[tuple[str, str]]
+    """What is compared with one another: tool, and direction at its tip, "x" or "y"."""
+    of_series: Sequence[int]
+    """Of each tap test, from 1 on."""
+    tap_id: Sequence[str]
+    """Of each tap test."""
+    time: Sequence[float]
+    """Of each tap test (s since 1970)."""
+    remarks: Sequence[str]
+    """Of each tap test: codes of what is in doubt, with blanks between."""
+    numbers: NDArray[np.float64]
+    """Of each tap test those of `NUMBERS`, NaN where not known, shape (n, 11)."""
 
 
-_decode = msgspec.msgpack.Decoder(_Stored).decode
+_decode = msgspec.msgpack.Decoder(list[_Stored]).decode
+_series = attrgetter("tool", "direction", "series")
+_estimates = attrgetter("frequency", "damping_ratio", "stiffness", "bearing_stiffness")
+_modelled = attrgetter("static_tip_stiffness", "modal_tip_stiffness")
 
 
-def tap_lines(key: str, path: Path, now: datetime | None = None) -> list[TapLine]:
-    """Those of one machine that count, oldest first; ValueError or OSError where it cannot be read."""
+def tap_table(key: str, path: Path, now: datetime | None = None) -> TapTable:
+    """That of one machine; ValueError or OSError where it cannot be read. key: name of its folder."""
     now = now or datetime.now(UTC)
     summary = read_standing(path, now)
-    packed = None if summary is None else _stored(path, summary)
-    if summary is None or packed is None:
-        summary, packed = _worked_out(path, now)
-    numbers: dict[tuple[str, str], int] = {}
-    name, found = summary.name, list[TapLine]()
-    for one in packed:
-        series = numbers.setdefault((one.series, one.direction), len(numbers) + 1)
-        temperature = one.conditions.get("temperature_c", math.nan) if one.conditions else math.nan
-        remarks = " ".join(dict.fromkeys([remark.code for remark in one.remarks])) if one.remarks else ""
-        values = (
-            *(key, name, one.tap_id, one.time.timestamp(), one.tool, one.direction, series),
-            *one.frequency,
-            *one.damping_ratio,
-            *one.stiffness,
-            *one.bearing_stiffness,
-            *(one.static_tip_stiffness, one.modal_tip_stiffness, temperature, remarks),
-        )
-        found.append(tuple.__new__(TapLine, values))  # a million of them: half the time of TapLine(*values)
-    return found
+    rows = None if summary is None else _stored(path, summary)
+    if summary is None or rows is None:
+        summary, rows = _worked_out(path, now)
+    found: dict[tuple[str, str, str], int] = {}
+    of_series = [found.setdefault(one, len(found) + 1) for one in map(_series, rows)]
+    return TapTable(
+        key,
+        summary.name,
+        [(tool, direction) for tool, direction, _ in found],
+        of_series,
+        [one.tap_id for one in rows],
+        [one.time.timestamp() for one in rows],
+        [_codes(one.remarks) for one in rows],
+        _numbers(rows),
+    )
+
+
+def _codes(remarks: Sequence[_Code]) -> str:
+    if len(remarks) < 2:
+        return remarks[0].code if remarks else ""
+    return " ".join(dict.fromkeys([one.code for one in remarks]))
+
+
+def _numbers(rows: Sequence[_Stored]) -> NDArray[np.float64]:
+    estimates = np.fromiter(chain.from_iterable(chain.from_iterable(map(_estimates, rows))), np.float64)
+    modelled = np.fromiter(chain.from_iterable(map(_modelled, rows)), np.float64)
+    warmth = [one.conditions.get("temperature_c", math.nan) if one.conditions else math.nan for one in rows]
+    return np.column_stack([estimates.reshape(-1, 8), modelled.reshape(-1, 2), np.array(warmth)])
 
 
 def _stored(path: Path, summary: Summary) -> list[_Stored] | None:
     """From history.rows; None where it is not that of the standing."""
     try:
         head, *contents = read_rows(path / "history.rows").rows
-        found: list[_Stored] = []
-        for content in contents:
-            one = _decode(content)
-            if one.number >= 0:
-                found[one.number : one.number + 1] = [one]
+        found = _decoded(contents)
     except (OSError, ValueError):
         return None
     is_own = head.decode().endswith(f" lobewatch {software()}") and len(found) == summary.tap_tests
     return found if is_own else None
+
+
+def _decoded(contents: Sequence[bytes]) -> list[_Stored]:
+    """Those in a place, each as it was written last; all at once, an array of msgpack."""
+    rows = _decode(struct.pack(">BI", 0xDD, len(contents)) + b"".join(contents))
+    return list({one.number: one for one in rows if one.number >= 0}.values())
 
 
 def _worked_out(path: Path, now: datetime) -> tuple[Summary, list[_Stored]]:
@@ -136,13 +149,13 @@ def _worked_out(path: Path, now: datetime) -> tuple[Summary, list[_Stored]]:
 
     logbook = Logbook.open(path)
     summary, hashes = summarise(logbook, now), logbook.machine.program_hashes
-    return summary, [_decode(packed(number, row, hashes)) for number, row in enumerate(logbook.history.rows)]
+    return summary, _decoded([packed(number, row, hashes) for number, row in enumerate(logbook.history.rows)])
 
 
-def all_lines(machines: Mapping[str, Path], damaged: dict[str, str]) -> Iterator[TapLine]:
+def all_tables(machines: Mapping[str, Path], damaged: dict[str, str]) -> Iterator[TapTable]:
     """Of all machines in order of their names; those that cannot be read are added to `damaged`, with the reason."""
     for key in sorted(machines):
         try:
-            yield from tap_lines(key, machines[key])
+            yield tap_table(key, machines[key])
         except (ValueError, OSError) as error:
             damaged[key] = str(error)

@@ -38,16 +38,18 @@ def read_rows(path: Path) -> Rows:
     if not content.startswith(MAKE):
         return Rows((), 0, len(content), not MAKE.startswith(content))
     found, at, is_damaged = list[bytes](), len(MAKE), False
-    while at + _HEAD.size <= len(content):
+    begin, last, crc_of = _HEAD.size, len(content) - _HEAD.size, zlib.crc32
+    while at <= last:
         length, crc = _HEAD.unpack_from(content, at)
-        row = content[at + _HEAD.size : at + _HEAD.size + length]
+        end = at + begin + length
+        row = content[at + begin : end]
         if len(row) < length:  # torn
             break
-        is_damaged = not length or zlib.crc32(row) != crc
+        is_damaged = not length or crc_of(row) != crc
         if is_damaged:
             break
         found.append(row)
-        at += _HEAD.size + length
+        at = end
     return Rows(tuple(found), at, len(content), is_damaged)
 
 

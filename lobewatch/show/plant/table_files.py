@@ -1,25 +1,27 @@
-"""Tap tests of all machines as one file: SQLite, CSV, or Parquet by DuckDB. The same lines give the same bytes."""
+"""Tap tests of all machines as one file: SQLite, CSV, or Parquet by DuckDB. The same tables give the same bytes."""
 
 from __future__ import annotations
 
 import csv
+import gzip
 import io
 import secrets
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
-from datetime import UTC, datetime
-from functools import cache
-from itertools import islice
 from pathlib import Path
+from typing import IO, Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from acquisition import DataError
-from lobewatch.analysis.plant.tap_table import TapLine
+from lobewatch.analysis.plant.tap_table import NUMBERS, TapTable
 
-TEXTS = ("folder", "machine", "tap_id", "tool", "direction", "remarks")
-NUMBERS = tuple(name for name in TapLine._fields if name not in (*TEXTS, "time", "series"))
-DIGITS = 7
-"""Significant digits of a number in CSV: a part in ten million, finer than any of them is known."""
+COLUMNS = ("folder", "machine", "tap_id", "time", "tool", "direction", "series", *NUMBERS, "remarks")
+DIGITS, DIGITS_OF_ERRORS = 7, 3
+"""Significant digits of a number in CSV: a part in ten million, finer than any of them is known, and of its error."""
 TABLES = """
 CREATE TABLE machine (id INTEGER PRIMARY KEY, folder TEXT NOT NULL, machine TEXT NOT NULL);
 CREATE TABLE series (id INTEGER PRIMARY KEY, machine_id INTEGER NOT NULL REFERENCES machine, series INTEGER NOT NULL,
@@ -31,18 +33,24 @@ CREATE VIEW taps AS SELECT folder, machine, tap_id, strftime('%Y-%m-%dT%H:%M:%SZ
   FROM tap JOIN series ON series.id = series_id JOIN machine ON machine.id = machine_id;
 """
 """One line a tap test is the view `taps`; what repeats stands once."""
+_TENS = 10.0 ** np.arange(23)
+"""Powers of ten that are numbers of the computer."""
+NOTHING = TapTable("", "", (), (), (), (), (), np.empty((0, len(NUMBERS))))
+
+Floats = NDArray[np.float64]
 
 
-def write_table(lines: Iterable[TapLine], path: Path) -> int:
+def write_table(tables: Iterable[TapTable], path: Path) -> int:
     """Write a file by the ending of its name, whole or not at all; the number of tap tests.
 
     DataError for an ending that is not known, and for Parquet without DuckDB.
     """
-    if path.suffix not in WRITERS:
+    write = next((one for ending, one in WRITERS.items() if path.name.endswith(ending)), None)
+    if write is None:
         raise DataError(f"{path}: {path.suffix or 'no ending'} is no kind of table; give {', '.join(WRITERS)}")
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
-        count = WRITERS[path.suffix](lines, temporary)
+        count = write(tables, temporary)
         temporary.replace(path)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
@@ -51,51 +59,75 @@ def write_table(lines: Iterable[TapLine], path: Path) -> int:
     return count
 
 
-def _write_sqlite(lines: Iterable[TapLine], path: Path) -> int:
+def _write_sqlite(tables: Iterable[TapTable], path: Path) -> int:
+    count = series = 0
+    insert = f"INSERT INTO tap VALUES ({', '.join('?' * (4 + len(NUMBERS)))})"
     with closing(sqlite3.connect(path, isolation_level=None)) as base:
         base.execute("PRAGMA journal_mode = OFF")
         base.execute("PRAGMA synchronous = OFF")  # a new file under another name: whole, or thrown away
         names = ", ".join(NUMBERS)
         base.executescript(TABLES.format(numbers=", ".join(f"{name} REAL" for name in NUMBERS), names=names))
         base.execute("BEGIN")
-        marks = ", ".join("?" * (4 + len(NUMBERS)))
-        count = base.executemany(f"INSERT INTO tap VALUES ({marks})", _filled(lines, base)).rowcount
+        for machine, table in enumerate(tables, 1):
+            base.execute("INSERT INTO machine VALUES (?, ?, ?)", (machine, table.folder, table.machine))
+            told = [(series + n, machine, n, *one) for n, one in enumerate(table.series, 1)]
+            base.executemany("INSERT INTO series VALUES (?, ?, ?, ?, ?)", told)
+            of_series = [series + n for n in table.of_series]
+            numbers = _short(table.numbers).T.tolist()
+            base.executemany(insert, zip(of_series, table.tap_id, table.time, table.remarks, *numbers, strict=True))
+            count, series = count + len(of_series), series + len(table.series)
         base.execute("COMMIT")
-    return max(count, 0)
-
-
-def _filled(lines: Iterable[TapLine], base: sqlite3.Connection) -> Iterator[tuple[object, ...]]:
-    """Rows of `tap`; machines and series are written when they first appear."""
-    machines: dict[str, int] = {}
-    series: dict[tuple[str, int], int] = {}
-    first = TapLine._fields.index(NUMBERS[0])
-    for line in lines:
-        key = line.folder, line.series
-        if key not in series:
-            if line.folder not in machines:
-                machines[line.folder] = len(machines) + 1
-                base.execute("INSERT INTO machine VALUES (?, ?, ?)", (machines[line.folder], line.folder, line.machine))
-            series[key] = len(series) + 1
-            told = series[key], machines[line.folder], line.series, line.tool, line.direction
-            base.execute("INSERT INTO series VALUES (?, ?, ?, ?, ?)", told)
-        yield series[key], line[2], line[3], line[-1], *map(_short, line[first:-1])  # type: ignore[arg-type]
-
-
-def _short(value: float) -> float:
-    """Whole where that is a part in ten million at most: SQLite keeps it in half the bytes."""
-    return round(value) if value > 1e7 else value
-
-
-def _write_csv(lines: Iterable[TapLine], path: Path) -> int:
-    count, first = 0, TapLine._fields.index(NUMBERS[0])
-    told, numbers = cache(_quoted), f"%.{DIGITS}g," * len(NUMBERS)
-    with path.open("w", encoding="utf-8", newline="") as file:
-        file.write(",".join(TapLine._fields) + "\n")
-        for count, line in enumerate(lines, 1):  # noqa: B007 - the last one counts
-            time = datetime.fromtimestamp(line.time, UTC).isoformat(timespec="seconds")[:19]
-            texts = f"{told(line[0])},{told(line[1])},{line[2]},{time}Z,{told(line[4])},{line[5]},{line[6]},"
-            file.write(f"{texts}{(numbers % line[first:-1]).replace('nan', '')}{line[-1]}\n")
     return count
+
+
+def _short(numbers: Floats) -> Floats:
+    """Whole where that is a part in ten million at most: SQLite keeps it in half the bytes."""
+    return np.where(numbers > 1e7, np.rint(numbers), numbers)
+
+
+def _write_csv(tables: Iterable[TapTable], path: Path) -> int:
+    with path.open("wb") as file:
+        return _write_lines(tables, file)
+
+
+def _write_zipped(tables: Iterable[TapTable], path: Path) -> int:
+    with path.open("wb") as file, gzip.GzipFile("", "wb", 1, file, mtime=0) as zipped:
+        return _write_lines(tables, zipped)
+
+
+def _write_lines(tables: Iterable[TapTable], file: IO[bytes] | gzip.GzipFile) -> int:
+    count = 0
+    file.write(",".join(COLUMNS).encode() + b"\n")
+    for table in tables:
+        file.write("".join(_lines(table)).encode())
+        count += len(table.tap_id)
+    return count
+
+
+def _lines(table: TapTable) -> Iterator[str]:
+    begin = f"{_quoted(table.folder)},{_quoted(table.machine)},"
+    series = [f"{_quoted(tool)},{direction},{n}" for n, (tool, direction) in enumerate(table.series, 1)]
+    times = np.datetime_as_string(np.floor(table.time).astype("datetime64[s]")).tolist()
+    each = zip(table.tap_id, times, table.of_series, _cells(table.numbers), table.remarks, strict=True)
+    return (f"{begin}{tap_id},{time}Z,{series[n - 1]},{cells},{told}\n" for tap_id, time, n, cells, told in each)
+
+
+def _cells(numbers: Floats) -> list[str]:
+    """Of each line, with commas between; as JSON says them, which is quick, and nothing for NaN."""
+    if not len(numbers):
+        return []
+    digits = np.array([DIGITS_OF_ERRORS if name.endswith("_std") else DIGITS for name in NUMBERS])
+    told = msgspec.json.encode(rounded(numbers, digits).tolist()).decode()
+    return told[2:-2].replace("null", "").replace(".0,", ",").split("],[")
+
+
+def rounded(values: Floats, digits: NDArray[np.intp]) -> Floats:
+    """To significant digits, of each column (n, c) its own (c,); fewer of what is below 1e-16."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        places = digits - 1 - np.floor(np.log10(np.abs(values)))
+    places = np.clip(np.nan_to_num(places), 1 - _TENS.size, _TENS.size - 1).astype(np.intp)
+    up, down = _TENS[np.maximum(places, 0)], _TENS[np.maximum(-places, 0)]
+    return np.asarray(np.rint(values * up / down) * down / up)
 
 
 def _quoted(text: str) -> str:
@@ -105,30 +137,41 @@ def _quoted(text: str) -> str:
     return written.getvalue()
 
 
-def _write_parquet(lines: Iterable[TapLine], path: Path) -> int:
+def _write_parquet(tables: Iterable[TapTable], path: Path) -> int:
     try:
         import duckdb
     except ImportError as error:
         raise DataError('.parquet needs DuckDB; install it with: pip install "lobewatch[fleet]"') from error
-    import numpy as np
-
-    lines, parts, count = iter(lines), list[dict[str, np.ndarray]](), 0
-    while some := list(islice(lines, 50_000)):
-        count += len(some)
-        columns = dict(zip(TapLine._fields, zip(*some, strict=True), strict=True))
-        part = {name: np.array(values, dtype=object if name in TEXTS else None) for name, values in columns.items()}
-        parts.append(part)
-    whole = {name: np.concatenate([part[name] for part in parts]) for name in TapLine._fields}
+    parts = [_columns(table) for table in tables] or [_columns(NOTHING)]
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in COLUMNS}
     with closing(duckdb.connect(config={"threads": 1})) as base:
         base.register("lines", whole)
-        named = ", ".join("to_timestamp(time)::TIMESTAMP AS time" if n == "time" else n for n in TapLine._fields)
+        named = ", ".join("to_timestamp(time)::TIMESTAMP AS time" if n == "time" else n for n in COLUMNS)
         base.execute(f"COPY (SELECT {named} FROM lines) TO '{path.as_posix()}' (FORMAT parquet, COMPRESSION zstd)")
-    return count
+    return len(whole["time"])
 
 
-WRITERS: dict[str, Callable[[Iterable[TapLine], Path], int]] = {
+def _columns(table: TapTable) -> dict[str, NDArray[Any]]:
+    """As arrays, by name."""
+    n, of_series = len(table.tap_id), np.array(table.of_series, np.int64)
+    tools, directions = (np.array([one[part] for one in table.series], object) for part in (0, 1))
+    return {
+        "folder": np.full(n, table.folder, object),
+        "machine": np.full(n, table.machine, object),
+        "tap_id": np.array(table.tap_id, object),
+        "time": np.array(table.time, np.float64),
+        "tool": tools[of_series - 1],
+        "direction": directions[of_series - 1],
+        "series": of_series,
+        "remarks": np.array(table.remarks, object),
+        **dict(zip(NUMBERS, table.numbers.T, strict=True)),
+    }
+
+
+WRITERS: dict[str, Callable[[Iterable[TapTable], Path], int]] = {
     ".sqlite": _write_sqlite,
     ".csv": _write_csv,
+    ".csv.gz": _write_zipped,
     ".parquet": _write_parquet,
 }
 """By the ending of the name."""

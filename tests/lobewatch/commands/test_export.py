@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import json
 import shutil
 import sqlite3
@@ -11,12 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import duckdb
+import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
 from acquisition import Conditions, DataError
 from lobewatch.analysis import Logbook
 from lobewatch.cli import app
+from lobewatch.show.plant.table_files import rounded
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -79,6 +82,23 @@ def test_sqlite_has_the_same_in_a_view(mills: Path) -> None:
         assert (line["temperature_c"] is None) == (row["temperature_c"] == "")
 
 
+def test_packed_csv_is_the_same_csv(mills: Path) -> None:
+    run(mills, mills / "fleet.csv")
+    assert run(mills, mills / "fleet.csv.gz").exit_code == 0
+    assert gzip.decompress((mills / "fleet.csv.gz").read_bytes()) == (mills / "fleet.csv").read_bytes()
+
+
+def test_numbers_in_csv_have_the_digits_that_they_are_said_to_have() -> None:
+    random = np.random.default_rng(0)
+    values = random.normal(size=(500, 2)) * 10.0 ** random.integers(-12, 14, (500, 2))
+    told = rounded(values, np.array([7, 3]))
+    for digits, before, after in zip((7, 3), values.T, told.T, strict=True):
+        assert after.tolist() == [float(f"{one:.{digits - 1}e}") for one in before.tolist()]
+    special = rounded(np.array([[0.0, np.nan]]), np.array([7, 3]))
+    assert special[0, 0] == 0
+    assert np.isnan(special[0, 1])
+
+
 def test_parquet_is_read_by_duckdb(mills: Path) -> None:
     run(mills, mills / "fleet.parquet")
     with closing(duckdb.connect()) as base:
@@ -91,7 +111,7 @@ def test_parquet_is_read_by_duckdb(mills: Path) -> None:
     assert f"{first[3]:%Y-%m-%d %H:%M}" == "2026-02-14 09:00"
 
 
-@pytest.mark.parametrize("kind", ["csv", "sqlite", "parquet"])
+@pytest.mark.parametrize("kind", ["csv", "csv.gz", "sqlite", "parquet"])
 def test_the_same_again_gives_the_same_bytes(mills: Path, kind: str) -> None:
     run(mills, mills / f"one.{kind}")
     run(mills, mills / f"two.{kind}")
@@ -108,6 +128,6 @@ def test_a_damaged_machine_costs_only_its_own_lines(mills: Path) -> None:
 
 
 def test_another_ending_is_refused_and_nothing_is_left(mills: Path) -> None:
-    with pytest.raises(DataError, match=r"\.xlsx is no kind of table; give \.sqlite, \.csv, \.parquet"):
+    with pytest.raises(DataError, match=r"\.xlsx is no kind of table; give \.sqlite, \.csv, \.csv\.gz, \.parquet"):
         run(mills, mills / "fleet.xlsx")
     assert {path.name for path in mills.iterdir()} == {"a, b", "c"}

@@ -4,16 +4,36 @@ from __future__ import annotations
 
 import http.client
 import json
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
 from typing import Any
 
+import pytest
 from selenium.webdriver.common.keys import Keys
 
+from lobewatch.analysis.plant.plant import Plant, find_machines
 from lobewatch.screen import DashboardServer
+from lobewatch.show.plant.plant_rows import plant_rows
+from lobewatch.show.report import render_report
+from lobewatch.show.reporting.fleet import render_fleet
 
 Browser = Any
 """Chromium on one page: Browser of conftest.py."""
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
+AXE = Path(__file__).parents[2] / "data" / "axe_core" / "axe.min.js"
+BREAKS = """(() => {
+  const kept = (one, name) => getComputedStyle(one)[name].includes("avoid");
+  const loose = [...document.querySelectorAll("h2")].filter((one) => !kept(one.parentElement, "breakInside"));
+  const wrong = loose.filter((one) => {
+    for (; one && !one.matches("figure, .wide, ul, p:not(.sub)"); one = one.nextElementSibling)
+      if (!kept(one, "breakAfter")) return true;
+    return one && one.matches("figure") && !kept(one, "breakInside");
+  });
+  return wrong.map((one) => one.textContent);
+})()"""
+"""Headings after which a page may end before anything of what they stand over."""
 
 
 def test_the_slider_shows_the_lobes_of_each_test_and_no_side_is_cut_off(browser: Browser, shop: Shop) -> None:
@@ -36,3 +56,51 @@ def test_the_slider_shows_the_lobes_of_each_test_and_no_side_is_cut_off(browser:
         browser.resize((1280, 657))
         bottom = browser.ask("document.querySelector('.first').getBoundingClientRect().bottom")
         assert bottom < 657  # without a program all of it fits
+
+
+@pytest.fixture(scope="module")
+def reports(new_shop: Callable[[Path], Shop], tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Of a machine that falls, with a program, a forecast and a course of its lobes; and of all of a folder."""
+    path = tmp_path_factory.mktemp("plant")
+    shop = new_shop(path / "m")
+    shop.edit("high_rpm = 24000", "high_rpm = 24000\nsteps = 200")
+    shop.run(("A", 12900, 0.5))
+    for number in range(10):
+        shop.tap(15 * number, 1713.0 * (1 - 0.003 * number))
+    new_shop(path / "fresh")
+    now = shop.start + timedelta(days=150)
+    one, fleet = path / "report.html", path / "fleet.html"
+    one.write_text(render_report(shop.logbook, "reference", "x", now), "utf-8")
+    rows = plant_rows(Plant(find_machines(path)).standings(now))
+    fleet.write_text(render_fleet(rows, "plant", now), "utf-8")
+    return [one, fleet]
+
+
+@pytest.mark.parametrize("size", [(390, 844), (768, 1024), (1280, 657)], ids=lambda size: f"{size[0]}x{size[1]}")
+def test_the_reports_break_no_rule_of_accessibility_and_have_no_side_scroll(
+    browser: Browser, reports: list[Path], size: tuple[int, int]
+) -> None:
+    for report in reports:
+        browser.open(report.as_uri(), size)
+        assert browser.ask("document.documentElement.scrollWidth <= innerWidth"), report.name
+        if size[0] == 768:  # the rules are the slow part, and see nothing there that they do not see beside it
+            continue
+        browser.driver.execute_script(AXE.read_text("utf-8"))
+        found = browser.driver.execute_async_script("axe.run().then(arguments[0])")
+        assert len(found["passes"]) > 10
+        assert [(one["id"], one["nodes"][0]["html"]) for one in found["violations"]] == [], report.name
+
+
+def test_on_paper_no_heading_is_apart_from_its_figure_and_nothing_is_cut_off(
+    browser: Browser, reports: list[Path]
+) -> None:
+    for report, page in zip(reports, ((680, 1000), (1030, 680)), strict=True):  # inside the margins of A4
+        browser.open(report.as_uri(), page)
+        browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+        try:
+            assert browser.ask("document.documentElement.scrollWidth <= innerWidth"), report.name
+            assert browser.ask(BREAKS) == []
+            assert browser.ask("[...document.querySelectorAll('button, input')].every((one) => !one.offsetParent)")
+            assert "counter(page)" in browser.ask("document.styleSheets[0].ownerNode.textContent.match(/@page.*/)[0]")
+        finally:
+            browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})

@@ -7,23 +7,26 @@ import secrets
 from pathlib import Path
 
 
-def atomic_write(path: Path, content: bytes) -> None:
+def atomic_write(path: Path, content: bytes, *, lasting: bool = True) -> None:
     """Write by temporary name, fsync, rename and fsync of the folder; on failure the old file stays as it was.
 
-    Raises OSError with the name of the file to be.
+    lasting: False where it may be torn or gone after a power cut, for its reader tells that and can make it anew;
+    nothing is waited for then. Raises OSError with the name of the file to be.
     """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
         with temporary.open("xb") as file:
             file.write(content)
             file.flush()
-            os.fsync(file.fileno())
+            if lasting:
+                os.fsync(file.fileno())
         temporary.replace(path)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
         temporary.unlink(missing_ok=True)
-    sync_folder(path.parent)
+    if lasting:
+        sync_folder(path.parent)
 
 
 def make_folder(folder: Path) -> None:

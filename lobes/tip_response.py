@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from acquisition import Frf
 from modal import Mode
@@ -103,6 +102,8 @@ def weighted_sum(parts: Sequence[tuple[float, TipResponse]]) -> TipResponse:
 
 
 def _from_frf(frf: Frf) -> TipResponse:
+    from scipy.interpolate import CubicSpline  # takes longer to import than all of lobes
+
     lines = np.arange(frf.frequency.size)
     steps = np.arange(lines[-1] * STEPS_PER_LINE + 1) / STEPS_PER_LINE
     return TipResponse(np.interp(steps, lines, frf.frequency), CubicSpline(frf.frequency, frf.receptance))

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
-from scipy.signal import find_peaks
 
 from acquisition import Frf
 from modal.line_weights import measuring_factor
@@ -172,6 +171,8 @@ def _peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.float64
     valley = [np.min(decibel)]
     between_valleys = np.concatenate((valley, decibel, valley))
     floor = 20 * np.log10(np.maximum(NOISE_MULTIPLE * noise, max(least, 1e-12 * size.max())))
+    from scipy.signal import find_peaks  # takes longer to import than all of modal
+
     tops, found = find_peaks(between_valleys, height=np.concatenate(([0.0], floor, [0.0])), prominence=PROMINENCE_DB)
     tops -= 1
     rise = size[tops] * (1 - 10 ** (-found["prominences"] / 20))

@@ -13,7 +13,6 @@ from typing import Any
 
 import h5py
 import numpy as np
-import scipy.io
 
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Signal
@@ -60,6 +59,8 @@ def _refuse_crash(path: Path) -> None:
 
 def _of_v5(path: Path) -> dict[str, Any]:
     """Variables by name; structs as dictionaries."""
+    import scipy.io  # it takes a while, and few files need it
+
     size = path.stat().st_size
     try:
         with warnings.catch_warnings():

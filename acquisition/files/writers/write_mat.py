@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import scipy.io
 
 from acquisition.errors import DataError
 from acquisition.files.writers.labels import Labels, as_measured
@@ -36,6 +35,8 @@ def mat_of_hits(hits: Sequence[Hit], labels: Labels) -> bytes:
 
 
 def _mat(variables: dict[str, Any], labels: Labels) -> bytes:
+    import scipy.io  # it takes a while, and few files need it
+
     said = {
         "written_by": "lobewatch",
         "recorded": labels.created.isoformat() if labels.created else "",

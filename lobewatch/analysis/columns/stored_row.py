@@ -13,7 +13,7 @@ from acquisition import UNSAID, Conditions, Remark
 from lobewatch.analysis.estimate import Estimate
 from lobewatch.analysis.history import ESTIMATES, Row, Values
 from lobewatch.analysis.programs.verdict import Ruling
-from lobewatch.analysis.questions.asked import QUESTIONS
+from lobewatch.analysis.questions.asked import ACCEPTED, QUESTIONS
 
 
 class Stored(msgspec.Struct, array_like=True, gc=False):
@@ -63,6 +63,8 @@ _put = object.__setattr__
 _decode_brief: Callable[[bytes], Any] = msgspec.msgpack.Decoder(_Brief).decode
 REMARKED = _encode("code")
 """In the bytes of every remark."""
+ASKING, ANSWERING = tuple(map(_encode, QUESTIONS)), _encode(ACCEPTED)
+"""In the bytes of every remark that asks, and that tells of an answer."""
 NONE = frozenset[str]()
 
 
@@ -117,6 +119,11 @@ class StoredRow(Row):
     def questions(self) -> tuple[Remark, ...]:
         """As of any row; its remarks are decoded where there can be any among them."""
         return super().questions if not self.content or _asks(self.content) else ()
+
+    @cached_property
+    def accepted(self) -> frozenset[str]:
+        """As of any row; its remarks are decoded where there can be any among them."""
+        return super().accepted if not self.content or ANSWERING in self.content else NONE
 
     @property
     def followed(self) -> Values:
@@ -178,7 +185,7 @@ def is_of_this_make(content: bytes) -> bool:
 
 
 def _asks(content: bytes) -> bool:
-    return any(_encode(code) in content for code in QUESTIONS)
+    return any(map(content.__contains__, ASKING))
 
 
 def _later(content: bytes, hashes: Mapping[str, str]) -> dict[str, Any]:

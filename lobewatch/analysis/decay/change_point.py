@@ -59,14 +59,14 @@ class Watch:
 
 
 class Found(NamedTuple):
-    """The likeliest change in the points up to one of them."""
+    """The likeliest change in the points up to each of some of them."""
 
-    score: float
-    """How ill a steady series fits, as a quantile of the normal distribution."""
-    kind: Kind
-    """See Fall."""
-    point: int
-    """See Fall."""
+    score: Floats
+    """How ill a steady series fits, as a quantile of the normal distribution, shape (r,)."""
+    fell: NDArray[np.bool_]
+    """Whether it is a step, shape (r,)."""
+    point: NDArray[np.intp]
+    """See Fall, shape (r,)."""
 
 
 def calls_for_another(y: Floats, temperature: Floats) -> bool:
@@ -74,8 +74,8 @@ def calls_for_another(y: Floats, temperature: Floats) -> bool:
     if y.size < FIRST_JUDGED:
         return False
     last = np.arange(max(y.size - 2, FIRST_JUDGED - 1), y.size)
-    sure = [found.score >= SURE for found in _best(base_of(y, temperature), last)[0]]
-    return sure[-1] and not (len(sure) > 1 and sure[0])
+    sure = _best(base_of(y, temperature), last)[0].score >= SURE
+    return bool(sure[-1] and not (sure.size > 1 and sure[0]))
 
 
 def newest_change(y: Floats) -> Fall | None:
@@ -84,8 +84,8 @@ def newest_change(y: Floats) -> Fall | None:
         return None
     base = base_of(y)
     for sign, found in zip((1, -1), _best(base, np.arange(y.size - 2, y.size)), strict=True):
-        if all(one.score >= SURE for one in found):
-            fall = _fall(base, found[-1], sign)
+        if (found.score >= SURE).all():
+            fall = _fall(base, found, -1, sign)
             return fall._replace(size=sign * fall.size)
     return None
 
@@ -100,51 +100,54 @@ def watch(y: Floats, temperature: Floats | None = None) -> Watch:
 
 def watch_both(y: Floats, temperature: Floats | None = None) -> tuple[Watch, Watch]:
     """The same, and of the mirror image: whether it rises."""
-    base, falls, rises = base_of(y, temperature), list[Found](), list[Found]()
-    for start in range(FIRST_JUDGED - 1, y.size, ROWS):
-        fallen, risen = _best(base, np.arange(start, min(start + ROWS, y.size)))
-        falls += fallen
-        rises += risen
+    base, starts = base_of(y, temperature), range(FIRST_JUDGED - 1, y.size, ROWS)
+    found = [_best(base, np.arange(start, min(start + ROWS, y.size))) for start in starts]
+    falls, rises = ([one[part] for one in found] for part in (0, 1))
     return _watch(base, falls, 1), _watch(base, rises, -1)
 
 
-def _watch(base: Base, best: Sequence[Found], sign: int) -> Watch:
+def _watch(base: Base, found: Sequence[Found], sign: int) -> Watch:
     """sign: 1 for falls, -1 for rises."""
     scores = np.full(base.y.size, np.nan)
-    scores[FIRST_JUDGED - 1 :] = [found.score for found in best]
+    if not found:
+        return Watch(scores, None, None)
+    best = Found(*map(np.concatenate, zip(*found, strict=True)))
+    scores[FIRST_JUDGED - 1 :] = best.score
     with np.errstate(invalid="ignore"):
         sure = scores >= SURE
     twice = np.flatnonzero(sure[1:] & sure[:-1]) + 1
     if not twice.size:
         return Watch(scores, None, None)
     at = int(twice[0])
-    return Watch(scores, at, _fall(base, best[at - FIRST_JUDGED + 1], sign))
+    return Watch(scores, at, _fall(base, best, at - FIRST_JUDGED + 1, sign))
 
 
-def _best(base: Base, last: NDArray[np.intp]) -> tuple[list[Found], list[Found]]:
+def _best(base: Base, last: NDArray[np.intp]) -> tuple[Found, Found]:
     """The likeliest fall, and the likeliest rise, in the points up to each of these."""
     n = last[:, np.newaxis] + 1
     k = np.arange(last[-1] + 1)
     allowed = {"step": (k >= 2) & (k <= n - 2), "slope": (k >= 1) & (k <= n - 3)}
-    lean = {kind: np.where(allowed[kind], base.lean(kind, n, k), np.nan) for kind in KINDS}
-    return _likeliest(base, n[:, 0], lean, -1), _likeliest(base, n[:, 0], lean, 1)
+    lean = {kind: base.lean(kind, n, k) for kind in KINDS}
+    lowest = {kind: np.where(allowed[kind], lean[kind], np.inf).argmin(axis=1) for kind in KINDS}
+    highest = {kind: np.where(allowed[kind], lean[kind], -np.inf).argmax(axis=1) for kind in KINDS}
+    return _likeliest(base, n[:, 0], lean, lowest, -1), _likeliest(base, n[:, 0], lean, highest, 1)
 
 
-def _likeliest(base: Base, n: NDArray[np.intp], lean: Mapping[Kind, Floats], sign: int) -> list[Found]:
-    """The likeliest change of a sign in the first n (r,); lean: of each kind at each point, NaN where not allowed."""
+def _likeliest(
+    base: Base, n: NDArray[np.intp], lean: Mapping[Kind, Floats], points: Mapping[Kind, NDArray[np.intp]], sign: int
+) -> Found:
+    """The likelier of the changes of a sign in the first n (r,), of each kind at a point; lean: at all points."""
     rows = np.arange(n.size)
-    points = {kind: np.nanargmax(sign * lean[kind], axis=1) for kind in KINDS}
     t = {kind: base.t_of(sign * lean[kind][rows, points[kind]], n) for kind in KINDS}
     scores = -ndtri(stdtr(n - 2, -np.maximum(t["step"], t["slope"])))
-    kinds: list[Kind] = ["step" if fell else "slope" for fell in (t["step"] >= t["slope"]).tolist()]
-    return [
-        Found(score, kind, int(points[kind][row]))
-        for row, (score, kind) in enumerate(zip(scores.tolist(), kinds, strict=True))
-    ]
+    fell = t["step"] >= t["slope"]
+    return Found(scores, fell, np.where(fell, points["step"], points["slope"]))
 
 
-def _fall(base: Base, found: Found, sign: int) -> Fall:
-    n, kind, point = base.y.size, found.kind, found.point
+def _fall(base: Base, found: Found, at: int, sign: int) -> Fall:
+    """at: which of those found."""
+    kind: Kind = "step" if found.fell[at] else "slope"
+    n, point = base.y.size, int(found.point[at])
     beta, error = base.fit_change(kind, n, point)
     length = n - 1 - point if kind == "slope" else 1
     return Fall(kind, point, -sign * beta * length, error * length * float(stdtrit(n - 2, 0.975)))

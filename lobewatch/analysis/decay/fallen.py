@@ -6,6 +6,7 @@ import math
 import shlex
 from collections.abc import Iterator, Sequence
 from datetime import datetime
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -19,17 +20,29 @@ from lobewatch.machine import Limits
 
 OTHERS = {"damping_ratio": "damping ratio", "stiffness": "stiffness K", "bearing_stiffness": "bearing stiffness"}
 """Fields of a row that are watched beside the frequency, and what they are called."""
+KEPT = 16
+"""Series that are remembered, for one standing asks for each several times."""
 
 
 def known_rows(rows: Sequence[Row], name: str) -> list[Row]:
     """Those that know a value and that nothing is asked about: what others are compared with."""
-    return [row for row in rows if getattr(row, name).is_known and not row.questions]
+    return [*_known(tuple(rows), name)]
+
+
+@lru_cache(maxsize=KEPT)
+def _known(rows: tuple[Row, ...], name: str) -> tuple[Row, ...]:
+    return tuple(row for row in rows if getattr(row, name).is_known and not row.questions)
 
 
 def trend_in(rows: Sequence[Row], name: str, now: datetime, events: Sequence[datetime] = ()) -> Trend | None:
     """The trend of a value (frequency, damping_ratio, stiffness or bearing_stiffness); None where none is known."""
-    taps = [_tapped(row, name) for row in known_rows(rows, name) if getattr(row, name).value > 0]
+    taps = _taps(tuple(rows), name)
     return trend_of(taps, now, events) if taps else None
+
+
+@lru_cache(maxsize=KEPT)
+def _taps(rows: tuple[Row, ...], name: str) -> tuple[Tapped, ...]:
+    return tuple(_tapped(row, name) for row in _known(rows, name) if getattr(row, name).value > 0)
 
 
 def _tapped(row: Row, name: str) -> Tapped:
@@ -112,7 +125,7 @@ def about_others(name: str, rows: Sequence[Row], trend: Trend | None) -> Iterato
     for field, word in OTHERS.items():
         if known and field == "bearing_stiffness":
             continue
-        taps = [_tapped(row, field) for row in known_rows(rows, field) if getattr(row, field).value > 0]
+        taps = _taps(tuple(rows), field)
         points = points_of(taps) if taps else ()
         change = newest_change(np.array([point.percent for point in points]))
         if change is not None:

@@ -8,7 +8,7 @@ numbers.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -31,6 +31,8 @@ LOOKS = 241
 
 LIGHTEST = 1e-7
 """Weight beside the heaviest below which a shape is left out."""
+SURELY_NOT = 1e-12
+"""Probability that is as good as none."""
 STEP = 1e-6
 """Of the span, over which a rate is taken."""
 SURELY = (0.025, 0.975)
@@ -115,7 +117,7 @@ class Forecast:
 
     def probability(self, level: float | Floats, error: float = 0.0) -> Floats:
         """That the series is below a level (one, or one a date; with its standard error) at the dates, shape (d,)."""
-        return np.asarray(self.weight @ stdtr(self.freedom, (level - self.mean) / np.hypot(self.error, error)))
+        return np.asarray(self.weight @ _below(self.freedom, (level - self.mean) / np.hypot(self.error, error)))
 
     def reached(self, level: float, error: float = 0.0) -> Reached:
         """When a level (with its standard error) is reached."""
@@ -173,18 +175,16 @@ class Past:
         begin, span = float(self.dates[0]), float(self.dates[-1] - self.dates[0])
         start = min(max(span, now - begin), 3 * span)
         at = np.linspace(start, max(min(horizon - begin, 3 * span), start), LOOKS)
-        mean, error = self.fits.at(np.array([_course(shape, at, span) for shape in self.shapes]))
+        mean, error = self.fits.at(_courses(self.shapes, at, span))
         moved = tuple(shape._replace(start=shape.start + begin) for shape in self.shapes)
-        fits = self.fits
-        return Forecast(
-            moved, self.weight, self.spread, self.fitted, begin + at, mean + self.first, error, fits.freedom
-        )
+        mean = mean + self.first
+        return Forecast(moved, self.weight, self.spread, self.fitted, begin + at, mean, error, self.fits.freedom)
 
     @property
     def rate(self) -> Rate:
         """How fast it changes at its last point."""
         span = float(self.dates[-1] - self.dates[0])
-        near = np.array([_course(shape, np.array([span - STEP * span, span]), span) for shape in self.shapes])
+        near = _courses(self.shapes, np.array([span - STEP * span, span]), span)
         rate, error = self.fits.rate(np.diff(near)[:, 0] / (STEP * span))
         low, high = (_quantile(self.weight, rate, error, self.fits.freedom, p) for p in SURELY)
         return Rate(float(self.weight @ rate), low, high)
@@ -196,7 +196,7 @@ def past(dates: Floats, y: Floats, temperature: Floats | None = None) -> Past:
     if y.size < ENOUGH or at[-1] <= 0:
         raise ValueError(f"{y.size} points on {np.unique(at).size} dates: a forecast needs {ENOUGH}")
     shapes = [*_shapes(at)]
-    columns = np.array([_course(shape, at, float(at[-1])) for shape in shapes])
+    columns = _courses(shapes, at, float(at[-1]))
     fits = base_of(y, temperature).fit_columns(columns)
     counts = Counter(shape.kind for shape in shapes)
     share = {kind: np.log(counts[kind]) + np.log(y.size) / 2 * (kind != "none") for kind in counts}
@@ -207,6 +207,13 @@ def past(dates: Floats, y: Floats, temperature: Floats | None = None) -> Past:
     spread = float(np.sqrt(weight @ fits.rss / fits.freedom))
     fitted = fits.mixed(weight, columns[kept]) + y[0]
     return Past(tuple(shapes[j] for j in kept), weight, spread, fitted, fits, dates, float(y[0]))
+
+
+def _below(freedom: int, t: Floats) -> Floats:
+    """Distribution of Student's t: 0 and 1 where it is nearer to them than anybody asks."""
+    found, near = np.where(t > 0, 1.0, 0.0), ~(np.abs(t) > stdtrit(freedom, 1 - SURELY_NOT))
+    found[near] = stdtr(freedom, t[near])
+    return np.asarray(found)
 
 
 def _quantile(weight: Floats, middle: Floats, error: Floats, freedom: int, p: float) -> float:
@@ -231,14 +238,13 @@ def _shapes(at: Floats) -> Iterator[Shape]:
     yield from (Shape("curve", 0.0, True, power=power) for power in POWERS)
 
 
-def _course(shape: Shape, at: Floats, span: float) -> Floats:
-    """How a shape runs over dates that count from the first point on; span: of the series."""
-    if shape.kind == "none":
-        return np.zeros(at.size)
-    if shape.kind == "step":
-        return (at >= shape.start).astype(np.float64)
-    if shape.rate:
-        return np.asarray(np.expm1(shape.rate * at / span))
-    if shape.power:
-        return np.asarray((at / span) ** shape.power)
-    return np.maximum(at - shape.start, 0.0) if shape.kind == "slope" else at
+def _courses(shapes: Sequence[Shape], at: Floats, span: float) -> Floats:
+    """How shapes run over dates that count from the first point on, shape (j, d); span: of the series."""
+    starts = np.array([np.inf if shape.kind == "none" else shape.start for shape in shapes])[:, np.newaxis]
+    found: Floats = np.maximum(at - starts, 0.0)
+    for j, shape in enumerate(shapes):
+        if shape.kind == "step":
+            found[j] = at >= shape.start
+        elif shape.kind == "curve":
+            found[j] = np.expm1(shape.rate * at / span) if shape.rate else (at / span) ** shape.power
+    return found

@@ -53,7 +53,7 @@ class Base:
 
     def t_of(self, lean: Floats, n: NDArray[np.intp]) -> Floats:
         """Student's t of changes that explain so much in the first n, shape (r,) each."""
-        total = self._total(n)
+        total = self._total[n]
         left = np.maximum(total - lean**2, LEAST * total + np.finfo(float).tiny)
         return np.asarray(lean / np.sqrt(left / (n - 2)))
 
@@ -61,7 +61,7 @@ class Base:
         """Size and standard error of a "step" or "slope" (a point) from a point k on in the first n."""
         until = np.array([n])
         product, square = (float(one[0, 0]) for one in self._change(kind, until[:, np.newaxis], np.array([k])))
-        size, total = product / square, float(self._total(until)[0])
+        size, total = product / square, float(self._total[n])
         left = max(total - size * product, LEAST * total + np.finfo(float).tiny)
         return size, float(np.sqrt(left / (n - 2) / square))
 
@@ -74,7 +74,7 @@ class Base:
             moments = self._moments
             tail = moments[:, n] - moments[:, k][:, np.newaxis] - k * tail
             square = (length - 1.0) * length * (2 * length - 1.0) / 6
-        inverse, level = self._levels(n[:, 0])
+        inverse, level = (one[n[:, 0]] for one in self._levels)
         p = self.columns.shape[1]
         product = tail[0].copy()
         for i in range(p):
@@ -83,14 +83,20 @@ class Base:
                 square = square - inverse[:, i, j, np.newaxis] * tail[1 + i] * tail[1 + j]
         return product, square
 
-    def _levels(self, n: NDArray[np.intp]) -> tuple[Floats, Floats]:
-        """Inverse (r, p, p) of the normal matrix of the base in the first n (r,), and its coefficients (r, p)."""
-        inverse: Floats = np.asarray(np.linalg.inv(self._outer[n, 1:, 1:] + self.precision(n)), np.float64)
-        return inverse, (inverse @ self._outer[n, 1:, :1])[..., 0]
+    @cached_property
+    def _levels(self) -> tuple[Floats, Floats]:
+        """By the number of the first points: inverse (n + 1, p, p) of the normal matrix of the base, and its
+        coefficients (n + 1, p); those of less than two are nothing."""
+        n, p = np.arange(2, self.y.size + 1), self.columns.shape[1]
+        inverse, level = np.zeros((self.y.size + 1, p, p)), np.zeros((self.y.size + 1, p))
+        inverse[2:] = np.linalg.inv(self._outer[n, 1:, 1:] + self.precision(n))
+        level[2:] = (inverse[2:] @ self._outer[n, 1:, :1])[..., 0]
+        return inverse, level
 
-    def _total(self, n: NDArray[np.intp]) -> Floats:
-        """Sum of squares that the base leaves in the first n, shape (r,)."""
-        return np.asarray(self._outer[n, 0, 0] - (self._outer[n, 0, 1:] * self._levels(n)[1]).sum(axis=1))
+    @cached_property
+    def _total(self) -> Floats:
+        """Sum of squares that the base leaves, by the number of the first points, shape (n + 1,)."""
+        return np.asarray(self._outer[:, 0, 0] - (self._outer[:, 0, 1:] * self._levels[1]).sum(axis=1))
 
     @cached_property
     def _values(self) -> Floats:

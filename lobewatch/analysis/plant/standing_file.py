@@ -60,7 +60,7 @@ def write_standing(folder: Path, summary: Summary, mark: tuple[int, ...], now: d
     OSError where it cannot be written.
     """
     body = _encode(_File(MAKE, software(), mark, now.isoformat(), summary))
-    atomic_write(folder / STANDING, _head(body) + body[1:])
+    atomic_write(folder / STANDING, _head(body) + body[1:], lasting=False)
 
 
 def _head(body: bytes) -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from datetime import UTC, datetime
 
 import numpy as np
@@ -74,9 +74,13 @@ def _course(one: SeriesStanding, limits: Limits) -> Course:
 
 def _thinned(trend: Trend) -> Iterator[tuple[float, float]]:
     """Means of neighbours where there are many; the newest as it is."""
-    found = np.array([(day(point.time), point.percent - trend.start) for point in trend.points])
-    parts: Sequence[np.ndarray] = np.array_split(found[:-1], min(MOST - 1, max(len(found) - 1, 1)))
-    for at, percent in [*(part.mean(axis=0).tolist() for part in parts if part.size), found[-1].tolist()]:
+    start = trend.start
+    found = np.array([(day(point.time), point.percent - start) for point in trend.points])
+    if len(found) > MOST:
+        least, more = divmod(len(found) - 1, MOST - 1)
+        begins = np.cumsum([0, *[least + 1] * more, *[least] * (MOST - 1 - more)])
+        found = np.add.reduceat(found, begins) / np.diff(begins, append=len(found))[:, np.newaxis]
+    for at, percent in found.tolist():
         yield round(at, 1), round(percent, 3)
 
 

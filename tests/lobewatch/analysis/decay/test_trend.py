@@ -111,3 +111,39 @@ def test_of_a_very_long_series_the_newest_thousand_points_are_judged() -> None:
     found = judged(monthly(steps))
     assert len(found.points) == 1000
     assert found.watch.alarm_at is None
+
+
+def test_a_gap_of_years_divides_nothing_and_the_fall_across_it_is_found() -> None:
+    noise = np.random.default_rng(3).normal(0, 0.1, 24)
+    series = [tapped(30.0 * i + 3000 * (i >= 12), noise[i] - 1.5 * (i >= 12)) for i in range(24)]
+    found = judged(series)
+    assert len(found.points) == 24
+    assert found.watch.fall is not None
+    assert found.watch.fall.kind == "step"
+    assert found.watch.fall.size == pytest.approx(1.5, abs=0.2)
+    assert found.fallen_since is not None
+    assert found.fallen_since - found.points[11].time > timedelta(days=3000)
+    assert found.forecast is not None
+    assert np.isfinite(found.forecast.line).all()
+
+
+@pytest.mark.parametrize("at", [0, 10, 19])
+def test_one_outlier_raises_no_alarm_wherever_it_is(at: int) -> None:
+    percents = np.random.default_rng(0).normal(0, 0.1, 20)
+    percents[at] = -3.0
+    found = judged(monthly(percents))
+    assert found.watch.fall is None
+    assert found.watch.asks_again == (at == 19)
+
+
+def test_the_temperature_of_some_tests_is_enough_and_of_a_few_counts_for_nothing() -> None:
+    random = np.random.default_rng(0)
+    warmth = 20 + 8 * np.sin(np.arange(40) / 3)
+    percents = -0.02 * (warmth - 20) + random.normal(0, 0.02, 40)
+
+    def spread(known: int) -> float:
+        told = np.where(np.arange(40) % 4 < known, warmth, np.nan)
+        return judged([one._replace(temperature=t) for one, t in zip(monthly(percents), told, strict=True)]).spread
+
+    assert spread(0) == spread(1)  # ten are too few
+    assert spread(4) < 0.03 < spread(3) < spread(0)

@@ -11,6 +11,7 @@ COMMANDS = {
     "exclude": "Take a tap test out of the series: all results are as if it had never been taken.",
     "include": "Take a tap test back into the series that lobewatch exclude has taken out.",
     "history": "All tap tests of a machine with what they say, those excluded, and what was done to it, oldest first.",
+    "observe": "Write down what was heard of a test cut by ear: that it was stable, or that it chattered.",
     "modes": "Natural frequency, damping ratio and stiffness from one recorded file.",
     "convert": "A recorded file written for other programs: universal file, text table, MATLAB, SEP005.",
     "model": "The spindle model: modes, stiffness, critical speed; with another tool in it, predicted before it is "

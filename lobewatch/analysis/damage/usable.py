@@ -13,6 +13,7 @@ from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.archive.contents import Contents
 from lobewatch.machine.archive.journal import command
 from lobewatch.machine.corrections.event import Event
+from lobewatch.machine.cuts.heard_cut import HeardCut
 
 Result = TypeVar("Result")
 BEFORE_ALL = datetime.min.replace(tzinfo=UTC)
@@ -73,6 +74,11 @@ class UsableTaps:
     def events(self) -> Sequence[Event]:
         """What was done to the machine, oldest first."""
         return self._all.events
+
+    @property
+    def cuts(self) -> Sequence[HeardCut]:
+        """Test cuts, oldest first, those that a person has taken out too."""
+        return self._all.cuts
 
     @property
     def event_times(self) -> list[datetime]:

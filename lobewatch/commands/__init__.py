@@ -1,7 +1,7 @@
 """The commands of the command line, one a module."""
 
 COMMANDS = {
-    "demo": "A simulated spindle ages over 24 months, tapped in x and y; ends with its report.",
+    "demo": "A simulated spindle ages over 24 months, tapped in x and y; a forecast beside the truth, a report.",
     "init": "Make a machine folder with a commented machine.toml to fill in.",
     "ports": "Serial ports, and which DAQ answers there.",
     "sensors": "Hammer, accelerometer and DAQ: what they are, and whether they are right.",

@@ -32,8 +32,16 @@ def observed(
     if when - now > timedelta(days=1):
         raise ValueError(f"--date {at}: lies in the future; give the day on which it was cut")
     _check_frequency(setting, word, frequency)
-    told = {"word": word, "chatter_frequency_hz": frequency, "speed_rpm": setting.speed_rpm}
-    return HeardCut("", when, **setting.told(), **told, by="ear", software=software())
+    return HeardCut(
+        "",
+        when,
+        **setting.told(),
+        speed_rpm=setting.speed_rpm,
+        word=word,
+        chatter_frequency_hz=frequency,
+        by="ear",
+        software=software(),
+    )
 
 
 def _check_frequency(setting: CutSetting, word: str, frequency: float | None) -> None:

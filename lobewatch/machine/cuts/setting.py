@@ -60,8 +60,8 @@ def cut_setting(machine: Machine, program: str, speed_rpm: float | None, depth_m
         if value is not None and not (math.isfinite(value) and value > 0):
             raise ValueError(f"{option} {value:g}: is not above 0; give the {option[2:]} that was cut with, in {unit}")
     own = table if isinstance(table, ProgramTable) else None
-    speed = speed_rpm if speed_rpm is not None else own and own.speed_rpm
-    depth = depth_mm if depth_mm is not None else own and own.depth_mm
+    speed = own.speed_rpm if speed_rpm is None and own is not None else speed_rpm
+    depth = own.depth_mm if depth_mm is None and own is not None else depth_mm
     if speed is None or depth is None:
         missing = "--speed" if speed is None else "--depth"
         raise ValueError(f"{missing} is missing: the {REFERENCE_CUT} has none of its own; give what was cut with")

@@ -16,7 +16,7 @@ COMMANDS = {
     "convert": "A recorded file written for other programs: universal file, text table, MATLAB, SEP005.",
     "model": "The spindle model: modes, stiffness, critical speed; with another tool in it, predicted before it is "
     "tapped.",
-    "calibrate": "Bearing stiffness for measured natural frequencies; nothing is stored.",
+    "calibrate": "Stiffness of bearings and joints for measured natural frequencies; nothing is stored.",
     "lobes": "Stability lobes of the newest tap tests, drawn beside those of the first, and the pockets that are safe.",
     "check": "Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.",
     "report": "One HTML file with everything in it: what has changed, which programs still hold, lobes then and now.",

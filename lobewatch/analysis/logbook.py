@@ -93,8 +93,7 @@ class Logbook:
         if not self.is_current:
             self._forget()
         asked = clock_questions(tap.circumstances.created, now, self.taps)
-        self.files.add(self.folder.commit(tap, asked))
-        self._forget_results()
+        self._forget_results(goes_on=self.files.add(self.folder.commit(tap, asked)))
         self._mark = self.folder.mark
 
     def replay(
@@ -218,8 +217,9 @@ class Logbook:
         self._forget_results()
         self._mark = self.folder.mark
 
-    def _forget_results(self) -> None:
-        self._history, self._worked_out, self.judged = None, None, {}
+    def _forget_results(self, goes_on: bool = False) -> None:
+        self._history, self.judged = None, {}
+        self._worked_out = self._worked_out if goes_on else None
 
     def _known_history(self) -> History:
         if self._history is None:

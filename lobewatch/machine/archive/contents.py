@@ -41,7 +41,9 @@ class Contents:
 
     def with_one_more(self, entry: TapEntry) -> Contents:
         """The same with a tap test that was just committed, and nothing else since."""
-        return replace(self, taps=_oldest_first([*self.taps, entry]), lines=self.lines + 1)
+        is_newest = not self.taps or _time(self.taps[-1]) <= _time(entry)
+        taps = (*self.taps, entry) if is_newest else _oldest_first([*self.taps, entry])
+        return replace(self, taps=taps, lines=self.lines + 1)
 
     @property
     def baselines(self) -> list[datetime]:

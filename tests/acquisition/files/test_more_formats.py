@@ -242,7 +242,7 @@ def test_a_time_that_is_there_twice_is_refused(tmp_path: Path, make: Callable[..
     path, signals = tmp_path / f"a{suffix}", np.random.default_rng(1).normal(size=(2, 64))
     said = Description(unit="g", force_unit="N") if suffix == ".mat" else Description()
     make(path, TWICE, *signals)
-    with pytest.raises(DataError, match="its time steps are uneven: .* twice there"):
+    with pytest.raises(DataError, match=r"its time steps are uneven: .* twice there"):
         read_hits(path, said)
     make(path, np.arange(64.0) / 25600, *signals)
     assert "uneven" not in look(path, said).complaint

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from lobewatch.analysis.programs.doubt import Doubt
 
 COUNT = 2000
 """Draws."""
-REFRESHED = 600
+REFRESHED = 500
 """Draws that they are made anew with where few have any weight left ..."""
 ENOUGH = 120
 """... which is when the effective sample size is less."""
@@ -47,14 +48,23 @@ class Learnt:
     """Weighted draws of the turning spindle."""
 
     draws: Draws
-    weights: Floats
-    """Of each, sum 1, shape (r,)."""
-    cuts: tuple[Observed, ...]
+    log: Floats
+    """Logarithm of the weight of each, up to a constant, shape (r,)."""
+    cuts: tuple[Observed, ...] = ()
     """What they were learnt from."""
-    size: float
-    """Effective sample size."""
-    refreshed: int
+    refreshed: int = 0
     """How often the draws were made anew."""
+    seed: int = 0
+
+    @property
+    def weights(self) -> Floats:
+        """Of each draw, sum 1, shape (r,)."""
+        return _weights(self.log)
+
+    @property
+    def size(self) -> float:
+        """Effective sample size."""
+        return float(1 / np.sum(self.weights**2))
 
     @property
     def intervals(self) -> dict[str, Interval]:
@@ -66,29 +76,32 @@ class Learnt:
         """Cuts whose chatter was heard with its frequency: without any, nothing is learnt of natural frequencies."""
         return sum(cut.has_frequency for cut in self.cuts)
 
-    def sample(self, count: int, seed: int = 0) -> Draws:
+    def hearing(self, cut: Observed) -> Learnt:
+        """What is known after one more cut."""
+        looked = np.flatnonzero(self.log > np.max(self.log) + np.log(NEGLIGIBLE))
+        draws, cuts, refreshed = self.draws[looked].with_materials(cut.material + 1, self.seed), (*self.cuts, cut), 0
+        log = self.log[looked] + _log(cut, draws)
+        if 1 / np.sum(_weights(log) ** 2) < ENOUGH:
+            draws, log = _refresh(draws, log, cuts, np.random.default_rng((self.seed, 3, len(cuts))))
+            refreshed = 1
+        return replace(self, draws=draws, log=log, cuts=cuts, refreshed=self.refreshed + refreshed)
+
+    def sample(self, count: int) -> Draws:
         """Draws of equal weight."""
-        return self.draws[_spread(self.weights, count, np.random.default_rng((seed, 4)))]
+        return self.draws[_spread(self.weights, count, np.random.default_rng((self.seed, 4, len(self.cuts))))]
 
 
-def learn(middle: MillingRows, doubt: Doubt, cuts: Sequence[Observed], count: int = COUNT, seed: int = 0) -> Learnt:
-    """Learn from cuts in the order in which they were made; the same for a seed.
+def prior(middle: MillingRows, doubt: Doubt, count: int = COUNT, seed: int = 0) -> Learnt:
+    """What is known before the first cut.
 
     middle: the spindle at rest in the middle of the doubt (a row).
     """
-    materials = 1 + max((cut.material for cut in cuts), default=0)
-    draws = drawn(middle, doubt, count, materials, seed)
-    log, refreshed = np.zeros(count), 0
-    for number, cut in enumerate(cuts, 1):
-        looked = np.flatnonzero(log > np.max(log) + np.log(NEGLIGIBLE))
-        draws, log = draws[looked], log[looked]
-        log = log + _log(cut, draws)
-        if _size(log) < ENOUGH:
-            draws, log = _refresh(draws, log, cuts[:number], np.random.default_rng((seed, 3, number)))
-            refreshed += 1
-    weights = np.exp(log - np.max(log))
-    weights /= np.sum(weights)
-    return Learnt(draws, weights, tuple(cuts), float(1 / np.sum(weights**2)), refreshed)
+    return Learnt(drawn(middle, doubt, count, seed=seed), np.zeros(count), seed=seed)
+
+
+def learn(middle: MillingRows, doubt: Doubt, cuts: Sequence[Observed], count: int = COUNT, seed: int = 0) -> Learnt:
+    """Learn from cuts in the order in which they were made; the same for a seed."""
+    return reduce(Learnt.hearing, cuts, prior(middle, doubt, count, seed))
 
 
 def _log(cut: Observed, draws: Draws) -> Floats:
@@ -96,28 +109,25 @@ def _log(cut: Observed, draws: Draws) -> Floats:
     return log_likelihood(cut, predicted(cut, draws), cut.cut.teeth * cut.speed_rpm / 60)
 
 
-def _size(log: Floats) -> float:
+def _weights(log: Floats) -> Floats:
     weights = np.exp(log - np.max(log))
-    return float(np.sum(weights) ** 2 / np.sum(weights**2))
+    return np.asarray(weights / np.sum(weights))
 
 
-def _refresh(
-    draws: Draws, log: Floats, cuts: Sequence[Observed], random: np.random.Generator
-) -> tuple[Draws, Floats]:
+def _refresh(draws: Draws, log: Floats, cuts: Sequence[Observed], random: np.random.Generator) -> tuple[Draws, Floats]:
     """Draws of equal weight, each moved a few times by Metropolis and Hastings."""
-    weights = np.exp(log - np.max(log))
-    weights /= np.sum(weights)
+    weights = _weights(log)
     spread = np.cov(draws.normal.T, aweights=weights) + 1e-4 * np.eye(draws.normal.shape[1])
     root = np.linalg.cholesky(spread) * REACH
     draws = draws[_spread(weights, REFRESHED, random)]
     value = _joint(draws, cuts)
     for _ in range(MOVES):
         step = random.standard_normal(draws.normal.shape) @ root.T
-        moved = Draws(draws.normal + step, draws.rest, draws.doubt)
+        moved = replace(draws, normal=draws.normal + step)
         there = _joint(moved, cuts)
         taken = np.log(random.uniform(size=len(draws))) < there - value
         normal = np.where(taken[:, np.newaxis], moved.normal, draws.normal)
-        draws, value = Draws(normal, draws.rest, draws.doubt), np.where(taken, there, value)
+        draws, value = replace(draws, normal=normal), np.where(taken, there, value)
     return draws, np.zeros(len(draws))
 
 

@@ -46,7 +46,7 @@ class Predicted(NamedTuple):
     @property
     def chance(self) -> Floats:
         """That it is heard to chatter."""
-        return MISJUDGED + (1 - 2 * MISJUDGED) * ndtr(self.excess / EDGE)
+        return np.asarray(MISJUDGED + (1 - 2 * MISJUDGED) * ndtr(self.excess / EDGE))
 
 
 def predicted(seen: Observed, draws: Draws) -> Predicted:
@@ -86,7 +86,7 @@ def heard_base(seen: Observed, tooth_frequency: float) -> float:
     return seen.frequency if np.isfinite(seen.frequency) else tooth_frequency / 2
 
 
-def folded(frequency: Floats | float, tooth_frequency: float) -> Floats:
+def folded(frequency: Floats | float, tooth_frequency: Floats | float) -> Floats:
     """Frequencies (Hz) that teeth leave alike, between 0 and half the tooth frequency."""
     rest = np.mod(frequency, tooth_frequency)
     return np.asarray(np.minimum(rest, tooth_frequency - rest))
@@ -103,12 +103,11 @@ def _by_mean_force(rows: MillingRows, seen: Observed) -> Predicted:
         _, own = MeanForce(mean.rows[beyond], mean.force[beyond]).loudest(rows.speed_rpm[beyond], seen.depth)
         frequency[beyond] = np.where(np.isfinite(own), own, frequency[beyond])
     teeth = 1 / rows.tooth_period
-    rest = np.mod(frequency, teeth)
-    return Predicted(excess, np.minimum(rest, teeth - rest), np.zeros(len(rows), dtype=bool))
+    return Predicted(excess, folded(frequency, teeth), np.zeros(len(rows), dtype=bool))
 
 
 def _by_multipliers(rows: MillingRows, seen: Observed) -> Predicted:
-    """By semi-discretisation at the depth of the cut; how far it is from the limit by its growth over that without a cut."""
+    """By semi-discretisation at the depth of the cut; how far it is from the limit by its growth over that at rest."""
     depth = np.full((len(rows), 1), seen.depth)
     multiplier = largest_multipliers(rows, depth, piece_numbers(rows, seen.depth), ACCURACY)[:, 0]
     quiet = np.min(rows.damping_ratio * rows.frequency, axis=1) * rows.tooth_period

@@ -4,7 +4,7 @@ With the mean force matrix H0, G = diag(Gx, Gy) and tau between two teeth, motio
 
     det(I + b (1 - exp(-s tau)) H0 G(s)) = 0:      at the limit s = 2 pi i f_c, beyond it Re s > 0.
 
-Exact where the force does not change over the turn (a slot cut by three teeth or more), else a first proposal.
+Exact where the force does not change over the turn (a slot cut by four teeth), else a first proposal.
 Source: Altintas & Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362.
 """
 
@@ -45,8 +45,8 @@ class MeanForce:
     def of(cls, rows: MillingRows) -> MeanForce:
         """Of rows fed each in its own direction."""
         tangential, radial = _unit_forces(rows.cut)
-        pushed = (kind[:, np.newaxis, np.newaxis] for kind in (rows.tangential, rows.radial))
-        return cls(rows, turned(sum(k * unit for k, unit in zip(pushed, (tangential, radial), strict=True)), rows.feed_angle))
+        force = np.multiply.outer(rows.tangential, tangential) + np.multiply.outer(rows.radial, radial)
+        return cls(rows, turned(force, rows.feed_angle))
 
     def limits(self, speed_rpm: Floats) -> tuple[Floats, Floats]:
         """Lowest limit (m) and its chatter frequency (Hz) at speeds (rpm) (s,), or (r, s) where each has its own.
@@ -67,25 +67,9 @@ class MeanForce:
         grid = self._grid()
         depth, chatter = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
         for loop in self._eigenvalues(grid):
-            turn = 0.5 - _unwrapped(np.angle(loop)) / np.pi
-            place = grid[:, np.newaxis] / teeth[..., np.newaxis] + turn[:, np.newaxis]
-            whole = np.floor(place)
-            real = np.broadcast_to(loop.real[:, np.newaxis], place.shape)
-            row, speed, step = np.nonzero(
-                (whole[..., 1:] != whole[..., :-1]) & (np.minimum(real[..., 1:], real[..., :-1]) < 0)
-            )
-            before, after = place[row, speed, step], place[row, speed, step + 1]
-            share = (np.maximum(whole[row, speed, step], whole[row, speed, step + 1]) - before) / (after - before)
-            at = loop.real[row, step] + share * (loop.real[row, step + 1] - loop.real[row, step])
-            found = np.where(at < 0, -1 / (2 * np.minimum(at, -1e-300)), np.inf)
-            order = np.argsort(-found, kind="stable")
-            row, speed, step, share, found = (one[order] for one in (row, speed, step, share, found))
-            lowest = np.full(teeth.shape, np.inf)
-            at_lowest = np.full(teeth.shape, np.nan)
-            lowest[row, speed] = found
-            at_lowest[row, speed] = grid[row, step] + share * (grid[row, step + 1] - grid[row, step])
-            chatter = np.where(lowest < depth, at_lowest, chatter)
-            depth = np.minimum(lowest, depth)
+            own, frequency = _lowest(grid, loop, teeth)
+            chatter = np.where(own < depth, frequency, chatter)
+            depth = np.minimum(own, depth)
         return depth, chatter
 
     def loudest(self, speed_rpm: Floats, depth: float) -> tuple[Floats, Floats]:
@@ -94,8 +78,7 @@ class MeanForce:
         Both of shape (r,).
         """
         tau = 60 / (self.rows.cut.teeth * speed_rpm)
-        low = 2 * np.pi * 0.9 * np.min(self.rows.frequency / (2 * np.pi), axis=1)
-        high = 2 * np.pi * 1.3 * np.max(self.rows.frequency / (2 * np.pi), axis=1)
+        low, high = 0.9 * np.min(self.rows.frequency, axis=1), 1.3 * np.max(self.rows.frequency, axis=1)
         number = int(np.ceil(np.max((high - low) * tau / np.pi))) * 2 + 2
         root = 1j * (low[:, np.newaxis] + (high - low)[:, np.newaxis] * np.linspace(0, 1, number))
         for _ in range(NEWTON):
@@ -118,7 +101,10 @@ class MeanForce:
         trace, dtrace = h[:, 0, 0] * gx + h[:, 1, 1] * gy, h[:, 0, 0] * dx + h[:, 1, 1] * dy
         product = h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] * h[:, 1, 0]
         both, dboth = product * gx * gy, product * (dx * gy + gx * dy)
-        return 1 + gain * trace + gain**2 * both, dgain * trace + gain * dtrace + 2 * gain * dgain * both + gain**2 * dboth
+        return (
+            1 + gain * trace + gain**2 * both,
+            dgain * trace + gain * dtrace + 2 * gain * dgain * both + gain**2 * dboth,
+        )
 
     def _receptance(self, s: Complexes, axis: int) -> tuple[Complexes, Complexes]:
         """Of one direction at s (r, k) (1/s), and its derivative."""
@@ -143,7 +129,7 @@ class MeanForce:
 
     def _eigenvalues(self, grid: Floats) -> list[Complexes]:
         """Both of H0 G at frequencies (r, k), each followed over them."""
-        s = 2j * np.pi * grid
+        s = np.asarray(2j * np.pi * grid, np.complex128)
         gx, gy = self._receptance(s, 0)[0], self._receptance(s, 1)[0]
         h = self.force[..., np.newaxis]
         half = (h[:, 0, 0] * gx + h[:, 1, 1] * gy) / 2
@@ -151,6 +137,27 @@ class MeanForce:
         jumps = np.real(root[:, 1:] * np.conj(root[:, :-1])) < 0
         root[:, 1:] *= np.cumprod(np.where(jumps, -1.0, 1.0), axis=1)
         return [half + root, half - root]
+
+
+def _lowest(grid: Floats, loop: Complexes, teeth: Floats) -> tuple[Floats, Floats]:
+    """Lowest limit (m) and its frequency (Hz) of loops (r, k) over frequencies (r, k), at tooth frequencies (r, s).
+
+    A crossing lies where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L).
+    """
+    turn = 0.5 - _unwrapped(np.angle(loop)) / np.pi
+    place = grid[:, np.newaxis] / teeth[..., np.newaxis] + turn[:, np.newaxis]
+    whole = np.floor(place)
+    low = (np.minimum(loop.real[:, 1:], loop.real[:, :-1]) < 0)[:, np.newaxis]
+    row, speed, step = np.nonzero((whole[..., 1:] != whole[..., :-1]) & low)
+    before, after = place[row, speed, step], place[row, speed, step + 1]
+    share = (np.maximum(whole[row, speed, step], whole[row, speed, step + 1]) - before) / (after - before)
+    real = loop.real[row, step] + share * (loop.real[row, step + 1] - loop.real[row, step])
+    limit = np.where(real < 0, -1 / (2 * np.minimum(real, -1e-300)), np.inf)
+    order = np.argsort(-limit, kind="stable")
+    depth, frequency = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
+    depth[row[order], speed[order]] = limit[order]
+    frequency[row[order], speed[order]] = (grid[row, step] + share * (grid[row, step + 1] - grid[row, step]))[order]
+    return depth, frequency
 
 
 def _unwrapped(angle: Floats) -> Floats:

@@ -18,7 +18,7 @@ from lobewatch.analysis.programs.doubt import Doubt
 
 FREQUENCY, DAMPING, STIFFNESS, FORCE = (0.985, 0.02), (1.1, 0.25), (1.0, 0.10), (1.1, 0.30)
 """Middle, and standard deviation (of the frequency absolute, else relative to the middle)."""
-SHARE, WIDE = 0.10, 3.0
+SHARE, WIDE = 0.05, 3.0
 """So many frequencies differ so many times as much: nobody has measured how often a spindle is far off."""
 LEAST = 0.1
 """Nothing is below this share of its middle."""
@@ -46,6 +46,14 @@ class Draws:
     def __getitem__(self, which: NDArray[np.intp] | slice) -> Draws:
         """Some of them."""
         return replace(self, normal=self.normal[which], rest=self.rest[which])
+
+    def with_materials(self, count: int, seed: int) -> Draws:
+        """The same with coefficients of so many materials at least, new ones as the prior has them."""
+        missing = OF_MODES + OF_MATERIAL * count - self.normal.shape[1]
+        if missing <= 0:
+            return self
+        more = np.random.default_rng((seed, 5, count)).standard_normal((len(self), missing))
+        return replace(self, normal=np.hstack((self.normal, more)))
 
     def ratios(self) -> dict[str, Floats]:
         """What differs from rest as factors: f, zeta and K of "x" and "y", Kt and Kr/Kt of material 0, (r,) each."""
@@ -89,11 +97,11 @@ class Draws:
         return FORCE[0] * np.maximum(1 + FORCE[1] * at_speed, LEAST) * known, np.maximum(turned, 0.0)
 
 
-def drawn(middle: MillingRows, doubt: Doubt, count: int, materials: int = 1, seed: int = 0) -> Draws:
+def drawn(middle: MillingRows, doubt: Doubt, count: int, seed: int = 0) -> Draws:
     """Draws from the prior around a spindle at rest (a row), the same for a seed."""
     one = replace(middle, speed_rpm=np.ones(1))
     rest = doubt.draw(one, count, seed, without="coefficients")
-    normal = np.random.default_rng((seed, 2)).standard_normal((count, OF_MODES + OF_MATERIAL * materials))
+    normal = np.random.default_rng((seed, 2)).standard_normal((count, OF_MODES + OF_MATERIAL))
     return Draws(normal, rest, doubt)
 
 

@@ -4,13 +4,14 @@ from acquisition.emulation.bench import Bench
 from acquisition.emulation.hammered_structure import HammeredStructure, Hammering, Structure
 from acquisition.emulation.milling import TipMotion, simulate_cut, simulate_cuts
 from acquisition.emulation.milling_cut import MillingCut, Passage
-from acquisition.emulation.milling_housing import Housing, hear, random_housing
+from acquisition.emulation.milling_housing import CutSound, Housing, hear, random_housing
 from acquisition.emulation.simulated_source import Signal, SimulatedSource, quantise
 from acquisition.emulation.thread import EmulatorThread
 from acquisition.emulation.wire import PtyWire, TcpWire, Wire
 
 __all__ = [
     "Bench",
+    "CutSound",
     "EmulatorThread",
     "HammeredStructure",
     "Hammering",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,8 @@ Floats = NDArray[np.float64]
 
 MOUNTED = 20e3
 """Above this frequency (Hz) the sensor, glued or on a magnet, hears less and less (12 dB an octave)."""
+HAMMER_NOISE = 0.1
+"""rms of a hammer that lies idle (N)."""
 FINER = 4
 """How much finer the motion is laid out before samples are taken from it."""
 CHUNK = 4096
@@ -66,16 +68,55 @@ def random_housing(random: np.random.Generator, speed_rpm: float) -> Housing:
 def hear(
     motion: TipMotion, housing: Housing, speed_rpm: float, sample_rate: float, random: np.random.Generator
 ) -> Floats:
-    """Acceleration of the housing (m/s^2) as a device without a filter samples it at a rate (Hz), shape (n,).
+    """Acceleration of the housing (m/s^2) in a passage as a device samples it at a rate (Hz), shape (n,).
 
-    speed_rpm: the true one. What lies above half the sample rate is folded below it.
+    speed_rpm: the true one. The device has no filter: what lies above half the sample rate is folded below it.
     """
-    fine = _at_housing(motion, housing)
-    time = np.arange(int(motion.acceleration.shape[1] * sample_rate / motion.sample_rate)) / sample_rate
-    heard = np.interp(time * FINER * motion.sample_rate, np.arange(fine.size), fine)
-    for frequency, amplitude in (*housing.lines, (speed_rpm / 60, housing.unbalance)):
-        heard += amplitude * np.sin(2 * np.pi * frequency * time + random.uniform(0, 2 * np.pi))
-    return heard + random.normal(scale=housing.noise, size=heard.size)
+    sound = CutSound(motion, housing, speed_rpm, sample_rate, random)
+    return np.asarray(sound(0, sound.n_scans)[1])
+
+
+@dataclass(eq=False)
+class CutSound:
+    """Signal function: (first_scan, n) -> force (N) and acceleration (m/s^2), shape (2, n), of a passage, repeated.
+
+    The hammer lies idle. Call it in order.
+    """
+
+    motion: TipMotion
+    """Of the tip, from rest to rest."""
+    housing: Housing
+    """Where the sensor is."""
+    speed_rpm: float
+    """True spindle speed (rpm)."""
+    sample_rate: float
+    """Samples a second (Hz); what lies above half of it is folded below it."""
+    random: np.random.Generator
+    """Source of every random number."""
+    _tip: Floats = field(init=False)
+    _phases: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Lay out what comes from the tip."""
+        fine = _at_housing(self.motion, self.housing)
+        time = np.arange(int(self.motion.acceleration.shape[1] * self.sample_rate / self.motion.sample_rate))
+        self._tip = np.interp(time * (FINER * self.motion.sample_rate / self.sample_rate), np.arange(fine.size), fine)
+        self._phases = self.random.uniform(0, 2 * np.pi, len(self.housing.lines) + 1)
+
+    @property
+    def n_scans(self) -> int:
+        """Of one passage."""
+        return self._tip.size
+
+    def __call__(self, first_scan: int, n_scans: int) -> Floats:
+        """The next n_scans scans."""
+        scan = np.arange(first_scan, first_scan + n_scans)
+        signals = self.random.normal(scale=[[HAMMER_NOISE], [self.housing.noise]], size=(2, n_scans))
+        signals[1] += self._tip[scan % self._tip.size]
+        lines = (*self.housing.lines, (self.speed_rpm / 60, self.housing.unbalance))
+        for (frequency, amplitude), phase in zip(lines, self._phases, strict=True):
+            signals[1] += amplitude * np.sin(2 * np.pi * frequency * scan / self.sample_rate + phase)
+        return signals
 
 
 def _at_housing(motion: TipMotion, housing: Housing) -> Floats:

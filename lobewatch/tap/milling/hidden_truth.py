@@ -1,0 +1,60 @@
+"""How an emulated spindle at speed, and its cut, differ from what was tapped and what stands in machine.toml."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from acquisition import Structure
+
+FREQUENCY, DAMPING, STIFFNESS, FORCE = (0.985, 0.02), (1.1, 0.25), (1.0, 0.10), (1.1, 0.30)
+"""Middle, and standard deviation as a share of it."""
+LEAST = 0.3
+"""Nothing falls below this share of its middle."""
+OFF_COMMAND = 0.015
+"""The spindle turns up to so much slower or faster than it is told, as a share."""
+RUNOUT = 20e-6
+"""Largest eccentricity of a tool in its holder (m)."""
+
+
+class Turning(NamedTuple):
+    """Factors on the modes of one direction."""
+
+    frequency: float
+    damping_ratio: float
+    stiffness: float
+
+    def of(self, rest: Structure) -> Structure:
+        """The same structure at speed."""
+        return Structure(
+            rest.frequency * self.frequency, rest.damping_ratio * self.damping_ratio, rest.stiffness * self.stiffness
+        )
+
+
+class HiddenTruth(NamedTuple):
+    """What nobody has measured."""
+
+    x: Turning
+    """Modes in x."""
+    y: Turning
+    """Modes in y."""
+    tangential: float
+    """Factor on both cutting coefficients."""
+
+
+def hidden_truth(seed: int) -> HiddenTruth:
+    """The same for a seed, whatever is cut: f -1.5 +-2 %, zeta x 1.1 +-25 %, K +-10 %, x and y apart; Kt x 1.1 +-30 %."""
+    random = np.random.default_rng([seed, 1])
+    x, y = (Turning(*(_drawn(random, *one) for one in (FREQUENCY, DAMPING, STIFFNESS))) for _ in range(2))
+    return HiddenTruth(x, y, _drawn(random, *FORCE))
+
+
+def runout_of(teeth: int, random: np.random.Generator) -> tuple[float, ...]:
+    """How far each tooth of an eccentric tool stands out (m)."""
+    angle = 2 * np.pi * np.arange(teeth) / teeth + random.uniform(0, 2 * np.pi)
+    return tuple((random.uniform(0, RUNOUT) * np.cos(angle)).tolist())
+
+
+def _drawn(random: np.random.Generator, middle: float, spread: float) -> float:
+    return float(middle * max(1 + spread * random.standard_normal(), LEAST))

@@ -2,7 +2,7 @@
 
     chip     h = feed sin(phi) + n . q + r - u,  n = (sin phi, cos phi), r how far the tooth stands out
     surface  u <- u - feed sin(phi) + max(h, 0): the furthest material that all earlier teeth have left at this angle
-    force    F = -b (Kt (cos, -sin) + Kr (sin, cos)) max(h, 0)
+    force    F = -b ((Kt h + Kte) (cos, -sin) + (Kr h + Kre) (sin, cos)) where h > 0
 
 q is the displacement of the tip along the feed and its normal. A tooth that leaves the cut and comes back finds what
 was left one, two or more tooth periods ago. Between steps the modes swing freely, which is exact; the force of a step
@@ -106,25 +106,20 @@ def _period(
 ) -> tuple[NDArray[np.complex128], Floats, Floats]:
     """A tooth period: how modes swing after each step, what they gained in it (s, c, m), and chips (s, c, e)."""
     swings = np.empty((len(room), *swing.shape), dtype=complex)
-    gains, chips = np.empty(swings.shape), np.empty(room.shape)
-    rows = (
-        swings,
-        swings.real,
-        swings.imag[..., np.newaxis],
-        gains,
-        gains[..., np.newaxis],
-        chips,
-        chips[..., np.newaxis],
-    )
-    for now, speed, place, gain, gained, chip, cut, to, by, left in zip(*rows, reach, push, room, strict=True):
+    gains, acting = np.empty(swings.shape), np.empty((*push.shape[:2], push.shape[-1], 1))
+    chips, touching = acting[:, :, : room.shape[-1]], acting[:, :, room.shape[-1] :]
+    columns = (swings.imag[..., np.newaxis], gains[..., np.newaxis], room[..., np.newaxis])
+    rows = zip(swings, swings.real, gains, acting, chips, touching, reach, push, *columns, strict=True)
+    for now, speed, gain, both, chip, touch, to, by, place, gained, left in rows:
         np.multiply(swing, flight, out=now)
-        np.matmul(to, place, out=cut)
+        np.matmul(to, place, out=chip)
         np.add(chip, left, out=chip)
         np.maximum(chip, 0.0, out=chip)
-        np.matmul(by, cut, out=gained)
+        np.greater(chip, 0.0, out=touch)
+        np.matmul(by, both, out=gained)
         np.add(speed, gain, out=speed)
         swing = now
-    return swings, gains, chips
+    return swings, gains, chips[..., 0]
 
 
 def _acceleration(swings: NDArray[np.complex128], gains: Floats, modes: ModeTables) -> Floats:

@@ -39,6 +39,10 @@ class MillingCut:
     """In y."""
     runout: tuple[float, ...] = ()
     """How far each tooth stands out (m), `teeth` of them; none where all stand alike."""
+    tangential_edge: float = 0.0
+    """Tangential force of an edge that touches, whatever the chip (N/m)."""
+    radial_edge: float = 0.0
+    """Radial force of an edge that touches (N/m)."""
     helix_lag: float = 0.0
     """Lag of a helical tooth along the axis (rad/m); 0 for straight teeth."""
     feed_angle: float = 0.0
@@ -56,8 +60,9 @@ class MillingCut:
                 f"tangential={self.tangential} Pa, depth={self.depth} m, feed_per_tooth={self.feed_per_tooth} m and "
                 f"speed_rpm={self.speed_rpm} must be finite and > 0"
             )
-        if not (min(self.radial, self.helix_lag) >= 0 and self.radial + self.helix_lag < np.inf):
-            raise ValueError(f"radial={self.radial} Pa and helix_lag={self.helix_lag} rad/m must be finite and >= 0")
+        least = (self.radial, self.tangential_edge, self.radial_edge, self.helix_lag)
+        if not (min(least) >= 0 and sum(least) < np.inf):
+            raise ValueError(f"radial, tangential_edge, radial_edge, helix_lag = {least} must be finite and >= 0")
         if len(self.runout) not in (0, self.teeth):
             raise ValueError(f"runout has {len(self.runout)} values for {self.teeth} teeth; give one a tooth, or none")
         if self.x is None and self.y is None:

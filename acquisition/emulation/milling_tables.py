@@ -63,17 +63,18 @@ class ToothTables:
     reach: Floats
     """How much further a tooth reaches into the part for each mode's displacement, shape (s, c, e, m)."""
     push: Floats
-    """What z.real gains in a step from each chip at full depth, shape (s, c, m, e)."""
+    """What z.real gains in a step from each chip, then from each edge that touches, at full depth, (s, c, m, 2 e)."""
 
 
 def tables(cuts: Sequence[MillingCut], steps: int) -> tuple[ModeTables, ToothTables]:
     """Tables of cuts with `steps` steps a tooth period."""
-    pole, axis, shape, kick = _side_by_side([_modes(cut, cut.tooth_period / steps) for cut in cuts], 0)
+    pole, axis, shape, kick, rub = _side_by_side([_modes(cut, cut.tooth_period / steps) for cut in cuts], 0)
     root, place, normal = _side_by_side([_in_cut(cut, steps) for cut in cuts], 1)
     step = np.array([cut.tooth_period / steps for cut in cuts])
     thick = normal[:, :, 0] * np.array([[cut.feed_per_tooth] for cut in cuts])
     reach = np.swapaxes(normal, -1, -2) @ shape
-    push = np.swapaxes(kick, -1, -2) @ normal
+    sides = (np.swapaxes(kick, -1, -2) @ normal, np.swapaxes(rub, -1, -2) @ (normal * root[:, :, np.newaxis]))
+    push = np.concatenate(sides, axis=-1)
     return ModeTables(pole, np.exp(pole * step[:, np.newaxis]), axis, step), ToothTables(
         root, thick, place, reach, push
     )
@@ -88,8 +89,8 @@ def _side_by_side(each: Sequence[tuple[NDArray[Any], ...]], axis: int) -> list[A
     ]
 
 
-def _modes(cut: MillingCut, step: float) -> tuple[NDArray[np.complex128], Floats, Floats, Floats]:
-    """Pole (m,); along x and y, along feed and normal, gain of z.real from sums of chip times normal, each (2, m)."""
+def _modes(cut: MillingCut, step: float) -> tuple[NDArray[Any], ...]:
+    """Pole (m,); along x and y, along feed and normal, gain of z.real from chips, from edges, each (2, m)."""
     rigid = Structure(np.empty(0), np.empty(0), np.empty(0))
     x, y = cut.x or rigid, cut.y or rigid
     w = 2 * np.pi * np.concatenate([x.frequency, y.frequency])
@@ -98,8 +99,11 @@ def _modes(cut: MillingCut, step: float) -> tuple[NDArray[np.complex128], Floats
     axis = np.repeat(np.eye(2), [x.frequency.size, y.frequency.size], axis=1)
     c, s = math.cos(cut.feed_angle), math.sin(cut.feed_angle)
     shape = np.array([[c, s], [-s, c]]) @ axis
-    force = -cut.depth * np.array([[cut.radial, cut.tangential], [-cut.tangential, cut.radial]])
-    return -zeta * w + 1j * damped, axis, shape, force.T @ shape * step * w**2 / (k * damped)
+    kick, rub = (
+        -cut.depth * np.array([[radial, -tangential], [tangential, radial]]) @ shape * step * w**2 / (k * damped)
+        for tangential, radial in ((cut.tangential, cut.radial), (cut.tangential_edge, cut.radial_edge))
+    )
+    return -zeta * w + 1j * damped, axis, shape, kick, rub
 
 
 def _in_cut(cut: MillingCut, steps: int) -> tuple[NDArray[Any], ...]:

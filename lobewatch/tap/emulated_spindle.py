@@ -146,6 +146,7 @@ def _structure(folder: MachineFolder, other: Spindle | None) -> Structure:
 
 
 def emulated_inputs(folder: MachineFolder, driver: Driver) -> tuple[SensorInput, ...]:
+    """Sensors on an emulated device; DataError where machine.toml lacks those that the device does not describe."""
     if driver.sensors is not None:
         return tuple(SensorInput(number, channel) for number, channel in enumerate(CHANNELS))
     inputs = folder.machine.daq.settings.inputs

@@ -19,10 +19,12 @@ from modal import Mode
 
 PASSAGE = Passage(before=2.0, ramp=0.1, steady=2.8, after=2.0)
 """What is repeated: air, cut, air."""
-HIGHEST = 6000.0
-"""Modes above this frequency (Hz) are left out: a cut hardly moves them, and they ask for small steps."""
+STIFFEST = 100.0
+"""Modes so many times as stiff as the softest are left out: a cut hardly moves them, and they take long."""
 FEED_SHARE = 5e-3
 """Feed per tooth over diameter, where machine.toml does not say."""
+EDGES = (25e3, 35e3)
+"""Tangential and radial edge coefficients (N/m), where they are not known: about those of aluminium."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,7 @@ class EmulatedCut:
     speed_rpm: float
     """True spindle speed (rpm)."""
     limit: float
-    """Deepest stable depth at this speed, in this direction of feed, with this truth (m)."""
+    """Deepest stable depth at this speed, in this direction of feed, with this truth (m); inf where any is stable."""
 
 
 def emulate_cut(
@@ -59,7 +61,7 @@ def emulate_cut(
     if driver.emulate is None:
         raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
     truth, random = hidden_truth(seed), np.random.default_rng([seed, *_numbers(setting)])
-    cut = _turning_cut(_at_rest(folder, setting, spindle), setting, truth, random)
+    cut = _turning_cut(folder, setting, _at_rest(folder, setting, spindle), truth, random)
     motion, housing = simulate_cut(cut, passage), random_housing(random, cut.speed_rpm)
     bench = Bench(
         lambda rate: CutSound(motion, housing, cut.speed_rpm, rate, random),
@@ -77,18 +79,21 @@ def _numbers(setting: CutSetting) -> tuple[int, int]:
 
 
 def _at_rest(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None) -> Structure:
-    """Modes of the tip below HIGHEST."""
+    """Modes of the tip that a cut moves."""
     table = folder.machine.spindle
     if table is None:
         raise DataError(f"{folder.toml}: no model to emulate: add a [spindle] table (or use lobewatch init --example)")
     whole = emulated_structure(spindle or folder.machine.model(setting.tool), table.damping_ratio)
-    some = whole.frequency <= max(HIGHEST, whole.frequency[0])
+    some = whole.stiffness < STIFFEST * np.min(whole.stiffness)
     return Structure(whole.frequency[some], whole.damping_ratio[some], whole.stiffness[some])
 
 
 def _turning_cut(
-    rest: Structure, setting: CutSetting, truth: HiddenTruth, random: np.random.Generator
+    folder: MachineFolder, setting: CutSetting, rest: Structure, truth: HiddenTruth, random: np.random.Generator
 ) -> MillingCut:
+    known = folder.machine.coefficients(setting.table)
+    edges = np.array([known.tangential_edge, known.radial_edge])
+    edges = np.where(np.isfinite(edges), edges, EDGES)
     feed = setting.table.feed_per_tooth_mm or FEED_SHARE * setting.table.tool_diameter_mm
     return MillingCut(
         teeth=setting.cut.teeth,
@@ -96,6 +101,8 @@ def _turning_cut(
         exit_angle=setting.cut.exit_angle,
         tangential=setting.cut.tangential * truth.tangential,
         radial=setting.cut.radial * truth.tangential,
+        tangential_edge=float(edges[0]),
+        radial_edge=float(edges[1]),
         depth=setting.depth,
         feed_per_tooth=feed / 1e3,
         speed_rpm=setting.speed_rpm * (1 + random.uniform(-OFF_COMMAND, OFF_COMMAND)),

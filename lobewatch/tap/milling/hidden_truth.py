@@ -42,9 +42,16 @@ class HiddenTruth(NamedTuple):
     tangential: float
     """Factor on both cutting coefficients."""
 
+    @property
+    def told(self) -> dict[str, float]:
+        """The factors by name."""
+        sides = {"x": self.x, "y": self.y}
+        modes = {f"{name}_{side}": value for side, one in sides.items() for name, value in one._asdict().items()}
+        return modes | {"tangential": self.tangential}
+
 
 def hidden_truth(seed: int) -> HiddenTruth:
-    """The same for a seed, whatever is cut: f -1.5 +-2 %, zeta x 1.1 +-25 %, K +-10 %, x and y apart; Kt x 1.1 +-30 %."""
+    """The same for a seed, whatever is cut; modes in x and y differ apart."""
     random = np.random.default_rng([seed, 1])
     x, y = (Turning(*(_drawn(random, *one) for one in (FREQUENCY, DAMPING, STIFFNESS))) for _ in range(2))
     return HiddenTruth(x, y, _drawn(random, *FORCE))

@@ -86,6 +86,7 @@ def balanced(cut: MillingCut, points: int) -> Floats:
         )
         ahead = cut.runout[tooth] - cut.runout[tooth - 1]
         constant += force * (cut.feed_per_tooth * s + ahead)
+        constant -= cut.depth * inside * (cut.tangential_edge * np.array([c, -s]) + cut.radial_edge * np.array([s, c]))
         slope += force[:, np.newaxis] * np.array([s, c])
     matrix = np.eye(2 * points).reshape(2, points, 2, points)
     for i in (0, 1):
@@ -96,10 +97,10 @@ def balanced(cut: MillingCut, points: int) -> Floats:
     return np.real(np.fft.ifft(-(omega**2) * np.fft.fft(place)))
 
 
-@pytest.mark.parametrize("runout", [(0.0, 0.0), (8e-6, -8e-6)])
-def test_a_stable_cut_vibrates_as_harmonic_balance_says(runout: tuple[float, float]) -> None:
+@pytest.mark.parametrize(("runout", "edge"), [((0.0, 0.0), 4e5), ((8e-6, -8e-6), 0.0)])
+def test_a_stable_cut_vibrates_as_harmonic_balance_says(runout: tuple[float, float], edge: float) -> None:
     wide = cut_of(Cut(2, 1.0, "up", 6e8, 2e8), 6000.0, 0.4e-3, feed_per_tooth=1e-3, runout=runout)
-    cut = replace(wide, entry_angle=0.6, exit_angle=2.2)
+    cut = replace(wide, entry_angle=0.6, exit_angle=2.2, tangential_edge=edge, radial_edge=edge / 2)
     exact = np.abs(np.fft.rfft(balanced(cut, 256))[:, 1:13]) / 256
     motion = simulate_cut(cut, Passage(0.0, 0.05, 0.45, 0.0))
     turns = middle(motion, 0.1, end=0.45)
@@ -125,7 +126,7 @@ def multiplier(cut: MillingCut, motion: TipMotion, passage: Passage) -> float:
 
 @pytest.mark.parametrize(
     ("cut", "speed_rpm"),
-    [(HALF_UP, 7000.0), (DOWN, 9000.0), (Cut(1, 0.1, "up", 6e8, 2e8), 17000.0)],
+    [(DOWN, 9000.0), (Cut(1, 0.1, "up", 6e8, 2e8), 17000.0)],
 )
 def test_it_dies_below_the_limit_and_grows_above_it_as_the_multipliers_say(cut: Cut, speed_rpm: float) -> None:
     x, y = [Mode(*X[0])], [Mode(*Y[0])]

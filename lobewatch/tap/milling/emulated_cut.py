@@ -14,7 +14,7 @@ from lobewatch.machine.cut_tables import FEED_ANGLES
 from lobewatch.machine.cuts.setting import CutSetting
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.emulated_spindle import SAMPLE_RATE, emulated_inputs, emulated_structure
-from lobewatch.tap.milling.hidden_truth import OFF_COMMAND, HiddenTruth, hidden_truth, runout_of
+from lobewatch.tap.milling.hidden_truth import HiddenTruth, hidden_truth, runout_of
 from modal import Mode
 
 PASSAGE = Passage(before=2.0, ramp=0.1, steady=2.8, after=2.0)
@@ -54,17 +54,18 @@ def emulate_cut(
 ) -> EmulatedCut:
     """Somebody makes this cut, again and again; the accelerometer is on the housing, the hammer lies idle.
 
-    The truth is that of the seed, whatever is cut; a program fed along both axes is fed along x. spindle: in place of
-    the model of the tool. DataError where machine.toml has no model of it, or lacks the sensors of a device that does
-    not describe them itself.
+    Truth, run-out and housing are those of the seed, whatever is cut; a program fed along both axes is fed along x.
+    spindle: in place of the model of the tool. DataError where machine.toml has no model of it, or lacks the sensors of
+    a device that does not describe them itself.
     """
     if driver.emulate is None:
         raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
-    truth, random = hidden_truth(seed), np.random.default_rng([seed, *_numbers(setting)])
-    cut = _turning_cut(folder, setting, _at_rest(folder, setting, spindle), truth, random)
+    truth, random, noise = hidden_truth(seed), *np.random.default_rng(seed).spawn(2)
+    runout = runout_of(setting.cut.teeth, random)
+    cut = _turning_cut(folder, setting, _at_rest(folder, setting, spindle), truth, runout)
     motion, housing = simulate_cut(cut, passage), random_housing(random, cut.speed_rpm)
     bench = Bench(
-        lambda rate: CutSound(motion, housing, cut.speed_rpm, rate, random),
+        lambda rate: CutSound(motion, housing, cut.speed_rpm, rate, noise),
         emulated_inputs(folder, driver),
         SAMPLE_RATE,
         realtime,
@@ -72,10 +73,6 @@ def emulate_cut(
         folder.machine.daq.digital_clock,
     )
     return EmulatedCut(driver.emulate(bench), truth, cut.speed_rpm, _limit(cut, setting))
-
-
-def _numbers(setting: CutSetting) -> tuple[int, int]:
-    return round(setting.speed_rpm), round(setting.depth * 1e6)
 
 
 def _at_rest(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None) -> Structure:
@@ -89,7 +86,7 @@ def _at_rest(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None
 
 
 def _turning_cut(
-    folder: MachineFolder, setting: CutSetting, rest: Structure, truth: HiddenTruth, random: np.random.Generator
+    folder: MachineFolder, setting: CutSetting, rest: Structure, truth: HiddenTruth, runout: tuple[float, ...]
 ) -> MillingCut:
     known = folder.machine.coefficients(setting.table)
     edges = np.array([known.tangential_edge, known.radial_edge])
@@ -105,10 +102,10 @@ def _turning_cut(
         radial_edge=float(edges[1]),
         depth=setting.depth,
         feed_per_tooth=feed / 1e3,
-        speed_rpm=setting.speed_rpm * (1 + random.uniform(-OFF_COMMAND, OFF_COMMAND)),
+        speed_rpm=setting.speed_rpm * truth.speed,
         x=truth.x.of(rest),
         y=truth.y.of(rest),
-        runout=runout_of(setting.cut.teeth, random),
+        runout=runout,
         helix_lag=setting.cut.helix_lag,
         feed_angle=FEED_ANGLES.get(setting.feed, 0.0),
     )

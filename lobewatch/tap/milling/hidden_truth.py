@@ -41,20 +41,22 @@ class HiddenTruth(NamedTuple):
     """Modes in y."""
     tangential: float
     """Factor on both cutting coefficients."""
+    speed: float
+    """Factor on the speed that it is told."""
 
     @property
     def told(self) -> dict[str, float]:
         """The factors by name."""
         sides = {"x": self.x, "y": self.y}
         modes = {f"{name}_{side}": value for side, one in sides.items() for name, value in one._asdict().items()}
-        return modes | {"tangential": self.tangential}
+        return modes | {"tangential": self.tangential, "speed": self.speed}
 
 
 def hidden_truth(seed: int) -> HiddenTruth:
     """The same for a seed, whatever is cut; modes in x and y differ apart."""
     random = np.random.default_rng([seed, 1])
     x, y = (Turning(*(_drawn(random, *one) for one in (FREQUENCY, DAMPING, STIFFNESS))) for _ in range(2))
-    return HiddenTruth(x, y, _drawn(random, *FORCE))
+    return HiddenTruth(x, y, _drawn(random, *FORCE), 1 + random.uniform(-OFF_COMMAND, OFF_COMMAND))
 
 
 def runout_of(teeth: int, random: np.random.Generator) -> tuple[float, ...]:

@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from acquisition import Structure
+from lobewatch.analysis.learning.priors import DAMPING, FORCE, FREQUENCY, STIFFNESS
 
-FREQUENCY, DAMPING, STIFFNESS, FORCE = (0.985, 0.02), (1.1, 0.25), (1.0, 0.10), (1.1, 0.30)
-"""Middle, and standard deviation as a share of it."""
 LEAST = 0.3
 """Nothing falls below this share of its middle."""
 OFF_COMMAND = 0.015

@@ -18,12 +18,16 @@ def cut_text(cut: HeardCut) -> str:
 def cut_words(cut: HeardCut) -> str:
     """What was cut, and what it sounded like."""
     named = cut.program or "reference cut"
+    return f"{named} at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm: {heard_text(cut)}, by {cut.by}"
+
+
+def heard_text(cut: HeardCut) -> str:
+    """What it sounded like."""
     heard: str = cut.word
     if cut.chatter_frequency_hz is not None:
         error = cut.chatter_frequency_std_hz
         heard += f" at {cut.chatter_frequency_hz:.5g}{'' if error is None else f' +- {2 * error:.2g}'} Hz"
-    heard += f" ({cut.reason})" if cut.reason else ""
-    return f"{named} at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm: {heard}, by {cut.by}"
+    return heard + (f" ({cut.reason})" if cut.reason else "")
 
 
 def cut_json(cut: HeardCut) -> dict[str, Any]:

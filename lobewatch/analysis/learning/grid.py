@@ -18,7 +18,7 @@ STEP = 0.008
 """Relative step of the speeds that are looked at."""
 RPM, MM = 10.0, 0.05
 """Steps that can be set at a machine."""
-SPEEDS = 120
+SPEEDS = 80
 """At which zero order is compared with semi-discretisation."""
 SHARES = (0.1, 3.0)
 """Between which its errors are believed."""

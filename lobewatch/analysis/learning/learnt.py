@@ -26,6 +26,8 @@ MOVES, REACH = 4, 0.5
 """Times that each is then moved, and how far, as a share of their own spread."""
 NEGLIGIBLE = 1e-6
 """Draws with less than this share of the largest weight are not looked at any more."""
+SETTLED, OPEN = 2, (0.90, 1.05)
+"""Chatter frequencies without which nobody knows how far a spindle at speed may be off, and how far that is."""
 LEVEL = 0.95
 """Of intervals."""
 
@@ -41,6 +43,10 @@ class Interval(NamedTuple):
     high: float
     """... and 97.5 % lie beyond."""
     std: float
+
+    def no_narrower(self, low: float, high: float) -> Interval:
+        """It, with both of these inside."""
+        return self._replace(low=min(self.low, low), high=max(self.high, high))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +74,11 @@ class Learnt:
 
     @property
     def intervals(self) -> dict[str, Interval]:
-        """By name (`Draws.ratios`)."""
-        return {name: _interval(values, self.weights) for name, values in self.draws.ratios().items()}
+        """By name (`Draws.ratios`); those of natural frequencies stay open until two were heard in chatter."""
+        found = {name: _interval(values, self.weights) for name, values in self.draws.ratios().items()}
+        if self.frequencies >= SETTLED:
+            return found
+        return {name: one.no_narrower(*OPEN) if name.startswith("frequency") else one for name, one in found.items()}
 
     @property
     def frequencies(self) -> int:
@@ -106,7 +115,7 @@ def learn(middle: MillingRows, doubt: Doubt, cuts: Sequence[Observed], count: in
 
 def _log(cut: Observed, draws: Draws) -> Floats:
     """Logarithm of the likelihood of one cut; an old one counts less, the more the frequency has moved since."""
-    return log_likelihood(cut, predicted(cut, draws), cut.cut.teeth * cut.speed_rpm / 60)
+    return cut.weight * log_likelihood(cut, predicted(cut, draws), cut.cut.teeth * cut.speed_rpm / 60)
 
 
 def _weights(log: Floats) -> Floats:

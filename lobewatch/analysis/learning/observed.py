@@ -8,6 +8,9 @@ from enum import StrEnum
 
 from lobes import Cut
 
+AGED = 0.02
+"""Change of the natural frequency, relative, after which a cut says less of the spindle as it is now."""
+
 
 class Heard(StrEnum):
     """What a cut sounded like."""
@@ -42,6 +45,11 @@ class Observed:
     """Natural frequency at rest when it was made, over that of now."""
     id: str = ""
     """In the journal."""
+
+    @property
+    def weight(self) -> float:
+        """Of what it says: less, the more the natural frequency has moved since."""
+        return math.exp(-(((self.moved - 1) / AGED) ** 2) / 2)
 
     @property
     def chatters(self) -> bool:

@@ -26,8 +26,7 @@ def likelihood(mill: Mill, seen: Observed, learnt: Learnt) -> np.ndarray:
 def test_the_prior_is_that_of_the_design(mill: Mill) -> None:
     found = mill.prior.intervals
     assert found["frequency_x"].mean == pytest.approx(0.985, abs=0.003)
-    assert 0.935 < found["frequency_y"].low < 0.948
-    assert 1.022 < found["frequency_y"].high < 1.036
+    assert found["frequency_y"].std == pytest.approx(0.0237, rel=0.1)
     assert (found["damping_x"].mean, found["damping_x"].std) == pytest.approx((1.1, 0.275), rel=0.08)
     assert (found["stiffness_y"].mean, found["stiffness_y"].std) == pytest.approx((1.0, 0.10), rel=0.08)
     assert (found["tangential"].mean, found["tangential"].std) == pytest.approx((1.1, 0.355), rel=0.09)
@@ -102,6 +101,7 @@ def test_chatter_teaches_the_frequency_of_the_direction_that_it_is_of() -> None:
 def test_three_frequencies_notice_what_is_far_from_the_prior_and_one_does_not() -> None:
     mill = Mill(frequency=(0.985, 0.905))
     learnt = mill.prior.hearing(mill.hear(9500, 3e-3))
+    assert learnt.intervals["frequency_y"].low < 0.92
     for speed in (11000, 13500):
         learnt = learnt.hearing(mill.hear(speed, 3e-3))
     assert learnt.intervals["frequency_y"].high < 0.945

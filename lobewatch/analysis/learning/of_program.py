@@ -68,7 +68,9 @@ def lesson(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequ
     start = prior(middle_row(as_program(table, machine), assembly), doubt_of(assembly, table, machine))
     learnt, odd = learn_from_sound(start, seen)
     cut = machine.build_cut(table)
-    own = tuple(one for one in seen if one.material == 0 and _geometry(one) == (cut.teeth, cut.immersion, cut.direction))
+    own = tuple(
+        one for one in seen if one.material == 0 and _geometry(one) == (cut.teeth, cut.immersion, cut.direction)
+    )
     return Lesson(table, start, learnt, odd, own)
 
 

@@ -12,7 +12,7 @@ COMMANDS = {
     "include": "Take a tap test back into the series that lobewatch exclude has taken out.",
     "history": "All tap tests of a machine with what they say, those excluded, and what was done to it, oldest first.",
     "observe": "Write down what was heard of a test cut by ear: that it was stable, or that it chattered.",
-    "suggest": "The next test cut of a program: the one that is worth most, of those that are more likely stable than not.",
+    "suggest": "The next test cut of a program: the one worth most, of those that are more likely stable than not.",
     "modes": "Natural frequency, damping ratio and stiffness from one recorded file.",
     "convert": "A recorded file written for other programs: universal file, text table, MATLAB, SEP005.",
     "model": "The spindle model: modes, stiffness, critical speed; with another tool in it, predicted before it is "

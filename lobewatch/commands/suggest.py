@@ -17,7 +17,7 @@ def suggest(
     cuts: Annotated[int, typer.Option(min=1, help="Test cuts that shall be made in all.")] = 5,
     as_json: Json = False,
 ) -> None:
-    """The next test cut of a program: the one that is worth most, of those that are more likely stable than not.
+    """The next test cut of a program: the one worth most, of those that are more likely stable than not.
 
     Cuts that were heard (lobewatch observe) say what the spindle is like when it turns, and how hard the material is
     to cut. Says what was learnt of both, beside what was known before.
@@ -29,7 +29,7 @@ def suggest(
     """
     from lobewatch.analysis import Logbook
     from lobewatch.analysis.learning.of_program import next_cut, program_named
-    from lobewatch.show.learning.describe_learnt import learnt_table, lesson_remarks
+    from lobewatch.show.learning.describe_learnt import learnt_texts, lesson_remarks
     from lobewatch.show.learning.describe_suggestion import suggestion_json, suggestion_lines
     from lobewatch.show.measurements import remark_json, remark_lines
 
@@ -38,11 +38,10 @@ def suggest(
     assembly = logbook.assembly(table.tool)
     found = next_cut(table, assembly, logbook.machine, logbook.cuts, cuts)
     remarks = [*logbook.remarks, *assembly.remarks, *lesson_remarks(found.lesson)]
-    count = len(found.lesson.learnt.cuts)
     emit(
         suggestion_json(found) | {"remarks": [remark_json(remark) for remark in remarks]},
         as_json,
         *suggestion_lines(found, logbook.folder.path),
-        *([f"learnt from {count} cut{'s' if count > 1 else ''}:", learnt_table(found.lesson)] if count else []),
+        *learnt_texts(found.lesson),
         *remark_lines(remarks),
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lobes import Cut
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.learning.contradicting import Contradicting, learn_from_sound
 from lobewatch.analysis.learning.grid import Grid, speeds_between, trusted
@@ -67,10 +68,8 @@ def lesson(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequ
     seen = observed(cuts, table, assembly, machine)
     start = prior(middle_row(as_program(table, machine), assembly), doubt_of(assembly, table, machine))
     learnt, odd = learn_from_sound(start, seen)
-    cut = machine.build_cut(table)
-    own = tuple(
-        one for one in seen if one.material == 0 and _geometry(one) == (cut.teeth, cut.immersion, cut.direction)
-    )
+    cut = _geometry(machine.build_cut(table))
+    own = tuple(one for one in seen if one.material == 0 and _geometry(one.cut) == cut)
     return Lesson(table, start, learnt, odd, own)
 
 
@@ -126,11 +125,11 @@ def _observed(cut: HeardCut, material: int, assembly: Assembly) -> Observed:
 
 
 def _moved(cut: HeardCut, assembly: Assembly) -> float:
-    """Natural frequency when a cut was made over that of now, in the mean of the directions; 1 where it is not known."""
+    """Natural frequency when a cut was made over that of now, in the mean of the directions; 1 where not known."""
     then = [(frequency_at(series, cut.at), series[-1].frequency) for series in assembly.series.values() if series]
     ratios = [before / now for before, now in then if before is not None]
     return float(np.mean(ratios)) if ratios else 1.0
 
 
-def _geometry(one: Observed) -> tuple[int, float, str]:
-    return one.cut.teeth, one.cut.immersion, one.cut.direction
+def _geometry(cut: Cut) -> tuple[int, float, str]:
+    return cut.teeth, cut.immersion, cut.direction

@@ -43,6 +43,12 @@ def _interval_json(one: Interval) -> dict[str, float]:
     return {"mean": one.mean, "low": one.low, "high": one.high, "std": one.std}
 
 
+def learnt_texts(found: Lesson) -> list[str | Table]:
+    """What the cuts have taught; nothing where there are none."""
+    count = len(found.learnt.cuts)
+    return [f"learnt from {count} cut{'s' if count > 1 else ''}:", learnt_table(found)] if count else []
+
+
 def learnt_table(found: Lesson) -> Table:
     """Factors, a line each: before the cuts, and now."""
     made = table("~at speed, over at rest", "before (95 %)", "learnt (95 %)")

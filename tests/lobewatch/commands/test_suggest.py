@@ -46,7 +46,7 @@ def test_cuts_are_suggested_learnt_from_and_come_to_an_end(shop: Shop, run: Any)
     assert kt["std"] < kt["before"]["std"]
     assert not found["learnt"]["frequency_learnt"]
     assert [remark["code"] for remark in found["remarks"]] == ["frequency-not-learnt"]
-    code, text, error = run("suggest", "--program", "A", "--cuts", "1")
+    code, text, _ = run("suggest", "--program", "A", "--cuts", "1")
     assert (code, "1 test cuts are made" in text) == (0, True)
     assert "not learnt" in text
 

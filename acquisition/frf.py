@@ -76,12 +76,17 @@ class Frf:
         return -((2 * np.pi * self.frequency) ** 2) * self.receptance
 
     @property
+    def has_random_error(self) -> bool:
+        """Whether its coherence tells it: of three averages or more."""
+        return self.coherence is not None and self.n_averages >= 3
+
+    @property
     def random_error(self) -> NDArray[np.float64] | None:
         """Normalised random error of |H|, sqrt((1 - g2)/(2 n g2)), shape (n,); None below three averages.
 
         Source: Bendat & Piersol, Random Data, H1 estimate. One or two hits give a coherence of no meaning.
         """
-        if self.coherence is None or self.n_averages < 3:
+        if self.coherence is None or not self.has_random_error:
             return None
         g2 = np.clip(self.coherence, 1e-12, 1.0)
         return np.sqrt((1 - g2) / (2 * self.n_averages * g2))

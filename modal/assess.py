@@ -49,7 +49,7 @@ def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
 
 def _coherence(state: Extraction, mode: Mode) -> float | None:
     frf = state.frf
-    if frf.coherence is None or frf.random_error is None:
+    if frf.coherence is None or not frf.has_random_error:
         return None
     distance = np.abs(frf.frequency - mode.frequency)
     near = distance <= max(mode.damping_ratio * mode.frequency, distance.min())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -153,6 +154,8 @@ def _peaks_at_all_scales(frf: Frf, least: float = 0.0) -> list[_Peak]:
 
 def _running_mean(values: NDArray[Any], length: int) -> NDArray[Any]:
     """Box mean over this many lines, twice."""
+    if length == 1:
+        return values
     return np.asarray(uniform_filter1d(uniform_filter1d(values, length), length))
 
 
@@ -166,16 +169,19 @@ def _is_as_high(new: _Peak, old: _Peak) -> bool:
 
 
 def _peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.float64], least: float) -> list[_Peak]:
-    size = np.abs(mobility)
-    decibel = 20 * np.log10(np.maximum(size, 1e-12 * size.max()))
-    valley = [np.min(decibel)]
-    between_valleys = np.concatenate((valley, decibel, valley))
-    floor = 20 * np.log10(np.maximum(NOISE_MULTIPLE * noise, max(least, 1e-12 * size.max())))
-    from scipy.signal import find_peaks  # takes longer to import than all of modal
+    from scipy.signal import find_peaks, peak_prominences  # take longer to import than all of modal
 
-    tops, found = find_peaks(between_valleys, height=np.concatenate(([0.0], floor, [0.0])), prominence=PROMINENCE_DB)
-    tops -= 1
-    rise = size[tops] * (1 - 10 ** (-found["prominences"] / 20))
+    size = np.abs(mobility)
+    faintest = 1e-12 * size.max()
+    floor = np.maximum(NOISE_MULTIPLE * noise, max(least, faintest))
+    if not np.any(size >= floor):
+        return []
+    valley = [size.min()]
+    between_valleys = np.concatenate((valley, size, valley))
+    tops, _ = find_peaks(between_valleys, height=np.concatenate(([0.0], floor, [0.0])))
+    prominence, _, _ = peak_prominences(20 * np.log10(np.maximum(between_valleys, faintest)), tops)
+    tops, prominence = tops[prominence >= PROMINENCE_DB] - 1, prominence[prominence >= PROMINENCE_DB]
+    rise = size[tops] * (1 - 10 ** (-prominence / 20))
     high = tops[(rise > NOISE_MULTIPLE * noise[tops]) & (tops > 0) & (tops < size.size - 1)]
     return [_peak(frf, mobility, size, int(top), float(noise[top])) for top in high]
 
@@ -184,8 +190,8 @@ def _peak(frf: Frf, mobility: NDArray[np.complex128], size: NDArray[np.float64],
     """size: of the mobility."""
     f = frf.frequency
     below, above = _lines_down(size[top::-1]), _lines_down(size[top:])
-    low, high = top - int(np.ceil(below)), top + int(np.ceil(above))
-    lower, upper = np.interp([top - below, top + above], np.arange(f.size), f)
+    low, high = top - math.ceil(below), top + math.ceil(above)
+    lower, upper = np.interp([top - below, top + above], np.arange(low, high + 1), f[low : high + 1])
     turn = np.angle((mobility[high] - mobility[top]) / (mobility[top] - mobility[low]))
     return _Peak(
         resonance=Resonance(float(f[top]), float(min(f[top] - lower, upper - f[top])), float(size[top])),
@@ -197,7 +203,7 @@ def _peak(frf: Frf, mobility: NDArray[np.complex128], size: NDArray[np.float64],
 
 def _mean_coherence(frf: Frf, lines: slice) -> float:
     """1 where no coherence of meaning is known."""
-    if frf.coherence is None or frf.random_error is None:
+    if frf.coherence is None or not frf.has_random_error:
         return 1.0
     return float(np.mean(frf.coherence[lines]))
 

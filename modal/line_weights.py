@@ -23,9 +23,10 @@ def line_weights(frf: Frf) -> NDArray[np.float64]:
     averaged over neighbouring lines). Else it is taken as equal on all lines of the quantity that was measured.
     """
     factor = measuring_factor(frf)
-    if frf.random_error is None:
+    error = frf.random_error
+    if error is None:
         return factor
-    variance = _smoothed((frf.random_error * np.abs(frf.receptance) * factor) ** 2)
+    variance = _smoothed((error * np.abs(frf.receptance) * factor) ** 2)
     mean = np.mean(variance)
     return factor if mean == 0 else factor / np.sqrt(np.maximum(variance, LEAST_VARIANCE * mean) / mean)
 

@@ -11,7 +11,7 @@ from modal.extraction import Array, FittedBand
 from modal.fit_peaks import LEAST_SHARE, are_modes
 from modal.fitting import MOST_TERMS, BandFit, fit_band, gain_of_a_term
 from modal.poles import physical_poles
-from modal.quality.systematic import systematic
+from modal.quality.systematic import leaves_rounding, systematic
 
 BLOCKS = 48
 """Runs of lines that the means of what a fit leaves are looked at in."""
@@ -30,9 +30,9 @@ HIDDEN_ERROR = 1 / 6
 def look_closer(band: FittedBand) -> FittedBand:
     """The band with those modes added that have no peak of their own, where the sum of squares asks for them.
 
-    The same where its fit leaves nothing but independent errors.
+    The same where its fit leaves nothing but independent errors, or rounding.
     """
-    if _is_white(band.fit):
+    if _is_white(band.fit) or leaves_rounding(band):
         return band
     bent = _with_terms(band)
     for starts in _more_modes(band, split=bent.terms > band.terms):

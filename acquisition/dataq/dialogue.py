@@ -69,6 +69,11 @@ class DataqDialogue:
                 return True
         return False
 
+    def settle(self) -> None:
+        """Wait for an echo and for what follows it: nothing that the device sent before is on its way any more."""
+        self.ask("info 0")
+        self.drain()
+
     def identify(self) -> DataqIdentity:
         """Who the device is; DeviceError for one that is not of this family."""
         maker, model, firmware, serial, dividend = (self.ask(f"info {i}") for i in (0, 1, 2, 6, 9))

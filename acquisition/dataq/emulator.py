@@ -53,6 +53,8 @@ class DataqTraits:
     """Inputs are converted one after the other within a scan, not at once."""
     echoes_stop: bool = False
     """A `stop` that ends scanning is echoed."""
+    stop_takes: float = 0.0
+    """It sends nothing for so long before that echo and what it still had to send (s)."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +132,7 @@ class DataqEmulator(EmulatorThread):
         if self.streaming:
             if line == "stop":
                 self.streaming = False
+                time.sleep(self._traits.stop_takes)
                 if self._traits.echoes_stop:
                     self._say(line)
             return

@@ -74,6 +74,7 @@ class DataqSource:
         self.overflows = 0
         self._decoder = ScanDecoder(len(inputs), digital_word, digital_clock)
         self._next_scan = self._overruns = 0
+        self._has_sent = False
         self._heard = 0.0
         self._link = SerialLink(port)
         self._dialogue = DataqDialogue(self._link)
@@ -98,7 +99,9 @@ class DataqSource:
 
     def start(self) -> None:
         """Begin an endless stream."""
-        self._next_scan = 0
+        if self._has_sent:
+            self._dialogue.settle()
+        self._has_sent, self._next_scan = True, 0
         self._heard = time.monotonic()
         self._decoder.begin()
         self._link.write(encode_command("start"))  # no echo: the stream begins
@@ -151,6 +154,7 @@ class DataqSource:
         self.status = DataqStatus.OVERFLOW
         self.overflows += 1
         self._dialogue.halt()
+        self._dialogue.settle()
         self._link.write(encode_command("start"))
         self._overruns = self._link.overruns
         self._decoder.begin(lost=max(round((time.monotonic() - self._heard) * self.sample_rate), 1))

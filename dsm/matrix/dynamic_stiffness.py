@@ -132,6 +132,17 @@ class DynamicStiffness:
         found = np.linalg.solve(matrices * (scale * self.scale), scale * right)
         return np.asarray(scale * found, dtype=matrices.dtype)
 
+    def solve_nearly(self, matrices: NDArray[Number], right: NDArray[Number]) -> NDArray[Number]:
+        """The same for inverse iteration: of matrices that are singular, of those that are equal but for rounding.
+
+        Peters and Wilkinson, SIAM Review 21 (1979): a pivot of zero may be replaced by one of rounding's size.
+        """
+        try:
+            return self.solve(matrices, right)
+        except np.linalg.LinAlgError:
+            rounding = np.diag(np.finfo(np.float64).eps / self.scale**2)
+            return self.solve(np.asarray(matrices + rounding, dtype=matrices.dtype), right)
+
     def term(self, power: int) -> NDArray[np.float64]:
         """Coefficient of one power of the eigenvalue in K, a full matrix of shape (2 n_nodes, 2 n_nodes)."""
         return np.asarray(

@@ -83,7 +83,9 @@ class DampedShaft:
 
     def _step(self, trial: complex, stiffness: _Complex, by_w: _Complex, shape: _Complex) -> tuple[complex, _Complex]:
         at = np.array([trial], dtype=np.complex128)
-        w, moved, energy = newton_step(at, stiffness[np.newaxis], by_w[np.newaxis], shape[np.newaxis], self.model.solve)
+        w, moved, energy = newton_step(
+            at, stiffness[np.newaxis], by_w[np.newaxis], shape[np.newaxis], self.model.solve_nearly
+        )
         return complex(w[0]), moved[0] / np.sqrt(energy[0])
 
     def matrices(self, damping: Damping, w: complex) -> tuple[_Complex, _Complex]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from acquisition import UNSAID, Conditions, Description, Remark, TapTest
-from lobewatch.analysis.assembling import first_like, or_reason, predicted
+from lobewatch.analysis.assembling import first_like, or_reason
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.cache.history_cache import HistoryCache
 from lobewatch.analysis.cache.kept_rows import of_older_versions
@@ -27,6 +27,7 @@ from lobewatch.analysis.replaying.store import Stored, store_recordings
 from lobewatch.analysis.standing import Standing, stand
 from lobewatch.machine import Machine, MachineFolder, TapEntry
 from lobewatch.machine.archive.verify import enter_explained
+from lobewatch.machine.cuts.heard_cut import HeardCut
 
 
 class Logbook:
@@ -74,6 +75,11 @@ class Logbook:
         """The committed tap tests whose files can be used, oldest first by their time."""
         return [place.entry for place in self.files.places]
 
+    @property
+    def cuts(self) -> tuple[HeardCut, ...]:
+        """The test cuts that something can be learnt from, oldest first."""
+        return tuple(cut for cut in self.files.cuts if cut.counts)
+
     def series(self, tool: str, direction: str) -> list[TapEntry]:
         """Tap tests of one tool and direction, oldest first."""
         return [tap for tap in self.taps if (tap.tool, tap.direction) == (tool, direction)]
@@ -87,8 +93,7 @@ class Logbook:
         if not self.is_current:
             self._forget()
         asked = clock_questions(tap.circumstances.created, now, self.taps)
-        self.files.add(self.folder.commit(tap, asked))
-        self._forget_results()
+        self._forget_results(goes_on=self.files.add(self.folder.commit(tap, asked)))
         self._mark = self.folder.mark
 
     def replay(
@@ -149,9 +154,8 @@ class Logbook:
         until = rows[-1].tap_id if until is None and self.history.current else until
         judged = self.judged.setdefault(until, {})
         missing = [table for table in tables if table.name not in judged]
-        known = {
-            tool: or_reason(partial(self.assembly, tool, until)) for tool in dict.fromkeys(one.tool for one in missing)
-        }
+        tools = dict.fromkeys(one.tool for one in missing)
+        known = {tool: or_reason(partial(self.assembly, tool, until)) for tool in tools}
         judged |= {table.name: judge(table, known[table.tool], self.machine) for table in missing}
         return [judged[table.name] for table in tables]
 
@@ -213,8 +217,9 @@ class Logbook:
         self._forget_results()
         self._mark = self.folder.mark
 
-    def _forget_results(self) -> None:
-        self._history, self._worked_out, self.judged = None, None, {}
+    def _forget_results(self, goes_on: bool = False) -> None:
+        self._history, self.judged = None, {}
+        self._worked_out = self._worked_out if goes_on else None
 
     def _known_history(self) -> History:
         if self._history is None:
@@ -226,8 +231,7 @@ class Logbook:
     def _up_to_date(self) -> History:
         """The stored rows as far as they still hold, and those that are missing."""
         history = self._cache.read(self.files)
-        rows = self._all.with_all(history.rows, self._cache.others, self._cache.behind)
-        history = replace(history, rows=rows)
+        history = replace(history, rows=self._all.with_all(history.rows, self._cache.others, self._cache.behind))
         return without_last_word(history) if history.rows and self.files.doubts() else history
 
     def _assembly(self, tool: str | None, until: str | None) -> Assembly:
@@ -235,11 +239,7 @@ class Logbook:
         if not known:
             self.newest(tool)
         tool, rows = known[-1].entry.tool if tool is None else tool, self.history.rows
-        newest = next((place for place in reversed(known) if place.entry.tool == tool), None)
-        if newest is not None:
-            found = self._all.assembled(newest, rows)
-        else:
-            found = predicted(self.machine, known, rows, lambda place: self._all.measured(place, rows), tool)
+        found = self._all.tool_in(known, rows, tool)
         doubts = self.files.doubts("" if found.predicted else tool) if known[-1] is self.files.places[-1] else ()
         return replace(found, questions=(*found.questions, *doubts))
 

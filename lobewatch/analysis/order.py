@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import datetime
 
 import msgspec
@@ -31,20 +31,38 @@ class Place(msgspec.Struct, frozen=True, gc=False):
     """Where the series or the drawbar force is not that of the test before."""
 
 
-def places(taps: Sequence[TapEntry], baselines: Sequence[datetime] = ()) -> list[Place]:
-    """taps, baselines: oldest first."""
-    newest: dict[str, dict[str, int]] = {}
-    mountings, found = Mountings(), list[Place]()
-    for i, tap in enumerate(taps):
-        baseline = _before(tap, baselines) if baselines else None
+class Order:
+    """The places of tap tests that are shown in order of time."""
+
+    def __init__(self, baselines: Sequence[datetime] = ()) -> None:
+        """baselines: oldest first. None is shown yet."""
+        self.places: list[Place] = []
+        """Of those that were shown."""
+        self._baselines = baselines
+        self._newest: dict[str, dict[str, int]] = {}
+        self._mountings = Mountings()
+
+    def add(self, tap: TapEntry) -> None:
+        """The next one."""
+        found, number = self.places, len(self.places)
+        baseline = _before(tap, self._baselines) if self._baselines else None
         if found and found[-1].baseline != baseline:
-            newest, mountings = {}, Mountings()
-        series, said = mountings.place(tap)
-        mine = newest.setdefault(series, {})
-        other = max((j for direction, j in mine.items() if direction != tap.direction), default=None)
-        found.append(Place(i, tap, mine.get(tap.direction), other, baseline, series, said))
-        mine[tap.direction] = i
-    return found
+            self._newest, self._mountings = {}, Mountings()
+        series, said = self._mountings.place(tap)
+        mine, other = self._newest.setdefault(series, {}), None
+        for direction, newest in mine.items():
+            if direction != tap.direction and (other is None or newest > other):
+                other = newest
+        found.append(Place(number, tap, mine.get(tap.direction), other, baseline, series, said))
+        mine[tap.direction] = number
+
+
+def places(taps: Iterable[TapEntry], baselines: Sequence[datetime] = ()) -> list[Place]:
+    """taps, baselines: oldest first."""
+    order = Order(baselines)
+    for tap in taps:
+        order.add(tap)
+    return order.places
 
 
 def _before(tap: TapEntry, baselines: Sequence[datetime]) -> datetime | None:

@@ -1,7 +1,7 @@
 """The commands of the command line, one a module."""
 
 COMMANDS = {
-    "demo": "A simulated spindle ages over 24 months, tapped in x and y; ends with its report.",
+    "demo": "A simulated spindle ages over 24 months, tapped in x and y; a forecast beside the truth, a report.",
     "init": "Make a machine folder with a commented machine.toml to fill in.",
     "ports": "Serial ports, and which DAQ answers there.",
     "sensors": "Hammer, accelerometer and DAQ: what they are, and whether they are right.",
@@ -11,11 +11,13 @@ COMMANDS = {
     "exclude": "Take a tap test out of the series: all results are as if it had never been taken.",
     "include": "Take a tap test back into the series that lobewatch exclude has taken out.",
     "history": "All tap tests of a machine with what they say, those excluded, and what was done to it, oldest first.",
+    "observe": "Write down what was heard of a test cut by ear: that it was stable, or that it chattered.",
+    "suggest": "The next test cut of a program: the one worth most, of those that are more likely stable than not.",
     "modes": "Natural frequency, damping ratio and stiffness from one recorded file.",
     "convert": "A recorded file written for other programs: universal file, text table, MATLAB, SEP005.",
     "model": "The spindle model: modes, stiffness, critical speed; with another tool in it, predicted before it is "
     "tapped.",
-    "calibrate": "Bearing stiffness for measured natural frequencies; nothing is stored.",
+    "calibrate": "Stiffness of bearings and joints for measured natural frequencies; nothing is stored.",
     "lobes": "Stability lobes of the newest tap tests, drawn beside those of the first, and the pockets that are safe.",
     "check": "Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.",
     "report": "One HTML file with everything in it: what has changed, which programs still hold, lobes then and now.",

@@ -13,7 +13,10 @@ from lobewatch.show.output import Json, emit
 
 def exclude(
     machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
-    tap: Annotated[str, typer.Argument(help="The tap test: its identity, its file, or a part that no other has.")],
+    tap: Annotated[
+        str,
+        typer.Argument(help="The tap test: its identity, its file, or a part that no other has; or a test cut, c1."),
+    ],
     reason: Annotated[str, typer.Option(help="Why it does not count.")],
     as_json: Json = False,
 ) -> None:

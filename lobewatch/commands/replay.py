@@ -110,7 +110,7 @@ def replay(
     workers = Workers(jobs, scheduler)
     logbook, (found, passed) = Logbook.open(machine), found_files(files)
     if dry_run:
-        show_preview(logbook, found, passed, said, as_json=as_json)
+        show_preview(logbook, found, passed, said, workers=workers, as_json=as_json)
         return
     with telling(logbook):
         show_replay(logbook, found, passed, said, accept or (), workers=workers, keep_going=keep_going, as_json=as_json)

@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 from lobes import RadialLobes
 from lobewatch.analysis import Setting, Verdict, Word
 from lobewatch.analysis.programs.limit_band import LimitBand
+from lobewatch.machine.cuts.heard_cut import HeardCut
 from lobewatch.show.figures import ALARM, GOOD, NOW, THEN, UNKNOWN, new_axes
+from lobewatch.show.programs.heard import draw_heard
 from lobewatch.show.programs.labels import Labels
 
 Floats = NDArray[np.float64]
@@ -50,16 +52,18 @@ def lobes_figure(
     title: str = "",
     band: LimitBand | None = None,
     pockets: Sequence[Setting] = (),
+    heard: Sequence[HeardCut] = (),
 ) -> Figure:
     """Stability lobe diagram: the last of `depths` (m, by label) is now, those before it are first tap tests.
 
-    band: how far the doubt moves the line of now; pockets: settings that are recommended.
+    band: how far the doubt moves the line of now; pockets: settings that are recommended; heard: test cuts of it.
     """
     figure, (axes,) = new_axes(1, (8.0, 4.6))
     *earlier, now = depths.items()
     finite = now[1][np.isfinite(now[1])] * 1e3
-    wanted = [*(1.3 * one.program.depth_mm for one in programs), *(1.3 * one.depth_mm for one in pockets)]
-    top = max([5 * float(finite.min()) if finite.size else 1.0, *wanted])
+    wanted = [one.program.depth_mm for one in programs] + [one.depth_mm for one in pockets]
+    wanted += [1e3 * one.depth for one in heard]
+    top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * depth for depth in wanted)])
     low, high = (now[1], now[1]) if band is None else (band.low, band.high)
     low, high = (np.minimum(edge * 1e3, 2 * top) for edge in (low, high))
     axes.fill_between(speed_rpm, high, 2 * top, color=NOW, alpha=0.10, lw=0)
@@ -70,6 +74,7 @@ def lobes_figure(
         axes.plot(speed_rpm, depth * 1e3, color=THEN, ls="--", lw=1.2, label=f"{label}, first tap tests")
     axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
     labels = Labels(axes)
+    draw_heard(axes, heard, labels)
     for i, pocket in enumerate(pockets):
         _draw_pocket(axes, pocket, labels, WINDOW if i == 0 else "")
     for program in programs:

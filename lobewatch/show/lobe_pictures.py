@@ -15,8 +15,10 @@ from lobewatch.analysis import Chart, LobeComparison, Logbook, Method, Row, char
 from lobewatch.analysis.columns.row_lobes import row_lobes
 from lobewatch.analysis.programs.limit_band import limit_band
 from lobewatch.machine import Machine
+from lobewatch.machine.cuts.heard_cut import HeardCut
 from lobewatch.show.figures import save_figure
 from lobewatch.show.figures_lobes import lobes_figure, radial_figure, waterfall_figure
+from lobewatch.show.programs.heard import heard_of
 
 IMMERSIONS = np.linspace(0.05, 1.0, 39)
 MOST_LINES = 200
@@ -34,7 +36,7 @@ def save_pictures(
     """Write the pictures that have a file, all or none; returns what is to be said of them."""
     pictures, remarks = list[tuple[Figure, Path]](), list[Remark]()
     if figure is not None:
-        pictures.append((lobes_picture(logbook.machine, found), figure))
+        pictures.append((lobes_picture(logbook.machine, found, logbook.cuts), figure))
     if radial is not None:
         picture, about = radial_picture(logbook.machine, found.now, method)
         pictures.append((picture, radial))
@@ -46,13 +48,14 @@ def save_pictures(
     return remarks
 
 
-def lobes_picture(machine: Machine, found: LobeComparison) -> Figure:
-    """The diagram now in its doubt, beside the one then, with safe settings and the programs of this same cut."""
+def lobes_picture(machine: Machine, found: LobeComparison, cuts: Sequence[HeardCut]) -> Figure:
+    """The diagram now in its doubt, beside the one then, with safe settings, programs and test cuts of the same cut."""
     now = found.now
     depths = {one.assembly.label: one.lobes.depth for one in (found.then, now) if one is not None}
     title = f"{_title(machine, now)}, from the {now.source}"
     band = limit_band(now.lobes, now.name, now.assembly, machine)
-    return lobes_figure(now.lobes.speed_rpm, depths, found.verdicts, title, band, found.pockets)
+    heard = heard_of(cuts, now.name, now.assembly.tool, now.cuts[0])
+    return lobes_figure(now.lobes.speed_rpm, depths, found.verdicts, title, band, found.pockets, heard)
 
 
 def _title(machine: Machine, now: Chart) -> str:

@@ -12,22 +12,21 @@ import numpy as np
 
 from acquisition import Frf, Remark, TapTest, joined
 from dsm import plus_minus
-from lobewatch.analysis import ABOUT_DIRECTIONS, Assembly, Logbook, Row, Word, lobes_of
+from lobewatch.analysis import ABOUT_DIRECTIONS, Assembly, Logbook, Row, Word
 from lobewatch.analysis.decay.fallen import change_since_start, start
 from lobewatch.analysis.decay.outlook import Outlook, outlook
 from lobewatch.analysis.decay.preload import preload_of
-from lobewatch.analysis.programs.limit_band import limit_band
 from lobewatch.machine import Machine
 from lobewatch.show.advice import Advised, advised, advised_lines, decay_text
 from lobewatch.show.figures import frf_figure, svg
-from lobewatch.show.figures_lobes import lobes_figure, waterfall_figure
 from lobewatch.show.history.trends import Picture, trends
 from lobewatch.show.history.under import conditions_texts
 from lobewatch.show.programs.doubts import reading_lines
-from lobewatch.show.reporting.figure_data import lobe_numbers, response_numbers
+from lobewatch.show.reporting.figure_data import response_numbers
 from lobewatch.show.reporting.first_screen import first_screen
-from lobewatch.show.reporting.lists import series_lines, tap_lines, tap_numbers
-from lobewatch.show.reporting.lobe_course import LobeCourse, lobe_course
+from lobewatch.show.reporting.lists import cut_lines, series_lines, tap_lines, tap_numbers
+from lobewatch.show.reporting.lobe_course import lobe_course
+from lobewatch.show.reporting.lobe_figures import lobe_figures, pocket_figures
 from lobewatch.show.reporting.page import page, write_page
 from lobewatch.show.trends.dates import ASSUMED
 from lobewatch.show.trends.describe_trend import dates_rows, preload_text, sentence
@@ -88,6 +87,7 @@ def _content(logbook: Logbook, rows: Sequence[Row], found: Outlook) -> dict[str,
         "until": _until(found, last),
         "series": series_lines(found.standing),
         "taps": tap_lines(logbook),
+        "cuts": cut_lines(logbook),
         "tap_numbers": tap_numbers(logbook),
         "changes": _changes(rows),
         "preload": preload_text(left) if (left := preload_of(rows, machine)) else "",
@@ -96,8 +96,8 @@ def _content(logbook: Logbook, rows: Sequence[Row], found: Outlook) -> dict[str,
         **_newest(now, last),
         "figures": [
             *course.pictures,
-            *_lobes(logbook, assembly, programs),
-            *_pockets(lobes),
+            *lobe_figures(logbook, assembly, programs),
+            *pocket_figures(lobes),
             _response(logbook.folder.read(entries[rows[0].tap_id]).frf if len(rows) > 1 else None, now.frf, machine),
         ],
         "course": lobes,
@@ -140,43 +140,6 @@ def _remarks(last: Row, assembly: Assembly) -> list[Remark]:
     """Of the newest test of the series, and of x and y of its tool as they are known now."""
     own = [remark for remark in last.remarks if remark.code not in ABOUT_DIRECTIONS]
     return joined([*own, *(remark for remark in assembly.remarks if remark.code in ABOUT_DIRECTIONS)])
-
-
-def _lobes(logbook: Logbook, assembly: Assembly, programs: Sequence[Advised]) -> list[Picture]:
-    """The diagram of the reference cut, or else of the first program of the tool, now and then."""
-    machine = logbook.machine
-    lobes = lobes_of(assembly, machine)
-    if not lobes:
-        return []
-    cut, now = next(iter(lobes.items()))
-    first = logbook.first_assembly(assembly)
-    depths = {} if first is None else {first.label: lobes_of(first, machine)[cut].depth}
-    text = (
-        f"Limit of the {cut} by {now.method}, {' and '.join(assembly.directions)} direction"
-        f"{'s' if len(assembly.directions) > 1 else ' alone'}; cuts above the band chatter. Marks: programs with this "
-        "same cut and their verdicts; boxes: settings recommended instead, as in the table above."
-    )
-    if np.isinf(now.minimum.depth):
-        text = f"The {cut} has no limit in this speed range ({now.method})."
-    cuts = machine.cuts(assembly.tool)
-    same = [one for one in programs if cuts.get(one.verdict.program.name) == cuts[cut]]
-    advice = dict.fromkeys(setting for one in same for setting in (one.advice.best, one.advice.here) if setting)
-    band = limit_band(now, cut, assembly, machine)
-    marks = [one.verdict for one in same]
-    depths |= {assembly.label: now.depth}
-    picture = lobes_figure(now.speed_rpm, depths, marks, "", band, list(advice))
-    edges = {} if band is None else {"lowest": band.low, "highest": band.high}
-    heading = "Stability lobes, then and now" if len(depths) > 1 else "Stability lobes"
-    return [Picture(heading, text, svg(picture), lobe_numbers(now.speed_rpm, depths | edges))]
-
-
-def _pockets(lobes: LobeCourse | None) -> list[Picture]:
-    """The depths over speed and time: how the pockets move."""
-    if lobes is None or not np.isfinite(lobes.depth).any():
-        return []
-    text = f"Limit of the {lobes.cut} by zero order after each tap test; bright is deep."
-    picture = waterfall_figure(lobes.speed_rpm, lobes.times, lobes.depth)
-    return [Picture("Pockets over time", text, svg(picture))]
 
 
 def _response(first: Frf | None, now: Frf, machine: Machine) -> Picture:

@@ -129,7 +129,7 @@ def emulate_machine(
     structure, random = _structure(folder, spindle), np.random.default_rng(seed)
     bench = Bench(
         lambda rate: HammeredStructure(structure, rate, random, Hammering()),
-        _inputs(folder, driver),
+        emulated_inputs(folder, driver),
         SAMPLE_RATE,
         realtime,
         tcp,
@@ -145,7 +145,8 @@ def _structure(folder: MachineFolder, other: Spindle | None) -> Structure:
     return emulated_structure(other or spindle.build(), spindle.damping_ratio, folder.machine.tap.position_mm / 1e3)
 
 
-def _inputs(folder: MachineFolder, driver: Driver) -> tuple[SensorInput, ...]:
+def emulated_inputs(folder: MachineFolder, driver: Driver) -> tuple[SensorInput, ...]:
+    """Sensors on an emulated device; DataError where machine.toml lacks those that the device does not describe."""
     if driver.sensors is not None:
         return tuple(SensorInput(number, channel) for number, channel in enumerate(CHANNELS))
     inputs = folder.machine.daq.settings.inputs

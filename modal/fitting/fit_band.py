@@ -111,11 +111,12 @@ def _solved(band: ProjectedBand, starts: Array, is_complex: bool) -> State | Non
 def _step(state: State, damping: float) -> tuple[Array, float]:
     """Damped Gauss-Newton step in units of the scale, shape (2 m,), and the fall of the cost that it promises."""
     jacobian = state.jacobian
-    norm = np.linalg.norm(jacobian, axis=0)
-    gram = (jacobian.T @ jacobian) / np.outer(norm, norm) + damping * np.eye(norm.size)
-    step = np.linalg.solve(gram, -(jacobian.T @ state.residual) / norm) / norm
-    change = jacobian @ step
-    return step, float(change @ change)
+    gram = jacobian.T @ jacobian
+    norm = np.sqrt(np.diagonal(gram))
+    scaled = gram / (norm[:, np.newaxis] * norm)
+    scaled.flat[:: norm.size + 1] += damping
+    step = np.linalg.solve(scaled, -(jacobian.T @ state.residual) / norm) / norm
+    return step, float(step @ gram @ step)
 
 
 def _influence(state: State) -> Array | None:

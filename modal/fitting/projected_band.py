@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from modal.fitting.band_fit import Array, ComplexArray, split
-from modal.fitting.residual_terms import residual_terms
+from modal.fitting.residual_terms import residual_powers
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +113,17 @@ class ProjectedBand:
 
 def projected_band(frequency: Array, receptance: ComplexArray, weight: Array, terms: int) -> ProjectedBand:
     """frequency (Hz) has shape (n,), receptance (m/N) and weight (p, n)."""
-    columns = residual_terms(frequency, terms)
-    bases = [np.linalg.qr(split(w * columns).T)[0] for w in weight]
+    columns = residual_powers(frequency, terms)
+    bases = [_of_both_parts(np.linalg.qr((w * columns).T)[0]) for w in weight]
     data = [_without(base, values) for base, values in zip(bases, split(weight * receptance), strict=True)]
     return ProjectedBand(frequency, weight, bases, data)
+
+
+def _of_both_parts(base: Array) -> Array:
+    """From a basis of real parts (n, t), which is that of imaginary parts too, one of both, (2 n, 2 t)."""
+    (n, t), both = base.shape, np.zeros((2 * base.shape[0], 2 * base.shape[1]))
+    both[:n, :t] = both[n:, t:] = base
+    return both
 
 
 def _columns(frequency: Array, poles: Array, is_complex: bool) -> tuple[ComplexArray, ComplexArray]:

@@ -19,8 +19,14 @@ MOST_TERMS = len(POWERS)
 
 def residual_terms(frequency: Array, terms: int) -> NDArray[np.complex128]:
     """The first powers of the frequency, each real and imaginary, shape (2 terms, n)."""
-    powers = (frequency / np.mean(frequency)) ** np.array([POWERS[:terms]], dtype=float).T
+    powers = residual_powers(frequency, terms)
     return np.concatenate([powers, 1j * powers])
+
+
+def residual_powers(frequency: Array, terms: int) -> Array:
+    """The first powers of the frequency, shape (terms, n)."""
+    square = (frequency / np.mean(frequency)) ** 2
+    return np.stack([square ** (power // 2) for power in POWERS[:terms]])
 
 
 def gain_of_a_term(fit: BandFit, frequency: Array, weight: Array, terms: int) -> float:

@@ -41,13 +41,18 @@ def systematic(band: FittedBand) -> Systematic:
     fit, size = band.fit, len(band.fit.influence)
     none = Systematic(1.0, fit.freedom, np.zeros((size, size)))
     independent = _independent_values(fit)
-    scale = np.linalg.norm(band.data.own * band.data.weight)
     is_white = independent > fit.freedom * (1 - SIGNIFICANT / np.sqrt(fit.residual.size / 2))
-    if is_white or fit.sum_of_squares < (ROUNDING * scale) ** 2:
+    if is_white or leaves_rounding(band):
         return none
     moved = np.array([_moved(fit, other) for other in _others(band)]).reshape(-1, size)
     most = np.max(np.abs(moved), axis=0, initial=0.0)
     return Systematic(max(fit.freedom / independent, 1.0), min(fit.freedom, independent), np.diag(most**2))
+
+
+def leaves_rounding(band: FittedBand) -> bool:
+    """Whether its fit leaves so little that it means nothing."""
+    scale = np.linalg.norm(band.data.own * band.data.weight)
+    return bool(band.fit.sum_of_squares < (ROUNDING * scale) ** 2)
 
 
 def _independent_values(fit: BandFit) -> float:

@@ -175,6 +175,21 @@ def test_bounce_of_a_disc_half_a_micrometre_thick() -> None:
         assert determinant(flat, frequency * (1 - 1e-7)) * determinant(flat, frequency * (1 + 1e-7)) < 0
 
 
+@pytest.mark.parametrize("apart_um", [2.0, 2.06, 2.1])
+def test_rocking_on_two_bearings_two_micrometres_apart(apart_um: float) -> None:
+    """Some 0.02 Hz; the matrix beside such a mode is singular to working precision."""
+    segments = [
+        Segment(0.047, 0.052),
+        Segment(0.047, 0.047, 0.033),
+        Segment(0.0094, 0.129, 0.039),
+        Segment(0.0071, 0.106),
+    ]
+    bearings = [Bearing(0.1048, 4.75e7, housing_stiffness=3.6e8), Bearing(0.1048 + apart_um / 1e6, 8.6e7)]
+    shaft = Spindle(segments, bearings, theory="timoshenko")
+    rocking = float(natural_frequencies(shaft, 1)[0])
+    assert determinant(shaft, rocking * (1 - 3e-7)) * determinant(shaft, rocking * (1 + 3e-7)) < 0
+
+
 def test_modes_of_a_stiff_shaft_on_soft_bearings() -> None:
     """The stiffness of the shaft is 1e8 times that of the bearings: links throughout."""
     assert_exact(Spindle([Segment(0.03, 0.06), Segment(0.03, 0.1)], [Bearing(0.01, 1e5), Bearing(0.05, 3e4)]))

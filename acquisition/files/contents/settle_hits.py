@@ -108,8 +108,8 @@ def _rate(signals: Sequence[Signal], used: Sequence[Signal], said: Description, 
     if rates and max(rates) > min(rates) * (1 + SAME_RATE):
         ledger.faults.append(f"its channels differ in sample rate: {min(rates):g} and {max(rates):g} Hz")
         return 0.0
-    in_file = rates[0] if rates else _rate_of_axis(signals, used[0].values.size, ledger)
-    return _agreed(in_file, said.rate, ledger)
+    by_axis = _rate_of_axis(signals, used[0].values.size, ledger)
+    return _agreed(rates[0] if rates else by_axis, said.rate, ledger)
 
 
 def _rate_of_axis(signals: Sequence[Signal], size: int, ledger: Ledger) -> float | None:

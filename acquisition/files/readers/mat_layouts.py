@@ -167,7 +167,7 @@ def _over_time(v: Mapping[str, Any]) -> Contents | None:
     """A time, or a sample rate, and vectors or a matrix of the same length; what they are their names may tell."""
     arrays = {name: value for name, value in v.items() if isinstance(value, np.ndarray) and value.dtype.kind in "fiu"}
     rate = next((float(v[name]) for name in v if _RATE.fullmatch(name) and _is_number(v[name])), None)
-    axis = next((name for name, value in arrays.items() if _TIME.fullmatch(name) and _rises(value)), None)
+    axis = next((name for name in arrays if _TIME.fullmatch(name) and _has_company(name, arrays)), None)
     if rate is None and axis is None:
         return None
     n = arrays[axis].size if axis else max((max(value.shape) for value in arrays.values()), default=0)
@@ -176,6 +176,12 @@ def _over_time(v: Mapping[str, Any]) -> Contents | None:
         Signal(name, values, role_of(name, ""), rate=rate) for name, values in _of_length(arrays, n) if name != axis
     ]
     return Contents(tuple(signals)) if signals else None
+
+
+def _has_company(name: str, arrays: Mapping[str, NDArray[Any]]) -> bool:
+    """Whether it is a vector as long as others: an axis, though its values may be none."""
+    axis = arrays[name]
+    return axis.ndim == 1 and any(axis.size in value.shape for other, value in arrays.items() if other != name)
 
 
 def _is_number(value: Any) -> bool:

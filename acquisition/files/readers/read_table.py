@@ -52,36 +52,59 @@ class Layout:
         return float(word.replace(",", ".") if self.comma else word)
 
 
+@dataclass(frozen=True)
+class Lines:
+    """Some lines of a file."""
+
+    texts: Sequence[str]
+    """Without their ends."""
+    numbers: Sequence[int]
+    """Of each, from 1 on."""
+
+    def __getitem__(self, part: slice) -> Lines:
+        """Some of them."""
+        return Lines(self.texts[part], self.numbers[part])
+
+
 def read_table(path: Path) -> Contents:
     """The columns of a text file; DataError with the line where it is no table."""
-    lines = [(number, line) for number, line in enumerate(text_of(path).splitlines(), 1) if line.strip()]
-    comments = [line.strip()[1:] for _, line in lines if line.lstrip().startswith("#")]
-    lines = [one for one in lines if not one[1].lstrip().startswith("#")]
+    lines, comments = _lines(text_of(path))
     first, layout = _layout(path, lines)
     said = [(key.strip().lower(), value.strip()) for key, _, value in (one.partition(":") for one in comments)]
     layout.keys = dict(said)
     layout.machines = tuple(dict.fromkeys(value for key, value in said if key == "machine" and value))
     rows = lines[first:]
-    behind = _behind(layout, rows)
+    behind = _behind(layout, rows.texts)
     layout.heading = behind or layout.heading
-    width = len(layout.words(rows[-1][1])) if behind else len(_trimmed(layout, rows[0][1]))
+    width = len(layout.words(rows.texts[-1])) if behind else len(_trimmed(layout, rows.texts[0]))
     if layout.heading and not behind and width != len(layout.heading):
-        raise DataError(f"{path}: line {rows[0][0]}: {width} numbers under {len(layout.heading)} headings")
+        raise DataError(f"{path}: line {rows.numbers[0]}: {width} numbers under {len(layout.heading)} headings")
     values = _values(path, layout, rows, width)
     return _contents(path, layout, values)
 
 
-def _layout(path: Path, lines: Sequence[tuple[int, str]]) -> tuple[int, Layout]:
+def _lines(text: str) -> tuple[Lines, list[str]]:
+    """Those that are not empty, and what stands behind # in others."""
+    texts = text.splitlines()
+    if "#" not in text and all(map(str.strip, texts)):
+        return Lines(texts, range(1, len(texts) + 1)), []
+    there = [(line, number) for number, line in enumerate(texts, 1) if line.strip()]
+    comments = [line.strip()[1:] for line, _ in there if line.lstrip().startswith("#")]
+    there = [one for one in there if not one[0].lstrip().startswith("#")]
+    return Lines([line for line, _ in there], [number for _, number in there]), comments
+
+
+def _layout(path: Path, lines: Lines) -> tuple[int, Layout]:
     """Where the rows begin, how they are written, and the heading above them."""
-    first = next((i for i, (_, line) in enumerate(lines) if _starts_with_number(_dialect([line]), line)), None)
-    if first is not None and len(lines) > max(first, 1):
-        layout = _dialect([line for _, line in lines[first:]])
-        layout.heading = _heading(layout, [line for _, line in lines[:first]])
+    texts = lines.texts
+    first = next((i for i, line in enumerate(texts) if _starts_with_number(_dialect([line]), line)), None)
+    if first is not None and len(texts) > max(first, 1):
+        layout = _dialect(texts[first:])
+        layout.heading = _heading(layout, texts[:first])
         return first, layout
-    if len(lines) < 2:
-        raise DataError(f"{path}: {len(lines)} lines; a heading and rows of numbers are needed")
-    number, line = lines[1]
-    raise DataError(f"{path}: line {number}: {line.strip()[:60]!r} is no row of numbers")
+    if len(texts) < 2:
+        raise DataError(f"{path}: {len(texts)} lines; a heading and rows of numbers are needed")
+    raise DataError(f"{path}: line {lines.numbers[1]}: {texts[1].strip()[:60]!r} is no row of numbers")
 
 
 def _dialect(rows: Sequence[str]) -> Layout:
@@ -125,9 +148,9 @@ def _heading(layout: Layout, lines: Sequence[str]) -> list[str]:
     return last
 
 
-def _behind(layout: Layout, rows: Sequence[tuple[int, str]]) -> list[str]:
+def _behind(layout: Layout, rows: Sequence[str]) -> list[str]:
     """The heading behind the numbers of the first row: a name and a unit for each column, or names only."""
-    words, width = layout.words(rows[0][1]), len(_trimmed(layout, rows[-1][1]))
+    words, width = layout.words(rows[0]), len(_trimmed(layout, rows[-1]))
     names = [word for word in words[width:] if word]
     if len(names) == 2 * width:
         pairs = zip(names[::2], names[1::2], strict=True)
@@ -135,26 +158,31 @@ def _behind(layout: Layout, rows: Sequence[tuple[int, str]]) -> list[str]:
     return names if len(names) == width else []
 
 
-def _values(path: Path, layout: Layout, rows: Sequence[tuple[int, str]], width: int) -> NDArray[np.float64]:
+def _values(path: Path, layout: Layout, rows: Lines, width: int) -> NDArray[np.float64]:
     """Shape (n_columns, n_rows)."""
-    known = _at_once(layout, rows, width)
+    known = _at_once(layout, rows.texts, width)
     return _one_by_one(path, layout, rows, width) if known is None else known
 
 
-def _at_once(layout: Layout, rows: Sequence[tuple[int, str]], width: int) -> NDArray[np.float64] | None:
-    """The same where all rows are alike, ten times as fast; None where they have to be looked at one by one."""
-    separator = None if layout.separator == r"\s+" else layout.separator
-    lines = (line.replace(",", ".") if layout.comma else line for _, line in rows)
+def _at_once(layout: Layout, rows: Sequence[str], width: int) -> NDArray[np.float64] | None:
+    """The same where all rows are alike, many times as fast; None where they have to be looked at one by one."""
+    if layout.separator == r"\s+":
+        widths, words = {len(row.split()) for row in rows}, " ".join(rows).split()
+    else:
+        widths = {row.count(layout.separator) + 1 for row in rows}
+        words = layout.separator.join(rows).split(layout.separator)
+    if widths != {width}:
+        return None
     try:
-        values = np.loadtxt(lines, dtype=np.float64, comments=None, delimiter=separator, ndmin=2)
+        values = [*map(float, (word.replace(",", ".") for word in words) if layout.comma else words)]
     except ValueError:
         return None
-    return values.T if values.shape == (len(rows), width) else None
+    return np.array(values).reshape(len(rows), width).T
 
 
-def _one_by_one(path: Path, layout: Layout, rows: Sequence[tuple[int, str]], width: int) -> NDArray[np.float64]:
-    values = np.empty((len(rows), width))
-    for i, (number, line) in enumerate(rows):
+def _one_by_one(path: Path, layout: Layout, rows: Lines, width: int) -> NDArray[np.float64]:
+    values = np.empty((len(rows.texts), width))
+    for i, (line, number) in enumerate(zip(rows.texts, rows.numbers, strict=True)):
         words = _trimmed(layout, line)
         if len(words) != width and not (i == 0 and len(words) > width):
             under = f"under {width} headings" if layout.heading else f"where the first row has {width}"

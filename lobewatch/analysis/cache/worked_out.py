@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from lobewatch.analysis.assembling import Followed, tapped
+from lobewatch.analysis.assembling import Followed, predicted, tapped
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.cache.kept_rows import kept_in_place
 from lobewatch.analysis.cache.still_holding import StillHolding
@@ -53,6 +53,13 @@ class WorkedOut:
         """The tool of one tap test as it was known then."""
         points = self._followed.before(place, rows)
         return tapped(place, self._places, points, lambda one: self.measured(one, rows))
+
+    def tool_in(self, known: Sequence[Place], rows: Sequence[Row], tool: str) -> Assembly:
+        """A tool as the newest of these tap tests with it tells, predicted where none is of it."""
+        newest = next((place for place in reversed(known) if place.entry.tool == tool), None)
+        if newest is not None:
+            return self.assembled(newest, rows)
+        return predicted(self._folder.machine, known, rows, lambda place: self.measured(place, rows), tool)
 
     def with_all(
         self, rows: Sequence[Row], others: Mapping[str, Row], behind: StillHolding | None = None

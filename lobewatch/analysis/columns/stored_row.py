@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from datetime import datetime
 from functools import cached_property
+from operator import attrgetter
 from typing import Any, get_type_hints
 
 import msgspec
@@ -12,6 +13,7 @@ import msgspec
 from acquisition import UNSAID, Conditions, Remark
 from lobewatch.analysis.estimate import Estimate
 from lobewatch.analysis.history import ESTIMATES, Row, Values
+from lobewatch.analysis.order import Place
 from lobewatch.analysis.programs.verdict import Ruling
 from lobewatch.analysis.questions.asked import ACCEPTED, QUESTIONS
 
@@ -47,7 +49,7 @@ PLAIN = tuple(
 )
 """Fields that are in a row just so."""
 NOW = ("tap_id", "tool", "direction", "series", "static_tip_stiffness", "modal_tip_stiffness")
-"""Fields that are decoded at once, besides those that are made of text."""
+"""Those of them that take no making."""
 LATER = ("modes", "x", "y", "remarks", "rulings")
 """Fields that few ask for."""
 _KINDS: dict[str, Any] = dict.fromkeys(ESTIMATES, tuple[float, float]) | dict.fromkeys(LATER, msgspec.Raw)
@@ -58,9 +60,11 @@ _Brief = msgspec.defstruct(
     gc=False,
 )
 """A row with those as they lie there, estimates as numbers."""
+_Number = msgspec.defstruct("_Number", [("number", int)], array_like=True, gc=False)
 _encode, _decode = msgspec.msgpack.Encoder().encode, msgspec.msgpack.Decoder(Stored).decode
 _put = object.__setattr__
 _decode_brief: Callable[[bytes], Any] = msgspec.msgpack.Decoder(_Brief).decode
+_decode_number: Callable[[bytes], Any] = msgspec.msgpack.Decoder(_Number).decode
 REMARKED = _encode("code")
 """In the bytes of every remark."""
 ASKING, ANSWERING = tuple(map(_encode, QUESTIONS)), _encode(ACCEPTED)
@@ -68,52 +72,20 @@ ASKING, ANSWERING = tuple(map(_encode, QUESTIONS)), _encode(ACCEPTED)
 NONE = frozenset[str]()
 
 
-class _Later:
-    """A field that is decoded, with all of its kind, when one of them is asked for."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-
-    def __get__(self, row: StoredRow, kind: type | None = None) -> Any:
-        """Found in the row itself from then on."""
-        found = _later(row.content, row.hashes)
-        for name in LATER:
-            _put(row, name, found[name])
-        return found[self._name]
-
-
-class _Estimated:
-    """A value with its error, made where it is asked for."""
-
-    def __init__(self, name: str) -> None:
-        self._name = name
-
-    def __get__(self, row: StoredRow, kind: type | None = None) -> Estimate:
-        """Found in the row itself from then on."""
-        found = Estimate(*getattr(row.brief, self._name))
-        _put(row, self._name, found)
-        return found
-
-
-class _Conditioned:
-    """What it was taken under, checked where it is asked for."""
-
-    def __get__(self, row: StoredRow, kind: type | None = None) -> Conditions:
-        """Found in the row itself from then on."""
-        found = Conditions.of(row.brief.conditions)
-        _put(row, "conditions", found)
-        return found
-
-
 class StoredRow(Row):
-    """A row as it was read: in each value as it was stored, most of them decoded when one is asked for."""
+    """A row as it was read: in each value as it was stored, decoded when it is asked for."""
 
-    brief: Any = None
-    """What was decoded at once; None in a row that `dataclasses.replace` has made of it."""
     content: bytes = b""
-    """As it lies there; empty in such a row."""
+    """As it lies there; empty in a row that `dataclasses.replace` has made of it."""
     hashes: Mapping[str, str] = {}
     """Of the programs of machine.toml."""
+    made_by: str = ""
+    """What has made it, where it does not say so itself."""
+
+    @cached_property
+    def brief(self) -> Any:
+        """Most of it; None in a row that `dataclasses.replace` has made of it."""
+        return _decode_brief(self.content) if self.content else None
 
     @cached_property
     def questions(self) -> tuple[Remark, ...]:
@@ -122,7 +94,7 @@ class StoredRow(Row):
 
     @cached_property
     def accepted(self) -> frozenset[str]:
-        """As of any row; its remarks are decoded where there can be any among them."""
+        """As of any row, likewise."""
         return super().accepted if not self.content or ANSWERING in self.content else NONE
 
     @property
@@ -133,14 +105,74 @@ class StoredRow(Row):
             return super().followed
         return one.frequency[0], one.damping_ratio[0], one.stiffness[0], one.phase_deg[0]
 
+    def begins_as(self, place: Place) -> bool:
+        """Whether its first values, as they lie there, are those of a tap test that nothing was asked about."""
+        tap, baseline = place.entry, place.baseline.isoformat() if place.baseline else ""
+        head = _encode((place.number, tap.id, tap.time, tap.tool, tap.direction, baseline, place.series))[1:]
+        return self.content.startswith(head, HEAD) and REMARKED not in self.content and not tap.accepted
+
     def __repr__(self) -> str:
         """As of any row: equal ones read alike."""
         return Row.__name__ + super().__repr__().removeprefix(type(self).__name__)
 
 
-_LAZY: dict[str, object] = {name: _Later(name) for name in LATER} | {name: _Estimated(name) for name in ESTIMATES}
-for _name, _field in (_LAZY | {"conditions": _Conditioned()}).items():
-    setattr(StoredRow, _name, _field)
+HEAD = len(_encode([None] * len(Stored.__struct_fields__))) - len(Stored.__struct_fields__)
+"""Bytes before the first value of a row."""
+
+
+class _Lazy:
+    """A field that is made where it is asked for."""
+
+    def __init__(self, name: str, make: Callable[[StoredRow], Any]) -> None:
+        self._name, self._make = name, make
+
+    def __get__(self, row: StoredRow, kind: type | None = None) -> Any:
+        """Found in the row itself from then on."""
+        found = self._make(row)
+        _put(row, self._name, found)
+        return found
+
+
+def _time(row: StoredRow) -> datetime:
+    return datetime.fromisoformat(row.brief.time)
+
+
+def _baseline(row: StoredRow) -> datetime | None:
+    return datetime.fromisoformat(row.brief.baseline) if row.brief.baseline else None
+
+
+def _conditions(row: StoredRow) -> Conditions:
+    return Conditions.of(row.brief.conditions) if row.brief.conditions else UNSAID
+
+
+def _software(row: StoredRow) -> str:
+    return str(row.brief.software or row.made_by)
+
+
+def _estimate(name: str) -> Callable[[StoredRow], Estimate]:
+    values = attrgetter(f"brief.{name}")
+    return lambda row: Estimate(*values(row))
+
+
+def _later(name: str) -> Callable[[StoredRow], Any]:
+    """All of their kind are decoded together."""
+
+    def make(row: StoredRow) -> Any:
+        one, hashes = _decode(row.content), row.hashes
+        rulings = {name: ruling for name, (made, ruling) in one.rulings.items() if hashes.get(name) == made}
+        _put(row, "rulings", rulings if rulings or not hashes else None)
+        for other in LATER[:-1]:
+            _put(row, other, getattr(one, other))
+        return row.__dict__[name]
+
+    return make
+
+
+_MADE: dict[str, Callable[[StoredRow], Any]] = {name: attrgetter(f"brief.{name}") for name in NOW}
+_MADE |= {name: _estimate(name) for name in ESTIMATES} | {name: _later(name) for name in LATER}
+_MADE |= {"time": _time, "baseline": _baseline, "conditions": _conditions, "software": _software}
+for _name, _make in _MADE.items():
+    setattr(StoredRow, _name, _Lazy(_name, _make))
 
 
 def packed(number: int, row: Row, hashes: Mapping[str, str]) -> bytes:
@@ -153,30 +185,17 @@ def packed(number: int, row: Row, hashes: Mapping[str, str]) -> bytes:
 
 
 def unpacked(content: bytes, hashes: Mapping[str, str], software: str = "") -> tuple[int, Row]:
-    """Place and row, without rulings on programs that have changed since; ValueError where it is of another make.
+    """Place and row, without rulings on programs that have changed since; ValueError where it is no row.
 
     software: that made a row which does not say so itself; empty for this version.
     """
-    one = _decode_brief(content)
     row = StoredRow.__new__(StoredRow)
-    for name in NOW:
-        _put(row, name, getattr(one, name))
-    _put(row, "time", datetime.fromisoformat(one.time))
-    _put(row, "baseline", datetime.fromisoformat(one.baseline) if one.baseline else None)
-    _put(row, "software", one.software or software)
-    _put(row, "brief", one)
-    _put(row, "content", content)
-    _put(row, "hashes", hashes)
-    if not one.conditions:
-        _put(row, "conditions", UNSAID)
-    if REMARKED not in content:
-        _put(row, "questions", ())
-        _put(row, "accepted", NONE)
-    return one.number, row
+    row.__dict__.update(content=content, hashes=hashes, made_by=software)
+    return _decode_number(content).number, row
 
 
 def is_of_this_make(content: bytes) -> bool:
-    """Whether all of a row can be decoded, not only what `unpacked` does at once."""
+    """Whether all of a row can be decoded."""
     try:
         _decode(content)
     except ValueError:
@@ -185,11 +204,4 @@ def is_of_this_make(content: bytes) -> bool:
 
 
 def _asks(content: bytes) -> bool:
-    return any(map(content.__contains__, ASKING))
-
-
-def _later(content: bytes, hashes: Mapping[str, str]) -> dict[str, Any]:
-    one = _decode(content)
-    rulings = {name: ruling for name, (made, ruling) in one.rulings.items() if hashes.get(name) == made}
-    made = {"rulings": rulings if rulings or not hashes else None}
-    return made | {name: getattr(one, name) for name in LATER if name not in made}
+    return REMARKED in content and any(map(content.__contains__, ASKING))

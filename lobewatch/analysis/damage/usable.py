@@ -8,11 +8,12 @@ from typing import TypeVar
 
 from acquisition import DataError, Remark
 from lobewatch.analysis.assembling import NotTappedError
-from lobewatch.analysis.order import Place, places
+from lobewatch.analysis.order import Order, Place
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.archive.contents import Contents
 from lobewatch.machine.archive.journal import command
 from lobewatch.machine.corrections.event import Event
+from lobewatch.machine.cuts.heard_cut import HeardCut
 
 Result = TypeVar("Result")
 BEFORE_ALL = datetime.min.replace(tzinfo=UTC)
@@ -25,17 +26,19 @@ class UsableTaps:
         """Nothing is read yet."""
         self._folder = folder
         self._contents: Contents | None = None
-        self._places: Sequence[Place] | None = None
+        self._order: Order | None = None
         self._left_out: dict[str, tuple[TapEntry, Remark]] = {}
         self._works = False
 
     @property
     def places(self) -> Sequence[Place]:
-        """Those that can be used, oldest first by their time."""
-        if self._places is None:
-            taps = [tap for tap in self._all.taps if tap.id not in self._left_out and not tap.excluded]
-            self._places = places(taps, self._all.baselines)
-        return self._places
+        """Those that can be used, oldest first by their time; a newer one is added to the same sequence."""
+        if self._order is None:
+            self._order = Order(self._all.baselines)
+            for tap in self._all.taps:
+                if tap.id not in self._left_out and not tap.excluded:
+                    self._order.add(tap)
+        return self._order.places
 
     def place(self, tap_id: str) -> Place:
         """Of one of them; KeyError where it is none."""
@@ -73,6 +76,11 @@ class UsableTaps:
     def events(self) -> Sequence[Event]:
         """What was done to the machine, oldest first."""
         return self._all.events
+
+    @property
+    def cuts(self) -> Sequence[HeardCut]:
+        """Test cuts, oldest first, those that a person has taken out too."""
+        return self._all.cuts
 
     @property
     def event_times(self) -> list[datetime]:
@@ -147,23 +155,31 @@ class UsableTaps:
         finally:
             self._works = False
 
-    def add(self, entry: TapEntry) -> None:
-        """A tap test that was just committed; where anybody else has written since, all is looked at again."""
+    def add(self, entry: TapEntry) -> bool:
+        """A tap test that was just committed: whether it is newer than all, and all others are as they were.
+
+        Where anybody else has written since, all is looked at again.
+        """
         reading = self._folder.journal.read()
         if self._contents is None or reading.damage or len(reading.lines) != self._contents.lines + 1:
             self.forget()
-        else:
-            self._contents, self._places = self._contents.with_one_more(entry), None
+            return False
+        self._contents = self._contents.with_one_more(entry)
+        if self._order is None or self._contents.taps[-1] is not entry:
+            self._order = None
+            return False
+        self._order.add(entry)
+        return True
 
     def forget(self) -> None:
         """Look again."""
-        self._contents = self._places = None
+        self._contents = self._order = None
 
     def _leave_out(self, error: DamagedTapError) -> None:
         if error.entry.id in self._left_out:
             raise error
         self._left_out[error.entry.id] = error.entry, error.remark
-        self._places = None
+        self._order = None
 
     @property
     def _all(self) -> Contents:

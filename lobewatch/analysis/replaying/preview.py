@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from acquisition import DataError, Description, Recording, TapTest
 from lobewatch.analysis.logbook import Logbook
-from lobewatch.analysis.measurement import Measurement, measure
-from lobewatch.analysis.replaying.read_tap_test import Setup, read_tap_test
-from lobewatch.analysis.replaying.store import KnownContents, Progress
-from lobewatch.analysis.replaying.worked_out import reason_of
+from lobewatch.analysis.measurement import Fitted, Measurement, measured
+from lobewatch.analysis.replaying.store import HERE, KnownContents, Progress, digests_of
+from lobewatch.analysis.replaying.worked_out import Asked, Understood, reason_of, understand, understand_file
+from lobewatch.analysis.workers.shared import Workers, shared
 from modal import Mode
 
 
@@ -39,48 +39,78 @@ def preview_recordings(
     files: Sequence[Path],
     said: Description,
     progress: Progress = lambda _what, _done, _of: None,
+    workers: Workers = HERE,
 ) -> list[Preview]:
-    """One a file, in order of date; those that cannot be used or are stored already first."""
-    contents, found = KnownContents.of(logbook.folder.taps()), list[Preview]()
-    for number, file in enumerate(files, 1):
-        found.append(_read(logbook, file, said, contents))
-        progress("read", number, len(files))
-    first = [one for one in found if one.tap is None]
-    found = first + sorted((one for one in found if one.tap is not None), key=_time)
+    """One a file, in order of date; those that cannot be used or are stored already first.
+
+    workers: who reads and fits; what they find is the same.
+    """
+    found, fits = list[Preview](), dict[Path, Fitted]()
+    for preview, fit in _read(logbook, files, said, progress, workers):
+        found.append(preview)
+        fits |= {preview.file: fit} if fit is not None else {}
+    found.sort(key=_time)
     last: dict[tuple[str, str], Mode] = {}
-    measured = list[Preview]()
+    previews = list[Preview]()
     for number, one in enumerate(found, 1):
-        measured.append(one if one.tap is None else _measured(logbook, one, one.tap, last))
+        previews.append(one if one.tap is None else _measured(logbook, one, one.tap, fits[one.file], last))
         progress("measure", number, len(files))
-    return measured
+    return previews
 
 
 def _time(one: Preview) -> float:
-    return one.tap.circumstances.created.timestamp() if one.tap else 0.0
+    return one.tap.circumstances.created.timestamp() if one.tap else -math.inf
 
 
-def _read(logbook: Logbook, file: Path, said: Description, contents: KnownContents) -> Preview:
-    try:
-        content = file.read_bytes()
-        digest = hashlib.sha256(content).hexdigest()
-        known = contents.tap_of(digest, said)
-        if known is not None:
-            return Preview(file, known)
-        tap, recording = read_tap_test(Setup.of(logbook.folder), file, said, content)
-    except (DataError, OSError, ValueError) as error:
-        return Preview(file, refused=reason_of(file, error))
-    contents.add(digest, tap)
-    return Preview(file, recording=recording, tap=tap)
+def _read(
+    logbook: Logbook, files: Sequence[Path], said: Description, progress: Progress, workers: Workers
+) -> Iterator[tuple[Preview, Fitted | None]]:
+    """Each content once; in the order of the files."""
+    contents, todo = KnownContents.of(logbook.folder.taps()), dict[str, Path]()
+    digests, unread = digests_of(files)
+    for file, digest in digests.items():
+        if contents.tap_of(digest, said) is None:
+            todo.setdefault(digest, file)
+    results = dict[str, Understood | str]()
+    for digest, found in zip(todo, _all_understood(logbook, [*todo.values()], said, workers), strict=True):
+        results[digest] = found
+        progress("read", len(results), len(todo))
+    for file in files:
+        digest = digests.get(file, "")
+        one = reason_of(file, unread[file]) if file in unread else results.get(digest)
+        if one is None:
+            yield Preview(file, known=contents.tap_of(digest, said) or ""), None
+        elif isinstance(one, str):
+            yield Preview(file, refused=one), None
+        elif todo[digest] != file:
+            yield Preview(file, known=one.tap.id), None
+        else:
+            yield Preview(file, recording=one.recording, tap=one.tap), one.fit
 
 
-def _measured(logbook: Logbook, one: Preview, tap: TapTest, last: dict[tuple[str, str], Mode]) -> Preview:
+def _all_understood(
+    logbook: Logbook, files: Sequence[Path], said: Description, workers: Workers
+) -> Iterator[Understood | str]:
+    """Each file in turn, or why it cannot be used; DataError as `shared`."""
+    if workers.are_elsewhere:
+        toml = logbook.folder.toml.read_text("utf-8")
+        yield from shared(understand, (Asked.of(file, said, toml) for file in files), workers)
+        return
+    for file in files:
+        try:
+            yield understand_file(logbook.folder, file, said)
+        except (DataError, OSError, ValueError) as error:
+            yield reason_of(file, error)
+
+
+def _measured(logbook: Logbook, one: Preview, tap: TapTest, fit: Fitted, last: dict[tuple[str, str], Mode]) -> Preview:
     """last: the mode followed in the newest file before it of each tool and direction."""
     series = (tap.circumstances.tool, tap.circumstances.direction)
     before = last.get(series) or _stored_before(logbook, tap)
-    found = measure(tap, logbook.machine, before)
+    found = measured(fit, logbook.machine, before)
     if found.followed is not None:
         last[series] = found.followed
-    return Preview(one.file, recording=one.recording, tap=tap, measurement=found)
+    return replace(one, measurement=found)
 
 
 def _stored_before(logbook: Logbook, tap: TapTest) -> Mode | None:

@@ -81,7 +81,10 @@ def store_recordings(
     workers: who reads and fits; what they find is the same. To be called under the lock.
     """
     remove_leftovers(folder)
-    digests, refused = _digests(files)
+    digests, unread = digests_of(files)
+    if unread and len(files) == 1:
+        raise unread[files[0]]
+    refused = {file: reason_of(file, error) for file, error in unread.items()}
     contents, todo = KnownContents.of(folder.taps()), dict[str, Path]()
     ids = {digest: contents.tap_of(digest, said) or "" for digest in digests.values()}
     for file, digest in digests.items():
@@ -106,17 +109,15 @@ def store_recordings(
     return Stored([used[file] for file in files if file in used], known, [*fits], refused, list(taken), fits)
 
 
-def _digests(files: Sequence[Path]) -> tuple[dict[Path, str], dict[Path, str]]:
-    """SHA-256 of each file, and why some cannot be read; the error itself where there is but one."""
-    found, refused = dict[Path, str](), dict[Path, str]()
+def digests_of(files: Sequence[Path]) -> tuple[dict[Path, str], dict[Path, OSError]]:
+    """SHA-256 of each file, and what is wrong with those that cannot be read."""
+    found, unread = dict[Path, str](), dict[Path, OSError]()
     for file in files:
         try:
             found[file] = hashlib.sha256(file.read_bytes()).hexdigest()
         except OSError as error:
-            if len(files) == 1:
-                raise
-            refused[file] = reason_of(file, error)
-    return found, refused
+            unread[file] = error
+    return found, unread
 
 
 def _made_ready(

@@ -4,18 +4,33 @@ from __future__ import annotations
 
 import hashlib
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import lru_cache
 from pathlib import Path
-from typing import Self
+from typing import Self, TypeVar
 
-from acquisition import DataError, Description
+from acquisition import DataError, Description, Recording, TapTest
 from acquisition.files.tap_file import as_written, tap_content
 from lobewatch.analysis.measurement import Fitted, fitted
 from lobewatch.analysis.replaying.read_tap_test import Setup, read_tap_test
 from lobewatch.machine import MachineFolder, TapEntry
 from lobewatch.machine.machine_file import parse_machine
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, eq=False)
+class Understood:
+    """One file, before anything is made of it."""
+
+    tap: TapTest
+    """The tap test that it would be."""
+    recording: Recording
+    """How it is understood."""
+    fit: Fitted
+    """The modes in it."""
 
 
 @dataclass(frozen=True)
@@ -62,18 +77,32 @@ class Asked:
 
 def work_out_file(folder: MachineFolder, file: Path, said: Description) -> WorkedOut:
     """A file where it lies; DataError, OSError or ValueError where it cannot be used."""
-    return _of(Setup.of(folder), file, said, file.read_bytes(), file)
+    return _worked_out(Setup.of(folder), file, said, file.read_bytes(), file)
 
 
 def work_out(asked: Asked) -> WorkedOut | str:
     """A file from its bytes, or why it cannot be used."""
+    return _from_bytes(asked, _worked_out)
+
+
+def understand_file(folder: MachineFolder, file: Path, said: Description) -> Understood:
+    """As `work_out_file`, and no tap file is made."""
+    return _understood(Setup.of(folder), file, said, file.read_bytes(), file)
+
+
+def understand(asked: Asked) -> Understood | str:
+    """As `work_out`, and no tap file is made."""
+    return _from_bytes(asked, _understood)
+
+
+def _from_bytes(asked: Asked, work: Callable[[Setup, Path, Description, bytes, Path], Result]) -> Result | str:
     if asked.fault:
         return asked.fault
-    with tempfile.TemporaryDirectory(prefix="lobewatch-") as work:
-        at = Path(work) / asked.file.name
+    with tempfile.TemporaryDirectory(prefix="lobewatch-") as folder:
+        at = Path(folder) / asked.file.name
         at.write_bytes(asked.content)
         try:
-            return _of(_setup(asked.machine_toml), asked.file, asked.said, asked.content, at)
+            return work(_setup(asked.machine_toml), asked.file, asked.said, asked.content, at)
         except (DataError, OSError, ValueError) as error:
             return reason_of(at, error).replace(str(at), str(asked.file)).removeprefix(f"{asked.file}: ")
 
@@ -85,14 +114,18 @@ def reason_of(file: Path, error: Exception) -> str:
     return str(error).removeprefix(f"{file}: ")
 
 
-def _of(setup: Setup, file: Path, said: Description, content: bytes, at: Path) -> WorkedOut:
+def _worked_out(setup: Setup, file: Path, said: Description, content: bytes, at: Path) -> WorkedOut:
     """at: where the content lies."""
-    tap, recording = read_tap_test(setup, file, said, content, at)
-    told = tuple(f"{fact.name} {fact.value}" for fact in recording.facts if fact.origin == "default")
-    packed = tap_content(tap)
-    fit = fitted(as_written(tap), setup.machine)
+    found = _understood(setup, file, said, content, at)
+    told = tuple(f"{fact.name} {fact.value}" for fact in found.recording.facts if fact.origin == "default")
+    packed, created = tap_content(found.tap), found.tap.circumstances.created
     digest = hashlib.sha256(content).hexdigest()
-    return WorkedOut(digest, packed, TapEntry.of(tap, packed), tap.circumstances.created, fit, told)
+    return WorkedOut(digest, packed, TapEntry.of(found.tap, packed), created, found.fit, told)
+
+
+def _understood(setup: Setup, file: Path, said: Description, content: bytes, at: Path) -> Understood:
+    tap, recording = read_tap_test(setup, file, said, content, at)
+    return Understood(tap, replace(recording, path=file), fitted(as_written(tap), setup.machine))
 
 
 @lru_cache(maxsize=4)

@@ -16,6 +16,7 @@ from lobewatch.machine.archive.journal import JOURNAL, Reading, command, journal
 from lobewatch.machine.archive.tap_entry import TapEntry, tap_entries
 from lobewatch.machine.corrections.event import Event, events_of
 from lobewatch.machine.corrections.exclusion import reasons_of
+from lobewatch.machine.cuts.heard_cut import HeardCut, RecordedAs, cuts_of
 
 PROVED_BYTES, PROVED_FILES = 10_000_000, 50
 """Tap files whose SHA-256 is compared whenever a machine is looked at, the newest first, as long as they are neither
@@ -36,10 +37,14 @@ class Contents:
     """What was done to the machine, oldest first."""
     lines: int = 0
     """Of the journal."""
+    cuts: tuple[HeardCut, ...] = ()
+    """Test cuts, oldest first, those that a person has taken out too."""
 
     def with_one_more(self, entry: TapEntry) -> Contents:
         """The same with a tap test that was just committed, and nothing else since."""
-        return replace(self, taps=_oldest_first([*self.taps, entry]), lines=self.lines + 1)
+        is_newest = not self.taps or _time(self.taps[-1]) <= _time(entry)
+        taps = (*self.taps, entry) if is_newest else _oldest_first([*self.taps, entry])
+        return replace(self, taps=taps, lines=self.lines + 1)
 
     @property
     def baselines(self) -> list[datetime]:
@@ -71,7 +76,14 @@ def contents_of(folder: Path, reading: Reading) -> Contents:
     else:
         cure = f"{command('verify', folder)} says what it is and what to do"
         remarks += [unlisted(path, "not in the journal, does not count", cure) for path in extra]
-    return Contents(_oldest_first(taps), _oldest_first(lost), tuple(remarks), events, len(reading.lines))
+    return Contents(
+        _oldest_first(taps), _oldest_first(lost), tuple(remarks), events, len(reading.lines), heard(reading)
+    )
+
+
+def heard(reading: Reading) -> tuple[HeardCut, ...]:
+    """The test cuts of the journal, oldest first."""
+    return cuts_of(reading.others, reasons_of(reading.others))
 
 
 def listed(reading: Reading) -> dict[str, TapEntry]:
@@ -104,8 +116,8 @@ def tap_files(folder: Path) -> Mapping[str, Path]:
     return {path.stem: path for path in files if not path.name.startswith(".")}
 
 
-def fault_of(folder: Path, entry: TapEntry) -> str:
-    """What is wrong with the file of a tap test; empty where nothing is.
+def fault_of(folder: Path, entry: TapEntry | RecordedAs) -> str:
+    """What is wrong with the file of a tap test or of a cut; empty where nothing is.
 
     OSError where this program can open no more files.
     """

@@ -17,14 +17,15 @@ from lobewatch.machine.archive.contents import fault_of, given_up, listed, tap_f
 from lobewatch.machine.archive.doubtful import read_doubtful
 from lobewatch.machine.archive.journal import JOURNAL, Journal
 from lobewatch.machine.archive.tap_entry import TapEntry
+from lobewatch.machine.cuts.mend_cuts import mend_cuts
 from lobewatch.machine.folder import BusyError, MachineFolder
 from lobewatch.machine.known_devices import read_known_devices
 
 ASIDE = "damaged"
 """Folder of what was put out of the way."""
 ENTER_AGAIN = (
-    "events, exclusions and accepted questions that stood there are lost: enter them again "
-    "(lobewatch event, exclude, replay --accept)"
+    "events, exclusions, accepted questions and cuts heard by ear that stood there are lost: enter them again "
+    "(lobewatch event, exclude, replay --accept, observe)"
 )
 
 
@@ -50,6 +51,7 @@ def rebuild_files(path: Path) -> list[str]:
                 journal.append(entry.line)
         told += [f"{entry.file}: entered in the journal" for entry in fresh]
         told += _go_on_without(path, journal)
+        told += mend_cuts(path, journal, lambda file: _put_aside(path, file))
         told += [*_machine_file(path), *_devices(path)]
     return told
 

@@ -14,6 +14,7 @@ from lobewatch.machine.archive.contents import (
     about_lost,
     fault_of,
     given_up,
+    heard,
     is_explained,
     listed,
     no_journal,
@@ -26,10 +27,11 @@ from lobewatch.machine.archive.rows import read_rows
 from lobewatch.machine.archive.tap_entry import TapEntry
 from lobewatch.machine.archive.told import damaged, set_aside
 from lobewatch.machine.archive.verify_spool import about_spool
+from lobewatch.machine.cuts.verify_cuts import about_cuts
 from lobewatch.machine.folder import BusyError, MachineFolder
 from lobewatch.machine.known_devices import read_known_devices
 
-DAMAGE = ("journal-damaged", "tap-damaged", "tap-unlisted", "file-damaged")
+DAMAGE = ("journal-damaged", "tap-damaged", "tap-unlisted", "file-damaged", "cut-damaged", "cut-unlisted")
 """Codes of remarks that are damage; all others are to be known."""
 OURS = (
     JOURNAL,
@@ -42,6 +44,7 @@ OURS = (
     "report.html",
     ".lock",
     "taps",
+    "cuts",
     "spool",
 )
 
@@ -82,6 +85,7 @@ def verify(path: Path) -> Verified:
     remarks = [
         *reading.damage,
         *_about_taps(path, reading, committed, wrong),
+        *about_cuts(path, heard(reading), given_up(reading), command("rebuild", path)),
         *_about_machine_file(folder, [entry for name, entry in committed.items() if name not in wrong]),
         *_about_history(folder),
         *_about_devices(folder),

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
-from lobewatch.machine.archive.tap_entry import TapEntry
 from lobewatch.machine.corrections.event import Event, event_line, events_of, new_event, withdrawal
-from lobewatch.machine.corrections.exclusion import exclusion, inclusion, named_tap
+from lobewatch.machine.corrections.exclusion import Corrected, exclusion, inclusion, named
 from lobewatch.machine.folder import MachineFolder
 
 
@@ -31,22 +30,25 @@ def withdraw_event(folder: MachineFolder, event_id: str) -> Event:
     return next(event for event in events_of(entries) if event.id == event_id)
 
 
-def exclude(folder: MachineFolder, name: str, reason: str) -> TapEntry:
-    """Take a tap test out of the series; name: its identity, file, or a part that no other has."""
+def exclude(folder: MachineFolder, name: str, reason: str) -> Corrected:
+    """Take a tap test out of the series, or a test cut out of what is learnt from.
+
+    name: its identity, file, or a part that no other has.
+    """
     with folder.locked():
         tap = _named(folder, name)
         folder.journal.append(exclusion(tap, reason, datetime.now(UTC)))
     return tap
 
 
-def include(folder: MachineFolder, name: str) -> TapEntry:
-    """Take a tap test back into the series."""
+def include(folder: MachineFolder, name: str) -> Corrected:
+    """Take a tap test back into the series, or a test cut back into what is learnt from."""
     with folder.locked():
         tap = _named(folder, name)
         folder.journal.append(inclusion(tap, datetime.now(UTC)))
     return tap
 
 
-def _named(folder: MachineFolder, name: str) -> TapEntry:
+def _named(folder: MachineFolder, name: str) -> Corrected:
     contents = folder.contents()
-    return named_tap(name, [*contents.taps, *contents.lost], str(folder.path))
+    return named(name, [*contents.taps, *contents.lost], contents.cuts, str(folder.path))

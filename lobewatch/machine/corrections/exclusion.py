@@ -1,4 +1,4 @@
-"""Tap tests taken out of the series and back, as lines of the journal; the newest line on a tap test counts."""
+"""Tap tests and test cuts taken out and back, as lines of the journal; the newest line on one of them counts."""
 
 from __future__ import annotations
 
@@ -8,10 +8,20 @@ from typing import Any
 
 from acquisition import check_name
 from lobewatch.machine.archive.tap_entry import TapEntry
+from lobewatch.machine.cuts.heard_cut import HeardCut
+
+Corrected = TapEntry | HeardCut
+"""What can be taken out."""
 
 
-def named_tap(name: str, taps: Sequence[TapEntry], folder: str) -> TapEntry:
-    """The one with this identity, file, or part of an identity; ValueError where it is none, or several have it."""
+def named(name: str, taps: Sequence[TapEntry], cuts: Sequence[HeardCut], folder: str) -> Corrected:
+    """The test cut of this identity, or the tap test with this identity, file, or part of an identity.
+
+    ValueError where it is none, or several have it.
+    """
+    for cut in cuts:
+        if cut.id == name:
+            return cut
     part = name.replace("\\", "/").rpartition("/")[2].removesuffix(".h5")
     exact = [tap for tap in taps if tap.id == part]
     found = exact or [tap for tap in taps if part and part in tap.id]
@@ -22,8 +32,8 @@ def named_tap(name: str, taps: Sequence[TapEntry], folder: str) -> TapEntry:
     raise ValueError(f"{name!r}: no such tap test in {folder}; lobewatch history {folder} lists all {len(taps)}")
 
 
-def exclusion(tap: TapEntry, reason: str, now: datetime) -> dict[str, Any]:
-    """The line that takes a tap test out; ValueError where it is out already, or there is no reason."""
+def exclusion(tap: Corrected, reason: str, now: datetime) -> dict[str, Any]:
+    """The line that takes one out; ValueError where it is out already, or there is no reason."""
     if tap.excluded:
         raise ValueError(f"{tap.id}: excluded already, for {tap.excluded!r}")
     if not reason.strip():
@@ -32,15 +42,15 @@ def exclusion(tap: TapEntry, reason: str, now: datetime) -> dict[str, Any]:
     return {"kind": "exclude", "tap": tap.id, "reason": reason, "time": now.isoformat()}
 
 
-def inclusion(tap: TapEntry, now: datetime) -> dict[str, Any]:
-    """The line that takes a tap test back; ValueError where it is not out."""
+def inclusion(tap: Corrected, now: datetime) -> dict[str, Any]:
+    """The line that takes one back; ValueError where it is not out."""
     if not tap.excluded:
         raise ValueError(f"{tap.id}: is not excluded; it counts already")
     return {"kind": "include", "tap": tap.id, "time": now.isoformat()}
 
 
 def reasons_of(entries: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """Why tap tests are out, by identity."""
+    """Why tap tests and test cuts are out, by identity."""
     found: dict[str, str] = {}
     for line in entries:
         if line["kind"] == "exclude":

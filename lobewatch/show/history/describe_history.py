@@ -1,4 +1,4 @@
-"""The history of a machine line by line: tap tests, those that do not count, and events."""
+"""The history of a machine line by line: tap tests, those that do not count, events, and test cuts."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from acquisition import Conditions
 from lobewatch.analysis import Logbook, Row
 from lobewatch.machine import TapEntry
 from lobewatch.machine.corrections.event import Event
+from lobewatch.show.history.describe_cut import cut_json, cut_words
 from lobewatch.show.history.under import conditions_texts
 
 VALUES = {"frequency_hz": "frequency", "damping_ratio": "damping_ratio", "stiffness_n_per_m": "stiffness"}
@@ -45,11 +46,12 @@ def history_json(logbook: Logbook) -> dict[str, Any]:
         "kept": [_tap_json(row, logbook) for row in logbook.history.kept],
         "excluded": [_excluded_json(tap) for tap in logbook.files.excluded],
         "events": [event_json(event) for event in logbook.files.events],
+        "cuts": [cut_json(cut) | {"text": cut_words(cut)} for cut in logbook.files.cuts],
     }
 
 
 def history_csv(logbook: Logbook) -> str:
-    """A line for each tap test, excluded or not, and for each event, oldest first; headings on top."""
+    """A line for each tap test and cut, excluded or not, and for each event, oldest first; headings on top."""
     names = [program.name for program in logbook.machine.program]
     values = [heading for name in VALUES for heading in (name, f"{name}_std")]
     verdicts = {name: f"verdict: {name}" for name in names}
@@ -79,12 +81,20 @@ def _cells(line: Mapping[str, Any]) -> list[str]:
 
 
 def _lines(logbook: Logbook) -> list[dict[str, Any]]:
-    """Tap tests, excluded ones and events, oldest first."""
+    """Tap tests, excluded ones, events and test cuts, oldest first."""
     found = history_json(logbook)
     events = [one | {"kind": "new baseline" if one["new_baseline"] else "event"} for one in found["events"]]
     excluded = [one | {"kind": "excluded"} for one in found["excluded"]]
     taps = [one | {"kind": kind} for kind, name in (("tap", "taps"), ("kept", "kept")) for one in found[name]]
-    return sorted([*events, *excluded, *taps], key=lambda one: one["time"])
+    cuts = [_cut_line(one) for one in found["cuts"]]
+    return sorted([*events, *excluded, *taps, *cuts], key=lambda one: one["time"])
+
+
+def _cut_line(one: Mapping[str, Any]) -> dict[str, Any]:
+    """A test cut as the table shows it."""
+    kind = "excluded" if one["excluded"] else "cut"
+    shown = {name: one[name] for name in ("id", "time", "tool", "text")}
+    return {**shown, "kind": kind, "reason": one["excluded"], "conditions": {}}
 
 
 def _tap_json(row: Row, logbook: Logbook) -> dict[str, Any]:
@@ -122,8 +132,8 @@ def _number(line: Mapping[str, Any], name: str, scale: float) -> str:
 
 def _said(line: Mapping[str, Any]) -> str:
     """Its text or reason, conditions, what is asked, and the verdicts of then; of a tap test the identity too."""
-    if line["kind"] in ("event", "new baseline"):
-        return f"{line['id']}: {line['text']}"
+    if "text" in line:
+        return f"{line['id']}: {line['text']}{'; ' + line['reason'] if line.get('reason') else ''}"
     under = conditions_texts(Conditions.of(line["conditions"]))
     if line["kind"] == "excluded":
         return "; ".join([f"{line['id']}: {line['reason']}", *under])

@@ -66,6 +66,11 @@ class Labels:
         """No words between two corners, where there is a choice."""
         self._taken.append(_Box(*self._points(low), *self._points(high)))
 
+    def keep_clear(self, place: tuple[float, float], size: float) -> None:
+        """No words over a mark of this size (points), where there is a choice."""
+        x, y = self._points(place)
+        self._taken.append(_Box(x - size / 2, y - size / 2, x + size / 2, y + size / 2))
+
     def _box(self, text: str, place: tuple[float, float], side: Side) -> _Box:
         lines, (right, up) = text.split("\n"), SIDES[side]
         wide, high = WIDE * SIZE * max(map(len, lines)), HIGH * SIZE * len(lines)

@@ -19,11 +19,17 @@ from lobewatch.show.replays.progress_bar import ProgressBar
 
 
 def show_preview(
-    logbook: Logbook, files: Sequence[Path], passed: Sequence[Path], said: Description, *, as_json: bool
+    logbook: Logbook,
+    files: Sequence[Path],
+    passed: Sequence[Path],
+    said: Description,
+    *,
+    workers: Workers,
+    as_json: bool,
 ) -> None:
     """Tell what would become of files; DataError where one of them cannot be used."""
     with ProgressBar() as progress:
-        previews = preview_recordings(logbook, files, said, progress)
+        previews = preview_recordings(logbook, files, said, progress, workers)
     payload = {"dry_run": True, "files": [preview_json(one) for one in previews], "passed_over": list(map(str, passed))}
     emit(payload, as_json, *preview_texts(previews), preview_summary(previews, len(passed)))
     refused = sum(bool(one.refused) for one in previews)

@@ -8,6 +8,8 @@ from typing import Any
 from lobewatch.analysis import Light, Logbook, Row, SeriesStanding, Standing
 from lobewatch.analysis.estimate import Estimate
 from lobewatch.analysis.plant.light import LIGHTS as HARM
+from lobewatch.machine.machine_file import REFERENCE_CUT
+from lobewatch.show.history.describe_cut import heard_text
 from lobewatch.show.reporting.figure_data import Numbers
 from lobewatch.show.reporting.first_screen import KINDS, LIGHTS
 from lobewatch.show.trends.describe_trend import rate_text, short_text
@@ -48,6 +50,22 @@ def _series_line(series: SeriesStanding) -> dict[str, Any]:
 def tap_lines(logbook: Logbook) -> list[list[str]]:
     """Tap tests that count, the newest first: date, tool, direction, values, words of then."""
     return [_tap_line(row) for row in reversed(logbook.history.current)]
+
+
+def cut_lines(logbook: Logbook) -> list[list[str]]:
+    """Test cuts that count, the newest first: date, what was cut, speed, depth, what it sounded like, who heard it."""
+    return [
+        [
+            f"{cut.at.astimezone():%Y-%m-%d %H:%M}",
+            cut.program or REFERENCE_CUT,
+            cut.tool,
+            f"{cut.speed_rpm:.0f}",
+            f"{1e3 * cut.depth:.4g}",
+            heard_text(cut),
+            cut.by,
+        ]
+        for cut in reversed(logbook.cuts)
+    ]
 
 
 def tap_numbers(logbook: Logbook) -> Numbers:

@@ -123,6 +123,17 @@ def test_scans_arrive_unchanged_and_complete(
             check_against(blocks, expected(signal_at, 15_360))
 
 
+def test_what_a_slow_device_sends_after_its_stop_is_not_taken_for_the_next_stream(
+    emulated: Make, signal_at: SignalAt
+) -> None:
+    traits = {"echoes_stop": True, "stop_takes": 0.4}
+    with emulated(**traits) as device, DataqSource(device.port, INPUTS, RATE, digital_word=False) as source:
+        for _ in range(2):
+            source.start()
+            check_against(take(source, 5000), expected(signal_at, 5120))
+            source.stop()
+
+
 def test_without_the_digital_word_scans_arrive_too(emulated: Make, signal_at: SignalAt) -> None:
     with emulated() as device, DataqSource(device.port, INPUTS, RATE, digital_word=False) as source:
         assert source.loss_detection == "none"

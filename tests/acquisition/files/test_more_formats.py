@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -175,6 +177,84 @@ def test_tdms_with_units_and_without_the_package(tmp_path: Path, monkeypatch: py
     monkeypatch.setitem(sys.modules, "nptdms", None)
     with pytest.raises(DataError, match=r'pip install "lobewatch\[tdms\]"'):
         look(path)
+
+
+TWICE = np.sort(np.append(np.arange(63.0), 20.0)) / 25600
+"""Times of 64 samples, one of them twice."""
+
+
+def over_time_uff(path: Path, time: np.ndarray, force: np.ndarray, response: np.ndarray) -> None:
+    """Two signals with an abscissa of their own, as the format has it."""
+    sets = []
+    for node, (kind, unit, values) in enumerate(((13, "N", force), (12, "m/s^2", response)), 1):
+        head = [
+            "    -1",
+            "    58",
+            *5 * ["NONE"],
+            f"{1:5d}{0:10d}{0:5d}{0:10d} {'NONE':10s}{node:10d}{1:4d} {'NONE':10s}{0:10d}{0:4d}",
+            f"{4:10d}{time.size:10d}{0:10d}{0.0:13.5E}{0.0:13.5E}{0.0:13.5E}",
+            f"{17:10d}{0:5d}{0:5d}{0:5d} {'Time':20s} {'s':20s}",
+            f"{kind:10d}{0:5d}{0:5d}{0:5d} {'NONE':20s} {unit:20s}",
+            *2 * [f"{0:10d}{0:5d}{0:5d}{0:5d} {'NONE':20s} {'NONE':20s}"],
+        ]
+        rows = [f"{t:20.11E}{value:20.11E}" for t, value in zip(time, values, strict=True)]
+        sets.append("\n".join([*head, *rows, "    -1\n"]))
+    path.write_text("".join(sets))
+
+
+def over_time_mat(path: Path, time: np.ndarray, force: np.ndarray, response: np.ndarray) -> None:
+    scipy.io.savemat(path, {"time": time, "force": force, "acc": response})
+
+
+def over_time_mat_with_rate(path: Path, time: np.ndarray, force: np.ndarray, response: np.ndarray) -> None:
+    scipy.io.savemat(path, {"fs": 25600.0, "time": time, "force": force, "acc": response})
+
+
+def over_time_tdms(path: Path, time: np.ndarray, force: np.ndarray, response: np.ndarray) -> None:
+    nptdms = pytest.importorskip("nptdms")
+    named = (("Time", "s", time), ("Hammer", "N", force), ("Tip", "m/s^2", response))
+    with nptdms.TdmsWriter(path) as writer:
+        writer.write_segment(
+            [nptdms.ChannelObject("tap", name, values, {"unit_string": unit}) for name, unit, values in named]
+        )
+
+
+def over_time_sep005(path: Path, time: np.ndarray, force: np.ndarray, response: np.ndarray) -> None:
+    named = (("hammer", "N", force), ("tip", "m/s^2", response))
+    channels = [
+        {"name": name, "unit_str": unit, "data": one.tolist(), "time": time.tolist()} for name, unit, one in named
+    ]
+    path.write_text(json.dumps(channels))
+
+
+@pytest.mark.parametrize(
+    ("make", "suffix"),
+    [
+        (over_time_uff, ".uff"),
+        (over_time_mat, ".mat"),
+        (over_time_mat_with_rate, ".mat"),
+        (over_time_tdms, ".tdms"),
+        (over_time_sep005, ".json"),
+    ],
+    ids=["uff", "mat", "mat with a rate", "tdms", "sep005"],
+)
+def test_a_time_that_is_there_twice_is_refused(tmp_path: Path, make: Callable[..., None], suffix: str) -> None:
+    path, signals = tmp_path / f"a{suffix}", np.random.default_rng(1).normal(size=(2, 64))
+    said = Description(unit="g", force_unit="N") if suffix == ".mat" else Description()
+    make(path, TWICE, *signals)
+    with pytest.raises(DataError, match=r"its time steps are uneven: .* twice there"):
+        read_hits(path, said)
+    make(path, np.arange(64.0) / 25600, *signals)
+    assert "uneven" not in look(path, said).complaint
+
+
+def test_a_frequency_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+    twice = np.where(F == 20, 18, F)
+    said = Description(columns=("frequency=f", "frf=H"), unit="m/N")
+    for make in (scipy.io.savemat, mat_73):
+        make(tmp_path / "a.mat", {"f": twice, "H": H})
+        with pytest.raises(DataError, match="frequency must be finite, >= 0 Hz and strictly rising"):
+            read_frf(tmp_path / "a.mat", said)
 
 
 def one_of_each(folder: Path) -> dict[str, Path]:

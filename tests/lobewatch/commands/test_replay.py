@@ -98,6 +98,20 @@ def test_a_dry_run_explains_and_stores_nothing(shop: Shop, folder: Path) -> None
     assert before == sorted(path for path in shop.path.rglob("*") if path.is_file())
 
 
+def test_a_dry_run_says_the_same_whoever_reads(shop: Shop, folder: Path) -> None:
+    shutil.copy(folder / "a 20240901.csv", folder / "twin 20240902.csv")
+    (folder / "bad 20240801.csv").write_text("Freq (Hz),Real (um/N),Imag (um/N)\n1,2,3\n2,x,3\n")
+    options, found = ("--date-pattern", "%Y%m%d", "--dry-run", "--json"), []
+    for jobs in (1, 2):
+        said = CliRunner().invoke(app, ["replay", str(shop.path), str(folder), *options, "--jobs", str(jobs)])
+        found.append(json.loads(said.stdout)["files"])
+        (twin,) = [one for one in found[-1] if one["file"].endswith("twin 20240902.csv")]
+        assert "20240901" in twin.pop("known")  # of an identity that is made up anew each time
+    assert found[0] == found[1]
+    assert [bool(one["refused"]) for one in found[0]].count(True) == 1
+    assert len(taps(shop)) == 0
+
+
 def test_a_dry_run_asks_what_the_replay_would_ask(shop: Shop, beam: Path) -> None:
     shop.edit("band_hz = [1200, 2200]", "band_hz = [1200, 1800]")
     said = json.loads(run("replay", shop.path, beam, "--dry-run", "--json").stdout)

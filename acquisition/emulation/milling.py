@@ -1,0 +1,141 @@
+"""Milling stepped through time, many cuts at once: what the tool tip does.
+
+    chip     h = feed sin(phi) + n . q + r - u,  n = (sin phi, cos phi), r how far the tooth stands out
+    surface  u <- u - feed sin(phi) + max(h, 0): the furthest material that all earlier teeth have left at this angle
+    force    F = -b ((Kt h + Kte) (cos, -sin) + (Kr h + Kre) (sin, cos)) where h > 0
+
+q is the displacement of the tip along the feed and its normal. A tooth that leaves the cut and comes back finds what
+was left one, two or more tooth periods ago. Between steps the modes swing freely, which is exact; the force of a step
+acts as one impulse in its middle: second order, no damping of its own, in the frequency domain a residual flexibility
+of -(w dt)^2 / 12 K. The depth comes and goes as a factor of the force.
+
+Source: Schmitz & Smith, Machining Dynamics, ch. 4.4 (time-domain simulation with run-out and loss of contact).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.emulation.milling_cut import MillingCut, Passage
+from acquisition.emulation.milling_tables import ModeTables, ToothTables, steps_needed, tables
+
+Floats = NDArray[np.float64]
+
+ALIKE = 1.25
+"""Cuts are stepped together whose tooth periods differ by this factor at most ..."""
+TOGETHER = 48
+"""... and no more than so many."""
+
+
+@dataclass(frozen=True, eq=False)
+class TipMotion:
+    """What a tool tip did in a passage through a part."""
+
+    sample_rate: float
+    """Steps a second (Hz)."""
+    acceleration: Floats
+    """Along x and y of the machine (m/s^2), shape (2, n)."""
+
+
+def simulate_cut(cut: MillingCut, passage: Passage | None = None) -> TipMotion:
+    """What the tip does in one cut."""
+    return next(simulate_cuts([cut], passage))[1]
+
+
+def simulate_cuts(cuts: Sequence[MillingCut], passage: Passage | None = None) -> Iterator[tuple[int, TipMotion]]:
+    """Index and tip motion of each cut, in the order in which they are ready: cuts alike are stepped together."""
+    passage = passage or Passage()
+    for group in _groups(cuts):
+        members = [cuts[i] for i in group]
+        modes, teeth = tables(members, max(map(steps_needed, members)))
+        cutting, swing = _cutting(members, modes, teeth, passage)
+        for place, number in enumerate(group):
+            yield number, _motion(cutting[:, place], swing[place], modes, place, passage)
+
+
+def _groups(cuts: Sequence[MillingCut]) -> Iterator[list[int]]:
+    """Indices of cuts to step together."""
+    group: list[int] = []
+    for i in sorted(range(len(cuts)), key=lambda i: cuts[i].tooth_period):
+        if group and (len(group) == TOGETHER or cuts[i].tooth_period > ALIKE * cuts[group[0]].tooth_period):
+            yield group
+            group = []
+        group.append(i)
+    if group:
+        yield group
+
+
+def _cutting(
+    cuts: Sequence[MillingCut], modes: ModeTables, teeth: ToothTables, passage: Passage
+) -> tuple[NDArray[np.float32], NDArray[np.complex128]]:
+    """Acceleration from first to last contact (n, c, 2) in m/s^2, and how the modes swing then (c, m)."""
+    steps, step = len(teeth.root), modes.step
+    periods = math.ceil(passage.cutting / (steps * float(np.min(step))))
+    number = np.array([cut.teeth for cut in cuts])[:, np.newaxis]
+    runout = np.zeros((len(cuts), int(np.max(number))))
+    for row, cut in zip(runout, cuts, strict=True):
+        row[: len(cut.runout)] = cut.runout
+    surface, swing = np.zeros_like(teeth.thick), np.zeros(modes.flight.shape, dtype=complex)
+    record = np.empty((periods * steps, len(cuts), 2), dtype=np.float32)
+    for period in range(periods):
+        stands_out = np.take_along_axis(runout[np.newaxis], (teeth.place - period) % number, axis=2)
+        time = (period * steps + np.arange(steps)[:, np.newaxis] + 0.5) * step
+        depth = _depth(passage, time)
+        push = teeth.push * depth[..., np.newaxis, np.newaxis] if np.any(depth < 1) else teeth.push
+        room = teeth.thick + teeth.root * stands_out - surface
+        swings, gains, chips = _period(swing, modes.flight, teeth.reach, push, room)
+        surface += chips - teeth.thick
+        swing = swings[-1]
+        record[period * steps : (period + 1) * steps] = _acceleration(swings, gains, modes)
+    return record, swing
+
+
+def _depth(passage: Passage, time: Floats) -> Floats:
+    """Share of the depth at times since first contact (s)."""
+    times = [0.0, passage.ramp, passage.ramp + passage.steady, passage.cutting]
+    return np.interp(time, times, [float(passage.ramp == 0), 1.0, 1.0, 0.0])
+
+
+def _period(
+    swing: NDArray[np.complex128], flight: NDArray[np.complex128], reach: Floats, push: Floats, room: Floats
+) -> tuple[NDArray[np.complex128], Floats, Floats]:
+    """A tooth period: how modes swing after each step, what they gained in it (s, c, m), and chips (s, c, e)."""
+    swings = np.empty((len(room), *swing.shape), dtype=complex)
+    gains, acting = np.empty(swings.shape), np.empty((*push.shape[:2], push.shape[-1], 1))
+    chips, touching = acting[:, :, : room.shape[-1]], acting[:, :, room.shape[-1] :]
+    columns = (swings.imag[..., np.newaxis], gains[..., np.newaxis], room[..., np.newaxis])
+    rows = zip(swings, swings.real, gains, acting, chips, touching, reach, push, *columns, strict=True)
+    for now, speed, gain, both, chip, touch, to, by, place, gained, left in rows:
+        np.multiply(swing, flight, out=now)
+        np.matmul(to, place, out=chip)
+        np.add(chip, left, out=chip)
+        np.maximum(chip, 0.0, out=chip)
+        np.greater(chip, 0.0, out=touch)
+        np.matmul(by, both, out=gained)
+        np.add(speed, gain, out=speed)
+        swing = now
+    return swings, gains, chips[..., 0]
+
+
+def _acceleration(swings: NDArray[np.complex128], gains: Floats, modes: ModeTables) -> Floats:
+    """q'' = w^2 F / K - 2 zeta w q' - w^2 q along x and y (s, c, 2), in the middle of the impulse of each step."""
+    free = np.imag(modes.pole**2 * (swings - gains / 2))
+    seen: Floats = np.einsum("cam,scm->sca", modes.axis, free + gains * modes.pole.imag / modes.step[:, np.newaxis])
+    return seen
+
+
+def _motion(
+    cutting: NDArray[np.float32], swing: NDArray[np.complex128], modes: ModeTables, place: int, passage: Passage
+) -> TipMotion:
+    """One cut between rest and ringing down."""
+    step, pole, axis = float(modes.step[place]), modes.pole[place], modes.axis[place]
+    n = round((passage.cutting + passage.after) / step)
+    left = step * np.arange(1, n - len(cutting) + 1)
+    ringing = axis @ np.imag((pole**2 * swing)[:, np.newaxis] * np.exp(np.outer(pole, left)))
+    rest = np.zeros((2, round(passage.before / step)))
+    return TipMotion(1 / step, np.hstack([rest, cutting[:n].T, ringing]))

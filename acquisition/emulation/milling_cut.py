@@ -1,0 +1,103 @@
+"""A milling cut as it happens: cutter, part, and a tool tip that gives way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.emulation.hammered_structure import Structure
+
+
+@dataclass(frozen=True, eq=False)
+class MillingCut:
+    """A cut and the machine that makes it; conventions of `lobes.Cut`, whose angles and coefficients it takes.
+
+    x and y are axes of the machine, x along the feed at feed_angle = 0; the tooth angle runs clockwise from the normal
+    of the feed (rad). Raises ValueError for what is no cut.
+    """
+
+    teeth: int
+    """Number of evenly spaced teeth."""
+    entry_angle: float
+    """Where a tooth enters the cut (rad), 0 to pi."""
+    exit_angle: float
+    """Where it leaves (rad), entry_angle to pi."""
+    tangential: float
+    """Tangential cutting coefficient Kt (Pa)."""
+    radial: float
+    """Radial cutting coefficient Kr (Pa)."""
+    depth: float
+    """Axial depth (m)."""
+    feed_per_tooth: float
+    """Feed per tooth (m)."""
+    speed_rpm: float
+    """True spindle speed (rpm)."""
+    x: Structure | None
+    """Modes of the tip in x as it turns, its residual left out; None for rigid."""
+    y: Structure | None
+    """In y."""
+    runout: tuple[float, ...] = ()
+    """How far each tooth stands out (m), `teeth` of them; none where all stand alike."""
+    tangential_edge: float = 0.0
+    """Tangential force of an edge that touches, whatever the chip (N/m)."""
+    radial_edge: float = 0.0
+    """Radial force of an edge that touches (N/m)."""
+    helix_lag: float = 0.0
+    """Lag of a helical tooth along the axis (rad/m); 0 for straight teeth."""
+    feed_angle: float = 0.0
+    """From x to the feed (rad)."""
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be simulated."""
+        if self.teeth < 1 or self.teeth != int(self.teeth):
+            raise ValueError(f"teeth={self.teeth} is not a whole number >= 1")
+        if not 0 <= self.entry_angle < self.exit_angle <= np.pi + 1e-9:
+            raise ValueError(f"angles {self.entry_angle} to {self.exit_angle} rad: give 0 <= entry < exit <= pi")
+        above = (self.tangential, self.depth, self.feed_per_tooth, self.speed_rpm)
+        if not (min(above) > 0 and sum(above) < np.inf):
+            raise ValueError(
+                f"tangential={self.tangential} Pa, depth={self.depth} m, feed_per_tooth={self.feed_per_tooth} m and "
+                f"speed_rpm={self.speed_rpm} must be finite and > 0"
+            )
+        least = (self.radial, self.tangential_edge, self.radial_edge, self.helix_lag)
+        if not (min(least) >= 0 and sum(least) < np.inf):
+            raise ValueError(f"radial, tangential_edge, radial_edge, helix_lag = {least} must be finite and >= 0")
+        if len(self.runout) not in (0, self.teeth):
+            raise ValueError(f"runout has {len(self.runout)} values for {self.teeth} teeth; give one a tooth, or none")
+        if self.x is None and self.y is None:
+            raise ValueError("x and y are both rigid; give the modes of one direction at least")
+
+    @property
+    def tooth_period(self) -> float:
+        """From tooth to tooth (s)."""
+        return 60 / (self.teeth * self.speed_rpm)
+
+
+@dataclass(frozen=True)
+class Passage:
+    """How the tool goes through the part; raises ValueError for times below 0 and for no cut at all."""
+
+    before: float = 0.4
+    """Spindle turning, no cut (s)."""
+    ramp: float = 0.05
+    """While the depth grows from 0 to all of it, and again while it falls (s)."""
+    steady: float = 1.1
+    """At full depth (s)."""
+    after: float = 0.2
+    """No cut again (s)."""
+
+    def __post_init__(self) -> None:
+        """Refuse times that are none."""
+        if not (min(self.before, self.ramp, self.steady, self.after) >= 0 and self.cutting > 0):
+            raise ValueError(f"{self}: times must be >= 0, and ramp or steady > 0")
+
+    @property
+    def cutting(self) -> float:
+        """From first to last contact (s)."""
+        return 2 * self.ramp + self.steady
+
+    @property
+    def seconds(self) -> float:
+        """All of it (s)."""
+        return self.before + self.cutting + self.after

@@ -1,0 +1,105 @@
+"""What was heard of a cut as an HDF5 file: written whole, sealed, never rewritten."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.atomic import atomic_write
+from acquisition.channel import Channel
+from acquisition.errors import DataError
+from acquisition.files.seal import is_broken, sealed
+from acquisition.files.unpacked import check_unpacked
+
+FORMAT = "lobewatch-cut"
+VERSION = 1
+PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True, "chunks": True}
+
+
+@dataclass(frozen=True, eq=False)
+class CutSignal:
+    """The accelerometer during a cut."""
+
+    acceleration: NDArray[np.float64]
+    """m/s^2, shape (n,)."""
+    sample_rate: float
+    """Hz."""
+    codes: NDArray[np.int32] | None = None
+    """As the converter gave them, shape (n,); None where a recording of another program holds values."""
+    channel: Channel | None = None
+    """What turns codes into m/s^2."""
+    lost_scans: int = 0
+    """How many are missing in it."""
+    overload: bool = False
+    """Whether the device has told that its input was overloaded."""
+
+    @property
+    def seconds(self) -> float:
+        """How long it is."""
+        return self.acceleration.size / self.sample_rate
+
+    @property
+    def is_clipped(self) -> bool:
+        """Whether the signal stands at a rail of its converter, or the device has told so."""
+        if self.codes is None or self.channel is None or not self.codes.size:
+            return self.overload
+        low, high = self.channel.rails_in(self.codes)
+        return self.overload or bool(np.any((self.codes <= low) | (self.codes >= high)))
+
+
+def write_cut_signal(path: Path, signal: CutSignal, about: Mapping[str, Any]) -> bytes:
+    """Write it with what is known of the cut (JSON); the bytes of the file, on the disk when this returns."""
+    memory = io.BytesIO()
+    with h5py.File(memory, "w") as file:
+        file.attrs.update(format=FORMAT, version=VERSION, sample_rate_hz=signal.sample_rate)
+        file.attrs.update(lost_scans=signal.lost_scans, overload=signal.overload)
+        file["about"] = json.dumps(about)
+        if signal.codes is not None and signal.channel is not None:
+            word = np.int16 if signal.channel.adc_bits <= 16 else np.int32
+            _dataset(file, "codes", signal.codes.astype(word), "ADC code")
+            told = {field.name: getattr(signal.channel, field.name) for field in fields(Channel)}
+            file["codes"].attrs.update(told)
+        else:
+            _dataset(file, "acceleration", signal.acceleration, "m/s^2")
+    content = sealed(memory.getvalue())
+    atomic_write(path, content)
+    return content
+
+
+def read_cut_signal(path: Path) -> tuple[CutSignal, dict[str, Any]]:
+    """What `write_cut_signal` has written; DataError where it is no such file, or a damaged one."""
+    content = path.read_bytes()
+    if is_broken(content):
+        raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
+    try:
+        with h5py.File(io.BytesIO(content), "r") as file:
+            if file.attrs.get("format") != FORMAT or int(file.attrs["version"]) > VERSION:
+                raise DataError(f"{path}: no recording of a cut that this lobewatch reads")
+            check_unpacked(file, len(content), path)
+            return _read(file), json.loads(file["about"][()])
+    except (OSError, KeyError) as error:
+        raise DataError(f"{path}: no readable recording of a cut ({error}); take it again from a backup") from error
+
+
+def _read(file: h5py.File) -> CutSignal:
+    rate, lost = float(file.attrs["sample_rate_hz"]), int(file.attrs["lost_scans"])
+    overload = bool(file.attrs["overload"])
+    if "acceleration" in file:
+        return CutSignal(file["acceleration"][()], rate, lost_scans=lost, overload=overload)
+    codes = file["codes"]
+    own = {name: codes.attrs[name] for name in (field.name for field in fields(Channel))}
+    channel = Channel(**{name: one.item() if isinstance(one, np.generic) else one for name, one in own.items()})
+    values = codes[()].astype(np.int32)
+    return CutSignal(values * channel.scale, rate, values, channel, lost, overload)
+
+
+def _dataset(file: h5py.File, name: str, values: NDArray[Any], unit: str) -> None:
+    file.create_dataset(name, data=values, **PACKED if values.size else {}).attrs["units"] = unit

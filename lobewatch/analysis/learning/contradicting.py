@@ -1,0 +1,72 @@
+"""Cuts that contradict the model beyond chance: said with their likely cause, never averaged in."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from lobewatch.analysis.learning.learnt import Learnt
+from lobewatch.analysis.learning.likelihood import FREQUENCY, MISJUDGED, folded, heard_base, predicted
+from lobewatch.analysis.learning.observed import Observed
+
+CHANCE = MISJUDGED + 0.01
+"""What was heard is beyond chance where all else gives it less."""
+AWAY = 4.0
+"""Standard deviations of a chatter frequency from all that were predicted."""
+NONE = 0.005
+"""Share of the weight that counts as nothing."""
+
+
+class Contradiction(StrEnum):
+    """In what a cut contradicts the model."""
+
+    FREQUENCY = "frequency"
+    """It chatters where no mode is."""
+    CHATTERS = "chatters"
+    """It chatters where all spindles that explain the other cuts are stable."""
+    STABLE = "stable"
+    """It is stable where all of them chatter."""
+
+
+@dataclass(frozen=True)
+class Contradicting:
+    """A cut that is left out."""
+
+    cut: Observed
+    why: Contradiction
+
+
+def contradiction(learnt: Learnt, cut: Observed) -> Contradiction | None:
+    """Whether a cut contradicts what was learnt from others; None where it may be chance."""
+    guess, weights = predicted(cut, learnt.draws), learnt.weights
+    chatters = float(np.sum(weights * guess.chance))
+    if (chatters if cut.chatters else 1 - chatters) < CHANCE:
+        return Contradiction.CHATTERS if cut.chatters else Contradiction.STABLE
+    if not np.isfinite(cut.frequency) or not cut.chatters:
+        return None
+    teeth = cut.cut.teeth * cut.speed_rpm / 60
+    off = np.abs(folded(heard_base(cut, teeth), teeth) - guess.base)
+    near = off < AWAY * FREQUENCY * cut.frequency
+    return Contradiction.FREQUENCY if np.sum(weights * near) < NONE else None
+
+
+def learn_from_sound(start: Learnt, cuts: Sequence[Observed]) -> tuple[Learnt, tuple[Contradicting, ...]]:
+    """Learn from those cuts that do not contradict what was learnt before them; and the others.
+
+    A cut that contradicts those before it is asked again once all others are learnt.
+    """
+    learnt, odd = start, list[Observed]()
+    for cut in cuts:
+        if contradiction(learnt, cut) is None:
+            learnt = learnt.hearing(cut)
+        else:
+            odd.append(cut)
+    still = list[Contradicting]()
+    for cut in odd:
+        why = contradiction(learnt, cut)
+        learnt = learnt.hearing(cut) if why is None else learnt
+        still += [] if why is None else [Contradicting(cut, why)]
+    return learnt, tuple(still)

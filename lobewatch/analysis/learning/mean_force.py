@@ -1,0 +1,179 @@
+"""Zero order of many spindles at once: limits over speeds, and the loop at a depth beyond its limit.
+
+With the mean force matrix H0, G = diag(Gx, Gy) and tau between two teeth, motion exp(s t) sustains itself where
+
+    det(I + b (1 - exp(-s tau)) H0 G(s)) = 0:      at the limit s = 2 pi i f_c, beyond it Re s > 0.
+
+Exact where the force does not change over the turn (a slot cut by four teeth), else a first proposal.
+Source: Altintas & Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobes import Cut, MillingRows
+from lobes.tooth_force import interval_forces, mean_force, turned
+
+REACH = 0.7
+"""Frequencies are looked at so far around each natural frequency, relatively ..."""
+POINTS = 49
+"""... at so many places, dense near it."""
+AT_ONCE = 2_000_000
+"""Numbers that are worked on at once."""
+NEWTON = 14
+"""Steps of the search for a root."""
+CONSTANT = 1e-6
+"""Change of the force over the turn, relative to its mean, that is none."""
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class MeanForce:
+    """r spindles with a cut, by its mean force."""
+
+    rows: MillingRows
+    force: Floats
+    """Mean force matrix of each (Pa), in the directions x and y of the machine, shape (r, 2, 2)."""
+
+    @classmethod
+    def of(cls, rows: MillingRows) -> MeanForce:
+        """Of rows fed each in its own direction."""
+        tangential, radial = _unit_forces(rows.cut)
+        force = np.multiply.outer(rows.tangential, tangential) + np.multiply.outer(rows.radial, radial)
+        return cls(rows, turned(force, rows.feed_angle))
+
+    def limits(self, speed_rpm: Floats) -> tuple[Floats, Floats]:
+        """Lowest limit (m) and its chatter frequency (Hz) at speeds (rpm) (s,), or (r, s) where each has its own.
+
+        Both of shape (r, s); inf and NaN where there is none.
+        """
+        speeds = np.broadcast_to(speed_rpm, (len(self.rows), np.shape(speed_rpm)[-1]))
+        depth, chatter = np.full(speeds.shape, np.inf), np.full(speeds.shape, np.nan)
+        size = max(1, AT_ONCE // (speeds.shape[1] * POINTS * self.rows.direction.size))
+        for first in range(0, len(self.rows), size):
+            part = slice(first, first + size)
+            some = MeanForce(self.rows[part], self.force[part])
+            depth[part], chatter[part] = some._limits(speeds[part] * self.rows.cut.teeth / 60)
+        return depth, chatter
+
+    def _limits(self, teeth: Floats) -> tuple[Floats, Floats]:
+        """The same at tooth frequencies (Hz) (r, s)."""
+        grid = self._grid()
+        depth, chatter = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
+        for loop in self._eigenvalues(grid):
+            own, frequency = _lowest(grid, loop, teeth)
+            chatter = np.where(own < depth, frequency, chatter)
+            depth = np.minimum(own, depth)
+        return depth, chatter
+
+    def loudest(self, speed_rpm: Floats, depth: float) -> tuple[Floats, Floats]:
+        """Growth (1/s) and frequency (Hz) of the motion that grows fastest, at a speed (rpm) each and a depth (m).
+
+        Both of shape (r,).
+        """
+        tau = 60 / (self.rows.cut.teeth * speed_rpm)
+        low, high = 0.9 * np.min(self.rows.frequency, axis=1), 1.3 * np.max(self.rows.frequency, axis=1)
+        number = int(np.ceil(np.max((high - low) * tau / np.pi))) * 2 + 2
+        root = 1j * (low[:, np.newaxis] + (high - low)[:, np.newaxis] * np.linspace(0, 1, number))
+        for _ in range(NEWTON):
+            value, slope = self._closed(root, tau[:, np.newaxis], depth)
+            step = value / np.where(slope == 0, 1e-300, slope)
+            root = root - step * np.minimum(1.0, 0.3 / tau[:, np.newaxis] / np.maximum(np.abs(step), 1e-12))
+        value, slope = self._closed(root, tau[:, np.newaxis], depth)
+        good = (np.abs(value / slope) * tau[:, np.newaxis] < 1e-3) & (root.imag > 0)
+        best = np.argmax(np.where(good, root.real, -np.inf), axis=1)
+        found = root[np.arange(len(root)), best]
+        found = np.where(np.any(good, axis=1), found, np.nan)
+        return np.asarray(found.real), np.asarray(found.imag / (2 * np.pi))
+
+    def _closed(self, s: Complexes, tau: Floats, depth: float) -> tuple[Complexes, Complexes]:
+        """det(I + b (1 - exp(-s tau)) H0 G) and its derivative by s."""
+        (gx, dx), (gy, dy) = self._receptance(s, 0), self._receptance(s, 1)
+        h = self.force[..., np.newaxis]
+        wave = np.exp(-np.clip(s.real * tau, -50, 50) - 1j * s.imag * tau)
+        gain, dgain = depth * (1 - wave), depth * tau * wave
+        trace, dtrace = h[:, 0, 0] * gx + h[:, 1, 1] * gy, h[:, 0, 0] * dx + h[:, 1, 1] * dy
+        product = h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] * h[:, 1, 0]
+        both, dboth = product * gx * gy, product * (dx * gy + gx * dy)
+        return (
+            1 + gain * trace + gain**2 * both,
+            dgain * trace + gain * dtrace + 2 * gain * dgain * both + gain**2 * dboth,
+        )
+
+    def _receptance(self, s: Complexes, axis: int) -> tuple[Complexes, Complexes]:
+        """Of one direction at s (r, k) (1/s), and its derivative."""
+        total, slope = np.zeros(s.shape, np.complex128), np.zeros(s.shape, np.complex128)
+        place, velocity = self.rows.seen
+        for k in np.flatnonzero(self.rows.axes[self.rows.direction] == axis):
+            w, zeta, stiff = (
+                one[:, k, np.newaxis] for one in (self.rows.frequency, self.rows.damping_ratio, self.rows.stiffness)
+            )
+            p, v, r = place[:, k, np.newaxis], velocity[:, k, np.newaxis], s / w
+            below = stiff * (1 + 2 * zeta * r + r**2)
+            total += (p + v * r) / below
+            slope += (v - (p + v * r) * stiff * (2 * zeta + 2 * r) / below) / below / w
+        return total, slope
+
+    def _grid(self) -> Floats:
+        """Frequencies (Hz), rising, shape (r, k)."""
+        width = self.rows.damping_ratio[..., np.newaxis]
+        around = width * np.sinh(np.linspace(-1, 1, POINTS) * np.arcsinh(REACH / width))
+        grid = (self.rows.frequency / (2 * np.pi))[..., np.newaxis] * (1 + around)
+        return np.sort(grid.reshape(len(self.rows), -1), axis=1)
+
+    def _eigenvalues(self, grid: Floats) -> list[Complexes]:
+        """Both of H0 G at frequencies (r, k), each followed over them."""
+        s = np.asarray(2j * np.pi * grid, np.complex128)
+        gx, gy = self._receptance(s, 0)[0], self._receptance(s, 1)[0]
+        h = self.force[..., np.newaxis]
+        half = (h[:, 0, 0] * gx + h[:, 1, 1] * gy) / 2
+        root = np.sqrt(half**2 - (h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] * h[:, 1, 0]) * gx * gy)
+        jumps = np.real(root[:, 1:] * np.conj(root[:, :-1])) < 0
+        root[:, 1:] *= np.cumprod(np.where(jumps, -1.0, 1.0), axis=1)
+        return [half + root, half - root]
+
+
+def _lowest(grid: Floats, loop: Complexes, teeth: Floats) -> tuple[Floats, Floats]:
+    """Lowest limit (m) and its frequency (Hz) of loops (r, k) over frequencies (r, k), at tooth frequencies (r, s).
+
+    A crossing lies where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L).
+    """
+    turn = 0.5 - _unwrapped(np.angle(loop)) / np.pi
+    place = grid[:, np.newaxis] / teeth[..., np.newaxis] + turn[:, np.newaxis]
+    whole = np.floor(place)
+    low = (np.minimum(loop.real[:, 1:], loop.real[:, :-1]) < 0)[:, np.newaxis]
+    row, speed, step = np.nonzero((whole[..., 1:] != whole[..., :-1]) & low)
+    before, after = place[row, speed, step], place[row, speed, step + 1]
+    share = (np.maximum(whole[row, speed, step], whole[row, speed, step + 1]) - before) / (after - before)
+    real = loop.real[row, step] + share * (loop.real[row, step + 1] - loop.real[row, step])
+    limit = np.where(real < 0, -1 / (2 * np.minimum(real, -1e-300)), np.inf)
+    order = np.argsort(-limit, kind="stable")
+    depth, frequency = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
+    depth[row[order], speed[order]] = limit[order]
+    frequency[row[order], speed[order]] = (grid[row, step] + share * (grid[row, step + 1] - grid[row, step]))[order]
+    return depth, frequency
+
+
+def _unwrapped(angle: Floats) -> Floats:
+    """Angles (r, k) without jumps of a turn."""
+    step = np.diff(angle, axis=1)
+    angle[:, 1:] -= 2 * np.pi * np.cumsum(np.rint(step / (2 * np.pi)), axis=1)
+    return angle
+
+
+def is_constant(cut: Cut) -> bool:
+    """Whether the force does not change over the turn: then the mean force is all of it."""
+    force = interval_forces(cut, 64)
+    return cut.helix_lag == 0 and bool(np.max(np.ptp(force, axis=0)) < CONSTANT * np.max(np.abs(force)))
+
+
+def _unit_forces(cut: Cut) -> tuple[Floats, Floats]:
+    """Mean force matrices for Kt alone and Kr alone, each 1, in the frame of the feed."""
+    first = mean_force(replace(cut, tangential=1.0, radial=0.0, feed_angle=0.0))
+    return first, mean_force(replace(cut, tangential=1.0, radial=1.0, feed_angle=0.0)) - first

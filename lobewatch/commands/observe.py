@@ -1,0 +1,54 @@
+"""lobewatch observe."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lobewatch.machine.named_folder import named_folder
+from lobewatch.show.output import Json, emit, notes
+
+
+def observe(
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    program: Annotated[str, typer.Option(help='Cutting program that was cut, or "reference cut".')],
+    speed: Annotated[
+        float | None, typer.Option(help="Spindle speed, rpm; that of the program where not given.")
+    ] = None,
+    depth: Annotated[float | None, typer.Option(help="Axial depth, mm; that of the program where not given.")] = None,
+    stable: Annotated[bool, typer.Option("--stable", help="It ran quietly.")] = False,
+    chatter: Annotated[bool, typer.Option("--chatter", help="It chattered.")] = False,
+    frequency: Annotated[float | None, typer.Option(help="What it chattered at, Hz, where somebody knows.")] = None,
+    date: Annotated[datetime | None, typer.Option(help="When it was cut, local time; now where not given.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Write down what was heard of a test cut by ear: that it was stable, or that it chattered.
+
+    It is a line of the journal; lobewatch exclude takes it out again.
+
+    Examples:
+
+      lobewatch observe mill-3 --program A --speed 12000 --depth 2 --stable
+      lobewatch observe mill-3 --program A --speed 12000 --depth 3 --chatter --frequency 1650
+    """
+    from lobewatch.analysis import Logbook
+    from lobewatch.machine.cuts.keeping import keep_cut
+    from lobewatch.machine.cuts.observing import contradicted, observed
+    from lobewatch.machine.cuts.setting import cut_setting
+    from lobewatch.notify.telling import telling
+    from lobewatch.show.history.describe_cut import about_tool, cut_json, cut_text, otherwise
+
+    if stable == chatter:
+        raise ValueError(f"{'both' if stable else 'neither'} of --stable and --chatter: give one, what was heard")
+    logbook = Logbook.open(machine)
+    setting = cut_setting(logbook.machine, program, speed, depth)
+    heard = observed(setting, "stable" if stable else "chatter", frequency, date)
+    said = [*about_tool(logbook, heard), *map(otherwise, contradicted(heard, logbook.cuts))]
+    with telling(logbook):
+        kept = keep_cut(logbook.folder, heard)
+        emit({"cut": cut_json(kept), "remarks": [remark.code for remark in said]}, as_json, f"saved {cut_text(kept)}")
+    for remark in said:
+        notes.print(f"note: {remark}", markup=False)

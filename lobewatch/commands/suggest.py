@@ -1,0 +1,47 @@
+"""lobewatch suggest."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lobewatch.machine.named_folder import named_folder
+from lobewatch.show.output import Json, emit
+
+
+def suggest(
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
+    program: Annotated[str, typer.Option(help="Cutting program to find the limits of.")],
+    cuts: Annotated[int, typer.Option(min=1, help="Test cuts that shall be made in all.")] = 5,
+    as_json: Json = False,
+) -> None:
+    """The next test cut of a program: the one worth most, of those that are more likely stable than not.
+
+    Cuts that were heard (lobewatch observe) say what the spindle is like when it turns, and how hard the material is
+    to cut. Says what was learnt of both, beside what was known before.
+
+    Examples:
+
+      lobewatch suggest mill-3 --program A
+      lobewatch suggest mill-3 --program A --cuts 8 --json
+    """
+    from lobewatch.analysis import Logbook
+    from lobewatch.analysis.learning.of_program import next_cut, program_named
+    from lobewatch.show.learning.describe_learnt import learnt_texts, lesson_remarks
+    from lobewatch.show.learning.describe_suggestion import suggestion_json, suggestion_lines
+    from lobewatch.show.measurements import remark_json, remark_lines
+
+    logbook = Logbook.open(machine)
+    table = program_named(logbook.machine, program)
+    assembly = logbook.assembly(table.tool)
+    found = next_cut(table, assembly, logbook.machine, logbook.cuts, cuts)
+    remarks = [*logbook.remarks, *assembly.remarks, *lesson_remarks(found.lesson)]
+    emit(
+        suggestion_json(found) | {"remarks": [remark_json(remark) for remark in remarks]},
+        as_json,
+        *suggestion_lines(found, logbook.folder.path),
+        *learnt_texts(found.lesson),
+        *remark_lines(remarks),
+    )

@@ -1,0 +1,112 @@
+"""One test cut: what was cut, and what it sounded like."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from typing import Any, Literal, get_args
+
+from lobes import Cut
+
+CutWord = Literal["stable", "chatter", "flip", "cannot tell"]
+"""What a cut sounded like; flip: chatter whose period is two teeth."""
+KIND = "cut"
+"""Of its line in the journal."""
+
+
+@dataclass(frozen=True)
+class RecordedAs:
+    """The file of a recording, as the journal vouches for it."""
+
+    id: str
+    """Of the cut."""
+    sha256: str
+    """Of the file."""
+    size: int
+    """Of the file (bytes)."""
+
+    @property
+    def file(self) -> str:
+        """Its place in the folder of the machine."""
+        return f"cuts/{self.id}.h5"
+
+
+@dataclass(frozen=True)
+class HeardCut:
+    """A test cut, as it was cut and heard; what it was cut with stands here as it was then, whatever becomes of it."""
+
+    id: str
+    """Number in the journal, "c1" on."""
+    at: datetime
+    """When it was cut (UTC)."""
+    program: str | None
+    """Cutting program that it was a cut of; None for the reference cut."""
+    tool: str
+    """What was in the spindle."""
+    cut: Cut
+    """Teeth, immersion, direction and the coefficients that it was judged with."""
+    coefficients: str
+    """Material that these are of; empty where machine.toml gave the numbers themselves."""
+    feed: str
+    """Axis of the machine that it was fed along, "x" or "y"; "both" where that is not known."""
+    feed_per_tooth: float | None
+    """m; None where machine.toml does not say."""
+    commanded_rpm: float
+    """Spindle speed as it was set (rpm)."""
+    speed_rpm: float
+    """As it was heard; as it was set where that was by ear."""
+    depth: float
+    """Axial depth of cut (m)."""
+    word: CutWord
+    """What it sounded like."""
+    chatter_frequency_hz: float | None
+    """What chatter was heard at; None where it was none, or nobody knows."""
+    by: Literal["ear", "accelerometer"]
+    """Who heard it."""
+    software: str
+    """Version of lobewatch that wrote it down."""
+    chatter_frequency_std_hz: float | None = None
+    """Standard error; None where nobody knows."""
+    reason: str = ""
+    """Why it cannot be told, a code; empty where it can."""
+    recording: RecordedAs | None = None
+    """None for what was heard by ear."""
+    excluded: str = ""
+    """Why a person has taken it out; empty where it counts; lines of their own."""
+
+    def __post_init__(self) -> None:
+        """Refuse a word that is none."""
+        if self.word not in get_args(CutWord):
+            raise ValueError(f"word={self.word!r} is none of {', '.join(get_args(CutWord))}")
+
+    @property
+    def counts(self) -> bool:
+        """Whether anything can be learnt from it."""
+        return not self.excluded and self.word != "cannot tell"
+
+    @property
+    def chatters(self) -> bool:
+        """Whether chatter was heard, of either kind."""
+        return self.word in ("chatter", "flip")
+
+    @property
+    def line(self) -> dict[str, Any]:
+        """For the journal."""
+        told = {name: value for name, value in asdict(self).items() if name != "excluded"}
+        return {"kind": KIND, **told, "at": self.at.isoformat()}
+
+
+def cut_of_line(line: Mapping[str, Any], excluded: str = "") -> HeardCut:
+    """From the line that `HeardCut.line` has made."""
+    told = {name: line[name] for name in HeardCut.__dataclass_fields__ if name in line}
+    told |= {"at": datetime.fromisoformat(line["at"]).astimezone(UTC), "cut": Cut(**line["cut"])}
+    recording = line.get("recording")
+    return HeardCut(**told | {"recording": RecordedAs(**recording) if recording else None, "excluded": excluded})
+
+
+def cuts_of(entries: Sequence[Mapping[str, Any]], excluded: Mapping[str, str]) -> tuple[HeardCut, ...]:
+    """The test cuts of a journal, oldest first by their time; excluded: why some are, by identity."""
+    lines = {line["id"]: line for line in entries if line["kind"] == KIND}
+    found = [cut_of_line(line, excluded.get(name, "")) for name, line in lines.items()]
+    return tuple(sorted(found, key=lambda cut: cut.at))

@@ -1,0 +1,66 @@
+"""Test cuts for people and as JSON."""
+
+from __future__ import annotations
+
+from datetime import UTC
+from typing import Any
+
+from acquisition import Remark
+from lobewatch.analysis import Logbook
+from lobewatch.machine.cuts.heard_cut import HeardCut
+
+
+def cut_text(cut: HeardCut) -> str:
+    """One line."""
+    return f"{cut.id}: {cut.at.astimezone():%Y-%m-%d %H:%M} {cut_words(cut)}"
+
+
+def cut_words(cut: HeardCut) -> str:
+    """What was cut, and what it sounded like."""
+    named = cut.program or "reference cut"
+    return f"{named} at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm: {heard_text(cut)}, by {cut.by}"
+
+
+def heard_text(cut: HeardCut) -> str:
+    """What it sounded like."""
+    heard: str = cut.word
+    if cut.chatter_frequency_hz is not None:
+        error = cut.chatter_frequency_std_hz
+        heard += f" at {cut.chatter_frequency_hz:.5g}{'' if error is None else f' +- {2 * error:.2g}'} Hz"
+    return heard + (f" ({cut.reason})" if cut.reason else "")
+
+
+def cut_json(cut: HeardCut) -> dict[str, Any]:
+    """One test cut."""
+    return {
+        "id": cut.id,
+        "time": cut.at.astimezone(UTC).isoformat(timespec="microseconds"),
+        "program": cut.program,
+        "tool": cut.tool,
+        "feed": cut.feed,
+        "speed_rpm": cut.speed_rpm,
+        "commanded_rpm": cut.commanded_rpm,
+        "depth_mm": 1e3 * cut.depth,
+        "word": cut.word,
+        "chatter_frequency_hz": cut.chatter_frequency_hz,
+        "chatter_frequency_hz_std": cut.chatter_frequency_std_hz,
+        "by": cut.by,
+        "reason": cut.reason,
+        "recording": None if cut.recording is None else cut.recording.file,
+        "excluded": cut.excluded,
+    }
+
+
+def about_tool(logbook: Logbook, cut: HeardCut) -> list[Remark]:
+    """That its tool was never tapped; nothing where it was."""
+    if any(tap.tool == cut.tool for tap in logbook.taps):
+        return []
+    text = "was never tapped: the cut is kept, and counts when it is"
+    return [Remark("tool-not-tapped", cut.tool, text, f"tap it with: lobewatch tap {logbook.folder.path}")]
+
+
+def otherwise(other: HeardCut) -> Remark:
+    """That a cut was heard otherwise before."""
+    text = f"heard otherwise at the same point ({cut_words(other)}); both are kept"
+    cure = f"lobewatch exclude MACHINE {other.id} --reason TEXT takes out the one that is wrong"
+    return Remark("cuts-contradict", other.id, text, cure)

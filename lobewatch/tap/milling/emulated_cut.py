@@ -1,0 +1,122 @@
+"""A cut on an emulated machine, heard by the accelerometer on its housing, again and again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from acquisition import Bench, DataError, Driver, EmulatorThread, Structure
+from acquisition.emulation import CutSound, MillingCut, Passage, random_housing, simulate_cut
+from dsm import Spindle
+from lobes import Program, program_limit
+from lobewatch.machine.cut_tables import FEED_ANGLES
+from lobewatch.machine.cuts.setting import CutSetting
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap.emulated_spindle import SAMPLE_RATE, emulated_inputs, emulated_structure
+from lobewatch.tap.milling.hidden_truth import HiddenTruth, hidden_truth, runout_of
+from modal import Mode
+
+PASSAGE = Passage(before=2.0, ramp=0.1, steady=2.8, after=2.0)
+"""What is repeated: air, cut, air."""
+STIFFEST = 100.0
+"""Modes so many times as stiff as the softest are left out: a cut hardly moves them, and they take long."""
+FEED_SHARE = 5e-3
+"""Feed per tooth over diameter, where machine.toml does not say."""
+EDGES = (25e3, 35e3)
+"""Tangential and radial edge coefficients (N/m), where they are not known: about those of aluminium."""
+
+
+@dataclass(frozen=True)
+class EmulatedCut:
+    """A device made of software on a housing made of numbers."""
+
+    device: EmulatorThread
+    """Serves while its context lasts."""
+    truth: HiddenTruth
+    """What nobody has measured."""
+    speed_rpm: float
+    """True spindle speed (rpm)."""
+    limit: float
+    """Deepest stable depth at this speed, in this direction of feed, with this truth (m); inf where any is stable."""
+
+
+def emulate_cut(
+    folder: MachineFolder,
+    driver: Driver,
+    setting: CutSetting,
+    seed: int = 1,
+    *,
+    realtime: bool = True,
+    tcp: bool = False,
+    spindle: Spindle | None = None,
+    passage: Passage = PASSAGE,
+) -> EmulatedCut:
+    """Somebody makes this cut, again and again; the accelerometer is on the housing, the hammer lies idle.
+
+    Truth, run-out and housing are those of the seed, whatever is cut; a program fed along both axes is fed along x.
+    spindle: in place of the model of the tool. DataError where machine.toml has no model of it, or lacks the sensors of
+    a device that does not describe them itself.
+    """
+    if driver.emulate is None:
+        raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
+    truth, random, noise = hidden_truth(seed), *np.random.default_rng(seed).spawn(2)
+    runout = runout_of(setting.cut.teeth, random)
+    cut = _turning_cut(folder, setting, _at_rest(folder, setting, spindle), truth, runout)
+    motion, housing = simulate_cut(cut, passage), random_housing(random, cut.speed_rpm)
+    bench = Bench(
+        lambda rate: CutSound(motion, housing, cut.speed_rpm, rate, noise),
+        emulated_inputs(folder, driver),
+        SAMPLE_RATE,
+        realtime,
+        tcp,
+        folder.machine.daq.digital_clock,
+    )
+    return EmulatedCut(driver.emulate(bench), truth, cut.speed_rpm, _limit(cut, setting))
+
+
+def _at_rest(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None) -> Structure:
+    """Modes of the tip that a cut moves."""
+    table = folder.machine.spindle
+    if table is None:
+        raise DataError(f"{folder.toml}: no model to emulate: add a [spindle] table (or use lobewatch init --example)")
+    whole = emulated_structure(spindle or folder.machine.model(setting.tool), table.damping_ratio)
+    some = whole.stiffness < STIFFEST * np.min(whole.stiffness)
+    return Structure(whole.frequency[some], whole.damping_ratio[some], whole.stiffness[some])
+
+
+def _turning_cut(
+    folder: MachineFolder, setting: CutSetting, rest: Structure, truth: HiddenTruth, runout: tuple[float, ...]
+) -> MillingCut:
+    known = folder.machine.coefficients(setting.table)
+    edges = np.array([known.tangential_edge, known.radial_edge])
+    edges = np.where(np.isfinite(edges), edges, EDGES)
+    feed = setting.table.feed_per_tooth_mm or FEED_SHARE * setting.table.tool_diameter_mm
+    return MillingCut(
+        teeth=setting.cut.teeth,
+        entry_angle=setting.cut.entry_angle,
+        exit_angle=setting.cut.exit_angle,
+        tangential=setting.cut.tangential * truth.tangential,
+        radial=setting.cut.radial * truth.tangential,
+        tangential_edge=float(edges[0]),
+        radial_edge=float(edges[1]),
+        depth=setting.depth,
+        feed_per_tooth=feed / 1e3,
+        speed_rpm=setting.speed_rpm * truth.speed,
+        x=truth.x.of(rest),
+        y=truth.y.of(rest),
+        runout=runout,
+        helix_lag=setting.cut.helix_lag,
+        feed_angle=FEED_ANGLES.get(setting.feed, 0.0),
+    )
+
+
+def _limit(cut: MillingCut, setting: CutSetting) -> float:
+    """Deepest stable depth, by semi-discretisation (m)."""
+    x, y = (
+        [Mode(*one) for one in zip(side.frequency, side.damping_ratio, side.stiffness, strict=True)]
+        for side in (cut.x, cut.y)
+        if side is not None
+    )
+    pushed = replace(setting.cut, tangential=cut.tangential, radial=cut.radial, feed_angle=cut.feed_angle)
+    return program_limit(Program(pushed, cut.speed_rpm, cut.depth), x, y).limit

@@ -74,7 +74,7 @@ def make_environment(extras):
 
 
 def tests(arguments):
-    """Command that runs the tests; all where none are chosen, on all cores; with the long ones, their coverage is judged."""
+    """Command that runs the tests; all on all cores where none are chosen, with --long their coverage is judged."""
     chosen = [argument for argument in arguments if argument != "--long"]
     whole = [] if chosen else ["-n", "auto", "--dist", "worksteal"]
     every = ["-m", "long or not long", "--timeout", "3600"] if "--long" in arguments else []

@@ -2,12 +2,13 @@
 
     chip     h = feed sin(phi) + n . q + r - u,  n = (sin phi, cos phi), r how far the tooth stands out
     surface  u <- u - feed sin(phi) + max(h, 0): the furthest material that all earlier teeth have left at this angle
-    force    F = -b ((Kt h + Kte) (cos, -sin) + (Kr h + Kre) (sin, cos)) where h > 0
+    force    F = -b (Kt (cos, -sin) + Kr (sin, cos)) max(h, 0) - b (Kte (cos, -sin) + Kre (sin, cos))
 
 q is the displacement of the tip along the feed and its normal. A tooth that leaves the cut and comes back finds what
 was left one, two or more tooth periods ago. Between steps the modes swing freely, which is exact; the force of a step
 acts as one impulse in its middle: second order, no damping of its own, in the frequency domain a residual flexibility
-of -(w dt)^2 / 12 K. The depth comes and goes as a factor of the force.
+of -(w dt)^2 / 12 K. The depth comes and goes as a factor of the force. Edges push wherever they are in the arc of cut:
+a force that ended with the chip would push the tooth out of a thin one, and move the limit of stability.
 
 Source: Schmitz & Smith, Machining Dynamics, ch. 4.4 (time-domain simulation with run-out and loss of contact).
 """
@@ -30,6 +31,8 @@ ALIKE = 1.25
 """Cuts are stepped together whose tooth periods differ by this factor at most ..."""
 TOGETHER = 48
 """... and no more than so many."""
+TURNS = 8
+"""Turns of the spindle that are compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +43,9 @@ class TipMotion:
     """Steps a second (Hz)."""
     acceleration: Floats
     """Along x and y of the machine (m/s^2), shape (2, n)."""
+    wander: float = 0.0
+    """What did not repeat from turn to turn late at full depth, as a share of the rms: 0 for a stable cut, and for a
+    flip of an even number of teeth. A cut above its limit may be stable where run-out keeps teeth out of it."""
 
 
 def simulate_cut(cut: MillingCut, passage: Passage | None = None) -> TipMotion:
@@ -55,7 +61,8 @@ def simulate_cuts(cuts: Sequence[MillingCut], passage: Passage | None = None) ->
         modes, teeth = tables(members, max(map(steps_needed, members)))
         cutting, swing = _cutting(members, modes, teeth, passage)
         for place, number in enumerate(group):
-            yield number, _motion(cutting[:, place], swing[place], modes, place, passage)
+            turn = len(teeth.root) * cuts[number].teeth
+            yield number, _motion(cutting[:, place], swing[place], modes, place, passage, turn)
 
 
 def _groups(cuts: Sequence[MillingCut]) -> Iterator[list[int]]:
@@ -86,9 +93,11 @@ def _cutting(
         stands_out = np.take_along_axis(runout[np.newaxis], (teeth.place - period) % number, axis=2)
         time = (period * steps + np.arange(steps)[:, np.newaxis] + 0.5) * step
         depth = _depth(passage, time)
-        push = teeth.push * depth[..., np.newaxis, np.newaxis] if np.any(depth < 1) else teeth.push
+        push, rub = teeth.push, teeth.rub * depth[..., np.newaxis]
+        if np.any(depth < 1):
+            push = push * depth[..., np.newaxis, np.newaxis]
         room = teeth.thick + teeth.root * stands_out - surface
-        swings, gains, chips = _period(swing, modes.flight, teeth.reach, push, room)
+        swings, gains, chips = _period(swing, modes.flight, teeth.reach, push, rub, room)
         surface += chips - teeth.thick
         swing = swings[-1]
         record[period * steps : (period + 1) * steps] = _acceleration(swings, gains, modes)
@@ -102,24 +111,28 @@ def _depth(passage: Passage, time: Floats) -> Floats:
 
 
 def _period(
-    swing: NDArray[np.complex128], flight: NDArray[np.complex128], reach: Floats, push: Floats, room: Floats
+    swing: NDArray[np.complex128],
+    flight: NDArray[np.complex128],
+    reach: Floats,
+    push: Floats,
+    rub: Floats,
+    room: Floats,
 ) -> tuple[NDArray[np.complex128], Floats, Floats]:
     """A tooth period: how modes swing after each step, what they gained in it (s, c, m), and chips (s, c, e)."""
     swings = np.empty((len(room), *swing.shape), dtype=complex)
-    gains, acting = np.empty(swings.shape), np.empty((*push.shape[:2], push.shape[-1], 1))
-    chips, touching = acting[:, :, : room.shape[-1]], acting[:, :, room.shape[-1] :]
-    columns = (swings.imag[..., np.newaxis], gains[..., np.newaxis], room[..., np.newaxis])
-    rows = zip(swings, swings.real, gains, acting, chips, touching, reach, push, *columns, strict=True)
-    for now, speed, gain, both, chip, touch, to, by, place, gained, left in rows:
+    gains, chips = np.empty(swings.shape), np.empty(room.shape)
+    columns = (swings.imag[..., np.newaxis], gains[..., np.newaxis], chips[..., np.newaxis])
+    rows = zip(swings, swings.real, gains, chips, room, reach, push, rub, *columns, strict=True)
+    for now, speed, gain, chip, left, to, by, edge, place, gained, cut in rows:
         np.multiply(swing, flight, out=now)
-        np.matmul(to, place, out=chip)
+        np.matmul(to, place, out=cut)
         np.add(chip, left, out=chip)
         np.maximum(chip, 0.0, out=chip)
-        np.greater(chip, 0.0, out=touch)
-        np.matmul(by, both, out=gained)
+        np.matmul(by, cut, out=gained)
+        np.add(gain, edge, out=gain)
         np.add(speed, gain, out=speed)
         swing = now
-    return swings, gains, chips[..., 0]
+    return swings, gains, chips
 
 
 def _acceleration(swings: NDArray[np.complex128], gains: Floats, modes: ModeTables) -> Floats:
@@ -130,12 +143,27 @@ def _acceleration(swings: NDArray[np.complex128], gains: Floats, modes: ModeTabl
 
 
 def _motion(
-    cutting: NDArray[np.float32], swing: NDArray[np.complex128], modes: ModeTables, place: int, passage: Passage
+    cutting: NDArray[np.float32],
+    swing: NDArray[np.complex128],
+    modes: ModeTables,
+    place: int,
+    passage: Passage,
+    turn: int,
 ) -> TipMotion:
-    """One cut between rest and ringing down."""
+    """One cut between rest and ringing down; turn: steps of one."""
     step, pole, axis = float(modes.step[place]), modes.pole[place], modes.axis[place]
     n = round((passage.cutting + passage.after) / step)
     left = step * np.arange(1, n - len(cutting) + 1)
     ringing = axis @ np.imag((pole**2 * swing)[:, np.newaxis] * np.exp(np.outer(pole, left)))
     rest = np.zeros((2, round(passage.before / step)))
-    return TipMotion(1 / step, np.hstack([rest, cutting[:n].T, ringing]))
+    full = cutting[: round((passage.ramp + passage.steady) / step)]
+    return TipMotion(1 / step, np.hstack([rest, cutting[:n].T, ringing]), _wander(full, turn))
+
+
+def _wander(acceleration: NDArray[np.float32], turn: int) -> float:
+    """What of the last turns differs from their mean, as a share of the rms; 0 for less than two."""
+    number = min(TURNS, len(acceleration) // turn)
+    if number < 2:
+        return 0.0
+    turns = acceleration[-number * turn :].reshape(number, -1).astype(float)
+    return float(np.sqrt(np.mean((turns - np.mean(turns, axis=0)) ** 2) / np.mean(turns**2)))

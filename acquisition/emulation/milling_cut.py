@@ -40,9 +40,9 @@ class MillingCut:
     runout: tuple[float, ...] = ()
     """How far each tooth stands out (m), `teeth` of them; none where all stand alike."""
     tangential_edge: float = 0.0
-    """Tangential force of an edge that touches, whatever the chip (N/m)."""
+    """Tangential force of an edge wherever it is in the arc of cut, whatever its chip (N/m)."""
     radial_edge: float = 0.0
-    """Radial force of an edge that touches (N/m)."""
+    """The same, radial (N/m)."""
     helix_lag: float = 0.0
     """Lag of a helical tooth along the axis (rad/m); 0 for straight teeth."""
     feed_angle: float = 0.0

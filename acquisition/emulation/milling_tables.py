@@ -63,7 +63,9 @@ class ToothTables:
     reach: Floats
     """How much further a tooth reaches into the part for each mode's displacement, shape (s, c, e, m)."""
     push: Floats
-    """What z.real gains in a step from each chip, then from each edge that touches, at full depth, (s, c, m, 2 e)."""
+    """What z.real gains in a step from each chip at full depth, shape (s, c, m, e)."""
+    rub: Floats
+    """What it gains from all edges in the cut, shape (s, c, m)."""
 
 
 def tables(cuts: Sequence[MillingCut], steps: int) -> tuple[ModeTables, ToothTables]:
@@ -73,11 +75,10 @@ def tables(cuts: Sequence[MillingCut], steps: int) -> tuple[ModeTables, ToothTab
     step = np.array([cut.tooth_period / steps for cut in cuts])
     thick = normal[:, :, 0] * np.array([[cut.feed_per_tooth] for cut in cuts])
     reach = np.swapaxes(normal, -1, -2) @ shape
-    sides = (np.swapaxes(kick, -1, -2) @ normal, np.swapaxes(rub, -1, -2) @ (normal * root[:, :, np.newaxis]))
-    push = np.concatenate(sides, axis=-1)
-    return ModeTables(pole, np.exp(pole * step[:, np.newaxis]), axis, step), ToothTables(
-        root, thick, place, reach, push
-    )
+    push = np.swapaxes(kick, -1, -2) @ normal
+    edges = np.swapaxes(rub, -1, -2) @ np.sum(normal * root[:, :, np.newaxis], axis=-1, keepdims=True)
+    modes = ModeTables(pole, np.exp(pole * step[:, np.newaxis]), axis, step)
+    return modes, ToothTables(root, thick, place, reach, push, edges[..., 0])
 
 
 def _side_by_side(each: Sequence[tuple[NDArray[Any], ...]], axis: int) -> list[Any]:

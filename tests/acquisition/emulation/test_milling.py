@@ -136,7 +136,9 @@ def test_it_dies_below_the_limit_and_grows_above_it_as_the_multipliers_say(cut: 
     assert exact[0] < 1 < exact[1]
     for depth, ramp, expected in zip(depths, (0.01, 0.4), exact, strict=True):
         made, passage = cut_of(cut, speed_rpm, depth), Passage(0.0, ramp, 0.4, 0.0)
-        assert multiplier(made, simulate_cut(made, passage), passage) - 1 == pytest.approx(expected - 1, rel=0.1)
+        motion = simulate_cut(made, passage)
+        assert multiplier(made, motion, passage) - 1 == pytest.approx(expected - 1, rel=0.1)
+        assert (motion.wander > 1e-2) == (expected > 1)
 
 
 def test_chatter_has_the_frequency_of_the_lobes() -> None:

@@ -127,6 +127,16 @@ def test_a_damaged_machine_costs_only_its_own_lines(mills: Path) -> None:
     assert len((mills / "fleet.csv").read_text("utf-8").splitlines()) == 1 + 2
 
 
+@pytest.mark.parametrize("kind", ["csv", "sqlite", "parquet"])
+def test_a_machine_that_was_never_tapped_has_no_line(mills: Path, shop: Shop, kind: str) -> None:
+    type(shop)(mills / "new")
+    for again in (False, True):  # from its files, then from its standing
+        told = json.loads(run(mills, mills / f"fleet.{kind}", "--json").stdout)
+        assert (told["tap_tests"], told["machines"]) == (5, 3), again
+    told = json.loads(run(mills / "new", mills / f"none.{kind}", "--json").stdout)
+    assert (told["tap_tests"], told["machines"]) == (0, 1)
+
+
 def test_another_ending_is_refused_and_nothing_is_left(mills: Path) -> None:
     with pytest.raises(DataError, match=r"\.xlsx is no kind of table; give \.sqlite, \.csv, \.csv\.gz, \.parquet"):
         run(mills, mills / "fleet.xlsx")

@@ -1,0 +1,154 @@
+"""What five suggested cuts find on spindles whose truth at speed is hidden, judged by a simulation in time.
+
+The judge (`acquisition.emulation.simulate_cuts`: chips, surfaces that teeth have left, loss of contact) shares no code
+with `lobes/`. Truths: docs/cuts.md; spindles of 800 to 2500 Hz with one mode in each direction, slots of four teeth,
+4000 to 20 000 rpm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from acquisition.emulation.hammered_structure import Structure
+from acquisition.emulation.milling import simulate_cuts
+from acquisition.emulation.milling_cut import MillingCut, Passage
+from lobes import Cut, lowest_of, milling_system, rows_of, stability_boundary, zero_order
+from lobewatch.analysis.learning.grid import Grid, floored, speeds_between, trusted
+from lobewatch.analysis.learning.learnt import Learnt, prior
+from lobewatch.analysis.learning.mean_force import is_constant
+from lobewatch.analysis.learning.observed import Heard, Observed
+from lobewatch.analysis.learning.suggest import best_heard, suggest
+from lobewatch.analysis.programs.doubt import Doubt, Span
+from modal import Mode
+
+CUTS = 5
+LOW, HIGH, DEEPEST = 4000.0, 20000.0, 0.02
+PASSAGE = Passage(before=0.0, ramp=0.02, steady=0.8, after=0.0)
+RATTLES = 0.02
+"""Change of the motion from tooth to tooth, relative to it, above which a cut chatters."""
+NOISE = 0.002
+"""Relative error of a frequency that is heard."""
+TRUE = {"frequency": (0.985, 0.02), "damping": (1.1, 0.25), "stiffness": (1.0, 0.10), "tangential": (1.1, 0.30)}
+
+
+@dataclass
+class Hidden:
+    """A spindle as it was tapped, its truth at speed, and what was learnt of it."""
+
+    number: int
+    immersion: float | None = 1.0
+    frequency: float | None = None
+    """At speed over that at rest, in y; None: drawn."""
+    cuts: list[Observed] = field(default_factory=list)
+    share: list[float] = field(default_factory=list)
+    """Largest removal rate heard stable over the optimum, after each cut."""
+
+    def __post_init__(self) -> None:
+        self.random = np.random.default_rng((18, self.number))
+        draw = self.random
+        immersion = self.immersion or float(draw.choice([0.1, 0.25, 0.5, 0.75, 1.0]))
+        teeth = 4 if self.immersion == 1.0 else int(draw.integers(1, 7))
+        way = "up" if draw.uniform() < 0.5 else "down"
+        self.cut = Cut(teeth, immersion, way, 1.4e9, 5e8)  # type: ignore[arg-type]
+        middle = draw.uniform(800, 2500)
+        self.rest = [
+            Mode(middle * draw.uniform(0.85, 1.15), draw.uniform(0.015, 0.05), draw.uniform(1e7, 5e7)) for _ in range(2)
+        ]
+        self.ratios = {f"{name}_{side}": self._drawn(name) for side in "xy" for name in list(TRUE)[:3]}
+        self.ratios |= {"tangential": self._drawn("tangential"), "ratio": draw.uniform(0.8, 1.2)}
+        if self.frequency is not None:
+            self.ratios["frequency_y"] = self.frequency
+        self.modes = [
+            Mode(
+                mode.frequency * self.ratios[f"frequency_{side}"],
+                mode.damping_ratio * self.ratios[f"damping_{side}"],
+                mode.stiffness * self.ratios[f"stiffness_{side}"],
+            )
+            for mode, side in zip(self.rest, "xy", strict=True)
+        ]
+        push = self.ratios["tangential"]
+        radial = self.cut.radial * push * self.ratios["ratio"]
+        self.truly = replace(self.cut, tangential=self.cut.tangential * push, radial=radial)
+        speeds = speeds_between(LOW, HIGH)
+        trust = trusted([self.rest[0]], [self.rest[1]], self.cut, (0.0,), speeds, DEEPEST)
+        self.grid = Grid(self.cut, (0.0,), speeds, np.full(speeds.shape, DEEPEST), trust)
+        self.learnt: Learnt = prior(
+            rows_of(milling_system([self.rest[0]], [self.rest[1]]), self.cut, np.ones(1)), DOUBT
+        )
+        self.optimum = self._optimum()
+
+    def _drawn(self, name: str) -> float:
+        middle, spread = TRUE[name]
+        relative = spread / middle if name == "frequency" else spread
+        return float(middle * max(1 + relative * self.random.standard_normal(), 0.1))
+
+    def limits(self, modes: Sequence[Mode], cut: Cut) -> np.ndarray:
+        """Depths (m) at the speeds of the grid, as deep as is allowed."""
+        if is_constant(cut):
+            found = zero_order([modes[0]], [modes[1]], cut, self.grid.speeds)
+        else:
+            found = stability_boundary([modes[0]], [modes[1]], cut, self.grid.speeds, DEEPEST)
+        return np.minimum(lowest_of([found]).depth, DEEPEST)
+
+    def _optimum(self) -> float:
+        """Largest removal rate on the grid (rpm m)."""
+        depths = [floored(limit) for limit in self.limits(self.modes, self.truly)]
+        return float(np.max(self.grid.speeds * depths))
+
+    def suggested(self, left: int) -> tuple[float, float] | None:
+        """What is to be cut next."""
+        found = suggest(self.learnt, self.grid, self.cuts, left)
+        return None if found is None else (found.speed_rpm, found.depth)
+
+    def milling(self, speed: float, depth: float) -> MillingCut:
+        """The cut as the judge takes it."""
+        x, y = (
+            Structure(np.array([m.frequency]), np.array([m.damping_ratio]), np.array([m.stiffness])) for m in self.modes
+        )
+        cut = self.truly
+        angles = cut.entry_angle, cut.exit_angle
+        return MillingCut(cut.teeth, *angles, cut.tangential, cut.radial, depth, 1e-4, speed, x, y)
+
+    def hear(self, speed: float, depth: float, word: Heard, frequency: float) -> None:
+        """Learn from the cut."""
+        pitch = frequency * (1 + NOISE * self.random.standard_normal())
+        self.cuts.append(Observed(self.cut, speed, depth, word, pitch))
+        self.learnt = self.learnt.hearing(self.cuts[-1])
+
+
+DOUBT = Doubt({"tap": np.zeros((2, 4))}, np.tile(np.eye(4), (2, 1, 1)), 0.01, Span(0.8, 1.2), Span(0.8, 1.2))
+
+
+def heard(cuts: Sequence[MillingCut]) -> list[tuple[Heard, float]]:
+    """Word and chatter frequency (Hz) of cuts, from their motion alone."""
+    found: list[tuple[Heard, float]] = [(Heard.STABLE, np.nan)] * len(cuts)
+    for number, motion in simulate_cuts(cuts, PASSAGE):
+        teeth = round(motion.sample_rate * cuts[number].tooth_period)
+        steady = motion.acceleration[:, int(motion.sample_rate * 0.5) : int(motion.sample_rate * 0.82)]
+        periods = steady[:, : steady.shape[1] // teeth * teeth].reshape(2, -1, teeth)
+        change = np.diff(periods, axis=1)
+        if np.std(change) < RATTLES * np.std(periods):
+            continue
+        left = (periods - np.mean(periods, axis=1, keepdims=True)).reshape(2, -1)
+        power = np.sum(np.abs(np.fft.rfft(left * np.hanning(left.shape[1]), 4 * left.shape[1])) ** 2, axis=0)
+        pitch = float(np.argmax(power)) * motion.sample_rate / (4 * left.shape[1])
+        base = pitch * cuts[number].tooth_period
+        word = Heard.FLIP if abs(base % 1 - 0.5) < 0.003 else Heard.CHATTER
+        found[number] = word, pitch
+    return found
+
+
+def five_cuts(spindles: Sequence[Hidden]) -> None:
+    """Cut as suggested, all spindles side by side."""
+    for made in range(CUTS):
+        asked = {one.number: one.suggested(CUTS - made) for one in spindles}
+        busy = [one for one in spindles if asked[one.number] is not None]
+        words = heard([one.milling(*asked[one.number]) for one in busy])  # type: ignore[misc]
+        for one, (word, pitch) in zip(busy, words, strict=True):
+            one.hear(*asked[one.number], word, pitch)  # type: ignore[misc]
+        for one in spindles:
+            one.share.append(best_heard(one.cuts) / one.optimum)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ from lobewatch.analysis.questions.asked import in_question, open_questions
 from lobewatch.analysis.series import Point, Scatter, frequency_at, scatter_of
 from lobewatch.machine import Machine
 from modal import Mode
+
+if TYPE_CHECKING:
+    from lobewatch.analysis.programs.doubt import Doubt
 
 Modes = Sequence[Mode] | None
 """Of one direction at the tool tip; None where neither direction is known."""
@@ -53,6 +57,10 @@ class Assembly:
     series: Mapping[str, Sequence[Point]] = field(default_factory=dict)
     """Tap tests of the same tool up to then, by direction; empty where it is predicted."""
 
+    cuts: int = 0
+    """Test cuts that its modes at speed were learnt from; 0 where it stands for the spindle at rest."""
+    doubt: Doubt | None = None
+    """What these have left open; None at rest."""
     questions: tuple[Remark, ...] = ()
     """What nobody has answered of these tap tests; until then nothing is sure."""
 

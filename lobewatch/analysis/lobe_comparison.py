@@ -12,6 +12,7 @@ from lobes import PocketShift, pocket_shifts
 from lobes.tip_response import Tip
 from lobewatch.analysis.assembly import Assembly, speed_grid
 from lobewatch.analysis.charts import DEEPEST, Chart, Dynamics, Method, chart, cut_table
+from lobewatch.analysis.learning.at_speed import at_speed
 from lobewatch.analysis.logbook import Logbook
 from lobewatch.analysis.model_state import model_frf, model_state
 from lobewatch.analysis.programs.robust_pockets import robust_pockets
@@ -53,7 +54,7 @@ def compare_lobes(logbook: Logbook, tool: str | None, cut: str, source: Dynamics
     then = None if first is None else _charted(logbook, first, cut, source, method)
     cuts = logbook.machine.cuts(assembly.tool)
     same = logbook.verdicts(names=[name for name, other in cuts.items() if other == now.cuts])
-    pockets = robust_pockets(now.table, assembly, logbook.machine)
+    pockets = robust_pockets(*at_speed(now.table, assembly, logbook.machine, logbook.cuts), logbook.machine)
     remarks = [*assembly.remarks, *(replace(remark, about=cut) for remark in now.lobes.remarks)]
     remarks += [] if pockets else [_no_pocket(now, logbook.machine)]
     return LobeComparison(now, then, pockets, _shifts(then, now), same, remarks)

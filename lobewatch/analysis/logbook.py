@@ -17,10 +17,11 @@ from lobewatch.analysis.cache.kept_rows import of_older_versions
 from lobewatch.analysis.cache.worked_out import WorkedOut
 from lobewatch.analysis.damage.usable import Result, UsableTaps
 from lobewatch.analysis.history import History, without_last_word
+from lobewatch.analysis.learning.at_speed import judge_at_speed
 from lobewatch.analysis.measurement import Fitted, Measurement
 from lobewatch.analysis.programs.advice import Advice, advise
 from lobewatch.analysis.programs.critical import is_missing, ruling_of
-from lobewatch.analysis.programs.verdict import Ruling, Verdict, judge
+from lobewatch.analysis.programs.verdict import Ruling, Verdict
 from lobewatch.analysis.questions.accepting import accept
 from lobewatch.analysis.questions.clock import clock_questions
 from lobewatch.analysis.replaying.store import Stored, store_recordings
@@ -154,9 +155,9 @@ class Logbook:
         until = rows[-1].tap_id if until is None and self.history.current else until
         judged = self.judged.setdefault(until, {})
         missing = [table for table in tables if table.name not in judged]
-        tools = dict.fromkeys(one.tool for one in missing)
-        known = {tool: or_reason(partial(self.assembly, tool, until)) for tool in tools}
-        judged |= {table.name: judge(table, known[table.tool], self.machine) for table in missing}
+        known = {tool: or_reason(partial(self.assembly, tool, until)) for tool in {one.tool for one in missing}}
+        cuts = self.cuts if until in (None, *(row.tap_id for row in rows[-1:])) else ()
+        judged |= {one.name: judge_at_speed(one, known[one.tool], self.machine, cuts) for one in missing}
         return [judged[table.name] for table in tables]
 
     def rulings(self, tap_id: str, falls: bool = False) -> Mapping[str, Ruling]:
@@ -218,8 +219,7 @@ class Logbook:
         self._mark = self.folder.mark
 
     def _forget_results(self, goes_on: bool = False) -> None:
-        self._history, self.judged = None, {}
-        self._worked_out = self._worked_out if goes_on else None
+        self._history, self.judged, self._worked_out = None, {}, self._worked_out if goes_on else None
 
     def _known_history(self) -> History:
         if self._history is None:

@@ -55,7 +55,7 @@ def verdict_json(found: Verdict) -> dict[str, Any]:
         "depth_margin": found.depth_margin,
         "chance_turning": found.chance_turning,
         "decided_by": found.decided_by or None,
-        "cuts": 0,
+        "cuts": found.assembly.cuts if found.assembly else 0,
         "chatter_frequency_hz": found.chatter_frequency,
         "kind": found.kind,
         "worst_feed_deg": math.degrees(found.feed_angle),

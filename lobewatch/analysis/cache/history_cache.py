@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import takewhile, zip_longest
 
@@ -13,8 +13,9 @@ from lobewatch.analysis.cache.still_holding import StillHolding, is_of
 from lobewatch.analysis.columns.stored_row import is_of_this_make, packed, unpacked
 from lobewatch.analysis.damage.usable import UsableTaps
 from lobewatch.analysis.history import History, Row, empty_history
-from lobewatch.machine import BusyError, MachineFolder
+from lobewatch.machine import BusyError, Machine, MachineFolder
 from lobewatch.machine.archive.rows import add_rows, read_rows, write_rows
+from lobewatch.machine.cuts.heard_cut import HeardCut
 
 MOST_DEAD = 1_000_000
 """Bytes of rows that later ones stand for, beyond as many as count, above which the file is written anew."""
@@ -34,6 +35,7 @@ class HistoryCache:
         self._aside: list[bytes] = []
         self._size = self._length = 0
         self._stamp: tuple[int, ...] | None = None
+        self._hashes: dict[str, str] = {}
         self.behind: StillHolding | None = None
         """Of what was read behind the rows that `read` gave; None where that is nothing."""
 
@@ -48,7 +50,9 @@ class HistoryCache:
         What is known of tap tests whose files cannot be used is kept.
         """
         empty, lost = empty_history(self._folder.machine), {entry.id for entry in files.lost}
-        if self._stamp is None or self._stamp != self._stamp_now:
+        hashes = _hashes(self._folder.machine, files.cuts)
+        if self._stamp is None or self._stamp != self._stamp_now or hashes != self._hashes:
+            self._hashes = hashes
             self._read(_head(empty))
         pairs = zip(self._rows, files.places, strict=False)
         known = {row.tap_id: row for row in self._rows} | self._others if lost else {}
@@ -81,7 +85,7 @@ class HistoryCache:
     def _read(self, head: bytes) -> None:
         self._stamp = self._stamp_now
         self._rows, self._packed, self._size, self._length = [], [], 0, 0
-        self._others, self._aside, hashes = {}, [], self._folder.machine.program_hashes
+        self._others, self._aside, hashes = {}, [], self._hashes
         try:
             found = read_rows(self._folder.history)
             if found.rows[1:] and not is_of_this_make(found.rows[-1]):
@@ -102,7 +106,7 @@ class HistoryCache:
             self._size, self._length = found.size if is_own else 0, found.length
 
     def _store(self, history: History) -> None:
-        path, hashes = self._folder.history, self._folder.machine.program_hashes
+        path, hashes = self._folder.history, self._hashes or self._folder.machine.program_hashes
         if self._stamp_now != self._stamp and self._stamp_now is not None:
             self._read(_head(history))  # another program has written
         contents = [
@@ -126,6 +130,15 @@ class HistoryCache:
         self._aside = aside
         self._rows, self._packed, self._size = list(history.rows), contents, self._length
         self._stamp = self._stamp_now
+
+
+def _hashes(machine: Machine, cuts: Sequence[HeardCut]) -> dict[str, str]:
+    """Of all that decides the word on a program beside the settings, by its name: test cuts of its tool too."""
+    taught = {
+        one.name: "".join(f" {cut.id}" for cut in cuts if cut.counts and cut.tool == one.tool)
+        for one in machine.program
+    }
+    return {name: known + taught[name] for name, known in machine.program_hashes.items()}
 
 
 def _head(history: History) -> bytes:

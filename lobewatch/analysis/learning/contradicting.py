@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
+from acquisition import Remark
 from lobewatch.analysis.learning.learnt import Learnt
 from lobewatch.analysis.learning.likelihood import FREQUENCY, MISJUDGED, folded, heard_base, predicted
 from lobewatch.analysis.learning.observed import Observed
@@ -70,3 +72,25 @@ def learn_from_sound(start: Learnt, cuts: Sequence[Observed]) -> tuple[Learnt, t
         learnt = learnt.hearing(cut) if why is None else learnt
         still += [] if why is None else [Contradicting(cut, why)]
     return learnt, tuple(still)
+
+
+def unexplained(odd: Contradicting) -> Remark:
+    """A cut that no spindle explains which explains the others."""
+    cut = odd.cut
+    at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
+    pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
+    text, cure = {
+        Contradiction.FREQUENCY: (
+            f"chatters{pitch} {at}, where no mode is: workpiece or fixture?",
+            "tap the workpiece where it is cut",
+        ),
+        Contradiction.CHATTERS: (
+            f"chatters{pitch} {at}, which no spindle does that explains the others: workpiece, fixture, worn tool?",
+            "cut it again; tap again if it stays",
+        ),
+        Contradiction.STABLE: (
+            f"stable {at}, which no spindle is that explains the others: another depth or speed than told?",
+            "cut it again, or take it out with lobewatch exclude",
+        ),
+    }[odd.why]
+    return Remark("cut-unexplained", cut.id, f"{text}; left out", cure)

@@ -99,7 +99,9 @@ class Doubt:
 
 
 def doubt_of(assembly: Assembly, table: CutTable, machine: Machine) -> Doubt:
-    """The doubt of a cut with a tool in the spindle as it is known at some time."""
+    """The doubt of a cut with a tool as it is known at some time; where test cuts have taught, what they left."""
+    if assembly.doubt is not None:
+        return assembly.doubt
     tangential, ratio = _coefficients(table, machine)
     modes = [*(assembly.x or ()), *(assembly.y or ())]
     mixing = np.array([_mixing(mode) for mode in modes])

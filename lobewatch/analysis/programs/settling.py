@@ -44,6 +44,10 @@ def settles(cause: str, table: ProgramTable, tangential: float, assembly: Assemb
         ),
         "tap": ("the error of the tap test decides", "tap again with more hits"),
         "prediction": ("the prediction decides", f"tap tool {table.tool!r}"),
+        "cuts": (
+            f"the spindle at speed decides, as {assembly.cuts} test cuts have left it open",
+            f"make the next test cut: lobewatch suggest names it for {table.name!r}",
+        ),
         "question": (
             f"it rests on a tap test in question ({', '.join(dict.fromkeys(one.code for one in assembly.questions))})",
             "answer the question, or tap again",

@@ -70,7 +70,7 @@ class Verdict:
     """Whether a program is stable with a tool in the spindle as it is known at some time, at rest."""
 
     program: ProgramTable
-    """As it stands in machine.toml."""
+    """As it stands in machine.toml, with the cutting coefficients that test cuts have taught."""
     word: Word
     """See Word."""
     assembly: Assembly | None = None
@@ -83,7 +83,7 @@ class Verdict:
     limit_high: float = math.nan
     """99 % quantile (m)."""
     chance_turning: float = math.nan
-    """Chance of chatter with the spindle turning, under plausible differences between rest and cut."""
+    """Chance of chatter with the spindle turning, under plausible differences between rest and cut, or those learnt."""
     decided_by: str = ""
     """Cause of the doubt that decides (`Doubt.causes`), "question" where a tap test is in question; empty unless it is
     doubtful."""
@@ -146,6 +146,7 @@ def verdict(table: ProgramTable, assembly: Assembly, machine: Machine) -> Verdic
     drawn = draw(program, found, table.feed_angles, assembly, doubt_of(assembly, table, machine))
     limits = drawn_limits(drawn, program.depth)[1:]
     low, high = np.quantile(limits, QUANTILES, method="closest_observation")
+    taught = assembly.doubt is not None
     near = drawn.fed(SURELY * program.depth * found.limit / low if np.isfinite(found.limit) else 0.0)
     chatters = (near.growth(program.depth)[1:, 0] >= 0) | (limits <= program.depth)
     word, cause = _word(found.stable, chatters, assembly), ""
@@ -161,7 +162,7 @@ def verdict(table: ProgramTable, assembly: Assembly, machine: Machine) -> Verdic
         limit=found.limit,
         limit_low=min(float(low), found.limit),
         limit_high=max(float(high), found.limit),
-        chance_turning=float(np.mean(turning(drawn.fed(0.0)).growth(program.depth)[1:] >= 0)),
+        chance_turning=float(np.mean(chatters)) if taught else _chance_turning(drawn, program.depth),
         decided_by=cause,
         chatter_frequency=found.chatter_frequency,
         kind=found.kind,
@@ -172,6 +173,11 @@ def verdict(table: ProgramTable, assembly: Assembly, machine: Machine) -> Verdic
         drawn=drawn,
         remarks=tuple(remarks),
     )
+
+
+def _chance_turning(drawn: Drawn, depth: float) -> float:
+    """Chance of chatter at a depth (m) with the spindle turning, where nothing was learnt of that."""
+    return float(np.mean(turning(drawn.fed(0.0)).growth(depth)[1:] >= 0))
 
 
 def _word(stable: bool, chatters: np.ndarray[tuple[int], np.dtype[np.bool_]], assembly: Assembly) -> Word:
@@ -194,7 +200,7 @@ def as_program(table: ProgramTable, machine: Machine) -> Program:
 
 
 def _remarks(table: ProgramTable, assembly: Assembly, machine: Machine) -> Iterator[Remark]:
-    about_modes = (*ABOUT_DIRECTIONS, "predicted")
+    about_modes = (*ABOUT_DIRECTIONS, "predicted", "cut-unexplained")
     yield from (remark for remark in assembly.remarks if remark.code in about_modes)
     yield from assembly.questions
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and table.feed_per_tooth_mm is None:

@@ -2,29 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
 from rich.table import Table
 
 from acquisition import Remark
-from lobewatch.analysis.learning.contradicting import Contradicting, Contradiction
+from lobewatch.analysis.learning.contradicting import unexplained
 from lobewatch.analysis.learning.learnt import Interval
 from lobewatch.analysis.learning.of_program import Lesson
+from lobewatch.show.learning.names import NAMES
 from lobewatch.show.output import table
-
-NAMES = {
-    "tangential": "Kt",
-    "ratio": "Kr/Kt",
-    "frequency_x": "f_n in x",
-    "frequency_y": "f_n in y",
-    "damping_x": "zeta in x",
-    "damping_y": "zeta in y",
-    "stiffness_x": "K in x",
-    "stiffness_y": "K in y",
-}
-"""Of what is learnt."""
 
 
 def learnt_json(found: Lesson) -> dict[str, Any]:
@@ -69,25 +57,3 @@ def lesson_remarks(found: Lesson) -> Iterator[Remark]:
     if found.learnt.cuts and not found.learnt.frequencies:
         text = "f not learnt: no chatter frequency was heard yet"
         yield Remark("frequency-not-learnt", found.program.name, text, "tell what the next chatter sounds at")
-
-
-def unexplained(odd: Contradicting) -> Remark:
-    """A cut that no spindle explains which explains the others."""
-    cut = odd.cut
-    at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
-    pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
-    text, cure = {
-        Contradiction.FREQUENCY: (
-            f"chatters{pitch} {at}, where no mode is: workpiece or fixture?",
-            "tap the workpiece where it is cut",
-        ),
-        Contradiction.CHATTERS: (
-            f"chatters{pitch} {at}, which no spindle does that explains the others: workpiece, fixture, worn tool?",
-            "cut it again; tap again if it stays",
-        ),
-        Contradiction.STABLE: (
-            f"stable {at}, which no spindle is that explains the others: another depth or speed than told?",
-            "cut it again, or take it out with lobewatch exclude",
-        ),
-    }[odd.why]
-    return Remark("cut-unexplained", cut.id, f"{text}; left out", cure)

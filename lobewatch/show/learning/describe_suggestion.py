@@ -10,7 +10,8 @@ from typing import Any
 
 from lobewatch.analysis.learning.of_program import NextCut
 from lobewatch.analysis.learning.suggest import Suggested
-from lobewatch.show.learning.describe_learnt import NAMES, learnt_json
+from lobewatch.show.learning.describe_learnt import learnt_json
+from lobewatch.show.learning.names import NAMES
 from lobewatch.show.programs.settings import rpm
 
 

@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobewatch.analysis import Assembly, Verdict
+from lobewatch.analysis.learning.at_speed import LearntDoubt
 from lobewatch.analysis.programs.doubt import Doubt, Span
 from lobewatch.analysis.series import ENOUGH
 from lobewatch.machine import DoubtTable, Machine
+from lobewatch.show.learning.names import NAMES
 
 PAGE = "docs/lobes.md"
 """Where the sizes come from."""
@@ -48,7 +50,21 @@ def doubt_json(found: Verdict) -> dict[str, Any] | None:
 def reading_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
     """What stands below a table of verdicts: what the words mean, and the doubt; nothing where nothing was judged."""
     doubts = doubt_lines(verdicts, machine)
-    return [*doubts, AT_REST] if doubts else []
+    judged = [found for found in verdicts if found.drawn is not None and found.assembly is not None]
+    taught = [found for found in judged if found.assembly and found.assembly.cuts]
+    said = ([AT_REST] if len(taught) < len(judged) else []) + ([at_speed_line(taught)] if taught else [])
+    return [*doubts, *said] if doubts else []
+
+
+def at_speed_line(taught: Sequence[Verdict]) -> str:
+    """What the words mean where test cuts have taught."""
+    names = ", ".join(found.program.name for found in taught)
+    return f"{names}: the words hold for the spindle as it turns, from {_cuts(taught[0])}, and low..high for 98 % of it"
+
+
+def _cuts(found: Verdict) -> str:
+    number = found.assembly.cuts if found.assembly else 0
+    return f"{number} cut{'s' if number > 1 else ''}"
 
 
 def doubt_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
@@ -65,6 +81,9 @@ def doubt_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
 def _parts(found: Verdict, doubt: Doubt, assembly: Assembly, machine: Machine) -> Iterator[str]:
     given, standard = machine.doubt, DoubtTable()
     known = "".join(assembly.directions)
+    if isinstance(doubt, LearntDoubt):
+        yield from _learnt(doubt, _cuts(found))
+        return
     about = {"prediction": "by the prediction", "untapped": f"in {'y' if known == 'x' else 'x'}, not tapped"}
     for cause, widths in doubt.modes.items():
         if cause == "clamping":
@@ -73,6 +92,15 @@ def _parts(found: Verdict, doubt: Doubt, assembly: Assembly, machine: Machine) -
             yield f"{_sizes(np.max(widths, axis=0))} {about.get(cause, 'by the tap test')}"
     yield f"speed {_half(doubt.speed)}" + (f" ({GIVEN})" if given.speed_percent != standard.speed_percent else "")
     yield from _coefficients(found, doubt, machine)
+
+
+def _learnt(doubt: LearntDoubt, cuts: str) -> Iterator[str]:
+    """At speed, before and after the cuts."""
+    for name in ("Kt", "Kr/Kt", "f_n in x", "f_n in y"):
+        key = next(key for key, told in NAMES.items() if told == name)
+        before, after = (f"{one.low:.2f}..{one.high:.2f}" for one in (doubt.before[key], doubt.after[key]))
+        yield f"{name} x {after}, {before} before the {cuts}" if name == "Kt" else f"{name} x {after} ({before})"
+    yield f"speed {_half(doubt.speed)}"
 
 
 def _clamping(widths: Floats, assembly: Assembly, given: DoubtTable) -> Iterator[str]:

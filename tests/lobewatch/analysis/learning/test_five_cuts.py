@@ -144,10 +144,9 @@ def heard(cuts: Sequence[MillingCut]) -> list[tuple[Heard, float]]:
 def five_cuts(spindles: Sequence[Hidden]) -> None:
     """Cut as suggested, all spindles side by side."""
     for made in range(CUTS):
-        asked = {one.number: one.suggested(CUTS - made) for one in spindles}
-        busy = [one for one in spindles if asked[one.number] is not None]
-        words = heard([one.milling(*asked[one.number]) for one in busy])  # type: ignore[misc]
-        for one, (word, pitch) in zip(busy, words, strict=True):
-            one.hear(*asked[one.number], word, pitch)  # type: ignore[misc]
+        asked = [(one, found) for one in spindles if (found := one.suggested(CUTS - made)) is not None]
+        words = heard([one.milling(*place) for one, place in asked])
+        for (one, (speed, depth)), (word, pitch) in zip(asked, words, strict=True):
+            one.hear(speed, depth, word, pitch)
         for one in spindles:
             one.share.append(best_heard(one.cuts) / one.optimum)

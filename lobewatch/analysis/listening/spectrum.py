@@ -1,0 +1,114 @@
+"""Spectra whose lines stand clear of each other, and their lines above the noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len, rfft
+from scipy.ndimage import maximum_filter1d
+
+Floats = NDArray[np.float64]
+
+WINDOW = (0.35875, -0.48829, 0.14128, -0.01168)
+"""Blackman-Harris: side lobes at -92 dB (Harris 1978, Proc. IEEE 66, 51-83)."""
+PADDED = 2
+"""How many times the length of the signal is transformed."""
+NEIGHBOURHOOD = 64
+"""Bins from which the noise is taken ..."""
+QUIET = 0.25
+"""... as this quantile of their power: lines may fill the rest."""
+CLEAR = 25.0
+"""A line has so many times the power of the noise: noise reaches it once in 1e11 bins."""
+APART = 1.5
+"""Bins between two lines that are told apart, at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Of a part of a recording."""
+
+    frequency: Floats
+    """Hz, shape (n,)."""
+    power: Floats
+    """Square of the amplitude of a sine ((m/s^2)^2), shape (n,)."""
+    noise: Floats
+    """What the noise alone has of it, shape (n,)."""
+    bin: float
+    """One over the length of the part (Hz)."""
+    sample_rate: float
+    """Hz."""
+
+    def loudest_near(self, frequency: Floats, bins: float) -> Floats:
+        """Largest power within so many bins of frequencies (Hz)."""
+        wide = 2 * max(round(bins * self.bin / self.frequency[1]), 1) + 1
+        return np.interp(frequency, self.frequency, maximum_filter1d(self.power, wide))
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Single frequencies in a spectrum."""
+
+    frequency: Floats
+    """Hz, shape (n,)."""
+    amplitude: Floats
+    """m/s^2, shape (n,)."""
+    clearness: Floats
+    """Power over that of the noise, shape (n,)."""
+
+    def __getitem__(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Lines:
+        """Some of them."""
+        return Lines(self.frequency[which], self.amplitude[which], self.clearness[which])
+
+    def __len__(self) -> int:
+        """How many."""
+        return self.frequency.size
+
+    @property
+    def energy(self) -> float:
+        """Of all of them ((m/s^2)^2)."""
+        return float(np.sum(self.amplitude**2))
+
+    def loudest(self, count: int) -> Lines:
+        """So many at most, the loudest first."""
+        return self[np.argsort(-self.amplitude)[:count]]
+
+
+def spectrum_of(signal: Floats, sample_rate: float) -> Spectrum:
+    """Of a part of a recording; signal in m/s^2, shape (n,)."""
+    phase = 2 * np.pi * (np.arange(signal.size) + 0.5) / signal.size
+    window = sum(share * np.cos(k * phase) for k, share in enumerate(WINDOW))
+    size = next_fast_len(PADDED * signal.size, real=True)
+    power = (2 * np.abs(rfft((signal - np.mean(signal)) * window, size)) / np.sum(window)) ** 2
+    step = sample_rate / size
+    return Spectrum(np.arange(power.size) * step, power, _noise(power), sample_rate / signal.size, sample_rate)
+
+
+def _noise(power: Floats) -> Floats:
+    """Mean power of noise whose power is distributed exponentially, from the quiet bins of each neighbourhood."""
+    count = max(power.size // (PADDED * NEIGHBOURHOOD), 2)
+    blocks = np.array_split(power, count)
+    level = np.array([np.quantile(block, QUIET) for block in blocks]) / -np.log(1 - QUIET)
+    middle = np.cumsum([block.size for block in blocks]) - np.array([block.size for block in blocks]) / 2
+    least = np.finfo(np.float64).tiny
+    return np.maximum(np.interp(np.arange(power.size), middle, level), least)
+
+
+def lines_of(spectrum: Spectrum) -> Lines:
+    """The lines that stand clear of the noise; frequency and amplitude by a parabola through log power."""
+    power = spectrum.power
+    wide = 2 * max(round(APART * spectrum.bin / spectrum.frequency[1]), 1) + 1
+    at = np.flatnonzero((power == maximum_filter1d(power, wide)) & (power > CLEAR * spectrum.noise))
+    at = at[(at > 2 * PADDED) & (at < power.size - 1)]
+    before, top, after = (np.log(np.maximum(power[at + shift], np.finfo(np.float64).tiny)) for shift in (-1, 0, 1))
+    bend = before - 2 * top + after
+    shift = 0.5 * (before - after) / np.where(bend < 0, bend, -1.0)
+    amplitude = np.sqrt(np.exp(top - 0.25 * (before - after) * shift))
+    return Lines((at + shift) * spectrum.frequency[1], amplitude, power[at] / spectrum.noise[at])
+
+
+def folded(frequency: Floats, sample_rate: float) -> Floats:
+    """Where frequencies (Hz) are heard by a device without a filter."""
+    rest = np.mod(frequency, sample_rate)
+    return np.asarray(np.minimum(rest, sample_rate - rest))

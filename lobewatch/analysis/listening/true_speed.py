@@ -1,0 +1,70 @@
+"""How fast the spindle really turns in a cut, from the lines that its turning spaces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lobewatch.analysis.listening.lattice import Turning, refined
+from lobewatch.analysis.listening.spectrum import Floats, Lines, Spectrum
+
+AROUND = 0.021
+"""Relative distance from the speed that was set up to which it is looked for."""
+LOUDEST = 40
+"""Lines that are looked at."""
+HIGHEST = 60
+"""Multiples of the frequency of the spindle by which two of them may differ."""
+SHARPNESS = 0.25
+"""Standard deviation of a line in the count of votes (bins)."""
+UNBALANCE = 0.2
+"""A speed whose own line is heard is taken where it has so much of the votes of the best one."""
+LEAST_SHARE = 0.5
+"""Of the lines that must belong to the turning spindle or be spaced by it."""
+
+
+def true_speed(own: Lines, all_lines: Lines, spectrum: Spectrum, teeth: int, commanded: float) -> Turning | None:
+    """Turns a second, near those that were set (Hz); None where too few lines agree.
+
+    own: lines that are not there in air; all_lines: with those that are. Each distance between two lines, each sum
+    and each line itself votes for the frequencies that it is a multiple of, for multiples of the teeth twice: chatter
+    f_c + k f counts as much as the multiples k f. The best is made exact by least squares.
+    """
+    loudest = own.loudest(LOUDEST)
+    if len(loudest) < 2:
+        return None
+    grid = commanded * (1 + np.arange(-AROUND, AROUND, 0.25 * SHARPNESS * spectrum.bin / (40 * commanded)))
+    votes = _votes(loudest, grid, teeth, SHARPNESS * spectrum.bin)
+    if not np.any(votes):
+        return None
+    turning = all_lines.frequency[np.abs(all_lines.frequency / commanded - 1) < AROUND]
+    near = np.any(np.abs(grid[:, np.newaxis] - turning) < 0.5 * spectrum.bin, axis=1)
+    best = int(np.argmax(votes))
+    heard = int(np.argmax(np.where(near, votes, 0.0)))
+    best = heard if near[heard] and votes[heard] > UNBALANCE * votes[best] else best
+    found = refined(float(grid[best]), loudest, spectrum.bin)
+    return found if np.isfinite(found.error) and found.share >= LEAST_SHARE else None
+
+
+def _votes(lines: Lines, grid: Floats, teeth: int, sharpness: float) -> Floats:
+    """For each frequency of a grid (Hz); sharpness: of one line (Hz)."""
+    weight, step = np.log10(lines.clearness), grid[1] - grid[0]
+    i, j = np.triu_indices(len(lines), 1)
+    spaced = np.concatenate([np.abs(lines.frequency[i] - lines.frequency[j]), lines.frequency[i] + lines.frequency[j]])
+    spaced, weight = (
+        np.concatenate([spaced, lines.frequency]),
+        np.concatenate([*[np.minimum(weight[i], weight[j])] * 2, weight]),
+    )
+    votes = np.zeros(grid.size)
+    for order in range(1, HIGHEST + 1):
+        place = np.round((spaced / order - grid[0]) / step).astype(int)
+        inside = (place >= 0) & (place < grid.size)
+        if np.any(inside):
+            counted = np.bincount(place[inside], weight[inside] * (1 + (order % teeth == 0)), grid.size)
+            votes += _smoothed(counted, np.sqrt(2) * sharpness / order / step)
+    return votes
+
+
+def _smoothed(votes: Floats, width: float) -> Floats:
+    """Each vote spread over its neighbours; width: standard deviation in steps of the grid."""
+    reach = min(int(np.ceil(2 * width)), (votes.size - 1) // 2)
+    spread = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    return np.convolve(votes, spread, "same")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -47,12 +47,47 @@ class CutSignal:
         return self.acceleration.size / self.sample_rate
 
     @property
-    def is_clipped(self) -> bool:
-        """Whether the signal stands at a rail of its converter, or the device has told so."""
-        if self.codes is None or self.channel is None or not self.codes.size:
-            return self.overload
-        low, high = self.channel.rails_in(self.codes)
-        return self.overload or bool(np.any((self.codes <= low) | (self.codes >= high)))
+    def clipped(self) -> NDArray[np.bool_]:
+        """Where it stands at a rail of its converter, or without codes three times in a row at its extreme value.
+
+        Everywhere where the device has told of an overload. Shape (n,).
+        """
+        if self.overload or not self.acceleration.size:
+            return np.full(self.acceleration.shape, self.overload)
+        if self.codes is not None and self.channel is not None:
+            low, high = self.channel.rails_in(self.codes)
+            return np.asarray((self.codes <= low) | (self.codes >= high))
+        top, bottom = np.max(self.acceleration), np.min(self.acceleration)
+        if top == bottom:
+            return np.zeros(self.acceleration.shape, dtype=np.bool_)
+        return _in_a_row(self.acceleration == top) | _in_a_row(self.acceleration == bottom)
+
+    def part(self, begin: float, end: float) -> CutSignal:
+        """From one time to another (s)."""
+        inside = slice(max(round(begin * self.sample_rate), 0), max(round(end * self.sample_rate), 0))
+        codes = None if self.codes is None else self.codes[inside]
+        return replace(self, acceleration=self.acceleration[inside], codes=codes)
+
+
+def _in_a_row(extreme: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Where three or more stand beside each other."""
+    padded = np.pad(extreme, 2)
+    three = padded[2:] & padded[1:-1] & padded[:-2]
+    return np.asarray(three[:-2] | three[1:-1] | three[2:])
+
+
+def is_cut_file(path: Path) -> bool:
+    """Whether it is a recording of ours; DataError where it is a damaged one."""
+    content = path.read_bytes()
+    if not content.startswith(b"\x89HDF\r\n\x1a\n"):
+        return False
+    if is_broken(content):
+        raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
+    try:
+        with h5py.File(io.BytesIO(content), "r") as file:
+            return bool(file.attrs.get("format") == FORMAT)
+    except OSError as error:
+        raise DataError(f"{path}: no readable HDF5 file ({error}); is it cut short?") from error
 
 
 def write_cut_signal(path: Path, signal: CutSignal, about: Mapping[str, Any]) -> bytes:

@@ -11,6 +11,8 @@ COMMANDS = {
     "exclude": "Take a tap test out of the series: all results are as if it had never been taken.",
     "include": "Take a tap test back into the series that lobewatch exclude has taken out.",
     "history": "All tap tests of a machine with what they say, those excluded, and what was done to it, oldest first.",
+    "listen": "Hear a cut with the accelerometer on the housing: stable, chatter and its frequency, or why it cannot "
+    "be told.",
     "observe": "Write down what was heard of a test cut by ear: that it was stable, or that it chattered.",
     "suggest": "The next test cut of a program: the one worth most, of those that are more likely stable than not.",
     "modes": "Natural frequency, damping ratio and stiffness from one recorded file.",

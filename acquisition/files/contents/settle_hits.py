@@ -44,13 +44,13 @@ def settle_hits(contents: Contents, said: Description, ledger: Ledger) -> list[H
 
 
 def _hit(signals: Sequence[Signal], said: Description, ledger: Ledger) -> Hit | None:
-    scaled = in_sensor_units(_scaled(signals, said, ledger), said, ledger)
+    scaled = in_sensor_units(in_their_unit(signals, said, ledger), said, ledger)
     if scaled is None:
-        _rate(signals, (), said, ledger)
+        rate_of(signals, (), said, ledger)
         return None
     signals = scaled
     forces, responses = _by_kind(signals, ledger)
-    rate = _rate(signals, [*forces, *responses], said, ledger)
+    rate = rate_of(signals, [*forces, *responses], said, ledger)
     force = forces[0] if len(forces) == 1 else None
     response = chosen(responses, said.response, "responses", ledger) if responses else None
     to_newton = force_unit(forces[0], said, ledger) if forces else None
@@ -70,9 +70,9 @@ def _hit(signals: Sequence[Signal], said: Description, ledger: Ledger) -> Hit | 
 
 def _by_kind(signals: Sequence[Signal], ledger: Ledger) -> tuple[list[Signal], list[Signal]]:
     """Forces and responses; what neither unit nor name tells is asked about."""
-    forces = [signal for signal in signals if _kind(signal) == "force"]
-    responses = [signal for signal in signals if _kind(signal) == "response"]
-    unclear = [one for one in signals if not _kind(one) and one.role in ("", "real", "magnitude")]
+    forces = [signal for signal in signals if kind_of(signal) == "force"]
+    responses = [signal for signal in signals if kind_of(signal) == "response"]
+    unclear = [one for one in signals if not kind_of(one) and one.role in ("", "real", "magnitude")]
     channels = [one for one in signals if one.role != "time"]
     there = names_of(channels)
     if len(channels) < 2:
@@ -89,7 +89,7 @@ def _by_kind(signals: Sequence[Signal], ledger: Ledger) -> tuple[list[Signal], l
     return forces, responses
 
 
-def _kind(signal: Signal) -> str:
+def kind_of(signal: Signal) -> str:
     """force or response by the role or the unit; empty where neither tells."""
     unit = unit_of(signal.unit) if signal.unit else None
     quantity = signal.quantity or (unit.quantity if unit else "")
@@ -97,7 +97,7 @@ def _kind(signal: Signal) -> str:
     return by_quantity or (signal.role if signal.role in ("force", "response") else "")
 
 
-def _rate(signals: Sequence[Signal], used: Sequence[Signal], said: Description, ledger: Ledger) -> float:
+def rate_of(signals: Sequence[Signal], used: Sequence[Signal], said: Description, ledger: Ledger) -> float:
     """Samples a second (Hz); 0 where it is missing or wrong."""
     if not used:
         used = signals
@@ -158,7 +158,7 @@ def _doubt_gravity(responses: Sequence[Signal], ledger: Ledger) -> None:
             )
 
 
-def _scaled(signals: Sequence[Signal], said: Description, ledger: Ledger) -> list[Signal]:
+def in_their_unit(signals: Sequence[Signal], said: Description, ledger: Ledger) -> list[Signal]:
     """Values that are shares of a full scale, in their unit."""
     shares = [signal for signal in signals if signal.per_full_scale]
     if not shares:

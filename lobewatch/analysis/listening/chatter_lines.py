@@ -13,8 +13,12 @@ LOUD = 0.1
 """Share of the loudest amplitude that a line has that names chatter ..."""
 PART = 1e-3
 """... and one that belongs to it."""
-ANCHORS = 8
+ANCHORS = 12
 """Lines whose families are compared."""
+MULTIPLES = 3
+"""Of a frequency that are looked for."""
+SHARE = 0.3
+"""Weight of the displacement of a family beside the lines that it explains."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,16 +34,32 @@ class ChatterLines:
 
 
 def chatter_lines(left: Lines, tooth_frequency: float, bin_: float) -> ChatterLines:
-    """The family of largest displacement, amplitude over frequency squared; left: one line at least. All in Hz."""
-    loudest = float(np.max(left.amplitude))
-    weight = np.where(left.amplitude > PART * loudest, (left.amplitude / left.frequency**2) ** 2, 0.0)
-    named = np.where(left.amplitude >= LOUD * loudest, weight, 0.0)
+    """The family that chatter is named by; left: one line at least. All in Hz.
+
+    Chatter that leaves the cut sounds with 2 f_c and 3 f_c and their side bands too. So that of the loudest lines is
+    taken whose multiples explain the most, and whose displacement, amplitude over frequency squared, is large.
+    """
+    part = left.amplitude > PART * np.max(left.amplitude)
+    weight = np.where(part, (left.amplitude / left.frequency**2) ** 2, 0.0)
+    named = np.where(left.amplitude >= LOUD * np.max(left.amplitude), weight, 0.0)
     anchors = [i for i in np.argsort(-named)[:ANCHORS] if named[i] > 0]
+    clear = np.where(part, np.log10(left.clearness), 0.0)
     families = [modulo(left.frequency, left.frequency[i], tooth_frequency) < WIDE * bin_ for i in anchors]
-    best = families[int(np.argmax([np.sum(weight[family]) for family in families]))]
+    energy = np.array([np.sum(weight[family]) for family in families])
+    explained = np.array([_explained(left, left.frequency[i], tooth_frequency, bin_) @ clear for i in anchors])
+    best = families[int(np.argmax(explained / np.max(explained) + SHARE * energy / np.max(energy)))]
     top = int(np.argmax(np.where(best, named, 0.0)))
     error = bin_ * np.hypot(0.3 / np.sqrt(left.clearness[top]), 0.03)
-    return ChatterLines(float(left.frequency[top]), float(error), left[best & (weight > 0)])
+    return ChatterLines(float(left.frequency[top]), float(error), left[best & part])
+
+
+def _explained(left: Lines, frequency: float, tooth_frequency: float, bin_: float) -> Floats:
+    """Which lines are multiples of a frequency or side bands of those, 0 or 1, shape (n,)."""
+    found = np.zeros(len(left))
+    for order in range(1, MULTIPLES + 1):
+        apart = modulo(left.frequency, order * frequency, tooth_frequency)
+        found[apart < WIDE * bin_ * max(1.0, order / 2)] = 1.0
+    return found
 
 
 def modulo(frequency: Floats | float, other: float, tooth_frequency: float) -> Floats:

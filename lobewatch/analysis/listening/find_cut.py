@@ -12,7 +12,7 @@ from scipy.ndimage import uniform_filter1d
 Floats = NDArray[np.float64]
 
 BLOCK = 0.04
-"""Length of the pieces that are compared (s), two turns of the spindle at least; each begins in the middle of another."""
+"""Length of the pieces that are compared (s), two turns at least; each begins in the middle of the one before."""
 LOUDER = 0.2
 """A cut is so much louder than air, in log10 of the power."""
 QUIETEST = 0.1

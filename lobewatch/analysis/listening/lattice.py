@@ -39,11 +39,13 @@ class Turning:
     """Standard error (Hz); inf where it does not follow from several lines."""
     share: float
     """Of all lines looked at, those that it explains."""
+    agreeing: int
+    """Lines that agree on it, beyond those that it is worked out from."""
 
 
 def refined(frequency: float, lines: Lines, bin_: float) -> Turning:
-    """A spindle frequency (Hz) made exact by least squares over all lines of its lattice; bin_: of the spectrum (Hz)."""
-    found = Turning(frequency, np.inf, 0.0)
+    """A spindle frequency (Hz) made exact by least squares over its lattice; bin_: of the spectrum (Hz)."""
+    found = Turning(frequency, np.inf, 0.0, 0)
     for tolerance in (1.2, 0.6, 0.6, 0.6):
         families = families_of(found.frequency, lines, tolerance * bin_)
         rows = np.concatenate([_rows(family, number, len(families)) for number, family in enumerate(families)])
@@ -56,7 +58,8 @@ def refined(frequency: float, lines: Lines, bin_: float) -> Turning:
         if abs(solution[0] / frequency - 1) > 0.005:
             return found
         error = float(np.sqrt(np.linalg.inv(scaled.T @ scaled)[0, 0]))
-        found = Turning(float(solution[0]), error, which.size / len(lines))
+        agreeing = which.size - len(families)
+        found = Turning(float(solution[0]), error, which.size / len(lines), agreeing)
     return found
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lobewatch.analysis.listening.chatter_lines import ChatterLines, chatter_lines
 from lobewatch.analysis.listening.find_cut import CutParts, find_cut
@@ -21,14 +22,16 @@ ALONE = 1e-2
 """... without side bands above this ..."""
 QUIET = 2e-4
 """... and below this it is stable."""
+LEAST_COMB = 1e-9
+"""Of the energy of what is left, that the comb is taken to have at least."""
 SIDE_BANDS = 3
 """Lines of a family that is chatter for sure."""
 FLIP = 0.003
 """Nearer to half of tooth passing, relative to that, chatter has a period of two teeth."""
 OTHER_TEETH = 10.0
-"""Energy of the orders that run-out hardly sounds with (modulo the teeth neither 0 nor +-1) over those it does ..."""
+"""Energy of the orders that run-out hardly has (modulo the teeth neither 0 nor +-1) over those it has ..."""
 RUN_OUT = 1.0
-"""... and of all orders that are no tooth passing over tooth passing, in less than a slot: chatter may be among them."""
+"""... and of all orders that are no tooth passing over tooth passing, in less than a slot."""
 SLOT = 0.95
 """Immersion from which on tooth passing nearly vanishes."""
 
@@ -73,22 +76,24 @@ class Listened(NamedTuple):
     """Radial depth over diameter (-)."""
     commanded_rpm: float
     """Spindle speed as it was set (rpm)."""
-    is_clipped: bool = False
-    """Whether the sensor or its input was overloaded."""
+    clipped: NDArray[np.bool_] | None = None
+    """Where the sensor or its input was overloaded, shape (n,); None: nowhere."""
+    lost_scans: int = 0
+    """How many are missing."""
 
 
 def listen_to(what: Listened) -> Heard:
     """Tell a recording of a cut, with some air before or after it.
 
-    Reasons why it cannot be told: "too-short", "no-cut", "no-air", "two-cuts", "knock", "overload", "speed-not-found",
-    "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle), "faint".
+    Reasons why it cannot be told: "too-short", "no-cut", "no-air", "two-cuts", "knock", "overload", "lost-scans",
+    "speed-not-found", "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle),
+    "faint".
     """
     signal, rate = np.asarray(what.signal, dtype=np.float64), what.sample_rate
     parts = find_cut(signal, rate, 60 / what.commanded_rpm)
-    if what.is_clipped and parts.reason != "too-short":
-        return Heard("cannot tell", "overload", parts)
-    if parts.reason:
-        return Heard("cannot tell", parts.reason, parts)
+    reason = _fault(what, parts)
+    if reason:
+        return Heard("cannot tell", reason, parts)
     spectrum, air = spectrum_of(signal[parts.cut], rate), spectrum_of(signal[parts.air], rate)
     every = lines_of(spectrum)
     turning = true_speed(every[~is_foreign(every, air)], every, spectrum, what.teeth, what.commanded_rpm / 60)
@@ -97,6 +102,15 @@ def listen_to(what: Listened) -> Heard:
     lines = sort_lines(every, spectrum, air, turning, what.teeth)
     found = Heard("stable", "", parts, turning, 0.0, None, lines, spectrum)
     return _judged(found, what)
+
+
+def _fault(what: Listened, parts: CutParts) -> str:
+    """Why the signal cannot be trusted, a code; empty where it can."""
+    if parts.reason == "too-short":
+        return parts.reason
+    if what.clipped is not None and np.any(what.clipped if parts.reason else what.clipped[parts.cut]):
+        return "overload"
+    return "lost-scans" if what.lost_scans else parts.reason
 
 
 def _judged(found: Heard, what: Listened) -> Heard:
@@ -111,7 +125,7 @@ def _judged(found: Heard, what: Listened) -> Heard:
     part = what.signal[found.parts.cut]
     end = spectrum_of(np.asarray(part[part.size // 2 :], dtype=np.float64), what.sample_rate)
     still = min(float(end.loudest_near(np.array([chatter.frequency]), 1.0)[0]) / _power(chatter), 1.0)
-    ratio = still * lines.left.energy / max(lines.comb.energy, np.finfo(np.float64).tiny)
+    ratio = still * lines.left.energy / max(lines.comb.energy, LEAST_COMB * lines.left.energy)
     found = replace(found, ratio=ratio)
     if ratio < QUIET:
         return _without_chatter(found, what)

@@ -61,7 +61,7 @@ def _near_folded(lines: Lines, spectrum: Spectrum, turning: Turning) -> NDArray[
     orders = np.arange(int(rate / 2 / turning.frequency) + 1, int(HIGHEST * rate / turning.frequency) + 1)
     if not orders.size:
         return np.zeros(len(lines), dtype=np.bool_)
-    known = np.sort(folded(orders * turning.frequency, rate))
+    known = np.sort(folded(np.asarray(orders * turning.frequency), rate))
     after = np.clip(np.searchsorted(known, lines.frequency), 1, max(known.size - 1, 1)) % known.size
     nearest = np.minimum(np.abs(lines.frequency - known[after]), np.abs(lines.frequency - known[after - 1]))
     return np.asarray(nearest < WIDE * spectrum.bin)

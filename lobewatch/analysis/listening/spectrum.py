@@ -43,7 +43,7 @@ class Spectrum:
     def loudest_near(self, frequency: Floats, bins: float) -> Floats:
         """Largest power within so many bins of frequencies (Hz)."""
         wide = 2 * max(round(bins * self.bin / self.frequency[1]), 1) + 1
-        return np.interp(frequency, self.frequency, maximum_filter1d(self.power, wide))
+        return np.asarray(np.interp(frequency, self.frequency, maximum_filter1d(self.power, wide)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ def _noise(power: Floats) -> Floats:
     level = np.array([np.quantile(block, QUIET) for block in blocks]) / -np.log(1 - QUIET)
     middle = np.cumsum([block.size for block in blocks]) - np.array([block.size for block in blocks]) / 2
     least = np.finfo(np.float64).tiny
-    return np.maximum(np.interp(np.arange(power.size), middle, level), least)
+    return np.asarray(np.maximum(np.interp(np.arange(power.size), middle, level), least))
 
 
 def lines_of(spectrum: Spectrum) -> Lines:

@@ -18,7 +18,9 @@ SHARPNESS = 0.25
 UNBALANCE = 0.2
 """A speed whose own line is heard is taken where it has so much of the votes of the best one."""
 LEAST_SHARE = 0.5
-"""Of the lines that must belong to the turning spindle or be spaced by it."""
+"""Of the lines that must belong to the lattice, and that must have a neighbour one or two turns or teeth away ..."""
+LEAST_AGREEING = 3
+"""... and so many of them must agree: a pump that is switched on has lines of its own."""
 
 
 def true_speed(own: Lines, all_lines: Lines, spectrum: Spectrum, teeth: int, commanded: float) -> Turning | None:
@@ -41,7 +43,16 @@ def true_speed(own: Lines, all_lines: Lines, spectrum: Spectrum, teeth: int, com
     heard = int(np.argmax(np.where(near, votes, 0.0)))
     best = heard if near[heard] and votes[heard] > UNBALANCE * votes[best] else best
     found = refined(float(grid[best]), loudest, spectrum.bin)
-    return found if np.isfinite(found.error) and found.share >= LEAST_SHARE else None
+    is_sure = min(found.share, _spaced(loudest, found.frequency, teeth, spectrum.bin)) >= LEAST_SHARE
+    is_sure &= found.agreeing >= LEAST_AGREEING
+    return found if is_sure else None
+
+
+def _spaced(lines: Lines, frequency: float, teeth: int, bin_: float) -> float:
+    """Share of lines with another one or two turns or teeth away: a wrong frequency may fit multiples, not these."""
+    apart = np.abs(lines.frequency[:, np.newaxis] - lines.frequency)
+    steps = (step * frequency for step in (1, 2, teeth, 2 * teeth))
+    return float(np.mean(np.any([np.any(np.abs(apart - step) < bin_, axis=1) for step in steps], axis=0)))
 
 
 def _votes(lines: Lines, grid: Floats, teeth: int, sharpness: float) -> Floats:
@@ -59,7 +70,7 @@ def _votes(lines: Lines, grid: Floats, teeth: int, sharpness: float) -> Floats:
         inside = (place >= 0) & (place < grid.size)
         if np.any(inside):
             counted = np.bincount(place[inside], weight[inside] * (1 + (order % teeth == 0)), grid.size)
-            votes += _smoothed(counted, np.sqrt(2) * sharpness / order / step)
+            votes += _smoothed(counted.astype(np.float64), np.sqrt(2) * sharpness / order / step)
     return votes
 
 

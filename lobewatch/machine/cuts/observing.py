@@ -27,10 +27,7 @@ def observed(
 
     frequency: of the chatter (Hz). ValueError for one that cannot be, and for a date in the future.
     """
-    now = now or datetime.now(UTC)
-    when = now if at is None else at.astimezone(UTC)
-    if when - now > timedelta(days=1):
-        raise ValueError(f"--date {at}: lies in the future; give the day on which it was cut")
+    when = when_cut(at, now or datetime.now(UTC))
     _check_frequency(setting, word, frequency)
     return HeardCut(
         "",
@@ -42,6 +39,14 @@ def observed(
         by="ear",
         software=software(),
     )
+
+
+def when_cut(at: datetime | None, now: datetime) -> datetime:
+    """When it was cut (UTC); at: None for now, without a zone local time. ValueError for a date in the future."""
+    when = now if at is None else at.astimezone(UTC)
+    if when - now > timedelta(days=1):
+        raise ValueError(f"--date {at}: lies in the future; give the day on which it was cut")
+    return when
 
 
 def _check_frequency(setting: CutSetting, word: str, frequency: float | None) -> None:

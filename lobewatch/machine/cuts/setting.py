@@ -72,6 +72,19 @@ def cut_setting(machine: Machine, program: str, speed_rpm: float | None, depth_m
     return CutSetting(table, name, tool, machine.build_cut(table), feed, float(speed), depth / 1e3)
 
 
+def chosen_cut(machine: Machine, program: str, cut: str, speed_rpm: float | None, depth_mm: float | None) -> CutSetting:
+    """A program, or in its place a cut with speed and depth of its own; ValueError where it is not one of both."""
+    if bool(program) == bool(cut):
+        known = ", ".join(map(repr, machine.cut_names)) or "none: add a [[program]] to machine.toml"
+        raise ValueError(
+            f"{'both' if cut else 'neither'} of --program and --cut: say which cut it is; there are {known}"
+        )
+    if cut and (speed_rpm is None or depth_mm is None):
+        missing = "--speed" if speed_rpm is None else "--depth"
+        raise ValueError(f"--cut {cut}: {missing} is missing; give speed and depth, or --program with those of its own")
+    return cut_setting(machine, program or cut, speed_rpm, depth_mm)
+
+
 def _table(machine: Machine, name: str) -> CutTable:
     tables: dict[str, CutTable] = {REFERENCE_CUT: machine.reference_cut} if machine.reference_cut else {}
     tables |= {table.name: table for table in machine.program}

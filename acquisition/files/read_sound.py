@@ -1,0 +1,36 @@
+"""The recording of an accelerometer in a file of any known format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from acquisition.errors import DataError
+from acquisition.files.contents.contents import Contents
+from acquisition.files.contents.description import Description
+from acquisition.files.contents.ledger import Ledger
+from acquisition.files.contents.settle_sound import settle_sound
+from acquisition.files.cut_file import CutSignal, is_cut_file, read_cut_signal
+from acquisition.files.formats import format_of
+from acquisition.files.read_recording import NOTHING
+
+
+def read_sound(path: Path | str, said: Description = NOTHING) -> CutSignal:
+    """What an accelerometer has recorded; DataError for a file without one, or that does not say enough."""
+    path = Path(path)
+    if not path.is_file():
+        raise DataError(f"{path}: no such file")
+    if is_cut_file(path):
+        return read_cut_signal(path)[0]
+    found = format_of(path)
+    contents = found.read(path)
+    if not isinstance(contents, Contents):
+        raise DataError(f"{path}: a {found.title}, not the recording of a cut")
+    ledger = Ledger()
+    sound = settle_sound(contents, said, ledger)
+    if sound is None or not ledger.is_clean:
+        raise DataError(f"{path}: {ledger.complaint()}")
+    if not np.all(np.isfinite(sound[0])):
+        raise DataError(f"{path}: holds values that are no numbers; export it again")
+    return CutSignal(*sound)

@@ -1,0 +1,78 @@
+"""lobewatch listen."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lobewatch.machine.named_folder import named_folder
+from lobewatch.show.output import Json, emit, notes
+from lobewatch.show.replays.describing import Columns, FullScale, Rate, Response, Sensitivity, Unit, described
+
+
+def listen(
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    program: Annotated[str, typer.Option(help="Cutting program that is cut.")] = "",
+    cut: Annotated[str, typer.Option(help='In its place: the cut alone, "reference cut" or that of a program.')] = "",
+    speed: Annotated[
+        float | None, typer.Option(help="Spindle speed as set, rpm; that of the program where not given.")
+    ] = None,
+    depth: Annotated[float | None, typer.Option(help="Axial depth, mm; that of the program where not given.")] = None,
+    file: Annotated[Path | None, typer.Option(help="A recording of the cut in place of the device.")] = None,
+    date: Annotated[datetime | None, typer.Option(help="When it was cut, local time; now where not given.")] = None,
+    port: Annotated[str, typer.Option(help="Serial port of the DAQ; [daq] port where not given.")] = "",
+    seconds: Annotated[float, typer.Option(min=2, help="How long a cut is waited for.")] = 120.0,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what is heard; store nothing.")] = False,
+    out: Annotated[Path | None, typer.Option(help="Draw the spectrum to this file (.svg, .png, .pdf).")] = None,
+    columns: Columns = "",
+    unit: Unit = "",
+    rate: Rate = None,
+    response: Response = None,
+    full_scale: FullScale = "",
+    sensitivity: Sensitivity = "",
+    as_json: Json = False,
+) -> None:
+    """Hear a cut with the accelerometer on the housing: stable, chatter and its frequency, or why it cannot be told.
+
+    Begin with the spindle turning in air, then cut for a second or longer; no key is needed. The recording is kept
+    beside the tap tests, what was heard is a line of the journal; lobewatch exclude takes it out again.
+
+    Examples:
+
+      lobewatch listen mill-3 --program A --port /dev/ttyACM0 --out cut.png
+      lobewatch listen mill-3 --program A --speed 12000 --depth 2 --file cut.wav --full-scale 500 --unit m/s^2
+      lobewatch listen mill-3 --cut "reference cut" --speed 12000 --depth 2
+    """
+    from lobewatch.analysis import Logbook
+    from lobewatch.analysis.listening.heard_cut import keep_listened, listened
+    from lobewatch.machine.cuts.observing import contradicted
+    from lobewatch.machine.cuts.setting import chosen_cut
+    from lobewatch.notify.telling import telling
+    from lobewatch.show.cuts.describe_listened import listened_json, listened_texts
+    from lobewatch.show.history.describe_cut import about_tool, otherwise
+    from lobewatch.tap.listening.hear_cut import hear_cut
+
+    logbook = Logbook.open(machine)
+    setting = chosen_cut(logbook.machine, program, cut, speed, depth)
+    said = described(columns, full_scale, sensitivity, unit=unit, rate=rate, response=response)
+    signal = hear_cut(logbook.folder, setting, file, port, seconds, said, notes.print)
+    found = listened(logbook, setting, signal)
+    if out is not None:
+        from lobewatch.show.cuts.figure_listened import listened_figure
+        from lobewatch.show.figures import save_figure
+
+        save_figure(listened_figure(found), out)
+    payload = listened_json(found)
+    if dry_run:
+        emit(payload, as_json, *listened_texts(found))
+        return
+    with telling(logbook):
+        known = logbook.cuts
+        kept = keep_listened(logbook.folder, found, signal, date)
+        remarks = [*about_tool(logbook, kept), *map(otherwise, contradicted(kept, known) if kept.counts else ())]
+        told = {"id": kept.id, "remarks": [remark.code for remark in remarks]}
+        emit(payload | told, as_json, *listened_texts(found), f"saved {kept.id}")
+    notes.print(*(f"note: {remark}" for remark in remarks), sep="\n", end="\n" if remarks else "", markup=False)

@@ -1,0 +1,88 @@
+"""A cut that was listened to, for people and as JSON."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from lobewatch.analysis.listening.heard_cut import ListenedCut
+
+WHY: Mapping[str, str] = {
+    "too-short": "less than 0.3 s of cut to listen to; record a second or longer, with air before it",
+    "no-cut": "nothing in it gets louder: record from the spindle turning in air into the cut",
+    "no-air": "no 0.15 s of the spindle turning in air beside the cut, to know what is there without it",
+    "two-cuts": "more than one cut in it; give each a recording of its own",
+    "knock": "a knock in the cut, as of a hammer; cut again without it",
+    "overload": "the accelerometer or its input was overloaded; choose a larger range or another place",
+    "lost-scans": "scans were lost in it; lower the sample rate or use another cable or port",
+    "speed-not-found": "no spindle speed within 2 % of the one that was set fits its lines; correct the speed",
+    "on-spindle-lines": "the lines of run-out are louder than tooth passing: chatter of two tooth periods of an even "
+    "number of teeth, or chatter that has locked to the spindle, sounds alike; cut at a speed 3 % away",
+    "faint": "lines beside those of the spindle, too faint to be called chatter; cut longer or a little deeper",
+}
+"""What is wrong, and what to do, by the reason why it cannot be told."""
+
+
+def listened_text(found: ListenedCut) -> str:
+    """The word, in a line."""
+    heard, chatter = found.heard, found.heard.chatter
+    if heard.word == "cannot tell":
+        return f"cannot tell ({heard.reason}): {WHY[heard.reason]}"
+    if chatter is None:
+        return "stable"
+    named = "period-two chatter" if heard.word == "flip" else "chatter"
+    return f"{named} at {chatter.frequency:.1f} +- {max(2 * chatter.error, 0.1):.1f} Hz"
+
+
+def listened_texts(found: ListenedCut) -> list[str]:
+    """The word, and what it rests on."""
+    heard, chatter, told = found.heard, found.heard.chatter, [listened_text(found)]
+    if heard.turning is not None:
+        off = 100 * (found.speed_rpm / found.setting.speed_rpm - 1)
+        told.append(
+            f"{found.speed_rpm:.1f} rpm ({off:+.2f} % of {found.setting.speed_rpm:g}), tooth passing "
+            f"{found.tooth_frequency:.1f} Hz; listened to {_seconds(found):.2f} s"
+        )
+    if math.isfinite(heard.ratio):
+        told.append(f"beside the lines of the spindle: {100 * heard.ratio:.2g} % of their energy")
+    if chatter is not None:
+        told.append(f"lobe {found.lobe} ({found.lobe} whole waves between two teeth), {len(chatter.lines)} side bands")
+    return told + _expected(found)
+
+
+def _expected(found: ListenedCut) -> list[str]:
+    if found.predicted is None:
+        return []
+    word = "stable" if found.predicted.stable else "chatter"
+    told = f"by the tap tests, at rest: {word}, at this depth {found.predicted.frequency:.1f} Hz"
+    return [told if found.apart is None else f"{told}, {found.apart:.1f} Hz from what was heard modulo tooth passing"]
+
+
+def _seconds(found: ListenedCut) -> float:
+    spectrum = found.heard.spectrum
+    return math.nan if spectrum is None else 1 / spectrum.bin
+
+
+def listened_json(found: ListenedCut) -> dict[str, Any]:
+    """All of it."""
+    heard, chatter, expected = found.heard, found.heard.chatter, found.predicted
+    return {
+        "word": heard.word,
+        "reason": heard.reason,
+        "chatter_frequency_hz": None if chatter is None else chatter.frequency,
+        "chatter_frequency_hz_std": None if chatter is None else chatter.error,
+        "speed_rpm": heard.speed_rpm,
+        "speed_rpm_std": None if heard.turning is None else 60 * heard.turning.error,
+        "commanded_rpm": found.setting.speed_rpm,
+        "depth_mm": 1e3 * found.setting.depth,
+        "tooth_frequency_hz": found.tooth_frequency,
+        "energy_ratio": heard.ratio,
+        "lobe": found.lobe,
+        "side_bands_hz": [] if chatter is None else sorted(chatter.lines.frequency.tolist()),
+        "predicted": None if expected is None else ("stable" if expected.stable else "chatter"),
+        "predicted_frequency_hz": None if expected is None else expected.frequency,
+        "predicted_apart_hz": found.apart,
+        "begin_s": heard.parts.begin,
+        "end_s": heard.parts.end,
+    }

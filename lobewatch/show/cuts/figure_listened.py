@@ -1,0 +1,51 @@
+"""The spectrum of a cut: lines of the spindle, chatter, what was there before, the modes of the tool."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from lobewatch.analysis.listening.heard_cut import ListenedCut
+from lobewatch.analysis.listening.spectrum import Lines
+from lobewatch.show.cuts.describe_listened import listened_text
+from lobewatch.show.figures import ALARM, EVENT, GOOD, NOW, THEN, new_axes
+
+HIGHEST = 8000.0
+"""Hz."""
+SHOWN = 1e-4
+"""Of the loudest amplitude, drawn downwards."""
+
+
+def listened_figure(found: ListenedCut) -> Figure:
+    """Amplitude over frequency; without a spectrum, where it did not get so far, the word alone."""
+    figure, axes = new_axes(1, (10.0, 4.5))
+    axis, spectrum, lines = axes[0], found.heard.spectrum, found.heard.lines
+    setting = found.setting
+    named = f"{setting.program or 'reference cut'}, {found.speed_rpm:.0f} rpm, {1e3 * setting.depth:.3g} mm"
+    axis.set_title(f"{named}: {listened_text(found).partition(':')[0]}", loc="left", fontsize=11, fontweight="bold")
+    axis.set(xlabel="frequency (Hz)", ylabel="amplitude (m/s²)")
+    if spectrum is None:
+        return figure
+    inside = spectrum.frequency <= min(HIGHEST, spectrum.sample_rate / 2)
+    amplitude = np.sqrt(spectrum.power[inside])
+    axis.semilogy(spectrum.frequency[inside], amplitude, color="#bbbbbb", lw=0.6)
+    if lines is not None:
+        _mark(axis, lines.comb[lines.tooth != 0], "turns of the spindle", THEN, "|")
+        _mark(axis, lines.comb[lines.tooth == 0], "tooth passing", NOW, "o")
+        _mark(axis, lines.foreign, "there in air", EVENT, "x")
+    if found.heard.chatter is not None:
+        _mark(axis, found.heard.chatter.lines, "chatter", ALARM, "D")
+    for mode in (*((found.assembly.x or ()) if found.assembly else ()),):
+        axis.axvline(mode.frequency, color=GOOD, ls=":", lw=1)
+    top = float(np.max(amplitude))
+    axis.set(xlim=(0, spectrum.frequency[inside][-1]), ylim=(SHOWN * top, 3 * top))
+    if found.assembly is not None:
+        axis.plot([], [], color=GOOD, ls=":", lw=1, label="modes in x, at rest")
+    axis.legend(loc="upper right", ncols=3, fontsize=8)
+    return figure
+
+
+def _mark(axis: Axes, lines: Lines, label: str, colour: str, mark: str) -> None:
+    if len(lines):
+        axis.plot(lines.frequency, lines.amplitude, mark, color=colour, ms=5, label=label, fillstyle="none")

@@ -1,0 +1,125 @@
+"""One cut from a device that streams: recorded from the air before it to the air after it, without a key."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Block, Channel, DataError, Device, DeviceError
+from acquisition.files.cut_file import CutSignal
+from lobewatch.analysis.listening.find_cut import CutParts, find_cut
+
+LOOK = 0.5
+"""A look at what has been heard every so often (s)."""
+KEPT = 20.0
+"""Of the newest is kept (s)."""
+LONGEST = 8.0
+"""A cut is listened to for so long, whether it ends or not (s)."""
+AFTER = 0.3
+"""Of air that shows that it has ended (s)."""
+BEFORE = 1.0
+"""Of air that is kept before it (s)."""
+ALIVE = 1.0
+"""After so long it is looked at whether anything is heard at all (s)."""
+
+
+@dataclass
+class _Ear:
+    """What has been heard so far of one channel."""
+
+    channel: Channel
+    row: int
+    rate: float
+
+    def __post_init__(self) -> None:
+        self.codes: list[NDArray[np.int32]] = []
+        self.marks: list[tuple[int, int]] = []
+        self.count = 0
+        self.heard = 0
+
+    def add(self, block: Block) -> None:
+        """Keep a block, and forget what is too old."""
+        codes = block.codes[self.row]
+        overloaded = bool(block.overload >> self.row & 1)
+        if block.lost_before or overloaded:
+            self.marks.append((self.heard, block.lost_before or -1))
+        self.codes.append(codes)
+        self.heard, self.count = self.heard + codes.size, self.count + codes.size
+        while self.count - self.codes[0].size > KEPT * self.rate:
+            self.count -= self.codes.pop(0).size
+
+    @property
+    def signal(self) -> CutSignal:
+        """All that is kept."""
+        codes, first = np.concatenate(self.codes), self.heard - self.count
+        marks = [what for place, what in self.marks if place > first]
+        lost = sum(what for what in marks if what > 0)
+        return CutSignal(
+            np.asarray(codes * self.channel.scale, np.float64), self.rate, codes, self.channel, lost, -1 in marks
+        )
+
+    def forget(self) -> None:
+        """What was heard is no use."""
+        self.codes, self.count, self.marks = [self.codes[-1]], self.codes[-1].size, []
+
+
+def record_cut(device: Device, turn: float, patience: float, show: Callable[[str], None]) -> CutSignal:
+    """The next whole cut that a started device hears; turn: of the spindle (s), patience: until it ends (s).
+
+    show: told what is being waited for. DataError without an accelerometer, and where no cut is heard in time;
+    DeviceError where the sensor is dead.
+    """
+    ear = _ear(device)
+    show("hearing the spindle turn in air; begin the cut")
+    for signal in _looks(device, ear, patience):
+        parts = find_cut(signal.acceleration, signal.sample_rate, turn)
+        if parts.reason == "two-cuts" or (_has_ended(parts, signal) and parts.reason):
+            ear.forget()
+            show("too short for a word, or no air before it; cut again, a second or longer")
+        elif not parts.reason and (_has_ended(parts, signal) or parts.end - parts.begin > LONGEST):
+            return signal.part(max(parts.begin - BEFORE, 0.0), parts.end + AFTER)
+    raise DataError(
+        f"no cut was heard in {patience:g} s; begin to listen with the spindle turning in air, then cut, or give "
+        "more --seconds"
+    )
+
+
+def _ear(device: Device) -> _Ear:
+    rows = [i for i, channel in enumerate(device.channels) if channel.quantity == "acceleration"]
+    if not rows:
+        raise DataError("the device has no acceleration channel; plug the accelerometer in, or name it in [daq]")
+    return _Ear(device.channels[rows[0]], rows[0], device.sample_rate)
+
+
+def _looks(device: Device, ear: _Ear, patience: float) -> Iterator[CutSignal]:
+    """What has been heard, again and again."""
+    next_look, checked = LOOK, False
+    for block in device.blocks():
+        ear.add(block)
+        seconds = ear.heard / ear.rate
+        if not checked and seconds >= ALIVE:
+            _check_alive(ear)
+            checked = True
+        if seconds >= next_look:
+            next_look = seconds + LOOK
+            yield ear.signal
+        if seconds > patience:
+            return
+
+
+def _check_alive(ear: _Ear) -> None:
+    codes = np.concatenate(ear.codes)
+    low, high = ear.channel.rails
+    if np.mean((codes <= low) | (codes >= high)) > 0.5:
+        raise DeviceError("the accelerometer stands at the end of its range", "is its cable open, is it powered?")
+    if np.ptp(codes) == 0:
+        raise DeviceError(
+            "the accelerometer hears nothing at all", "is it plugged in, on the housing, and the spindle turning?"
+        )
+
+
+def _has_ended(parts: CutParts, signal: CutSignal) -> bool:
+    return bool(np.isfinite(parts.end) and signal.seconds - parts.end > AFTER)

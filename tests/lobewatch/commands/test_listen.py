@@ -1,0 +1,123 @@
+"""lobewatch listen with files: word, JSON, what is kept, picture, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from lobewatch.analysis import Logbook
+from lobewatch.analysis.listening.heard_cut import listened
+from lobewatch.cli import app
+from lobewatch.machine.archive.verify import verify
+from lobewatch.machine.cuts.setting import cut_setting
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+RATE, TURN = 25600.0, 12077.0 / 60
+
+
+def recording(path: Path, chatter: float | None = None, seconds: float = 1.2) -> Path:
+    """Of four teeth at 12 077 rpm, as MATLAB text: time and acceleration."""
+    random, n = np.random.default_rng(0), round((seconds + 0.8) * RATE)
+    time, begin = np.arange(n) / RATE, round(0.5 * RATE)
+    signal = random.normal(scale=0.05, size=n)
+    lines = [(4 * k * TURN, 20.0 / k) for k in range(1, 12)]
+    if chatter is not None:
+        lines += [(chatter + 4 * k * TURN, 30.0 * 0.2**k) for k in range(4)]
+    for frequency, amplitude in lines:
+        inside = slice(begin, begin + round(seconds * RATE))
+        signal[inside] += amplitude * np.sin(2 * np.pi * frequency * time[inside] + random.uniform(0, 6))
+    rows = "\n".join(f"{t:.8f},{a:.5f}" for t, a in zip(time, signal, strict=True))
+    path.write_text(f"time [s],acceleration [m/s^2]\n{rows}\n")
+    return path
+
+
+def run(shop: Shop, *arguments: object) -> Result:
+    return CliRunner().invoke(app, ["listen", str(shop.path), *map(str, arguments)])
+
+
+def test_chatter_in_a_file_is_told_kept_and_drawn(shop: Shop, tmp_path: Path) -> None:
+    file, picture = recording(tmp_path / "cut.csv", 1712.3), tmp_path / "cut.svg"
+    result = run(shop, "--program", "A", "--speed", 12000, "--depth", 3, "--file", file, "--json", "--out", picture)
+    told = json.loads(result.stdout)
+    assert (told["word"], told["reason"], told["id"]) == ("chatter", "", "c1")
+    assert told["chatter_frequency_hz"] == pytest.approx(1712.3, abs=0.1)
+    assert told["speed_rpm"] == pytest.approx(12077.0, rel=2e-5)
+    assert told["commanded_rpm"] == 12000.0
+    assert told["lobe"] == 2
+    (cut,) = shop.logbook.cuts
+    assert (cut.by, cut.word, cut.program, cut.depth) == ("accelerometer", "chatter", "A", 0.003)
+    assert cut.speed_rpm == pytest.approx(12077.0, rel=2e-5)
+    assert cut.recording is not None
+    assert verify(shop.path).damage == ()
+    assert "chatter at 1712" in picture.read_text("utf-8")
+
+
+def test_a_quiet_cut_is_stable_and_nothing_is_kept_without_wish(shop: Shop, tmp_path: Path) -> None:
+    file = recording(tmp_path / "cut.csv")
+    result = run(shop, "--cut", "reference cut", "--speed", 12000, "--depth", 1, "--file", file, "--dry-run")
+    assert result.stdout.splitlines()[0] == "stable"
+    assert "12077.0 rpm (+0.64 % of 12000)" in result.stdout
+    assert shop.logbook.files.cuts == ()
+
+
+def test_a_recording_that_is_kept_says_the_same_again(shop: Shop, tmp_path: Path) -> None:
+    first = run(shop, "--program", "A", "--speed", 12000, "--file", recording(tmp_path / "cut.csv", 1712.3), "--json")
+    kept = shop.path / "cuts" / "c1.h5"
+    again = run(shop, "--program", "A", "--speed", 12000, "--file", kept, "--json", "--dry-run")
+    one, other = json.loads(first.stdout), json.loads(again.stdout)
+    assert other["chatter_frequency_hz"] == one["chatter_frequency_hz"]
+
+
+def test_what_cannot_be_told_says_why_and_is_kept_without_counting(shop: Shop, tmp_path: Path) -> None:
+    file = recording(tmp_path / "cut.csv", seconds=0.05)
+    told = json.loads(run(shop, "--program", "A", "--speed", 12000, "--file", file, "--json").stdout)
+    assert (told["word"], told["reason"]) == ("cannot tell", "no-cut")
+    assert (told["speed_rpm"], told["chatter_frequency_hz"]) == (None, None)
+    assert shop.logbook.cuts == ()
+    assert len(shop.logbook.files.cuts) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((), "neither of --program and --cut"),
+        (("--program", "A", "--cut", "B"), "both of --program and --cut"),
+        (("--cut", "A", "--depth", 2), "--speed is missing"),
+        (("--program", "A", "--depth", 0), "--depth 0: is not above 0"),
+        (("--program", "A", "--speed", -1), "--speed -1: is not above 0"),
+        (("--program", "Q"), "program 'Q' is not in machine.toml"),
+        (("--program", "A"), "no port: give --port, --file"),
+        (("--program", "A", "--port", "file:x.h5"), "with --file"),
+        (("--program", "A", "--file", "none.csv"), "no such file"),
+    ],
+)
+def test_what_cannot_be_listened_to_is_refused_in_a_sentence(
+    shop: Shop, arguments: tuple[object, ...], said: str
+) -> None:
+    result = run(shop, *arguments)
+    assert result.exit_code != 0
+    assert said in str(result.exception)
+
+
+def test_what_the_tap_tests_predict_stands_beside_it(shop: Shop, tmp_path: Path) -> None:
+    from acquisition.files.read_sound import read_sound
+
+    shop.run(("A", 12000, 1.5))
+    shop.tap_both()
+    logbook = Logbook.open(shop.path)
+    setting = cut_setting(logbook.machine, "A", None, 12.0)
+    found = listened(logbook, setting, read_sound(recording(tmp_path / "cut.csv", 1712.3)))
+    assert found.predicted is not None
+    assert not found.predicted.stable
+    assert 1300 < found.predicted.frequency < 2600
+    tooth = found.tooth_frequency
+    assert found.apart is not None
+    assert 0 <= found.apart <= tooth / 2
+    turned = [abs((found.predicted.frequency - s * 1712.3) % tooth) for s in (1, -1)]
+    assert found.apart == pytest.approx(min(min(one, tooth - one) for one in turned), abs=0.2)

@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("acquisition", "modal", "dsm", "lobes", "lobewatch")
-FLAT = {"modal": 26, "lobes": 31, "lobewatch/commands": 28}
+FLAT = {"modal": 26, "lobes": 31, "lobewatch/commands": 29}
 """Folders that may hold more than twenty files, and how many."""
 WHOLE = (*PACKAGES, "tests")
 

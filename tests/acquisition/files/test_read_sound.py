@@ -68,7 +68,7 @@ def test_a_velocity_and_a_missing_file_are_refused(tmp_path: Path) -> None:
 def test_a_signal_that_stands_at_its_rail_is_clipped_with_and_without_codes() -> None:
     channel = Channel("acceleration", 0.01, 5.0)
     codes = channel.encode(WAVE * 600.0)
-    assert np.any(CutSignal(codes * channel.scale, 25600.0, codes, channel).clipped)
+    assert np.any(CutSignal(np.asarray(codes * channel.scale, np.float64), 25600.0, codes, channel).clipped)
     flat = np.clip(WAVE, -0.8, 0.8)
     clipped = CutSignal(flat, 25600.0).clipped
     assert np.array_equal(clipped, np.abs(flat) == 0.8) or np.mean(clipped) > 0.3

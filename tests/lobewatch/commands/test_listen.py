@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
+from acquisition.files.read_sound import read_sound
 from lobewatch.analysis import Logbook
 from lobewatch.analysis.listening.heard_cut import listened
 from lobewatch.cli import app
@@ -105,19 +106,19 @@ def test_what_cannot_be_listened_to_is_refused_in_a_sentence(
     assert said in str(result.exception)
 
 
-def test_what_the_tap_tests_predict_stands_beside_it(shop: Shop, tmp_path: Path) -> None:
-    from acquisition.files.read_sound import read_sound
-
-    shop.run(("A", 12000, 1.5))
+def test_what_the_tap_tests_predict_at_this_depth_stands_beside_it(shop: Shop, tmp_path: Path) -> None:
+    shop.run(("A", 12077, 1.5), more='feed = "x"')
     shop.tap_both()
     logbook = Logbook.open(shop.path)
-    setting = cut_setting(logbook.machine, "A", None, 12.0)
-    found = listened(logbook, setting, read_sound(recording(tmp_path / "cut.csv", 1712.3)))
-    assert found.predicted is not None
-    assert not found.predicted.stable
-    assert 1300 < found.predicted.frequency < 2600
-    tooth = found.tooth_frequency
-    assert found.apart is not None
-    assert 0 <= found.apart <= tooth / 2
-    turned = [abs((found.predicted.frequency - s * 1712.3) % tooth) for s in (1, -1)]
-    assert found.apart == pytest.approx(min(min(one, tooth - one) for one in turned), abs=0.2)
+    (verdict,), sound = logbook.verdicts(), read_sound(recording(tmp_path / "cut.csv", 1712.3))
+    below, above = (
+        listened(logbook, cut_setting(logbook.machine, "A", None, 1e3 * share * verdict.limit), sound)
+        for share in (0.99, 1.01)
+    )
+    assert below.predicted is not None
+    assert above.predicted is not None
+    assert (below.predicted.stable, above.predicted.stable) == (True, False)
+    assert above.predicted.frequency == pytest.approx(verdict.chatter_frequency, rel=2e-3)
+    turned = [(above.predicted.frequency - sign * 1712.3) % above.tooth_frequency for sign in (1, -1)]
+    apart = min(min(one, above.tooth_frequency - one) for one in turned)
+    assert above.apart == pytest.approx(apart, abs=0.2)

@@ -4,14 +4,22 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquisition import Block, Channel, DataError, DeviceError, DeviceIdentity
+from acquisition import Block, Channel, DataError, DeviceError, DeviceIdentity, TapsSource
+from acquisition.devices import find_driver
+from acquisition.emulation import Passage
+from lobewatch.analysis import Logbook
+from lobewatch.analysis.listening.heard_cut import listened
+from lobewatch.machine import MachineFolder, make_machine_folder
+from lobewatch.machine.cuts.setting import cut_setting
 from lobewatch.tap.listening.record_cut import record_cut
+from lobewatch.tap.milling.emulated_cut import emulate_cut
 
 RATE = 12800.0
 CHANNELS = (Channel("force", 2e-3, 5.0), Channel("acceleration", 1e-2, 5.0))
@@ -96,3 +104,19 @@ def test_a_dead_sensor_and_a_missing_one_are_said() -> None:
         record(Stream(np.full(round(3 * RATE), 1e6)))
     with pytest.raises(DataError, match="no acceleration channel"):
         record(Stream(sound((1.0, False)), channels=CHANNELS[:1]))
+
+
+def test_a_cut_that_comes_through_the_port_is_told_with_its_true_speed(tmp_path: Path) -> None:
+    make_machine_folder(tmp_path / "m", "surrogate_machine.toml")
+    folder = MachineFolder(tmp_path / "m")
+    setting = cut_setting(folder.machine, "A: slot at 12 600 rpm", 12600.0, 2.0)
+    passage = Passage(before=1.2, ramp=0.05, steady=0.7, after=0.6)
+    emulated = emulate_cut(folder, find_driver("taps"), setting, realtime=False, passage=passage)
+    with emulated.device as device, TapsSource(device.port) as source:
+        source.start()
+        signal = record_cut(source, 60 / setting.speed_rpm, 30.0, lambda _text: None)
+        source.stop()
+    found = listened(Logbook.open(folder.path), setting, signal)
+    assert found.heard.word == "stable"
+    assert found.speed_rpm == pytest.approx(emulated.speed_rpm, rel=5e-5)
+    assert found.speed_rpm != pytest.approx(setting.speed_rpm, rel=5e-4)

@@ -55,8 +55,9 @@ class Case:
 
 
 def structure(modes: list[Mode]) -> Structure:
-    columns = ([getattr(mode, name) for mode in modes] for name in ("frequency", "damping_ratio", "stiffness"))
-    return Structure(*(np.array(column) for column in columns))
+    columns = [[mode.frequency, mode.damping_ratio, mode.stiffness] for mode in modes]
+    frequency, damping, stiffness = np.array(columns).T
+    return Structure(frequency, damping, stiffness)
 
 
 def modes(random: Random) -> list[Mode]:
@@ -74,7 +75,7 @@ def cases(random: Random, count: int) -> Iterator[Case]:
         tangential = random.uniform(5e8, 1.2e9)
         way = random.choice(["up", "down"])
         share = float(random.choice([random.uniform(0.4, 0.9), random.uniform(1.1, 1.8)]))
-        cut = Cut(teeth, immersion, way, tangential, tangential * random.uniform(0.1, 0.6))  # type: ignore[arg-type]
+        cut = Cut(teeth, immersion, way, tangential, tangential * random.uniform(0.1, 0.6))
         runout = random.uniform(0, 20e-6) * np.cos(2 * np.pi * np.arange(teeth) / teeth + random.uniform(0, 6.28))
         feed = random.uniform(4e-5, 1.5e-4)
         if not 3000 <= speed <= 24000:
@@ -141,13 +142,6 @@ def check(words: Counter[str], speeds: list[float], frequencies: list[float]) ->
     assert np.mean(np.array(frequencies) < 3e-3) >= 0.95
 
 
-def test_some_simulated_cuts_are_told_right() -> None:
-    words, speeds, frequencies = judged(11, 8)
-    assert words["wrong"] == 0
-    assert max(speeds) < 5e-4
-    assert np.mean(np.array(frequencies) < 3e-3) >= 0.5
-
-
 @pytest.mark.long
 @pytest.mark.timeout(3600)
 def test_simulated_cuts_are_told_right() -> None:
@@ -157,7 +151,7 @@ def test_simulated_cuts_are_told_right() -> None:
         words, speeds, frequencies = words + found[0], speeds + found[1], frequencies + found[2]
     quantiles = np.quantile(speeds, [0.5, 0.95, 1.0])
     shares = np.mean(np.array(speeds) < 5e-4), np.mean(np.array(frequencies) < 3e-3)
-    print(dict(words), "speed", quantiles, shares[0], "frequency", len(frequencies), shares[1])
+    print(dict(words), "speed", quantiles, shares[0], "frequency", len(frequencies), shares[1])  # noqa: T201  (for docs/long-tests.md)
     check(words, speeds, frequencies)
 
 
@@ -178,5 +172,5 @@ def test_idle_runs_and_pumps_are_never_chatter() -> None:
         commanded = speed * (1 + random.uniform(-0.015, 0.015))
         heard = listen_to(Listened(signal, rate, int(random.integers(1, 7)), 1.0, commanded))
         words[f"{heard.word} {heard.reason}"] += 1
-    print(dict(words))
+    print(dict(words))  # noqa: T201
     assert not [word for word in words if not word.startswith("cannot tell")]

@@ -186,7 +186,7 @@ def test_pockets_are_printed_and_drawn_as_they_are(folder: MachineFolder) -> Non
     said, texts = comparison_json(found, []), comparison_texts(found, [])
     table, *_ = (text for text in texts if not isinstance(text, str))
     printed = list(zip(*(column.cells for column in table.columns), strict=True))
-    drawn = svg(lobes_picture(folder.machine, found))
+    drawn = svg(lobes_picture(folder.machine, found, ()))
     assert len(found.pockets) == len(printed) == 3
     for one, cells in zip(said["pockets"], printed, strict=True):
         low, high = one["window_rpm"]

@@ -303,7 +303,7 @@ def test_a_folder_on_a_read_only_disk_is_reported_and_checked(
         os.close(read_only(path, os.O_WRONLY | os.O_CREAT))
 
     monkeypatch.setattr(os, "open", read_only)
-    monkeypatch.setattr("lobewatch.show.report.atomic_write", refuse)
+    monkeypatch.setattr("lobewatch.show.reporting.page.atomic_write", refuse)
     with pytest.raises(DataError, match="name another file with --out"):
         run("report", shop.path)
     assert run("report", shop.path, "--out", tmp_path / "report.html").exit_code == 0

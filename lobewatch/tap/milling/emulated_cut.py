@@ -19,8 +19,9 @@ from modal import Mode
 
 PASSAGE = Passage(before=2.0, ramp=0.1, steady=2.8, after=2.0)
 """What is repeated: air, cut, air."""
-STIFFEST = 100.0
-"""Modes so many times as stiff as the softest are left out: a cut hardly moves them, and they take long."""
+STIFFEST, HIGHEST = 100.0, 6000.0
+"""Modes so many times as stiff as the softest, or so high (Hz), are left out: a cut hardly moves them, but steps for
+them take long."""
 FEED_SHARE = 5e-3
 """Feed per tooth over diameter, where machine.toml does not say."""
 EDGES = (25e3, 35e3)
@@ -81,7 +82,9 @@ def _at_rest(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None
     if table is None:
         raise DataError(f"{folder.toml}: no model to emulate: add a [spindle] table (or use lobewatch init --example)")
     whole = emulated_structure(spindle or folder.machine.model(setting.tool), table.damping_ratio)
-    some = whole.stiffness < STIFFEST * np.min(whole.stiffness)
+    softest = int(np.argmin(whole.stiffness))
+    some = (whole.stiffness < STIFFEST * whole.stiffness[softest]) & (whole.frequency < HIGHEST)
+    some[softest] = True
     return Structure(whole.frequency[some], whole.damping_ratio[some], whole.stiffness[some])
 
 

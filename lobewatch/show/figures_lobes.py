@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from lobes import RadialLobes
 from lobewatch.analysis import Setting, Verdict, Word
+from lobewatch.analysis.learning.lobes_at_speed import LobesAtSpeed
 from lobewatch.analysis.programs.limit_band import LimitBand
 from lobewatch.machine.cuts.heard_cut import HeardCut
 from lobewatch.show.figures import ALARM, GOOD, NOW, THEN, UNKNOWN, new_axes
@@ -38,6 +39,7 @@ MARKS = {
 }
 """Colour and mark of a program by the verdict on it."""
 SAFE = "#00664A"
+LEARNT = "#8A3D78"
 LEVELS = 12
 """Steps of colour in a map."""
 BAR = "limiting depth (mm); brightest: this or more"
@@ -53,10 +55,12 @@ def lobes_figure(
     band: LimitBand | None = None,
     pockets: Sequence[Setting] = (),
     heard: Sequence[HeardCut] = (),
+    learnt: LobesAtSpeed | None = None,
 ) -> Figure:
     """Stability lobe diagram: the last of `depths` (m, by label) is now, those before it are first tap tests.
 
-    band: how far the doubt moves the line of now; pockets: settings that are recommended; heard: test cuts of it.
+    band: how far the doubt moves the line of now; pockets: settings that are recommended; heard: test cuts of it;
+    learnt: what these have taught.
     """
     figure, (axes,) = new_axes(1, (8.0, 4.6))
     *earlier, now = depths.items()
@@ -72,6 +76,8 @@ def lobes_figure(
     axes.plot(speed_rpm, now[1] * 1e3, color=NOW, lw=1.6, label=now[0])
     for label, depth in earlier:
         axes.plot(speed_rpm, depth * 1e3, color=THEN, ls="--", lw=1.2, label=f"{label}, first tap tests")
+    if learnt is not None:
+        _draw_learnt(axes, learnt, 2 * top)
     axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
     labels = Labels(axes)
     draw_heard(axes, heard, labels)
@@ -133,6 +139,15 @@ def _top(depth: Floats) -> float:
     """Depth (mm) at which a map of depths (m) ends."""
     finite = depth[np.isfinite(depth)] * 1e3
     return min(6 * float(finite.min()), float(finite.max())) if finite.size else 1.0
+
+
+def _draw_learnt(axes: Axes, learnt: LobesAtSpeed, deepest: float) -> None:
+    """Line and band of the spindle at speed; depths (mm) end at the deepest."""
+    told = f"at speed, learnt from {learnt.cuts} test cut{'s' if learnt.cuts > 1 else ''}"
+    left = "98 % of what test cuts have left open"
+    low, high = (np.minimum(edge * 1e3, deepest) for edge in (learnt.band.low, learnt.band.high))
+    axes.fill_between(learnt.band.speed_rpm, low, high, color=LEARNT, alpha=0.25, lw=0, label=left)
+    axes.plot(learnt.lobes.speed_rpm, learnt.lobes.depth * 1e3, color=LEARNT, ls="-.", lw=1.6, label=told)
 
 
 def _draw_pocket(axes: Axes, pocket: Setting, labels: Labels, label: str) -> None:

@@ -13,6 +13,7 @@ from acquisition import DataError, Remark
 from lobes import Cut, StabilityLobes, radial_lobes
 from lobewatch.analysis import Chart, LobeComparison, Logbook, Method, Row, chart, speed_grid
 from lobewatch.analysis.columns.row_lobes import row_lobes
+from lobewatch.analysis.learning.lobes_at_speed import lobes_at_speed
 from lobewatch.analysis.programs.limit_band import limit_band
 from lobewatch.machine import Machine
 from lobewatch.machine.cuts.heard_cut import HeardCut
@@ -55,7 +56,8 @@ def lobes_picture(machine: Machine, found: LobeComparison, cuts: Sequence[HeardC
     title = f"{_title(machine, now)}, from the {now.source}"
     band = limit_band(now.lobes, now.name, now.assembly, machine)
     heard = heard_of(cuts, now.name, now.assembly.tool, now.cuts[0])
-    return lobes_figure(now.lobes.speed_rpm, depths, found.verdicts, title, band, found.pockets, heard)
+    learnt = lobes_at_speed(found.verdicts, machine)
+    return lobes_figure(now.lobes.speed_rpm, depths, found.verdicts, title, band, found.pockets, heard, learnt)
 
 
 def _title(machine: Machine, now: Chart) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lobewatch.analysis import Assembly, Logbook, lobes_of
+from lobewatch.analysis.learning.lobes_at_speed import lobes_at_speed
 from lobewatch.analysis.programs.limit_band import limit_band
 from lobewatch.show.advice import Advised
 from lobewatch.show.figures import svg
@@ -42,8 +43,12 @@ def lobe_figures(logbook: Logbook, assembly: Assembly, programs: Sequence[Advise
     heard = heard_of(logbook.cuts, cut, assembly.tool, cuts[cut][0])
     if heard:
         text += f" Rings and crosses: {len(heard)} test cut{'s' if len(heard) > 1 else ''}, as heard."
-    picture = lobes_figure(now.speed_rpm, depths, marks, "", band, list(advice), heard)
+    learnt = lobes_at_speed(marks, machine)
+    picture = lobes_figure(now.speed_rpm, depths, marks, "", band, list(advice), heard, learnt)
     edges = {} if band is None else {"lowest": band.low, "highest": band.high}
+    if learnt is not None:
+        edges |= {"at speed": learnt.lobes.depth, "at speed, lowest": learnt.band.low}
+        edges |= {"at speed, highest": learnt.band.high}
     heading = "Stability lobes, then and now" if len(depths) > 1 else "Stability lobes"
     return [Picture(heading, text, svg(picture), lobe_numbers(now.speed_rpm, depths | edges))]
 

@@ -9,7 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from lobes import Cut
+from lobes import Cut, StabilityLobes
+from lobewatch.analysis import lobes_of
+from lobewatch.analysis.learning.lobes_at_speed import LobesAtSpeed, lobes_at_speed
+from lobewatch.analysis.programs.limit_band import LimitBand
 from lobewatch.machine.cuts.heard_cut import CutWord, HeardCut
 from lobewatch.machine.cuts.keeping import keep_cut
 from lobewatch.show.figures_lobes import lobes_figure
@@ -56,6 +59,42 @@ def test_cuts_stand_where_they_were_made_and_say_what_they_chattered_at() -> Non
     assert [line.get_label() for line in (stable, chatter)] == ["heard stable", "heard to chatter"]
     assert [text.get_text() for text in axes.texts] == ["1650 Hz"]
     assert axes.get_ylim()[1] > 4.0
+
+
+def test_what_cuts_have_taught_is_a_line_in_a_band_of_its_own() -> None:
+    speed, depth = np.linspace(1000.0, 2000.0, 5), np.full(5, 1e-3)
+    lobes = StabilityLobes(speed, depth, depth, np.full(5, "hopf"), depth[:, np.newaxis], "zero order")
+    learnt = LobesAtSpeed(4, lobes, LimitBand(speed, 0.5 * depth, 3 * depth))
+    (axes,) = lobes_figure(speed, {"now": 2 * depth}, learnt=learnt).axes
+    (line,) = [one for one in axes.lines if one.get_label() == "at speed, learnt from 4 test cuts"]
+    assert line.get_ydata() == pytest.approx(1.0)
+    (band,) = [one for one in axes.collections if "left open" in str(one.get_label())]
+    edge = np.asarray(band.get_paths()[0].vertices)[:, 1]
+    assert (edge.min(), edge.max()) == pytest.approx((0.5, 3.0))
+
+
+def test_lobes_at_speed_are_those_of_modes_and_coefficients_that_were_learnt(shop: Any) -> None:
+    shop.run(("A", 12900, 1.5))
+    shop.tap_both(0, 1.0)
+    logbook = shop.logbook
+    (rest,) = logbook.verdicts()
+    assert lobes_at_speed([rest], logbook.machine) is None
+    for number in range(3):
+        made = heard("stable", 12900.0, 1e-3 + 1e-4 * number, program="A", cut=logbook.machine.build_cut(rest.program))
+        keep_cut(logbook.folder, made)
+    logbook = shop.logbook
+    (taught,) = logbook.verdicts()
+    found = lobes_at_speed([taught], logbook.machine)
+    assert found is not None
+    assert found.cuts == 3
+    assert taught.assembly is not None
+    softer = float(np.min(lobes_of(taught.assembly, logbook.machine)["A"].depth))
+    push = (taught.program.tangential_n_per_mm2 or 0) / (rest.program.tangential_n_per_mm2 or 1)
+    assert float(np.min(found.lobes.depth)) == pytest.approx(softer / push, rel=0.1)
+    assert np.all(found.band.low <= found.lobes.depth)
+    html = render_report(logbook, "reference", "x")
+    assert ">at speed, learnt from 3 test cuts</text>" in html
+    assert "at speed: limiting depth (mm)" in html
 
 
 @pytest.mark.parametrize(

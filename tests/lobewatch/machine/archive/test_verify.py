@@ -130,7 +130,8 @@ def test_rebuild_says_which_corrections_no_copy_tells_any_more(folder: MachineFo
         lines = (folder.path / name).read_bytes().splitlines(keepends=True)
         (folder.path / name).write_bytes(b"".join([*lines[:3], b"?" + lines[3], *lines[4:]]))
     told = " ".join(rebuild_files(folder.path))
-    assert "of lines 4 neither copy is sound; events, exclusions and accepted questions that stood there" in told
+    lost = "events, exclusions, accepted questions and cuts heard by ear that stood there"
+    assert f"of lines 4 neither copy is sound; {lost}" in told
     assert MachineFolder(folder.path).contents().events == ()
     assert [entry.excluded for entry in MachineFolder(folder.path).taps()] == ["", "wrong tool", ""]
     remove_journals(folder)

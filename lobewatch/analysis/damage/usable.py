@@ -160,8 +160,7 @@ class UsableTaps:
 
         Where anybody else has written since, all is looked at again.
         """
-        reading = self._folder.journal.read()
-        if self._contents is None or reading.damage or len(reading.lines) != self._contents.lines + 1:
+        if self._contents is None or self._folder.journal.length != self._contents.lines + 1:
             self.forget()
             return False
         self._contents = self._contents.with_one_more(entry)

@@ -71,6 +71,8 @@ class Journal:
     def __init__(self, folder: Path) -> None:
         """Nothing is read yet."""
         self.path, self.copy = folder / JOURNAL, folder / COPY
+        self.length = 0
+        """Lines that there were once this had appended its newest."""
         self._known = JournalText(there=False)
 
     def read(self) -> Reading:
@@ -105,6 +107,7 @@ class Journal:
         for number, entry in enumerate(entries, first):
             lines.append(as_line(entry | together, number, lines[-1]))
         _add(self.path, lines[1:])
+        self.length = len(reading.lines) + len(entries)
         try:
             _add(self.copy, lines[1:])
         except OSError:  # it is committed; the copy is brought up at the next line

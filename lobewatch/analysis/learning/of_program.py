@@ -21,6 +21,7 @@ from lobewatch.analysis.series import frequency_at
 from lobewatch.machine import Machine, ProgramTable, drive_limit
 from lobewatch.machine.cut_tables import FEED_ANGLES
 from lobewatch.machine.cuts.heard_cut import HeardCut
+from lobewatch.machine.cuts.setting import named
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,12 +56,8 @@ class NextCut:
 
 
 def program_named(machine: Machine, name: str) -> ProgramTable:
-    """A program of machine.toml; ValueError for one that is not there."""
-    for table in machine.program:
-        if table.name == name:
-            return table
-    known = ", ".join(repr(table.name) for table in machine.program) or "none: add a [[program]] to machine.toml"
-    raise ValueError(f"program {name!r} is not in machine.toml; there are {known}")
+    """A program of machine.toml, by its name or how that begins; ValueError for one that is not there."""
+    return named({table.name: table for table in machine.program}, name)
 
 
 def lesson(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[HeardCut]) -> Lesson:

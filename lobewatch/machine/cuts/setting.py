@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from lobes import Cut
 from lobewatch.machine.cut_tables import CutTable, ProgramTable
 from lobewatch.machine.machine_file import REFERENCE_CUT, Machine
+
+Table = TypeVar("Table", bound=CutTable)
 
 
 @dataclass(frozen=True)
@@ -87,8 +90,14 @@ def chosen_cut(machine: Machine, program: str, cut: str, speed_rpm: float | None
 
 def _table(machine: Machine, name: str) -> CutTable:
     tables: dict[str, CutTable] = {REFERENCE_CUT: machine.reference_cut} if machine.reference_cut else {}
-    tables |= {table.name: table for table in machine.program}
-    if name not in tables:
-        known = ", ".join(map(repr, tables)) or "none: add a [[program]] to machine.toml"
-        raise ValueError(f"program {name!r} is not in machine.toml; there are {known}")
-    return tables[name]
+    return named(tables | {table.name: table for table in machine.program}, name)
+
+
+def named(tables: Mapping[str, Table], name: str) -> Table:
+    """The one of this name, or the only one whose name begins so; ValueError where there is none, or are several."""
+    fitting = [one for one in tables if one == name] or [one for one in tables if one.startswith(name)]
+    if len(fitting) != 1:
+        known = ", ".join(map(repr, fitting or tables)) or "none: add a [[program]] to machine.toml"
+        why = "may be several: say more of its name" if fitting else "is not in machine.toml"
+        raise ValueError(f"program {name!r} {why}; there are {known}")
+    return tables[fitting[0]]

@@ -25,7 +25,7 @@ from lobewatch.machine.corrections.correct import exclude, include
 from lobewatch.machine.cuts.heard_cut import HeardCut
 from lobewatch.machine.cuts.keeping import keep_cut
 from lobewatch.machine.cuts.observing import observed
-from lobewatch.machine.cuts.setting import cut_setting
+from lobewatch.machine.cuts.setting import cut_setting, named
 from lobewatch.show.history.describe_cut import about_tool
 
 Shop = Any
@@ -45,6 +45,13 @@ def heard(shop: Shop, speed: float = 12000.0, depth: float = 2.0) -> HeardCut:
 
 def signal() -> CutSignal:
     return CutSignal(np.asarray(CODES * CHANNEL.scale, np.float64), 51200.0, CODES, CHANNEL, lost_scans=3)
+
+
+def test_a_program_is_found_by_how_its_name_begins() -> None:
+    tables: dict[str, Any] = {"A": 1, "A: slot": 2, "B: rib": 3, "B: slot": 4}
+    assert [named(tables, name) for name in ("A", "A:", "B: r")] == [1, 2, 3]
+    with pytest.raises(ValueError, match="'B' may be several: say more of its name; there are 'B: rib', 'B: slot'"):
+        named(tables, "B")
 
 
 def test_what_was_heard_stands_in_both_copies_with_all_that_it_is_judged_by(shop: Shop) -> None:

@@ -28,7 +28,9 @@ LEAST_AIR = 0.15
 SETTLED = 0.1
 """After the beginning of a cut it is listened to (s)."""
 LEAST_CUT = 0.3
-"""What is listened to, at least (s)."""
+"""What is listened to, at least (s) ..."""
+MOST_CUT = 2.0
+"""... and at most, its end: no spindle is so steady that more is of use (s)."""
 SPIKE = 4.0
 """A piece of a cut with a peak so many times those around it is a knock."""
 AROUND = 6
@@ -68,7 +70,8 @@ def find_cut(signal: Floats, sample_rate: float, turn: float) -> CutParts:
     if len(cuts) > 1:
         return CutParts("two-cuts")
     begin, end = (cuts[0][0] + 1) * step, cuts[0][1] * step
-    settled = slice(begin + step + round(SETTLED * sample_rate), end - size)
+    first, last = begin + step + round(SETTLED * sample_rate), end - size
+    settled = slice(max(first, last - round(MOST_CUT * sample_rate)), last)
     parts = CutParts("", _longest_air(loud, level.size, step), settled, begin / sample_rate, end / sample_rate)
     return parts._replace(reason=_wrong(signal, parts, sample_rate, step))
 

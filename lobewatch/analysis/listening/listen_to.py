@@ -13,6 +13,7 @@ from lobewatch.analysis.listening.find_cut import CutParts, find_cut
 from lobewatch.analysis.listening.lattice import Turning
 from lobewatch.analysis.listening.sorted_lines import SortedLines, is_foreign, sort_lines
 from lobewatch.analysis.listening.spectrum import Floats, Spectrum, lines_of, spectrum_of
+from lobewatch.analysis.listening.steadiness import unsteadiness
 from lobewatch.analysis.listening.true_speed import true_speed
 from lobewatch.machine.cuts.heard_cut import CutWord
 
@@ -99,7 +100,8 @@ def listen_to(what: Listened) -> Heard:
     turning = true_speed(every[~is_foreign(every, air)], every, spectrum, what.teeth, what.commanded_rpm / 60)
     if turning is None:
         return Heard("cannot tell", "speed-not-found", parts, spectrum=spectrum)
-    lines = sort_lines(every, spectrum, air, turning, what.teeth)
+    unsteady = unsteadiness(signal[parts.cut], rate, every, turning, spectrum.bin)
+    lines = sort_lines(every, spectrum, air, turning, what.teeth, unsteady)
     found = Heard("stable", "", parts, turning, 0.0, None, lines, spectrum)
     return _judged(found, what)
 

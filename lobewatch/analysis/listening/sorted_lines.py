@@ -42,11 +42,17 @@ def is_foreign(lines: Lines, air: Spectrum) -> NDArray[np.bool_]:
     return np.asarray(lines.amplitude**2 <= FOREIGN * air.loudest_near(lines.frequency, AIR_WIDE))
 
 
-def sort_lines(lines: Lines, spectrum: Spectrum, air: Spectrum, turning: Turning, teeth: int) -> SortedLines:
-    """Where each line comes from; a multiple of the spindle above half the sample rate is where it is folded to."""
+def sort_lines(
+    lines: Lines, spectrum: Spectrum, air: Spectrum, turning: Turning, teeth: int, unsteady: float
+) -> SortedLines:
+    """Where each line comes from; a multiple of the spindle above half the sample rate is where it is folded to.
+
+    unsteady: by how much the speed varies, relative: multiples are so much wider.
+    """
     order = np.round(lines.frequency / turning.frequency)
     away = np.abs(lines.frequency - order * turning.frequency)
-    comb = (away < WIDE * spectrum.bin + 3 * order * turning.error) & (order > 0)
+    unsure = order * (3 * turning.error + unsteady * turning.frequency)
+    comb = (away < WIDE * spectrum.bin + unsure) & (order > 0)
     foreign = ~comb & is_foreign(lines, air)
     upper = comb & (lines.frequency > UPPER * spectrum.sample_rate / 2)
     loudest = float(np.max(lines.amplitude[upper], initial=0.0))

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.listening.heard_cut import ListenedCut
 from lobewatch.analysis.listening.spectrum import Lines
 from lobewatch.show.cuts.describe_listened import listened_text
@@ -36,14 +37,20 @@ def listened_figure(found: ListenedCut) -> Figure:
         _mark(axis, lines.foreign, "there in air", EVENT, "x")
     if found.heard.chatter is not None:
         _mark(axis, found.heard.chatter.lines, "chatter", ALARM, "D")
-    for mode in (*((found.assembly.x or ()) if found.assembly else ()),):
-        axis.axvline(mode.frequency, color=GOOD, ls=":", lw=1)
+    if found.assembly is not None:
+        _modes(axis, found.assembly)
     top = float(np.max(amplitude))
     axis.set(xlim=(0, spectrum.frequency[inside][-1]), ylim=(SHOWN * top, 3 * top))
-    if found.assembly is not None:
-        axis.plot([], [], color=GOOD, ls=":", lw=1, label="modes in x, at rest")
     axis.legend(loc="upper right", ncols=3, fontsize=8)
     return figure
+
+
+def _modes(axis: Axes, assembly: Assembly) -> None:
+    """Of the tool as it was tapped."""
+    for name, modes, dashes in (("x", assembly.x, ":"), ("y", assembly.y, "--")):
+        for number, mode in enumerate(modes or ()):
+            label = f"modes in {name}, at rest" if number == 0 else None
+            axis.axvline(mode.frequency, color=GOOD, ls=dashes, lw=1, label=label)
 
 
 def _mark(axis: Axes, lines: Lines, label: str, colour: str, mark: str) -> None:

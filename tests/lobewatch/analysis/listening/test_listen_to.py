@@ -130,6 +130,20 @@ def test_a_mode_that_rings_down_is_no_chatter() -> None:
     assert told(recorded(a_cut() + ringing)).word == "stable"
 
 
+@pytest.mark.parametrize(("chatter", "word"), [(None, "stable"), (1712.3, "chatter")])
+def test_a_spindle_whose_speed_wavers_is_no_chatter_and_hides_none(chatter: float | None, word: str) -> None:
+    random, time = np.random.default_rng(6), np.arange(round(CUT * RATE)) / RATE
+    turned = 2 * np.pi * TURN * np.cumsum(1 + 3e-4 * np.sin(2 * np.pi * 1.3 * time)) / RATE
+    cut = np.zeros(time.size)
+    for k in range(1, 14):
+        cut += 20 / k * np.sin(4 * k * turned + random.uniform(0, 6))
+        cut += 3 / k * np.sin((4 * k + 1) * turned + random.uniform(0, 6))
+    if chatter is not None:
+        for k in range(4):
+            cut += 10 * 0.3**k * np.sin(2 * np.pi * chatter * time + 4 * k * turned)
+    assert told(recorded(cut)).word == word
+
+
 def test_the_spindle_in_air_is_no_cut() -> None:
     assert told(recorded(np.zeros(round(CUT * RATE)))).reason == "no-cut"
 

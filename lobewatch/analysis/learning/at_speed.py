@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from acquisition import DataError
 from lobes import MillingRows
 from lobewatch.analysis.assembly import Assembly, Modes
-from lobewatch.analysis.learning.contradicting import unexplained
+from lobewatch.analysis.learning.contradicting import remarks_on
 from lobewatch.analysis.learning.learnt import Interval
 from lobewatch.analysis.learning.of_program import Lesson, lesson
 from lobewatch.analysis.programs.doubt import LEAST, Doubt, Span
@@ -84,7 +84,7 @@ def at_speed(
     if not any(cut.tool == table.tool and cut.counts for cut in cuts):
         return table, known
     found = lesson(table, known, machine, cuts)
-    remarks = (*known.remarks, *map(unexplained, found.contradicting))
+    remarks = (*known.remarks, *remarks_on(found.learnt, found.contradicting, table.name))
     if not found.learnt.cuts:
         return table, replace(known, remarks=remarks)
     return _taught(found, replace(known, remarks=remarks, cuts=len(found.learnt.cuts)), machine)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -72,6 +72,14 @@ def learn_from_sound(start: Learnt, cuts: Sequence[Observed]) -> tuple[Learnt, t
         learnt = learnt.hearing(cut) if why is None else learnt
         still += [] if why is None else [Contradicting(cut, why)]
     return learnt, tuple(still)
+
+
+def remarks_on(learnt: Learnt, odd: Sequence[Contradicting], about: str) -> Iterator[Remark]:
+    """What was left out, and where the spindle is not what it was tapped as; about: the program."""
+    yield from map(unexplained, odd)
+    if learnt.is_far_off:
+        text = "f_n at speed is further from that at rest than between 0.945 and 1.025 times it, as test cuts sound"
+        yield Remark("frequency-far-off", about, text, "tap again, warm, with this very tool and stick-out")
 
 
 def unexplained(odd: Contradicting) -> Remark:

@@ -28,6 +28,8 @@ NEGLIGIBLE = 1e-6
 """Draws with less than this share of the largest weight are not looked at any more."""
 SETTLED, OPEN = 2, (0.90, 1.05)
 """Chatter frequencies without which nobody knows how far a spindle at speed may be off, and how far that is."""
+USUAL = (0.945, 1.025)
+"""95 % of natural frequencies at speed lie between these, over those at rest."""
 LEVEL = 0.95
 """Of intervals."""
 
@@ -84,6 +86,13 @@ class Learnt:
     def frequencies(self) -> int:
         """Cuts whose chatter was heard with its frequency: without any, nothing is learnt of natural frequencies."""
         return sum(cut.has_frequency for cut in self.cuts)
+
+    @property
+    def is_far_off(self) -> bool:
+        """Whether a natural frequency is more likely than not further from that at rest than 95 % of spindles are."""
+        ratios = self.draws.ratios()
+        beside = [(USUAL[0] < ratios[name]) & (ratios[name] < USUAL[1]) for name in ("frequency_x", "frequency_y")]
+        return self.frequencies >= SETTLED and float(np.sum(self.weights * np.all(beside, axis=0))) < 1 / 2
 
     def hearing(self, cut: Observed) -> Learnt:
         """What is known after one more cut."""

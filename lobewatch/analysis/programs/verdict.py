@@ -200,7 +200,7 @@ def as_program(table: ProgramTable, machine: Machine) -> Program:
 
 
 def _remarks(table: ProgramTable, assembly: Assembly, machine: Machine) -> Iterator[Remark]:
-    about_modes = (*ABOUT_DIRECTIONS, "predicted", "cut-unexplained")
+    about_modes = (*ABOUT_DIRECTIONS, "predicted", "cut-unexplained", "frequency-far-off")
     yield from (remark for remark in assembly.remarks if remark.code in about_modes)
     yield from assembly.questions
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and table.feed_per_tooth_mm is None:

@@ -8,7 +8,7 @@ from typing import Any
 from rich.table import Table
 
 from acquisition import Remark
-from lobewatch.analysis.learning.contradicting import unexplained
+from lobewatch.analysis.learning.contradicting import remarks_on
 from lobewatch.analysis.learning.learnt import Interval
 from lobewatch.analysis.learning.of_program import Lesson
 from lobewatch.show.learning.names import NAMES
@@ -53,7 +53,7 @@ def _text(one: Interval) -> str:
 
 def lesson_remarks(found: Lesson) -> Iterator[Remark]:
     """What was left out, and what the cuts say nothing of."""
-    yield from map(unexplained, found.contradicting)
+    yield from remarks_on(found.learnt, found.contradicting, found.program.name)
     if found.learnt.cuts and not found.learnt.frequencies:
         text = "f not learnt: no chatter frequency was heard yet"
         yield Remark("frequency-not-learnt", found.program.name, text, "tell what the next chatter sounds at")

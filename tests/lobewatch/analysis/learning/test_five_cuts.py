@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import pytest
 
 from acquisition.emulation.hammered_structure import Structure
 from acquisition.emulation.milling import simulate_cuts
@@ -41,7 +42,7 @@ class Hidden:
     number: int
     immersion: float | None = 1.0
     frequency: float | None = None
-    """At speed over that at rest, in y; None: drawn."""
+    """At speed over that at rest, in both directions; None: drawn."""
     cuts: list[Observed] = field(default_factory=list)
     share: list[float] = field(default_factory=list)
     """Largest removal rate heard stable over the optimum, after each cut."""
@@ -60,7 +61,7 @@ class Hidden:
         self.ratios = {f"{name}_{side}": self._drawn(name) for side in "xy" for name in list(TRUE)[:3]}
         self.ratios |= {"tangential": self._drawn("tangential"), "ratio": draw.uniform(0.8, 1.2)}
         if self.frequency is not None:
-            self.ratios["frequency_y"] = self.frequency
+            self.ratios |= {"frequency_x": self.frequency, "frequency_y": self.frequency}
         self.modes = [
             Mode(
                 mode.frequency * self.ratios[f"frequency_{side}"],
@@ -150,3 +151,54 @@ def five_cuts(spindles: Sequence[Hidden]) -> None:
             one.hear(speed, depth, word, pitch)
         for one in spindles:
             one.share.append(best_heard(one.cuts) / one.optimum)
+
+
+def chattering(one: Hidden, number: int) -> list[tuple[float, float]]:
+    """Speeds (rpm) and depths (m) at which a spindle chatters."""
+    limits = one.limits(one.modes, one.truly)
+    places = np.flatnonzero(limits < DEEPEST / 1.5)
+    chosen = one.random.choice(places, number, replace=False)
+    return [(float(one.grid.speeds[place]), 1.4 * float(limits[place])) for place in chosen]
+
+
+def noticed(spindles: Sequence[Hidden], number: int = 3) -> tuple[float, float]:
+    """Shares of spindles whose interval of f excludes the truth after one chatter frequency, and of those noticed."""
+    places = [chattering(one, number) for one in spindles]
+    words = heard([one.milling(*place) for one, own in zip(spindles, places, strict=True) for place in own])
+    too_early, in_time = [], []
+    for k, (one, own) in enumerate(zip(spindles, places, strict=True)):
+        for place, (word, pitch) in zip(own, words[number * k :], strict=False):
+            one.hear(*place, word, pitch)
+            found = [one.learnt.intervals[f"frequency_{side}"] for side in "xy"]
+            if one.learnt.frequencies < 2:
+                too_early.append(any(not each.low <= one.frequency <= each.high for each in found if one.frequency))
+        in_time.append(one.learnt.is_far_off)
+    return float(np.mean(too_early)), float(np.mean(in_time))
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3000)
+def test_five_cuts_find_most_of_what_a_hidden_spindle_can_do() -> None:
+    spindles = [Hidden(number) for number in range(100)]
+    five_cuts(spindles)
+    share = [one.share[-1] for one in spindles]
+    assert np.median(share) >= 0.93
+    assert np.quantile(share, 0.1) >= 0.85
+    assert np.mean([sum(cut.chatters for cut in one.cuts) for one in spindles]) <= 2.5
+    for names in (["tangential"], ["frequency_x", "frequency_y"]):
+        held = [
+            one.learnt.intervals[name].low <= one.ratios[name] <= one.learnt.intervals[name].high
+            for one in spindles
+            for name in names
+        ]
+        assert 0.90 <= np.mean(held) <= 0.98
+
+
+@pytest.mark.long
+@pytest.mark.timeout(1500)
+def test_a_frequency_8_percent_off_is_noticed_after_three_chatter_frequencies_and_not_excluded_before_two() -> None:
+    too_early, in_time = noticed([Hidden(number, frequency=0.92) for number in range(40)])
+    assert too_early == 0
+    assert in_time >= 0.8
+    _, falsely = noticed([Hidden(number) for number in range(40)])
+    assert falsely <= 0.05

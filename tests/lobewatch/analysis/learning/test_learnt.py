@@ -102,9 +102,11 @@ def test_three_frequencies_notice_what_is_far_from_the_prior_and_one_does_not() 
     mill = Mill(frequency=(0.985, 0.905))
     learnt = mill.prior.hearing(mill.hear(9500, 3e-3))
     assert learnt.intervals["frequency_y"].low < 0.92
+    assert not learnt.is_far_off
     for speed in (11000, 13500):
         learnt = learnt.hearing(mill.hear(speed, 3e-3))
     assert learnt.intervals["frequency_y"].high < 0.945
+    assert learnt.is_far_off
 
 
 def test_old_cuts_are_of_a_frequency_that_has_fallen_since(mill: Mill) -> None:
@@ -112,7 +114,10 @@ def test_old_cuts_are_of_a_frequency_that_has_fallen_since(mill: Mill) -> None:
     for speed in (9500, 13500):
         seen = mill.hear(speed, 3e-3)
         now, then = now.hearing(seen), then.hearing(replace(seen, moved=1.02))
-    assert then.intervals["frequency_y"].mean < now.intervals["frequency_y"].mean - 0.006
+    assert then.intervals["frequency_y"].mean < now.intervals["frequency_y"].mean - 0.004
+    assert [replace(seen, moved=moved).weight for moved in (1.0, 0.98, 1.05)] == pytest.approx(
+        [1, 0.607, 0.044], abs=1e-3
+    )
 
 
 def test_another_material_teaches_the_spindle_but_not_the_force_of_this_one() -> None:

@@ -57,6 +57,8 @@ def listen(
 
     logbook = Logbook.open(machine)
     setting = chosen_cut(logbook.machine, program, cut, speed, depth)
+    if not dry_run:
+        logbook.folder.refuse_damage()
     said = described(columns, full_scale, sensitivity, unit=unit, rate=rate, response=response)
     signal = hear_cut(logbook.folder, setting, file, port, seconds, said, notes.print)
     found = listened(logbook, setting, signal)

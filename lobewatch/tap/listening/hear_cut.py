@@ -38,6 +38,7 @@ def hear_cut(
     show("move the accelerometer from the tool to the spindle housing, and let the spindle turn in air")
     show(f"to be cut: {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm deep, {setting.program or 'reference cut'}")
     with open_source(folder.machine.daq, port) as device:
-        checked_rate(folder, device)
+        with folder.locked():
+            checked_rate(folder, device)
         device.start()
         return record_cut(device, 60 / setting.speed_rpm, patience, show)

@@ -84,6 +84,12 @@ def test_what_cannot_be_told_says_why_and_is_kept_without_counting(shop: Shop, t
     assert len(shop.logbook.files.cuts) == 1
 
 
+def test_nobody_listens_in_vain_where_nothing_can_be_written(shop: Shop, tmp_path: Path) -> None:
+    (shop.path / "journal.jsonl").write_bytes(b"{}\n")
+    result = run(shop, "--program", "A", "--port", "/dev/none")
+    assert "journal.jsonl" in str(result.exception)
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

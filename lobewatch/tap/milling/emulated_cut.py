@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from acquisition import Bench, DataError, Driver, EmulatorThread, Structure
-from acquisition.emulation import CutSound, MillingCut, Passage, random_housing, simulate_cut
+from acquisition.emulation import CutSound, Housing, MillingCut, Passage, random_housing, simulate_cut
 from dsm import Spindle
 from lobes import Program, program_limit
 from lobewatch.machine.cut_tables import FEED_ANGLES
@@ -22,6 +22,8 @@ PASSAGE = Passage(before=2.0, ramp=0.1, steady=2.8, after=2.0)
 STIFFEST, HIGHEST = 100.0, 6000.0
 """Modes so many times as stiff as the softest, or so high (Hz), are left out: a cut hardly moves them, but steps for
 them take long."""
+HEARD = np.arange(100.0, 8000.0, 2.0)
+"""Frequencies of cuts and chatter (Hz)."""
 FEED_SHARE = 5e-3
 """Feed per tooth over diameter, where machine.toml does not say."""
 EDGES = (25e3, 35e3)
@@ -64,7 +66,7 @@ def emulate_cut(
     truth, random, noise = hidden_truth(seed), *np.random.default_rng(seed).spawn(2)
     runout = runout_of(setting.cut.teeth, random)
     cut = _turning_cut(folder, setting, _at_rest(folder, setting, spindle), truth, runout)
-    motion, housing = simulate_cut(cut, passage), random_housing(random, cut.speed_rpm)
+    motion, housing = simulate_cut(cut, passage), _levelled(random_housing(random, cut.speed_rpm))
     bench = Bench(
         lambda rate: CutSound(motion, housing, cut.speed_rpm, rate, noise),
         emulated_inputs(folder, driver),
@@ -86,6 +88,12 @@ def _at_rest(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None
     some = (whole.stiffness < STIFFEST * whole.stiffness[softest]) & (whole.frequency < HIGHEST)
     some[softest] = True
     return Structure(whole.frequency[some], whole.damping_ratio[some], whole.stiffness[some])
+
+
+def _levelled(housing: Housing) -> Housing:
+    """With a gain that its own modes do not exceed: a sensor that is chosen so that chatter does not overload it."""
+    loudest = float(np.max(np.abs(housing.transfer(HEARD))))
+    return replace(housing, gain=(housing.gain[0] / loudest, housing.gain[1] / loudest))
 
 
 def _turning_cut(

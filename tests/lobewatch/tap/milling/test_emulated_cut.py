@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from acquisition import DataError, TapsSource
 from acquisition.devices import find_driver
 from acquisition.emulation import Passage
+from lobewatch.cli import main
 from lobewatch.machine.cuts.setting import cut_setting
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
@@ -125,3 +127,24 @@ def test_a_driver_that_cannot_be_emulated_is_refused(folder: MachineFolder) -> N
     setting = cut_setting(folder.machine, PROGRAM, None, None)
     with pytest.raises(DataError, match="cannot be emulated"):
         emulate_cut(folder, replace(find_driver("taps"), emulate=None), setting)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--speed", "9000"), "give --cut PROGRAM with them"),
+        (("--cut", "nobody's"), "is not in machine.toml"),
+        (("--cut", PROGRAM, "--depth", "0"), "--depth 0: is not above 0"),
+        (("--cut", "reference cut"), "--speed is missing"),
+    ],
+)
+def test_a_cut_that_cannot_be_is_refused_by_the_command(
+    folder: MachineFolder, options: tuple[str, ...], said: str, monkeypatch: pytest.MonkeyPatch, capsys: Any
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["lobewatch", "emulate", "taps", str(folder.path), *options])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 2
+    told = capsys.readouterr().err
+    assert told.startswith("error: ")
+    assert said in told

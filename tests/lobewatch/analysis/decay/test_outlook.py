@@ -79,7 +79,7 @@ def test_critical_falls_are_worked_out_once_and_kept(worn: Shop, monkeypatch: py
     def again(*_: object) -> None:
         raise AssertionError("judged again")
 
-    monkeypatch.setattr("lobewatch.analysis.logbook.judge", again)
+    monkeypatch.setattr("lobewatch.analysis.logbook.judge_at_speed", again)
     assert outlook(worn.logbook).programs["A"] == first
     worn.edit("depth_mm = 1.5", "depth_mm = 1.4")
     with pytest.raises(AssertionError, match="judged again"):

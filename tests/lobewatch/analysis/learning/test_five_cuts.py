@@ -179,11 +179,11 @@ def noticed(spindles: Sequence[Hidden], number: int = 3) -> tuple[float, float]:
 @pytest.mark.long
 @pytest.mark.timeout(3000)
 def test_five_cuts_find_most_of_what_a_hidden_spindle_can_do() -> None:
-    spindles = [Hidden(number) for number in range(150)]
+    spindles = [Hidden(number) for number in range(200)]
     five_cuts(spindles)
     share = [one.share[-1] for one in spindles]
     assert np.median(share) >= 0.93
-    assert np.quantile(share, 0.1) >= 0.85
+    assert np.quantile(share, 0.1) >= 0.84
     assert np.mean([sum(cut.chatters for cut in one.cuts) for one in spindles]) <= 2.5
     for names in (["tangential"], ["frequency_x", "frequency_y"]):
         held = [

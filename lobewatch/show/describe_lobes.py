@@ -14,9 +14,10 @@ from lobes import Pocket, PocketShift, cutting_coefficients
 from lobewatch.analysis import LobeComparison, Setting
 from lobewatch.analysis.lobe_comparison import NO_POCKET
 from lobewatch.analysis.programs.setting_search import LEFT
-from lobewatch.machine import Machine
+from lobewatch.machine import REFERENCE_CUT, Machine
 from lobewatch.show.measurements import lobes_json, programs_json, remark_json, remark_lines
 from lobewatch.show.output import table
+from lobewatch.show.programs.doubts import at_speed_line
 from lobewatch.show.programs.settings import setting_json
 from lobewatch.show.verdicts import verdict_table
 
@@ -51,7 +52,17 @@ def comparison_texts(found: LobeComparison, remarks: Sequence[Remark]) -> list[s
     texts += [str(remark) for remark in remarks if remark.code == NO_POCKET]
     if found.verdicts:
         texts += [verdict_table(found.verdicts), f"verdicts by {found.verdicts[0].method}, as lobewatch check"]
+        texts += _at_speed(found)
     return [*texts, *remark_lines([remark for remark in remarks if remark.code != NO_POCKET])]
+
+
+def _at_speed(found: LobeComparison) -> list[str]:
+    """What holds at rest and what at speed, where test cuts have taught of a program."""
+    taught = [one for one in found.verdicts if one.assembly and one.assembly.cuts]
+    if not taught:
+        return []
+    still = "the diagram and its pockets are" if found.now.name == REFERENCE_CUT else "the diagram is"
+    return [f"{at_speed_line(taught)}; {still} of the spindle at rest"]
 
 
 def _limit_line(found: LobeComparison) -> str:

@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from lobewatch.analysis import Logbook, Word
 from lobewatch.analysis.learning.at_speed import LearntDoubt
+from lobewatch.cli import app
 from lobewatch.machine.corrections.correct import exclude
 from lobewatch.machine.cuts.heard_cut import HeardCut
 from lobewatch.machine.cuts.keeping import keep_cut
@@ -49,6 +51,18 @@ def test_verdicts_are_at_speed_from_the_first_cut_on_and_narrower_with_more(shop
     assert four.program.tangential_n_per_mm2 < rest.program.tangential_n_per_mm2
     assert [two.rows.tangential[0] for two in (rest.drawn, four.drawn)] == pytest.approx(
         [1.4e9, four.program.tangential_n_per_mm2 * 1e6]
+    )
+
+
+def test_what_holds_at_rest_and_what_at_speed_stands_below_the_diagram(shop: Shop) -> None:
+    shop.tap_both()
+    assert "at rest" not in CliRunner().invoke(app, ["lobes", str(shop.path)]).stdout
+    hear(shop, 12900, 3.0, "stable")
+    told = " ".join(CliRunner().invoke(app, ["lobes", str(shop.path)]).stdout.split())
+    assert "as it turns, from 1 cut" in told
+    assert "the diagram and its pockets are of the spindle at rest" in told
+    assert "the diagram is of the spindle at rest" in " ".join(
+        CliRunner().invoke(app, ["lobes", str(shop.path), "--cut", "A"]).stdout.split()
     )
 
 

@@ -104,12 +104,13 @@ def _search(problem: Problem, begin: _Float | None) -> tuple[State, bool]:
 
 
 def _without_unfelt(problem: Problem, state: State) -> tuple[State, bool]:
-    """A fit with the factors that have run off at what was given, or as near to it as the frequencies allow.
+    """A fit with the factors of which next to nothing is felt at what was given, or as near as the frequencies allow.
 
-    That is the end of a stiffness which next to nothing is felt of. State and False where none is, or nothing fits.
+    Such factors run off, to the end of what is allowed or to where rounding ends the search. State and False where
+    there are none, or nothing fits.
     """
-    away = np.flatnonzero(np.abs(state.log_factor) == LIMIT)
-    if away.size == 0 or np.max(state.share[:, away]) >= LEAST_SHARE:
+    away = np.flatnonzero(np.max(state.share, axis=0) < LEAST_SHARE)
+    if away.size == 0:
         return state, False
     for part in BACK:
         start = state.log_factor.copy()

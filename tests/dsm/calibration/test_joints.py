@@ -104,12 +104,13 @@ def test_the_error_of_a_prediction_is_what_noise_makes_of_it() -> None:
     assert stated.frequency_std == pytest.approx(np.std([natural_frequencies(one, 1)[0] for one in changed]), rel=0.3)
 
 
-def test_a_joint_that_no_mode_feels_is_open() -> None:
-    """A thousand times as stiff as any: a remark, no number, and no failure for the noise."""
+@pytest.mark.parametrize("seed", [1, 3, 4, 9])
+def test_a_joint_that_no_mode_feels_is_open(seed: int) -> None:
+    """Ten thousand times as stiff as any: a remark, no number, and no failure for the noise."""
     *two, _ = tools(np.random.default_rng(4))
     rigid = [scale_groups(one, {HOLDER: 1e4, TILTING: 1e4}) for one in two]
     exact = measured(rigid)
-    exact["frequency"] = exact["frequency"] * (1 + NOISE * np.random.default_rng(1).normal(size=2 * MODES))
+    exact["frequency"] = exact["frequency"] * (1 + NOISE * np.random.default_rng(seed).normal(size=2 * MODES))
     fit = fit_stiffness(rigid, **exact)
     assert fit.open_groups == {HOLDER, TILTING}
     assert codes(fit) >= {"group-not-felt"}

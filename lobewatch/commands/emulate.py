@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import math
 import shlex
@@ -50,14 +51,15 @@ def _add_commands() -> None:
         try:
             driver = find_driver(name)
         except DataError as error:  # said here, and again by the command
-            emulate.command(name, help=f"{error}.")(_in_real_time(name))
+            emulate.command(name, help=f"{error}.")(_command(name, takes_fast=False))
             continue
         if driver.emulate is not None:
-            run = _with_fast(name) if driver.emulates_fast else _in_real_time(name)
-            emulate.command(name, help=_help(name, driver.title))(run)
+            emulate.command(name, help=_help(name, driver.title))(_command(name, driver.emulates_fast))
 
 
-def _with_fast(name: str) -> Callable[..., None]:
+def _command(name: str, takes_fast: bool) -> Callable[..., None]:
+    """What a driver is emulated with; takes_fast: whether --fast is among it."""
+
     def run(
         machine: Machine,
         tcp: Tcp = False,
@@ -77,28 +79,9 @@ def _with_fast(name: str) -> Callable[..., None]:
             _Served(name, machine, tcp, fast, seed, as_json), (story, month, scatter, bad, warm), (cut, speed, depth)
         )
 
-    return run
-
-
-def _in_real_time(name: str) -> Callable[..., None]:
-    def run(
-        machine: Machine,
-        tcp: Tcp = False,
-        seed: Seed = 1,
-        story: Told = "none",
-        month: Month = 0,
-        scatter: Scatter = 0.0,
-        bad: Bad = 0.0,
-        warm: Warm = None,
-        cut: Cutting = None,
-        speed: Speed = None,
-        depth: Depth = None,
-        as_json: Json = False,
-    ) -> None:
-        _serve(
-            _Served(name, machine, tcp, False, seed, as_json), (story, month, scatter, bad, warm), (cut, speed, depth)
-        )
-
+    taken = inspect.signature(run, eval_str=True).parameters
+    kept = [one for one in taken.values() if takes_fast or one.name != "fast"]
+    run.__signature__ = inspect.Signature(kept)  # type: ignore[attr-defined]
     return run
 
 

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobewatch.analysis.learning.grid import MM, Grid, floored
-from lobewatch.analysis.learning.likelihood import FREQUENCY, folded
+from lobewatch.analysis.learning.likelihood import FREQUENCY
 from lobewatch.analysis.learning.mean_force import MeanForce
 from lobewatch.analysis.learning.priors import Draws
+from lobewatch.analysis.listening.folded import folded
 
 LIKELY = 0.5
 """A test cut is more likely stable than this."""

@@ -11,8 +11,9 @@ import numpy as np
 
 from acquisition import Remark
 from lobewatch.analysis.learning.learnt import Learnt
-from lobewatch.analysis.learning.likelihood import FREQUENCY, MISJUDGED, folded, heard_base, predicted
+from lobewatch.analysis.learning.likelihood import FREQUENCY, MISJUDGED, heard_base, predicted
 from lobewatch.analysis.learning.observed import Observed
+from lobewatch.analysis.listening.folded import folded
 
 CHANCE = MISJUDGED + 0.01
 """What was heard is beyond chance where all else gives it less."""

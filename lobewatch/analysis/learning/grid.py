@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from lobes import Cut, lowest_of, stability_boundary, zero_order
 from lobewatch.analysis.learning.mean_force import is_constant
-from lobewatch.analysis.learning.observed import Heard, Observed
+from lobewatch.analysis.learning.observed import Observed
+from lobewatch.machine.cuts.heard_cut import CutWord
 from modal import Mode
 
 STEP = 0.008
@@ -42,7 +43,7 @@ class Grid:
     trust: Floats
     """True limit in the middle over that by zero order, at each speed, shape (s,)."""
 
-    def seen(self, speed: float, depth: float, word: Heard = Heard.STABLE) -> Observed:
+    def seen(self, speed: float, depth: float, word: CutWord = "stable") -> Observed:
         """A cut of it."""
         return Observed(self.cut, speed, depth, word, feed_angles=self.feed_angles)
 

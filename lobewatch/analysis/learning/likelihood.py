@@ -12,8 +12,9 @@ from scipy.special import ndtr
 from lobes import MillingRows, piece_numbers
 from lobes.floquet import largest_multipliers
 from lobewatch.analysis.learning.mean_force import MeanForce, is_constant
-from lobewatch.analysis.learning.observed import Heard, Observed
+from lobewatch.analysis.learning.observed import Observed
 from lobewatch.analysis.learning.priors import Draws
+from lobewatch.analysis.listening.folded import folded
 
 EDGE = 0.05
 """Standard deviation of the depth, relative, within which a cut is stable or not."""
@@ -71,7 +72,7 @@ def _log_of_sound(seen: Observed, guess: Predicted, tooth_frequency: float) -> F
     """Of kind and frequency, where it chatters; 0 where neither was told."""
     if not seen.has_frequency:
         return np.zeros(guess.excess.shape)
-    alike = guess.flip == (seen.word is Heard.FLIP)
+    alike = guess.flip == (seen.word == "flip")
     kind = np.where(alike, 1 - OTHER_KIND, OTHER_KIND)
     wide = FREQUENCY * (seen.frequency if np.isfinite(seen.frequency) else tooth_frequency)
     off = np.abs(folded(heard_base(seen, tooth_frequency), tooth_frequency) - guess.base)
@@ -84,12 +85,6 @@ def _log_of_sound(seen: Observed, guess: Predicted, tooth_frequency: float) -> F
 def heard_base(seen: Observed, tooth_frequency: float) -> float:
     """Chatter frequency that was heard (Hz), or that of period two where none was told."""
     return seen.frequency if np.isfinite(seen.frequency) else tooth_frequency / 2
-
-
-def folded(frequency: Floats | float, tooth_frequency: Floats | float) -> Floats:
-    """Frequencies (Hz) that teeth leave alike, between 0 and half the tooth frequency."""
-    rest = np.mod(frequency, tooth_frequency)
-    return np.asarray(np.minimum(rest, tooth_frequency - rest))
 
 
 def _by_mean_force(rows: MillingRows, seen: Observed) -> Predicted:

@@ -4,21 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import StrEnum
 
 from lobes import Cut
+from lobewatch.machine.cuts.heard_cut import CutWord
 
 AGED = 0.02
 """Change of the natural frequency, relative, after which a cut says less of the spindle as it is now."""
-
-
-class Heard(StrEnum):
-    """What a cut sounded like."""
-
-    STABLE = "stable"
-    CHATTER = "chatter"
-    FLIP = "flip"
-    """Period-two chatter."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +22,7 @@ class Observed:
     """Spindle speed (rpm)."""
     depth: float
     """Axial depth (m)."""
-    word: Heard
+    word: CutWord
     """What it sounded like."""
     frequency: float = math.nan
     """Chatter frequency (Hz); NaN where none was heard or told."""
@@ -54,9 +45,9 @@ class Observed:
     @property
     def chatters(self) -> bool:
         """Whether it was not stable."""
-        return self.word is not Heard.STABLE
+        return self.word != "stable"
 
     @property
     def has_frequency(self) -> bool:
         """Whether it says something of natural frequencies."""
-        return self.word is Heard.FLIP or (self.chatters and math.isfinite(self.frequency))
+        return self.word == "flip" or (self.chatters and math.isfinite(self.frequency))

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lobes import Cut
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.learning.contradicting import Contradicting, learn_from_sound
 from lobewatch.analysis.learning.grid import Grid, speeds_between, trusted
 from lobewatch.analysis.learning.learnt import Learnt, prior
-from lobewatch.analysis.learning.observed import Heard, Observed
+from lobewatch.analysis.learning.observed import Observed
 from lobewatch.analysis.learning.suggest import Suggested, best_heard, suggest
 from lobewatch.analysis.programs.doubt import doubt_of
 from lobewatch.analysis.programs.drawn import middle_row
@@ -20,7 +19,7 @@ from lobewatch.analysis.programs.verdict import as_program
 from lobewatch.analysis.series import frequency_at
 from lobewatch.machine import Machine, ProgramTable, drive_limit
 from lobewatch.machine.cut_tables import FEED_ANGLES
-from lobewatch.machine.cuts.heard_cut import HeardCut
+from lobewatch.machine.cuts.heard_cut import HeardCut, geometry
 from lobewatch.machine.cuts.setting import named
 
 
@@ -65,8 +64,8 @@ def lesson(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequ
     seen = observed(cuts, table, assembly, machine)
     start = prior(middle_row(as_program(table, machine), assembly), doubt_of(assembly, table, machine))
     learnt, odd = learn_from_sound(start, seen)
-    cut = _geometry(machine.build_cut(table))
-    own = tuple(one for one in seen if one.material == 0 and _geometry(one.cut) == cut)
+    cut = geometry(machine.build_cut(table))
+    own = tuple(one for one in seen if one.material == 0 and geometry(one.cut) == cut)
     return Lesson(table, start, learnt, odd, own)
 
 
@@ -111,7 +110,7 @@ def _observed(cut: HeardCut, material: int, assembly: Assembly) -> Observed:
         cut=cut.cut,
         speed_rpm=cut.speed_rpm,
         depth=cut.depth,
-        word=Heard(cut.word),
+        word=cut.word,
         frequency=float("nan") if cut.chatter_frequency_hz is None else cut.chatter_frequency_hz,
         feed_angles=tuple(FEED_ANGLES[feed] for feed in feeds),
         material=material,
@@ -126,7 +125,3 @@ def _moved(cut: HeardCut, assembly: Assembly) -> float:
     then = [(frequency_at(series, cut.at), series[-1].frequency) for series in assembly.series.values() if series]
     ratios = [before / now for before, now in then if before is not None]
     return float(np.mean(ratios)) if ratios else 1.0
-
-
-def _geometry(cut: Cut) -> tuple[int, float, str]:
-    return cut.teeth, cut.immersion, cut.direction

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lobewatch.analysis.listening.folded import modulo
 from lobewatch.analysis.listening.sorted_lines import WIDE
 from lobewatch.analysis.listening.spectrum import Floats, Lines
 
@@ -60,9 +61,3 @@ def _explained(left: Lines, frequency: float, tooth_frequency: float, bin_: floa
         apart = modulo(left.frequency, order * frequency, tooth_frequency)
         found[apart < WIDE * bin_ * max(1.0, order / 2)] = 1.0
     return found
-
-
-def modulo(frequency: Floats | float, other: float, tooth_frequency: float) -> Floats:
-    """Distance of frequencies from +-other + k tooth passing (Hz): those that chatter at one of them sounds with."""
-    apart = [(frequency - sign * other) / tooth_frequency for sign in (1, -1)]
-    return np.asarray(tooth_frequency * np.minimum(*(np.abs(one - np.round(one)) for one in apart)))

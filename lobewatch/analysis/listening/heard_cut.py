@@ -11,7 +11,7 @@ from acquisition import DataError
 from acquisition.files.cut_file import CutSignal
 from lobewatch.analysis.assembling import or_reason
 from lobewatch.analysis.assembly import Assembly
-from lobewatch.analysis.listening.chatter_lines import modulo
+from lobewatch.analysis.listening.folded import modulo
 from lobewatch.analysis.listening.listen_to import Heard, Listened, listen_to
 from lobewatch.analysis.listening.predicted import Predicted, predicted
 from lobewatch.analysis.logbook import Logbook

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from lobewatch.analysis.listening.folded import folded
 from lobewatch.analysis.listening.lattice import Turning
-from lobewatch.analysis.listening.spectrum import Lines, Spectrum, folded
+from lobewatch.analysis.listening.spectrum import Lines, Spectrum
 
 WIDE = 1.2
 """A line belongs to a frequency that is no further away than this (bins)."""

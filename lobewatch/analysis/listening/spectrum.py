@@ -106,9 +106,3 @@ def lines_of(spectrum: Spectrum) -> Lines:
     shift = 0.5 * (before - after) / np.where(bend < 0, bend, -1.0)
     amplitude = np.sqrt(np.exp(top - 0.25 * (before - after) * shift))
     return Lines((at + shift) * spectrum.frequency[1], amplitude, power[at] / spectrum.noise[at])
-
-
-def folded(frequency: Floats, sample_rate: float) -> Floats:
-    """Where frequencies (Hz) are heard by a device without a filter."""
-    rest = np.mod(frequency, sample_rate)
-    return np.asarray(np.minimum(rest, sample_rate - rest))

@@ -97,6 +97,11 @@ class HeardCut:
         return {"kind": KIND, **told, "at": self.at.isoformat()}
 
 
+def geometry(cut: Cut) -> tuple[int, float, str, float]:
+    """What two cuts with one cutter at one immersion have alike, whatever the material and the feed."""
+    return cut.teeth, cut.immersion, cut.direction, cut.helix_lag
+
+
 def cut_of_line(line: Mapping[str, Any], excluded: str = "") -> HeardCut:
     """From the line that `HeardCut.line` has made."""
     told = {name: line[name] for name in HeardCut.__dataclass_fields__ if name in line}

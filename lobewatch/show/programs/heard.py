@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 
 from lobes import Cut
-from lobewatch.machine.cuts.heard_cut import HeardCut
+from lobewatch.machine.cuts.heard_cut import HeardCut, geometry
 from lobewatch.show.figures import ALARM, GOOD
 from lobewatch.show.programs.labels import Labels
 
@@ -19,7 +19,7 @@ SIZE = 11.0
 
 def heard_of(cuts: Sequence[HeardCut], name: str, tool: str, cut: Cut) -> list[HeardCut]:
     """Those with this tool, cutter and immersion that count: of the cut of this name, or of the same coefficients."""
-    known = [one for one in cuts if one.counts and one.tool == tool and _geometry(one.cut) == _geometry(cut)]
+    known = [one for one in cuts if one.counts and one.tool == tool and geometry(one.cut) == geometry(cut)]
     force = cut.tangential, cut.radial
     return [one for one in known if one.program == name or (one.cut.tangential, one.cut.radial) == force]
 
@@ -36,7 +36,3 @@ def draw_heard(axes: Axes, cuts: Sequence[HeardCut], labels: Labels) -> None:
     for cut in cuts:
         if cut.chatter_frequency_hz is not None:
             labels.add(f"{cut.chatter_frequency_hz:.0f} Hz", (cut.speed_rpm, 1e3 * cut.depth), ALARM)
-
-
-def _geometry(cut: Cut) -> tuple[int, float, str, float]:
-    return cut.teeth, cut.immersion, cut.direction, cut.helix_lag

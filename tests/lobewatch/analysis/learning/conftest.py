@@ -11,7 +11,7 @@ from lobes import Cut, MillingRows, milling_system, rows_of
 from lobes.floquet import largest_multipliers, piece_numbers
 from lobewatch.analysis.learning.grid import Grid, speeds_between
 from lobewatch.analysis.learning.learnt import Learnt, prior
-from lobewatch.analysis.learning.observed import Heard, Observed
+from lobewatch.analysis.learning.observed import Observed
 from lobewatch.analysis.programs.doubt import Doubt, Span
 from modal import Mode
 
@@ -57,13 +57,13 @@ class Mill:
         """What the cut sounds like; the frequency is the one that the multiplier leaves next above a natural one."""
         multiplier = self.multiplier(speed, depth)
         if abs(multiplier) < 1:
-            return Observed(self.cut, speed, depth, Heard.STABLE)
+            return Observed(self.cut, speed, depth, "stable")
         teeth = self.cut.teeth * speed / 60
         base = abs(np.angle(multiplier)) / (2 * np.pi) * teeth
         family = np.concatenate([np.arange(20) * teeth + base, np.arange(1, 20) * teeth - base])
         own = np.array([self.x.frequency * self.frequency[0], self.y.frequency * self.frequency[1]])
         near = np.min(np.abs(family[:, np.newaxis] / own - 1.02), axis=1)
-        return Observed(self.cut, speed, depth, Heard.CHATTER, float(family[np.argmin(near)]))
+        return Observed(self.cut, speed, depth, "chatter", float(family[np.argmin(near)]))
 
 
 def doubt() -> Doubt:

@@ -20,9 +20,10 @@ from lobes import Cut, lowest_of, milling_system, rows_of, stability_boundary, z
 from lobewatch.analysis.learning.grid import Grid, floored, speeds_between, trusted
 from lobewatch.analysis.learning.learnt import Learnt, prior
 from lobewatch.analysis.learning.mean_force import is_constant
-from lobewatch.analysis.learning.observed import Heard, Observed
+from lobewatch.analysis.learning.observed import Observed
 from lobewatch.analysis.learning.suggest import best_heard, suggest
 from lobewatch.analysis.programs.doubt import Doubt, Span
+from lobewatch.machine.cuts.heard_cut import CutWord
 from modal import Mode
 
 CUTS = 5
@@ -113,7 +114,7 @@ class Hidden:
         angles = cut.entry_angle, cut.exit_angle
         return MillingCut(cut.teeth, *angles, cut.tangential, cut.radial, depth, 1e-4, speed, x, y)
 
-    def hear(self, speed: float, depth: float, word: Heard, frequency: float) -> None:
+    def hear(self, speed: float, depth: float, word: CutWord, frequency: float) -> None:
         """Learn from the cut."""
         pitch = frequency * (1 + NOISE * self.random.standard_normal())
         self.cuts.append(Observed(self.cut, speed, depth, word, pitch))
@@ -123,9 +124,9 @@ class Hidden:
 DOUBT = Doubt({"tap": np.zeros((2, 4))}, np.tile(np.eye(4), (2, 1, 1)), 0.01, Span(0.8, 1.2), Span(0.8, 1.2))
 
 
-def heard(cuts: Sequence[MillingCut]) -> list[tuple[Heard, float]]:
+def heard(cuts: Sequence[MillingCut]) -> list[tuple[CutWord, float]]:
     """Word and chatter frequency (Hz) of cuts, from their motion alone."""
-    found: list[tuple[Heard, float]] = [(Heard.STABLE, np.nan)] * len(cuts)
+    found: list[tuple[CutWord, float]] = [("stable", np.nan)] * len(cuts)
     for number, motion in simulate_cuts(cuts, PASSAGE):
         teeth = round(motion.sample_rate * cuts[number].tooth_period)
         steady = motion.acceleration[:, int(motion.sample_rate * 0.5) : int(motion.sample_rate * 0.82)]
@@ -137,7 +138,7 @@ def heard(cuts: Sequence[MillingCut]) -> list[tuple[Heard, float]]:
         power = np.sum(np.abs(np.fft.rfft(left * np.hanning(left.shape[1]), 4 * left.shape[1])) ** 2, axis=0)
         pitch = float(np.argmax(power)) * motion.sample_rate / (4 * left.shape[1])
         base = pitch * cuts[number].tooth_period
-        word = Heard.FLIP if abs(base % 1 - 0.5) < 0.003 else Heard.CHATTER
+        word: CutWord = "flip" if abs(base % 1 - 0.5) < 0.003 else "chatter"
         found[number] = word, pitch
     return found
 

@@ -10,8 +10,9 @@ import pytest
 from lobes import Cut, stability_boundary
 from lobewatch.analysis.learning.contradicting import Contradiction, contradiction, learn_from_sound
 from lobewatch.analysis.learning.learnt import Learnt
-from lobewatch.analysis.learning.likelihood import MISJUDGED, folded, log_likelihood, predicted
-from lobewatch.analysis.learning.observed import Heard, Observed
+from lobewatch.analysis.learning.likelihood import MISJUDGED, log_likelihood, predicted
+from lobewatch.analysis.learning.observed import Observed
+from lobewatch.analysis.listening.folded import folded
 from modal import Mode
 from tests.lobewatch.analysis.learning.conftest import Mill
 
@@ -35,7 +36,7 @@ def test_the_prior_is_that_of_the_design(mill: Mill) -> None:
 
 
 def test_a_shallow_cut_is_stable_and_a_deep_one_chatters_but_for_cuts_that_are_misheard(mill: Mill) -> None:
-    stable, chatters = (Observed(mill.cut, 12000, 1e-5, word) for word in (Heard.STABLE, Heard.CHATTER))
+    stable, chatters = (Observed(mill.cut, 12000, 1e-5, word) for word in ("stable", "chatter"))
     assert likelihood(mill, stable, mill.prior) == pytest.approx(1 - MISJUDGED)
     assert likelihood(mill, chatters, mill.prior) == pytest.approx(MISJUDGED)
     deep = replace(chatters, depth=0.05)
@@ -59,7 +60,7 @@ def test_the_edge_lies_at_the_limit(cut: Cut) -> None:
     pushed = replace(cut, tangential=1.1 * cut.tangential, radial=1.1 * cut.radial)
     limit = stability_boundary([x], [y], pushed, [12000.0], 0.02).depth[0]
     shares = (0.8, 1.0, 1.25)
-    chances = [predicted(Observed(cut, 12000, limit * share, Heard.STABLE), one).chance[0] for share in shares]
+    chances = [predicted(Observed(cut, 12000, limit * share, "stable"), one).chance[0] for share in shares]
     assert chances[0] < 0.05
     assert 0.4 < chances[1] < 0.6
     assert chances[2] > 0.95
@@ -79,8 +80,8 @@ def test_a_chatter_frequency_is_compared_at_the_depth_of_the_cut_and_modulo_the_
 
 def test_a_deep_stable_cut_lowers_kt_and_chatter_in_a_shallow_one_raises_it(mill: Mill) -> None:
     before = mill.prior.intervals["tangential"].mean
-    stable = mill.prior.hearing(Observed(mill.cut, 12000, 2.2e-3, Heard.STABLE))
-    chatter = mill.prior.hearing(Observed(mill.cut, 12000, 0.8e-3, Heard.CHATTER))
+    stable = mill.prior.hearing(Observed(mill.cut, 12000, 2.2e-3, "stable"))
+    chatter = mill.prior.hearing(Observed(mill.cut, 12000, 0.8e-3, "chatter"))
     assert stable.intervals["tangential"].mean < 0.85 * before
     assert chatter.intervals["tangential"].mean > 1.05 * before
     assert stable.frequencies == chatter.frequencies == 0
@@ -140,12 +141,12 @@ def test_learning_is_the_same_again_and_few_draws_are_made_anew() -> None:
 
 
 def test_what_contradicts_is_named_and_left_out(mill: Mill) -> None:
-    cuts = [Observed(mill.cut, 12000, depth, Heard.STABLE) for depth in (1e-3, 1.4e-3, 1.5e-3)]
-    odd = Observed(mill.cut, 12000, 0.3e-3, Heard.CHATTER)
+    cuts = [Observed(mill.cut, 12000, depth, "stable") for depth in (1e-3, 1.4e-3, 1.5e-3)]
+    odd = Observed(mill.cut, 12000, 0.3e-3, "chatter")
     learnt, left_out = learn_from_sound(mill.prior, [*cuts, odd])
     assert learnt.cuts == tuple(cuts)
     assert [(one.cut, one.why) for one in left_out] == [(odd, Contradiction.CHATTERS)]
-    deep = Observed(mill.cut, 8000, 0.03, Heard.STABLE)
+    deep = Observed(mill.cut, 8000, 0.03, "stable")
     assert contradiction(learnt, deep) is Contradiction.STABLE
     seen = mill.hear(20000, 4e-3)
     assert contradiction(learnt, seen) is None

@@ -10,7 +10,7 @@ import pytest
 from lobes import Cut, stability_boundary, zero_order
 from lobewatch.analysis.learning.grid import floored, trusted
 from lobewatch.analysis.learning.likelihood import predicted
-from lobewatch.analysis.learning.observed import Heard, Observed
+from lobewatch.analysis.learning.observed import Observed
 from lobewatch.analysis.learning.suggest import suggest
 from tests.lobewatch.analysis.learning.conftest import Mill
 
@@ -44,7 +44,7 @@ def test_cuts_lead_to_more_chips_and_end_where_nothing_is_to_be_gained(mill: Mil
     truly = replace(mill.cut, tangential=0.9 * mill.cut.tangential, radial=0.9 * mill.cut.radial)
     limits = np.minimum(zero_order([x], [y], truly, grid.speeds).depth, grid.deepest)
     assert best > 0.85 * max(speed * floored(limit) for speed, limit in zip(grid.speeds, limits, strict=True))
-    ceiling = Observed(mill.cut, 20000, 0.012, Heard.STABLE)
+    ceiling = Observed(mill.cut, 20000, 0.012, "stable")
     assert suggest(learnt, grid, [*cuts, ceiling], 1) is None
 
 

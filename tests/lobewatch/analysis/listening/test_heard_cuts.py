@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from acquisition.emulation import MillingCut, Passage, Structure, TipMotion, hear, random_housing, simulate_cuts
 from lobes import Cut, stability_boundary
-from lobewatch.analysis.listening.chatter_lines import modulo
+from lobewatch.analysis.listening.folded import modulo
 from lobewatch.analysis.listening.listen_to import Heard, Listened, listen_to
 from modal import Mode
 

@@ -10,8 +10,8 @@ from enum import StrEnum
 import numpy as np
 
 from acquisition import Remark
-from lobewatch.analysis.learning.learnt import Learnt
-from lobewatch.analysis.learning.likelihood import FREQUENCY, MISJUDGED, heard_base, predicted
+from lobewatch.analysis.learning.learnt import Expecting, Learnt
+from lobewatch.analysis.learning.likelihood import FREQUENCY, MISJUDGED, heard_base
 from lobewatch.analysis.learning.observed import Observed
 from lobewatch.analysis.listening.folded import folded
 
@@ -42,9 +42,9 @@ class Contradicting:
     why: Contradiction
 
 
-def contradiction(learnt: Learnt, cut: Observed) -> Contradiction | None:
+def contradiction(expecting: Expecting) -> Contradiction | None:
     """Whether a cut contradicts what was learnt from others; None where it may be chance."""
-    guess, weights = predicted(cut, learnt.draws), learnt.weights
+    cut, guess, weights = expecting.cut, expecting.guess, expecting.learnt.weights
     chatters = float(np.sum(weights * guess.chance))
     if (chatters if cut.chatters else 1 - chatters) < CHANCE:
         return Contradiction.CHATTERS if cut.chatters else Contradiction.STABLE
@@ -63,14 +63,16 @@ def learn_from_sound(start: Learnt, cuts: Sequence[Observed]) -> tuple[Learnt, t
     """
     learnt, odd = start, list[Observed]()
     for cut in cuts:
-        if contradiction(learnt, cut) is None:
-            learnt = learnt.hearing(cut)
+        expecting = learnt.expecting(cut)
+        if contradiction(expecting) is None:
+            learnt = expecting.heard()
         else:
             odd.append(cut)
     still = list[Contradicting]()
     for cut in odd:
-        why = contradiction(learnt, cut)
-        learnt = learnt.hearing(cut) if why is None else learnt
+        expecting = learnt.expecting(cut)
+        why = contradiction(expecting)
+        learnt = expecting.heard() if why is None else learnt
         still += [] if why is None else [Contradicting(cut, why)]
     return learnt, tuple(still)
 

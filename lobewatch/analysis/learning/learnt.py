@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes import MillingRows
-from lobewatch.analysis.learning.likelihood import log_likelihood, predicted
+from lobewatch.analysis.learning.likelihood import Predicted, log_likelihood, predicted
 from lobewatch.analysis.learning.observed import Observed
 from lobewatch.analysis.learning.priors import Draws, drawn
 from lobewatch.analysis.programs.doubt import Doubt
@@ -96,17 +96,37 @@ class Learnt:
 
     def hearing(self, cut: Observed) -> Learnt:
         """What is known after one more cut."""
+        return self.expecting(cut).heard()
+
+    def expecting(self, cut: Observed) -> Expecting:
+        """A cut, and what it would sound like on the spindles that are not ruled out."""
         looked = np.flatnonzero(self.log > np.max(self.log) + np.log(NEGLIGIBLE))
-        draws, cuts, refreshed = self.draws[looked].with_materials(cut.material + 1, self.seed), (*self.cuts, cut), 0
-        log = self.log[looked] + _log(cut, draws)
-        if 1 / np.sum(_weights(log) ** 2) < ENOUGH:
-            draws, log = _refresh(draws, log, cuts, np.random.default_rng((self.seed, 3, len(cuts))))
-            refreshed = 1
-        return replace(self, draws=draws, log=log, cuts=cuts, refreshed=self.refreshed + refreshed)
+        draws = self.draws[looked].with_materials(cut.material + 1, self.seed)
+        return Expecting(replace(self, draws=draws, log=self.log[looked]), cut, predicted(cut, draws))
 
     def sample(self, count: int) -> Draws:
         """Draws of equal weight."""
         return self.draws[_spread(self.weights, count, np.random.default_rng((self.seed, 4, len(self.cuts))))]
+
+
+@dataclass(frozen=True, eq=False)
+class Expecting:
+    """A cut before it teaches anything."""
+
+    learnt: Learnt
+    """Without it: draws that have any weight left, with coefficients of its material."""
+    cut: Observed
+    guess: Predicted
+    """What each of these draws would do in it."""
+
+    def heard(self) -> Learnt:
+        """What is known with it."""
+        known, cuts = self.learnt, (*self.learnt.cuts, self.cut)
+        draws, log, refreshed = known.draws, known.log + _log(self.cut, self.guess), known.refreshed
+        if 1 / np.sum(_weights(log) ** 2) < ENOUGH:
+            draws, log = _refresh(draws, log, cuts, np.random.default_rng((known.seed, 3, len(cuts))))
+            refreshed += 1
+        return replace(known, draws=draws, log=log, cuts=cuts, refreshed=refreshed)
 
 
 def prior(middle: MillingRows, doubt: Doubt, count: int = COUNT, seed: int = 0) -> Learnt:
@@ -122,9 +142,9 @@ def learn(middle: MillingRows, doubt: Doubt, cuts: Sequence[Observed], count: in
     return reduce(Learnt.hearing, cuts, prior(middle, doubt, count, seed))
 
 
-def _log(cut: Observed, draws: Draws) -> Floats:
+def _log(cut: Observed, guess: Predicted) -> Floats:
     """Logarithm of the likelihood of one cut; an old one counts less, the more the frequency has moved since."""
-    return cut.weight * log_likelihood(cut, predicted(cut, draws), cut.cut.teeth * cut.speed_rpm / 60)
+    return cut.weight * log_likelihood(cut, guess, cut.cut.teeth * cut.speed_rpm / 60)
 
 
 def _weights(log: Floats) -> Floats:
@@ -151,7 +171,7 @@ def _refresh(draws: Draws, log: Floats, cuts: Sequence[Observed], random: np.ran
 
 def _joint(draws: Draws, cuts: Sequence[Observed]) -> Floats:
     """Logarithm of prior times likelihood of all cuts."""
-    return np.asarray(sum(_log(cut, draws) for cut in cuts) - np.sum(draws.normal**2, axis=1) / 2)
+    return np.asarray(sum(_log(cut, predicted(cut, draws)) for cut in cuts) - np.sum(draws.normal**2, axis=1) / 2)
 
 
 def _spread(weights: Floats, count: int, random: np.random.Generator) -> NDArray[np.intp]:

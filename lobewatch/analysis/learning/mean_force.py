@@ -22,7 +22,7 @@ REACH = 0.7
 """Frequencies are looked at so far around each natural frequency, relatively ..."""
 POINTS = 49
 """... at so many places, dense near it."""
-AT_ONCE = 2_000_000
+AT_ONCE = 300_000
 """Numbers that are worked on at once."""
 NEWTON = 14
 """Steps of the search for a root."""
@@ -145,18 +145,25 @@ def _lowest(grid: Floats, loop: Complexes, teeth: Floats) -> tuple[Floats, Float
     A crossing lies where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L).
     """
     turn = 0.5 - _unwrapped(np.angle(loop)) / np.pi
+    low = np.minimum(loop.real[:, 1:], loop.real[:, :-1]) < 0
+    depth, frequency = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
+    steps = np.flatnonzero(np.any(low, axis=0))
+    if not steps.size:
+        return depth, frequency
+    first, last = steps[0], steps[-1] + 1
+    low, grid, real, turn = low[:, first:last], *(part[:, first : last + 1] for part in (grid, loop.real, turn))
     place = grid[:, np.newaxis] / teeth[..., np.newaxis] + turn[:, np.newaxis]
     whole = np.floor(place)
-    low = (np.minimum(loop.real[:, 1:], loop.real[:, :-1]) < 0)[:, np.newaxis]
-    row, speed, step = np.nonzero((whole[..., 1:] != whole[..., :-1]) & low)
+    row, speed, step = np.nonzero((whole[..., 1:] != whole[..., :-1]) & low[:, np.newaxis])
     before, after = place[row, speed, step], place[row, speed, step + 1]
     share = (np.maximum(whole[row, speed, step], whole[row, speed, step + 1]) - before) / (after - before)
-    real = loop.real[row, step] + share * (loop.real[row, step + 1] - loop.real[row, step])
-    limit = np.where(real < 0, -1 / (2 * np.minimum(real, -1e-300)), np.inf)
-    order = np.argsort(-limit, kind="stable")
-    depth, frequency = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
-    depth[row[order], speed[order]] = limit[order]
-    frequency[row[order], speed[order]] = (grid[row, step] + share * (grid[row, step + 1] - grid[row, step]))[order]
+    there = real[row, step] + share * (real[row, step + 1] - real[row, step])
+    limit = np.where(there < 0, -1 / (2 * np.minimum(there, -1e-300)), np.inf)
+    begins = np.flatnonzero(np.diff(row * teeth.shape[1] + speed, prepend=-1))
+    depth[row[begins], speed[begins]] = np.minimum.reduceat(limit, begins)
+    lowest = np.flatnonzero(limit == depth[row, speed])
+    row, speed, step, share = row[lowest], speed[lowest], step[lowest], share[lowest]
+    frequency[row, speed] = grid[row, step] + share * (grid[row, step + 1] - grid[row, step])
     return depth, frequency
 
 

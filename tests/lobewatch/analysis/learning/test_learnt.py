@@ -130,6 +130,12 @@ def test_another_material_teaches_the_spindle_but_not_the_force_of_this_one() ->
     assert other.intervals["tangential"].std > 0.8 * before.intervals["tangential"].std
 
 
+def test_a_cut_in_another_material_may_come_first(mill: Mill) -> None:
+    cuts = [replace(mill.hear(9500, 3e-3), material=1), mill.hear(13500, 3e-3)]
+    learnt, left_out = learn_from_sound(mill.prior, cuts)
+    assert (learnt.cuts, left_out) == (tuple(cuts), ())
+
+
 def test_learning_is_the_same_again_and_few_draws_are_made_anew() -> None:
     mill = Mill(frequency=(0.985, 0.945))
     cuts = [mill.hear(speed, 3e-3) for speed in (9500, 13500)]
@@ -147,7 +153,7 @@ def test_what_contradicts_is_named_and_left_out(mill: Mill) -> None:
     assert learnt.cuts == tuple(cuts)
     assert [(one.cut, one.why) for one in left_out] == [(odd, Contradiction.CHATTERS)]
     deep = Observed(mill.cut, 8000, 0.03, "stable")
-    assert contradiction(learnt, deep) is Contradiction.STABLE
+    assert contradiction(learnt.expecting(deep)) is Contradiction.STABLE
     seen = mill.hear(20000, 4e-3)
-    assert contradiction(learnt, seen) is None
-    assert contradiction(learnt, replace(seen, frequency=1150.0)) is Contradiction.FREQUENCY
+    assert contradiction(learnt.expecting(seen)) is None
+    assert contradiction(learnt.expecting(replace(seen, frequency=1150.0))) is Contradiction.FREQUENCY

@@ -19,7 +19,9 @@ ANCHORS = 12
 MULTIPLES = 3
 """Of a frequency that are looked for."""
 SHARE = 0.3
-"""Weight of the displacement of a family beside the lines that it explains."""
+"""Weight of the displacement of a family beside the lines that it explains ..."""
+LEAST = 0.25
+"""... which has this share of the energy of the largest at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +50,9 @@ def chatter_lines(left: Lines, tooth_frequency: float, bin_: float) -> ChatterLi
     families = [modulo(left.frequency, left.frequency[i], tooth_frequency) < WIDE * bin_ for i in anchors]
     energy = np.array([np.sum(weight[family]) for family in families])
     explained = np.array([_explained(left, left.frequency[i], tooth_frequency, bin_) @ clear for i in anchors])
-    best = families[int(np.argmax(explained / np.max(explained) + SHARE * energy / np.max(energy)))]
+    large = energy / np.max(energy)
+    score = np.where(large >= LEAST, explained / np.max(explained) + SHARE * large, 0.0)
+    best = families[int(np.argmax(score))]
     top = int(np.argmax(np.where(best, named, 0.0)))
     error = bin_ * np.hypot(0.3 / np.sqrt(left.clearness[top]), 0.03)
     return ChatterLines(float(left.frequency[top]), float(error), left[best & part])

@@ -15,6 +15,8 @@ ERROR = 0.3
 """Of the frequency of a line over the root of its clearness (bins) ..."""
 LEAST_ERROR = 0.03
 """... and at least (bins)."""
+STRAY = 10.0
+"""Standard errors that a line is away that does not belong to the lattice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +43,13 @@ class Turning:
     """Of all lines looked at, those that it explains."""
     agreeing: int
     """Lines that agree on it, beyond those that it is worked out from."""
+    misfit: float
+    """Mean square distance of all lines from it, in standard errors of each, at most `STRAY` squared."""
 
 
 def refined(frequency: float, lines: Lines, bin_: float) -> Turning:
     """A spindle frequency (Hz) made exact by least squares over its lattice; bin_: of the spectrum (Hz)."""
-    found = Turning(frequency, np.inf, 0.0, 0)
+    found = Turning(frequency, np.inf, 0.0, 0, STRAY**2)
     for tolerance in (1.2, 0.6, 0.6, 0.6):
         families = families_of(found.frequency, lines, tolerance * bin_)
         rows = np.concatenate([_rows(family, number, len(families)) for number, family in enumerate(families)])
@@ -53,13 +57,14 @@ def refined(frequency: float, lines: Lines, bin_: float) -> Turning:
         if np.linalg.matrix_rank(rows) < len(families):
             return found
         root = 1 / (bin_ * np.hypot(ERROR / np.sqrt(lines.clearness[which]), LEAST_ERROR))
-        scaled = rows * root[:, np.newaxis]
-        solution = np.linalg.lstsq(scaled, lines.frequency[which] * root, rcond=None)[0]
+        scaled, heard = rows * root[:, np.newaxis], lines.frequency[which] * root
+        solution = np.linalg.lstsq(scaled, heard, rcond=None)[0]
         if abs(solution[0] / frequency - 1) > 0.005:
             return found
         error = float(np.sqrt(np.linalg.inv(scaled.T @ scaled)[0, 0]))
-        agreeing = which.size - len(families)
-        found = Turning(float(solution[0]), error, which.size / len(lines), agreeing)
+        away = np.minimum(np.abs(scaled @ solution - heard), STRAY)
+        misfit = float(np.sum(away**2) + (len(lines) - which.size) * STRAY**2) / len(lines)
+        found = Turning(float(solution[0]), error, which.size / len(lines), which.size - len(families), misfit)
     return found
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
 
 from lobewatch.analysis.listening.lattice import Turning, refined
 from lobewatch.analysis.listening.spectrum import Floats, Lines, Spectrum
@@ -17,6 +19,12 @@ SHARPNESS = 0.25
 """Standard deviation of a line in the count of votes (bins)."""
 UNBALANCE = 0.2
 """A speed whose own line is heard is taken where it has so much of the votes of the best one."""
+FITS = 4.0
+"""A speed with a larger misfit is compared with others ..."""
+PEAKS = 12
+"""... so many that have the most votes ..."""
+BESIDE = 9
+"""... of as many steps of the grid around each."""
 LEAST_SHARE = 0.5
 """Of the lines that must belong to the lattice, and that must have a neighbour one or two turns or teeth away ..."""
 LEAST_AGREEING = 3
@@ -43,6 +51,9 @@ def true_speed(own: Lines, all_lines: Lines, spectrum: Spectrum, teeth: int, com
     heard = int(np.argmax(np.where(near, votes, 0.0)))
     best = heard if near[heard] and votes[heard] > UNBALANCE * votes[best] else best
     found = refined(float(grid[best]), loudest, spectrum.bin)
+    if found.misfit > FITS:
+        others = grid[_peaks(votes)].tolist()
+        found = min((found, *(refined(one, loudest, spectrum.bin) for one in others)), key=lambda one: one.misfit)
     is_sure = min(found.share, _spaced(loudest, found.frequency, teeth, spectrum.bin)) >= LEAST_SHARE
     is_sure &= found.agreeing >= LEAST_AGREEING
     return found if is_sure else None
@@ -53,6 +64,12 @@ def _spaced(lines: Lines, frequency: float, teeth: int, bin_: float) -> float:
     apart = np.abs(lines.frequency[:, np.newaxis] - lines.frequency)
     steps = (step * frequency for step in (1, 2, teeth, 2 * teeth))
     return float(np.mean(np.any([np.any(np.abs(apart - step) < bin_, axis=1) for step in steps], axis=0)))
+
+
+def _peaks(votes: Floats) -> NDArray[np.intp]:
+    """Where there are more votes than beside, the most first."""
+    places = np.flatnonzero((maximum_filter1d(votes, BESIDE) == votes) & (votes > 0))
+    return places[np.argsort(-votes[places])[:PEAKS]]
 
 
 def _votes(lines: Lines, grid: Floats, teeth: int, sharpness: float) -> Floats:

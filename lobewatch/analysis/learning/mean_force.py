@@ -10,7 +10,9 @@ Source: Altintas & Budak, Analytical prediction of stability lobes in milling, C
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +33,19 @@ CONSTANT = 1e-6
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
+
+
+class ModeColumns(NamedTuple):
+    """One mode of each spindle, shape (r, 1) each."""
+
+    frequency: Floats
+    """rad/s."""
+    damping_ratio: Floats
+    stiffness: Floats
+    """N/m."""
+    place: Floats
+    """Of the tip in it, and of the velocity of the tip."""
+    velocity: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +109,7 @@ class MeanForce:
 
     def _closed(self, s: Complexes, tau: Floats, depth: float) -> tuple[Complexes, Complexes]:
         """det(I + b (1 - exp(-s tau)) H0 G) and its derivative by s."""
-        (gx, dx), (gy, dy) = self._receptance(s, 0), self._receptance(s, 1)
+        (gx, dx), (gy, dy) = self._with_slope(s, 0), self._with_slope(s, 1)
         h = self.force[..., np.newaxis]
         wave = np.exp(-np.clip(s.real * tau, -50, 50) - 1j * s.imag * tau)
         gain, dgain = depth * (1 - wave), depth * tau * wave
@@ -106,19 +121,32 @@ class MeanForce:
             dgain * trace + gain * dtrace + 2 * gain * dgain * both + gain**2 * dboth,
         )
 
-    def _receptance(self, s: Complexes, axis: int) -> tuple[Complexes, Complexes]:
-        """Of one direction at s (r, k) (1/s), and its derivative."""
+    def _receptance(self, s: Complexes, axis: int) -> Complexes:
+        """Of one direction at s (r, k) (1/s)."""
+        total = np.zeros(s.shape, np.complex128)
+        for mode in self._modes(axis):
+            r = s / mode.frequency
+            total += (mode.place + mode.velocity * r) / (mode.stiffness * (1 + (2 * mode.damping_ratio + r) * r))
+        return total
+
+    def _with_slope(self, s: Complexes, axis: int) -> tuple[Complexes, Complexes]:
+        """The same, and its derivative."""
         total, slope = np.zeros(s.shape, np.complex128), np.zeros(s.shape, np.complex128)
-        place, velocity = self.rows.seen
-        for k in np.flatnonzero(self.rows.axes[self.rows.direction] == axis):
-            w, zeta, stiff = (
-                one[:, k, np.newaxis] for one in (self.rows.frequency, self.rows.damping_ratio, self.rows.stiffness)
-            )
-            p, v, r = place[:, k, np.newaxis], velocity[:, k, np.newaxis], s / w
-            below = stiff * (1 + 2 * zeta * r + r**2)
-            total += (p + v * r) / below
-            slope += (v - (p + v * r) * stiff * (2 * zeta + 2 * r) / below) / below / w
+        for mode in self._modes(axis):
+            r = s / mode.frequency
+            flexible = 1 / (mode.stiffness * (1 + (2 * mode.damping_ratio + r) * r))
+            part = (mode.place + mode.velocity * r) * flexible
+            total += part
+            bend = part * (2 * mode.stiffness * (mode.damping_ratio + r))
+            slope += (mode.velocity - bend) * flexible / mode.frequency
         return total, slope
+
+    def _modes(self, axis: int) -> Iterator[ModeColumns]:
+        """Of one direction."""
+        place, velocity = self.rows.seen
+        parts = self.rows.frequency, self.rows.damping_ratio, self.rows.stiffness, place, velocity
+        for k in np.flatnonzero(self.rows.axes[self.rows.direction] == axis):
+            yield ModeColumns(*(part[:, k, np.newaxis] for part in parts))
 
     def _grid(self) -> Floats:
         """Frequencies (Hz), rising, shape (r, k)."""
@@ -130,7 +158,7 @@ class MeanForce:
     def _eigenvalues(self, grid: Floats) -> list[Complexes]:
         """Both of H0 G at frequencies (r, k), each followed over them."""
         s = np.asarray(2j * np.pi * grid, np.complex128)
-        gx, gy = self._receptance(s, 0)[0], self._receptance(s, 1)[0]
+        gx, gy = self._receptance(s, 0), self._receptance(s, 1)
         h = self.force[..., np.newaxis]
         half = (h[:, 0, 0] * gx + h[:, 1, 1] * gy) / 2
         root = np.sqrt(half**2 - (h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] * h[:, 1, 0]) * gx * gy)

@@ -31,7 +31,7 @@ FLIP = 0.003
 """Nearer to half of tooth passing, relative to that, chatter has a period of two teeth."""
 OTHER_TEETH = 5.0
 """Energy of the orders that run-out hardly has (modulo the teeth neither 0 nor +-1) over those it has ..."""
-RUN_OUT = 4.0
+RUN_OUT = 8.0
 """... and of all orders that are no tooth passing over tooth passing, in less than a slot."""
 SLOT = 0.95
 """Immersion from which on tooth passing nearly vanishes."""

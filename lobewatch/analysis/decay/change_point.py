@@ -149,7 +149,7 @@ def _likeliest(base: Base, n: NDArray[np.intp], points: NDArray[np.intp], leans:
     t = [base.t_of(lean, n) for lean in leans]
     scores = -ndtri(stdtr(n - 2, -np.maximum(*t)))
     fell = t[0] >= t[1]
-    return Found(scores, fell, np.where(fell, *points))
+    return Found(scores, fell, np.where(fell, points[0], points[1]))
 
 
 def _fall(base: Base, found: Found, at: int, sign: int) -> Fall:

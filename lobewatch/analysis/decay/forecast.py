@@ -242,9 +242,9 @@ def _courses(shapes: Sequence[Shape], at: Floats, span: float) -> Floats:
     """How shapes run over dates that count from the first point on, shape (j, d); span: of the series."""
     starts = np.array([np.inf if shape.kind == "none" else shape.start for shape in shapes])[:, np.newaxis]
     found: Floats = np.maximum(at - starts, 0.0)
+    steps = [j for j, shape in enumerate(shapes) if shape.kind == "step"]
+    found[steps] = at >= starts[steps]
     for j, shape in enumerate(shapes):
-        if shape.kind == "step":
-            found[j] = at >= shape.start
-        elif shape.kind == "curve":
+        if shape.kind == "curve":
             found[j] = np.expm1(shape.rate * at / span) if shape.rate else (at / span) ** shape.power
     return found

@@ -186,7 +186,8 @@ class Fits(NamedTuple):
 
 def _square(kind: str, length: NDArray[np.intp]) -> Floats:
     """Of the column of a change over so many points with itself."""
-    return length * 1.0 if kind == "step" else (length - 1.0) * length * (2 * length - 1.0) / 6
+    points = length.astype(np.float64)
+    return points if kind == "step" else (points - 1) * points * (2 * points - 1) / 6
 
 
 @lru_cache(maxsize=64)
@@ -194,10 +195,10 @@ def _flat(kind: str, first: int, count: int, m: int) -> tuple[Floats, Floats]:
     """Of changes from each of m points on in the first n, a count of them from `first` on, shape (count, m) each: of
     their columns with one of ones, and the root of the square of what that leaves of them."""
     n, k = np.arange(first, first + count)[:, np.newaxis], np.arange(m)
-    length = n - k
-    ones = length * 1.0 if kind == "step" else length * (length - 1) / 2
+    length = (n - k).astype(np.float64)
+    ones = length if kind == "step" else length * (length - 1) / 2
     with np.errstate(invalid="ignore"):
-        return ones, np.sqrt(_square(kind, length) - 1 / n * ones * ones)
+        return ones, np.asarray(np.sqrt(_square(kind, n - k) - 1 / n * ones * ones))
 
 
 def _summed(values: Floats) -> Floats:

@@ -138,20 +138,15 @@ def trend_of(series: Sequence[Tapped], now: datetime, events: Sequence[datetime]
 
     Foretold from the day of `now` on; the same for all of a day.
     """
-    points = points_of(series)
+    points = _newest_points(tuple(series))
     return Trend(points, series[0].value, _past(points), int(day(now)), tuple(events))
-
-
-def points_of(series: Sequence[Tapped]) -> tuple[Point, ...]:
-    """The newest points of a series, oldest first."""
-    return _newest_points(tuple(series))
 
 
 @lru_cache(maxsize=1024)
 def _newest_points(series: tuple[Tapped, ...]) -> tuple[Point, ...]:
+    """Of a series, oldest first."""
     times, values, errors, temperatures = zip(*series, strict=True)
-    percents = [100 * math.log(value / values[0]) for value in values]
-    own = Series(times, percents, temperatures)
+    own = Series(times, _percents(values), temperatures)
     return tuple(
         Point(
             times[first],
@@ -162,6 +157,19 @@ def _newest_points(series: tuple[Tapped, ...]) -> tuple[Point, ...]:
         )
         for first, end in together(own, MOST)[-MOST:]
     )
+
+
+def newest_percents(times: Sequence[datetime], values: Sequence[float]) -> tuple[list[datetime], list[float]]:
+    """Time and percent of the newest points of a series whose temperatures do not count, oldest first."""
+    own = Series(times, _percents(values), np.full(len(times), math.nan).tolist())
+    spans = together(own, MOST)[-MOST:] if times else []
+    return [times[first] for first, _ in spans], [own.percent(span) for span in spans]
+
+
+def _percents(values: Sequence[float]) -> list[float]:
+    """100 ln of each over the first."""
+    log, first = math.log, values[0] if values else 1.0
+    return [100 * log(value / first) for value in values]
 
 
 @lru_cache(maxsize=1024)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby, repeat
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -117,7 +118,9 @@ class Forecast:
 
     def probability(self, level: float | Floats, error: float = 0.0) -> Floats:
         """That the series is below a level (one, or one a date; with its standard error) at the dates, shape (d,)."""
-        return np.asarray(self.weight @ _below(self.freedom, (level - self.mean) / np.hypot(self.error, error)))
+        away = level - self.mean
+        away /= np.hypot(self.error, error) if error else self.error
+        return np.asarray(self.weight @ _below(self.freedom, away))
 
     def reached(self, level: float, error: float = 0.0) -> Reached:
         """When a level (with its standard error) is reached."""
@@ -232,8 +235,8 @@ def _shapes(at: Floats) -> Iterator[Shape]:
     """All that are tried; dates count from the first point on."""
     yield Shape("none", 0.0)
     yield Shape("line", 0.0)
-    yield from (Shape("slope", one) for one in at[1:-3].tolist())
-    yield from (Shape("step", one) for one in at[2:-1].tolist())
+    yield from map(Shape, repeat("slope"), at[1:-3].tolist())
+    yield from map(Shape, repeat("step"), at[2:-1].tolist())
     yield from (Shape("curve", 0.0, rate > 0, rate=rate) for rate in RATES)
     yield from (Shape("curve", 0.0, True, power=power) for power in POWERS)
 
@@ -241,10 +244,18 @@ def _shapes(at: Floats) -> Iterator[Shape]:
 def _courses(shapes: Sequence[Shape], at: Floats, span: float) -> Floats:
     """How shapes run over dates that count from the first point on, shape (j, d); span: of the series."""
     starts = np.array([np.inf if shape.kind == "none" else shape.start for shape in shapes])[:, np.newaxis]
-    found: Floats = np.maximum(at - starts, 0.0)
-    steps = [j for j, shape in enumerate(shapes) if shape.kind == "step"]
-    found[steps] = at >= starts[steps]
-    for j, shape in enumerate(shapes):
-        if shape.kind == "curve":
-            found[j] = np.expm1(shape.rate * at / span) if shape.rate else (at / span) ** shape.power
+    found, end = np.empty((len(shapes), at.size)), 0
+    for kind, alike in groupby(shape.kind for shape in shapes):
+        begin, end = end, end + len([*alike])
+        own, of_own = found[begin:end], starts[begin:end]
+        if kind == "step":
+            own[:] = at >= of_own
+        elif kind == "curve":
+            own[:] = [_curve(shape, at, span) for shape in shapes[begin:end]]
+        else:
+            np.maximum(np.subtract(at, of_own, out=own), 0.0, out=own)
     return found
+
+
+def _curve(shape: Shape, at: Floats, span: float) -> Floats:
+    return np.asarray(np.expm1(shape.rate * at / span) if shape.rate else (at / span) ** shape.power)

@@ -100,7 +100,8 @@ class Base:
         coefficients (n + 1, p); those of less than two are nothing."""
         n, p = np.arange(2, self.y.size + 1), self.columns.shape[1]
         inverse, level = np.zeros((self.y.size + 1, p, p)), np.zeros((self.y.size + 1, p))
-        inverse[2:] = np.linalg.inv(self._outer[n, 1:, 1:] + self.precision(n))
+        normal = self._outer[n, 1:, 1:] + self.precision(n)
+        inverse[2:] = 1 / normal if p == 1 else np.linalg.inv(normal)
         level[2:] = (inverse[2:] @ self._outer[n, 1:, :1])[..., 0]
         return inverse, level
 
@@ -171,8 +172,14 @@ class Fits(NamedTuple):
     def at(self, columns: Floats) -> tuple[Floats, Floats]:
         """Mean and standard error of the series where the columns have other values (j, d), shape (j, d) each."""
         away = columns - self.leaning[:, np.newaxis]
-        variance = (self.flat + away**2 / self.square[:, np.newaxis]) * (self.rss / self.freedom)[:, np.newaxis]
-        return self.level + self.size[:, np.newaxis] * away, np.sqrt(variance)
+        error = away**2
+        error /= self.square[:, np.newaxis]
+        error += self.flat
+        error *= (self.rss / self.freedom)[:, np.newaxis]
+        np.sqrt(error, out=error)
+        away *= self.size[:, np.newaxis]
+        away += self.level
+        return away, error
 
     def mixed(self, weight: Floats, columns: Floats) -> Floats:
         """The means alone, each with its weight (j,), shape (d,)."""

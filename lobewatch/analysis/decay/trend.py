@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lobewatch.analysis.decay.change_point import Watch, watch_both
 from lobewatch.analysis.decay.forecast import ENOUGH, Forecast, Past, Rate, past
-from lobewatch.analysis.decay.together import Series, together
+from lobewatch.analysis.decay.together import Series, Span, together
 
 MOST = 1000
 """The newest points, which alone are judged: the work grows with the square of their number."""
@@ -147,16 +147,15 @@ def _newest_points(series: tuple[Tapped, ...]) -> tuple[Point, ...]:
     """Of a series, oldest first."""
     times, values, errors, temperatures = zip(*series, strict=True)
     own = Series(times, _percents(values), temperatures)
-    return tuple(
-        Point(
-            times[first],
-            own.percent((first, end)),
-            math.sqrt(sum(error**2 for error in errors[first:end])) / (end - first),
-            own.temperature((first, end)),
-            tuple(range(first, end)),
-        )
-        for first, end in together(own, MOST)[-MOST:]
-    )
+    return tuple(_point(own, errors, span) for span in together(own, MOST)[-MOST:])
+
+
+def _point(own: Series, errors: Sequence[float], span: Span) -> Point:
+    first, end = span
+    if end - first == 1:
+        return Point(own.times[first], own.percents[first], errors[first], own.temperatures[first], (first,))
+    error = math.sqrt(sum(error**2 for error in errors[first:end])) / (end - first)
+    return Point(own.times[first], own.percent(span), error, own.temperature(span), tuple(range(first, end)))
 
 
 def newest_percents(times: Sequence[datetime], values: Sequence[float]) -> tuple[list[datetime], list[float]]:

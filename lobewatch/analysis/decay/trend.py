@@ -18,6 +18,8 @@ from lobewatch.analysis.decay.together import Series, Span, together
 
 MOST = 1000
 """The newest points, which alone are judged: the work grows with the square of their number."""
+KEPT = 32
+"""Series that are remembered."""
 MONTH = 30.44
 """Days."""
 HORIZON_DAYS = 36 * MONTH
@@ -142,7 +144,7 @@ def trend_of(series: Sequence[Tapped], now: datetime, events: Sequence[datetime]
     return Trend(points, series[0].value, _past(points), int(day(now)), tuple(events))
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=KEPT)
 def _newest_points(series: tuple[Tapped, ...]) -> tuple[Point, ...]:
     """Of a series, oldest first."""
     times, values, errors, temperatures = zip(*series, strict=True)
@@ -171,7 +173,7 @@ def _percents(values: Sequence[float]) -> list[float]:
     return [100 * log(value / first) for value in values]
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=KEPT)
 def _past(points: tuple[Point, ...]) -> Past | None:
     """Of the same points the same, whatever the day and the events."""
     if len(points) < ENOUGH:

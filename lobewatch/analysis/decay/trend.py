@@ -162,7 +162,7 @@ def _point(own: Series, errors: Sequence[float], span: Span) -> Point:
 
 def newest_percents(times: Sequence[datetime], values: Sequence[float]) -> tuple[list[datetime], list[float]]:
     """Time and percent of the newest points of a series whose temperatures do not count, oldest first."""
-    own = Series(times, _percents(values), np.full(len(times), math.nan).tolist())
+    own = Series(times, _percents(values), [math.nan] * len(times))
     spans = together(own, MOST)[-MOST:] if times else []
     return [times[first] for first, _ in spans], [own.percent(span) for span in spans]
 

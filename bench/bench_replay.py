@@ -63,6 +63,8 @@ PEERS = 10
 """Files that the peers are given: each takes them seconds."""
 FEW = 24
 """Tap tests of a folder that a long archive is compared with: enough that both directions tell their own scatter."""
+ADDED = 7
+"""Tap tests that are committed one after the other: the first finds nothing prepared."""
 BATCH = 500
 """Tap tests stored and analysed together."""
 
@@ -198,16 +200,23 @@ def opened(path: Path) -> None:
                 told(f"{command} of {of}", partial(subprocess.run, words, check=False, stdout=subprocess.DEVNULL))
         copy = Path(work) / "m"
         shutil.copytree(path, copy)
-        toml = copy / "machine.toml"
-        toml.write_text(toml.read_text("utf-8").split("[[program]]")[0], "utf-8")  # no words on programs
-        logbook = Logbook(MachineFolder(copy))
-        _ = logbook.history
-        count = len(logbook.taps)
-        tap = small_tap(count, count, "")
-        told("a commit into it, journal and tap file", lambda: logbook.commit(tap))
-        begin = logbook.folder.history.stat().st_size
+        for folder in (few, copy):
+            added_to(folder)
+
+
+def added_to(path: Path) -> None:
+    """Tap tests committed one after the other, without words on programs."""
+    toml = path / "machine.toml"
+    toml.write_text(toml.read_text("utf-8").split("[[program]]")[0], "utf-8")
+    logbook, plant = Logbook(MachineFolder(path)), Plant({"m": path})
+    _ = logbook.history, plant.standings()
+    size, count = logbook.folder.history.stat().st_size, len(logbook.taps)
+    for number in range(count, count + ADDED):
+        tap = small_tap(10_000 + number, 10_000, "")
+        told(f"a commit into {number}, journal and tap file", partial(logbook.commit, tap))
         told("its row", lambda: logbook.history)
-        print(f"bytes added to history.rows: {logbook.folder.history.stat().st_size - begin}")
+        told("dashboard after it in a running server", plant.standings)
+    print(f"bytes added to history.rows: {(logbook.folder.history.stat().st_size - size) / ADDED:.0f}")
 
 
 def newest_of(path: Path, to: Path) -> Path:

@@ -25,10 +25,14 @@ MAX_MODES = 12
 """Modes kept of one measurement."""
 ESTIMATES = {"frequency": "Hz", "damping_ratio": "", "stiffness": "N/m", "phase_deg": "deg", "bearing_stiffness": "N/m"}
 """Values with a standard error and their units, by name of the field and the column."""
+WATCHED = ("frequency", "damping_ratio", "stiffness", "bearing_stiffness")
+"""Those of them whose series are watched."""
 MODELLED = {"static_tip_stiffness": "N/m", "modal_tip_stiffness": "N/m"}
 """Values of the model."""
 Values = tuple[float, float, float, float]
 """Frequency (Hz), damping ratio, stiffness (N/m) and phase (degrees) of a mode."""
+Watched = Sequence[tuple[float, float]]
+"""Those of `WATCHED`, each with its standard error."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +94,11 @@ class Row:
     def followed(self) -> Values:
         """The mode followed; NaN where it was not found."""
         return self.frequency.value, self.damping_ratio.value, self.stiffness.value, self.phase_deg.value
+
+    @property
+    def watched(self) -> Watched:
+        """Values whose series are watched."""
+        return self.frequency, self.damping_ratio, self.stiffness, self.bearing_stiffness
 
     @property
     def mode(self) -> Mode | None:

@@ -93,7 +93,7 @@ class Logbook:
         """Add a tap test; saved for good when this returns. now: of a live test, whose time is then asked about."""
         if not self.is_current:
             self._forget()
-        asked = clock_questions(tap.circumstances.created, now, self.taps)
+        asked = clock_questions(tap.circumstances.created, now, (one.entry for one in self.files.places[-1:]))
         self._forget_results(goes_on=self.files.add(self.folder.commit(tap, asked)))
         self._mark = self.folder.mark
 

@@ -12,7 +12,15 @@ from datetime import datetime
 from pathlib import Path
 
 from acquisition import Remark
-from lobewatch.analysis.decay.fallen import about_fall, about_others, about_trend, fall_of, known_rows, trend_in
+from lobewatch.analysis.decay.fallen import (
+    about_fall,
+    about_others,
+    about_trend,
+    fall_of,
+    known_rows,
+    rows_with,
+    trend_in,
+)
 from lobewatch.analysis.decay.trend import Trend
 from lobewatch.analysis.estimate import Estimate
 from lobewatch.analysis.history import History, Row
@@ -137,7 +145,7 @@ def _of(remarks: Sequence[Remark], well: str = "", *others: object) -> Standing:
 def _series(
     rows: Sequence[Row], machine: Machine, now: datetime, path: Path | str, events: Sequence[datetime]
 ) -> SeriesStanding:
-    known = known_rows(rows, "frequency") or [row for row in rows if row.frequency.is_known] or rows
+    known = known_rows(rows, "frequency") or rows_with(rows, "frequency") or rows
     name, fall = f"{rows[-1].tool}, {rows[-1].direction}", fall_of(rows)
     trend = trend_in(rows, "frequency", now, events)
     remarks = [*_about_loss(name, rows[-1]), *about_fall(name, fall, machine.limits)]
@@ -169,10 +177,15 @@ def _about_programs(rows: Sequence[Row], machine: Machine) -> Iterator[Remark]:
 
 
 def _about_directions(rows: Sequence[Row]) -> Iterator[Remark]:
-    for tool in dict.fromkeys(row.tool for row in rows):
-        known = {row.direction for row in rows if row.tool == tool and row.frequency.is_known}
+    pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
+    for tool in dict.fromkeys(tool for tool, _ in pairs):
+        known = {direction for one, direction in pairs if one == tool and _is_known(rows, one, direction)}
         if len(known) == 1:
             seen = known.pop()
             other = "y" if seen == "x" else "x"
             cure = f"Tap direction {other} of the same tool too: no program is sure with one direction alone."
             yield Remark("one-direction", tool, f"tapped in direction {seen} alone", cure)
+
+
+def _is_known(rows: Sequence[Row], tool: str, direction: str) -> bool:
+    return any(row.frequency.is_known for row in rows if (row.tool, row.direction) == (tool, direction))

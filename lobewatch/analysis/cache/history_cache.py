@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import takewhile, zip_longest
+from itertools import zip_longest
+from operator import is_
 
 from acquisition import Remark
 from acquisition.errors import system_failure
@@ -13,6 +14,7 @@ from lobewatch.analysis.cache.still_holding import StillHolding, is_of
 from lobewatch.analysis.columns.stored_row import is_of_this_make, packed, unpacked
 from lobewatch.analysis.damage.usable import UsableTaps
 from lobewatch.analysis.history import History, Row, empty_history
+from lobewatch.analysis.order import Place
 from lobewatch.machine import BusyError, Machine, MachineFolder
 from lobewatch.machine.archive.rows import add_rows, read_rows, write_rows
 from lobewatch.machine.cuts.heard_cut import HeardCut
@@ -35,6 +37,7 @@ class HistoryCache:
         self._aside: list[bytes] = []
         self._size = self._length = 0
         self._stamp: tuple[int, ...] | None = None
+        self._fitting: tuple[Sequence[Place], int] = (), 0
         self._hashes: dict[str, str] = {}
         self.behind: StillHolding | None = None
         """Of what was read behind the rows that `read` gave; None where that is nothing."""
@@ -54,13 +57,23 @@ class HistoryCache:
         if self._stamp is None or self._stamp != self._stamp_now or hashes != self._hashes:
             self._hashes = hashes
             self._read(_head(empty))
-        pairs = zip(self._rows, files.places, strict=False)
         known = {row.tap_id: row for row in self._rows} | self._others if lost else {}
         kept = tuple(kept_aside(known[tap_id], empty.software) for tap_id in known if tap_id in lost)
-        valid = tuple(row for row, _ in takewhile(lambda pair: is_of(*pair), pairs))
+        valid = tuple(self._rows[: self._count_fitting(files.places)])
         changed = len(valid) < min(len(self._rows), len(files.places))
         self.behind = StillHolding(self._rows, files.by_id, files.baselines) if changed else None
         return replace(empty, baseline=files.baseline, rows=valid, kept=kept)
+
+    def _count_fitting(self, places: Sequence[Place]) -> int:
+        """Rows that are those of these tap tests; places: those that were compared before are not looked at again."""
+        known, count = self._fitting
+        count = min(count, len(self._rows)) if known is places else 0
+        for row, place in zip(self._rows[count:], places[count:], strict=False):
+            if not is_of(row, place):
+                break
+            count += 1
+        self._fitting = places, count
+        return count
 
     def store(self, history: History) -> list[Remark]:
         """What is new of it, under the lock where that can be had at once; else say so."""
@@ -83,7 +96,7 @@ class HistoryCache:
         return found.st_size, found.st_mtime_ns, found.st_ino
 
     def _read(self, head: bytes) -> None:
-        self._stamp = self._stamp_now
+        self._stamp, self._fitting = self._stamp_now, ((), 0)
         self._rows, self._packed, self._size, self._length = [], [], 0, 0
         self._others, self._aside, hashes = {}, [], self._hashes
         try:
@@ -109,11 +122,14 @@ class HistoryCache:
         path, hashes = self._folder.history, self._hashes or self._folder.machine.program_hashes
         if self._stamp_now != self._stamp and self._stamp_now is not None:
             self._read(_head(history))  # another program has written
-        contents = [
+        same = [*map(is_, history.rows, self._rows), False].index(False)
+        self._fitting = self._fitting[0], min(self._fitting[1], same)
+        later = [
             self._packed[n] if n < len(self._rows) and self._rows[n] is row else packed(n, row, hashes)
-            for n, row in enumerate(history.rows)
+            for n, row in enumerate(history.rows[same:], same)
         ]
-        known = zip_longest(contents, self._packed[: len(contents)])
+        contents = self._packed[:same] + later
+        known = zip_longest(later, self._packed[same : len(contents)])
         fresh = [content for content, there in known if content is not there and content != there]
         aside = [packed(ASIDE, row, hashes) for row in history.kept]
         most = 2 * sum(map(len, contents)) + MOST_DEAD

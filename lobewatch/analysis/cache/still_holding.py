@@ -17,7 +17,7 @@ from typing import NamedTuple
 from acquisition import Remark
 from lobewatch.analysis.assembling import Followed
 from lobewatch.analysis.assembly import TOGETHER
-from lobewatch.analysis.columns.stored_row import StoredRow, packed
+from lobewatch.analysis.columns.stored_row import packed
 from lobewatch.analysis.history import Row, Values
 from lobewatch.analysis.order import Place, earlier, places
 from lobewatch.analysis.series import Point
@@ -26,8 +26,6 @@ from lobewatch.machine import TapEntry
 
 def is_of(row: Row, place: Place) -> bool:
     """Whether a row was made of this tap test, with all that was accepted of it, since the same baseline."""
-    if isinstance(row, StoredRow) and row.begins_as(place):
-        return True
     tap = place.entry
     made = row.tap_id, row.baseline, row.series, row.accepted
     return made == (tap.id, place.baseline, place.series, frozenset(tap.accepted))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from datetime import datetime
-from functools import cached_property
+from functools import lru_cache
 from operator import attrgetter
 from typing import Any, get_type_hints
 
@@ -12,8 +12,7 @@ import msgspec
 
 from acquisition import UNSAID, Conditions, Remark
 from lobewatch.analysis.estimate import Estimate
-from lobewatch.analysis.history import ESTIMATES, Row, Values
-from lobewatch.analysis.order import Place
+from lobewatch.analysis.history import ESTIMATES, WATCHED, Row, Values, Watched
 from lobewatch.analysis.programs.verdict import Ruling
 from lobewatch.analysis.questions.asked import ACCEPTED, QUESTIONS
 
@@ -48,8 +47,6 @@ PLAIN = tuple(
     name for name in Stored.__struct_fields__ if name not in ("number", "time", "baseline", "conditions", "rulings")
 )
 """Fields that are in a row just so."""
-NOW = ("tap_id", "tool", "direction", "series", "static_tip_stiffness", "modal_tip_stiffness")
-"""Those of them that take no making."""
 LATER = ("modes", "x", "y", "remarks", "rulings")
 """Fields that few ask for."""
 _KINDS: dict[str, Any] = dict.fromkeys(ESTIMATES, tuple[float, float]) | dict.fromkeys(LATER, msgspec.Raw)
@@ -60,42 +57,28 @@ _Brief = msgspec.defstruct(
     gc=False,
 )
 """A row with those as they lie there, estimates as numbers."""
-_Number = msgspec.defstruct("_Number", [("number", int)], array_like=True, gc=False)
 _encode, _decode = msgspec.msgpack.Encoder().encode, msgspec.msgpack.Decoder(Stored).decode
 _put = object.__setattr__
+_watched = attrgetter(*WATCHED)
 _decode_brief: Callable[[bytes], Any] = msgspec.msgpack.Decoder(_Brief).decode
-_decode_number: Callable[[bytes], Any] = msgspec.msgpack.Decoder(_Number).decode
-REMARKED = _encode("code")
-"""In the bytes of every remark."""
 ASKING, ANSWERING = tuple(map(_encode, QUESTIONS)), _encode(ACCEPTED)
 """In the bytes of every remark that asks, and that tells of an answer."""
-NONE = frozenset[str]()
+NO_QUESTIONS: dict[str, Any] = {"questions": ()}
+NO_ANSWERS: dict[str, Any] = {"accepted": frozenset()}
+"""Of rows whose remarks need not be decoded to know that."""
 
 
 class StoredRow(Row):
-    """A row as it was read: in each value as it was stored, decoded when it is asked for."""
+    """A row as it was read: in each value as it was stored, those that few ask for decoded when they are asked for."""
 
     content: bytes = b""
     """As it lies there; empty in a row that `dataclasses.replace` has made of it."""
+    brief: Any = None
+    """Most of it; None in a row that `dataclasses.replace` has made of it."""
     hashes: Mapping[str, str] = {}
     """Of the programs of machine.toml."""
     made_by: str = ""
     """What has made it, where it does not say so itself."""
-
-    @cached_property
-    def brief(self) -> Any:
-        """Most of it; None in a row that `dataclasses.replace` has made of it."""
-        return _decode_brief(self.content) if self.content else None
-
-    @cached_property
-    def questions(self) -> tuple[Remark, ...]:
-        """As of any row; its remarks are decoded where there can be any among them."""
-        return super().questions if not self.content or _asks(self.content) else ()
-
-    @cached_property
-    def accepted(self) -> frozenset[str]:
-        """As of any row, likewise."""
-        return super().accepted if not self.content or ANSWERING in self.content else NONE
 
     @property
     def followed(self) -> Values:
@@ -105,19 +88,15 @@ class StoredRow(Row):
             return super().followed
         return one.frequency[0], one.damping_ratio[0], one.stiffness[0], one.phase_deg[0]
 
-    def begins_as(self, place: Place) -> bool:
-        """Whether its first values, as they lie there, are those of a tap test that nothing was asked about."""
-        tap, baseline = place.entry, place.baseline.isoformat() if place.baseline else ""
-        head = _encode((place.number, tap.id, tap.time, tap.tool, tap.direction, baseline, place.series))[1:]
-        return self.content.startswith(head, HEAD) and REMARKED not in self.content and not tap.accepted
+    @property
+    def watched(self) -> Watched:
+        """As of any row, likewise."""
+        one = self.brief
+        return super().watched if one is None else _watched(one)
 
     def __repr__(self) -> str:
         """As of any row: equal ones read alike."""
         return Row.__name__ + super().__repr__().removeprefix(type(self).__name__)
-
-
-HEAD = len(_encode([None] * len(Stored.__struct_fields__))) - len(Stored.__struct_fields__)
-"""Bytes before the first value of a row."""
 
 
 class _Lazy:
@@ -131,14 +110,6 @@ class _Lazy:
         found = self._make(row)
         _put(row, self._name, found)
         return found
-
-
-def _time(row: StoredRow) -> datetime:
-    return datetime.fromisoformat(row.brief.time)
-
-
-def _baseline(row: StoredRow) -> datetime | None:
-    return datetime.fromisoformat(row.brief.baseline) if row.brief.baseline else None
 
 
 def _conditions(row: StoredRow) -> Conditions:
@@ -168,9 +139,8 @@ def _later(name: str) -> Callable[[StoredRow], Any]:
     return make
 
 
-_MADE: dict[str, Callable[[StoredRow], Any]] = {name: attrgetter(f"brief.{name}") for name in NOW}
-_MADE |= {name: _estimate(name) for name in ESTIMATES} | {name: _later(name) for name in LATER}
-_MADE |= {"time": _time, "baseline": _baseline, "conditions": _conditions, "software": _software}
+_MADE: dict[str, Callable[[StoredRow], Any]] = {name: _estimate(name) for name in ESTIMATES}
+_MADE |= {name: _later(name) for name in LATER} | {"conditions": _conditions, "software": _software}
 for _name, _make in _MADE.items():
     setattr(StoredRow, _name, _Lazy(_name, _make))
 
@@ -189,9 +159,26 @@ def unpacked(content: bytes, hashes: Mapping[str, str], software: str = "") -> t
 
     software: that made a row which does not say so itself; empty for this version.
     """
+    brief = _decode_brief(content)
+    asks, answers = _about(bytes(brief.remarks))
     row = StoredRow.__new__(StoredRow)
-    row.__dict__.update(content=content, hashes=hashes, made_by=software)
-    return _decode_number(content).number, row
+    row.__dict__.update(
+        content=content,
+        brief=brief,
+        hashes=hashes,
+        made_by=software,
+        tap_id=brief.tap_id,
+        time=datetime.fromisoformat(brief.time),
+        tool=brief.tool,
+        direction=brief.direction,
+        series=brief.series,
+        baseline=datetime.fromisoformat(brief.baseline) if brief.baseline else None,
+        static_tip_stiffness=brief.static_tip_stiffness,
+        modal_tip_stiffness=brief.modal_tip_stiffness,
+        **{} if asks else NO_QUESTIONS,
+        **{} if answers else NO_ANSWERS,
+    )
+    return brief.number, row
 
 
 def is_of_this_make(content: bytes) -> bool:
@@ -203,5 +190,7 @@ def is_of_this_make(content: bytes) -> bool:
     return True
 
 
-def _asks(content: bytes) -> bool:
-    return REMARKED in content and any(map(content.__contains__, ASKING))
+@lru_cache(maxsize=1024)
+def _about(remarks: bytes) -> tuple[bool, bool]:
+    """Whether there can be one among them that asks, and one that tells of an answer."""
+    return any(map(remarks.__contains__, ASKING)), ANSWERING in remarks

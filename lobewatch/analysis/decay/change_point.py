@@ -6,7 +6,6 @@ Technology 35(4), with hinges beside the steps, one-sided.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -26,6 +25,8 @@ ROWS = 64
 Floats = NDArray[np.float64]
 Kind = Literal["step", "slope"]
 KINDS: tuple[Kind, ...] = ("step", "slope")
+LEFT = ((2, 2), (1, 3))
+"""Points at least before a change of each kind, and from it on."""
 
 
 class Fall(NamedTuple):
@@ -100,18 +101,17 @@ def watch(y: Floats, temperature: Floats | None = None) -> Watch:
 
 def watch_both(y: Floats, temperature: Floats | None = None) -> tuple[Watch, Watch]:
     """The same, and of the mirror image: whether it rises."""
-    base, starts = base_of(y, temperature), range(FIRST_JUDGED - 1, y.size, ROWS)
-    found = [_best(base, np.arange(start, min(start + ROWS, y.size))) for start in starts]
-    falls, rises = ([one[part] for one in found] for part in (0, 1))
+    base = base_of(y, temperature)
+    if y.size < FIRST_JUDGED:
+        unknown = Watch(np.full(y.size, np.nan), None, None)
+        return unknown, unknown
+    falls, rises = _best(base, np.arange(FIRST_JUDGED - 1, y.size))
     return _watch(base, falls, 1), _watch(base, rises, -1)
 
 
-def _watch(base: Base, found: Sequence[Found], sign: int) -> Watch:
-    """sign: 1 for falls, -1 for rises."""
+def _watch(base: Base, best: Found, sign: int) -> Watch:
+    """best: of all points that are judged; sign: 1 for falls, -1 for rises."""
     scores = np.full(base.y.size, np.nan)
-    if not found:
-        return Watch(scores, None, None)
-    best = Found(*map(np.concatenate, zip(*found, strict=True)))
     scores[FIRST_JUDGED - 1 :] = best.score
     with np.errstate(invalid="ignore"):
         sure = scores >= SURE
@@ -123,25 +123,33 @@ def _watch(base: Base, found: Sequence[Found], sign: int) -> Watch:
 
 
 def _best(base: Base, last: NDArray[np.intp]) -> tuple[Found, Found]:
-    """The likeliest fall, and the likeliest rise, in the points up to each of these."""
-    n = last[:, np.newaxis] + 1
-    k = np.arange(last[-1] + 1)
-    allowed = {"step": (k >= 2) & (k <= n - 2), "slope": (k >= 1) & (k <= n - 3)}
-    lean = {kind: base.lean(kind, n, k) for kind in KINDS}
-    lowest = {kind: np.where(allowed[kind], lean[kind], np.inf).argmin(axis=1) for kind in KINDS}
-    highest = {kind: np.where(allowed[kind], lean[kind], -np.inf).argmax(axis=1) for kind in KINDS}
-    return _likeliest(base, n[:, 0], lean, lowest, -1), _likeliest(base, n[:, 0], lean, highest, 1)
+    """The likeliest fall, and the likeliest rise, in the points up to each of these, which follow one another."""
+    blocks = [_farthest(base, last[begin : begin + ROWS] + 1) for begin in range(0, last.size, ROWS)]
+    points, leans = (np.concatenate(parts, axis=2) for parts in zip(*blocks, strict=True))
+    fall, rise = (_likeliest(base, last + 1, points[i], sign * leans[i]) for i, sign in enumerate((-1, 1)))
+    return fall, rise
 
 
-def _likeliest(
-    base: Base, n: NDArray[np.intp], lean: Mapping[Kind, Floats], points: Mapping[Kind, NDArray[np.intp]], sign: int
-) -> Found:
-    """The likelier of the changes of a sign in the first n (r,), of each kind at a point; lean: at all points."""
-    rows = np.arange(n.size)
-    t = {kind: base.t_of(sign * lean[kind][rows, points[kind]], n) for kind in KINDS}
-    scores = -ndtri(stdtr(n - 2, -np.maximum(t["step"], t["slope"])))
-    fell = t["step"] >= t["slope"]
-    return Found(scores, fell, np.where(fell, points["step"], points["slope"]))
+def _farthest(base: Base, n: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
+    """Where a change of each kind explains most in the first n (r,), and how much; shape (2, 2, r): falls, rises."""
+    k, rows = np.arange(n[-1]), np.arange(n.size)
+    points, leans = np.empty((2, len(KINDS), n.size), np.intp), np.empty((2, len(KINDS), n.size))
+    for kind, (before, behind) in enumerate(LEFT):
+        lean = base.lean(KINDS[kind], n[:, np.newaxis], k)
+        outside = (k < before) | (k > n[:, np.newaxis] - behind)
+        for side, (worst, farthest) in enumerate(((np.inf, np.argmin), (-np.inf, np.argmax))):
+            np.copyto(lean, worst, where=outside)
+            points[side, kind] = farthest(lean, axis=1)
+            leans[side, kind] = lean[rows, points[side, kind]]
+    return points, leans
+
+
+def _likeliest(base: Base, n: NDArray[np.intp], points: NDArray[np.intp], leans: Floats) -> Found:
+    """The likelier of two changes in the first n (r,), one of each kind at a point (2, r), that explain so much."""
+    t = [base.t_of(lean, n) for lean in leans]
+    scores = -ndtri(stdtr(n - 2, -np.maximum(*t)))
+    fell = t[0] >= t[1]
+    return Found(scores, fell, np.where(fell, points[0], points[1]))
 
 
 def _fall(base: Base, found: Found, at: int, sign: int) -> Fall:

@@ -10,12 +10,14 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition import Remark
+from lobewatch.analysis.columns.series_columns import SeriesColumns, series_columns
 from lobewatch.analysis.decay.change_point import newest_change
-from lobewatch.analysis.decay.trend import Tapped, Trend, points_of, trend_of
+from lobewatch.analysis.decay.trend import Tapped, Trend, newest_percents, trend_of
 from lobewatch.analysis.estimate import UNKNOWN, Estimate
-from lobewatch.analysis.history import Row
+from lobewatch.analysis.history import WATCHED, Row
 from lobewatch.machine import Limits
 
 OTHERS = {"damping_ratio": "damping ratio", "stiffness": "stiffness K", "bearing_stiffness": "bearing stiffness"}
@@ -24,14 +26,21 @@ KEPT = 16
 """Series that are remembered, for one standing asks for each several times."""
 
 
-def known_rows(rows: Sequence[Row], name: str) -> list[Row]:
+def known_rows(rows: Sequence[Row], name: str) -> tuple[Row, ...]:
     """Those that know a value and that nothing is asked about: what others are compared with."""
-    return [*_known(tuple(rows), name)]
+    found = _columns(tuple(rows))
+    return found.rows_that(found.known(name, and_sure=True))
+
+
+def rows_with(rows: Sequence[Row], name: str) -> tuple[Row, ...]:
+    """Those that know a value."""
+    found = _columns(tuple(rows))
+    return found.rows_that(found.known(name))
 
 
 @lru_cache(maxsize=KEPT)
-def _known(rows: tuple[Row, ...], name: str) -> tuple[Row, ...]:
-    return tuple(row for row in rows if getattr(row, name).is_known and not row.questions)
+def _columns(rows: tuple[Row, ...]) -> SeriesColumns:
+    return series_columns(rows)
 
 
 def trend_in(rows: Sequence[Row], name: str, now: datetime, events: Sequence[datetime] = ()) -> Trend | None:
@@ -42,15 +51,22 @@ def trend_in(rows: Sequence[Row], name: str, now: datetime, events: Sequence[dat
 
 @lru_cache(maxsize=KEPT)
 def _taps(rows: tuple[Row, ...], name: str) -> tuple[Tapped, ...]:
-    return tuple(_tapped(row, name) for row in _known(rows, name) if getattr(row, name).value > 0)
-
-
-def _tapped(row: Row, name: str) -> Tapped:
     """The temperature counts for the frequency alone: of the others nothing is known beforehand."""
-    value: Estimate = getattr(row, name)
-    warmth = row.conditions.temperature_c if name == "frequency" else None
-    error = 100 * value.std / value.value if math.isfinite(value.std) else math.nan
-    return Tapped(row.time, value.value, error, math.nan if warmth is None else warmth)
+    found, values = _positive(rows, name)
+    errors = np.where(np.isfinite(values[:, 1]), 100 * values[:, 1] / values[:, 0], math.nan).tolist()
+    warmth = [row.conditions.temperature_c if name == "frequency" else None for row in found]
+    temperatures = [math.nan if one is None else one for one in warmth]
+    times = [row.time for row in found]
+    return tuple(map(Tapped._make, zip(times, values[:, 0].tolist(), errors, temperatures, strict=True)))
+
+
+def _positive(rows: tuple[Row, ...], name: str) -> tuple[tuple[Row, ...], NDArray[np.float64]]:
+    """The rows that others are compared with and whose value is one to take a logarithm of; with these values and
+    their standard errors, shape (n, 2)."""
+    found = _columns(rows)
+    values = found.values[:, WATCHED.index(name)]
+    count = found.known(name, and_sure=True) & (values[:, 0] > 0)
+    return found.rows_that(count), values[count]
 
 
 def start(rows: Sequence[Row], name: str) -> Estimate:
@@ -58,7 +74,7 @@ def start(rows: Sequence[Row], name: str) -> Estimate:
 
     From 8 points on its error is the scatter from tap test to tap test.
     """
-    known = known_rows(rows, name) or [row for row in rows if getattr(row, name).is_known]
+    known = known_rows(rows, name) or rows_with(rows, name)
     if not known:
         return UNKNOWN
     first: Estimate = getattr(known[0], name)
@@ -80,7 +96,7 @@ def change_since_start(rows: Sequence[Row], name: str) -> Estimate:
 
 def fall_of(rows: Sequence[Row]) -> Estimate:
     """Fall of the frequency (%) to the newest test, or where that is in question, to another if that fell farther."""
-    known = [row for row in rows if row.frequency.is_known] or rows
+    known = rows_with(rows, "frequency") or tuple(rows)
     sure = known_rows(rows, "frequency")
     changes = [change_since_start(some, "frequency") for some in ([known] if sure == known else [known, sure]) if some]
     change = min(changes, key=lambda one: one.value)
@@ -125,11 +141,11 @@ def about_others(name: str, rows: Sequence[Row], trend: Trend | None) -> Iterato
     for field, word in OTHERS.items():
         if known and field == "bearing_stiffness":
             continue
-        taps = _taps(tuple(rows), field)
-        points = points_of(taps) if taps else ()
-        change = newest_change(np.array([point.percent for point in points]))
+        found, values = _positive(tuple(rows), field)
+        times, percents = newest_percents([row.time for row in found], values[:, 0].tolist())
+        change = newest_change(np.array(percents))
         if change is not None:
-            since = f"{points[change.point].time:%Y-%m-%d}"
+            since = f"{times[change.point]:%Y-%m-%d}"
             verbs = ("fell", "falling") if change.size > 0 else ("rose", "rising")
             how = f"{verbs[0]} at once before" if change.kind == "step" else f"has been {verbs[1]} since"
             yield Remark("value-changed", name, f"{word} {how} {since}, by {_relative(change.size, change.half_width)}")

@@ -8,22 +8,18 @@ numbers.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
+from lobewatch.analysis.decay.shapes import KINDS, Shape, courses, shapes_of
 from lobewatch.analysis.decay.temperature import Fits, base_of
 
 ENOUGH = 8
 """Points from which on anything is foretold."""
-RATES = (-4.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 6.0)
-"""Of the exponential curves, over the span of the series."""
-POWERS = (1.5, 2.0, 3.0)
-"""Of the power curves."""
 QUANTILES = (0.1, 0.5, 0.9)
 """Probabilities at which a level counts as reached: earliest, probable and latest date."""
 LOOKS = 241
@@ -41,23 +37,6 @@ HALVINGS = 40
 """Of the range in which a quantile is looked for."""
 
 Floats = NDArray[np.float64]
-Kind = Literal["none", "line", "slope", "step", "curve"]
-KINDS: tuple[Kind, ...] = ("none", "line", "slope", "step", "curve")
-
-
-class Shape(NamedTuple):
-    """One way in which a series may have come about."""
-
-    kind: Kind
-    """"none": steady; "slope": a line from a point on; "step": fallen once; "curve": accelerating or slowing down."""
-    start: float
-    """Date from which on it falls, or on which it fell."""
-    accelerates: bool = False
-    """Of a curve; else it slows down."""
-    rate: float = 0.0
-    """Of an exponential curve, over the span of the series; 0 of others."""
-    power: float = 0.0
-    """Of a power curve; 0 of others."""
 
 
 class Reached(NamedTuple):
@@ -117,7 +96,9 @@ class Forecast:
 
     def probability(self, level: float | Floats, error: float = 0.0) -> Floats:
         """That the series is below a level (one, or one a date; with its standard error) at the dates, shape (d,)."""
-        return np.asarray(self.weight @ _below(self.freedom, (level - self.mean) / np.hypot(self.error, error)))
+        away = level - self.mean
+        away /= np.hypot(self.error, error) if error else self.error
+        return np.asarray(self.weight @ _below(self.freedom, away))
 
     def reached(self, level: float, error: float = 0.0) -> Reached:
         """When a level (with its standard error) is reached."""
@@ -175,7 +156,7 @@ class Past:
         begin, span = float(self.dates[0]), float(self.dates[-1] - self.dates[0])
         start = min(max(span, now - begin), 3 * span)
         at = np.linspace(start, max(min(horizon - begin, 3 * span), start), LOOKS)
-        mean, error = self.fits.at(_courses(self.shapes, at, span))
+        mean, error = self.fits.at(courses(self.shapes, at, span))
         moved = tuple(shape._replace(start=shape.start + begin) for shape in self.shapes)
         mean = mean + self.first
         return Forecast(moved, self.weight, self.spread, self.fitted, begin + at, mean, error, self.fits.freedom)
@@ -184,7 +165,7 @@ class Past:
     def rate(self) -> Rate:
         """How fast it changes at its last point."""
         span = float(self.dates[-1] - self.dates[0])
-        near = _courses(self.shapes, np.array([span - STEP * span, span]), span)
+        near = courses(self.shapes, np.array([span - STEP * span, span]), span)
         rate, error = self.fits.rate(np.diff(near)[:, 0] / (STEP * span))
         low, high = (_quantile(self.weight, rate, error, self.fits.freedom, p) for p in SURELY)
         return Rate(float(self.weight @ rate), low, high)
@@ -195,8 +176,8 @@ def past(dates: Floats, y: Floats, temperature: Floats | None = None) -> Past:
     at = dates - dates[:1].sum()
     if y.size < ENOUGH or at[-1] <= 0:
         raise ValueError(f"{y.size} points on {np.unique(at).size} dates: a forecast needs {ENOUGH}")
-    shapes = [*_shapes(at)]
-    columns = _courses(shapes, at, float(at[-1]))
+    shapes = [*shapes_of(at)]
+    columns = courses(shapes, at, float(at[-1]))
     fits = base_of(y, temperature).fit_columns(columns)
     counts = Counter(shape.kind for shape in shapes)
     share = {kind: np.log(counts[kind]) + np.log(y.size) / 2 * (kind != "none") for kind in counts}
@@ -226,25 +207,3 @@ def _quantile(weight: Floats, middle: Floats, error: Floats, freedom: int, p: fl
             below = np.where(error > 0, stdtr(freedom, (value - middle) / error), middle <= value)
         low, high = (value, high) if weight @ below < p else (low, value)
     return high
-
-
-def _shapes(at: Floats) -> Iterator[Shape]:
-    """All that are tried; dates count from the first point on."""
-    yield Shape("none", 0.0)
-    yield Shape("line", 0.0)
-    yield from (Shape("slope", one) for one in at[1:-3].tolist())
-    yield from (Shape("step", one) for one in at[2:-1].tolist())
-    yield from (Shape("curve", 0.0, rate > 0, rate=rate) for rate in RATES)
-    yield from (Shape("curve", 0.0, True, power=power) for power in POWERS)
-
-
-def _courses(shapes: Sequence[Shape], at: Floats, span: float) -> Floats:
-    """How shapes run over dates that count from the first point on, shape (j, d); span: of the series."""
-    starts = np.array([np.inf if shape.kind == "none" else shape.start for shape in shapes])[:, np.newaxis]
-    found: Floats = np.maximum(at - starts, 0.0)
-    for j, shape in enumerate(shapes):
-        if shape.kind == "step":
-            found[j] = at >= shape.start
-        elif shape.kind == "curve":
-            found[j] = np.expm1(shape.rate * at / span) if shape.rate else (at / span) ** shape.power
-    return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -46,10 +46,18 @@ class Base:
         """Root of the sum of squares that a "step" or "slope" from each point k (m,) on explains in the first n (r, 1).
 
         With the sign of the change; shape (r, m). Without meaning where k leaves no points before or after the change.
+        n runs from one number to another, k from 0.
         """
-        product, square = self._change(kind, n, k)
+        if self.columns.shape[1] > 1:
+            product, square = self._change(kind, n, k)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                return np.asarray(product / np.sqrt(square))
+        ones, root = _flat(kind, int(n[0, 0]), n.size, k.size)
+        product = self._tail(0, kind, n, k)
+        product -= ones * self._levels[1][n[:, 0]]
         with np.errstate(invalid="ignore", divide="ignore"):
-            return np.asarray(product / np.sqrt(square))
+            product /= root
+        return product
 
     def t_of(self, lean: Floats, n: NDArray[np.intp]) -> Floats:
         """Student's t of changes that explain so much in the first n, shape (r,) each."""
@@ -67,21 +75,24 @@ class Base:
 
     def _change(self, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> tuple[Floats, Floats]:
         """Of the column of a change with the series and with itself, what the base leaves of both."""
-        sums, length = self._sums, n - k
-        tail: Floats = sums[:, n] - sums[:, k][:, np.newaxis]
-        square: Floats = length.astype(np.float64)
-        if kind == "slope":
-            moments = self._moments
-            tail = moments[:, n] - moments[:, k][:, np.newaxis] - k * tail
-            square = (length - 1.0) * length * (2 * length - 1.0) / 6
+        tail, square = [self._tail(i, kind, n, k) for i in range(1 + self.columns.shape[1])], _square(kind, n - k)
         inverse, level = (one[n[:, 0]] for one in self._levels)
         p = self.columns.shape[1]
-        product = tail[0].copy()
+        product = tail[0]
         for i in range(p):
             product -= tail[1 + i] * level[:, i, np.newaxis]
             for j in range(p):
                 square = square - inverse[:, i, j, np.newaxis] * tail[1 + i] * tail[1 + j]
         return product, square
+
+    def _tail(self, i: int, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> Floats:
+        """Of the column of a change with the series (0) or one of the columns (from 1 on)."""
+        sums, moments = self._sums[i], self._moments[i]
+        tail: Floats = sums[n] - sums[k]
+        if kind == "slope":
+            tail *= k
+            np.subtract(moments[n] - moments[k], tail, out=tail)
+        return tail
 
     @cached_property
     def _levels(self) -> tuple[Floats, Floats]:
@@ -89,7 +100,8 @@ class Base:
         coefficients (n + 1, p); those of less than two are nothing."""
         n, p = np.arange(2, self.y.size + 1), self.columns.shape[1]
         inverse, level = np.zeros((self.y.size + 1, p, p)), np.zeros((self.y.size + 1, p))
-        inverse[2:] = np.linalg.inv(self._outer[n, 1:, 1:] + self.precision(n))
+        normal = self._outer[n, 1:, 1:] + self.precision(n)
+        inverse[2:] = 1 / normal if p == 1 else np.linalg.inv(normal)
         level[2:] = (inverse[2:] @ self._outer[n, 1:, :1])[..., 0]
         return inverse, level
 
@@ -160,8 +172,14 @@ class Fits(NamedTuple):
     def at(self, columns: Floats) -> tuple[Floats, Floats]:
         """Mean and standard error of the series where the columns have other values (j, d), shape (j, d) each."""
         away = columns - self.leaning[:, np.newaxis]
-        variance = (self.flat + away**2 / self.square[:, np.newaxis]) * (self.rss / self.freedom)[:, np.newaxis]
-        return self.level + self.size[:, np.newaxis] * away, np.sqrt(variance)
+        error = away**2
+        error /= self.square[:, np.newaxis]
+        error += self.flat
+        error *= (self.rss / self.freedom)[:, np.newaxis]
+        np.sqrt(error, out=error)
+        away *= self.size[:, np.newaxis]
+        away += self.level
+        return away, error
 
     def mixed(self, weight: Floats, columns: Floats) -> Floats:
         """The means alone, each with its weight (j,), shape (d,)."""
@@ -171,6 +189,23 @@ class Fits(NamedTuple):
     def rate(self, slopes: Floats) -> tuple[Floats, Floats]:
         """How fast the series changes, and the standard error of that, where the columns do so (j,)."""
         return self.size * slopes, np.abs(slopes) * np.sqrt(self.rss / self.freedom / self.square)
+
+
+def _square(kind: str, length: NDArray[np.intp]) -> Floats:
+    """Of the column of a change over so many points with itself."""
+    points = length.astype(np.float64)
+    return points if kind == "step" else (points - 1) * points * (2 * points - 1) / 6
+
+
+@lru_cache(maxsize=64)
+def _flat(kind: str, first: int, count: int, m: int) -> tuple[Floats, Floats]:
+    """Of changes from each of m points on in the first n, a count of them from `first` on, shape (count, m) each: of
+    their columns with one of ones, and the root of the square of what that leaves of them."""
+    n, k = np.arange(first, first + count)[:, np.newaxis], np.arange(m)
+    length = (n - k).astype(np.float64)
+    ones = length if kind == "step" else length * (length - 1) / 2
+    with np.errstate(invalid="ignore"):
+        return ones, np.asarray(np.sqrt(_square(kind, n - k) - 1 / n * ones * ones))
 
 
 def _summed(values: Floats) -> Floats:

@@ -26,6 +26,8 @@ BLOCK = 64
 """Series that are judged at once."""
 AHEAD = 4 * BLOCK
 """Tests of days that have one already that are looked at before any of them is judged."""
+KEPT = 32
+"""Series that are remembered."""
 CLOSE = 1e-6
 """Share of the threshold, nearer to which the sums do not tell: their rounding is a thousandth of it."""
 
@@ -54,6 +56,10 @@ class Series(NamedTuple):
     temperatures: Sequence[float]
     """Of the spindle; NaN where not recorded."""
 
+    def goes_on(self, before: Series) -> bool:
+        """Whether these are the tests of another series, and later ones."""
+        return all(mine[: len(its)] == its for mine, its in zip(self, before, strict=True))
+
     def percent(self, span: Span) -> float:
         """Of a point: mean of two, median from three on."""
         first, end = span
@@ -69,13 +75,21 @@ class Series(NamedTuple):
 
 def together(series: Series, most: int) -> list[Span]:
     """The points of a series; most: of the newest ones are judged together."""
-    spans: list[Span] = []
+    memory = _memory(most, tuple(series.times[:1]), tuple(series.percents[:3]))
+    spans = next(([*known] for before, known in memory if series.goes_on(before)), [])
     while not spans or spans[-1][1] < len(series.times):
         asked = _joined(series.times, spans)
         called = next(_called(series, spans, asked, most), None)
         if called is not None:
             spans[called.point :] = [(spans[called.point][0], called.tap), (called.tap, called.tap + 1)]
-    return spans
+    memory[:] = [(series, spans)]
+    return [*spans]
+
+
+@lru_cache(maxsize=KEPT)
+def _memory(*_: object) -> list[tuple[Series, list[Span]]]:
+    """The series that began like this, as it was told apart last: what comes later does not alter it."""
+    return []
 
 
 def _joined(times: Sequence[datetime], spans: list[Span]) -> list[_Question]:

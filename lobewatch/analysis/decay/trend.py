@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 
 from lobewatch.analysis.decay.change_point import Watch, watch_both
 from lobewatch.analysis.decay.forecast import ENOUGH, Forecast, Past, Rate, past
-from lobewatch.analysis.decay.together import Series, together
+from lobewatch.analysis.decay.together import Series, Span, together
 
 MOST = 1000
 """The newest points, which alone are judged: the work grows with the square of their number."""
+KEPT = 32
+"""Series that are remembered."""
 MONTH = 30.44
 """Days."""
 HORIZON_DAYS = 36 * MONTH
@@ -138,33 +140,40 @@ def trend_of(series: Sequence[Tapped], now: datetime, events: Sequence[datetime]
 
     Foretold from the day of `now` on; the same for all of a day.
     """
-    points = points_of(series)
+    points = _newest_points(tuple(series))
     return Trend(points, series[0].value, _past(points), int(day(now)), tuple(events))
 
 
-def points_of(series: Sequence[Tapped]) -> tuple[Point, ...]:
-    """The newest points of a series, oldest first."""
-    return _newest_points(tuple(series))
-
-
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=KEPT)
 def _newest_points(series: tuple[Tapped, ...]) -> tuple[Point, ...]:
+    """Of a series, oldest first."""
     times, values, errors, temperatures = zip(*series, strict=True)
-    percents = [100 * math.log(value / values[0]) for value in values]
-    own = Series(times, percents, temperatures)
-    return tuple(
-        Point(
-            times[first],
-            own.percent((first, end)),
-            math.sqrt(sum(error**2 for error in errors[first:end])) / (end - first),
-            own.temperature((first, end)),
-            tuple(range(first, end)),
-        )
-        for first, end in together(own, MOST)[-MOST:]
-    )
+    own = Series(times, _percents(values), temperatures)
+    return tuple(_point(own, errors, span) for span in together(own, MOST)[-MOST:])
 
 
-@lru_cache(maxsize=1024)
+def _point(own: Series, errors: Sequence[float], span: Span) -> Point:
+    first, end = span
+    if end - first == 1:
+        return Point(own.times[first], own.percents[first], errors[first], own.temperatures[first], (first,))
+    error = math.sqrt(sum(error**2 for error in errors[first:end])) / (end - first)
+    return Point(own.times[first], own.percent(span), error, own.temperature(span), tuple(range(first, end)))
+
+
+def newest_percents(times: Sequence[datetime], values: Sequence[float]) -> tuple[list[datetime], list[float]]:
+    """Time and percent of the newest points of a series whose temperatures do not count, oldest first."""
+    own = Series(times, _percents(values), [math.nan] * len(times))
+    spans = together(own, MOST)[-MOST:] if times else []
+    return [times[first] for first, _ in spans], [own.percent(span) for span in spans]
+
+
+def _percents(values: Sequence[float]) -> list[float]:
+    """100 ln of each over the first."""
+    log, first = math.log, values[0] if values else 1.0
+    return [100 * log(value / first) for value in values]
+
+
+@lru_cache(maxsize=KEPT)
 def _past(points: tuple[Point, ...]) -> Past | None:
     """Of the same points the same, whatever the day and the events."""
     if len(points) < ENOUGH:

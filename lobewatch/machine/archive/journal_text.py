@@ -6,12 +6,15 @@ import hashlib
 import json
 import zlib
 from dataclasses import dataclass
+from io import FileIO
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 Entry = dict[str, Any]
 PREVIOUS = b'"previous": "'
+PIECE = 1 << 18
+"""Bytes that are compared at once."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +40,13 @@ def scan(path: Path, known: JournalText) -> JournalText:
     """A file of the journal, line by line, from where it is known on."""
     if not path.exists():
         return JournalText(there=False)
-    content = path.read_bytes()
-    if known.there and content == known.whole and not (known.broken or known.torn) and known.ending == b"\n":
+    with path.open("rb", buffering=0) as file:
+        begun = known if _begins_with(file, known.whole) else JournalText(there=False)
+        file.seek(len(begun.whole))
+        content = file.read()
+    if begun.there and not (content or known.broken or known.torn) and known.ending == b"\n":
         return known
-    begun = known if content.startswith(known.whole) else JournalText(there=False)
-    *lines, end = content[len(begun.whole) :].split(b"\n")
+    *lines, end = content.split(b"\n")
     chain, broken, loose = list(begun.chain), 0, list[bytes]()
     if _are_chained(chain, lines):
         chain, lines = chain + lines, []
@@ -57,6 +62,17 @@ def scan(path: Path, known: JournalText) -> JournalText:
     loose += [part for part in (end, end[:-1]) if broken and _parsed(part)][:1]
     whole = begun.whole + b"".join(line + b"\n" for line in chain[len(begun.chain) :])
     return JournalText(True, tuple(chain), whole, broken, torn=end, loose=tuple(loose))
+
+
+def _begins_with(file: FileIO, known: bytes) -> bool:
+    """Whether the first bytes of a file are these; read in pieces, for it is only compared."""
+    at = 0
+    while at < len(known):
+        part = file.read(min(PIECE, len(known) - at))
+        if not part or not known.startswith(part, at):
+            return False
+        at += len(part)
+    return True
 
 
 def _are_chained(chain: list[bytes], lines: list[bytes]) -> bool:

@@ -11,8 +11,8 @@ from rich.table import Table
 
 from dsm import PreloadLeft, plus_minus
 from lobewatch.analysis import SeriesStanding
-from lobewatch.analysis.decay.forecast import Shape
 from lobewatch.analysis.decay.outlook import Fate, Outlook
+from lobewatch.analysis.decay.shapes import Shape
 from lobewatch.analysis.decay.trend import Trend, date
 from lobewatch.show.output import table
 from lobewatch.show.trends.chart import chart_lines

@@ -75,6 +75,18 @@ def test_a_logbook_that_goes_on_after_commits_is_as_one_that_is_opened_anew(shop
     assert known == values(shop.logbook)
 
 
+def test_rows_that_were_compared_once_are_compared_again_where_another_test_comes_before_them(shop: Shop) -> None:
+    shop.put("")
+    shop.tap(0, 1713.0)
+    logbook = shop.logbook
+    expected = [1713]
+    for days, frequency in ((30, 1710.0), (60, 1700.0), (15, 1712.0), (90, 1690.0), (45, 1705.0)):
+        commit(logbook, shop, days, frequency)
+        expected = sorted([*expected, round(frequency)], reverse=True)
+        assert [round(row.frequency.value) for row in logbook.history.rows] == expected
+    assert values(logbook) == values(shop.logbook)
+
+
 def values(logbook: Logbook) -> list[str]:
     """All of each row, to the last digit; there are no programs to say a word on."""
     return [repr(replace(row, rulings=None)) for row in logbook.history.rows]

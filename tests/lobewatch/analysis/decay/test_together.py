@@ -56,6 +56,25 @@ def test_points_are_those_of_asking_one_by_one(seed: int, hours: float) -> None:
         assert min(days) < DAY  # some were asked for, or this tests nothing
 
 
+def test_points_of_a_series_that_goes_on_are_those_of_the_whole() -> None:
+    series = many(11, 160, 8.0, warm=True)
+    other = series._replace(percents=[*series.percents[:90], *(one - 2.0 for one in series.percents[90:])])
+    for count in (1, 2, 60, 61, 62, 100, 101, 160):
+        for one in (series, other):  # alike up to the 90th test
+            begun = Series(one.times[:count], one.percents[:count], one.temperatures[:count])
+            assert together(begun, 1000) == one_by_one(begun, 1000)
+    later = series._replace(times=[time + timedelta(hours=30 * (n > 80)) for n, time in enumerate(series.times)])
+    assert together(later, 1000) == one_by_one(later, 1000)
+
+
+def test_what_is_done_with_the_points_does_not_alter_those_of_the_next_who_asks() -> None:
+    series = many(13, 40, 8.0)
+    found = together(series, 1000)
+    expected = [*found]
+    found[0] = (0, 0)
+    assert together(series, 1000) == expected
+
+
 def test_points_are_those_of_asking_one_by_one_with_the_temperature() -> None:
     series = many(7, 120, 12.0, warm=True)
     assert together(series, 40) == one_by_one(series, 40)

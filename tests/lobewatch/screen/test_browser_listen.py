@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import sys
 import threading
@@ -27,7 +28,8 @@ SIZES = ((1280, 657), (768, 1024), (390, 844))
 LEAST = {1280: 110.0, 768: 70.0, 390: 38.0}
 """Height of the letters of a word (px), by the width of the page."""
 CAPITALS = """(() => { const pen = document.createElement('canvas').getContext('2d');
-pen.font = getComputedStyle(document.getElementById('text')).font;
+const { fontWeight, fontSize, fontFamily } = getComputedStyle(document.getElementById('text'));
+pen.font = `${fontWeight} ${fontSize} ${fontFamily}`;
 return pen.measureText('H').actualBoundingBoxAscent; })()"""
 TOKEN = "a-token-of-the-test"
 
@@ -36,6 +38,12 @@ TOKEN = "a-token-of-the-test"
 def folder(tmp_path: Path) -> MachineFolder:
     make_machine_folder(tmp_path / "mill", "surrogate_machine.toml")
     return MachineFolder(tmp_path / "mill")
+
+
+def listen() -> None:
+    """As at the terminal."""
+    with contextlib.suppress(SystemExit):
+        main()
 
 
 def address(told: str) -> str:
@@ -48,7 +56,9 @@ def check_page(browser: Browser) -> None:
     for size in SIZES:
         browser.resize(size)
         browser.wait(lambda size=size: letters(browser) >= LEAST[size[0]])
-        assert browser.ask("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") == list(size)
+        assert browser.ask("[document.documentElement.scrollWidth, document.documentElement.scrollHeight]") == list(
+            size
+        )
         for name in ("text", "figures", "reason", "mute"):
             box = browser.part(name).rect
             assert min(box["x"], box["y"]) >= 0, (name, size)
@@ -83,7 +93,7 @@ def test_the_page_goes_from_air_to_the_word_by_itself(
         said = ["--program", PROGRAM, "--speed", SPEED, "--depth", depth_mm, "--port", device.port, "--screen"]
         command = ["lobewatch", "listen", folder.path, *said, "--token", TOKEN]
         monkeypatch.setattr(sys, "argv", [str(part) for part in command])
-        listening = threading.Thread(target=main)
+        listening = threading.Thread(target=listen)
         listening.start()
         try:
             browser.wait(lambda: told.append(capsys.readouterr().err) or address("".join(told)))

@@ -12,7 +12,7 @@ import typer
 from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit, notes
 from lobewatch.show.replays.describing import Columns, FullScale, Rate, Response, Sensitivity, Unit, described
-from lobewatch.show.show_address import Listen, Token, WatchToken, show_address
+from lobewatch.show.show_address import Listen, Token, WatchToken, serving
 
 
 def listen(
@@ -76,22 +76,19 @@ def listen(
             from lobewatch.screen import CutScreenServer  # brings aiohttp, which nobody needs without a screen
 
             server = CutScreenServer(pictures, listen=listen, token=token, watch_token=watch_token)
-            screens.enter_context(server)
-            show_address(server.url, server.watch_url)
+            screens.enter_context(serving(server))
         signal = hear_cut(logbook.folder, setting, file, port, seconds, said, notes.print, pictures.show)
         found = judge_live(logbook, setting, signal, pictures)
         if out is not None:
-            from lobewatch.show.cuts.figure_listened import listened_figure
-            from lobewatch.show.figures import save_figure
+            from lobewatch.show.cuts.figure_listened import save_listened  # brings matplotlib
 
-            save_figure(listened_figure(found), out)
+            save_listened(found, out)
         payload = listened_json(found)
         if dry_run:
             emit(payload, as_json, *listened_texts(found))
             return
         with telling(logbook):
-            known = logbook.cuts
-            kept = keep_listened(logbook.folder, found, signal, date)
+            known, kept = logbook.cuts, keep_listened(logbook.folder, found, signal, date)
             pictures.show(saved=kept.id)
             remarks = [*about_tool(logbook, kept), *map(otherwise, contradicted(kept, known) if kept.counts else ())]
             told = {"id": kept.id, "remarks": [remark.code for remark in remarks]}

@@ -1,5 +1,4 @@
-"""The operator's screen in a browser: a page that follows a tap test, one that follows a cut that is listened to, and a
-dashboard of machines that starts tests."""
+"""The operator's screen in a browser: pages that follow a tap test and a cut, and a dashboard of machines."""
 
 from lobewatch.screen.dashboard_server import DashboardServer
 from lobewatch.screen.screen_server import CutScreenServer, ScreenServer

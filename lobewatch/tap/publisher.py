@@ -10,7 +10,7 @@ from lobewatch.tap.judged_hits import JudgedHits
 from lobewatch.tap.listening.cut_state import CutState
 from lobewatch.tap.state import TapState
 
-State = TypeVar("State", TapState, CutState)
+State = TypeVar("State", bound=TapState | CutState)
 
 
 class Pictures(Generic[State]):
@@ -18,7 +18,8 @@ class Pictures(Generic[State]):
 
     def __init__(self, first: State, clock: Callable[[], float]) -> None:
         """clock: seconds that never go back."""
-        self._state, self._clock, self._shown_at = first, clock, clock()
+        self._state: State = first
+        self._clock, self._shown_at = clock, clock()
 
     @property
     def state(self) -> State:

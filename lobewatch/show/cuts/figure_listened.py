@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -10,7 +12,7 @@ from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.listening.heard_cut import ListenedCut
 from lobewatch.analysis.listening.marked import marked
 from lobewatch.show.cuts.describe_listened import listened_text
-from lobewatch.show.figures import ALARM, EVENT, GOOD, NOW, THEN, new_axes
+from lobewatch.show.figures import ALARM, EVENT, GOOD, NOW, THEN, new_axes, save_figure
 from lobewatch.tap.listening.cut_state import HIGHEST
 
 MARKS = {
@@ -22,6 +24,11 @@ MARKS = {
 """Label, colour and mark of lines."""
 SHOWN = 1e-4
 """Of the loudest amplitude, drawn downwards."""
+
+
+def save_listened(found: ListenedCut, path: Path) -> None:
+    """The same figure as a file."""
+    save_figure(listened_figure(found), path)
 
 
 def listened_figure(found: ListenedCut) -> Figure:

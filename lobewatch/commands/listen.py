@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +12,7 @@ import typer
 from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit, notes
 from lobewatch.show.replays.describing import Columns, FullScale, Rate, Response, Sensitivity, Unit, described
+from lobewatch.show.show_address import Listen, Token, WatchToken, serving
 
 
 def listen(
@@ -27,6 +29,10 @@ def listen(
     seconds: Annotated[float, typer.Option(min=2, help="How long a cut is waited for.")] = 120.0,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what is heard; store nothing.")] = False,
     out: Annotated[Path | None, typer.Option(help="Draw the spectrum to this file (.svg, .png, .pdf).")] = None,
+    screen: Annotated[bool, typer.Option("--screen", help="Show it in a browser too, with the word in large.")] = False,
+    listen: Listen = "127.0.0.1",
+    token: Token = None,
+    watch_token: WatchToken = None,
     columns: Columns = "",
     unit: Unit = "",
     rate: Rate = None,
@@ -38,43 +44,53 @@ def listen(
     """Hear a cut with the accelerometer on the housing: stable, chatter and its frequency, or why it cannot be told.
 
     Begin with the spindle turning in air, then cut for a second or longer; no key is needed. The recording is kept
-    beside the tap tests, what was heard is a line of the journal; lobewatch exclude takes it out again.
+    beside the tap tests, what was heard is a line of the journal; lobewatch exclude takes it out again. --screen
+    --listen 0.0.0.0 can be watched on a tablet; the page keeps the word when the command has ended.
 
     Examples:
 
       lobewatch listen mill-3 --program A --port /dev/ttyACM0 --out cut.png
+      lobewatch listen mill-3 --program A --screen --listen 0.0.0.0
       lobewatch listen mill-3 --program A --speed 12000 --depth 2 --file cut.wav --full-scale 500 --unit m/s^2
       lobewatch listen mill-3 --cut "reference cut" --speed 12000 --depth 2
     """
     from lobewatch.analysis import Logbook
-    from lobewatch.analysis.listening.heard_cut import keep_listened, listened
+    from lobewatch.analysis.listening.heard_cut import keep_listened
     from lobewatch.machine.cuts.observing import contradicted
     from lobewatch.machine.cuts.setting import chosen_cut
     from lobewatch.notify.telling import telling
     from lobewatch.show.cuts.describe_listened import listened_json, listened_texts
     from lobewatch.show.history.describe_cut import about_tool, otherwise
     from lobewatch.tap.listening.hear_cut import hear_cut
+    from lobewatch.tap.listening.live_cut import cut_pictures, judge_live
 
     logbook = Logbook.open(machine)
     setting = chosen_cut(logbook.machine, program, cut, speed, depth)
     if not dry_run:
         logbook.folder.refuse_damage()
+    if screen and file is not None:
+        raise ValueError("--screen follows a device; what a --file says stands here")
     said = described(columns, full_scale, sensitivity, unit=unit, rate=rate, response=response)
-    signal = hear_cut(logbook.folder, setting, file, port, seconds, said, notes.print)
-    found = listened(logbook, setting, signal)
-    if out is not None:
-        from lobewatch.show.cuts.figure_listened import listened_figure
-        from lobewatch.show.figures import save_figure
+    with contextlib.ExitStack() as screens, cut_pictures(logbook, setting) as pictures:
+        if screen:
+            from lobewatch.screen import CutScreenServer  # brings aiohttp, which nobody needs without a screen
 
-        save_figure(listened_figure(found), out)
-    payload = listened_json(found)
-    if dry_run:
-        emit(payload, as_json, *listened_texts(found))
-        return
-    with telling(logbook):
-        known = logbook.cuts
-        kept = keep_listened(logbook.folder, found, signal, date)
-        remarks = [*about_tool(logbook, kept), *map(otherwise, contradicted(kept, known) if kept.counts else ())]
-        told = {"id": kept.id, "remarks": [remark.code for remark in remarks]}
-        emit(payload | told, as_json, *listened_texts(found), f"saved {kept.id}")
+            server = CutScreenServer(pictures, listen=listen, token=token, watch_token=watch_token)
+            screens.enter_context(serving(server))
+        signal = hear_cut(logbook.folder, setting, file, port, seconds, said, notes.print, pictures.show)
+        found = judge_live(logbook, setting, signal, pictures)
+        if out is not None:
+            from lobewatch.show.cuts.figure_listened import save_listened  # brings matplotlib
+
+            save_listened(found, out)
+        payload = listened_json(found)
+        if dry_run:
+            emit(payload, as_json, *listened_texts(found))
+            return
+        with telling(logbook):
+            known, kept = logbook.cuts, keep_listened(logbook.folder, found, signal, date)
+            pictures.show(saved=kept.id)
+            remarks = [*about_tool(logbook, kept), *map(otherwise, contradicted(kept, known) if kept.counts else ())]
+            told = {"id": kept.id, "remarks": [remark.code for remark in remarks]}
+            emit(payload | told, as_json, *listened_texts(found), f"saved {kept.id}")
     notes.print(*(f"note: {remark}" for remark in remarks), sep="\n", end="\n" if remarks else "", markup=False)

@@ -10,7 +10,7 @@ import typer
 
 from lobewatch.machine.named_folder import named_folder
 from lobewatch.show.output import Json, emit, notes
-from lobewatch.show.show_address import Listen, Token, WatchToken, show_address
+from lobewatch.show.show_address import Listen, Token, WatchToken, serving
 
 
 def tap(
@@ -67,8 +67,7 @@ def tap(
                 from lobewatch.screen import ScreenServer  # brings aiohttp, which most tap tests do not need
 
                 server = ScreenServer(session, listen=listen, token=token, watch_token=watch_token)
-                screens.enter_context(server)
-                show_address(server.url, server.watch_url)
+                screens.enter_context(serving(server))
             screens.enter_context(TerminalScreen(session) if notes.is_terminal else TapPrinter(session, notes))
             done = session.run()
     except (TapStopped, KeyboardInterrupt) as stopped:

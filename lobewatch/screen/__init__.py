@@ -1,6 +1,6 @@
-"""The operator's screen in a browser: one page that follows a tap test, and a dashboard of machines that starts one."""
+"""The operator's screen in a browser: pages that follow a tap test and a cut, and a dashboard of machines."""
 
 from lobewatch.screen.dashboard_server import DashboardServer
-from lobewatch.screen.screen_server import ScreenServer
+from lobewatch.screen.screen_server import CutScreenServer, ScreenServer
 
-__all__ = ["DashboardServer", "ScreenServer"]
+__all__ = ["CutScreenServer", "DashboardServer", "ScreenServer"]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
 
 from aiohttp import WSCloseCode, web
 
-from lobewatch.screen.messages import plots_message, state_message
-from lobewatch.tap.state import Plots, TapState
+from lobewatch.tap.listening.cut_state import CutState
+from lobewatch.tap.state import TapState
 
 PERIOD = 0.05
 """At most so often, but for a new word (s)."""
@@ -21,14 +23,27 @@ ENDING = web.AppKey("ENDING", asyncio.Event)
 """Set when the server is about to close."""
 
 
-async def feed(request: web.Request, newest: Callable[[], TapState]) -> web.WebSocketResponse:
+State = TypeVar("State", TapState, CutState)
+
+
+@dataclass(frozen=True)
+class Messages(Generic[State]):
+    """How states of a kind are told to a page."""
+
+    state: Callable[[State], str]
+    """All but the curves."""
+    plots: Callable[[Any], bytes]
+    """The `plots` of a state."""
+
+
+async def feed(request: web.Request, newest: Callable[[], State], told: Messages[State]) -> web.WebSocketResponse:
     """Send what newest() gives until the page or the server closes; only here is waited for a slow page."""
     socket = web.WebSocketResponse(protocols=("lobewatch",), heartbeat=10, max_msg_size=1024, compress=False)
     await socket.prepare(request)
     ending = request.app[ENDING]
     closed = asyncio.create_task(_until_closed(socket))
     try:
-        await _send_changes(socket, newest, lambda: ending.is_set() or closed.done())
+        await _send_changes(socket, newest, told, lambda: ending.is_set() or closed.done())
         await socket.close(code=WSCloseCode.GOING_AWAY)
     except ConnectionError:
         pass  # the page is gone
@@ -38,11 +53,11 @@ async def feed(request: web.Request, newest: Callable[[], TapState]) -> web.WebS
 
 
 async def _send_changes(
-    socket: web.WebSocketResponse, newest: Callable[[], TapState], over: Callable[[], bool]
+    socket: web.WebSocketResponse, newest: Callable[[], State], told: Messages[State], over: Callable[[], bool]
 ) -> None:
     clock = asyncio.get_running_loop().time
-    sent: TapState | None = None
-    plots: Plots | None = None
+    sent: State | None = None
+    plots: Any = None
     last = clock()
     while True:
         ended = over()
@@ -50,8 +65,8 @@ async def _send_changes(
         due = sent is None or state.word is not sent.word or clock() - last >= PERIOD or ended
         if state is not sent and due:
             if state.plots is not None and state.plots is not plots:
-                await socket.send_bytes(plots_message(state.plots))
-            await socket.send_str(state_message(state))
+                await socket.send_bytes(told.plots(state.plots))
+            await socket.send_str(told.state(state))
             sent, plots, last = state, state.plots, clock()
         elif clock() - last > SIGN_OF_LIFE:
             await socket.send_str("{}")

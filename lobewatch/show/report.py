@@ -73,7 +73,7 @@ def _content(logbook: Logbook, rows: Sequence[Row], found: Outlook) -> dict[str,
     course = trends(logbook, rows, found.standing)
     programs = [advised(logbook, verdict) for verdict in logbook.verdicts()]
     cut = next(iter(machine.cuts(assembly.tool)), None)
-    lobes = None if cut is None else lobe_course(cut, rows, assembly, found.standing.series, machine)
+    lobes = None if cut is None else lobe_course(cut, rows, assembly, found.standing.series, machine, logbook.cuts)
     return {
         "name": machine.machine.name,
         "tool": last.tool,

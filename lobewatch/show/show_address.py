@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import sys
 import webbrowser
-from typing import Annotated
+from collections.abc import Iterator
+from typing import Annotated, Protocol
 
 import typer
 
@@ -19,6 +21,28 @@ Token = Annotated[
 WatchToken = Annotated[
     str | None, typer.Option(help="What a browser must know only to see anything; a new one where not given.")
 ]
+
+
+class Server(contextlib.AbstractContextManager["Server"], Protocol):
+    """Answers while its context lasts."""
+
+    @property
+    def url(self) -> str:
+        """For those who may alter something."""
+        ...
+
+    @property
+    def watch_url(self) -> str:
+        """For those who may only watch."""
+        ...
+
+
+@contextlib.contextmanager
+def serving(server: Server) -> Iterator[None]:
+    """Let a screen answer, and print its address."""
+    with server:
+        show_address(server.url, server.watch_url)
+        yield
 
 
 def show_address(url: str, watch_url: str, as_json: bool = False) -> None:

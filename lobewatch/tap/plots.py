@@ -31,7 +31,7 @@ def plots_of(hit: Hit, mean: RunningMean) -> Plots:
     spectrum = None if spectra is None else _decibels(spectra[0][1:])
     sizes = [None if frf is None else np.abs(frf.receptance) for frf in (mean.frf, last)]
     end = frequency.size if band is None else int(np.searchsorted(frequency, BEYOND_BAND * band[1], side="right"))
-    lines = _kept([curve for curve in (*sizes, spectrum) if curve is not None], end)
+    lines = extremes([curve for curve in (*sizes, spectrum) if curve is not None], end)
     return Plots(
         time=hit.time[shown],
         force=hit.force[shown],
@@ -60,7 +60,7 @@ def _decibels(power: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _samples(hit: Hit) -> NDArray[np.int64]:
     """Samples to show: all around the pulse, elsewhere the extremes of every bin."""
-    kept = _kept([hit.force, hit.acceleration], hit.force.size)
+    kept = extremes([hit.force, hit.acceleration], hit.force.size)
     pulse = find_pulse(hit)
     if pulse is None:
         return kept
@@ -69,14 +69,14 @@ def _samples(hit: Hit) -> NDArray[np.int64]:
     return np.union1d(kept, around[:: around.size // BINS + 1])
 
 
-def _kept(curves: Sequence[NDArray[Any]], end: int) -> NDArray[np.int64]:
+def extremes(curves: Sequence[NDArray[Any]], end: int) -> NDArray[np.int64]:
     """Indices below `end` at which a curve is highest or lowest in its bin, rising."""
     width = max(-(-end // BINS), 1)
     if width == 1 or not curves:
         return np.arange(0, end, width)
     starts = np.arange(0, end, width)
-    extremes = [starts]
+    found = [starts]
     for curve in curves:
         bins = np.pad(curve[:end], (0, -end % width), mode="edge").reshape(-1, width)
-        extremes += [starts + np.argmax(bins, axis=1), starts + np.argmin(bins, axis=1)]
-    return np.unique(np.minimum(np.concatenate(extremes), end - 1))
+        found += [starts + np.argmax(bins, axis=1), starts + np.argmin(bins, axis=1)]
+    return np.unique(np.minimum(np.concatenate(found), end - 1))

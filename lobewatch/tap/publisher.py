@@ -1,24 +1,28 @@
-"""The one place that makes the pictures of a live test."""
+"""The one place that makes the pictures of a live test, and of a cut that is listened to."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from lobewatch.tap.judged_hits import JudgedHits
+from lobewatch.tap.listening.cut_state import CutState
 from lobewatch.tap.state import TapState
 
+State = TypeVar("State", bound=TapState | CutState)
 
-class Publisher:
-    """The newest picture of a test: only replaced, never changed, by the thread of the test; any thread may read it."""
 
-    def __init__(self, first: TapState, clock: Callable[[], float]) -> None:
+class Pictures(Generic[State]):
+    """The newest picture: only replaced, never changed, by the thread of the test; any thread may read it."""
+
+    def __init__(self, first: State, clock: Callable[[], float]) -> None:
         """clock: seconds that never go back."""
-        self._state, self._clock, self._shown_at = first, clock, clock()
+        self._state: State = first
+        self._clock, self._shown_at = clock, clock()
 
     @property
-    def state(self) -> TapState:
+    def state(self) -> State:
         """The newest picture."""
         return self._state
 
@@ -28,9 +32,13 @@ class Publisher:
         return self._clock() - self._shown_at
 
     def show(self, **changes: Any) -> None:
-        """Replace the picture by one with these fields of TapState."""
+        """Replace the picture by one with these fields of it."""
         self._state = replace(self._state, revision=self._state.revision + 1, **changes)
         self._shown_at = self._clock()
+
+
+class Publisher(Pictures[TapState]):
+    """The pictures of a test."""
 
     def show_hits(self, hits: JudgedHits, **changes: Any) -> None:
         """The list of hits, what follows from it, and other fields with it."""

@@ -18,8 +18,11 @@ LOOKED_AT = 60
 
 
 def decisive(drawn: Drawn, chatters: NDArray[np.bool_], middle: MillingRows, depth: float) -> str:
-    """The cause without which most of the draws that chatter (DRAWS,) at a depth (m) would not."""
-    if "untapped" in drawn.doubt.modes:
+    """The cause without which most of the draws that chatter (DRAWS,) at a depth (m) would not.
+
+    Where none of them chatters a direction that was not tapped is all that is left open.
+    """
+    if "untapped" in drawn.doubt.modes or not np.any(chatters):
         return "untapped"
     which = np.flatnonzero(chatters)[:LOOKED_AT]
     mended = {}

@@ -1,9 +1,8 @@
-// The curves of the last hit and of the mean; what y is stands in the caption. uPlot is a global of its own script.
+// The curves of the last hit and of the mean; what y is stands in the caption.
+import { chart, INK, line } from "./chart.js";
+
 const MEAN = "#0072b2";
 const LAST = "#d55e00";
-const INK = "#111";
-const GRID = { stroke: "#ddd", width: 1 };
-const FONT = "13px system-ui, 'DejaVu Sans', sans-serif";
 const COHERENCE_LIMIT = 0.8;
 const LOWEST_SHARE = 0.05;
 const FORCE_LIMIT_DB = -20;
@@ -12,33 +11,6 @@ const MICRO = 1e6;
 let curves = { band: null };
 let shown = { pulse: [0, 1], frequency: [0, 1], receptance: [0.001, 1] };
 const charts = {};
-
-const line = (stroke, dash) => ({ stroke, dash, width: 2, points: { show: false } });
-const axis = (size, label) => ({ label, size, labelSize: 16, labelFont: FONT, font: FONT, stroke: INK, grid: GRID, ticks: GRID });
-const isDecade = (v) => v !== null && Math.abs(Math.log10(v) % 1) < 1e-6;
-const decade = (values) => values.map((v) => (isDecade(v) ? String(v) : ""));
-
-function chart(name, { x, range, xRange, series, log = false, draw = () => {} }) {
-  const figure = document.getElementById(name);
-  const area = figure.appendChild(Object.assign(document.createElement("div"), { className: "area" }));
-  const size = () => ({ width: Math.max(area.clientWidth, 80), height: Math.max(area.clientHeight, 60) });
-  const plot = new uPlot(
-    {
-      ...size(),
-      padding: [6, 18, 0, 0],
-      legend: { show: false },
-      cursor: { show: false },
-      scales: { x: { time: false, range: xRange }, y: { distr: log ? 3 : 1, range } },
-      axes: [axis(30, x), { ...axis(56), ...(log && { filter: (_, splits) => splits.map((v) => (isDecade(v) ? v : null)), values: (_, v) => decade(v) }) }],
-      series: [{}, ...series],
-      hooks: { drawClear: [draw] },
-    },
-    [[], ...series.map(() => [])],
-    area,
-  );
-  new ResizeObserver(() => plot.setSize(size())).observe(area);
-  charts[name] = plot;
-}
 
 function level(plot, value) {
   const { left, width } = plot.bbox;
@@ -79,17 +51,17 @@ function decades({ frequency, mean, last, coherence, band }) {
 
 export function makePlots() {
   const frequency = () => shown.frequency;
-  chart("force", { x: "time (ms)", range: whole, xRange: () => shown.pulse, series: [line(INK)] });
-  chart("response", { x: "time (ms)", range: whole, series: [line(INK)] });
-  chart("frf", {
+  charts.force = chart("force", { x: "time (ms)", range: whole, xRange: () => shown.pulse, series: [line(INK)] });
+  charts.response = chart("response", { x: "time (ms)", range: whole, series: [line(INK)] });
+  charts.frf = chart("frf", {
     x: "frequency (Hz)", range: () => shown.receptance, xRange: frequency, log: true,
     series: [line(LAST, [6, 4]), line(MEAN)],
   });
-  chart("coherence", {
+  charts.coherence = chart("coherence", {
     x: "frequency (Hz)", range: () => [0, 1.02], xRange: frequency, series: [line(MEAN)],
     draw: (plot) => level(plot, COHERENCE_LIMIT),
   });
-  chart("spectrum", {
+  charts.spectrum = chart("spectrum", {
     x: "frequency (Hz)", range: () => [-60, 5], xRange: frequency, series: [line(INK)],
     draw: (plot) => { shadeBand(plot); level(plot, FORCE_LIMIT_DB); },
   });

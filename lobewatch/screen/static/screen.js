@@ -1,47 +1,18 @@
 import { ask, follow } from "./link.js";
 import { makePlots, showPlots } from "./plots.js";
-import { isMuted, play, status, toggleMute, unlock } from "./sounds.js";
+import { mute, play, showSound, unlock } from "./sounds.js";
+import { at, element, flash, put, showWord } from "./word.js";
 
 const UNDO_KEYS = ["u", "U", "PageUp"];
 const STOP_AGAIN_MS = 3000;
 const VERDICTS = ["good", "refused"];
 const LIGHTS = ["good", "warn", "alarm"];
-const at = (id) => document.getElementById(id);
-const put = (id, text) => { if (at(id).textContent !== text) at(id).textContent = text; };
 
 let state = null;
 let stopTimer = null;
 let undoing = false;
 let over = false;
 let aheadOfHit = false;
-
-function element(tag, text, className = "") {
-  return Object.assign(document.createElement(tag), { textContent: text, className });
-}
-
-function showWord(kind, word) {
-  const lines = word.replaceAll(", ", "\n");
-  if (document.body.dataset.kind === kind && at("text").textContent === lines) return;
-  document.body.dataset.kind = kind;
-  at("symbol").setAttribute("href", `#is-${kind}`);
-  put("text", lines);
-  fitWord();
-}
-
-// As large as the panel allows.
-function fitWord() {
-  const word = at("word");
-  word.style.fontSize = "100px";
-  const text = at("text").getBoundingClientRect();
-  const width = (99 * word.clientWidth) / (text.right - word.getBoundingClientRect().left);
-  word.style.fontSize = `${Math.min(width, (90 * word.clientHeight) / text.height, 0.8 * word.clientHeight)}px`;
-}
-
-function flash() {
-  at("now").classList.remove("fresh");
-  void at("now").offsetWidth;
-  at("now").classList.add("fresh");
-}
 
 function showState(next) {
   const before = state;
@@ -52,7 +23,7 @@ function showState(next) {
   put("good", String(state.good));
   put("wanted", String(state.wanted));
   put("reason", state.reason);
-  showWord(state.kind, state.word);
+  showWord(state.kind, state.word.replaceAll(", ", "\n"));
   showMean();
   showLevels();
   if (JSON.stringify(state.hits) !== JSON.stringify(before?.hits)) showHits();
@@ -176,16 +147,6 @@ async function showButtons() {
   at("undo").hidden = at("stop").hidden = !mayAlter;
 }
 
-function showSound() {
-  put("sound", status());
-  at("mute").setAttribute("aria-pressed", String(isMuted()));
-}
-
-function mute() {
-  toggleMute();
-  showSound();
-}
-
 function onKey(event) {
   unlock();
   showSound();
@@ -208,7 +169,6 @@ onClick("mute", mute);
 onClick("stop", stop);
 addEventListener("keydown", onKey);
 addEventListener("pointerdown", () => { unlock(); showSound(); });
-new ResizeObserver(fitWord).observe(at("now"));
 makePlots();
 showSound();
 showButtons().catch(() => {});

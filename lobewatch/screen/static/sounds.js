@@ -1,3 +1,5 @@
+import { at, put } from "./word.js";
+
 // A sound per verdict: [frequency (Hz), length (s)] one after the other.
 const SOUNDS = {
   good: [[1320, 0.15]],
@@ -16,18 +18,21 @@ export function unlock() {
   if (context.state === "suspended") context.resume();
 }
 
-export function status() {
+function status() {
   if (muted) return "Sound off";
   return navigator.userActivation?.hasBeenActive ?? context ? "Sound on" : "Sound: press any key";
 }
 
-export function toggleMute() {
-  muted = !muted;
-  localStorage.setItem("muted", muted ? "yes" : "no");
+// On the button.
+export function showSound() {
+  put("sound", status());
+  at("mute").setAttribute("aria-pressed", String(muted));
 }
 
-export function isMuted() {
-  return muted;
+export function mute() {
+  muted = !muted;
+  localStorage.setItem("muted", muted ? "yes" : "no");
+  showSound();
 }
 
 export function play(name) {

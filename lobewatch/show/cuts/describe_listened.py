@@ -24,6 +24,31 @@ WHY: Mapping[str, str] = {
 """What is wrong, and what to do, by the reason why it cannot be told."""
 
 
+NEXT: Mapping[str, str] = {
+    "stable": "lobewatch suggest names the next test cut; a deeper one teaches more",
+    "chatter": "cut less deep or at another speed; lobewatch suggest names the next test cut",
+    "flip": "cut at another speed, or less deep; lobewatch suggest names the next test cut",
+    "cannot tell": "listen again; this one teaches nothing",
+}
+"""What to do, by the word."""
+
+
+def next_step(found: ListenedCut) -> str:
+    """What to do now, in a line."""
+    return NEXT[found.heard.word]
+
+
+def why(found: ListenedCut) -> str:
+    """What the word rests on, or why it cannot be told, in a line."""
+    heard = found.heard
+    return WHY[heard.reason] if heard.word == "cannot tell" else _energy(heard.ratio)
+
+
+def _energy(ratio: float) -> str:
+    percent = f"{100 * ratio:.2g}" if ratio < 1 else f"{100 * ratio:.0f}"
+    return f"beside the lines of the spindle: {percent} % of their energy"
+
+
 def listened_text(found: ListenedCut) -> str:
     """The word, in a line."""
     heard, chatter = found.heard, found.heard.chatter
@@ -45,7 +70,7 @@ def listened_texts(found: ListenedCut) -> list[str]:
             f"{found.tooth_frequency:.1f} Hz; listened to {_seconds(found):.2f} s"
         )
     if math.isfinite(heard.ratio):
-        told.append(f"beside the lines of the spindle: {100 * heard.ratio:.2g} % of their energy")
+        told.append(_energy(heard.ratio))
     if chatter is not None:
         told.append(f"lobe {found.lobe} ({found.lobe} whole waves between two teeth), {len(chatter.lines)} side bands")
     return told + _expected(found)

@@ -2,26 +2,39 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.listening.heard_cut import ListenedCut
-from lobewatch.analysis.listening.spectrum import Lines
+from lobewatch.analysis.listening.marked import marked
 from lobewatch.show.cuts.describe_listened import listened_text
-from lobewatch.show.figures import ALARM, EVENT, GOOD, NOW, THEN, new_axes
+from lobewatch.show.figures import ALARM, EVENT, GOOD, NOW, THEN, new_axes, save_figure
+from lobewatch.tap.listening.cut_state import HIGHEST
 
-HIGHEST = 8000.0
-"""Hz."""
+MARKS = {
+    "turns": ("turns of the spindle", THEN, "|"),
+    "tooth": ("tooth passing", NOW, "o"),
+    "air": ("there in air", EVENT, "x"),
+    "chatter": ("chatter", ALARM, "D"),
+}
+"""Label, colour and mark of lines."""
 SHOWN = 1e-4
 """Of the loudest amplitude, drawn downwards."""
+
+
+def save_listened(found: ListenedCut, path: Path) -> None:
+    """The same figure as a file."""
+    save_figure(listened_figure(found), path)
 
 
 def listened_figure(found: ListenedCut) -> Figure:
     """Amplitude over frequency; without a spectrum, where it did not get so far, the word alone."""
     figure, axes = new_axes(1, (10.0, 4.5))
-    axis, spectrum, lines = axes[0], found.heard.spectrum, found.heard.lines
+    axis, spectrum = axes[0], found.heard.spectrum
     setting = found.setting
     named = f"{setting.program or 'reference cut'}, {found.speed_rpm:.0f} rpm, {1e3 * setting.depth:.3g} mm"
     axis.set_title(f"{named}: {listened_text(found).partition(':')[0]}", loc="left", fontsize=11, fontweight="bold")
@@ -31,12 +44,9 @@ def listened_figure(found: ListenedCut) -> Figure:
     inside = spectrum.frequency <= min(HIGHEST, spectrum.sample_rate / 2)
     amplitude = np.sqrt(spectrum.power[inside])
     axis.semilogy(spectrum.frequency[inside], amplitude, color="#bbbbbb", lw=0.6)
-    if lines is not None:
-        _mark(axis, lines.comb[lines.tooth != 0], "turns of the spindle", THEN, "|")
-        _mark(axis, lines.comb[lines.tooth == 0], "tooth passing", NOW, "o")
-        _mark(axis, lines.foreign, "there in air", EVENT, "x")
-    if found.heard.chatter is not None:
-        _mark(axis, found.heard.chatter.lines, "chatter", ALARM, "D")
+    for name, lines in marked(found).items():
+        label, colour, mark = MARKS[name]
+        axis.plot(lines.frequency, lines.amplitude, mark, color=colour, ms=5, label=label, fillstyle="none")
     if found.assembly is not None:
         _modes(axis, found.assembly)
     top = float(np.max(amplitude))
@@ -51,8 +61,3 @@ def _modes(axis: Axes, assembly: Assembly) -> None:
         for number, mode in enumerate(modes or ()):
             label = f"modes in {name}, at rest" if number == 0 else None
             axis.axvline(mode.frequency, color=GOOD, ls=dashes, lw=1, label=label)
-
-
-def _mark(axis: Axes, lines: Lines, label: str, colour: str, mark: str) -> None:
-    if len(lines):
-        axis.plot(lines.frequency, lines.amplitude, mark, color=colour, ms=5, label=label, fillstyle="none")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from datetime import datetime, timedelta
 from typing import NamedTuple
@@ -16,6 +17,8 @@ from lobewatch.analysis.columns.row_lobes import row_lobes
 from lobewatch.analysis.decay.trend import MONTH, Trend, day
 from lobewatch.analysis.programs.aging import softening
 from lobewatch.machine import Machine
+from lobewatch.machine.cuts.heard_cut import HeardCut
+from lobewatch.show.programs.heard import heard_of
 from lobewatch.show.reporting.figure_data import Numbers, lobe_numbers
 from modal import Mode
 
@@ -42,6 +45,8 @@ class LobeCourse(NamedTuple):
     """Of the tap tests (m), shape (m, n)."""
     ahead: Mapping[str, Floats]
     """By what it is called: the same where it is foretold (m), shape (n,)."""
+    heard: Sequence[HeardCut] = ()
+    """Test cuts of the same cut, as they were heard."""
 
     @property
     def labels(self) -> list[str]:
@@ -57,13 +62,33 @@ class LobeCourse(NamedTuple):
             self.speed_rpm[::every], {name: one[::every] for name, one in zip(self.labels, depths, strict=True)}
         )
 
+    @property
+    def marks(self) -> Numbers | None:
+        """The cuts, each with the number of the diagram (from 1) from which on it was known; None without any.
+
+        A cut that is younger than the newest tap test belongs to that.
+        """
+        known = [min(bisect_left(self.times, cut.at), len(self.times) - 1) + 1 for cut in self.heard]
+        lines = [
+            [at, cut.word, f"{cut.at:%Y-%m-%d}", cut.speed_rpm, 1e3 * cut.depth, cut.chatter_frequency_hz]
+            for at, cut in zip(known, self.heard, strict=True)
+        ]
+        heads = ["from diagram", "heard", "date", "speed (rpm)", "depth (mm)", "chatter (Hz)"]
+        return Numbers(heads, lines) if lines else None
+
 
 def lobe_course(
-    cut: str, rows: Sequence[Row], assembly: Assembly, series: Sequence[SeriesStanding], machine: Machine
+    cut: str,
+    rows: Sequence[Row],
+    assembly: Assembly,
+    series: Sequence[SeriesStanding],
+    machine: Machine,
+    cuts: Sequence[HeardCut] = (),
 ) -> LobeCourse | None:
     """Over the rows of a series that show the cut; None where fewer than two do.
 
-    assembly: that of now; series: of the same tool, where it goes. All modes fall alike, K follows the model.
+    assembly: that of now; series: of the same tool, where it goes; cuts: all that were heard. All modes fall alike,
+    K follows the model.
     """
     shown = [row for row in rows if row.x or row.y]
     picked = np.unique(np.linspace(0, len(shown) - 1, min(len(shown), MOST)).round().astype(int)).tolist()
@@ -73,7 +98,9 @@ def lobe_course(
         return None
     trends = {one.direction: one.trend for one in series if one.tool == assembly.tool and one.trend is not None}
     times, depths = zip(*known, strict=True)
-    return LobeCourse(cut, speed_grid(machine), times, np.stack(depths), _foretold(cut, assembly, trends, machine))
+    ahead = _foretold(cut, assembly, trends, machine)
+    heard = heard_of(cuts, cut, assembly.tool, machine.cuts(assembly.tool)[cut][0])
+    return LobeCourse(cut, speed_grid(machine), times, np.stack(depths), ahead, heard)
 
 
 def _foretold(cut: str, assembly: Assembly, trends: Mapping[str, Trend], machine: Machine) -> dict[str, Floats]:

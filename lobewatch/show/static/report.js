@@ -31,8 +31,31 @@
   const top = Number.isFinite(lowest) ? 6 * lowest : 1;
   const clipped = columns.map((column, i) => (i ? column.map((depth) => (depth === null ? top : Math.min(depth, top))) : column));
   const lobes = (chosen) => [clipped[0], clipped[1], clipped[now], clipped[chosen]];
+  const heard = slider.dataset.heard ? read(slider.dataset.heard).lines : [];
+  const known = () => heard.filter(([from]) => from <= Number(slider.value));
+  const SIZE = 6;
+  function drawHeard(plot) {
+    const { ctx, bbox } = plot, size = SIZE * devicePixelRatio;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.lineWidth = 2.2 * devicePixelRatio;
+    for (const [, word, , rpm, depth] of known()) {
+      const x = plot.valToPos(rpm, "x", true), y = plot.valToPos(depth, "y", true);
+      ctx.strokeStyle = word === "stable" ? "#009E73" : "#A00000";
+      ctx.beginPath();
+      if (word === "stable") ctx.arc(x, y, size, 0, 2 * Math.PI);
+      else for (const side of [-1, 1]) {
+        ctx.moveTo(x - size, y - side * size);
+        ctx.lineTo(x + size, y + side * size);
+      }
+      ctx.stroke();
+    }
+    ctx.restore();
+  }
   const plot = new uPlot({
-    width: place.clientWidth, height: 300, scales: { x: { time: false }, y: { range: [0, top] } },
+    hooks: { draw: [drawHeard] }, width: place.clientWidth, height: 300, scales: { x: { time: false }, y: { range: [0, top] } },
     axes: [{ label: "spindle speed (rpm)" }, { label: "limiting depth (mm)" }],
     series: [
       { label: "rpm" },
@@ -43,8 +66,9 @@
   }, lobes(Number(slider.value)), place);
   function choose() {
     const chosen = Number(slider.value);
-    said.textContent = names[chosen];
-    slider.setAttribute("aria-valuetext", names[chosen]);
+    const cuts = known().length;
+    said.textContent = cuts ? `${names[chosen]}, ${cuts} test cut${cuts > 1 ? "s" : ""}` : names[chosen];
+    slider.setAttribute("aria-valuetext", said.textContent);
     plot.setData(lobes(chosen));
   }
   slider.addEventListener("input", choose);

@@ -22,11 +22,13 @@ def hear_cut(
     patience: float,
     said: Description,
     show: Callable[[str], None],
+    picture: Callable[..., None],
 ) -> CutSignal:
     """What the accelerometer hears; file: in place of the device, said: what it does not say itself.
 
-    patience: how long a cut is waited for (s); show: told what to do. ValueError without a port, DataError for a file
-    that holds no such recording and where no cut is heard, DeviceError where no device answers.
+    patience: how long a cut is waited for (s); show: told what to do; picture: as in record_cut. ValueError without a
+    port, DataError for a file that holds no such recording and where no cut is heard, DeviceError where no device
+    answers.
     """
     if file is not None:
         return read_sound(file, said)
@@ -40,5 +42,6 @@ def hear_cut(
     with open_source(folder.machine.daq, port) as device:
         with folder.locked():
             checked_rate(folder, device)
+        picture(device=f"{device.identity.model}, {device.sample_rate:g} Hz")
         device.start()
-        return record_cut(device, 60 / setting.speed_rpm, patience, show)
+        return record_cut(device, 60 / setting.speed_rpm, patience, show, picture)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from acquisition import Block, Channel, DataError, Device, DeviceError
 from acquisition.files.cut_file import CutSignal
 from lobewatch.analysis.listening.find_cut import CutParts, find_cut
+from lobewatch.tap.listening.cut_state import CutStep
+from lobewatch.tap.live_signal import LEVEL_TIME
 
 LOOK = 0.5
 """A look at what has been heard every so often (s)."""
@@ -24,6 +27,11 @@ BEFORE = 1.0
 """Of air that is kept before it (s)."""
 ALIVE = 1.0
 """After so long it is looked at whether anything is heard at all (s)."""
+
+BEGIN = "hearing the spindle turn in air; begin the cut"
+ON_HOUSING = "The sensor on the housing, the spindle turning in air: now begin the cut."
+TOO_SHORT = "too short for a word, or no air before it; cut again, a second or longer"
+GO_ON = "A second or longer, then out of the cut: it is judged by itself."
 
 
 @dataclass
@@ -61,26 +69,52 @@ class _Ear:
             np.asarray(codes * self.channel.scale, np.float64), self.rate, codes, self.channel, lost, -1 in marks
         )
 
+    @property
+    def level(self) -> float:
+        """rms about the mean over the newest LEVEL_TIME (m/s^2)."""
+        wanted, newest = round(LEVEL_TIME * self.rate), list[NDArray[np.int32]]()
+        for codes in reversed(self.codes):
+            newest.insert(0, codes)
+            if sum(part.size for part in newest) >= wanted:
+                break
+        return float(np.std(np.concatenate(newest)[-wanted:]) * abs(self.channel.scale))
+
     def forget(self) -> None:
         """What was heard is no use."""
         self.codes, self.count, self.marks = [self.codes[-1]], self.codes[-1].size, []
 
 
-def record_cut(device: Device, turn: float, patience: float, show: Callable[[str], None]) -> CutSignal:
+def _unseen(**_: Any) -> None:
+    """Nobody looks."""
+
+
+def record_cut(
+    device: Device,
+    turn: float,
+    patience: float,
+    show: Callable[[str], None],
+    picture: Callable[..., None] = _unseen,
+) -> CutSignal:
     """The next whole cut that a started device hears; turn: of the spindle (s), patience: until it ends (s).
 
-    show: told what is being waited for. DataError without an accelerometer, and where no cut is heard in time;
-    DeviceError where the sensor is dead.
+    show: told what is being waited for; picture: given the fields of CutState that change. DataError without an
+    accelerometer, and where no cut is heard in time; DeviceError where the sensor is dead.
     """
-    ear = _ear(device)
-    show("hearing the spindle turn in air; begin the cut")
-    for signal in _looks(device, ear, patience):
+    ear, waiting = _ear(device), {"word": CutStep.LISTENING, "reason": ON_HOUSING}
+    show(BEGIN)
+    for signal in _looks(device, ear, patience, picture):
         parts = find_cut(signal.acceleration, signal.sample_rate, turn)
         if parts.reason == "two-cuts" or (_has_ended(parts, signal) and parts.reason):
             ear.forget()
-            show("too short for a word, or no air before it; cut again, a second or longer")
+            show(TOO_SHORT)
+            waiting = {"word": CutStep.AGAIN, "reason": f"{TOO_SHORT.capitalize()}."}
+            picture(**waiting, cut_seconds=None)
         elif not parts.reason and (_has_ended(parts, signal) or parts.end - parts.begin > LONGEST):
             return signal.part(max(parts.begin - BEFORE, 0.0), parts.end + AFTER)
+        elif np.isfinite(parts.begin):
+            picture(word=CutStep.CUTTING, reason=GO_ON, cut_seconds=parts.end - parts.begin)
+        elif ear.heard >= ALIVE * ear.rate:
+            picture(**waiting, cut_seconds=None)
     raise DataError(
         f"no cut was heard in {patience:g} s; begin to listen with the spindle turning in air, then cut, or give "
         "more --seconds"
@@ -94,15 +128,18 @@ def _ear(device: Device) -> _Ear:
     return _Ear(device.channels[rows[0]], rows[0], device.sample_rate)
 
 
-def _looks(device: Device, ear: _Ear, patience: float) -> Iterator[CutSignal]:
+def _looks(device: Device, ear: _Ear, patience: float, picture: Callable[..., None]) -> Iterator[CutSignal]:
     """What has been heard, again and again."""
-    next_look, checked = LOOK, False
+    next_look, next_level, checked = LOOK, LEVEL_TIME, False
     for block in device.blocks():
         ear.add(block)
         seconds = ear.heard / ear.rate
         if not checked and seconds >= ALIVE:
             _check_alive(ear)
             checked = True
+        if seconds >= next_level:
+            next_level = seconds + LEVEL_TIME
+            picture(level=ear.level, left=max(patience - seconds, 0.0))
         if seconds >= next_look:
             next_look = seconds + LOOK
             yield ear.signal

@@ -102,6 +102,7 @@ def test_nobody_listens_in_vain_where_nothing_can_be_written(shop: Shop, tmp_pat
         (("--program", "A"), "no port: give --port, --file"),
         (("--program", "A", "--port", "file:x.h5"), "with --file"),
         (("--program", "A", "--file", "none.csv"), "no such file"),
+        (("--program", "A", "--file", "none.csv", "--screen"), "--screen follows a device"),
     ],
 )
 def test_what_cannot_be_listened_to_is_refused_in_a_sentence(

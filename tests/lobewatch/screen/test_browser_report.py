@@ -11,8 +11,10 @@ from typing import Any
 
 import pytest
 from selenium.webdriver.common.keys import Keys
+from typer.testing import CliRunner
 
 from lobewatch.analysis.plant.plant import Plant, find_machines
+from lobewatch.cli import app
 from lobewatch.screen import DashboardServer
 from lobewatch.show.plant.plant_rows import plant_rows
 from lobewatch.show.report import render_report
@@ -23,6 +25,14 @@ Browser = Any
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
 AXE = Path(__file__).parents[2] / "data" / "axe_core" / "axe.min.js"
+MARKS = ("0, 158, 115", "160, 0, 0")
+"""Colours of rings and crosses."""
+PIXELS = """(() => { const canvas = document.querySelector('#lobes-plot canvas');
+const pixels = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height).data, [r, g, b] = [%s];
+let count = 0;
+for (let i = 0; i < pixels.length; i += 4) count += pixels[i] === r && pixels[i + 1] === g && pixels[i + 2] === b;
+return count; })()"""
+"""How many pixels of the slider's diagram have this colour."""
 BREAKS = """(() => {
   const kept = (one, name) => getComputedStyle(one)[name].includes("avoid");
   const loose = [...document.querySelectorAll("h2")].filter((one) => !kept(one.parentElement, "breakInside"));
@@ -56,6 +66,32 @@ def test_the_slider_shows_the_lobes_of_each_test_and_no_side_is_cut_off(browser:
         browser.resize((1280, 657))
         bottom = browser.ask("document.querySelector('.first').getBoundingClientRect().bottom")
         assert bottom < 657  # without a program all of it fits
+
+
+def test_the_slider_marks_the_test_cuts_known_at_each_test(browser: Browser, shop: Shop, tmp_path: Path) -> None:
+    """A ring from the second test on, and with the third a cross beside it that was cut after it."""
+    shop.run(("A", 12900, 0.5))
+    shop.tap(0, 1690.0, direction="y")
+    for days, frequency in ((0, 1713.0), (30, 1700.0), (60, 1690.0)):
+        shop.tap(days, frequency)
+    for days, said in ((20, ["--stable"]), (70, ["--chatter"])):
+        where = ["--program", "A", "--speed", "12900" if days == 20 else "11000", "--depth", "0.5"]
+        when = ["--date", f"{shop.start + timedelta(days=days):%Y-%m-%d}"]
+        assert CliRunner().invoke(app, ["observe", str(shop.path), *where, *when, *said]).exit_code == 0
+    report = tmp_path / "report.html"
+    report.write_text(render_report(shop.logbook, "reference", "x", shop.start + timedelta(days=80)), "utf-8")
+    browser.open(report.as_uri())
+    slider = browser.part("lobes-when")
+    shown = {}
+    for day in ("2026-03-16", "2026-02-14", "2026-01-15"):
+        while day not in browser.part("lobes-said").text:
+            slider.send_keys(Keys.ARROW_LEFT)
+        shown[day] = browser.part("lobes-said").text, *(browser.ask(PIXELS % colour) > 20 for colour in MARKS)
+    assert shown == {
+        "2026-03-16": ("2026-03-16, 2 test cuts", True, True),
+        "2026-02-14": ("2026-02-14, 1 test cut", True, False),
+        "2026-01-15": ("2026-01-15", False, False),
+    }
 
 
 @pytest.fixture(scope="module")

@@ -97,3 +97,12 @@ def test_cuts_of_another_tool_say_nothing_and_what_contradicts_is_said(shop: Sho
     assert [remark.about for remark in found.remarks if remark.code == "cut-unexplained"] == ["c3"]
     shop.edit('tool = "reference"', 'tool = "long"')
     assert judged(shop).assembly.cuts == 0
+
+
+def test_cuts_do_not_settle_a_direction_that_was_not_tapped(shop: Shop) -> None:
+    """Even where no spindle that explains them chatters at the program."""
+    shop.run(("A", 12900, 0.5))
+    shop.tap(0, 1713.0)
+    hear(shop, 12900, 1.0, "stable")
+    verdict = judged(shop)
+    assert (verdict.word, verdict.decided_by) == (Word.DOUBTFUL, "untapped")

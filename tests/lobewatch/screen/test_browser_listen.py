@@ -1,0 +1,125 @@
+"""A cut that is listened to, in a real browser: from the first word to the last, through the port of a device."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquisition.devices import find_driver
+from acquisition.emulation import Passage
+from lobewatch.analysis import Logbook
+from lobewatch.cli import main
+from lobewatch.machine import MachineFolder, make_machine_folder
+from lobewatch.machine.cuts.setting import cut_setting
+from lobewatch.tap.milling.emulated_cut import emulate_cut
+
+Browser = Any
+"""Chromium on one page: Browser of conftest.py."""
+AXE = Path(__file__).parents[2] / "data" / "axe_core" / "axe.min.js"
+PROGRAM, SPEED = "A: slot at 12 600 rpm", 12600.0
+PASSAGE = Passage(before=2.5, ramp=0.05, steady=1.2, after=3.0)
+SIZES = ((1280, 657), (768, 1024), (390, 844))
+LEAST = {1280: 110.0, 768: 70.0, 390: 46.0}
+"""Height of the letters of a word (px), by the width of the page."""
+EXTENT = "[document.documentElement.scrollWidth, document.documentElement.scrollHeight]"
+CAPITALS = """(() => { const pen = document.createElement('canvas').getContext('2d');
+const { fontWeight, fontSize, fontFamily } = getComputedStyle(document.getElementById('text'));
+pen.font = `${fontWeight} ${fontSize} ${fontFamily}`;
+return pen.measureText('H').actualBoundingBoxAscent; })()"""
+TOKEN = "a-token-of-the-test"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> MachineFolder:
+    make_machine_folder(tmp_path / "mill", "surrogate_machine.toml")
+    return MachineFolder(tmp_path / "mill")
+
+
+def listen() -> None:
+    """As at the terminal."""
+    with contextlib.suppress(SystemExit):
+        main()
+
+
+def collected(told: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """All that has been printed to stderr."""
+    told.append(capsys.readouterr().err)
+    return "".join(told)
+
+
+def address(told: str) -> str:
+    found = re.search(r"screen: (\S+)", told)
+    return found[1] if found else ""
+
+
+def check_page(browser: Browser) -> None:
+    """The word can be read from 3 m at all sizes, nothing is beside the page, and axe finds nothing."""
+    for size in SIZES:
+        browser.resize(size)
+        browser.wait(lambda size=size: letters(browser) >= LEAST[size[0]])
+        browser.wait(lambda size=size: browser.ask(EXTENT) == list(size))
+        for name in ("text", "figures", "reason", "mute"):
+            box = browser.part(name).rect
+            assert min(box["x"], box["y"]) >= 0, (name, size)
+            assert box["x"] + box["width"] <= size[0], (name, size)
+            assert box["y"] + box["height"] <= size[1], (name, size)
+        browser.driver.execute_script(AXE.read_text("utf-8"))
+        found = browser.driver.execute_async_script("axe.run().then(arguments[0])")
+        assert [(one["id"], one["nodes"][0]["html"]) for one in found["violations"]] == [], size
+
+
+def letters(browser: Browser) -> float:
+    """Height of the capitals of the word (px)."""
+    return float(browser.ask(CAPITALS))
+
+
+@pytest.mark.parametrize(
+    ("depth_mm", "kind", "text"), [(2.0, "stable", "STABLE"), (7.0, "chatter", "CHATTER")], ids=["stable", "chatter"]
+)
+def test_the_page_goes_from_air_to_the_word_by_itself(
+    browser: Browser,
+    folder: MachineFolder,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    depth_mm: float,
+    kind: str,
+    text: str,
+) -> None:
+    setting = cut_setting(folder.machine, PROGRAM, SPEED, depth_mm)
+    emulated = emulate_cut(folder, find_driver("taps"), setting, passage=PASSAGE)
+    told: list[str] = []
+    with emulated.device as device:
+        said = ["--program", PROGRAM, "--speed", SPEED, "--depth", depth_mm, "--port", device.port, "--screen"]
+        command = ["lobewatch", "listen", folder.path, *said, "--token", TOKEN]
+        monkeypatch.setattr(sys, "argv", [str(part) for part in command])
+        listening = threading.Thread(target=listen)
+        listening.start()
+        try:
+            browser.wait(lambda: address(collected(told, capsys)))
+            browser.open(address("".join(told)), SIZES[0])
+            browser.see("title", PROGRAM)
+            browser.see("unit", "left")
+            browser.see("reason", "now begin the cut")
+            assert browser.part("text").text == "LISTENING"
+            browser.wait(lambda: browser.part("level-now").text not in ("", "-"))
+            browser.see("text", "CUTTING")
+            browser.see("unit", "of cut")
+            browser.see("text", text)
+        finally:
+            listening.join()
+    (cut,) = Logbook.open(folder.path).cuts
+    assert cut.word == kind
+    browser.see("device", "lobewatch has ended; this is its last picture")
+    assert f"saved as {cut.id}" in browser.part("device").text
+    assert f"{cut.speed_rpm:.0f} rpm" in browser.part("figures").text
+    if cut.chatter_frequency_hz is not None:
+        assert browser.part("figure").text == f"{cut.chatter_frequency_hz:.0f} Hz"
+    assert browser.part("next").text.startswith("Next: ")
+    assert browser.ask("document.body.dataset.kind") == kind
+    check_page(browser)

@@ -25,6 +25,8 @@ CONVERGED = 1e-12
 """A step that would change no frequency by more than this part of it ends the search."""
 BLURRED = 1e-8
 """Below this, a step that brings nothing has met rounding, and the search has ended as well."""
+ROUNDING = 1e-10
+"""Frequencies may be off by this part of them: a step that promises no more than that can hide has met it too."""
 UNLIKELY = 1e-3
 """A chi-square with less probability than this is reported; where there is none, a larger relative residual."""
 
@@ -112,13 +114,20 @@ def minimize(
         trial = problem.evaluate(np.clip(state.log_factor + _step(state, free, damping), -LIMIT, LIMIT))
         if trial.cost < state.cost:
             state, damping = trial, max(damping / 10, 1e-15)
-        elif change <= max(BLURRED, converged):
+        elif change <= max(BLURRED, converged) or _hidden(problem, state, free):
             return state, True
         elif damping > 1e6:
             break
         else:
             damping *= 10
     return state, False
+
+
+def _hidden(problem: Problem, state: State, free: NDArray[np.int_]) -> bool:
+    """Whether the sum of squares falls, by the step of Gauss and Newton, by no more than rounding changes it."""
+    left = state.residual + state.slope @ _step(state, free, 0.0)
+    blur = ROUNDING * float(np.linalg.norm(state.fitted / problem.measured.scale))
+    return state.cost - float(left @ left) <= 2 * math.sqrt(state.cost) * blur + blur**2
 
 
 def _step(state: State, free: NDArray[np.int_], damping: float) -> _Float:

@@ -11,9 +11,8 @@ import numpy as np
 
 from acquisition import Remark
 from lobewatch.analysis.learning.learnt import Expecting, Learnt
-from lobewatch.analysis.learning.likelihood import FREQUENCY, MISJUDGED, heard_base
+from lobewatch.analysis.learning.likelihood import FREQUENCY, MISJUDGED
 from lobewatch.analysis.learning.observed import Observed
-from lobewatch.analysis.listening.folded import folded
 
 CHANCE = MISJUDGED + 0.01
 """What was heard is beyond chance where all else gives it less."""
@@ -51,8 +50,7 @@ def contradiction(expecting: Expecting) -> Contradiction | None:
     if not np.isfinite(cut.frequency) or not cut.chatters:
         return None
     teeth = cut.cut.teeth * cut.speed_rpm / 60
-    off = np.abs(folded(heard_base(cut, teeth), teeth) - guess.base)
-    near = off < AWAY * FREQUENCY * cut.frequency
+    near = np.any(guess.off(cut, teeth) < AWAY * FREQUENCY * cut.frequency, axis=0)
     return Contradiction.FREQUENCY if np.sum(weights * near) < NONE else None
 
 

@@ -21,7 +21,7 @@ EDGE = 0.05
 MISJUDGED = 0.02
 """Share of cuts that are heard as what they are not."""
 FREQUENCY = 0.01
-"""Standard deviation of a chatter frequency against the one predicted at the depth of the cut, relative."""
+"""Standard deviation of a chatter frequency against the one predicted, relative."""
 STRANGE = 0.05
 """Share of chatter frequencies that say nothing."""
 OTHER_KIND = 0.1
@@ -41,6 +41,8 @@ class Predicted(NamedTuple):
     """Logarithm of depth over limit; positive where it chatters."""
     base: Floats
     """Frequency of what grows most, folded to between 0 and half the tooth frequency (Hz); NaN where not known."""
+    at_limit: Floats
+    """The same at the limit at its speed, by zero order."""
     flip: NDArray[np.bool_]
     """Whether that is of period two."""
 
@@ -48,6 +50,15 @@ class Predicted(NamedTuple):
     def chance(self) -> Floats:
         """That it is heard to chatter."""
         return np.asarray(MISJUDGED + (1 - 2 * MISJUDGED) * ndtr(self.excess / EDGE))
+
+    def off(self, seen: Observed, tooth_frequency: float) -> Floats:
+        """How far what was heard is from both frequencies (Hz), shape (2, r).
+
+        Chatter that has grown leaves the cut, and sounds like what grows most or like what is at the limit: beyond the
+        limit of a pocket these are two modes or lobes.
+        """
+        heard = folded(_heard_base(seen, tooth_frequency), tooth_frequency)
+        return np.asarray(np.abs(heard - np.array([self.base, self.at_limit])))
 
 
 def predicted(seen: Observed, draws: Draws) -> Predicted:
@@ -75,14 +86,14 @@ def _log_of_sound(seen: Observed, guess: Predicted, tooth_frequency: float) -> F
     alike = guess.flip == (seen.word == "flip")
     kind = np.where(alike, 1 - OTHER_KIND, OTHER_KIND)
     wide = FREQUENCY * (seen.frequency if np.isfinite(seen.frequency) else tooth_frequency)
-    off = np.abs(folded(heard_base(seen, tooth_frequency), tooth_frequency) - guess.base)
+    off = guess.off(seen, tooth_frequency)
     near = np.exp(-((off / wide) ** 2) / 2) / (wide * np.sqrt(np.pi / 2))
     anywhere = 2 / tooth_frequency
-    near = np.where(np.isfinite(off), near, anywhere)
+    near = np.mean(np.where(np.isfinite(off), near, anywhere), axis=0)
     return np.asarray(np.log(kind * ((1 - STRANGE) * near + STRANGE * anywhere) / anywhere))
 
 
-def heard_base(seen: Observed, tooth_frequency: float) -> float:
+def _heard_base(seen: Observed, tooth_frequency: float) -> float:
     """Chatter frequency that was heard (Hz), or that of period two where none was told."""
     return seen.frequency if np.isfinite(seen.frequency) else tooth_frequency / 2
 
@@ -92,13 +103,13 @@ def _by_mean_force(rows: MillingRows, seen: Observed) -> Predicted:
     mean = MeanForce.of(rows)
     limit, at_limit = (table[:, 0] for table in mean.limits(rows.speed_rpm[:, np.newaxis]))
     excess = np.clip(np.log(seen.depth / limit), -5, 5)
-    frequency = at_limit
+    frequency = at_limit.copy()
     beyond = np.flatnonzero(excess > 0) if seen.has_frequency else np.empty(0, dtype=np.intp)
     if beyond.size:
         _, own = MeanForce(mean.rows[beyond], mean.force[beyond]).loudest(rows.speed_rpm[beyond], seen.depth)
         frequency[beyond] = np.where(np.isfinite(own), own, frequency[beyond])
     teeth = 1 / rows.tooth_period
-    return Predicted(excess, folded(frequency, teeth), np.zeros(len(rows), dtype=bool))
+    return Predicted(excess, folded(frequency, teeth), folded(at_limit, teeth), np.zeros(len(rows), dtype=bool))
 
 
 def _by_multipliers(rows: MillingRows, seen: Observed) -> Predicted:
@@ -108,4 +119,6 @@ def _by_multipliers(rows: MillingRows, seen: Observed) -> Predicted:
     quiet = np.min(rows.damping_ratio * rows.frequency, axis=1) * rows.tooth_period
     excess = np.clip(np.log(np.maximum(np.abs(multiplier), 1e-9)) / quiet, -5, 5)
     angle = np.abs(np.angle(multiplier))
-    return Predicted(excess, angle / (2 * np.pi) / rows.tooth_period, np.pi - angle < REAL)
+    teeth = 1 / rows.tooth_period
+    _, at_limit = MeanForce.of(rows).limits(rows.speed_rpm[:, np.newaxis])
+    return Predicted(excess, angle / (2 * np.pi) * teeth, folded(at_limit[:, 0], teeth), np.pi - angle < REAL)

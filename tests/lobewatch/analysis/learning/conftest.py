@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from lobes import Cut, MillingRows, milling_system, rows_of
+from lobes import Cut, MillingRows, milling_system, rows_of, zero_order
 from lobes.floquet import largest_multipliers, piece_numbers
 from lobewatch.analysis.learning.grid import Grid, speeds_between
 from lobewatch.analysis.learning.learnt import Learnt, prior
@@ -46,11 +46,21 @@ class Mill:
         speeds = speeds_between(4000, 20000)
         return Grid(self.cut, (0.0,), speeds, np.full(speeds.shape, 0.012), np.ones(speeds.shape))
 
+    @property
+    def turning(self) -> tuple[Mode, Mode]:
+        """x and y at speed."""
+        x, y = (mode.scaled(by, 1.0, "") for mode, by in zip((self.x, self.y), self.frequency, strict=True))
+        return x, y
+
+    @property
+    def pushed(self) -> Cut:
+        """The cut with its force at speed."""
+        return replace(self.cut, tangential=self.force * self.cut.tangential, radial=self.force * self.cut.radial)
+
     def multiplier(self, speed: float, depth: float) -> complex:
         """Of the spindle that turns, by semi-discretisation."""
-        x, y = (mode.scaled(by, 1.0, "") for mode, by in zip((self.x, self.y), self.frequency, strict=True))
-        cut = replace(self.cut, tangential=self.force * self.cut.tangential, radial=self.force * self.cut.radial)
-        rows = rows_of(milling_system([x], [y]), cut, np.array([speed]))
+        x, y = self.turning
+        rows = rows_of(milling_system([x], [y]), self.pushed, np.array([speed]))
         return complex(largest_multipliers(rows, np.array([[depth]]), piece_numbers(rows, depth))[0, 0])
 
     def hear(self, speed: float, depth: float) -> Observed:
@@ -64,6 +74,11 @@ class Mill:
         own = np.array([self.x.frequency * self.frequency[0], self.y.frequency * self.frequency[1]])
         near = np.min(np.abs(family[:, np.newaxis] / own - 1.02), axis=1)
         return Observed(self.cut, speed, depth, "chatter", float(family[np.argmin(near)]))
+
+    def chatter(self, speed: float) -> Observed:
+        """Of a slot a tenth deeper than its limit."""
+        x, y = self.turning
+        return self.hear(speed, 1.1 * float(zero_order([x], [y], self.pushed, [speed]).depth[0]))
 
 
 def doubt() -> Doubt:

@@ -7,7 +7,7 @@ with `lobes/`. Truths: docs/cuts.md; spindles of 800 to 2500 Hz with one mode in
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from acquisition.emulation.milling_cut import MillingCut, Passage
 from lobes import Cut, lowest_of, milling_system, rows_of, stability_boundary, zero_order
 from lobewatch.analysis.learning.grid import Grid, floored, speeds_between, trusted
 from lobewatch.analysis.learning.learnt import Learnt, prior
+from lobewatch.analysis.learning.likelihood import log_likelihood, predicted
 from lobewatch.analysis.learning.mean_force import is_constant
 from lobewatch.analysis.learning.observed import Observed
 from lobewatch.analysis.learning.suggest import best_heard, suggest
@@ -63,17 +64,7 @@ class Hidden:
         self.ratios |= {"tangential": self._drawn("tangential"), "ratio": draw.uniform(0.8, 1.2)}
         if self.frequency is not None:
             self.ratios |= {"frequency_x": self.frequency, "frequency_y": self.frequency}
-        self.modes = [
-            Mode(
-                mode.frequency * self.ratios[f"frequency_{side}"],
-                mode.damping_ratio * self.ratios[f"damping_{side}"],
-                mode.stiffness * self.ratios[f"stiffness_{side}"],
-            )
-            for mode, side in zip(self.rest, "xy", strict=True)
-        ]
-        push = self.ratios["tangential"]
-        radial = self.cut.radial * push * self.ratios["ratio"]
-        self.truly = replace(self.cut, tangential=self.cut.tangential * push, radial=radial)
+        self.turn(self.ratios)
         speeds = speeds_between(LOW, HIGH)
         trust = trusted([self.rest[0]], [self.rest[1]], self.cut, (0.0,), speeds, DEEPEST)
         self.grid = Grid(self.cut, (0.0,), speeds, np.full(speeds.shape, DEEPEST), trust)
@@ -81,6 +72,20 @@ class Hidden:
             rows_of(milling_system([self.rest[0]], [self.rest[1]]), self.cut, np.ones(1)), DOUBT
         )
         self.optimum = self._optimum()
+
+    def turn(self, ratios: Mapping[str, float]) -> None:
+        """Make it so at speed, over what it is at rest."""
+        self.modes = [
+            Mode(
+                mode.frequency * ratios[f"frequency_{side}"],
+                mode.damping_ratio * ratios[f"damping_{side}"],
+                mode.stiffness * ratios[f"stiffness_{side}"],
+            )
+            for mode, side in zip(self.rest, "xy", strict=True)
+        ]
+        push = ratios["tangential"]
+        radial = self.cut.radial * push * ratios["ratio"]
+        self.truly = replace(self.cut, tangential=self.cut.tangential * push, radial=radial)
 
     def _drawn(self, name: str) -> float:
         middle, spread = TRUE[name]
@@ -177,6 +182,21 @@ def noticed(spindles: Sequence[Hidden], number: int = 3) -> tuple[float, float]:
     return float(np.mean(too_early)), float(np.mean(in_time))
 
 
+def test_chatter_beyond_a_pocket_that_sounds_as_at_its_limit_speaks_for_the_truth() -> None:
+    """Simulated in time; what grows most at this depth sounds 22 % higher."""
+    one, speed, depth = Hidden(215), 13510.0, 12e-3
+    truth = one.learnt.draws[:1]
+    truth.normal[:] = 0.0
+    one.turn({name: float(values[0]) for name, values in truth.ratios().items()})
+    ((word, pitch),) = heard([one.milling(speed, depth)])
+    seen = Observed(one.cut, speed, depth, word, pitch)
+    guess, teeth = predicted(seen, truth), one.cut.teeth * speed / 60
+    own, at_limit = guess.off(seen, teeth)[:, 0] / pitch
+    assert own > 0.1
+    assert at_limit < 0.01
+    assert log_likelihood(seen, guess, teeth) > 1
+
+
 @pytest.mark.long
 @pytest.mark.timeout(3000)
 def test_five_cuts_find_most_of_what_a_hidden_spindle_can_do() -> None:
@@ -184,7 +204,7 @@ def test_five_cuts_find_most_of_what_a_hidden_spindle_can_do() -> None:
     five_cuts(spindles)
     share = [one.share[-1] for one in spindles]
     assert np.median(share) >= 0.93
-    assert np.quantile(share, 0.1) >= 0.84
+    assert np.quantile(share, 0.1) >= 0.85
     assert np.mean([sum(cut.chatters for cut in one.cuts) for one in spindles]) <= 2.5
     for names in (["tangential"], ["frequency_x", "frequency_y"]):
         held = [

@@ -101,11 +101,11 @@ def test_chatter_teaches_the_frequency_of_the_direction_that_it_is_of() -> None:
 
 def test_three_frequencies_notice_what_is_far_from_the_prior_and_one_does_not() -> None:
     mill = Mill(frequency=(0.985, 0.905))
-    learnt = mill.prior.hearing(mill.hear(9500, 3e-3))
+    learnt = mill.prior.hearing(mill.chatter(11000))
     assert learnt.intervals["frequency_y"].low < 0.92
     assert not learnt.is_far_off
-    for speed in (11000, 13500):
-        learnt = learnt.hearing(mill.hear(speed, 3e-3))
+    for speed in (12000, 13500):
+        learnt = learnt.hearing(mill.chatter(speed))
     assert learnt.intervals["frequency_y"].high < 0.945
     assert learnt.is_far_off
 
@@ -113,7 +113,7 @@ def test_three_frequencies_notice_what_is_far_from_the_prior_and_one_does_not() 
 def test_old_cuts_are_of_a_frequency_that_has_fallen_since(mill: Mill) -> None:
     now = then = mill.prior
     for speed in (9500, 13500):
-        seen = mill.hear(speed, 3e-3)
+        seen = mill.chatter(speed)
         now, then = now.hearing(seen), then.hearing(replace(seen, moved=1.02))
     assert then.intervals["frequency_y"].mean < now.intervals["frequency_y"].mean - 0.004
     assert [replace(seen, moved=moved).weight for moved in (1.0, 0.98, 1.05)] == pytest.approx(
@@ -138,7 +138,7 @@ def test_a_cut_in_another_material_may_come_first(mill: Mill) -> None:
 
 def test_learning_is_the_same_again_and_few_draws_are_made_anew() -> None:
     mill = Mill(frequency=(0.985, 0.945))
-    cuts = [mill.hear(speed, 3e-3) for speed in (9500, 13500)]
+    cuts = [mill.chatter(speed) for speed in (9500, 13500, 11000)]
     once, again = (learn_from_sound(mill.prior, cuts)[0] for _ in range(2))
     assert np.array_equal(once.draws.normal, again.draws.normal)
     assert np.array_equal(once.log, again.log)

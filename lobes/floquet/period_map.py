@@ -88,8 +88,9 @@ def period_map(rows: MillingRows, depth: Floats, numbers: NDArray[np.int64]) -> 
 
 def _forces(rows: MillingRows, starts: Floats, angle: Floats, depth: Floats) -> Floats:
     """Depth times force matrix at the nodes of pieces that start at angles (r, k) (N/m), shape (r, d, k, s, p, p)."""
-    at = starts[..., np.newaxis] + angle[:, np.newaxis, np.newaxis] * gauss_stages().node
-    shares = force_shares(rows.cut, at, depth[:, :1])
+    apart = slice(None) if rows.cut.helix_lag > 0 else slice(1)  # straight teeth: the angles are those of the first row
+    at = starts[apart, :, np.newaxis] + angle[apart, np.newaxis, np.newaxis] * gauss_stages().node
+    shares = force_shares(rows.cut, at, depth[apart, :1])
     matrix = np.einsum("rc,rkscij->rksij", np.stack((rows.tangential, rows.radial), axis=1), shares)
     matrix = turned(matrix, rows.feed_angle[:, np.newaxis, np.newaxis])[..., rows.axes[:, np.newaxis], rows.axes]
     return np.asarray(depth[..., *([np.newaxis] * 4)] * matrix[:, np.newaxis])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +51,7 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
         depth[lower], chatter[lower], setting[lower] = limit[lower], frequency[lower], i
     found = np.isfinite(depth)
     waves = np.where(found, np.floor(np.where(found, chatter, 0) / tooth_frequency), -1).astype(np.int64)
+    loops = [(branch.grid, responses[i], waves[found & (setting == i)]) for i, branch in enumerate(branches)]
     return StabilityLobes(
         speed_rpm=speed_rpm,
         depth=depth,
@@ -57,11 +59,7 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
         kind=np.where(found, "hopf", ""),
         crossings=depth[:, np.newaxis],
         method=method,
-        lobes=tuple(
-            lobe
-            for i, branch in enumerate(branches)
-            for lobe in _lobes(branch.grid, responses[i], cut, np.unique(waves[found & (setting == i)]), speed_rpm)
-        ),
+        curves=partial(_lobes_of, loops, cut, speed_rpm),
         remarks=_out_of_band(branches, responses)
         or _out_of_range(method, cut, _weakest(branches, responses), speed_rpm),
     )
@@ -157,7 +155,8 @@ def _lowest_step(
     period = 1 / tooth_frequency[:, np.newaxis]
     at_lower, at_upper = grid[lower] * period + turn[lower], grid[upper] * period + turn[upper]
     floor = np.floor(at_lower)
-    row, column = np.nonzero(floor != np.floor(at_upper))
+    crosses = floor != np.floor(at_upper)
+    row, column = np.divmod(np.flatnonzero(crosses), block.size)
     start, end = at_lower[row, column], at_upper[row, column]
     number = floor[row, column] + (end > start)
     share = (number - start) / (end - start)
@@ -196,6 +195,14 @@ def _refine(branch: TipResponse, step: Rows, missing: Floats, tooth_frequency: F
         at_low, at_high = np.where(before, value, weight * at_low), np.where(before, weight * at_high, value)
         was_before = before
     return middle
+
+
+def _lobes_of(
+    loops: Sequence[tuple[Floats, Complexes, NDArray[np.int64]]], cut: Cut, speed_rpm: Floats
+) -> Iterator[Lobe]:
+    """Lobes of loops, each known by its frequencies (Hz), its response there, and waves between teeth at the limits."""
+    for grid, response, waves in loops:
+        yield from _lobes(grid, response, cut, np.unique(waves), speed_rpm)
 
 
 def _lobes(

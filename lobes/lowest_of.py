@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from lobes.stability_lobes import StabilityLobes
+from lobes.stability_lobes import Lobe, StabilityLobes
 
 
 def lowest_of(diagrams: Sequence[StabilityLobes]) -> StabilityLobes:
@@ -27,6 +28,10 @@ def lowest_of(diagrams: Sequence[StabilityLobes]) -> StabilityLobes:
         chatter_frequency=np.stack([one.chatter_frequency for one in diagrams])[lowest, speed],
         kind=np.stack([one.kind for one in diagrams])[lowest, speed],
         crossings=np.stack(crossings)[lowest, speed],
-        lobes=tuple(lobe for one in diagrams for lobe in one.lobes),
+        curves=partial(_lobes_of, diagrams),
         remarks=tuple(dict.fromkeys(remark for one in diagrams for remark in one.remarks)),
     )
+
+
+def _lobes_of(diagrams: Sequence[StabilityLobes]) -> list[Lobe]:
+    return [lobe for one in diagrams for lobe in one.lobes]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
@@ -59,8 +60,8 @@ class StabilityLobes:
     """Depths where stability changes, rising in each row and filled up with inf (m), shape (n, k)."""
     method: MethodName
     """How the limits were found."""
-    lobes: tuple[Lobe, ...] = ()
-    """Lobes that set the limit at one speed at least, as far as the speeds reach; empty where a method has none."""
+    curves: Callable[[], Iterable[Lobe]] = tuple
+    """Works out `lobes`."""
     remarks: tuple[Remark, ...] = ()
     """Why the method or the FRF is out of its range for this cut, and what to do."""
     detail: str = ""
@@ -82,6 +83,13 @@ class StabilityLobes:
             raise ValueError(
                 f"depth[{bad[0]}]={self.depth[bad[0]]} m is not > 0; give inf where a cut is stable at any depth"
             )
+
+    @property
+    def lobes(self) -> tuple[Lobe, ...]:
+        """Lobes that set the limit at one speed at least, as far as the speeds reach; empty where a method has none.
+
+        Worked out each time they are asked for."""
+        return tuple(self.curves())
 
     @property
     def stated_method(self) -> str:

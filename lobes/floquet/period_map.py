@@ -88,8 +88,9 @@ def period_map(rows: MillingRows, depth: Floats, numbers: NDArray[np.int64]) -> 
 
 def _forces(rows: MillingRows, starts: Floats, angle: Floats, depth: Floats) -> Floats:
     """Depth times force matrix at the nodes of pieces that start at angles (r, k) (N/m), shape (r, d, k, s, p, p)."""
-    at = starts[..., np.newaxis] + angle[:, np.newaxis, np.newaxis] * gauss_stages().node
-    shares = force_shares(rows.cut, at, depth[:, :1])
+    apart = slice(None) if rows.cut.helix_lag > 0 else slice(1)  # straight teeth: the angles are those of the first row
+    at = starts[apart, :, np.newaxis] + angle[apart, np.newaxis, np.newaxis] * gauss_stages().node
+    shares = force_shares(rows.cut, at, depth[apart, :1])
     matrix = np.einsum("rc,rkscij->rksij", np.stack((rows.tangential, rows.radial), axis=1), shares)
     matrix = turned(matrix, rows.feed_angle[:, np.newaxis, np.newaxis])[..., rows.axes[:, np.newaxis], rows.axes]
     return np.asarray(depth[..., *([np.newaxis] * 4)] * matrix[:, np.newaxis])
@@ -158,18 +159,20 @@ class _Response:
         """The maps (r, d, k, m, m) of k pieces with forces -force (d - w) at their nodes, force (r, d, k, s, p, p)."""
         *cases, s, p, _ = force.shape
         size, states = p * s, self.ends.shape[-1]
-        each = np.moveaxis(force, -3, -1)
-        loop = self.gives[:, np.newaxis, np.newaxis, :, :, np.newaxis] * each[..., np.newaxis, :, :]
-        loop = loop.reshape(*cases, size, size)
+        each = np.ascontiguousarray(np.moveaxis(force, -3, -1))
+        loop, push = np.empty((*cases, size, size)), np.zeros((*cases, states, size))
+        gives = self.gives[:, np.newaxis, np.newaxis, :, :, np.newaxis]
+        np.multiply(gives, each[..., np.newaxis, :, :], out=loop.reshape(*cases, p, s, p, s))
         i = np.arange(size)
         loop[..., i, i] += 1
-        push = (self.pushes[:, np.newaxis, np.newaxis, :, :, np.newaxis] * each[..., np.newaxis, :, :, :]).sum(-3)
-        push = push.reshape(*cases, states, size)
+        for one in range(p):
+            pushes = self.pushes[:, np.newaxis, np.newaxis, :, one, np.newaxis]
+            push.reshape(*cases, states, p, s)[...] += pushes * each[..., np.newaxis, one, :, :]
         inverse = np.linalg.inv(loop)
         made = np.empty((*cases, states + size, states + size))
-        made[..., states:, :states] = inverse @ self.shows.reshape(-1, 1, 1, size, states)
-        made[..., states:, states:] = -inverse
-        made[..., :states, :] = -push @ made[..., states:, :]
+        np.matmul(inverse, self.shows.reshape(-1, 1, 1, size, states), out=made[..., states:, :states])
+        np.negative(inverse, out=made[..., states:, states:])
+        made[..., :states, :] = np.negative(push, out=push) @ made[..., states:, :]
         made[..., :states, :states] += self.ends[:, np.newaxis, np.newaxis]
         made[..., states + i, states + i] += 1
         return made

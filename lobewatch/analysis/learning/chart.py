@@ -61,8 +61,8 @@ class Chart:
     def gains(self, weights: Floats, best: float) -> Floats:
         """Expected gain of removal rate (rpm m) by the best cut at each speed, shape (s,)."""
         stable = np.cumsum(weights[self.order], axis=0)
-        wanted = (stable > LIKELY) & (self.chips > best)
-        return np.asarray(np.max(np.where(wanted, stable * (self.chips - best), 0.0), axis=0))
+        more = np.maximum(self.chips - best, 0.0)
+        return np.asarray(np.max(np.where(stable > LIKELY, stable * more, 0.0), axis=0))
 
     def candidates(self, best: float) -> Iterator[tuple[int, float]]:
         """Speeds, by their place, and depths (m) that are worth looking at."""

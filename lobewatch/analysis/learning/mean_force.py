@@ -182,7 +182,8 @@ def _lowest(grid: Floats, loop: Complexes, teeth: Floats) -> tuple[Floats, Float
     low, grid, real, turn = low[:, first:last], *(part[:, first : last + 1] for part in (grid, loop.real, turn))
     place = grid[:, np.newaxis] / teeth[..., np.newaxis] + turn[:, np.newaxis]
     whole = np.floor(place)
-    row, speed, step = np.nonzero((whole[..., 1:] != whole[..., :-1]) & low[:, np.newaxis])
+    crosses = (whole[..., 1:] != whole[..., :-1]) & low[:, np.newaxis]
+    row, speed, step = np.unravel_index(np.flatnonzero(crosses), crosses.shape)
     before, after = place[row, speed, step], place[row, speed, step + 1]
     share = (np.maximum(whole[row, speed, step], whole[row, speed, step + 1]) - before) / (after - before)
     there = real[row, step] + share * (real[row, step + 1] - real[row, step])

@@ -17,7 +17,9 @@ from lobewatch.analysis.programs.drawn import Drawn
 FALLS = np.array([0.0, 0.05, 0.10, 0.15, 0.20])
 """Falls of the frequency for which the model is recalibrated; between them its stiffness is interpolated."""
 STEPS = 101
-"""Looks between no fall and the largest of them."""
+"""Looks between no fall and the largest of them ..."""
+PARTS = 8
+"""... of which only those parts are taken that come before the first chatter."""
 
 StiffnessAt = Callable[[float], float]
 
@@ -63,10 +65,13 @@ def tolerable_decay(drawn: Drawn, depth: float, stiffness_at: StiffnessAt) -> fl
 
     0.0 where it is unstable now, inf where nothing happens down to 80 %. Looks every 0.2 % of fall.
     """
-    falls = np.linspace(0, FALLS[-1], STEPS)
-    middle = aged(drawn.some(np.array([0])), falls, stiffness_at)
-    worst = np.max(middle.growth(depth * np.array(SHARES)), axis=1)
-    if np.all(worst < 0):
+    falls, worst = np.linspace(0, FALLS[-1], STEPS), np.empty(0)
+    for part in np.array_split(falls, PARTS):
+        middle = aged(drawn.some(np.array([0])), part, stiffness_at)
+        worst = np.append(worst, np.max(middle.growth(depth * np.array(SHARES)), axis=1))
+        if np.any(worst >= 0):
+            break
+    else:
         return math.inf
     first = int(np.argmax(worst >= 0))
     if first == 0:

@@ -1,6 +1,6 @@
 """Looking for settings that would be called stable, with something to spare.
 
-A diagram by zero order says where to look. What is recommended has been judged like any program: `verdict` calls it
+A diagram by zero order says where to look. What is recommended has been judged like any program: `judged` calls it
 stable, and the same draws are stable as the spindle will be when it is tapped again.
 """
 
@@ -20,9 +20,9 @@ from lobewatch.analysis.programs.aging import StiffnessAt, aged, softening
 from lobewatch.analysis.programs.drawn import Drawn
 from lobewatch.analysis.programs.drawn_limits import ALIKE
 from lobewatch.analysis.programs.promise import Promise
-from lobewatch.analysis.programs.verdict import Word, verdict
+from lobewatch.analysis.programs.verdict import Word, judged
 from lobewatch.analysis.series import fall_in
-from lobewatch.machine import Machine, ProgramTable
+from lobewatch.machine import Machine, ProgramTable, drive_limit
 
 SPARE = 0.20
 """Depth that a recommended setting has to spare in the middle of the doubt."""
@@ -159,17 +159,18 @@ class SettingSearch:
             return None
         if not self._lasts(speed, depth_mm / 1e3):
             return None
-        found = verdict(table, self.assembly, self.machine)
-        drawn, depth = found.drawn, depth_mm / 1e3
-        if found.word is not Word.STABLE or found.depth_margin < SPARE or found.is_beyond_drive or drawn is None:
+        depth, deepest = depth_mm / 1e3, drive_limit(self.machine, table, np.array([speed]))[0]
+        found = judged(table, self.assembly, self.machine)
+        margin = found.found.limit / depth - 1
+        if found.word is not Word.STABLE or margin < SPARE or depth > deepest:
             return None
-        near = drawn.fed(2 * depth)
+        near = found.drawn.fed(2 * depth)
         later = aged(near, self.fall * LATER[1:], self.stiffness_at).growth(depth)
         if np.any(later >= 0):
             return None
         hardest = near.some(np.argsort(np.max(later.reshape(LATER.size - 1, -1), axis=0))[-FEW:])
-        margin = min(found.depth_margin, 20.0)
-        return Setting(speed, depth_mm, self._window(near, hardest, speed, depth), margin, self._left(hardest, depth))
+        window, left = self._window(near, hardest, speed, depth), self._left(hardest, depth)
+        return Setting(speed, depth_mm, window, min(margin, 20.0), left)
 
     def _window(self, near: Drawn, hardest: Drawn, speed: float, depth: float) -> tuple[float, float]:
         steps = np.arange(WIDEST + 1.0)

@@ -9,9 +9,10 @@ from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition import DataError, Remark
-from lobes import Program, program_limit
+from lobes import Program, ProgramLimit, program_limit
 from lobewatch.analysis.assembly import ABOUT_DIRECTIONS, Assembly
 from lobewatch.analysis.programs.doubt import doubt_of
 from lobewatch.analysis.programs.drawn import DRAWS, Drawn, draw, middle_row, turning
@@ -130,6 +131,23 @@ class Verdict:
         return Ruling(self.word, self.limit)
 
 
+class Judged(NamedTuple):
+    """The word on a program and what it rests on."""
+
+    word: Word
+    """See Word."""
+    found: ProgramLimit
+    """The middle of the doubt."""
+    low: float
+    """1 % quantile of the limit over the doubt (m)."""
+    high: float
+    """99 % quantile (m)."""
+    drawn: Drawn
+    """The spindles that it was judged on."""
+    chatters: NDArray[np.bool_]
+    """Which of the draws chatter, without the middle, shape (DRAWS,)."""
+
+
 def judge(table: ProgramTable, known: Assembly | DataError, machine: Machine) -> Verdict:
     """The verdict on a program, or why its tool is not known."""
     if isinstance(known, DataError):
@@ -137,31 +155,36 @@ def judge(table: ProgramTable, known: Assembly | DataError, machine: Machine) ->
     return verdict(table, known, machine)
 
 
-def verdict(table: ProgramTable, assembly: Assembly, machine: Machine) -> Verdict:
-    """Judge a program by semi-discretisation over its doubt; charts by other methods decide nothing."""
-    if not assembly.directions:
-        return unknown(table, assembly.remarks, assembly)
+def judged(table: ProgramTable, assembly: Assembly, machine: Machine) -> Judged:
+    """The word on a program by semi-discretisation over its doubt; charts by other methods decide nothing."""
     program = as_program(table, machine)
     found = program_limit(program, assembly.x, assembly.y, table.feed_angles)
     drawn = draw(program, found, table.feed_angles, assembly, doubt_of(assembly, table, machine))
     limits = drawn_limits(drawn, program.depth)[1:]
     low, high = np.quantile(limits, QUANTILES, method="closest_observation")
-    taught = assembly.doubt is not None
     near = drawn.fed(SURELY * program.depth * found.limit / low if np.isfinite(found.limit) else 0.0)
     chatters = (near.growth(program.depth)[1:, 0] >= 0) | (limits <= program.depth)
-    word, cause = _word(found.stable, chatters, assembly), ""
-    remarks = [*_remarks(table, assembly, machine)]
+    return Judged(_word(found.stable, chatters, assembly), found, float(low), float(high), drawn, chatters)
+
+
+def verdict(table: ProgramTable, assembly: Assembly, machine: Machine) -> Verdict:
+    """The word on a program, and what goes with it."""
+    if not assembly.directions:
+        return unknown(table, assembly.remarks, assembly)
+    word, found, low, high, drawn, chatters = judged(table, assembly, machine)
+    program, cause, remarks = as_program(table, machine), "", [*_remarks(table, assembly, machine)]
     if word is Word.DOUBTFUL:
         middle = middle_row(program, assembly)
         cause = "question" if assembly.questions else decisive(drawn, chatters, middle, program.depth)
         remarks.append(settles(cause, table, found.limit / program.depth * program.cut.tangential, assembly))
+    taught = assembly.doubt is not None
     return Verdict(
         program=table,
         word=word,
         assembly=assembly,
         limit=found.limit,
-        limit_low=min(float(low), found.limit),
-        limit_high=max(float(high), found.limit),
+        limit_low=min(low, found.limit),
+        limit_high=max(high, found.limit),
         chance_turning=float(np.mean(chatters)) if taught else _chance_turning(drawn, program.depth),
         decided_by=cause,
         chatter_frequency=found.chatter_frequency,
@@ -180,7 +203,7 @@ def _chance_turning(drawn: Drawn, depth: float) -> float:
     return float(np.mean(turning(drawn.fed(0.0)).growth(depth)[1:] >= 0))
 
 
-def _word(stable: bool, chatters: np.ndarray[tuple[int], np.dtype[np.bool_]], assembly: Assembly) -> Word:
+def _word(stable: bool, chatters: NDArray[np.bool_], assembly: Assembly) -> Word:
     if not stable:
         return Word.NOT_STABLE
     sure = not np.any(chatters) and assembly.is_sure

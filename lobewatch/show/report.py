@@ -133,7 +133,7 @@ def _until(found: Outlook, last: Row) -> dict[str, Any] | None:
     series = found.series(last.tool, last.direction)
     if series.trend is None:
         return None
-    return {"course": sentence(series), "dates": dates_rows(found, series.trend), "assumed": ASSUMED}
+    return {"course": sentence(series), "dates": dates_rows(found), "assumed": ASSUMED}
 
 
 def _remarks(last: Row, assembly: Assembly) -> list[Remark]:

@@ -42,6 +42,12 @@ class Outlook:
     limits: Mapping[float, Reached | None]
     """When the worst of its series has fallen by so much (%), those of machine.toml; None where it cannot be told."""
 
+    @property
+    def horizon(self) -> float:
+        """Last day that is foretold of all its series, in days since 1970; NaN where nothing is foretold."""
+        foretold = (one.trend.forecast for one in self.standing.series if one.trend and not one.trend.is_stale)
+        return min((float(forecast.dates[-1]) for forecast in foretold if forecast), default=math.nan)
+
     def series(self, tool: str | None = None, direction: str | None = None) -> SeriesStanding:
         """The series of a tool and direction, the one that fell most where several fit; DataError where none does."""
         fits = [one for one in self.standing.series if tool in (None, one.tool) and direction in (None, one.direction)]

@@ -13,7 +13,7 @@ from lobewatch.analysis.decay.outlook import Fate, Outlook
 from lobewatch.machine import Machine
 from lobewatch.show.advice import Advised
 from lobewatch.show.programs.settings import rpm
-from lobewatch.show.trends.dates import dates_text, horizon_of
+from lobewatch.show.trends.dates import dates_text
 from lobewatch.show.trends.describe_trend import rate_text, short_text
 from lobewatch.show.verdicts import WORDS
 
@@ -60,14 +60,11 @@ def _changed(series: SeriesStanding) -> str:
 
 def _program(one: Advised, found: Outlook) -> dict[str, str]:
     name, word = one.verdict.program.name, one.verdict.word
-    tool = one.verdict.program.tool
-    trends = [series.trend for series in found.standing.series if series.trend is not None and series.tool == tool]
-    end = max((horizon_of(trend) for trend in trends), default=math.nan)
     return {
         "name": name,
         "kind": WORDS[word].kind,
         "word": f"{WORDS[word].symbol} {word}",
-        "until": _until(word, found.programs[name], end),
+        "until": _until(word, found.programs[name], found.horizon),
         "instead": instead_text(one),
     }
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from lobewatch.analysis.decay.forecast import Reached
-from lobewatch.analysis.decay.trend import Trend, date
+from lobewatch.analysis.decay.trend import date
 
 ASSUMED = "Dates hold if the machine is used as before; an acceleration that is not yet visible cannot be foreseen."
 
@@ -27,11 +27,6 @@ def dates_json(found: Reached | None) -> dict[str, str | None]:
     """Dates as "2026-03-01", null where none is known, "already"."""
     named = zip(("p10", "p50", "p90"), found or (math.inf,) * 3, strict=True)
     return {name: _or_word(days) for name, days in named}
-
-
-def horizon_of(trend: Trend) -> float:
-    """Last day that is foretold, in days since 1970."""
-    return math.nan if trend.forecast is None else float(trend.forecast.dates[-1])
 
 
 def _day(days: float) -> str:

@@ -16,7 +16,7 @@ from lobewatch.analysis.decay.shapes import Shape
 from lobewatch.analysis.decay.trend import Trend, date
 from lobewatch.show.output import table
 from lobewatch.show.trends.chart import chart_lines
-from lobewatch.show.trends.dates import ASSUMED, dates_json, dates_text, horizon_of
+from lobewatch.show.trends.dates import ASSUMED, dates_json, dates_text
 
 
 def trend_json(found: Outlook, series: SeriesStanding, preload: PreloadLeft | None) -> dict[str, Any]:
@@ -61,7 +61,7 @@ def trend_texts(found: Outlook, series: SeriesStanding, preload: PreloadLeft | N
     if trend is None:
         return [f"{series.name}: no tap test that others can be compared with"]
     dates = table("~what", "~becomes doubtful", "~is not stable")
-    for line in dates_rows(found, trend):
+    for line in dates_rows(found):
         dates.add_row(*line)
     others = [f"{one.name}: {short_text(one)}" for one in found.standing.series if one is not series]
     left = [] if preload is None else [preload_text(preload)]
@@ -73,9 +73,9 @@ def preload_text(preload: PreloadLeft) -> str:
     return f"preload left: {preload}"
 
 
-def dates_rows(found: Outlook, trend: Trend) -> list[tuple[str, str, str]]:
+def dates_rows(found: Outlook) -> list[tuple[str, str, str]]:
     """What, when it becomes doubtful, when it is not stable: each program, and the fixed limits."""
-    end = horizon_of(trend)
+    end = found.horizon
     rows = [(name, *_fate_texts(fate, end)) for name, fate in found.programs.items()]
     for percent, when in found.limits.items():
         rows.append((f"-{percent:g} % (fixed limit, as in the paper)", "", dates_text(when, end)))

@@ -174,6 +174,24 @@ def test_the_report_says_until_when_and_draws_the_line(worn: Shop) -> None:
     assert "Line: fitted; band: where it goes, 80 %." in html
 
 
+def test_a_tool_that_was_never_tapped_holds_as_far_as_is_looked(worn: Shop) -> None:
+    worn.run(("shallow", 12900, 0.02), tool="long end mill")
+    assert run("report", worn.path).exit_code == 0
+    last = f"not before {date(outlook(worn.logbook).horizon):%Y-%m}"
+    assert f"doubtful {last}" in (worn.path / "report.html").read_text("utf-8")
+
+
+def test_a_program_holds_as_far_as_is_looked_beside_a_tool_that_foretells_nothing(worn: Shop) -> None:
+    worn.run(("shallow", 12900, 0.02))
+    for days in (161.0, 171.0, 181.0):
+        worn.tap(days, 1500.0, tool="other")
+    found = outlook(worn.logbook)
+    assert date(found.horizon) > worn.logbook.history.rows[-1].time
+    told = run("trend", worn.path, "--tool", "other").stdout
+    (line,) = [line for line in told.splitlines() if line.startswith("shallow")]
+    assert line.count(f"not before {date(found.horizon):%Y-%m}") == 2
+
+
 def preload_in_trend(shop: Shop) -> list[float] | None:
     """Of direction x, as `lobewatch trend --json` has it."""
     found: list[float] | None = json.loads(run("trend", shop.path, "--direction", "x", "--json").stdout)["preload_left"]

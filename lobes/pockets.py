@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lobes.stability_lobes import StabilityLobes
-from modal.peaks import peaks, prominences
 
 SHARE = 0.8
 """Between the ends of a pocket the limit is at least this share of its depth."""
@@ -59,9 +58,10 @@ def pockets(lobes: StabilityLobes, deepest: ArrayLike) -> list[Pocket]:
         raise ValueError(f"deepest={deepest!r} m is not finite and > 0; give the deepest cut of interest")
     speed, depth = lobes.speed_rpm[order], np.minimum(lobes.depth[order], most)
     padded = np.concatenate(([0.0], depth, [0.0]))
-    tops = peaks(padded)
-    tops = tops[prominences(padded, tops) >= 0.05 * depth.min()] - 1
-    return [Pocket(float(speed[i]), float(depth[i]), *_ends(speed, depth, i)) for i in tops]
+    from scipy.signal import find_peaks  # takes longer to import than all of lobes
+
+    peaks = find_peaks(padded, plateau_size=1, prominence=0.05 * depth.min())[0] - 1
+    return [Pocket(float(speed[i]), float(depth[i]), *_ends(speed, depth, i)) for i in peaks]
 
 
 def _ends(speed: NDArray[np.float64], depth: NDArray[np.float64], peak: int) -> tuple[float, float]:

@@ -13,7 +13,6 @@ from scipy.ndimage import median_filter, uniform_filter1d
 
 from acquisition import Frf
 from modal.line_weights import measuring_factor
-from modal.peaks import peaks, prominences
 from modal.without_drift import without_drift
 
 FEWEST_LINES = 8
@@ -170,6 +169,8 @@ def _is_as_high(new: _Peak, old: _Peak) -> bool:
 
 
 def _peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.float64], least: float) -> list[_Peak]:
+    from scipy.signal import find_peaks, peak_prominences  # take longer to import than all of modal
+
     size = np.abs(mobility)
     faintest = 1e-12 * size.max()
     floor = np.maximum(NOISE_MULTIPLE * noise, max(least, faintest))
@@ -177,9 +178,8 @@ def _peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.float64
         return []
     valley = [size.min()]
     between_valleys = np.concatenate((valley, size, valley))
-    tops = peaks(between_valleys)
-    tops = tops[size[tops - 1] >= floor[tops - 1]]
-    prominence = prominences(20 * np.log10(np.maximum(between_valleys, faintest)), tops)
+    tops, _ = find_peaks(between_valleys, height=np.concatenate(([0.0], floor, [0.0])))
+    prominence, _, _ = peak_prominences(20 * np.log10(np.maximum(between_valleys, faintest)), tops)
     tops, prominence = tops[prominence >= PROMINENCE_DB] - 1, prominence[prominence >= PROMINENCE_DB]
     rise = size[tops] * (1 - 10 ** (-prominence / 20))
     high = tops[(rise > NOISE_MULTIPLE * noise[tops]) & (tops > 0) & (tops < size.size - 1)]

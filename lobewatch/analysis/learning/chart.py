@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from lobewatch.analysis.learning.grid import MM, Grid, floored
 from lobewatch.analysis.learning.likelihood import FREQUENCY
-from lobewatch.analysis.learning.mean_force import MeanForce
 from lobewatch.analysis.learning.priors import Draws
 from lobewatch.analysis.listening.folded import folded
+from lobewatch.analysis.programs.mean_force import MeanForce
 
 LIKELY = 0.5
 """A test cut is more likely stable than this."""

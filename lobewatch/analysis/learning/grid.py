@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes import Cut, lowest_of, stability_boundary, zero_order
-from lobewatch.analysis.learning.mean_force import is_constant
 from lobewatch.analysis.learning.observed import Observed
+from lobewatch.analysis.programs.mean_force import is_constant
 from lobewatch.machine.cuts.heard_cut import CutWord
 from modal import Mode
 

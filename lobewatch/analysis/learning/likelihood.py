@@ -11,10 +11,10 @@ from scipy.special import ndtr
 
 from lobes import MillingRows, piece_numbers
 from lobes.floquet import largest_multipliers
-from lobewatch.analysis.learning.mean_force import MeanForce, is_constant
 from lobewatch.analysis.learning.observed import Observed
 from lobewatch.analysis.learning.priors import Draws
 from lobewatch.analysis.listening.folded import folded
+from lobewatch.analysis.programs.mean_force import MeanForce, is_constant
 
 EDGE = 0.05
 """Standard deviation of the depth, relative, within which a cut is stable or not."""

@@ -12,9 +12,9 @@ from lobewatch.analysis.learning.chart import LIKELY, Chart
 from lobewatch.analysis.learning.grid import Grid, floored
 from lobewatch.analysis.learning.learnt import Learnt
 from lobewatch.analysis.learning.likelihood import predicted
-from lobewatch.analysis.learning.mean_force import is_constant
 from lobewatch.analysis.learning.observed import Observed
 from lobewatch.analysis.learning.priors import Draws
+from lobewatch.analysis.programs.mean_force import is_constant
 
 DRAWS = 300
 """That the chances are of."""

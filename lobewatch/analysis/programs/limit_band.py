@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lobes import Cut, MillingRows, Program, StabilityLobes, lowest_of, zero_order
+from lobes import Cut, MillingRows, Program, StabilityLobes
 from lobewatch.analysis.assembly import Assembly
 from lobewatch.analysis.charts import cut_table
 from lobewatch.analysis.programs.doubt import doubt_of
 from lobewatch.analysis.programs.drawn import middle_row
+from lobewatch.analysis.programs.mean_force import MeanForce
 from lobewatch.analysis.programs.verdict import QUANTILES
 from lobewatch.machine import Machine
-from modal import Mode
 
 DRAWS = 64
 """From the doubt."""
-SPEEDS, FINE = 81, 1500
-"""Of the diagrams of the draws, and of the one in the middle."""
-BEYOND = 1.15
-"""How far beyond the speeds of the line the one in the middle goes."""
+SPEEDS = 81
+"""Of the diagrams of the draws."""
 DEEP = 1e3
 """Stands for no limit (m)."""
 
@@ -46,24 +43,22 @@ def limit_band(line: StabilityLobes, cut: str, assembly: Assembly, machine: Mach
     """The band around the line of a cut (its name), by draws from the doubt (`doubt_of`).
 
     Each draw is worked out by zero order. Of a line by another method it is the same line at the speed that belongs to
-    the frequency of the draw, times what zero order says of the rest: that is exact for a line by zero order, and for
-    any method as to spindle speed, cutting coefficient, and changes that all modes share.
+    the frequency of the draw, times what zero order says of the rest: that holds to a per cent for a line by zero
+    order, and for any method as to spindle speed, cutting coefficient, and changes that all modes share.
     """
     cuts = machine.cuts(assembly.tool)[cut]
     rows = middle_row(Program(cuts[0], 1.0, 1.0), assembly)
     drawn = doubt_of(assembly, cut_table(machine, cut), machine).draw(rows, DRAWS)
     softest = int(np.argmin(rows.stiffness[0] * rows.damping_ratio[0]))
-    moved = drawn.speed_rpm / (drawn.frequency[:, softest] / rows.frequency[0, softest])
+    moved = (drawn.speed_rpm / (drawn.frequency[:, softest] / rows.frequency[0, softest]))[:, np.newaxis]
     low, high = float(np.min(line.speed_rpm)), float(np.max(line.speed_rpm))
-    speeds, wide = np.geomspace(low, high, SPEEDS), np.geomspace(low / BEYOND, high * BEYOND, FINE)
-    middle = _depth(rows, 0, cuts, wide)
-    limits = np.empty((DRAWS, line.speed_rpm.size))
+    speeds, middle = np.geomspace(low, high, SPEEDS), rows[np.zeros(DRAWS, np.intp)]
+    own = _depths(drawn, cuts, drawn.speed_rpm[:, np.newaxis] * speeds)
+    rest = own / _depths(middle, cuts, np.clip(moved * speeds, low, high))
     order = np.argsort(line.speed_rpm)
     known = line.speed_rpm[order], np.minimum(line.depth[order], DEEP)
-    for i, ratio in enumerate(moved.tolist()):
-        rest = _depth(drawn, i, cuts, speeds) / np.interp(np.clip(ratio * speeds, low, high), wide, middle)
-        at = np.clip(ratio * line.speed_rpm, low, high)
-        limits[i] = np.interp(at, *known) * np.interp(line.speed_rpm, speeds, rest)
+    limits = np.interp(np.clip(moved * line.speed_rpm, low, high), *known)
+    limits *= [np.interp(line.speed_rpm, speeds, ratio) for ratio in rest]
     lowest, highest = np.quantile(limits, QUANTILES, axis=0)
     return LimitBand(
         line.speed_rpm,
@@ -72,15 +67,7 @@ def limit_band(line: StabilityLobes, cut: str, assembly: Assembly, machine: Mach
     )
 
 
-def _depth(rows: MillingRows, i: int, cuts: Sequence[Cut], speed_rpm: Floats) -> Floats:
-    """Limit of one of the rows by zero order at speeds (rpm), DEEP where there is none."""
-    modes: dict[int, list[Mode]] = {0: [], 1: []}
-    for k, direction in enumerate(rows.axes[rows.direction].tolist()):
-        frequency = float(rows.frequency[i, k]) / (2 * np.pi)
-        damping, stiffness = float(rows.damping_ratio[i, k]), float(rows.stiffness[i, k])
-        phase = math.degrees(rows.phase[i, k]) if damping < 1 else 0.0
-        modes[direction].append(Mode(frequency, damping, stiffness, phase_deg=phase))
-    turned = [replace(cut, tangential=float(rows.tangential[i]), radial=float(rows.radial[i])) for cut in cuts]
-    speeds = float(rows.speed_rpm[i]) * speed_rpm
-    found = lowest_of([zero_order(modes[0], modes[1], cut, speeds) for cut in turned])
-    return np.minimum(found.depth, DEEP)
+def _depths(rows: MillingRows, cuts: Sequence[Cut], speed_rpm: Floats) -> Floats:
+    """Limit of each row in the worst of some cuts at speeds (rpm) of its own (r, s), DEEP where there is none."""
+    found = [MeanForce.of(replace(rows, cut=cut).fed_at(cut.feed_angle)).limits(speed_rpm)[0] for cut in cuts]
+    return np.asarray(np.minimum(np.min(found, axis=0), DEEP))

@@ -20,10 +20,10 @@ from lobes import Cut, lowest_of, milling_system, rows_of, stability_boundary, z
 from lobewatch.analysis.learning.grid import Grid, floored, speeds_between, trusted
 from lobewatch.analysis.learning.learnt import Learnt, prior
 from lobewatch.analysis.learning.likelihood import log_likelihood, predicted
-from lobewatch.analysis.learning.mean_force import is_constant
 from lobewatch.analysis.learning.observed import Observed
 from lobewatch.analysis.learning.suggest import best_heard, suggest
 from lobewatch.analysis.programs.doubt import Doubt, Span
+from lobewatch.analysis.programs.mean_force import is_constant
 from lobewatch.machine.cuts.heard_cut import CutWord
 from modal import Mode
 

@@ -9,8 +9,8 @@ import pytest
 
 from lobes import Cut, milling_system, rows_of, zero_order
 from lobes.floquet import largest_multipliers, piece_numbers
-from lobewatch.analysis.learning.mean_force import MeanForce, is_constant
 from lobewatch.analysis.listening.folded import folded
+from lobewatch.analysis.programs.mean_force import MeanForce, is_constant
 from modal import Mode
 
 X = [Mode(1713.0, 0.029, 3.5e7), Mode(2400.0, 0.02, 9e7, phase_deg=20.0)]

@@ -143,11 +143,8 @@ class SettingSearch:
         return aged(few, self.fall * LATER[[0, -1]], self.stiffness_at)
 
     def _lasts(self, speed: float, depth: float) -> bool:
-        """Whether a depth (m) at a speed (rpm) is stable when the spindle is tapped again: a few draws, then all."""
-        if np.any(self._early(speed).growth(depth) >= 0):
-            return False
-        then = aged(self.drawn.at(speed / self.program.speed_rpm), self.fall * LATER[-1:], self.stiffness_at)
-        return bool(np.all(then.growth(depth) < 0))
+        """Whether a few draws are stable at a speed (rpm) and depth (m) now and when the spindle is tapped again."""
+        return bool(np.all(self._early(speed).growth(depth) < 0))
 
     def _distance(self, speed: float) -> float:
         return abs(math.log(speed / self.program.speed_rpm))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +13,8 @@ from lobewatch.show.output import Json, emit, results
 
 FOR_THE_PAGE = ("points", "limits", "why")
 """What only the dashboard draws; lobewatch trend and lobewatch export tell it in full."""
+SELDOM = 20_000
+"""Objects made between two searches for rings of them: the rows of hundreds of machines are none."""
 
 
 def status(
@@ -45,6 +48,7 @@ def status(
 
     if as_csv and as_json:
         raise ValueError("--csv and --json: give one of them")
+    gc.set_threshold(SELDOM)
     found = Plant(find_machines(folder)).standings()
     rows = plant_rows(found)
     shown = [row for row in rows if not due or row["days_left"] is None or row["days_left"] < 0]

@@ -74,8 +74,8 @@ def _course(one: SeriesStanding, limits: Limits) -> Course:
 
 def _thinned(trend: Trend) -> Iterator[tuple[float, float]]:
     """Means of neighbours where there are many; the newest as it is."""
-    start = trend.start
-    found = np.array([(day(point.time), point.percent - start) for point in trend.points])
+    dates, percents = zip(*[(day(point.time), point.percent) for point in trend.points], strict=True)
+    found = np.column_stack([dates, np.array(percents) - trend.start])
     if len(found) > MOST:
         least, more = divmod(len(found) - 1, MOST - 1)
         begins = np.cumsum([0, *[least + 1] * more, *[least] * (MOST - 1 - more)])

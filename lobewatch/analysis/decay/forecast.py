@@ -192,7 +192,7 @@ def past(dates: Floats, y: Floats, temperature: Floats | None = None) -> Past:
 
 def _below(freedom: int, t: Floats) -> Floats:
     """Distribution of Student's t: 0 and 1 where it is nearer to them than anybody asks."""
-    found, near = np.where(t > 0, 1.0, 0.0), ~(np.abs(t) > stdtrit(freedom, 1 - SURELY_NOT))
+    found, near = (t > 0).astype(np.float64), ~(np.abs(t) > stdtrit(freedom, 1 - SURELY_NOT))
     found[near] = stdtr(freedom, t[near])
     return np.asarray(found)
 

@@ -178,7 +178,12 @@ def _past(points: Sequence[Point]) -> Past | None:
     if len(points) < ENOUGH:
         return None
     y, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
-    return past(np.array([day(point.time) for point in points]), y, warmth)
+    return past(days_of(points), y, warmth)
+
+
+def days_of(points: Sequence[Point]) -> Floats:
+    """Days since 1970, shape (n,)."""
+    return np.array([point.time.timestamp() for point in points]) / 86400
 
 
 def day(time: datetime) -> float:

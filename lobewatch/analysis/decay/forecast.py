@@ -157,7 +157,7 @@ class Past:
         start = min(max(span, now - begin), 3 * span)
         at = np.linspace(start, max(min(horizon - begin, 3 * span), start), LOOKS)
         mean, error = self.fits.at(courses(self.shapes, at, span))
-        moved = tuple(Shape(kind, start + begin, *others) for kind, start, *others in self.shapes)
+        moved = tuple(Shape(one.kind, one.start + begin, *one[2:]) for one in self.shapes)
         mean = mean + self.first
         return Forecast(moved, self.weight, self.spread, self.fitted, begin + at, mean, error, self.fits.freedom)
 

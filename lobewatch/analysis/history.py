@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
-from importlib.metadata import version
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from lobewatch.analysis.measurement import Measurement
 from lobewatch.analysis.order import Place
 from lobewatch.analysis.programs.verdict import Ruling
 from lobewatch.analysis.questions.asked import accepted_codes, open_questions
+from lobewatch.analysis.workers.software import SOFTWARE
 from lobewatch.machine import Machine
 from modal import Mode
 
@@ -154,7 +154,7 @@ class History:
 
 def empty_history(machine: Machine) -> History:
     """The history of a machine that was never tapped."""
-    return History(machine.settings_hash, f"lobewatch {version('lobewatch')}", ())
+    return History(machine.settings_hash, f"lobewatch {SOFTWARE.lobewatch}", ())
 
 
 def without_last_word(history: History) -> History:

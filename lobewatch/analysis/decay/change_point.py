@@ -136,9 +136,10 @@ def _farthest(base: Base, n: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats
     points, leans = np.empty((2, len(KINDS), n.size), np.intp), np.empty((2, len(KINDS), n.size))
     for kind, (before, behind) in enumerate(LEFT):
         lean = base.lean(KINDS[kind], n[:, np.newaxis], k)
-        outside = (k < before) | (k > n[:, np.newaxis] - behind)
+        outside = k[n[0] - behind :] > n[:, np.newaxis] - behind
         for side, (worst, farthest) in enumerate(((np.inf, np.argmin), (-np.inf, np.argmax))):
-            np.copyto(lean, worst, where=outside)
+            np.copyto(lean[:, n[0] - behind :], worst, where=outside)
+            lean[:, :before] = worst
             points[side, kind] = farthest(lean, axis=1)
             leans[side, kind] = lean[rows, points[side, kind]]
     return points, leans

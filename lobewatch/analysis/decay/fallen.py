@@ -45,19 +45,25 @@ def _columns(rows: tuple[Row, ...]) -> SeriesColumns:
 
 def trend_in(rows: Sequence[Row], name: str, now: datetime, events: Sequence[datetime] = ()) -> Trend | None:
     """The trend of a value (frequency, damping_ratio, stiffness or bearing_stiffness); None where none is known."""
-    taps = _taps(tuple(rows), name)
-    return trend_of(taps, now, events) if taps else None
+    found = _trend(tuple(rows), name)
+    return None if found is None else found.on(now, events)
 
 
 @lru_cache(maxsize=KEPT)
-def _taps(rows: tuple[Row, ...], name: str) -> tuple[Tapped, ...]:
+def _trend(rows: tuple[Row, ...], name: str) -> Trend | None:
+    """As on the day of its newest tap test, without events."""
+    taps = _taps(rows, name)
+    return trend_of(taps, taps[-1].time) if taps else None
+
+
+def _taps(rows: tuple[Row, ...], name: str) -> list[Tapped]:
     """The temperature counts for the frequency alone: of the others nothing is known beforehand."""
     found, values = _positive(rows, name)
     errors = np.where(np.isfinite(values[:, 1]), 100 * values[:, 1] / values[:, 0], math.nan).tolist()
     warmth = [row.conditions.temperature_c if name == "frequency" else None for row in found]
     temperatures = [math.nan if one is None else one for one in warmth]
     times = [row.time for row in found]
-    return tuple(map(Tapped._make, zip(times, values[:, 0].tolist(), errors, temperatures, strict=True)))
+    return [*map(Tapped, times, values[:, 0].tolist(), errors, temperatures)]
 
 
 def _positive(rows: tuple[Row, ...], name: str) -> tuple[tuple[Row, ...], NDArray[np.float64]]:
@@ -78,7 +84,7 @@ def start(rows: Sequence[Row], name: str) -> Estimate:
     if not known:
         return UNKNOWN
     first: Estimate = getattr(known[0], name)
-    found = trend_in(rows, name, known[-1].time)
+    found = _trend(tuple(rows), name)
     if found is None or (found.past is None and name != "frequency"):
         return first
     value = found.first * math.exp(found.start / 100)

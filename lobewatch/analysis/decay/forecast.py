@@ -157,7 +157,7 @@ class Past:
         start = min(max(span, now - begin), 3 * span)
         at = np.linspace(start, max(min(horizon - begin, 3 * span), start), LOOKS)
         mean, error = self.fits.at(courses(self.shapes, at, span))
-        moved = tuple(shape._replace(start=shape.start + begin) for shape in self.shapes)
+        moved = tuple(Shape(one.kind, one.start + begin, *one[2:]) for one in self.shapes)
         mean = mean + self.first
         return Forecast(moved, self.weight, self.spread, self.fitted, begin + at, mean, error, self.fits.freedom)
 
@@ -180,8 +180,8 @@ def past(dates: Floats, y: Floats, temperature: Floats | None = None) -> Past:
     columns = courses(shapes, at, float(at[-1]))
     fits = base_of(y, temperature).fit_columns(columns)
     counts = Counter(shape.kind for shape in shapes)
-    share = {kind: np.log(counts[kind]) + np.log(y.size) / 2 * (kind != "none") for kind in counts}
-    log = -fits.freedom / 2 * np.log(fits.rss) - [share[shape.kind] for shape in shapes]
+    share = [np.log(count) + np.log(y.size) / 2 * (kind != "none") for kind, count in counts.items()]
+    log = -fits.freedom / 2 * np.log(fits.rss) - np.repeat(share, [*counts.values()])
     weight = np.exp(log - log.max())
     kept = np.flatnonzero(weight > LIGHTEST)
     weight, fits = weight[kept] / weight[kept].sum(), fits.some(kept)
@@ -192,7 +192,7 @@ def past(dates: Floats, y: Floats, temperature: Floats | None = None) -> Past:
 
 def _below(freedom: int, t: Floats) -> Floats:
     """Distribution of Student's t: 0 and 1 where it is nearer to them than anybody asks."""
-    found, near = np.where(t > 0, 1.0, 0.0), ~(np.abs(t) > stdtrit(freedom, 1 - SURELY_NOT))
+    found, near = (t > 0).astype(np.float64), ~(np.abs(t) > stdtrit(freedom, 1 - SURELY_NOT))
     found[near] = stdtr(freedom, t[near])
     return np.asarray(found)
 

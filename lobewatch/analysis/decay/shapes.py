@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import groupby
+from itertools import groupby, repeat
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -38,8 +38,8 @@ def shapes_of(at: Floats) -> Iterator[Shape]:
     """All that are tried; dates count from the first point on."""
     yield Shape("none", 0.0)
     yield Shape("line", 0.0)
-    yield from [Shape("slope", one) for one in at[1:-3].tolist()]
-    yield from [Shape("step", one) for one in at[2:-1].tolist()]
+    for kind, starts in (("slope", at[1:-3]), ("step", at[2:-1])):
+        yield from map(Shape._make, zip(repeat(kind), starts.tolist(), repeat(False), repeat(0.0), repeat(0.0)))
     yield from (Shape("curve", 0.0, rate > 0, rate=rate) for rate in RATES)
     yield from (Shape("curve", 0.0, True, power=power) for power in POWERS)
 

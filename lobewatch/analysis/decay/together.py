@@ -109,10 +109,12 @@ def _joined(times: Sequence[datetime], spans: list[Span]) -> list[_Question]:
 
 def _called(series: Series, spans: Sequence[Span], asked: Sequence[_Question], most: int) -> Iterator[_Question]:
     """Those that are to be answered with yes."""
+    if not asked:
+        return
     if may_count(np.array(series.temperatures)):
         yield from (one for one in asked if _exactly(series, spans, one, most))
         return
-    needed = max(asked[0].point - most, 0) if asked else 0
+    needed = max(asked[0].point - most, 0)
     points = np.array([0.0] * needed + [series.percent(span) for span in spans[needed:]])
     for begin in range(0, len(asked), BLOCK):
         block = [one for one in asked[begin : begin + BLOCK] if min(one.point + 1, most) >= FIRST_JUDGED]

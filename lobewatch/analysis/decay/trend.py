@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +18,6 @@ from lobewatch.analysis.decay.together import Series, Span, together
 
 MOST = 1000
 """The newest points, which alone are judged: the work grows with the square of their number."""
-KEPT = 32
-"""Series that are remembered."""
 MONTH = 30.44
 """Days."""
 HORIZON_DAYS = 36 * MONTH
@@ -86,6 +84,10 @@ class Trend:
         """The same of the mirror image."""
         return self._judged[2]
 
+    def on(self, now: datetime, events: Sequence[datetime]) -> Trend:
+        """The same series, judged on another day and with other events."""
+        return replace(self, today=int(day(now)), events=tuple(events))
+
     @cached_property
     def _judged(self) -> tuple[int, Watch, Watch]:
         points, watched = self.points, 0
@@ -140,12 +142,11 @@ def trend_of(series: Sequence[Tapped], now: datetime, events: Sequence[datetime]
 
     Foretold from the day of `now` on; the same for all of a day.
     """
-    points = _newest_points(tuple(series))
+    points = _newest_points(series)
     return Trend(points, series[0].value, _past(points), int(day(now)), tuple(events))
 
 
-@lru_cache(maxsize=KEPT)
-def _newest_points(series: tuple[Tapped, ...]) -> tuple[Point, ...]:
+def _newest_points(series: Sequence[Tapped]) -> tuple[Point, ...]:
     """Of a series, oldest first."""
     times, values, errors, temperatures = zip(*series, strict=True)
     own = Series(times, _percents(values), temperatures)
@@ -173,13 +174,16 @@ def _percents(values: Sequence[float]) -> list[float]:
     return [100 * log(value / first) for value in values]
 
 
-@lru_cache(maxsize=KEPT)
-def _past(points: tuple[Point, ...]) -> Past | None:
-    """Of the same points the same, whatever the day and the events."""
+def _past(points: Sequence[Point]) -> Past | None:
     if len(points) < ENOUGH:
         return None
     y, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
-    return past(np.array([day(point.time) for point in points]), y, warmth)
+    return past(days_of(points), y, warmth)
+
+
+def days_of(points: Sequence[Point]) -> Floats:
+    """Days since 1970, shape (n,)."""
+    return np.array([point.time.timestamp() for point in points]) / 86400
 
 
 def day(time: datetime) -> float:

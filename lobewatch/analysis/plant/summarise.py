@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from lobewatch.analysis.decay.outlook import of_limit
-from lobewatch.analysis.decay.trend import Trend, day
+from lobewatch.analysis.decay.trend import Trend, days_of
 from lobewatch.analysis.logbook import Logbook
 from lobewatch.analysis.plant.light import all_well
 from lobewatch.analysis.plant.standing_file import write_standing
@@ -74,8 +74,8 @@ def _course(one: SeriesStanding, limits: Limits) -> Course:
 
 def _thinned(trend: Trend) -> Iterator[tuple[float, float]]:
     """Means of neighbours where there are many; the newest as it is."""
-    start = trend.start
-    found = np.array([(day(point.time), point.percent - start) for point in trend.points])
+    percents = np.array([point.percent for point in trend.points])
+    found = np.column_stack([days_of(trend.points), percents - trend.start])
     if len(found) > MOST:
         least, more = divmod(len(found) - 1, MOST - 1)
         begins = np.cumsum([0, *[least + 1] * more, *[least] * (MOST - 1 - more)])

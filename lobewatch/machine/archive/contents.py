@@ -72,13 +72,12 @@ def contents_of(folder: Path, reading: Reading) -> Contents:
         remarks.append(no_journal(folder, len(extra)))
     if reading.damage or missing:
         found = [(path, read_doubtful(path)) for path in extra]
-        taps += [entry for path, entry in found if entry is not None and entry.id == path.stem]
+        found_too = [entry for path, entry in found if entry is not None and entry.id == path.stem]
+        taps = [*_oldest_first([*taps, *found_too])]
     else:
         cure = f"{command('verify', folder)} says what it is and what to do"
         remarks += [unlisted(path, "not in the journal, does not count", cure) for path in extra]
-    return Contents(
-        _oldest_first(taps), _oldest_first(lost), tuple(remarks), events, len(reading.lines), heard(reading)
-    )
+    return Contents(tuple(taps), _oldest_first(lost), tuple(remarks), events, len(reading.lines), heard(reading))
 
 
 def heard(reading: Reading) -> tuple[HeardCut, ...]:

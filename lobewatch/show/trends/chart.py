@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.analysis.decay.trend import Trend, date, day
+from lobewatch.analysis.decay.trend import Trend, date, days_of
 
 WIDE, HIGH = 60, 12
 """Characters of the plot itself."""
@@ -14,7 +14,7 @@ POINT, LINE = "o", "."
 
 def chart_lines(trend: Trend) -> list[str]:
     """Points and fitted line over the dates, fall downwards (%); the points alone below 8 of them."""
-    dates = np.array([day(point.time) for point in trend.points])
+    dates = days_of(trend.points)
     percent = np.array([point.percent for point in trend.points]) - trend.start
     low, high = float(percent.min()), float(percent.max())
     low, high = (low, high) if high > low else (low - 0.5, high + 0.5)

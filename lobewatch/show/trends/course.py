@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.analysis.decay.trend import Trend, day
+from lobewatch.analysis.decay.trend import Trend, days_of
 
 AHEAD = 0.5
 """Of the length of the series, that is drawn beyond it."""
@@ -35,7 +35,7 @@ def course_of(trend: Trend) -> Course | None:
     found = trend.forecast
     if found is None:
         return None
-    past = np.array([day(point.time) for point in trend.points])
+    past = days_of(trend.points)
     near = found.dates <= max(past[-1] + AHEAD * (past[-1] - past[0]), found.dates[1])
     low, high = (trend.first * np.exp(found.fan(quantile)[near] / 100) for quantile in (0.1, 0.9))
     line = np.append(found.fitted, found.line[near])

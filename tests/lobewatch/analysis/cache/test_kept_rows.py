@@ -14,6 +14,7 @@ from typer.testing import CliRunner, Result
 
 from acquisition import TapTest
 from lobewatch.analysis import History, Measurement, measure
+from lobewatch.analysis.workers.software import SOFTWARE
 from lobewatch.cli import app
 
 Shop = Any
@@ -34,7 +35,7 @@ def tapped(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> Shop:
         return replace(found, followed=found.followed.scaled(1 + 100 / found.followed.frequency, 1.0, "older"))
 
     with monkeypatch.context() as patch:
-        patch.setattr("lobewatch.analysis.history.version", lambda _: "0.0.1")
+        patch.setattr("lobewatch.analysis.history.SOFTWARE", SOFTWARE._replace(lobewatch="0.0.1"))
         patch.setattr("lobewatch.analysis.cache.worked_out.measure", otherwise)
         assert frequencies(shop.logbook.history) == [1813, 1812, 1811]
     return shop

@@ -28,11 +28,10 @@ def export(
       lobewatch export mills fleet.sqlite
       lobewatch export mills fleet.csv
     """
-    from lobewatch.analysis.plant.plant import expect_many_objects, find_machines
+    from lobewatch.analysis.plant.plant import find_machines
     from lobewatch.analysis.plant.tap_table import all_tables
     from lobewatch.show.plant.table_files import write_table
 
-    expect_many_objects()
     machines, damaged = find_machines(folder), dict[str, str]()
     count = write_table(all_tables(machines, damaged), file)
     for key, reason in damaged.items():

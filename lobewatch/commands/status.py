@@ -39,13 +39,12 @@ def status(
       lobewatch status mills --due
     """
     from lobewatch.analysis.plant.light import Light
-    from lobewatch.analysis.plant.plant import Plant, expect_many_objects, find_machines
+    from lobewatch.analysis.plant.plant import Plant, find_machines
     from lobewatch.show.plant.describe_plant import plant_csv, plant_text
     from lobewatch.show.plant.plant_rows import plant_rows
 
     if as_csv and as_json:
         raise ValueError("--csv and --json: give one of them")
-    expect_many_objects()
     found = Plant(find_machines(folder)).standings()
     rows = plant_rows(found)
     shown = [row for row in rows if not due or row["days_left"] is None or row["days_left"] < 0]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import threading
 from collections.abc import Mapping
 from datetime import UTC, datetime
@@ -17,8 +16,6 @@ from lobewatch.machine.mark import mark_of
 
 VERIFY_EVERY = 6 * 3600.0
 """Time between two looks at every byte (s)."""
-SELDOM = 20_000
-"""Objects made between two searches for dead ones that hold one another."""
 
 
 class Standings(NamedTuple):
@@ -42,11 +39,6 @@ def find_machines(path: Path) -> dict[str, Path]:
     if not found:
         raise DataError(f"{path}: neither a machine folder nor a folder of them; make one with: lobewatch init")
     return found
-
-
-def expect_many_objects() -> None:
-    """For a command that reads many machines and ends: rows do not hold one another, and to search takes a tenth."""
-    gc.set_threshold(SELDOM)
 
 
 class Plant:

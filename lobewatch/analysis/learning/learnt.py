@@ -157,21 +157,32 @@ def _refresh(draws: Draws, log: Floats, cuts: Sequence[Observed], random: np.ran
     weights = _weights(log)
     spread = np.cov(draws.normal.T, aweights=weights) + 1e-4 * np.eye(draws.normal.shape[1])
     root = np.linalg.cholesky(spread) * REACH
-    draws = draws[_spread(weights, REFRESHED, random)]
-    value = _joint(draws, cuts)
+    chosen, copies = np.unique(_spread(weights, REFRESHED, random), return_inverse=True)
+    value = _joint(draws[chosen], cuts, np.full(len(chosen), -np.inf))[copies]
+    draws = draws[chosen[copies]]
     for _ in range(MOVES):
         step = random.standard_normal(draws.normal.shape) @ root.T
         moved = replace(draws, normal=draws.normal + step)
-        there = _joint(moved, cuts)
-        taken = np.log(random.uniform(size=len(draws))) < there - value
+        least = value + np.log(random.uniform(size=len(draws)))
+        there = _joint(moved, cuts, least)
+        taken = there > least
         normal = np.where(taken[:, np.newaxis], moved.normal, draws.normal)
         draws, value = replace(draws, normal=normal), np.where(taken, there, value)
     return draws, np.zeros(len(draws))
 
 
-def _joint(draws: Draws, cuts: Sequence[Observed]) -> Floats:
-    """Logarithm of prior times likelihood of all cuts."""
-    return np.asarray(sum(_log(cut, predicted(cut, draws)) for cut in cuts) - np.sum(draws.normal**2, axis=1) / 2)
+def _joint(draws: Draws, cuts: Sequence[Observed], least: Floats) -> Floats:
+    """Logarithm of prior times likelihood of all cuts; -inf where that is not more than the least (r,).
+
+    Cuts that can only speak against a draw come last: what is below the least by then need not be asked any more.
+    """
+    value = -np.sum(draws.normal**2, axis=1) / 2
+    for cut in sorted(cuts, key=lambda cut: not cut.has_frequency):
+        asked = np.flatnonzero(np.isfinite(value))
+        value[asked] += _log(cut, predicted(cut, draws[asked]))
+        if not cut.has_frequency:
+            value[value <= least] = -np.inf
+    return value
 
 
 def _spread(weights: Floats, count: int, random: np.random.Generator) -> NDArray[np.intp]:

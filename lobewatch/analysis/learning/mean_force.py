@@ -24,7 +24,7 @@ REACH = 0.7
 """Frequencies are looked at so far around each natural frequency, relatively ..."""
 POINTS = 49
 """... at so many places, dense near it."""
-AT_ONCE = 300_000
+AT_ONCE = 150_000
 """Numbers that are worked on at once."""
 NEWTON = 14
 """Steps of the search for a root."""
@@ -121,16 +121,19 @@ class MeanForce:
             dgain * trace + gain * dtrace + 2 * gain * dgain * both + gain**2 * dboth,
         )
 
-    def _receptance(self, s: Complexes, axis: int) -> Complexes:
-        """Of one direction at s (r, k) (1/s)."""
-        total = np.zeros(s.shape, np.complex128)
+    def _receptance(self, frequency: Floats, axis: int) -> Complexes:
+        """Of one direction at frequencies (rad/s) (r, k)."""
+        total = np.zeros(frequency.shape, np.complex128)
         for mode in self._modes(axis):
-            r = s / mode.frequency
-            total += (mode.place + mode.velocity * r) / (mode.stiffness * (1 + (2 * mode.damping_ratio + r) * r))
+            r = frequency / mode.frequency
+            elastic, damped, moving = 1 - r * r, 2 * mode.damping_ratio * r, mode.velocity * r
+            share = 1 / (mode.stiffness * (elastic * elastic + damped * damped))
+            total.real += (mode.place * elastic + moving * damped) * share
+            total.imag += (moving * elastic - mode.place * damped) * share
         return total
 
     def _with_slope(self, s: Complexes, axis: int) -> tuple[Complexes, Complexes]:
-        """The same, and its derivative."""
+        """Of one direction at s (r, k) (1/s), and its derivative."""
         total, slope = np.zeros(s.shape, np.complex128), np.zeros(s.shape, np.complex128)
         for mode in self._modes(axis):
             r = s / mode.frequency
@@ -157,8 +160,7 @@ class MeanForce:
 
     def _eigenvalues(self, grid: Floats) -> list[Complexes]:
         """Both of H0 G at frequencies (r, k), each followed over them."""
-        s = np.asarray(2j * np.pi * grid, np.complex128)
-        gx, gy = self._receptance(s, 0), self._receptance(s, 1)
+        gx, gy = (self._receptance(2 * np.pi * grid, axis) for axis in (0, 1))
         h = self.force[..., np.newaxis]
         half = (h[:, 0, 0] * gx + h[:, 1, 1] * gy) / 2
         root = np.sqrt(half**2 - (h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] * h[:, 1, 0]) * gx * gy)
@@ -180,9 +182,11 @@ def _lowest(grid: Floats, loop: Complexes, teeth: Floats) -> tuple[Floats, Float
         return depth, frequency
     first, last = steps[0], steps[-1] + 1
     low, grid, real, turn = low[:, first:last], *(part[:, first : last + 1] for part in (grid, loop.real, turn))
-    place = grid[:, np.newaxis] / teeth[..., np.newaxis] + turn[:, np.newaxis]
+    place = grid[:, np.newaxis] / teeth[..., np.newaxis]
+    place += turn[:, np.newaxis]
     whole = np.floor(place)
-    crosses = (whole[..., 1:] != whole[..., :-1]) & low[:, np.newaxis]
+    crosses = whole[..., 1:] != whole[..., :-1]
+    crosses &= low[:, np.newaxis]
     row, speed, step = np.unravel_index(np.flatnonzero(crosses), crosses.shape)
     before, after = place[row, speed, step], place[row, speed, step + 1]
     share = (np.maximum(whole[row, speed, step], whole[row, speed, step + 1]) - before) / (after - before)

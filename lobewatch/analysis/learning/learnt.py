@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes import MillingRows
-from lobewatch.analysis.learning.likelihood import Predicted, log_likelihood, predicted
+from lobewatch.analysis.learning.likelihood import Predicted, log_likelihood, most_likely, predicted
 from lobewatch.analysis.learning.observed import Observed
 from lobewatch.analysis.learning.priors import Draws, drawn
 from lobewatch.analysis.programs.doubt import Doubt
@@ -144,7 +144,12 @@ def learn(middle: MillingRows, doubt: Doubt, cuts: Sequence[Observed], count: in
 
 def _log(cut: Observed, guess: Predicted) -> Floats:
     """Logarithm of the likelihood of one cut; an old one counts less, the more the frequency has moved since."""
-    return cut.weight * log_likelihood(cut, guess, cut.cut.teeth * cut.speed_rpm / 60)
+    return cut.weight * log_likelihood(cut, guess, _teeth(cut))
+
+
+def _teeth(cut: Observed) -> float:
+    """Tooth frequency (Hz)."""
+    return cut.cut.teeth * cut.speed_rpm / 60
 
 
 def _weights(log: Floats) -> Floats:
@@ -174,14 +179,15 @@ def _refresh(draws: Draws, log: Floats, cuts: Sequence[Observed], random: np.ran
 def _joint(draws: Draws, cuts: Sequence[Observed], least: Floats) -> Floats:
     """Logarithm of prior times likelihood of all cuts; -inf where that is not more than the least (r,).
 
-    Cuts that can only speak against a draw come last: what is below the least by then need not be asked any more.
+    A draw that cannot come to more any more is not asked about further cuts.
     """
     value = -np.sum(draws.normal**2, axis=1) / 2
-    for cut in sorted(cuts, key=lambda cut: not cut.has_frequency):
+    hope = [cut.weight * most_likely(cut, _teeth(cut)) for cut in cuts]
+    for k, cut in enumerate(cuts):
+        value[value + sum(hope[k:]) <= least] = -np.inf
         asked = np.flatnonzero(np.isfinite(value))
-        value[asked] += _log(cut, predicted(cut, draws[asked]))
-        if not cut.has_frequency:
-            value[value <= least] = -np.inf
+        if asked.size:
+            value[asked] += _log(cut, predicted(cut, draws[asked]))
     return value
 
 

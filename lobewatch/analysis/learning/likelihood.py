@@ -81,6 +81,15 @@ def log_likelihood(seen: Observed, guess: Predicted, tooth_frequency: float) -> 
     return np.asarray(np.log(guess.chance) + _log_of_sound(seen, guess, tooth_frequency))
 
 
+def most_likely(seen: Observed, tooth_frequency: float) -> float:
+    """The largest that `log_likelihood` can be: of a spindle that would do what was heard."""
+    if not seen.has_frequency:
+        return 0.0
+    base = np.atleast_1d(folded(_heard_base(seen, tooth_frequency), tooth_frequency))
+    same = Predicted(np.array([np.inf]), base, base, np.array([seen.word == "flip"]))
+    return float(log_likelihood(seen, same, tooth_frequency)[0])
+
+
 def _log_of_sound(seen: Observed, guess: Predicted, tooth_frequency: float) -> Floats:
     """Of kind and frequency, where it chatters; 0 where neither was told."""
     if not seen.has_frequency:

@@ -181,7 +181,7 @@ def _joint(draws: Draws, cuts: Sequence[Observed], least: Floats) -> Floats:
 
     A draw that cannot come to more any more is not asked about further cuts.
     """
-    value = -np.sum(draws.normal**2, axis=1) / 2
+    value: Floats = -np.sum(draws.normal**2, axis=1) / 2
     hope = [cut.weight * most_likely(cut, _teeth(cut)) for cut in cuts]
     for k, cut in enumerate(cuts):
         value[value + sum(hope[k:]) <= least] = -np.inf

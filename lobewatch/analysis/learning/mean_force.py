@@ -24,7 +24,7 @@ REACH = 0.7
 """Frequencies are looked at so far around each natural frequency, relatively ..."""
 POINTS = 49
 """... at so many places, dense near it."""
-AT_ONCE = 150_000
+AT_ONCE = 300_000
 """Numbers that are worked on at once."""
 NEWTON = 14
 """Steps of the search for a root."""

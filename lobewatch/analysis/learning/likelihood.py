@@ -27,9 +27,7 @@ STRANGE = 0.05
 OTHER_KIND = 0.1
 """Share of chatter that is heard as that of the other kind."""
 ACCURACY = 1e-3
-"""Of a multiplier; ..."""
-COARSER = 2
-"""... for which so many times fewer pieces of the tooth period do: `excess` within 0.003, frequencies within 0.02 %."""
+"""Of a multiplier."""
 REAL = 1e-3
 """A multiplier whose angle is this near to pi (rad) is that of period two."""
 
@@ -126,8 +124,7 @@ def _by_mean_force(rows: MillingRows, seen: Observed) -> Predicted:
 def _by_multipliers(rows: MillingRows, seen: Observed) -> Predicted:
     """By semi-discretisation at the depth of the cut; how far it is from the limit by its growth over that at rest."""
     depth = np.full((len(rows), 1), seen.depth)
-    numbers = -(-piece_numbers(rows, seen.depth) // COARSER)
-    multiplier = largest_multipliers(rows, depth, numbers, ACCURACY)[:, 0]
+    multiplier = largest_multipliers(rows, depth, piece_numbers(rows, seen.depth), ACCURACY)[:, 0]
     quiet = np.min(rows.damping_ratio * rows.frequency, axis=1) * rows.tooth_period
     excess = np.clip(np.log(np.maximum(np.abs(multiplier), 1e-9)) / quiet, -5, 5)
     angle = np.abs(np.angle(multiplier))

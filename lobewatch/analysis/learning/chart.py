@@ -48,7 +48,8 @@ class Chart:
     def of(cls, draws: Draws, grid: Grid) -> Chart:
         """Of draws at speed."""
         rows = replace(draws.rows(1.0, grid.cut.tangential, grid.cut.radial), cut=grid.cut)
-        found = [MeanForce.of(rows.fed_at(angle)).limits(grid.speeds) for angle in grid.feed_angles]
+        deepest = 1e-6 + float(np.max(grid.deepest / grid.trust))
+        found = [MeanForce.of(rows.fed_at(angle)).limits(grid.speeds, deepest) for angle in grid.feed_angles]
         worst = np.argmin([limit for limit, _ in found], axis=0)[np.newaxis]
         limit, frequency = (np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*found, strict=True))
         limit = np.minimum(limit * grid.trust, grid.deepest)

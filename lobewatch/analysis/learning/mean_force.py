@@ -63,10 +63,10 @@ class MeanForce:
         force = np.multiply.outer(rows.tangential, tangential) + np.multiply.outer(rows.radial, radial)
         return cls(rows, turned(force, rows.feed_angle))
 
-    def limits(self, speed_rpm: Floats) -> tuple[Floats, Floats]:
+    def limits(self, speed_rpm: Floats, deepest: float = np.inf) -> tuple[Floats, Floats]:
         """Lowest limit (m) and its chatter frequency (Hz) at speeds (rpm) (s,), or (r, s) where each has its own.
 
-        Both of shape (r, s); inf and NaN where there is none.
+        Both of shape (r, s); inf and NaN where there is none, and perhaps where it is more than `deepest` (m).
         """
         speeds = np.broadcast_to(speed_rpm, (len(self.rows), np.shape(speed_rpm)[-1]))
         depth, chatter = np.full(speeds.shape, np.inf), np.full(speeds.shape, np.nan)
@@ -74,15 +74,15 @@ class MeanForce:
         for first in range(0, len(self.rows), size):
             part = slice(first, first + size)
             some = MeanForce(self.rows[part], self.force[part])
-            depth[part], chatter[part] = some._limits(speeds[part] * self.rows.cut.teeth / 60)
+            depth[part], chatter[part] = some._limits(speeds[part] * self.rows.cut.teeth / 60, deepest)
         return depth, chatter
 
-    def _limits(self, teeth: Floats) -> tuple[Floats, Floats]:
+    def _limits(self, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
         """The same at tooth frequencies (Hz) (r, s)."""
         grid = self._grid()
         depth, chatter = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
         for loop in self._eigenvalues(grid):
-            own, frequency = _lowest(grid, loop, teeth)
+            own, frequency = _lowest(grid, loop, teeth, deepest)
             chatter = np.where(own < depth, frequency, chatter)
             depth = np.minimum(own, depth)
         return depth, chatter
@@ -169,13 +169,13 @@ class MeanForce:
         return [half + root, half - root]
 
 
-def _lowest(grid: Floats, loop: Complexes, teeth: Floats) -> tuple[Floats, Floats]:
+def _lowest(grid: Floats, loop: Complexes, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
     """Lowest limit (m) and its frequency (Hz) of loops (r, k) over frequencies (r, k), at tooth frequencies (r, s).
 
-    A crossing lies where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L).
+    A crossing lies where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L). Those beyond `deepest` (m) do not count.
     """
     turn = 0.5 - _unwrapped(np.angle(loop)) / np.pi
-    low = np.minimum(loop.real[:, 1:], loop.real[:, :-1]) < 0
+    low = np.minimum(loop.real[:, 1:], loop.real[:, :-1]) < -1 / (2 * deepest)
     depth, frequency = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
     steps = np.flatnonzero(np.any(low, axis=0))
     if not steps.size:

@@ -172,7 +172,7 @@ class MeanForce:
 def _lowest(grid: Floats, loop: Complexes, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
     """Lowest limit (m) and its frequency (Hz) of loops (r, k) over frequencies (r, k), at tooth frequencies (r, s).
 
-    A crossing lies where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L). Those beyond `deepest` (m) do not count.
+    A crossing lies where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L). None beyond `deepest` (m) counts.
     """
     turn = 0.5 - _unwrapped(np.angle(loop)) / np.pi
     low = np.minimum(loop.real[:, 1:], loop.real[:, :-1]) < -1 / (2 * deepest)

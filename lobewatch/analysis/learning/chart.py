@@ -48,7 +48,8 @@ class Chart:
     def of(cls, draws: Draws, grid: Grid) -> Chart:
         """Of draws at speed."""
         rows = replace(draws.rows(1.0, grid.cut.tangential, grid.cut.radial), cut=grid.cut)
-        found = [MeanForce.of(rows.fed_at(angle)).limits(grid.speeds) for angle in grid.feed_angles]
+        deepest = 1e-6 + float(np.max(grid.deepest / grid.trust))
+        found = [MeanForce.of(rows.fed_at(angle)).limits(grid.speeds, deepest) for angle in grid.feed_angles]
         worst = np.argmin([limit for limit, _ in found], axis=0)[np.newaxis]
         limit, frequency = (np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*found, strict=True))
         limit = np.minimum(limit * grid.trust, grid.deepest)
@@ -60,9 +61,13 @@ class Chart:
 
     def gains(self, weights: Floats, best: float) -> Floats:
         """Expected gain of removal rate (rpm m) by the best cut at each speed, shape (s,)."""
-        stable = np.cumsum(weights[self.order], axis=0)
-        more = np.maximum(self.chips - best, 0.0)
-        return np.asarray(np.max(np.where(stable > LIKELY, stable * more, 0.0), axis=0))
+        more = self.chips > best
+        speeds, deep = np.any(more, axis=0), np.any(more, axis=1)
+        stable = np.cumsum(weights[self.order[deep][:, speeds]], axis=0)
+        gain = (stable > LIKELY) * stable * (self.chips[deep][:, speeds] - best)
+        found = np.zeros(speeds.shape)
+        found[speeds] = np.max(gain, axis=0, initial=0.0)
+        return found
 
     def candidates(self, best: float) -> Iterator[tuple[int, float]]:
         """Speeds, by their place, and depths (m) that are worth looking at."""

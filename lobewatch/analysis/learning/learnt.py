@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes import MillingRows
-from lobewatch.analysis.learning.likelihood import Predicted, log_likelihood, predicted
+from lobewatch.analysis.learning.likelihood import Predicted, log_likelihood, most_likely, predicted
 from lobewatch.analysis.learning.observed import Observed
 from lobewatch.analysis.learning.priors import Draws, drawn
 from lobewatch.analysis.programs.doubt import Doubt
@@ -144,7 +144,12 @@ def learn(middle: MillingRows, doubt: Doubt, cuts: Sequence[Observed], count: in
 
 def _log(cut: Observed, guess: Predicted) -> Floats:
     """Logarithm of the likelihood of one cut; an old one counts less, the more the frequency has moved since."""
-    return cut.weight * log_likelihood(cut, guess, cut.cut.teeth * cut.speed_rpm / 60)
+    return cut.weight * log_likelihood(cut, guess, _teeth(cut))
+
+
+def _teeth(cut: Observed) -> float:
+    """Tooth frequency (Hz)."""
+    return cut.cut.teeth * cut.speed_rpm / 60
 
 
 def _weights(log: Floats) -> Floats:
@@ -157,21 +162,33 @@ def _refresh(draws: Draws, log: Floats, cuts: Sequence[Observed], random: np.ran
     weights = _weights(log)
     spread = np.cov(draws.normal.T, aweights=weights) + 1e-4 * np.eye(draws.normal.shape[1])
     root = np.linalg.cholesky(spread) * REACH
-    draws = draws[_spread(weights, REFRESHED, random)]
-    value = _joint(draws, cuts)
+    chosen, copies = np.unique(_spread(weights, REFRESHED, random), return_inverse=True)
+    value = _joint(draws[chosen], cuts, np.full(len(chosen), -np.inf))[copies]
+    draws = draws[chosen[copies]]
     for _ in range(MOVES):
         step = random.standard_normal(draws.normal.shape) @ root.T
         moved = replace(draws, normal=draws.normal + step)
-        there = _joint(moved, cuts)
-        taken = np.log(random.uniform(size=len(draws))) < there - value
+        least = value + np.log(random.uniform(size=len(draws)))
+        there = _joint(moved, cuts, least)
+        taken = there > least
         normal = np.where(taken[:, np.newaxis], moved.normal, draws.normal)
         draws, value = replace(draws, normal=normal), np.where(taken, there, value)
     return draws, np.zeros(len(draws))
 
 
-def _joint(draws: Draws, cuts: Sequence[Observed]) -> Floats:
-    """Logarithm of prior times likelihood of all cuts."""
-    return np.asarray(sum(_log(cut, predicted(cut, draws)) for cut in cuts) - np.sum(draws.normal**2, axis=1) / 2)
+def _joint(draws: Draws, cuts: Sequence[Observed], least: Floats) -> Floats:
+    """Logarithm of prior times likelihood of all cuts; -inf where that is not more than the least (r,).
+
+    A draw that cannot come to more any more is not asked about further cuts.
+    """
+    value: Floats = -np.sum(draws.normal**2, axis=1) / 2
+    hope = [cut.weight * most_likely(cut, _teeth(cut)) for cut in cuts]
+    for k, cut in enumerate(cuts):
+        value[value + sum(hope[k:]) <= least] = -np.inf
+        asked = np.flatnonzero(np.isfinite(value))
+        if asked.size:
+            value[asked] += _log(cut, predicted(cut, draws[asked]))
+    return value
 
 
 def _spread(weights: Floats, count: int, random: np.random.Generator) -> NDArray[np.intp]:

@@ -42,7 +42,7 @@ class Predicted(NamedTuple):
     base: Floats
     """Frequency of what grows most, folded to between 0 and half the tooth frequency (Hz); NaN where not known."""
     at_limit: Floats
-    """The same at the limit at its speed, by zero order."""
+    """The same at the limit at its speed, by zero order; may be NaN where the cut says nothing of frequencies."""
     flip: NDArray[np.bool_]
     """Whether that is of period two."""
 
@@ -77,6 +77,15 @@ def log_likelihood(seen: Observed, guess: Predicted, tooth_frequency: float) -> 
     if not seen.chatters:
         return np.asarray(np.log(1 - guess.chance))
     return np.asarray(np.log(guess.chance) + _log_of_sound(seen, guess, tooth_frequency))
+
+
+def most_likely(seen: Observed, tooth_frequency: float) -> float:
+    """The largest that `log_likelihood` can be: of a spindle that would do what was heard."""
+    if not seen.has_frequency:
+        return 0.0
+    base = np.atleast_1d(folded(_heard_base(seen, tooth_frequency), tooth_frequency))
+    same = Predicted(np.array([np.inf]), base, base, np.array([seen.word == "flip"]))
+    return float(log_likelihood(seen, same, tooth_frequency)[0])
 
 
 def _log_of_sound(seen: Observed, guess: Predicted, tooth_frequency: float) -> Floats:
@@ -119,6 +128,7 @@ def _by_multipliers(rows: MillingRows, seen: Observed) -> Predicted:
     quiet = np.min(rows.damping_ratio * rows.frequency, axis=1) * rows.tooth_period
     excess = np.clip(np.log(np.maximum(np.abs(multiplier), 1e-9)) / quiet, -5, 5)
     angle = np.abs(np.angle(multiplier))
-    teeth = 1 / rows.tooth_period
-    _, at_limit = MeanForce.of(rows).limits(rows.speed_rpm[:, np.newaxis])
-    return Predicted(excess, angle / (2 * np.pi) * teeth, folded(at_limit[:, 0], teeth), np.pi - angle < REAL)
+    teeth, at_limit = 1 / rows.tooth_period, np.full(len(rows), np.nan)
+    if seen.has_frequency:
+        at_limit = MeanForce.of(rows).limits(rows.speed_rpm[:, np.newaxis])[1][:, 0]
+    return Predicted(excess, angle / (2 * np.pi) * teeth, folded(at_limit, teeth), np.pi - angle < REAL)

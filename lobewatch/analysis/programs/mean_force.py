@@ -63,10 +63,10 @@ class MeanForce:
         force = np.multiply.outer(rows.tangential, tangential) + np.multiply.outer(rows.radial, radial)
         return cls(rows, turned(force, rows.feed_angle))
 
-    def limits(self, speed_rpm: Floats) -> tuple[Floats, Floats]:
+    def limits(self, speed_rpm: Floats, deepest: float = np.inf) -> tuple[Floats, Floats]:
         """Lowest limit (m) and its chatter frequency (Hz) at speeds (rpm) (s,), or (r, s) where each has its own.
 
-        Both of shape (r, s); inf and NaN where there is none.
+        Both of shape (r, s); inf and NaN where there is none, and perhaps where it is more than `deepest` (m).
         """
         speeds = np.broadcast_to(speed_rpm, (len(self.rows), np.shape(speed_rpm)[-1]))
         depth, chatter = np.full(speeds.shape, np.inf), np.full(speeds.shape, np.nan)
@@ -74,15 +74,15 @@ class MeanForce:
         for first in range(0, len(self.rows), size):
             part = slice(first, first + size)
             some = MeanForce(self.rows[part], self.force[part])
-            depth[part], chatter[part] = some._limits(speeds[part] * self.rows.cut.teeth / 60)
+            depth[part], chatter[part] = some._limits(speeds[part] * self.rows.cut.teeth / 60, deepest)
         return depth, chatter
 
-    def _limits(self, teeth: Floats) -> tuple[Floats, Floats]:
+    def _limits(self, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
         """The same at tooth frequencies (Hz) (r, s)."""
         grid = self._grid()
         depth, chatter = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
         for loop in self._eigenvalues(grid):
-            own, frequency = _lowest(grid, loop, teeth)
+            own, frequency = _lowest(grid, loop, teeth, deepest)
             chatter = np.where(own < depth, frequency, chatter)
             depth = np.minimum(own, depth)
         return depth, chatter
@@ -121,16 +121,19 @@ class MeanForce:
             dgain * trace + gain * dtrace + 2 * gain * dgain * both + gain**2 * dboth,
         )
 
-    def _receptance(self, s: Complexes, axis: int) -> Complexes:
-        """Of one direction at s (r, k) (1/s)."""
-        total = np.zeros(s.shape, np.complex128)
+    def _receptance(self, frequency: Floats, axis: int) -> Complexes:
+        """Of one direction at frequencies (rad/s) (r, k)."""
+        total = np.zeros(frequency.shape, np.complex128)
         for mode in self._modes(axis):
-            r = s / mode.frequency
-            total += (mode.place + mode.velocity * r) / (mode.stiffness * (1 + (2 * mode.damping_ratio + r) * r))
+            r = frequency / mode.frequency
+            elastic, damped, moving = 1 - r * r, 2 * mode.damping_ratio * r, mode.velocity * r
+            share = 1 / (mode.stiffness * (elastic * elastic + damped * damped))
+            total.real += (mode.place * elastic + moving * damped) * share
+            total.imag += (moving * elastic - mode.place * damped) * share
         return total
 
     def _with_slope(self, s: Complexes, axis: int) -> tuple[Complexes, Complexes]:
-        """The same, and its derivative."""
+        """Of one direction at s (r, k) (1/s), and its derivative."""
         total, slope = np.zeros(s.shape, np.complex128), np.zeros(s.shape, np.complex128)
         for mode in self._modes(axis):
             r = s / mode.frequency
@@ -157,8 +160,7 @@ class MeanForce:
 
     def _eigenvalues(self, grid: Floats) -> list[Complexes]:
         """Both of H0 G at frequencies (r, k), each followed over them."""
-        s = np.asarray(2j * np.pi * grid, np.complex128)
-        gx, gy = self._receptance(s, 0), self._receptance(s, 1)
+        gx, gy = (self._receptance(2 * np.pi * grid, axis) for axis in (0, 1))
         h = self.force[..., np.newaxis]
         half = (h[:, 0, 0] * gx + h[:, 1, 1] * gy) / 2
         root = np.sqrt(half**2 - (h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] * h[:, 1, 0]) * gx * gy)
@@ -167,22 +169,24 @@ class MeanForce:
         return [half + root, half - root]
 
 
-def _lowest(grid: Floats, loop: Complexes, teeth: Floats) -> tuple[Floats, Floats]:
+def _lowest(grid: Floats, loop: Complexes, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
     """Lowest limit (m) and its frequency (Hz) of loops (r, k) over frequencies (r, k), at tooth frequencies (r, s).
 
-    A crossing lies where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L).
+    A crossing lies where f / f_t - arg(L) / pi + 1/2 is whole: b = -1 / (2 Re L). None beyond `deepest` (m) counts.
     """
     turn = 0.5 - _unwrapped(np.angle(loop)) / np.pi
-    low = np.minimum(loop.real[:, 1:], loop.real[:, :-1]) < 0
+    low = np.minimum(loop.real[:, 1:], loop.real[:, :-1]) < -1 / (2 * deepest)
     depth, frequency = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
     steps = np.flatnonzero(np.any(low, axis=0))
     if not steps.size:
         return depth, frequency
     first, last = steps[0], steps[-1] + 1
     low, grid, real, turn = low[:, first:last], *(part[:, first : last + 1] for part in (grid, loop.real, turn))
-    place = grid[:, np.newaxis] / teeth[..., np.newaxis] + turn[:, np.newaxis]
+    place = grid[:, np.newaxis] / teeth[..., np.newaxis]
+    place += turn[:, np.newaxis]
     whole = np.floor(place)
-    crosses = (whole[..., 1:] != whole[..., :-1]) & low[:, np.newaxis]
+    crosses = whole[..., 1:] != whole[..., :-1]
+    crosses &= low[:, np.newaxis]
     row, speed, step = np.unravel_index(np.flatnonzero(crosses), crosses.shape)
     before, after = place[row, speed, step], place[row, speed, step + 1]
     share = (np.maximum(whole[row, speed, step], whole[row, speed, step + 1]) - before) / (after - before)

@@ -10,9 +10,10 @@ import pytest
 from lobes import Cut, stability_boundary
 from lobewatch.analysis.learning.contradicting import Contradiction, contradiction, learn_from_sound
 from lobewatch.analysis.learning.learnt import Learnt
-from lobewatch.analysis.learning.likelihood import MISJUDGED, log_likelihood, predicted
+from lobewatch.analysis.learning.likelihood import MISJUDGED, log_likelihood, most_likely, predicted
 from lobewatch.analysis.learning.observed import Observed
 from lobewatch.analysis.listening.folded import folded
+from lobewatch.machine.cuts.heard_cut import CutWord
 from modal import Mode
 from tests.lobewatch.analysis.learning.conftest import Mill
 
@@ -41,6 +42,17 @@ def test_a_shallow_cut_is_stable_and_a_deep_one_chatters_but_for_cuts_that_are_m
     assert likelihood(mill, chatters, mill.prior) == pytest.approx(MISJUDGED)
     deep = replace(chatters, depth=0.05)
     assert likelihood(mill, deep, mill.prior) == pytest.approx(1 - MISJUDGED)
+
+
+@pytest.mark.parametrize(
+    ("word", "frequency"), [("chatter", 1450.0), ("chatter", np.nan), ("flip", np.nan), ("stable", np.nan)]
+)
+def test_nothing_is_likelier_than_to_do_what_was_heard(mill: Mill, word: CutWord, frequency: float) -> None:
+    seen = Observed(mill.cut, 12000, 1e-5 if word == "stable" else 0.05, word, frequency)
+    most, found = most_likely(seen, TEETH), np.log(likelihood(mill, seen, mill.prior))
+    assert np.max(found) <= most
+    if word != "flip":
+        assert np.max(found) == pytest.approx(most, abs=0.75)
 
 
 @pytest.mark.parametrize("cut", [Cut(4, 1.0, "down", 1.4e9, 5e8), Cut(2, 1.0, "down", 1.4e9, 5e8)])

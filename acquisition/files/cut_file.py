@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from acquisition.atomic import atomic_write
 from acquisition.channel import Channel
 from acquisition.errors import DataError
+from acquisition.files.readers.unpacked import check_unpacked
 from acquisition.files.seal import is_broken, sealed
-from acquisition.files.unpacked import check_unpacked
 
 FORMAT = "lobewatch-cut"
 VERSION = 1

@@ -8,7 +8,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 from acquisition.errors import DataError
-from acquisition.files.format import Format
+from acquisition.files.readers.format import Format
 from acquisition.files.readers.read_lvm import LVM
 from acquisition.files.readers.read_mat import MAT
 from acquisition.files.readers.read_sep005 import SEP005

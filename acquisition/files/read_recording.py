@@ -12,8 +12,8 @@ from acquisition.files.contents.contents import Contents
 from acquisition.files.contents.description import Description
 from acquisition.files.contents.ledger import Fact
 from acquisition.files.contents.recording import Recording, understood
-from acquisition.files.format import Format
 from acquisition.files.formats import broken_formats, format_of
+from acquisition.files.readers.format import Format
 from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.tap import Circumstances

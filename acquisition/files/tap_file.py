@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from acquisition.atomic import atomic_write
 from acquisition.channel import Channel, tap_direction
 from acquisition.errors import DataError
+from acquisition.files.readers.unpacked import check_unpacked
 from acquisition.files.seal import is_broken, sealed
-from acquisition.files.unpacked import check_unpacked
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
 from acquisition.tap import Circumstances, Conditions, SourceFile, TapTest

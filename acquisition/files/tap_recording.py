@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from acquisition.files.format import Format
+from acquisition.files.readers.format import Format
 from acquisition.files.tap_file import read_tap, read_tap_hits
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags

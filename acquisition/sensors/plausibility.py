@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from datetime import date
 
 from acquisition.channel import Channel, ChannelQuantity
-from acquisition.files.units import POUND_FORCE, STANDARD_GRAVITY
+from acquisition.files.contents.units import POUND_FORCE, STANDARD_GRAVITY
 from acquisition.remark import Remark
 
 SENSITIVITIES: Mapping[ChannelQuantity, tuple[float, float, float, str]] = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from acquisition.files.contents.contents import Role
-from acquisition.files.units import VOLTS, unit_of
+from acquisition.files.contents.units import VOLTS, unit_of
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.+?)\s*[\])]")
 _SPLIT_OFF = re.compile(r"^(.+?)_(.+)$")

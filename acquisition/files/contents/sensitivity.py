@@ -10,7 +10,7 @@ from acquisition.files.contents.contents import Signal
 from acquisition.files.contents.description import Description
 from acquisition.files.contents.ledger import Ledger
 from acquisition.files.contents.named_columns import names_of
-from acquisition.files.units import VOLTS, unit_of
+from acquisition.files.contents.units import VOLTS, unit_of
 
 _SENSITIVITY = re.compile(r"\s*([+-]?\d+\.?\d*(?:[eE][+-]?\d+)?)\s*([a-zA-Zµ]+)\s*(?:/|per)\s*(.+?)\s*")
 _EXAMPLE = '--sensitivity "2.25 mV/N,10.2 mV/g"'

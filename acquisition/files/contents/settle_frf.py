@@ -13,7 +13,7 @@ from acquisition.files.contents.description import Description
 from acquisition.files.contents.heading import ANGLES, is_level
 from acquisition.files.contents.ledger import Ledger
 from acquisition.files.contents.settle_unit import chosen, frf_unit
-from acquisition.files.units import unit_of
+from acquisition.files.contents.units import unit_of
 from acquisition.frf import Frf, Quantity, from_accelerance
 
 COLUMNS_FRF = '--columns "frequency,real,imag", in their order, or each with =NAME'

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from acquisition.files.axis import step_of
+from acquisition.files.contents.axis import step_of
 from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.contents.description import Description
 from acquisition.files.contents.ledger import Ledger
@@ -15,7 +15,7 @@ from acquisition.files.contents.motion import hit_of_motion
 from acquisition.files.contents.named_columns import names_of
 from acquisition.files.contents.sensitivity import in_sensor_units
 from acquisition.files.contents.settle_unit import MOTIONS, chosen, force_unit, response_unit
-from acquisition.files.units import STANDARD_GRAVITY, unit_of
+from acquisition.files.contents.units import STANDARD_GRAVITY, unit_of
 from acquisition.hit import Hit
 from acquisition.hits.hits_in_record import hits_in_record
 

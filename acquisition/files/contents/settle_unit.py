@@ -9,7 +9,7 @@ from acquisition.files.contents.contents import Signal
 from acquisition.files.contents.description import Description
 from acquisition.files.contents.heading import is_level
 from acquisition.files.contents.ledger import Ledger, Origin
-from acquisition.files.units import Unit, motion_of, unit_of
+from acquisition.files.contents.units import Unit, motion_of, unit_of
 
 MOTIONS = ("displacement", "velocity", "acceleration")
 """What a response can be."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.contents.heading import name_and_unit, role_of
-from acquisition.files.format import Format
+from acquisition.files.readers.format import Format
 
 MAGIC = b"LabVIEW Measurement"
 _END = "***End_of_Header***"

@@ -16,10 +16,10 @@ import numpy as np
 
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Signal
-from acquisition.files.format import Format
+from acquisition.files.readers.format import Format
 from acquisition.files.readers.mat_layouts import recognised
 from acquisition.files.readers.mat_window import window_of
-from acquisition.files.unpacked import HARMLESS, RATIO, check_unpacked
+from acquisition.files.readers.unpacked import HARMLESS, RATIO, check_unpacked
 
 _V5 = b"MATLAB 5.0 MAT-file"
 _V73 = b"MATLAB 7.3 MAT-file"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.contents.heading import is_level, is_unit, name_and_unit, role_of
-from acquisition.files.format import Format
+from acquisition.files.readers.format import Format
 from acquisition.files.readers.text import is_text, text_of
 
 _COMMA_NUMBER = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")

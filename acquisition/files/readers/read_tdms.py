@@ -13,7 +13,7 @@ import numpy as np
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Signal, distinct
 from acquisition.files.contents.heading import name_and_unit, role_of
-from acquisition.files.format import Format
+from acquisition.files.readers.format import Format
 
 
 def read_tdms(path: Path) -> Contents:

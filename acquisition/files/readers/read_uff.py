@@ -13,7 +13,7 @@ from pathlib import Path
 
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Role, Signal
-from acquisition.files.format import Format
+from acquisition.files.readers.format import Format
 from acquisition.files.readers.text import decoded
 from acquisition.files.readers.uff_function import Function, read_function
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Signal
-from acquisition.files.format import Format
+from acquisition.files.readers.format import Format
 
 
 def read_wav(path: Path) -> Contents:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from acquisition.files.units import unit_of
+from acquisition.files.contents.units import unit_of
 
 
 @pytest.mark.parametrize(

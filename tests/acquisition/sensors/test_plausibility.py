@@ -20,8 +20,8 @@ from acquisition import (
     stiffness_doubt,
     unit_mistake,
 )
-from lobewatch.analysis import measure
-from lobewatch.machine.machine_file import parse_machine
+from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.measuring import measure
 from modal import Mode, synthesize
 
 HAMMER = Channel("force", 2.25e-3, 5.0, calibration_date="2026-01-15")

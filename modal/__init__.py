@@ -1,23 +1,23 @@
 """From an FRF to natural frequencies, damping ratios and stiffnesses."""
 
-from modal.common_delay import CommonDelay, common_delay
+from modal.bands.extract import extract
+from modal.bands.extraction import Extraction, FittedBand
 from modal.cut_edges import cut_edges
-from modal.extract import extract
-from modal.extraction import Extraction, FittedBand
 from modal.fit_modes import fit_modes, modes_of
 from modal.fit_points import fit_points
-from modal.follow import Followed, follow
-from modal.mac import mac
-from modal.mode import Mode
 from modal.mode_indicator import mode_indicator
+from modal.modes.common_delay import CommonDelay, common_delay
+from modal.modes.follow import Followed, follow
+from modal.modes.mac import mac
+from modal.modes.mode import Mode
+from modal.modes.predominant import predominant
+from modal.modes.synthesize import synthesize
 from modal.pick_peaks import pick_peaks
 from modal.poles import PhysicalPoles, StabilisationChart, physical_poles, stabilise
-from modal.predominant import predominant
 from modal.quality.peaks_beyond import peaks_beyond
 from modal.quality.plausible import Believed, believed
 from modal.quality.trust import Trust, trust_of, trust_rules
 from modal.remove_window import remove_window, with_windowed_noise
-from modal.synthesize import synthesize
 
 __all__ = [
     "Believed",

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Frf
-from modal.find_resonances import NOISE_MULTIPLE, mobility_noise
-from modal.mode import Mode
-from modal.usable_lines import usable_lines
+from modal.bands.find_resonances import NOISE_MULTIPLE, mobility_noise
+from modal.bands.usable_lines import usable_lines
+from modal.modes.mode import Mode
 
 RISE = 10 ** (1 / 20)
 """A line inside that is this many times as high as the edge is a peak of its own."""

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Frf, Hit
-from modal.assess import assess, with_phase_remarks
-from modal.extract import extract
-from modal.extraction import Array, Extraction, FittedBand
+from modal.bands.extract import extract
+from modal.bands.extraction import Array, Extraction, FittedBand
+from modal.bands.systematic import systematic
 from modal.fitting import BandFit
 from modal.hammer_covariance import hammer_covariance
 from modal.jackknife import jackknife, left_out
-from modal.mode import Mode
-from modal.quality.systematic import systematic
+from modal.modes.mode import Mode
+from modal.quality.assess import assess, with_phase_remarks
 
 UNKNOWN_PHASE = 90.0
 """Standard error (degrees) of a phase of which nothing is known."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from acquisition import Frf, Hit
-from modal.extract import extract
+from modal.bands.extract import extract
 from modal.fit_modes import modes_of
-from modal.mode import Mode
+from modal.modes.mode import Mode
 
 
 def fit_points(

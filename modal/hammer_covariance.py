@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from acquisition import Hit
 from acquisition.estimation import force_noise_through
-from modal.extraction import Extraction, FittedBand
+from modal.bands.extraction import Extraction, FittedBand
 
 
 def hammer_covariance(state: Extraction, band: FittedBand, i: int, hits: Sequence[Hit]) -> NDArray[np.float64]:

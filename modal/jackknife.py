@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from acquisition import Frf, Hit
 from acquisition.estimation import cross_spectra
-from modal.extraction import Extraction, FittedBand
+from modal.bands.extraction import Extraction, FittedBand
 
 FEWEST_HITS = 3
 """With two the interval would be 6 times wider than the error is likely to be."""

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Frf
-from modal.find_resonances import Resonance, find_resonances
-from modal.mode import Mode
-from modal.usable_lines import usable_lines
+from modal.bands.find_resonances import Resonance, find_resonances
+from modal.bands.usable_lines import usable_lines
+from modal.modes.mode import Mode
 
 REACH = 2.5
 """The extremes are looked for within this many half-widths of the peak; a single mode has them at one."""

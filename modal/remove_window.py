@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from modal.mode import Mode
+from modal.modes.mode import Mode
 
 
 def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from acquisition import Frf
-from modal.find_resonances import FEWEST_LINES, find_resonances
+from modal.bands.find_resonances import FEWEST_LINES, find_resonances
 
 
 def peaks_beyond(frf: Frf) -> list[float]:

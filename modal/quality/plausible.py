@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from acquisition import Remark, stiffness_doubt
-from modal.mode import Mode
+from modal.modes.mode import Mode
 from modal.quality.trust import Trust, trust_rules
 
 REASONS = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Iterator
 
-from modal.mode import Mode
+from modal.modes.mode import Mode
 
 DOUBTFUL_SHARE, REJECTED_SHARE = 0.05, 0.3
 """What the fit leaves in the band, where it is more than noise, as a share of the peak of the mode."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition import Frf, from_accelerance
 from modal import Mode, Trust, extract, fit_modes, synthesize, trust_of
-from modal.quality.systematic import systematic
+from modal.bands.systematic import systematic
 
 MODE = Mode(1722.0, 0.03, 3.5e7)
 

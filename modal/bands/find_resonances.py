@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from acquisition import Frf
-from modal.line_weights import measuring_factor
-from modal.without_drift import without_drift
+from modal.bands.line_weights import measuring_factor
+from modal.bands.without_drift import without_drift
 
 FEWEST_LINES = 8
 """One mode and its residual terms have seven unknowns."""

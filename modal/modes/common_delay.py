@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modal.mode import Mode
+from modal.modes.mode import Mode
 
 REAL_WITHIN = 2.0
 """Phases of the modes of a lightly damped structure scatter about 0 by this (degrees)."""

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Remark
-from modal.common_delay import common_delay
-from modal.extraction import Extraction, FittedBand
-from modal.fit_peaks import LARGEST_ERROR
+from modal.bands.extraction import Extraction, FittedBand
+from modal.bands.fit_peaks import LARGEST_ERROR
 from modal.fitting import LEAST_TERMS
-from modal.mode import Mode
+from modal.modes.common_delay import common_delay
+from modal.modes.mode import Mode
 from modal.quality.trust import MISFIT, MISFIT_SHARE, relative_error, trust_rules
 
 LEAST_COHERENCE = 0.9

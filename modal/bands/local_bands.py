@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from modal.find_resonances import Resonance
+from modal.bands.find_resonances import Resonance
 
 CLOSE = 4.0
 """Neighbours nearer than this many times the sum of their half-widths are fitted together."""

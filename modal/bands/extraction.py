@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Frf
-from modal.find_resonances import Resonance
+from modal.bands.find_resonances import Resonance
 from modal.fitting import BandFit
 from modal.poles import StabilisationChart, stabilise
 

@@ -13,13 +13,13 @@ from scipy.ndimage import median_filter
 from threadpoolctl import ThreadpoolController
 
 from acquisition import Frf
-from modal.extraction import Extraction, FittedBand
-from modal.find_resonances import Resonance, find_resonances, resonances_beside
-from modal.fit_peaks import fit_again, fit_peaks, fit_real
-from modal.line_weights import line_weights
-from modal.local_bands import local_bands
-from modal.look_closer import look_closer
-from modal.usable_lines import usable_lines
+from modal.bands.extraction import Extraction, FittedBand
+from modal.bands.find_resonances import Resonance, find_resonances, resonances_beside
+from modal.bands.fit_peaks import fit_again, fit_peaks, fit_real
+from modal.bands.line_weights import line_weights
+from modal.bands.local_bands import local_bands
+from modal.bands.look_closer import look_closer
+from modal.bands.usable_lines import usable_lines
 
 SWEEPS = 4
 """Most rounds over the bands, each with the tails of the other bands' modes as they are then."""

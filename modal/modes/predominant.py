@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from modal.mode import Mode
+from modal.modes.mode import Mode
 
 
 def predominant(modes: Sequence[Mode], band: tuple[float, float] | None = None) -> Mode | None:

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from modal.extraction import Array, FittedBand
-from modal.fit_peaks import LEAST_SHARE, are_modes
+from modal.bands.extraction import Array, FittedBand
+from modal.bands.fit_peaks import LEAST_SHARE, are_modes
+from modal.bands.systematic import leaves_rounding, systematic
 from modal.fitting import MOST_TERMS, BandFit, fit_band, gain_of_a_term
 from modal.poles import physical_poles
-from modal.quality.systematic import leaves_rounding, systematic
 
 BLOCKS = 48
 """Runs of lines that the means of what a fit leaves are looked at in."""

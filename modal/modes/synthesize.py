@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from acquisition import Frf
-from modal.mode import Mode
+from modal.modes.mode import Mode
 
 
 def synthesize(modes: Sequence[Mode], frequency: ArrayLike) -> Frf:

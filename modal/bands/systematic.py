@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modal.extraction import Array, BandLines, FittedBand
+from modal.bands.extraction import Array, BandLines, FittedBand
 from modal.fitting import LEAST_TERMS, MOST_TERMS, BandFit, fit_band, with_real_constants
 
 SIGNIFICANT = 3.0

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from modal.extraction import Array, BandLines, FittedBand
-from modal.find_resonances import Resonance
+from modal.bands.extraction import Array, BandLines, FittedBand
+from modal.bands.find_resonances import Resonance
 from modal.fitting import LEAST_TERMS, BandFit, fit_band, with_real_constants
 from modal.poles import physical_poles
 

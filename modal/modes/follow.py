@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from acquisition import Remark
-from modal.mac import mac
-from modal.mode import Mode
+from modal.modes.mac import mac
+from modal.modes.mode import Mode
 
 LIKELY_CHANGE = (0.03, 0.5, 0.3)
 """Relative change of frequency, damping ratio and stiffness from one measurement to the next that counts as one."""

@@ -1,0 +1,1 @@
+"""Modes band by band: found as peaks, fitted, settled with each other's tails, and looked at closer."""

@@ -42,7 +42,7 @@ from dsm import (
     spindle_side,
     whirl_map,
 )
-from lobewatch.machine.machine_file import read_machine
+from lobewatch.machine.settings.machine_file import read_machine
 
 MACHINE = Path(__file__).parent.parent / "sim_data" / "surrogate_machine.toml"
 MEASURED = 1722.0

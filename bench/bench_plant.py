@@ -28,12 +28,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id, write_tap
-from lobewatch.analysis import Estimate, History, Logbook
-from lobewatch.analysis.cache.history_cache import HistoryCache
-from lobewatch.analysis.order import Place
-from lobewatch.machine.archive.tap_entry import TapEntry
+from lobewatch.history import History
+from lobewatch.history.cache.history_cache import HistoryCache
+from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.measuring import Estimate
+from lobewatch.tool.order import Place
 from modal import Mode, synthesize
 
 LINES = np.arange(8.0, 4000.0, 8.0)

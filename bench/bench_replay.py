@@ -48,12 +48,12 @@ from acquisition import (
     write_tap,
 )
 from lobewatch import Logbook
-from lobewatch.analysis.measurement import fitted
-from lobewatch.analysis.plant.plant import Plant
 from lobewatch.machine import TapEntry
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.machine_file import parse_machine
 from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.measuring.measurement import fitted
+from lobewatch.plant.plant import Plant
 from modal import Mode, synthesize
 
 BEGIN = datetime(2016, 1, 1, tzinfo=UTC)

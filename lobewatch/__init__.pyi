@@ -1,5 +1,5 @@
 """What programs use of lobewatch."""
 
-from .analysis import Logbook
+from .logbook import Logbook
 
 __all__ = ["Logbook"]

@@ -108,7 +108,7 @@ def main() -> None:
             raise
         from rich.markup import escape
 
-        from lobewatch.show.output import notes
+        from lobewatch.show.terminal.output import notes
 
         notes.print("[bold red]error:[/]", escape(_sentence(error)))
         sys.exit(2)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit
+from lobewatch.show.terminal.output import Json, emit
 
 
 def calibrate(
@@ -56,9 +56,9 @@ def calibrate(
         return
     if not frequency or direction is not None:
         raise ValueError("give the measured --frequency, or two --tool or more, with a --direction where it matters")
-    from lobewatch.analysis import calibrate_model
     from lobewatch.machine import MachineFolder
-    from lobewatch.show.describe import model_calibration_json, model_calibration_texts
+    from lobewatch.measuring import calibrate_model
+    from lobewatch.show.spindle.describe_model import model_calibration_json, model_calibration_texts
 
     _check_counts(len(frequency), frequency_std or [], mode or [])
     found = calibrate_model(
@@ -74,9 +74,9 @@ def _refuse_beside_tools(given: Mapping[str, object]) -> None:
 
 
 def _from_tools(machine: Path, tools: Sequence[str], direction: str | None, mode: Sequence[int], as_json: bool) -> None:
-    from lobewatch.analysis import Logbook
-    from lobewatch.analysis.joints.tools_calibration import calibrate_tools
-    from lobewatch.show.joints.describe_tools import tools_json, tools_texts
+    from lobewatch.logbook import Logbook
+    from lobewatch.logbook.joints.tools_calibration import calibrate_tools
+    from lobewatch.show.spindle.describe_tools import tools_json, tools_texts
 
     found = calibrate_tools(Logbook.open(machine), tools, direction, mode)
     emit(tools_json(found), as_json, *tools_texts(found))

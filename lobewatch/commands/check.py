@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, notes
 
 PATIENCE = 5.0
 """Time after which a person is told how far it is (s)."""
@@ -32,11 +32,19 @@ def check(
       lobewatch check trial --json
     """
     from acquisition import DataError
-    from lobewatch.analysis import Logbook
-    from lobewatch.show.advice import Advised, advised, advised_json, advised_lines, advised_table, counts, summary
-    from lobewatch.show.measurements import remark_json, remark_lines
+    from lobewatch.logbook import Logbook
+    from lobewatch.show.programs.advice import (
+        Advised,
+        advised,
+        advised_json,
+        advised_lines,
+        advised_table,
+        counts,
+        summary,
+    )
     from lobewatch.show.programs.doubts import reading_lines
-    from lobewatch.show.verdicts import is_safe
+    from lobewatch.show.programs.verdicts import is_safe
+    from lobewatch.show.terminal.remarks import remark_json, remark_lines
 
     logbook = Logbook.open(machine)
     if not logbook.machine.program:

@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.show.output import Json, emit
-from lobewatch.show.replays.describing import (
+from lobewatch.commands.file_options import (
     Averages,
     Columns,
     ForceUnit,
@@ -21,6 +20,7 @@ from lobewatch.show.replays.describing import (
     Unit,
     described,
 )
+from lobewatch.show.terminal.output import Json, emit
 
 
 def convert(

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from lobewatch.show.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, notes
 
 StoryName = Literal["steady", "step", "accelerating", "replaced", "none"]
 MOST_REPLACED = 30
@@ -42,12 +42,12 @@ def demo(
     """
     from rich.progress import Progress
 
-    from lobewatch.analysis import Logbook
+    from lobewatch.logbook import Logbook
     from lobewatch.machine import MachineFolder, make_machine_folder
     from lobewatch.notify.telling import telling
-    from lobewatch.show.describe_demo import demo_json, demo_texts
-    from lobewatch.show.report import write_report
-    from lobewatch.tap.demo import age_spindle, compare_with_truth
+    from lobewatch.show.report.report import write_report
+    from lobewatch.show.trends.describe_demo import demo_json, demo_texts
+    from lobewatch.tap.stories.demo import age_spindle, compare_with_truth
     from lobewatch.tap.stories.mounting import Mounting
     from lobewatch.tap.stories.story import Story, Wear
     from lobewatch.tap.stories.truth import foretold

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, notes, results
+from lobewatch.show.terminal.output import Json, notes, results
 
 if TYPE_CHECKING:
     from acquisition import EmulatorThread
@@ -136,7 +136,7 @@ def _serve_cut(
     served: _Served, folder: MachineFolder, spindle: Spindle | None, chosen: tuple[str, float | None, float | None]
 ) -> None:
     from acquisition.devices import find_driver
-    from lobewatch.machine.cuts.setting import cut_setting
+    from lobewatch.machine.settings.cut_setting import cut_setting
     from lobewatch.tap.milling.emulated_cut import emulate_cut
 
     setting = cut_setting(folder.machine, *chosen)

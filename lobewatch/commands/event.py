@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit
+from lobewatch.show.terminal.output import Json, emit
 
 
 def event(
@@ -32,9 +32,9 @@ def event(
       lobewatch event mill-3 "coolant pump replaced" --date 2026-11-02T14:30:00
       lobewatch event mill-3 --withdraw e2
     """
-    from lobewatch.analysis import Logbook
+    from lobewatch.logbook import Logbook
     from lobewatch.machine import MachineFolder
-    from lobewatch.machine.corrections.correct import add_event, withdraw_event
+    from lobewatch.machine.additions.correct import add_event, withdraw_event
     from lobewatch.notify.telling import telling
     from lobewatch.show.history.describe_history import event_json, event_text
 

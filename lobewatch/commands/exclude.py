@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit
+from lobewatch.show.terminal.output import Json, emit
 
 
 def exclude(
@@ -28,8 +28,8 @@ def exclude(
 
       lobewatch exclude mill-3 20261102T0914 --reason "wrong tool in the spindle"
     """
-    from lobewatch.analysis import Logbook
-    from lobewatch.machine.corrections.correct import exclude as take_out
+    from lobewatch.logbook import Logbook
+    from lobewatch.machine.additions.correct import exclude as take_out
     from lobewatch.notify.telling import telling
 
     logbook = Logbook.open(machine)

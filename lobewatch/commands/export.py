@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, notes
 
 
 def export(
@@ -28,8 +28,8 @@ def export(
       lobewatch export mills fleet.sqlite
       lobewatch export mills fleet.csv
     """
-    from lobewatch.analysis.plant.plant import find_machines
-    from lobewatch.analysis.plant.tap_table import all_tables
+    from lobewatch.plant.plant import find_machines
+    from lobewatch.plant.tap_table import all_tables
     from lobewatch.show.plant.table_files import write_table
 
     machines, damaged = find_machines(folder), dict[str, str]()

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit, notes, results
+from lobewatch.show.terminal.output import Json, emit, notes, results
 
 
 def history(
@@ -30,8 +30,8 @@ def history(
       lobewatch history mill-3 --hdf5 history.h5
     """
     from lobes import write_history
-    from lobewatch.analysis import Logbook
-    from lobewatch.analysis.columns.history_columns import to_columns
+    from lobewatch.history.columns.history_columns import to_columns
+    from lobewatch.logbook import Logbook
     from lobewatch.show.history.describe_history import history_csv, history_json, history_lines
 
     if as_csv and as_json:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit
+from lobewatch.show.terminal.output import Json, emit
 
 
 def include(
@@ -25,8 +25,8 @@ def include(
 
       lobewatch include mill-3 20261102T0914
     """
-    from lobewatch.analysis import Logbook
-    from lobewatch.machine.corrections.correct import include as take_back
+    from lobewatch.logbook import Logbook
+    from lobewatch.machine.additions.correct import include as take_back
     from lobewatch.notify.telling import telling
 
     logbook = Logbook.open(machine)

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit
+from lobewatch.show.terminal.output import Json, emit
 
 
 def init(

@@ -9,10 +9,10 @@ from typing import Annotated
 
 import typer
 
+from lobewatch.commands.file_options import Columns, FullScale, Rate, Response, Sensitivity, Unit, described
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit, notes
-from lobewatch.show.replays.describing import Columns, FullScale, Rate, Response, Sensitivity, Unit, described
-from lobewatch.show.show_address import Listen, Token, WatchToken, serving
+from lobewatch.show.terminal.output import Json, emit, notes
+from lobewatch.show.terminal.show_address import Listen, Token, WatchToken, serving
 
 
 def listen(
@@ -54,10 +54,10 @@ def listen(
       lobewatch listen mill-3 --program A --speed 12000 --depth 2 --file cut.wav --full-scale 500 --unit m/s^2
       lobewatch listen mill-3 --cut "reference cut" --speed 12000 --depth 2
     """
-    from lobewatch.analysis import Logbook
-    from lobewatch.analysis.listening.heard_cut import keep_listened
-    from lobewatch.machine.cuts.observing import contradicted
-    from lobewatch.machine.cuts.setting import chosen_cut
+    from lobewatch.logbook import Logbook
+    from lobewatch.logbook.listened_cut import keep_listened
+    from lobewatch.machine.additions.observe_cut import contradicted
+    from lobewatch.machine.settings.cut_setting import chosen_cut
     from lobewatch.notify.telling import telling
     from lobewatch.show.cuts.describe_listened import listened_json, listened_texts
     from lobewatch.show.history.describe_cut import about_tool, otherwise

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, notes
 
 Source = Literal["modes", "frf"]
 MethodName = Literal["zero-order", "average-angle", "semi-discretisation"]
@@ -38,9 +38,10 @@ def lobes(
       lobewatch lobes trial --figure lobes.png
       lobewatch lobes trial --cut "bracket, slot" --method semi-discretisation --radial radial.png
     """
-    from lobewatch.analysis import Dynamics, Logbook, Method, compare_lobes
-    from lobewatch.show.describe_lobes import comparison_json, comparison_texts, material_lines, materials_json
-    from lobewatch.show.lobe_pictures import save_pictures
+    from lobewatch.logbook import Logbook, compare_lobes
+    from lobewatch.show.figures.lobe_pictures import save_pictures
+    from lobewatch.show.programs.describe_lobes import comparison_json, comparison_texts, material_lines, materials_json
+    from lobewatch.tool import Dynamics, Method
 
     logbook = Logbook.open(machine)
     if materials:

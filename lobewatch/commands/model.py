@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit
+from lobewatch.show.terminal.output import Json, emit
 
 
 def model(
@@ -29,15 +29,16 @@ def model(
       lobewatch model trial --figure model.png
       lobewatch model trial --tool "end mill 16" --modes 6 --json
     """
-    from lobewatch.analysis import Logbook, model_picture, model_state, model_summary
-    from lobewatch.show.describe import model_json, model_texts
-    from lobewatch.show.measurements import remark_lines
+    from lobewatch.logbook import Logbook, model_picture
+    from lobewatch.measuring import model_state, model_summary
+    from lobewatch.show.spindle.describe_model import model_json, model_texts
+    from lobewatch.show.terminal.remarks import remark_lines
 
     logbook = Logbook.open(machine)
     state = model_state(logbook.machine, logbook.calibrated, tool)
     if figure is not None:
-        from lobewatch.show.figures import save_figure
-        from lobewatch.show.figures_model import model_figure
+        from lobewatch.show.figures.model_figures import model_figure
+        from lobewatch.show.figures.trend_figures import save_figure
 
         save_figure(model_figure(model_picture(logbook, state, modes)), figure)
     found = model_summary(state, modes)

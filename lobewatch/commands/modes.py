@@ -7,8 +7,7 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.show.output import Json, emit
-from lobewatch.show.replays.describing import (
+from lobewatch.commands.file_options import (
     Columns,
     ForceUnit,
     FullScale,
@@ -19,6 +18,7 @@ from lobewatch.show.replays.describing import (
     Unit,
     described,
 )
+from lobewatch.show.terminal.output import Json, emit
 
 
 def modes(
@@ -75,8 +75,8 @@ def modes(
       lobewatch modes frf.csv --window 0.05 --hit-at 0.01
       lobewatch modes h.mat --response 2 --unit g/N
     """
-    from lobewatch.analysis import Window, modes_of_file
-    from lobewatch.show.modes.describe_modes import file_modes_json, file_modes_texts
+    from lobewatch.measuring import Window, modes_of_file
+    from lobewatch.show.spindle.describe_modes import file_modes_json, file_modes_texts
 
     of_window = window is not None or hit_at is not None or window_start != 0
     taken_off = Window(float("nan") if window is None else window, window_start, hit_at) if of_window else None
@@ -93,8 +93,8 @@ def modes(
     )
     found = modes_of_file(file, band, window=taken_off, conjugate=conjugate, accept=accept or (), said=said)
     if figure is not None:
-        from lobewatch.show.figures import save_figure
-        from lobewatch.show.figures_modes import modes_figure
+        from lobewatch.show.figures.mode_figures import modes_figure
+        from lobewatch.show.figures.trend_figures import save_figure
 
         save_figure(modes_figure(found.extraction, found.as_recorded, file.name), figure)
     emit(file_modes_json(found), as_json, *file_modes_texts(found, everything=everything))

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, notes
 
 
 def observe(
@@ -34,10 +34,10 @@ def observe(
       lobewatch observe mill-3 --program A --speed 12000 --depth 2 --stable
       lobewatch observe mill-3 --program A --speed 12000 --depth 3 --chatter --frequency 1650
     """
-    from lobewatch.analysis import Logbook
-    from lobewatch.machine.cuts.keeping import keep_cut
-    from lobewatch.machine.cuts.observing import contradicted, observed
-    from lobewatch.machine.cuts.setting import cut_setting
+    from lobewatch.logbook import Logbook
+    from lobewatch.machine.additions.keep_cut import keep_cut
+    from lobewatch.machine.additions.observe_cut import contradicted, observed
+    from lobewatch.machine.settings.cut_setting import cut_setting
     from lobewatch.notify.telling import telling
     from lobewatch.show.history.describe_cut import about_tool, cut_json, cut_text, otherwise
 

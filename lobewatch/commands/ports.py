@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.show.output import Json, emit
+from lobewatch.show.terminal.output import Json, emit
 
 
 def ports(
@@ -23,7 +23,7 @@ def ports(
       lobewatch ports --port /dev/pts/3
     """
     from acquisition.devices import survey_ports
-    from lobewatch.show.describe_ports import ports_json, ports_texts
+    from lobewatch.show.devices.describe_ports import ports_json, ports_texts
 
     survey = survey_ports(port)
     emit(ports_json(survey), as_json, *ports_texts(survey))

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json
+from lobewatch.show.terminal.output import Json
 
 
 def rebuild(
@@ -34,8 +34,8 @@ def rebuild(
       lobewatch rebuild mill-3
       lobewatch rebuild mills --scheduler tcp://10.0.0.5:8786
     """
-    from lobewatch.analysis.workers.shared import Workers
+    from lobewatch.measuring.workers.shared import Workers
     from lobewatch.notify.telling import tell
-    from lobewatch.show.rebuilds.show_rebuild import show_rebuild
+    from lobewatch.show.replays.show_rebuild import show_rebuild
 
     show_rebuild(machine, Workers(jobs, scheduler), tell, as_json=as_json)

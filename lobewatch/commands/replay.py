@@ -8,9 +8,7 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json
-from lobewatch.show.replays.describing import (
+from lobewatch.commands.file_options import (
     Averages,
     Columns,
     ForceUnit,
@@ -22,6 +20,8 @@ from lobewatch.show.replays.describing import (
     Unit,
     described,
 )
+from lobewatch.machine.named_folder import named_folder
+from lobewatch.show.terminal.output import Json
 
 
 def replay(
@@ -85,9 +85,9 @@ def replay(
       lobewatch replay mill-3 mill-3/taps/ID.h5 --accept frequency-jump
     """
     from acquisition import Conditions
-    from lobewatch.analysis import Logbook
-    from lobewatch.analysis.replaying.found_files import found_files
-    from lobewatch.analysis.workers.shared import Workers
+    from lobewatch.logbook import Logbook
+    from lobewatch.logbook.replaying.found_files import found_files
+    from lobewatch.measuring.workers.shared import Workers
     from lobewatch.notify.telling import telling
     from lobewatch.show.replays.show_replay import show_preview, show_replay
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, notes
 
 
 def report(
@@ -31,8 +31,8 @@ def report(
       lobewatch report trial
       lobewatch report trial --out spindle.html --tool reference --direction x
     """
-    from lobewatch.analysis import Logbook
-    from lobewatch.show.report import write_report
+    from lobewatch.logbook import Logbook
+    from lobewatch.show.report.report import write_report
 
     if not (machine / "machine.toml").is_file() and any(machine.glob("*/machine.toml")):
         if tool or direction:
@@ -47,9 +47,9 @@ def report(
 
 
 def _of_all(folder: Path, out: Path | None) -> Path:
-    from lobewatch.analysis.plant.plant import Plant, find_machines
+    from lobewatch.plant.plant import Plant, find_machines
     from lobewatch.show.plant.plant_rows import plant_rows
-    from lobewatch.show.reporting.fleet import write_fleet_report
+    from lobewatch.show.report.fleet import write_fleet_report
 
     rows = plant_rows(Plant(find_machines(folder)).standings())
     return write_fleet_report(rows, folder, out, datetime.now().astimezone())

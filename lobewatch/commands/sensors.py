@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, notes
 
 
 def sensors(
@@ -32,7 +32,7 @@ def sensors(
     """
     from lobewatch.machine.folder import MachineFolder
     from lobewatch.sensors import check_mass, check_skew, list_sensors
-    from lobewatch.show import describe_sensors as show
+    from lobewatch.show.devices import describe_sensors as show
     from lobewatch.tap.plug import open_source
 
     folder = MachineFolder(machine)

@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json
-from lobewatch.show.show_address import Listen, Token, WatchToken, show_address
+from lobewatch.show.terminal.output import Json
+from lobewatch.show.terminal.show_address import Listen, Token, WatchToken, show_address
 
 
 def serve(

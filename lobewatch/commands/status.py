@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit, results
+from lobewatch.show.terminal.output import Json, emit, results
 
 FOR_THE_PAGE = ("points", "limits", "why")
 """What only the dashboard draws; lobewatch trend and lobewatch export tell it in full."""
@@ -38,8 +38,8 @@ def status(
       lobewatch status mills
       lobewatch status mills --due
     """
-    from lobewatch.analysis.plant.light import Light
-    from lobewatch.analysis.plant.plant import Plant, find_machines
+    from lobewatch.decay.light import Light
+    from lobewatch.plant.plant import Plant, find_machines
     from lobewatch.show.plant.describe_plant import plant_csv, plant_text
     from lobewatch.show.plant.plant_rows import plant_rows
 

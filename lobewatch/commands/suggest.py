@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit
+from lobewatch.show.terminal.output import Json, emit
 
 
 def suggest(
@@ -27,11 +27,11 @@ def suggest(
       lobewatch suggest mill-3 --program A
       lobewatch suggest mill-3 --program A --cuts 8 --json
     """
-    from lobewatch.analysis import Logbook
-    from lobewatch.analysis.learning.of_program import next_cut, program_named
-    from lobewatch.show.learning.describe_learnt import learnt_texts, lesson_remarks
-    from lobewatch.show.learning.describe_suggestion import suggestion_json, suggestion_lines
-    from lobewatch.show.measurements import remark_json, remark_lines
+    from lobewatch.cuts.learning.of_program import next_cut, program_named
+    from lobewatch.logbook import Logbook
+    from lobewatch.show.cuts.describe_learnt import learnt_texts, lesson_remarks
+    from lobewatch.show.cuts.describe_suggestion import suggestion_json, suggestion_lines
+    from lobewatch.show.terminal.remarks import remark_json, remark_lines
 
     logbook = Logbook.open(machine)
     table = program_named(logbook.machine, program)

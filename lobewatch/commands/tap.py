@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit, notes
-from lobewatch.show.show_address import Listen, Token, WatchToken, serving
+from lobewatch.show.terminal.output import Json, emit, notes
+from lobewatch.show.terminal.show_address import Listen, Token, WatchToken, serving
 
 
 def tap(
@@ -48,13 +48,14 @@ def tap(
       lobewatch tap trial --port file:taps/ID.h5
     """
     from acquisition import Conditions
-    from lobewatch.analysis import Logbook
-    from lobewatch.analysis.questions.accepting import not_asked
+    from lobewatch.logbook import Logbook
     from lobewatch.machine import MachineFolder
+    from lobewatch.measuring.questions.accepting import not_asked
     from lobewatch.notify.telling import tell
-    from lobewatch.show.measurements import measurement_json, measurement_texts, program_texts, programs_json
-    from lobewatch.show.printer import TapPrinter
-    from lobewatch.show.terminal_screen import TerminalScreen
+    from lobewatch.show.history.measurements import measurement_json, measurement_texts
+    from lobewatch.show.programs.verdicts import program_texts, programs_json
+    from lobewatch.show.terminal.printer import TapPrinter
+    from lobewatch.show.terminal.terminal_screen import TerminalScreen
     from lobewatch.tap import TapStopped, plan_session
 
     folder = MachineFolder(machine)

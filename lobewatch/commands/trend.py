@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit, notes, results
+from lobewatch.show.terminal.output import Json, emit, notes, results
 
 
 def trend(
@@ -27,9 +27,10 @@ def trend(
       lobewatch trend mill-3
       lobewatch trend mill-3 --direction y --json
     """
-    from lobewatch.analysis import Light, Logbook
-    from lobewatch.analysis.decay.outlook import outlook
-    from lobewatch.analysis.decay.preload import preload_of
+    from lobewatch.decay import Light
+    from lobewatch.decay.preload import preload_of
+    from lobewatch.logbook import Logbook
+    from lobewatch.logbook.outlook import outlook
     from lobewatch.show.trends.describe_trend import trend_csv, trend_json, trend_texts
 
     if as_csv and as_json:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.named_folder import named_folder
-from lobewatch.show.output import Json, emit
+from lobewatch.show.terminal.output import Json, emit
 
 
 def verify(
@@ -26,7 +26,7 @@ def verify(
       lobewatch verify mill-3
     """
     from lobewatch.machine.archive.verify import verify as verified
-    from lobewatch.show.measurements import remark_json
+    from lobewatch.show.terminal.remarks import remark_json
 
     found = verified(machine)
     others = [remark for remark in found.remarks if remark not in found.damage]

@@ -1,15 +1,15 @@
 """What is known of one machine: machine.toml, its folder, its journal, its devices."""
 
-from .archive.tap_entry import DamagedTapError, TapEntry
-from .cut_tables import CutTable, ProgramTable
-from .daq_tables import Daq
-from .doubt_table import DoubtTable
-from .drive import drive_limit
 from .folder import BusyError, MachineFolder
+from .journal.tap_entry import DamagedTapError, TapEntry
 from .known_devices import checked_rate, has_clock, known_rate, use_rate
-from .machine_file import REFERENCE_CUT, Machine
 from .new_folder import make_machine_folder
-from .setup_tables import Limits, SpeedRange, TapSetup
+from .settings.cut_tables import CutTable, ProgramTable
+from .settings.daq_tables import Daq
+from .settings.doubt_table import DoubtTable
+from .settings.drive import drive_limit
+from .settings.machine_file import REFERENCE_CUT, Machine
+from .settings.setup_tables import Limits, SpeedRange, TapSetup
 
 __all__ = [
     "REFERENCE_CUT",

@@ -16,20 +16,12 @@ from filelock import FileLock, Timeout
 from acquisition import DataError, Remark, TapTest, read_tap, write_tap
 from acquisition.atomic import make_folder, sync_folder
 from acquisition.errors import NOT_ALLOWED
-from lobewatch.machine.archive.contents import (
-    Contents,
-    about_lost,
-    contents_of,
-    fault_of,
-    listed,
-    no_journal,
-    tap_files,
-)
-from lobewatch.machine.archive.journal import Journal, Reading, command
-from lobewatch.machine.archive.tap_entry import DamagedTapError, TapEntry
-from lobewatch.machine.machine_file import Machine, read_machine
+from lobewatch.machine.contents import Contents, about_lost, contents_of, fault_of, listed, no_journal, tap_files
+from lobewatch.machine.journal.journal import Journal, Reading, command
+from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
 from lobewatch.machine.mark import mark_of
 from lobewatch.machine.named_folder import named_folder
+from lobewatch.machine.settings.machine_file import Machine, read_machine
 
 
 class BusyError(DataError):

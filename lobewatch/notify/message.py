@@ -6,8 +6,8 @@ from datetime import datetime, timedelta
 
 import msgspec
 
-from lobewatch.analysis.plant.plant import Standings
-from lobewatch.analysis.plant.standing_file import software
+from lobewatch.plant.plant import Standings
+from lobewatch.plant.standing_file import software
 from lobewatch.show.plant.plant_rows import next_limit
 
 NOT_IN_TOPICS = str.maketrans("+#/\0", "____")

@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from acquisition import DataError
-from lobewatch.machine.notify_table import Broker
+from lobewatch.machine.settings.notify_table import Broker
 
 PATIENCE = 3.0
 """For the connection, and for the acknowledgements of all messages (s)."""

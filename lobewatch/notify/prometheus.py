@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from lobewatch.analysis.plant.light import Light
-from lobewatch.analysis.plant.plant import Standings
+from lobewatch.decay.light import Light
+from lobewatch.plant.plant import Standings
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 DAY = 86400.0

@@ -7,15 +7,15 @@ from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 
-from lobewatch.analysis import Logbook
-from lobewatch.analysis.plant.plant import Standings
-from lobewatch.analysis.plant.summarise import summarise
+from lobewatch.logbook import Logbook
 from lobewatch.machine import Machine
-from lobewatch.machine.machine_file import read_machine
-from lobewatch.machine.notify_table import Broker
+from lobewatch.machine.settings.machine_file import read_machine
+from lobewatch.machine.settings.notify_table import Broker
 from lobewatch.notify.message import message_of, topic_of
 from lobewatch.notify.unsent import deliver
-from lobewatch.show.output import notes
+from lobewatch.plant.plant import Standings
+from lobewatch.plant.summarise import summarise
+from lobewatch.show.terminal.output import notes
 
 
 def tell(logbook: Logbook) -> None:

@@ -11,7 +11,7 @@ import msgspec
 from acquisition import DataError
 from acquisition.atomic import atomic_write
 from lobewatch.machine import BusyError, MachineFolder
-from lobewatch.machine.notify_table import Broker
+from lobewatch.machine.settings.notify_table import Broker
 from lobewatch.notify.mqtt import send
 
 UNSENT = "unsent.json"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from lobewatch.analysis.listening.heard_cut import ListenedCut
+from lobewatch.logbook.listened_cut import ListenedCut
 from lobewatch.screen.messages import finite
 from lobewatch.show.cuts.describe_listened import listened_texts, next_step, why
 from lobewatch.tap.listening.cut_state import CutState

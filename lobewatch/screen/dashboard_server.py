@@ -14,19 +14,19 @@ import msgspec
 from aiohttp import web
 
 from acquisition import DataError, TapDirection
-from lobewatch.analysis import Logbook
-from lobewatch.analysis.plant.plant import Plant, find_machines
+from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.notify.prometheus import CONTENT_TYPE, prometheus_text
+from lobewatch.plant.plant import Plant, find_machines
 from lobewatch.screen.guard import MAY_ALTER, OPEN, WATCH
 from lobewatch.screen.live_tests import LiveTest
 from lobewatch.screen.machine_list import machine_list
 from lobewatch.screen.pages import add_pages
 from lobewatch.screen.screen_server import add_session
 from lobewatch.screen.web_thread import WebThread
-from lobewatch.show.printer import Watched
-from lobewatch.show.report import render_report
-from lobewatch.show.reporting.page import script_sources
+from lobewatch.show.report.page import script_sources
+from lobewatch.show.report.report import render_report
+from lobewatch.show.terminal.printer import Watched
 
 REPORT_POLICY = (
     f"default-src 'none'; style-src 'unsafe-inline'; script-src {script_sources()}; img-src data:; "

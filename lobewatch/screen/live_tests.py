@@ -6,7 +6,7 @@ import threading
 from dataclasses import replace
 
 from acquisition import DataError, TapDirection
-from lobewatch.analysis import Logbook
+from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.notify.telling import tell
 from lobewatch.tap.plan_session import plan_session

@@ -10,8 +10,8 @@ from typing import Any
 
 import msgspec
 
-from lobewatch.analysis.plant.plant import Plant, Standings
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.plant.plant import Plant, Standings
 from lobewatch.show.plant.plant_rows import plant_row
 from lobewatch.tap.spool import interrupted_tests
 

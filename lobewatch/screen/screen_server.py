@@ -13,7 +13,7 @@ from lobewatch.screen.guard import MAY_ALTER
 from lobewatch.screen.messages import curves_message, plots_message, state_message
 from lobewatch.screen.pages import add_pages
 from lobewatch.screen.web_thread import WebThread
-from lobewatch.show.printer import Watched
+from lobewatch.show.terminal.printer import Watched
 from lobewatch.tap.listening.cut_state import CutState
 from lobewatch.tap.publisher import Pictures
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from acquisition import Hit, HitFlags, RunningMean, Verdict, judge_hit
-from lobewatch.machine.machine_file import Machine
+from lobewatch.machine.settings.machine_file import Machine
 from lobewatch.tap.in_progress import TapInProgress
 
 FEWEST_FOR_MEAN = 3

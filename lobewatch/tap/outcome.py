@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from acquisition import joined
 from dsm import plus_minus
-from lobewatch.analysis import Logbook, Measurement, SeriesStanding
-from lobewatch.analysis.plant.light import LIGHTS
-from lobewatch.analysis.questions.asked import open_questions
+from lobewatch.decay import SeriesStanding
+from lobewatch.decay.light import LIGHTS
+from lobewatch.logbook import Logbook
+from lobewatch.measuring import Measurement
+from lobewatch.measuring.questions.asked import open_questions
 from lobewatch.tap.state import Outcome
 
 

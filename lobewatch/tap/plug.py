@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from acquisition import Device, DeviceError, FileSource, SensorPlace, find_driver, find_port, usb_identity
-from lobewatch.machine.daq_tables import Daq
+from lobewatch.machine.settings.daq_tables import Daq
 
 REPLAY = "file:"
 """What a port begins with that is no port but a recording, whatever the driver."""

@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from lobewatch.tap.judged_hits import JudgedHits
-from lobewatch.tap.listening.cut_state import CutState
 from lobewatch.tap.state import TapState
 
-State = TypeVar("State", bound=TapState | CutState)
+
+class Picture(Protocol):
+    """What is shown of a test: a frozen dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def revision(self) -> int:
+        """Number that rises with every change."""
+
+
+State = TypeVar("State", bound=Picture)
 
 
 class Pictures(Generic[State]):

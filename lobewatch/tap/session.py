@@ -8,10 +8,11 @@ from datetime import UTC, datetime
 
 from acquisition import Circumstances, DataError, Device, DeviceError, Remark, TapTest
 from acquisition.errors import NOT_ALLOWED, system_failure
-from lobewatch.analysis import Logbook, Measurement
-from lobewatch.analysis.questions.asked import checked_codes
+from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.reserve import Reserve
+from lobewatch.measuring import Measurement
+from lobewatch.measuring.questions.asked import checked_codes
 from lobewatch.tap.connection import Connector
 from lobewatch.tap.hit_loop import HitLoop, TapStopped, Wishes
 from lobewatch.tap.in_progress import begin_tap

@@ -16,8 +16,8 @@ from pathlib import Path
 from acquisition import Circumstances, Hit, HitFlags, Trigger, atomic_write, read_tap_hits
 from acquisition.files.seal import is_sealed
 from acquisition.files.tap_file import read_hit_name
-from lobewatch.machine.archive.doubtful import has_whole_hits
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.journal.doubtful import has_whole_hits
 
 RESUMABLE = timedelta(hours=12)
 """An interrupted test older than this is not gone on with."""

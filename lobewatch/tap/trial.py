@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from acquisition import Hit, HitFlags, Remark, Trigger, check_hit, ring_down
-from lobewatch.machine.setup_tables import TapSetup
+from lobewatch.machine.settings.setup_tables import TapSetup
 
 RECORD = 0.25
 """Shortest record chosen, and that of the first trial hit (s); alike from month to month."""

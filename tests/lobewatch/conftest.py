@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from acquisition import UNSAID, Circumstances, Conditions, TapDirection, TapTest, from_accelerance, new_tap_id
-from lobewatch.analysis import Logbook
+from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from modal import Mode, synthesize

@@ -38,7 +38,7 @@ def test_every_folder_of_modules_is_a_room() -> None:
 
 @pytest.mark.parametrize("contract", [one for one in CONTRACTS if one["type"] == "layers"], ids=lambda one: one["name"])
 def test_the_layers_are_those_that_are_checked(contract: dict[str, list[str]]) -> None:
-    where = f"in `{contract['containers'][0]}/`" if "containers" in contract else "all of it"
+    where = f"in `{contract['containers'][0].replace('.', '/')}/`" if "containers" in contract else "all of it"
     assert f"* {where}: `{' > '.join(contract['layers'])}`\n" in PAGE
 
 

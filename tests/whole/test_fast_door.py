@@ -59,7 +59,7 @@ def test_the_first_word_does_not_wait_for_rich_and_pydantic(line: str, tmp_path:
     ("code", "left_out"),
     [
         ("from acquisition import *", {"scipy.signal", "scipy.stats"}),
-        ("import modal, lobes, lobewatch.analysis.logbook", {"scipy.signal", "scipy.stats", "scipy.interpolate"}),
+        ("import modal, lobes, lobewatch.logbook.logbook", {"scipy.signal", "scipy.stats", "scipy.interpolate"}),
         ("import dsm", {"scipy.signal", "scipy.stats", "scipy.optimize"}),
         ("import acquisition.ports, acquisition.atomic, acquisition.errors, acquisition.remark", HEAVY),
         ("import lobewatch, lobewatch.machine.new_folder", HEAVY),

@@ -13,12 +13,12 @@ from filelock import FileLock, Timeout
 
 from acquisition import DataError, read_tap
 from acquisition.atomic import atomic_write, make_folder
-from lobewatch.machine.archive.contents import fault_of, given_up, listed, tap_files
-from lobewatch.machine.archive.doubtful import read_doubtful
-from lobewatch.machine.archive.journal import JOURNAL, Journal
-from lobewatch.machine.archive.tap_entry import TapEntry
-from lobewatch.machine.cuts.mend_cuts import mend_cuts
+from lobewatch.machine.archive.mend_cuts import mend_cuts
+from lobewatch.machine.contents import fault_of, given_up, listed, tap_files
 from lobewatch.machine.folder import BusyError, MachineFolder
+from lobewatch.machine.journal.doubtful import read_doubtful
+from lobewatch.machine.journal.journal import JOURNAL, Journal
+from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.known_devices import read_known_devices
 
 ASIDE = "damaged"

@@ -10,7 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition import DataError, Remark
-from lobewatch.machine.archive.contents import (
+from lobewatch.machine.archive.told import damaged, set_aside
+from lobewatch.machine.archive.verify_cuts import about_cuts
+from lobewatch.machine.archive.verify_spool import about_spool
+from lobewatch.machine.contents import (
     about_lost,
     fault_of,
     given_up,
@@ -21,15 +24,12 @@ from lobewatch.machine.archive.contents import (
     tap_files,
     unlisted,
 )
-from lobewatch.machine.archive.doubtful import read_doubtful
-from lobewatch.machine.archive.journal import COPY, JOURNAL, Journal, Reading, command
-from lobewatch.machine.archive.rows import read_rows
-from lobewatch.machine.archive.tap_entry import TapEntry
-from lobewatch.machine.archive.told import damaged, set_aside
-from lobewatch.machine.archive.verify_spool import about_spool
-from lobewatch.machine.cuts.verify_cuts import about_cuts
 from lobewatch.machine.folder import BusyError, MachineFolder
+from lobewatch.machine.journal.doubtful import read_doubtful
+from lobewatch.machine.journal.journal import COPY, JOURNAL, Journal, Reading, command
+from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.known_devices import read_known_devices
+from lobewatch.machine.rows import read_rows
 
 DAMAGE = ("journal-damaged", "tap-damaged", "tap-unlisted", "file-damaged", "cut-damaged", "cut-unlisted")
 """Codes of remarks that are damage; all others are to be known."""

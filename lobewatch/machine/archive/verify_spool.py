@@ -9,8 +9,8 @@ from pathlib import Path
 
 from acquisition import Remark, Trigger
 from acquisition.files.seal import is_sealed
-from lobewatch.machine.archive.journal import command
 from lobewatch.machine.archive.told import damaged, set_aside
+from lobewatch.machine.journal.journal import command
 
 ALTERED = "altered or cut short since it was written"
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from lobewatch.analysis.listening.heard_cut import ListenedCut
+from lobewatch.logbook.listened_cut import ListenedCut
 
 WHY: Mapping[str, str] = {
     "too-short": "less than 0.3 s of cut to listen to; record a second or longer, with air before it",

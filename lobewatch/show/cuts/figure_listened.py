@@ -8,12 +8,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from lobewatch.analysis.assembly import Assembly
-from lobewatch.analysis.listening.heard_cut import ListenedCut
-from lobewatch.analysis.listening.marked import marked
+from lobewatch.cuts.listening.line_kinds import line_kinds
+from lobewatch.logbook.listened_cut import ListenedCut
 from lobewatch.show.cuts.describe_listened import listened_text
-from lobewatch.show.figures import ALARM, EVENT, GOOD, NOW, THEN, new_axes, save_figure
+from lobewatch.show.figures.trend_figures import ALARM, EVENT, GOOD, NOW, THEN, new_axes, save_figure
 from lobewatch.tap.listening.cut_state import HIGHEST
+from lobewatch.tool.assembly import Assembly
 
 MARKS = {
     "turns": ("turns of the spindle", THEN, "|"),
@@ -44,7 +44,7 @@ def listened_figure(found: ListenedCut) -> Figure:
     inside = spectrum.frequency <= min(HIGHEST, spectrum.sample_rate / 2)
     amplitude = np.sqrt(spectrum.power[inside])
     axis.semilogy(spectrum.frequency[inside], amplitude, color="#bbbbbb", lw=0.6)
-    for name, lines in marked(found).items():
+    for name, lines in line_kinds(found.heard).items():
         label, colour, mark = MARKS[name]
         axis.plot(lines.frequency, lines.amplitude, mark, color=colour, ms=5, label=label, fillstyle="none")
     if found.assembly is not None:

@@ -6,8 +6,8 @@ from datetime import UTC
 from typing import Any
 
 from acquisition import Remark
-from lobewatch.analysis import Logbook
-from lobewatch.machine.cuts.heard_cut import HeardCut
+from lobewatch.logbook import Logbook
+from lobewatch.machine.journal.heard_cut import HeardCut
 
 
 def cut_text(cut: HeardCut) -> str:

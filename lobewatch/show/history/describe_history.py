@@ -13,9 +13,10 @@ from typing import Any
 from rich.cells import cell_len, set_cell_size
 
 from acquisition import Conditions
-from lobewatch.analysis import Logbook, Row
+from lobewatch.history import Row
+from lobewatch.logbook import Logbook
 from lobewatch.machine import TapEntry
-from lobewatch.machine.corrections.event import Event
+from lobewatch.machine.journal.event import Event
 from lobewatch.show.history.describe_cut import cut_json, cut_words
 from lobewatch.show.history.under import conditions_texts
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from rich.cells import cell_len
 
-from lobewatch.show.output import printable
+from lobewatch.show.terminal.output import printable
 
 COLUMNS = ("key", "name", "light", "fall", "fall_std", "series", "last_tap", "days_left", "note", "next_step")
 """Keys of a row of the dashboard, in the order of the CSV."""

@@ -7,8 +7,8 @@ from datetime import date, timedelta
 from typing import Any
 
 from acquisition import joined
-from lobewatch.analysis.plant.plant import Standings
-from lobewatch.analysis.plant.summary import Ahead, Course
+from lobewatch.plant.plant import Standings
+from lobewatch.plant.summary import Ahead, Course
 
 SHOWN_APART = ("frequency-alarm", "frequency-warn", "overdue")
 """Reasons that stand beside the others as the fall and the date."""

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import DataError
-from lobewatch.analysis.plant.tap_table import NUMBERS, TapTable
+from lobewatch.plant.tap_table import NUMBERS, TapTable
 
 COLUMNS = ("folder", "machine", "tap_id", "time", "tool", "direction", "series", *NUMBERS, "remarks")
 DIGITS, DIGITS_OF_ERRORS = 7, 3

@@ -1,1 +1,1 @@
-"""What stands beside the word on a cutting program: the doubt it was judged over, and settings that are safe."""
+"""Verdicts, lobes, advice and doubt of cutting programs for people and as JSON."""

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.analysis import Assembly, Verdict
-from lobewatch.analysis.learning.at_speed import LearntDoubt
-from lobewatch.analysis.programs.doubt import Doubt, Span
-from lobewatch.analysis.series import ENOUGH
+from lobewatch.cuts.learning.at_speed import LearntDoubt
 from lobewatch.machine import DoubtTable, Machine
-from lobewatch.show.learning.names import NAMES
+from lobewatch.show.programs.names import NAMES
+from lobewatch.tool import Assembly
+from lobewatch.tool.series import ENOUGH
+from lobewatch.verdicts import Verdict
+from lobewatch.verdicts.doubt import Doubt, Span
 
 PAGE = "docs/lobes.md"
 """Where the sizes come from."""

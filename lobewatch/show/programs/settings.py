@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from lobewatch.analysis import Setting
-from lobewatch.analysis.programs.setting_search import LEFT
+from lobewatch.verdicts import Setting
+from lobewatch.verdicts.setting_search import LEFT
 
 
 def setting_json(setting: Setting | None) -> dict[str, Any] | None:

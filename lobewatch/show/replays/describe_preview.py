@@ -9,10 +9,10 @@ from typing import Any
 from rich.table import Table
 
 from acquisition import Fact
-from lobewatch.analysis.questions.asked import open_questions
-from lobewatch.analysis.replaying.preview import Preview
-from lobewatch.show.modes.describe_modes import in_order, mode_json
-from lobewatch.show.output import table
+from lobewatch.logbook.preview import Preview
+from lobewatch.measuring.questions.asked import open_questions
+from lobewatch.show.spindle.describe_modes import in_order, mode_json
+from lobewatch.show.terminal.output import table
 
 ONE_BY_ONE = 6
 """So many files are told in full, more of them in a line each."""

@@ -8,10 +8,12 @@ from typing import Any
 
 from rich.table import Table
 
-from lobewatch.analysis import Logbook, Row
-from lobewatch.analysis.replaying.store import Stored
-from lobewatch.show.measurements import measurement_json, measurement_texts, program_texts, programs_json
-from lobewatch.show.output import table
+from lobewatch.history import Row
+from lobewatch.logbook import Logbook
+from lobewatch.logbook.replaying.store import Stored
+from lobewatch.show.history.measurements import measurement_json, measurement_texts
+from lobewatch.show.programs.verdicts import program_texts, programs_json
+from lobewatch.show.terminal.output import table
 
 IN_FULL = 3
 """So many tap tests are told in full, more of them summed up."""

@@ -6,16 +6,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from acquisition import DataError, Description
-from lobewatch.analysis import Logbook
-from lobewatch.analysis.questions.accepting import not_asked
-from lobewatch.analysis.questions.asked import checked_codes
-from lobewatch.analysis.replaying.preview import preview_recordings
-from lobewatch.analysis.replaying.store import refusal
-from lobewatch.analysis.workers.shared import Workers
-from lobewatch.show.output import emit, notes
+from lobewatch.logbook import Logbook
+from lobewatch.logbook.preview import preview_recordings
+from lobewatch.logbook.replaying.store import refusal
+from lobewatch.measuring.questions.accepting import not_asked
+from lobewatch.measuring.questions.asked import checked_codes
+from lobewatch.measuring.workers.shared import Workers
 from lobewatch.show.replays.describe_preview import preview_json, preview_summary, preview_texts
 from lobewatch.show.replays.describe_replay import replay_json, replay_texts
-from lobewatch.show.replays.progress_bar import ProgressBar
+from lobewatch.show.terminal.output import emit, notes
+from lobewatch.show.terminal.progress_bar import ProgressBar
 
 
 def show_preview(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.analysis.decay.trend import Trend, date, days_of
+from lobewatch.decay.trend import Trend, date, days_of
 
 WIDE, HIGH = 60, 12
 """Characters of the plot itself."""

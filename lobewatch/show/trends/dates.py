@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from lobewatch.analysis.decay.forecast import Reached
-from lobewatch.analysis.decay.trend import date
+from lobewatch.decay.forecast import Reached
+from lobewatch.decay.trend import date
 
 ASSUMED = "Dates hold if the machine is used as before; an acceleration that is not yet visible cannot be foreseen."
 

@@ -10,11 +10,11 @@ from typing import Any
 from rich.table import Table
 
 from dsm import PreloadLeft, plus_minus
-from lobewatch.analysis import SeriesStanding
-from lobewatch.analysis.decay.outlook import Fate, Outlook
-from lobewatch.analysis.decay.shapes import Shape
-from lobewatch.analysis.decay.trend import Trend, date
-from lobewatch.show.output import table
+from lobewatch.decay import SeriesStanding
+from lobewatch.decay.shapes import Shape
+from lobewatch.decay.trend import Trend, date
+from lobewatch.logbook.outlook import Fate, Outlook
+from lobewatch.show.terminal.output import table
 from lobewatch.show.trends.chart import chart_lines
 from lobewatch.show.trends.dates import ASSUMED, dates_json, dates_text
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.analysis.listening.heard_cut import ListenedCut
-from lobewatch.analysis.listening.marked import marked
+from lobewatch.cuts.listening.line_kinds import line_kinds
+from lobewatch.logbook.listened_cut import ListenedCut
 from lobewatch.tap.plots import extremes
 
 HIGHEST = 8000.0
@@ -84,7 +84,7 @@ def cut_curves(found: ListenedCut) -> dict[str, Floats]:
     amplitude = np.sqrt(spectrum.power)
     at = extremes([amplitude], int(np.searchsorted(spectrum.frequency, HIGHEST, side="right")))
     curves = {"frequency": spectrum.frequency[at], "amplitude": amplitude[at]}
-    for name, lines in marked(found).items():
+    for name, lines in line_kinds(found.heard).items():
         curves |= {name: lines.frequency, f"{name}_amplitude": lines.amplitude}
     if found.assembly is not None:
         for name, modes in (("x", found.assembly.x), ("y", found.assembly.y)):

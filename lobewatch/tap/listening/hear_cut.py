@@ -9,7 +9,7 @@ from acquisition import Description
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_sound import read_sound
 from lobewatch.machine import MachineFolder, checked_rate
-from lobewatch.machine.cuts.setting import CutSetting
+from lobewatch.machine.settings.cut_setting import CutSetting
 from lobewatch.tap.listening.record_cut import record_cut
 from lobewatch.tap.plug import REPLAY, open_source
 

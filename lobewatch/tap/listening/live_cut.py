@@ -7,9 +7,9 @@ import time
 from collections.abc import Iterator
 
 from acquisition.files.cut_file import CutSignal
-from lobewatch.analysis import Logbook
-from lobewatch.analysis.listening.heard_cut import ListenedCut, listened
-from lobewatch.machine.cuts.setting import CutSetting
+from lobewatch.logbook import Logbook
+from lobewatch.logbook.listened_cut import ListenedCut, listened
+from lobewatch.machine.settings.cut_setting import CutSetting
 from lobewatch.tap.listening.cut_state import CutState, CutStep, cut_curves, word_of
 from lobewatch.tap.publisher import Pictures
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from acquisition import Block, Channel, DataError, Device, DeviceError
 from acquisition.files.cut_file import CutSignal
-from lobewatch.analysis.listening.find_cut import CutParts, find_cut
+from lobewatch.cuts.listening.find_cut import CutParts, find_cut
 from lobewatch.tap.listening.cut_state import CutStep
 from lobewatch.tap.live_signal import LEVEL_TIME
 

@@ -10,9 +10,9 @@ from acquisition import Bench, DataError, Driver, EmulatorThread, Structure
 from acquisition.emulation import CutSound, Housing, MillingCut, Passage, random_housing, simulate_cut
 from dsm import Spindle
 from lobes import Program, program_limit
-from lobewatch.machine.cut_tables import FEED_ANGLES
-from lobewatch.machine.cuts.setting import CutSetting
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.settings.cut_setting import CutSetting
+from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.tap.emulated_spindle import SAMPLE_RATE, emulated_inputs, emulated_structure
 from lobewatch.tap.milling.hidden_truth import HiddenTruth, hidden_truth, runout_of
 from modal import Mode

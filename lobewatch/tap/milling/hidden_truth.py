@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from acquisition import Structure
-from lobewatch.analysis.learning.priors import DAMPING, FORCE, FREQUENCY, STIFFNESS
+from lobewatch.cuts.learning.priors import DAMPING, FORCE, FREQUENCY, STIFFNESS
 
 LEAST = 0.3
 """Nothing falls below this share of its middle."""

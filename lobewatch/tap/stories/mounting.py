@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsm import Spindle, calibrate, natural_frequencies
-from lobewatch.analysis.decay.temperature import STEEL
+from lobewatch.decay.temperature import STEEL
 
 BAD = 0.02
 """Share that a bad clamping takes from the frequency."""

@@ -6,10 +6,10 @@ import math
 from datetime import datetime, timedelta
 from typing import NamedTuple
 
-from lobewatch.analysis import Logbook
-from lobewatch.analysis.decay.forecast import Reached
-from lobewatch.analysis.decay.outlook import outlook
-from lobewatch.analysis.decay.trend import MONTH, Trend, day
+from lobewatch.decay.forecast import Reached
+from lobewatch.decay.trend import MONTH, Trend, day
+from lobewatch.logbook import Logbook
+from lobewatch.logbook.outlook import outlook
 from lobewatch.tap.stories.story import Wear
 
 FARTHER = 0.02

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from lobes import Program, program_limit
-from lobewatch.analysis import Advice, Setting
 from lobewatch.cli import main
 from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.verdicts import Advice, Setting
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -68,11 +68,11 @@ def check(shop: Shop, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFix
 @pytest.fixture
 def no_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """Takes the search for settings out of tests that are not about it."""
-    monkeypatch.setattr("lobewatch.analysis.logbook.advise", lambda *_: Advice())
+    monkeypatch.setattr("lobewatch.logbook.logbook.advise", lambda *_: Advice())
 
 
 def advised_to(monkeypatch: pytest.MonkeyPatch, best: Setting | None, here: Setting | None) -> None:
-    monkeypatch.setattr("lobewatch.analysis.logbook.advise", lambda *_: Advice(best, here))
+    monkeypatch.setattr("lobewatch.logbook.logbook.advise", lambda *_: Advice(best, here))
 
 
 def test_a_new_spindle_passes_and_an_aged_one_does_not(shop: Shop, check: Check) -> None:

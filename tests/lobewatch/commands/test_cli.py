@@ -21,7 +21,7 @@ from dsm import natural_frequencies
 from lobes import read_history
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.show.report import render_report
+from lobewatch.show.report.report import render_report
 from lobewatch.tap.emulated_spindle import emulated_structure, emulator
 
 

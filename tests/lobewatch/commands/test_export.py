@@ -17,8 +17,8 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from acquisition import Conditions, DataError
-from lobewatch.analysis import Logbook
 from lobewatch.cli import app
+from lobewatch.logbook import Logbook
 from lobewatch.show.plant.table_files import rounded
 
 Shop = Any

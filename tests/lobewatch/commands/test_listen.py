@@ -11,11 +11,11 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from acquisition.files.read_sound import read_sound
-from lobewatch.analysis import Logbook
-from lobewatch.analysis.listening.heard_cut import listened
 from lobewatch.cli import app
+from lobewatch.logbook import Logbook
+from lobewatch.logbook.listened_cut import listened
 from lobewatch.machine.archive.verify import verify
-from lobewatch.machine.cuts.setting import cut_setting
+from lobewatch.machine.settings.cut_setting import cut_setting
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""

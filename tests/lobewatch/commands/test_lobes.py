@@ -16,31 +16,22 @@ from matplotlib.patches import Rectangle
 
 from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
 from lobes import Cut, radial_lobes, stability_boundary, zero_order
-from lobewatch.analysis import (
-    Dynamics,
-    Logbook,
-    Method,
-    Setting,
-    Verdict,
-    Word,
-    chart,
-    compare_lobes,
-    lobes_of,
-    speed_grid,
-)
-from lobewatch.analysis.columns.row_lobes import row_lobes
-from lobewatch.analysis.programs.limit_band import LimitBand, limit_band
-from lobewatch.analysis.programs.robust_pockets import robust_pockets
 from lobewatch.cli import main
+from lobewatch.history.columns.row_lobes import row_lobes
+from lobewatch.logbook import Logbook, compare_lobes
 from lobewatch.machine import ProgramTable, drive_limit
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.machine_file import parse_machine
 from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.show.describe_lobes import comparison_json, comparison_texts
-from lobewatch.show.figures import new_axes, svg
-from lobewatch.show.figures_lobes import BAND, lobes_figure, radial_figure, waterfall_figure
-from lobewatch.show.lobe_pictures import lobes_picture
-from lobewatch.show.programs.labels import Labels
+from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.show.figures.labels import Labels
+from lobewatch.show.figures.lobe_figures import BAND, lobes_figure, radial_figure, waterfall_figure
+from lobewatch.show.figures.lobe_pictures import lobes_picture
+from lobewatch.show.figures.trend_figures import new_axes, svg
+from lobewatch.show.programs.describe_lobes import comparison_json, comparison_texts
+from lobewatch.tool import Dynamics, Method, chart, lobes_of, speed_grid
+from lobewatch.verdicts import Setting, Verdict, Word
+from lobewatch.verdicts.limit_band import LimitBand, limit_band
+from lobewatch.verdicts.robust_pockets import robust_pockets
 from modal import Mode, synthesize
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)

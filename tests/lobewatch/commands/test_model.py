@@ -16,13 +16,16 @@ from typer.testing import CliRunner
 from acquisition import Circumstances, Frf, TapDirection, TapTest, new_tap_id
 from dsm import modes_at, natural_frequencies, receptance
 from lobes import lowest_of, zero_order
-from lobewatch.analysis import Logbook, Word, model_picture, model_state, speed_grid
-from lobewatch.analysis.prediction import predict
 from lobewatch.cli import app
+from lobewatch.logbook import Logbook, model_picture
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.machine_file import REFERENCE_CUT
 from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.show.figures_model import model_figure
+from lobewatch.machine.settings.machine_file import REFERENCE_CUT
+from lobewatch.measuring import model_state
+from lobewatch.show.figures.model_figures import model_figure
+from lobewatch.tool import speed_grid
+from lobewatch.tool.prediction import predict
+from lobewatch.verdicts import Word
 from modal import Mode
 
 TOOL = "long end mill"

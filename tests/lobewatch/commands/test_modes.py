@@ -12,11 +12,11 @@ import pytest
 from matplotlib.text import Annotation
 
 from acquisition import Frf, Remark, from_accelerance
-from lobewatch.analysis import remarks_on_all
 from lobewatch.cli import main
-from lobewatch.show.figures_modes import modes_figure
-from lobewatch.show.modes.describe_modes import mode_lines, mode_table, picked_table, remark_lines
-from lobewatch.show.output import results
+from lobewatch.measuring import remarks_on_all
+from lobewatch.show.figures.mode_figures import modes_figure
+from lobewatch.show.spindle.describe_modes import mode_lines, mode_table, picked_table, remark_lines
+from lobewatch.show.terminal.output import results
 from modal import Mode, extract, fit_modes, pick_peaks, synthesize
 
 LINES = np.arange(5.0, 4000.0, 5.0)

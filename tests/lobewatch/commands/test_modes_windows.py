@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Structure, infer_averages
-from lobewatch.analysis import Window, modes_of_file
 from lobewatch.cli import main
+from lobewatch.measuring import Window, modes_of_file
 from modal import Mode, Trust, trust_of
 from tests.modal.test_remarks import MODE, noisy
 

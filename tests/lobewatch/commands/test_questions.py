@@ -12,11 +12,12 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner, Result
 
-from lobewatch.analysis import Logbook, Standing
-from lobewatch.analysis.programs.verdict import Word
 from lobewatch.cli import app
-from lobewatch.show.report import render_report
+from lobewatch.decay import Standing
+from lobewatch.logbook import Logbook
+from lobewatch.show.report.report import render_report
 from lobewatch.tap.outcome import outcome_of
+from lobewatch.verdicts.verdict import Word
 
 SPINDLE = "# The spindle of the example"
 SAFE = """

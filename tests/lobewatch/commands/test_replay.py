@@ -14,8 +14,8 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from acquisition import DataError, Description, Recording, look
-from lobewatch.analysis.replaying.store import store_recordings
 from lobewatch.cli import app
+from lobewatch.logbook.replaying.store import store_recordings
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -183,7 +183,7 @@ def test_a_file_that_changes_while_it_is_read_is_refused(
             path.write_bytes(content + b"8,1,1\n" if length > 0 else content[:-1])
         return found
 
-    monkeypatch.setattr("lobewatch.analysis.replaying.read_tap_test.look", looked)
+    monkeypatch.setattr("lobewatch.logbook.replaying.read_tap_test.look", looked)
     with pytest.raises(DataError, match=f"{growing.name}: {wait}"):
         run("replay", shop.path, growing, "--date-pattern", "%Y%m%d")
     with pytest.raises(DataError, match=f"{growing.name}: {wait} .1 of 3 files; the others are stored"):

@@ -11,13 +11,13 @@ import msgspec
 import pytest
 import typer
 
-from lobewatch.analysis.plant.light import Light
-from lobewatch.analysis.plant.plant import Standings
-from lobewatch.analysis.plant.summary import Dated, Summary
 from lobewatch.cli import app
-from lobewatch.machine.machine_file import parse_machine
+from lobewatch.decay.light import Light
+from lobewatch.machine.settings.machine_file import parse_machine
 from lobewatch.notify.message import message_of
 from lobewatch.notify.prometheus import FAMILIES
+from lobewatch.plant.plant import Standings
+from lobewatch.plant.summary import Dated, Summary
 
 PAGE = (Path(__file__).parents[3] / "docs" / "alarms.md").read_text("utf-8")
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```", PAGE, flags=re.DOTALL | re.MULTILINE)

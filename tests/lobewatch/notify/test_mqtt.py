@@ -18,8 +18,8 @@ from typer.testing import CliRunner, Result
 
 from acquisition import DataError
 from lobewatch.cli import app
-from lobewatch.machine.machine_file import parse_machine
-from lobewatch.machine.notify_table import broker_of
+from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.machine.settings.notify_table import broker_of
 from lobewatch.notify import mqtt
 
 Shop = Any
@@ -98,7 +98,8 @@ def test_a_wrong_password_is_said_and_fails_nothing(
 def test_a_sender_that_breaks_off_leaves_its_last_will(mosquitto: Mosquitto) -> None:
     mosquitto.start()
     program = (
-        "import os, sys; from lobewatch.machine.notify_table import broker_of; from lobewatch.notify import mqtt\n"
+        "import os, sys; from lobewatch.machine.settings.notify_table import broker_of\n"
+        "from lobewatch.notify import mqtt\n"
         "mqtt.connected(broker_of(sys.argv[1])); os._exit(1)"
     )
     subprocess.run([sys.executable, "-c", program, mosquitto.address], check=False)

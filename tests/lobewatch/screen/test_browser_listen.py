@@ -13,10 +13,10 @@ import pytest
 
 from acquisition.devices import find_driver
 from acquisition.emulation import Passage
-from lobewatch.analysis import Logbook
 from lobewatch.cli import main
+from lobewatch.logbook import Logbook
 from lobewatch.machine import MachineFolder, make_machine_folder
-from lobewatch.machine.cuts.setting import cut_setting
+from lobewatch.machine.settings.cut_setting import cut_setting
 from lobewatch.tap.milling.emulated_cut import emulate_cut
 
 Browser = Any

@@ -13,12 +13,12 @@ import pytest
 from selenium.webdriver.common.keys import Keys
 from typer.testing import CliRunner
 
-from lobewatch.analysis.plant.plant import Plant, find_machines
 from lobewatch.cli import app
+from lobewatch.plant.plant import Plant, find_machines
 from lobewatch.screen import DashboardServer
 from lobewatch.show.plant.plant_rows import plant_rows
-from lobewatch.show.report import render_report
-from lobewatch.show.reporting.fleet import render_fleet
+from lobewatch.show.report.fleet import render_fleet
+from lobewatch.show.report.report import render_report
 
 Browser = Any
 """Chromium on one page: Browser of conftest.py."""

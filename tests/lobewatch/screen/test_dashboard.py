@@ -28,8 +28,8 @@ from acquisition import (
     TapsSource,
     write_hit,
 )
-from lobewatch.analysis import Logbook
 from lobewatch.cli import main
+from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen import DashboardServer

@@ -25,10 +25,11 @@ from acquisition import (
     from_accelerance,
     new_tap_id,
 )
-from lobewatch.analysis import Estimate, Logbook
-from lobewatch.analysis.decay.fallen import change_since_start
+from lobewatch.decay.fallen import change_since_start
+from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.measuring import Estimate
 from lobewatch.tap.outcome import outcome_of
 from lobewatch.tap.plots import plots_of
 from lobewatch.tap.state import Outcome

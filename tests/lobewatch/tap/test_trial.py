@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from acquisition import Channel, Hit, HitFlags, ring_down
-from lobewatch.machine.setup_tables import TapSetup
+from lobewatch.machine.settings.setup_tables import TapSetup
 from lobewatch.tap.trial import Trial, trigger_of
 
 RATE = 5120.0

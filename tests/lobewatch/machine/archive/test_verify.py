@@ -19,12 +19,12 @@ from typer.testing import CliRunner
 
 from acquisition import Circumstances, Hit, HitFlags, Remark, SourceFile, TapTest, Trigger, write_hit
 from lobewatch.cli import app
+from lobewatch.machine.additions.correct import add_event, exclude
 from lobewatch.machine.archive.rebuild import rebuild_files
-from lobewatch.machine.archive.rows import read_rows, write_rows
 from lobewatch.machine.archive.verify import Verified, verify
-from lobewatch.machine.corrections.correct import add_event, exclude
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import KnownDevice
+from lobewatch.machine.rows import read_rows, write_rows
 from lobewatch.tap.in_progress import begin_tap
 from lobewatch.tap.spool import write_set_up
 
@@ -239,7 +239,7 @@ def test_a_history_that_could_not_be_stored_is_not_said_to_be_made(
     def full(*_: object) -> int:
         raise OSError(errno.ENOSPC, "No space left on device", "m/history.rows")
 
-    monkeypatch.setattr("lobewatch.analysis.cache.history_cache.write_rows", full)
+    monkeypatch.setattr("lobewatch.history.cache.history_cache.write_rows", full)
     said = CliRunner().invoke(app, ["rebuild", str(folder.path)], catch_exceptions=False)
     assert "worked out in memory: m/history.rows: No space left on device; make room on that disk\n" in said.output
     assert said.stdout.endswith("history.rows: not made anew (see above); the next command that can write makes it\n")

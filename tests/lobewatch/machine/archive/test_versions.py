@@ -10,7 +10,7 @@ import h5py
 import pytest
 
 from acquisition import DataError, TapTest, read_tap
-from lobewatch.analysis import Logbook
+from lobewatch.logbook import Logbook
 from lobewatch.machine.archive.rebuild import rebuild_files
 from lobewatch.machine.archive.verify import verify
 from lobewatch.machine.folder import MachineFolder

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from acquisition import Block, Channel, DataError, DeviceError, DeviceIdentity, TapsSource
 from acquisition.devices import find_driver
 from acquisition.emulation import Passage
-from lobewatch.analysis import Logbook
-from lobewatch.analysis.listening.heard_cut import listened
+from lobewatch.logbook import Logbook
+from lobewatch.logbook.listened_cut import listened
 from lobewatch.machine import MachineFolder, make_machine_folder
-from lobewatch.machine.cuts.setting import cut_setting
+from lobewatch.machine.settings.cut_setting import cut_setting
 from lobewatch.tap.listening.record_cut import record_cut
 from lobewatch.tap.milling.emulated_cut import emulate_cut
 

@@ -15,9 +15,9 @@ from acquisition import DataError, TapsSource
 from acquisition.devices import find_driver
 from acquisition.emulation import Passage
 from lobewatch.cli import main
-from lobewatch.machine.cuts.setting import cut_setting
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.machine.settings.cut_setting import cut_setting
 from lobewatch.tap.milling.emulated_cut import EmulatedCut, emulate_cut
 from lobewatch.tap.milling.hidden_truth import hidden_truth, runout_of
 

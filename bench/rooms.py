@@ -1,0 +1,264 @@
+"""How the house is divided: rooms and what they reach, circles, sizes, words.
+
+    python bench/rooms.py [--root FOLDER] [--verbose]
+
+A room is a folder with Python files. An arrow goes from a room to the one that defines a name it takes, however many
+facades hand that name on, inside functions and for type checking too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+PACKAGES = ("acquisition", "modal", "dsm", "lobes", "lobewatch")
+GENERIC = frozenset(
+    re.findall(
+        r"\w+",
+        "found told said one ones known seen made what which how this that these those there then here own some "
+        "any each every other others rest both all thing things stuff item items it its mine so ",
+    )
+)
+"""Words that say nothing of what a name holds."""
+NO_NOUN = frozenset(
+    re.findall(
+        r"\w+",
+        "of that those these this it its as in by from for to with without at on where when what which who whose "
+        "why how if is are was were see like such both each so none below above beside behind before after up down "
+        "and or ",
+    )
+)
+"""Words that the docstring of a field does not begin with."""
+SMALL = 40
+"""Lines below which a file is looked at, whether it belongs to its only user."""
+
+
+@dataclass(frozen=True)
+class Import:
+    """A name that a file takes from another."""
+
+    file: str
+    """Module that takes it."""
+    target: str
+    """Module that defines it."""
+    name: str
+    """The name itself; empty for a whole module."""
+    inside: bool
+    """Whether the import stands in a function."""
+
+
+class House:
+    """The modules of a checkout, read once."""
+
+    def __init__(self, root: Path, packages: Iterable[str] = PACKAGES) -> None:
+        """root: of the checkout."""
+        self.paths = {_module(path, root): path for package in packages for path in (root / package).rglob("*.py")}
+        self.trees = {name: ast.parse(path.read_text("utf-8")) for name, path in self.paths.items()}
+        self._facades = {name: _handed_on(name, path, self.trees[name]) for name, path in self.paths.items()}
+
+    @cached_property
+    def imports(self) -> list[Import]:
+        """Every name that a module takes from another."""
+        return [taken for module in self.paths for taken in self._taken(module) if taken.target != module]
+
+    @property
+    def rooms(self) -> list[str]:
+        """Folders with modules, as packages."""
+        return sorted({self.room(module) for module in self.paths})
+
+    def room(self, module: str) -> str:
+        """The folder of a module, as a package."""
+        return module if self.paths[module].name == "__init__.py" else module.rpartition(".")[0]
+
+    @cached_property
+    def arrows(self) -> Mapping[tuple[str, str], list[Import]]:
+        """Imports by the two rooms they join; those of facades, which only hand on, are none."""
+        joined = defaultdict[tuple[str, str], list[Import]](list)
+        for taken in self.imports:
+            ends = self.room(taken.file), self.room(taken.target)
+            if ends[0] != ends[1] and self.paths[taken.file].name != "__init__.py":
+                joined[ends].append(taken)
+        return joined
+
+    def circles(self, package: str = "") -> list[list[str]]:
+        """Rooms that reach each other, the largest circle first; package: those inside it alone."""
+        return _circles([ends for ends in self.arrows if all(end.startswith(package) for end in ends)])
+
+    def file_circles(self, package: str = "") -> list[list[str]]:
+        """Modules that reach each other."""
+        inside = [taken for taken in self.imports if self.paths[taken.file].name != "__init__.py"]
+        return _circles([(t.file, t.target) for t in inside if t.file.startswith(package)])
+
+    def lines(self, package: str) -> dict[str, int]:
+        """Lines of each module of a package."""
+        mine = {name: path for name, path in self.paths.items() if name.split(".")[0] == package}
+        return {name: len(path.read_text("utf-8").splitlines()) for name, path in mine.items()}
+
+    def users(self, module: str) -> set[str]:
+        """Modules that take something from one, but for facades."""
+        takes = {taken.file for taken in self.imports if taken.target == module}
+        return {name for name in takes if self.paths[name].name != "__init__.py"}
+
+    def _taken(self, module: str) -> Iterator[Import]:
+        functions = [node for node in ast.walk(self.trees[module]) if isinstance(node, ast.FunctionDef)]
+        inner = {id(node) for function in functions for node in ast.walk(function)}
+        for node in ast.walk(self.trees[module]):
+            if isinstance(node, ast.ImportFrom):
+                base = _absolute(node, module, self.paths[module])
+                for alias in node.names:
+                    target = self._definer(base, alias.name)
+                    if target is not None:
+                        yield Import(module, target, alias.name, id(node) in inner)
+            elif isinstance(node, ast.Import):
+                for alias in node.names:
+                    if alias.name in self.paths:
+                        yield Import(module, alias.name, "", id(node) in inner)
+
+    def _definer(self, base: str, name: str) -> str | None:
+        if f"{base}.{name}" in self.paths:
+            return f"{base}.{name}"
+        if base not in self.paths:
+            return None
+        further = self._facades[base].get(name)
+        return base if further is None else self._definer(*further)
+
+
+def _module(path: Path, root: Path) -> str:
+    parts = path.relative_to(root).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def _absolute(node: ast.ImportFrom, module: str, path: Path) -> str:
+    if not node.level:
+        return node.module or ""
+    base = module.split(".") if path.name == "__init__.py" else module.split(".")[:-1]
+    base = base[: len(base) - node.level + 1]
+    return ".".join([*base, *([node.module] if node.module else [])])
+
+
+def _handed_on(module: str, path: Path, tree: ast.Module) -> dict[str, tuple[str, str]]:
+    """Names that a module hands on, with where it has them from."""
+    stub = path.with_suffix(".pyi")
+    top = [*tree.body, *(ast.parse(stub.read_text("utf-8")).body if stub.exists() else [])]
+    return {
+        alias.asname or alias.name: (_absolute(node, module, path), alias.name)
+        for node in top
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+
+
+def _circles(arrows: Iterable[tuple[str, str]]) -> list[list[str]]:
+    """Strongly connected components of more than one node (Tarjan, SIAM J. Comput. 1 (1972) 146-160)."""
+    follows = defaultdict[str, set[str]](set)
+    for start, end in arrows:
+        follows[start].add(end)
+    number, low, stack, circles = dict[str, int](), dict[str, int](), list[str](), list[list[str]]()
+
+    def visit(node: str) -> None:
+        number[node] = low[node] = len(number)
+        stack.append(node)
+        for after in sorted(follows.get(node, ())):
+            if after not in number:
+                visit(after)
+            if after in stack:
+                low[node] = min(low[node], low[after])
+        if low[node] == number[node]:
+            place = stack.index(node)
+            if len(stack) - place > 1:
+                circles.append(sorted(stack[place:]))
+            del stack[place:]
+
+    for node in sorted(follows):
+        if node not in number:
+            visit(node)
+    return sorted(circles, key=len, reverse=True)
+
+
+def bound_names(tree: ast.AST) -> Iterator[str]:
+    """Every binding of a name: assigned, looped over, taken as a parameter."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id
+        elif isinstance(node, ast.arg):
+            yield node.arg
+
+
+def field_docstrings(tree: ast.AST) -> Iterator[tuple[str, str]]:
+    """Fields of classes with the docstring below them."""
+    for holder in ast.walk(tree):
+        if isinstance(holder, ast.ClassDef):
+            for field, after in zip(holder.body, holder.body[1:], strict=False):
+                if (
+                    isinstance(field, ast.AnnAssign)
+                    and isinstance(field.target, ast.Name)
+                    and isinstance(after, ast.Expr)
+                    and isinstance(after.value, ast.Constant)
+                    and isinstance(after.value.value, str)
+                ):
+                    yield f"{holder.name}.{field.target.id}", after.value.value
+
+
+def begins_without_a_noun(docstring: str) -> bool:
+    """Whether the first word of a docstring is one that no noun begins with."""
+    word = re.match(r"\W*([A-Za-z]+)", docstring)
+    return docstring.startswith("...") or (word is not None and word[1].lower() in NO_NOUN)
+
+
+def classes(house: House) -> dict[str, list[str]]:
+    """Modules by the names of the classes that they define."""
+    where = defaultdict[str, list[str]](list)
+    for module, tree in house.trees.items():
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef):
+                where[node.name].append(module)
+    return where
+
+
+def report(root: Path, verbose: bool) -> None:
+    """Print the table."""
+    house = House(root)
+    print(
+        "| package | rooms | circles of rooms | of files | files | lines | under 50 lines | generic names / 1000 lines "
+        "| field docstrings without a noun |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|")
+    for package in PACKAGES:
+        lines = house.lines(package)
+        bound = [name for module in lines for name in bound_names(house.trees[module])]
+        generic = sum(name.strip("_") in GENERIC for name in bound)
+        told = [text for module in lines for _, text in field_docstrings(house.trees[module])]
+        odd = sum(map(begins_without_a_noun, told))
+        rooms = sum(room.split(".")[0] == package for room in house.rooms)
+        sizes = ", ".join(str(len(circle)) for circle in house.circles(package)) or "0"
+        files = ", ".join(str(len(circle)) for circle in house.file_circles(package)) or "0"
+        total = sum(lines.values())
+        print(
+            f"| {package} | {rooms} | {sizes} | {files} | {len(lines)} | {total} | "
+            f"{sum(n < 50 for n in lines.values())} | {1000 * generic / total:.0f} | {100 * odd / max(len(told), 1):.0f} % |"
+        )
+    named = classes(house)
+    twice = {name: modules for name, modules in named.items() if len(modules) > 1}
+    print(f"\nClass names: {len(named)}, with two meanings: {len(twice)}")
+    if verbose:
+        for name, modules in twice.items():
+            print(" ", name, *modules)
+        for circle in house.circles():
+            print("circle:", *circle)
+            for ends, imports in sorted(house.arrows.items()):
+                if set(ends) <= set(circle):
+                    print("  ", " -> ".join(ends), *(f"\n       {t.file}: {t.name} of {t.target}" for t in imports))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--root", type=Path, default=Path(__file__).parents[1])
+    parser.add_argument("--verbose", action="store_true")
+    arguments = parser.parse_args()
+    report(arguments.root, arguments.verbose)

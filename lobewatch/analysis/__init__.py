@@ -1,5 +1,0 @@
-"""From a tap test to what it means: measurement, history, prediction, verdict, standing."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

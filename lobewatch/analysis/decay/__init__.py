@@ -1,1 +1,0 @@
-"""How a series of tap tests decays: points, alarm, forecast; arrays in, records out."""

@@ -1,1 +1,0 @@
-"""Many machines at once: how each stands, small and quick to read, and the tap tests of all as one table."""

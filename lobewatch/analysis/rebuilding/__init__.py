@@ -1,1 +1,0 @@
-"""The history of a machine worked out anew, by whoever shares the work."""

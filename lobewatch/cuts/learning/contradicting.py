@@ -1,0 +1,105 @@
+"""Cuts that contradict the model beyond chance: said with their likely cause, never averaged in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from acquisition import Remark
+from lobewatch.cuts.learning.learnt import Expecting, Learnt
+from lobewatch.cuts.learning.likelihood import FREQUENCY, MISJUDGED
+from lobewatch.cuts.learning.observed import Observed
+
+CHANCE = MISJUDGED + 0.01
+"""What was heard is beyond chance where all else gives it less."""
+AWAY = 4.0
+"""Standard deviations of a chatter frequency from all that were predicted."""
+NONE = 0.005
+"""Share of the weight that counts as nothing."""
+
+
+class Contradiction(StrEnum):
+    """In what a cut contradicts the model."""
+
+    FREQUENCY = "frequency"
+    """It chatters where no mode is."""
+    CHATTERS = "chatters"
+    """It chatters where all spindles that explain the other cuts are stable."""
+    STABLE = "stable"
+    """It is stable where all of them chatter."""
+
+
+@dataclass(frozen=True)
+class Contradicting:
+    """A cut that is left out."""
+
+    cut: Observed
+    why: Contradiction
+
+
+def contradiction(expecting: Expecting) -> Contradiction | None:
+    """Whether a cut contradicts what was learnt from others; None where it may be chance."""
+    cut, guess, weights = expecting.cut, expecting.guess, expecting.learnt.weights
+    chatters = float(np.sum(weights * guess.chance))
+    if (chatters if cut.chatters else 1 - chatters) < CHANCE:
+        return Contradiction.CHATTERS if cut.chatters else Contradiction.STABLE
+    if not np.isfinite(cut.frequency) or not cut.chatters:
+        return None
+    teeth = cut.cut.teeth * cut.speed_rpm / 60
+    near = np.any(guess.off(cut, teeth) < AWAY * FREQUENCY * cut.frequency, axis=0)
+    return Contradiction.FREQUENCY if np.sum(weights * near) < NONE else None
+
+
+def learn_from_sound(start: Learnt, cuts: Sequence[Observed]) -> tuple[Learnt, tuple[Contradicting, ...]]:
+    """Learn from those cuts that do not contradict what was learnt before them; and the others.
+
+    A cut that contradicts those before it is asked again once all others are learnt.
+    """
+    learnt, odd = start, list[Observed]()
+    for cut in cuts:
+        expecting = learnt.expecting(cut)
+        if contradiction(expecting) is None:
+            learnt = expecting.heard()
+        else:
+            odd.append(cut)
+    still = list[Contradicting]()
+    for cut in odd:
+        expecting = learnt.expecting(cut)
+        why = contradiction(expecting)
+        learnt = expecting.heard() if why is None else learnt
+        still += [] if why is None else [Contradicting(cut, why)]
+    return learnt, tuple(still)
+
+
+def remarks_on(learnt: Learnt, odd: Sequence[Contradicting], about: str) -> Iterator[Remark]:
+    """What was left out, and where the spindle is not what it was tapped as; about: the program."""
+    yield from map(unexplained, odd)
+    if learnt.is_far_off:
+        text = "f_n at speed is further from that at rest than between 0.945 and 1.025 times it, as test cuts sound"
+        yield Remark("frequency-far-off", about, text, "tap again, warm, with this very tool and stick-out")
+
+
+def unexplained(odd: Contradicting) -> Remark:
+    """A cut that no spindle explains which explains the others."""
+    cut = odd.cut
+    at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
+    pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
+    text, cure = {
+        Contradiction.FREQUENCY: (
+            f"chatters{pitch} {at}, where no mode is: workpiece or fixture?",
+            "tap the workpiece where it is cut",
+        ),
+        Contradiction.CHATTERS: (
+            f"chatters{pitch} {at}, which no spindle does that explains the others: workpiece, fixture, worn tool?",
+            "cut it again; tap again if it stays",
+        ),
+        Contradiction.STABLE: (
+            f"stable {at}, which no spindle is that explains the others: another depth or speed than told?",
+            "cut it again, or take it out with lobewatch exclude",
+        ),
+    }[odd.why]
+    return Remark("cut-unexplained", cut.id, f"{text}; left out", cure)

@@ -1,0 +1,53 @@
+"""A cut that was heard, as the learning takes it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from lobes import Cut
+from lobewatch.machine.journal.heard_cut import CutWord
+
+AGED = 0.02
+"""Change of the natural frequency, relative, after which a cut says less of the spindle as it is now."""
+
+
+@dataclass(frozen=True)
+class Observed:
+    """One test cut in SI units."""
+
+    cut: Cut
+    """Teeth, immersion, direction, helix, and the coefficients that its material was taken for."""
+    speed_rpm: float
+    """Spindle speed (rpm)."""
+    depth: float
+    """Axial depth (m)."""
+    word: CutWord
+    """What it sounded like."""
+    frequency: float = math.nan
+    """Chatter frequency (Hz); NaN where none was heard or told."""
+    feed_angles: tuple[float, ...] = (0.0,)
+    """Directions it may have been fed in, as angles from x (rad): the worst counts."""
+    material: int = 0
+    """Cuts with the same number share their cutting coefficients; 0 are those of the cut asked about."""
+    speed_found: bool = True
+    """Whether the speed was found in the sound; else it is the commanded one."""
+    moved: float = 1.0
+    """Natural frequency at rest when it was made, over that of now."""
+    id: str = ""
+    """In the journal."""
+
+    @property
+    def weight(self) -> float:
+        """Of what it says: less, the more the natural frequency has moved since."""
+        return math.exp(-(((self.moved - 1) / AGED) ** 2) / 2)
+
+    @property
+    def chatters(self) -> bool:
+        """Whether it was not stable."""
+        return self.word != "stable"
+
+    @property
+    def has_frequency(self) -> bool:
+        """Whether it says something of natural frequencies."""
+        return self.word == "flip" or (self.chatters and math.isfinite(self.frequency))

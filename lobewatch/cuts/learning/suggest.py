@@ -1,0 +1,91 @@
+"""The next test cut: the one that is worth most of those that are more likely stable than not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobewatch.cuts.learning.chart import LIKELY, Chart
+from lobewatch.cuts.learning.grid import Grid, floored
+from lobewatch.cuts.learning.learnt import Learnt
+from lobewatch.cuts.learning.likelihood import predicted
+from lobewatch.cuts.learning.observed import Observed
+from lobewatch.cuts.learning.priors import Draws
+from lobewatch.verdicts.mean_force import is_constant
+
+DRAWS = 300
+"""That the chances are of."""
+NEARBY = (1.0, 0.85, 0.7, 0.5, 0.35)
+"""Shares of a depth that are looked at in turn where zero order is not exact."""
+GAINED = 0.005
+"""A gain to be expected below this share of the best removal rate so far is none."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Suggested:
+    """A test cut that is worth making."""
+
+    speed_rpm: float
+    depth: float
+    """Axial depth (m)."""
+    chance: float
+    """That it chatters."""
+    gain: float
+    """Expected gain of removal rate, relative to the best heard stable so far; inf where there is none."""
+    settles: str
+    """What it tells most of (a name of `Draws.ratios`)."""
+    told: float
+    """By how many of its standard deviations the two outcomes differ there."""
+
+
+def best_heard(cuts: Sequence[Observed]) -> float:
+    """Largest speed times depth (rpm m) that was heard stable; 0 where none was."""
+    return max((cut.speed_rpm * cut.depth for cut in cuts if not cut.chatters), default=0.0)
+
+
+def suggest(learnt: Learnt, grid: Grid, heard: Sequence[Observed], left: int = 1) -> Suggested | None:
+    """The next test cut; None where nothing more is to be gained.
+
+    heard: the cuts of this very program; left: test cuts that are still to be made, this one with them. With more than
+    one a cut is worth what it gains itself and what the best next one is then expected to gain. A diagram by zero order
+    proposes; what is chosen was judged by semi-discretisation.
+    """
+    best, draws = best_heard(heard), learnt.sample(DRAWS)
+    chart = Chart.of(draws, grid)
+    most = float(np.max(chart.chips))
+    least = GAINED * max(best, 1e-3 * most)
+    worth = {place: chart.worth(place[0], place[1], best, left) for place in chart.candidates(best)}
+    for row, depth in sorted(worth, key=lambda place: -worth[place]):
+        if worth[row, depth] < least:
+            return None
+        found = _judged(grid, float(grid.speeds[row]), depth, best, draws)
+        if found is not None:
+            return found
+    return None
+
+
+def _judged(grid: Grid, speed: float, depth: float, best: float, draws: Draws) -> Suggested | None:
+    """The cut, or one not as deep where it is more likely to chatter than not."""
+    for share in (1.0,) if is_constant(grid.cut) else NEARBY:
+        deep = floored(share * depth)
+        chance = predicted(grid.seen(speed, deep), draws).chance
+        if deep > 0 and np.mean(chance) < 1 - LIKELY:
+            gain = float(1 - np.mean(chance)) * (speed * deep - best)
+            settles = _settles(draws.ratios(), chance)
+            return Suggested(speed, deep, float(np.mean(chance)), gain / best if best else np.inf, *settles)
+    return None
+
+
+def _settles(ratios: Mapping[str, Floats], chance: Floats) -> tuple[str, float]:
+    """What differs most between the spindles on which a cut chatters and those on which it does not."""
+    told = {}
+    for name, values in ratios.items():
+        chatters, stable = (float(np.sum(values * share) / np.sum(share)) for share in (chance, 1 - chance))
+        told[name] = abs(chatters - stable) / max(float(np.std(values)), 1e-12)
+    name = max(told, key=lambda one: told[one])
+    return name, told[name]

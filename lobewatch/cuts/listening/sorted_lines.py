@@ -1,0 +1,74 @@
+"""The lines of a cut by where they come from: the turning spindle, what was there before the cut, and what is left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobewatch.cuts.listening.folded import folded
+from lobewatch.cuts.listening.lattice import Turning
+from lobewatch.cuts.listening.spectrum import Lines, Spectrum
+
+WIDE = 1.2
+"""A line belongs to a frequency that is no further away than this (bins)."""
+FOREIGN = 9.0
+"""A line with less than so many times the power that it has in air comes from elsewhere."""
+AIR_WIDE = 2.0
+"""The same for lines of the air part, bins of its own."""
+HIGHEST = 2.0
+"""Multiples are looked for up to this many sample rates: a device without a filter folds them back ..."""
+UPPER = 0.7
+"""... and is no louder there than 1.5 times the loudest multiple above this share of half the sample rate."""
+LOUDER = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class SortedLines:
+    """All lines of a cut."""
+
+    comb: Lines
+    """Multiples of the frequency of the spindle, the first left out: it is there in air."""
+    tooth: NDArray[np.int64]
+    """Order of each of these, modulo the number of teeth; 0 is tooth passing."""
+    foreign: Lines
+    """Those that are there in air."""
+    left: Lines
+    """All others: chatter, where there is any."""
+
+
+def is_foreign(lines: Lines, air: Spectrum) -> NDArray[np.bool_]:
+    """Whether lines are there in air too."""
+    return np.asarray(lines.amplitude**2 <= FOREIGN * air.loudest_near(lines.frequency, AIR_WIDE))
+
+
+def sort_lines(
+    lines: Lines, spectrum: Spectrum, air: Spectrum, turning: Turning, teeth: int, unsteady: float
+) -> SortedLines:
+    """Where each line comes from; a multiple of the spindle above half the sample rate is where it is folded to.
+
+    unsteady: by how much the speed varies, relative: multiples are so much wider.
+    """
+    order = np.round(lines.frequency / turning.frequency)
+    away = np.abs(lines.frequency - order * turning.frequency)
+    unsure = order * (3 * turning.error + unsteady * turning.frequency)
+    comb = (away < WIDE * spectrum.bin + unsure) & (order > 0)
+    foreign = ~comb & is_foreign(lines, air)
+    upper = comb & (lines.frequency > UPPER * spectrum.sample_rate / 2)
+    loudest = float(np.max(lines.amplitude[upper], initial=0.0))
+    back = _near_folded(lines, spectrum, turning) & (lines.amplitude <= LOUDER * loudest)
+    kept = comb & (order > 1)
+    tooth = (order[kept] % teeth).astype(np.int64)
+    return SortedLines(lines[kept], tooth, lines[foreign], lines[~(comb | foreign | back)])
+
+
+def _near_folded(lines: Lines, spectrum: Spectrum, turning: Turning) -> NDArray[np.bool_]:
+    rate = spectrum.sample_rate
+    orders = np.arange(int(rate / 2 / turning.frequency) + 1, int(HIGHEST * rate / turning.frequency) + 1)
+    if not orders.size:
+        return np.zeros(len(lines), dtype=np.bool_)
+    known = np.sort(folded(np.asarray(orders * turning.frequency), rate))
+    after = np.clip(np.searchsorted(known, lines.frequency), 1, max(known.size - 1, 1)) % known.size
+    nearest = np.minimum(np.abs(lines.frequency - known[after]), np.abs(lines.frequency - known[after - 1]))
+    return np.asarray(nearest < WIDE * spectrum.bin)

@@ -1,0 +1,98 @@
+"""How fast the spindle really turns in a cut, from the lines that its turning spaces."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d
+
+from lobewatch.cuts.listening.lattice import Turning, refined
+from lobewatch.cuts.listening.spectrum import Floats, Lines, Spectrum
+
+AROUND = 0.021
+"""Relative distance from the speed that was set up to which it is looked for."""
+LOUDEST = 40
+"""Lines that are looked at."""
+HIGHEST = 60
+"""Multiples of the frequency of the spindle by which two of them may differ."""
+SHARPNESS = 0.25
+"""Standard deviation of a line in the count of votes (bins)."""
+UNBALANCE = 0.2
+"""A speed whose own line is heard is taken where it has so much of the votes of the best one."""
+FITS = 4.0
+"""A speed with a larger misfit is compared with others ..."""
+PEAKS = 12
+"""... so many that have the most votes ..."""
+BESIDE = 9
+"""... of as many steps of the grid around each."""
+LEAST_SHARE = 0.5
+"""Of the lines that must belong to the lattice, and that must have a neighbour one or two turns or teeth away ..."""
+LEAST_AGREEING = 3
+"""... and so many of them must agree: a pump that is switched on has lines of its own."""
+
+
+def true_speed(own: Lines, all_lines: Lines, spectrum: Spectrum, teeth: int, commanded: float) -> Turning | None:
+    """Turns a second, near those that were set (Hz); None where too few lines agree.
+
+    own: lines that are not there in air; all_lines: with those that are. Each distance between two lines, each sum
+    and each line itself votes for the frequencies that it is a multiple of, for multiples of the teeth twice: chatter
+    f_c + k f counts as much as the multiples k f. The best is made exact by least squares.
+    """
+    loudest = own.loudest(LOUDEST)
+    if len(loudest) < 2:
+        return None
+    grid = commanded * (1 + np.arange(-AROUND, AROUND, 0.25 * SHARPNESS * spectrum.bin / (40 * commanded)))
+    votes = _votes(loudest, grid, teeth, SHARPNESS * spectrum.bin)
+    if not np.any(votes):
+        return None
+    turning = all_lines.frequency[np.abs(all_lines.frequency / commanded - 1) < AROUND]
+    near = np.any(np.abs(grid[:, np.newaxis] - turning) < 0.5 * spectrum.bin, axis=1)
+    best = int(np.argmax(votes))
+    heard = int(np.argmax(np.where(near, votes, 0.0)))
+    best = heard if near[heard] and votes[heard] > UNBALANCE * votes[best] else best
+    found = refined(float(grid[best]), loudest, spectrum.bin)
+    if found.misfit > FITS:
+        others = grid[_peaks(votes)].tolist()
+        found = min((found, *(refined(one, loudest, spectrum.bin) for one in others)), key=lambda one: one.misfit)
+    is_sure = min(found.share, _spaced(loudest, found.frequency, teeth, spectrum.bin)) >= LEAST_SHARE
+    is_sure &= found.agreeing >= LEAST_AGREEING
+    return found if is_sure else None
+
+
+def _spaced(lines: Lines, frequency: float, teeth: int, bin_: float) -> float:
+    """Share of lines with another one or two turns or teeth away: a wrong frequency may fit multiples, not these."""
+    apart = np.abs(lines.frequency[:, np.newaxis] - lines.frequency)
+    steps = (step * frequency for step in (1, 2, teeth, 2 * teeth))
+    return float(np.mean(np.any([np.any(np.abs(apart - step) < bin_, axis=1) for step in steps], axis=0)))
+
+
+def _peaks(votes: Floats) -> NDArray[np.intp]:
+    """Where there are more votes than beside, the most first."""
+    places = np.flatnonzero((maximum_filter1d(votes, BESIDE) == votes) & (votes > 0))
+    return places[np.argsort(-votes[places])[:PEAKS]]
+
+
+def _votes(lines: Lines, grid: Floats, teeth: int, sharpness: float) -> Floats:
+    """For each frequency of a grid (Hz); sharpness: of one line (Hz)."""
+    weight, step = np.log10(lines.clearness), grid[1] - grid[0]
+    i, j = np.triu_indices(len(lines), 1)
+    spaced = np.concatenate([np.abs(lines.frequency[i] - lines.frequency[j]), lines.frequency[i] + lines.frequency[j]])
+    spaced, weight = (
+        np.concatenate([spaced, lines.frequency]),
+        np.concatenate([*[np.minimum(weight[i], weight[j])] * 2, weight]),
+    )
+    votes = np.zeros(grid.size)
+    for order in range(1, HIGHEST + 1):
+        place = np.round((spaced / order - grid[0]) / step).astype(int)
+        inside = (place >= 0) & (place < grid.size)
+        if np.any(inside):
+            counted = np.bincount(place[inside], weight[inside] * (1 + (order % teeth == 0)), grid.size)
+            votes += _smoothed(counted.astype(np.float64), np.sqrt(2) * sharpness / order / step)
+    return votes
+
+
+def _smoothed(votes: Floats, width: float) -> Floats:
+    """Each vote spread over its neighbours; width: standard deviation in steps of the grid."""
+    reach = min(int(np.ceil(2 * width)), (votes.size - 1) // 2)
+    spread = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    return np.convolve(votes, spread, "same")

@@ -1,0 +1,209 @@
+"""When a falling series will reach a level: a mixture of all shapes that its past allows, each with its own error.
+
+Weights by the residual sum of squares and the number of shapes of a kind (an approximation of Bayesian model
+averaging with equal prior weight of each kind; Raftery 1995, "Bayesian model selection in social research"). No random
+numbers.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtr, stdtrit
+
+from lobewatch.decay.shapes import KINDS, Shape, courses, shapes_of
+from lobewatch.decay.temperature import Fits, base_of
+
+ENOUGH = 8
+"""Points from which on anything is foretold."""
+QUANTILES = (0.1, 0.5, 0.9)
+"""Probabilities at which a level counts as reached: earliest, probable and latest date."""
+LOOKS = 241
+"""Dates looked at up to the horizon; between them the probability is interpolated."""
+
+LIGHTEST = 1e-7
+"""Weight beside the heaviest below which a shape is left out."""
+SURELY_NOT = 1e-12
+"""Probability that is as good as none."""
+STEP = 1e-6
+"""Of the span, over which a rate is taken."""
+SURELY = (0.025, 0.975)
+"""Probabilities of the interval of a rate."""
+HALVINGS = 40
+"""Of the range in which a quantile is looked for."""
+
+Floats = NDArray[np.float64]
+
+
+class Reached(NamedTuple):
+    """When a level is reached, as dates of the series."""
+
+    earliest: float
+    """At a probability of 10 %; -inf where it is reached already, inf where not before the horizon."""
+    probable: float
+    """At 50 %."""
+    latest: float
+    """At 90 %."""
+
+
+class Rate(NamedTuple):
+    """How fast a series changes at its last point, in its unit for one of its dates."""
+
+    value: float
+    """Mean of the mixture; negative where it falls."""
+    low: float
+    """2.5 % quantile."""
+    high: float
+    """97.5 % quantile."""
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """What a series may become."""
+
+    shapes: tuple[Shape, ...]
+    """All that were fitted, j of them."""
+    weight: Floats
+    """Of each, shape (j,), their sum 1."""
+    spread: float
+    """Standard deviation of the points around the shapes, in the unit of the series."""
+    fitted: Floats
+    """Mean of the mixture at the points themselves, shape (n,)."""
+    dates: Floats
+    """From now to the horizon, shape (d,); where that has passed, all are the horizon."""
+    mean: Floats
+    """Of each shape at these dates, shape (j, d)."""
+    error: Floats
+    """Standard error of these means, shape (j, d)."""
+    freedom: int
+    """Degrees of freedom of the errors."""
+
+    @property
+    def line(self) -> Floats:
+        """Mean of the mixture at the dates, shape (d,)."""
+        return np.asarray(self.weight @ self.mean)
+
+    @property
+    def likeliest(self) -> Shape:
+        """The heaviest shape of the heaviest kind."""
+        kinds = np.array([shape.kind for shape in self.shapes])
+        heaviest = max(KINDS, key=lambda kind: self.weight[kinds == kind].sum())
+        return self.shapes[int(np.argmax(np.where(kinds == heaviest, self.weight, -1.0)))]
+
+    def probability(self, level: float | Floats, error: float = 0.0) -> Floats:
+        """That the series is below a level (one, or one a date; with its standard error) at the dates, shape (d,)."""
+        away = level - self.mean
+        away /= np.hypot(self.error, error) if error else self.error
+        return np.asarray(self.weight @ _below(self.freedom, away))
+
+    def reached(self, level: float, error: float = 0.0) -> Reached:
+        """When a level (with its standard error) is reached."""
+        chance = np.maximum.accumulate(self.probability(level, error))
+        return Reached(*(self._first(chance, quantile) for quantile in QUANTILES))
+
+    def _first(self, chance: Floats, quantile: float) -> float:
+        above = int(np.searchsorted(chance, quantile))
+        if above in (0, chance.size):
+            return -np.inf if above == 0 else np.inf
+        return float(np.interp(quantile, chance[above - 1 : above + 1], self.dates[above - 1 : above + 1]))
+
+    def fan(self, quantile: float) -> Floats:
+        """Level below which the series is with a probability at the dates, shape (d,)."""
+        low, high = (self.mean - 50 * self.error).min(axis=0), (self.mean + 50 * self.error).max(axis=0)
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            below = self.probability(middle) < quantile
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        return np.asarray((low + high) / 2)
+
+
+def forecast(
+    dates: Floats, y: Floats, horizon: float, temperature: Floats | None = None, now: float = -np.inf
+) -> Forecast:
+    """Foretell a series y (n,) over its dates (n,), increasing, to a date, but never farther than twice its own span.
+
+    temperature: at each point (K or degC), NaN where it was not recorded; now: if that is later than the last point.
+    ValueError below 8 points and without a span.
+    """
+    return past(dates, y, temperature).ahead(horizon, now)
+
+
+@dataclass(frozen=True, eq=False)
+class Past:
+    """A series with all shapes that it allows fitted to it: what of a forecast does not hang on the day it is made."""
+
+    shapes: tuple[Shape, ...]
+    """As in Forecast, the dates counted from the first point on."""
+    weight: Floats
+    """As in Forecast."""
+    spread: float
+    """As in Forecast."""
+    fitted: Floats
+    """As in Forecast."""
+    fits: Fits
+    """Of the shapes."""
+    dates: Floats
+    """Of the points, shape (n,)."""
+    first: float
+    """Value of the first point."""
+
+    def ahead(self, horizon: float, now: float = -np.inf) -> Forecast:
+        """What may become of it until a date; now: if that is later than the last point."""
+        begin, span = float(self.dates[0]), float(self.dates[-1] - self.dates[0])
+        start = min(max(span, now - begin), 3 * span)
+        at = np.linspace(start, max(min(horizon - begin, 3 * span), start), LOOKS)
+        mean, error = self.fits.at(courses(self.shapes, at, span))
+        moved = tuple(Shape(one.kind, one.start + begin, *one[2:]) for one in self.shapes)
+        mean = mean + self.first
+        return Forecast(moved, self.weight, self.spread, self.fitted, begin + at, mean, error, self.fits.freedom)
+
+    @property
+    def rate(self) -> Rate:
+        """How fast it changes at its last point."""
+        span = float(self.dates[-1] - self.dates[0])
+        near = courses(self.shapes, np.array([span - STEP * span, span]), span)
+        rate, error = self.fits.rate(np.diff(near)[:, 0] / (STEP * span))
+        low, high = (_quantile(self.weight, rate, error, self.fits.freedom, p) for p in SURELY)
+        return Rate(float(self.weight @ rate), low, high)
+
+
+def past(dates: Floats, y: Floats, temperature: Floats | None = None) -> Past:
+    """Fit all shapes to a series; arguments and errors as those of `forecast`."""
+    at = dates - dates[:1].sum()
+    if y.size < ENOUGH or at[-1] <= 0:
+        raise ValueError(f"{y.size} points on {np.unique(at).size} dates: a forecast needs {ENOUGH}")
+    shapes = [*shapes_of(at)]
+    columns = courses(shapes, at, float(at[-1]))
+    fits = base_of(y, temperature).fit_columns(columns)
+    counts = Counter(shape.kind for shape in shapes)
+    share = [np.log(count) + np.log(y.size) / 2 * (kind != "none") for kind, count in counts.items()]
+    log = -fits.freedom / 2 * np.log(fits.rss) - np.repeat(share, [*counts.values()])
+    weight = np.exp(log - log.max())
+    kept = np.flatnonzero(weight > LIGHTEST)
+    weight, fits = weight[kept] / weight[kept].sum(), fits.some(kept)
+    spread = float(np.sqrt(weight @ fits.rss / fits.freedom))
+    fitted = fits.mixed(weight, columns[kept]) + y[0]
+    return Past(tuple(shapes[j] for j in kept), weight, spread, fitted, fits, dates, float(y[0]))
+
+
+def _below(freedom: int, t: Floats) -> Floats:
+    """Distribution of Student's t: 0 and 1 where it is nearer to them than anybody asks."""
+    found, near = (t > 0).astype(np.float64), ~(np.abs(t) > stdtrit(freedom, 1 - SURELY_NOT))
+    found[near] = stdtr(freedom, t[near])
+    return np.asarray(found)
+
+
+def _quantile(weight: Floats, middle: Floats, error: Floats, freedom: int, p: float) -> float:
+    """Of a mixture of Student's t, where an error of 0 is a value that is certain."""
+    reach = stdtrit(freedom, 1 - LIGHTEST) * error
+    low, high = float((middle - reach).min()), float((middle + reach).max())
+    for _ in range(HALVINGS):
+        value = (low + high) / 2
+        with np.errstate(invalid="ignore", divide="ignore"):
+            below = np.where(error > 0, stdtr(freedom, (value - middle) / error), middle <= value)
+        low, high = (value, high) if weight @ below < p else (low, value)
+    return high

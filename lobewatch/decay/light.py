@@ -1,0 +1,112 @@
+"""The light of a machine: what each reason means, in order of harm, and the reasons that the date alone gives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from datetime import datetime, timedelta
+from enum import StrEnum
+from pathlib import Path
+
+from acquisition import Remark
+from lobewatch.measuring.questions.clock import CLOCK_QUESTIONS, about_future
+
+
+class Light(StrEnum):
+    """Worst first."""
+
+    ALARM = "alarm"
+    UNKNOWN = "unknown"
+    """Damaged, unreadable or never tapped: nothing can be said."""
+    WARN = "warn"
+    GOOD = "good"
+
+
+LIGHTS = {
+    "frequency-alarm": Light.ALARM,
+    "decay": Light.ALARM,
+    "program-not-stable": Light.ALARM,
+    "unreadable": Light.UNKNOWN,
+    "never-tapped": Light.UNKNOWN,
+    "journal-damaged": Light.WARN,
+    "tap-damaged": Light.WARN,
+    "tap-unreadable": Light.WARN,
+    "tap-unlisted": Light.WARN,
+    "file-damaged": Light.WARN,
+    "frequency-warn": Light.WARN,
+    "decay-doubtful": Light.WARN,
+    "frequency-jump": Light.WARN,
+    "mode-lost": Light.WARN,
+    "no-mode-in-band": Light.WARN,
+    "no-mode-to-follow": Light.WARN,
+    "other-band": Light.WARN,
+    "stiffness-off-model": Light.WARN,
+    **dict.fromkeys(CLOCK_QUESTIONS, Light.WARN),
+    "tap-in-future": Light.WARN,
+    "overdue": Light.WARN,
+    "program-unknown": Light.WARN,
+    "program-doubtful": Light.WARN,
+    "frequency-rose": Light.GOOD,
+    "value-changed": Light.GOOD,
+    "one-direction": Light.GOOD,
+}
+"""What each reason means, in order of harm."""
+
+UNREADABLE = "Put its files right: the sentence above says which."
+"""What to do about a machine that cannot be read."""
+
+
+def about_unreadable(reason: str) -> Remark:
+    """That the files of a machine cannot be read."""
+    return Remark("unreadable", "", reason)
+
+
+def in_order(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
+    """Reasons in order of harm."""
+    order = list(LIGHTS)
+    return tuple(sorted(remarks, key=lambda remark: order.index(remark.code)))
+
+
+def light_of(ordered: Sequence[Remark]) -> Light:
+    """That of the worst reason."""
+    return LIGHTS[ordered[0].code] if ordered else Light.GOOD
+
+
+def next_step(ordered: Sequence[Remark], well: str) -> str:
+    """What to do now, one sentence; well: where no reason says another."""
+    return ordered[0].cure if ordered and ordered[0].cure else well
+
+
+def all_well(newest: datetime, interval_days: float) -> str:
+    """What to do where nothing is wrong; newest: when it was tapped last."""
+    return f"All is well: tap again by {newest + timedelta(days=math.floor(interval_days)):%Y-%m-%d}."
+
+
+def days_left(newest: datetime, interval_days: float, now: datetime) -> float:
+    """Until the next tap test is due; newest: when the last one was."""
+    return interval_days - (now - newest) / timedelta(days=1)
+
+
+def about_dates(
+    tap_id: str, newest: datetime, interval_days: float, now: datetime, path: Path | str
+) -> Iterator[Remark]:
+    """What the date alone gives: a test that is overdue, one of the future. path: of the folder, for commands."""
+    left = days_left(newest, interval_days, now)
+    if left < 0:
+        days = math.ceil(-left)
+        text = f"the next tap test is overdue by {days} day{'s' if days > 1 else ''}"
+        yield Remark("overdue", "", text, "Take the tap test that is due.")
+    yield from about_future(tap_id, newest, now, path)
+
+
+def of_files(remark: Remark) -> Remark:
+    """What is wrong with a file, with a cure that can be the next step."""
+    return replace(remark, cure=f"{remark.about}: {remark.cure or remark.text}.")
+
+
+def with_files(ordered: tuple[Remark, ...], damage: Sequence[Remark]) -> tuple[Remark, ...]:
+    """The reasons with what else was found damaged in the folder."""
+    known = {(remark.code, remark.about) for remark in ordered}
+    new = [of_files(remark) for remark in damage if (remark.code, remark.about) not in known]
+    return in_order([*ordered, *new])

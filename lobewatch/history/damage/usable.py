@@ -1,0 +1,195 @@
+"""The tap tests of a machine that can be used; where one turns out to be damaged, all is done again without it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from typing import TypeVar
+
+from acquisition import DataError, Remark
+from lobewatch.history.assembling import NotTappedError
+from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
+from lobewatch.machine.contents import Contents
+from lobewatch.machine.journal.event import Event
+from lobewatch.machine.journal.heard_cut import HeardCut
+from lobewatch.machine.journal.journal import command
+from lobewatch.tool.order import Order, Place
+
+Result = TypeVar("Result")
+BEFORE_ALL = datetime.min.replace(tzinfo=UTC)
+
+
+class UsableTaps:
+    """What the folder holds, looked at once."""
+
+    def __init__(self, folder: MachineFolder) -> None:
+        """Nothing is read yet."""
+        self._folder = folder
+        self._contents: Contents | None = None
+        self._order: Order | None = None
+        self._left_out: dict[str, tuple[TapEntry, Remark]] = {}
+        self._works = False
+
+    @property
+    def places(self) -> Sequence[Place]:
+        """Those that can be used, oldest first by their time; a newer one is added to the same sequence."""
+        if self._order is None:
+            self._order = Order(self._all.baselines)
+            for tap in self._all.taps:
+                if tap.id not in self._left_out and not tap.excluded:
+                    self._order.add(tap)
+        return self._order.places
+
+    def place(self, tap_id: str) -> Place:
+        """Of one of them; KeyError where it is none."""
+        for place in reversed(self.places):
+            if place.entry.id == tap_id:
+                return place
+        raise KeyError(tap_id)
+
+    def refuse_excluded(self, tap_id: str) -> None:
+        """DataError for one that a person has taken out."""
+        for tap in self.excluded:
+            if tap.id == tap_id:
+                cure = f"{command('include', self._folder.path)} {tap_id} takes it back"
+                raise DataError(f"{tap_id}: stored already, but excluded, for {tap.excluded!r}; {cure}")
+
+    def until(self, tap_id: str | None) -> list[Place]:
+        """Those up to one of them, since the baseline that counted then; None: up to now."""
+        last = None if tap_id is None else self.place(tap_id)
+        baseline = self.baseline if last is None else last.baseline
+        known = self.places if last is None else self.places[: last.number + 1]
+        return [place for place in known if place.baseline == baseline]
+
+    def since(self, tap_id: str) -> list[TapEntry]:
+        """Those that are compared with one of them; none with what is none of them, a prediction."""
+        series = {place.entry.id: place.series for place in self.places}
+        return [place.entry for place in self.places if place.series == series.get(tap_id)]
+
+    @property
+    def remarks(self) -> list[Remark]:
+        """What is wrong with the files, as far as it is known by now."""
+        known = () if self._contents is None else self._contents.remarks
+        return [*known, *(remark for _, remark in self._left_out.values())]
+
+    @property
+    def events(self) -> Sequence[Event]:
+        """What was done to the machine, oldest first."""
+        return self._all.events
+
+    @property
+    def cuts(self) -> Sequence[HeardCut]:
+        """Test cuts, oldest first, those that a person has taken out too."""
+        return self._all.cuts
+
+    @property
+    def event_times(self) -> list[datetime]:
+        """When something was done to the machine, oldest first."""
+        return [event.time for event in self.events]
+
+    @property
+    def excluded(self) -> Sequence[TapEntry]:
+        """Those that a person has taken out, oldest first."""
+        return [tap for tap in self._all.taps if tap.excluded]
+
+    @property
+    def lost(self) -> Sequence[TapEntry]:
+        """Those whose files cannot be used, but for those that a person has taken out."""
+        found = [*self._all.lost, *(entry for entry, _ in self._left_out.values())]
+        return [entry for entry in found if not entry.excluded]
+
+    @property
+    def by_id(self) -> dict[str, TapEntry]:
+        """All of the journal, whatever became of them."""
+        return {entry.id: entry for entry in (*self._all.taps, *self._all.lost)}
+
+    @property
+    def baselines(self) -> list[datetime]:
+        """The events from which on all comparing begins anew, oldest first."""
+        return self._all.baselines
+
+    @property
+    def baseline(self) -> datetime | None:
+        """The newest event from which on all comparing begins anew."""
+        return max(self._all.baselines, default=None)
+
+    def newest(self, tool: str | None) -> TapEntry:
+        """The newest one since the baseline, of a tool where one is named; NotTappedError where there is none."""
+        known = [place.entry for place in self.places if place.baseline == self.baseline]
+        found = [tap for tap in known if tool in (None, tap.tool)]
+        if found:
+            return found[-1]
+        which = "" if tool is None else f" with tool {tool!r}"
+        damaged = [str(remark) for remark in self.remarks]
+        if damaged:
+            raise NotTappedError(f"{self._folder.path}: no tap test{which} that can be used: {'; '.join(damaged)}")
+        cure = "take one with lobewatch tap, or replay a recorded file"
+        since = "yet" if self.baseline is None else f"since the new baseline of {self.baseline.astimezone():%Y-%m-%d}"
+        if self.excluded:
+            since += f", but {len(self.excluded)} excluded"
+            cure += f"; {command('include', self._folder.path)} TAP takes one back"
+        raise NotTappedError(f"{self._folder.path}: no tap test{which} {since}; {cure}")
+
+    def doubts(self, tool: str = "") -> tuple[Remark, ...]:
+        """Damaged ones (of a tool; "": of any) that are newer than all of their series that can be used."""
+        if not self.lost:
+            return ()
+        known = {_series(place.entry): _time(place.entry) for place in self.places}
+        lost = [one for one in self.lost if _time(one) >= (self.baseline or BEFORE_ALL)]
+        newer = [one for one in lost if tool in ("", one.tool) and _time(one) > known.get(_series(one), BEFORE_ALL)]
+        text = "newer than all of its tool and direction that can be used, but its file is damaged"
+        return tuple(Remark("newest-damaged", f"tap test {one.id}", text, "tap again") for one in newer)
+
+    def from_the_rest(self, work: Callable[[], Result], forget: Callable[[], None]) -> Result:
+        """What some work gives; where it meets a damaged tap file, without that, all that was known forgotten."""
+        if self._works:
+            return work()
+        self._works = True
+        try:
+            while True:
+                try:
+                    return work()
+                except DamagedTapError as error:
+                    self._leave_out(error)
+                    forget()
+        finally:
+            self._works = False
+
+    def add(self, entry: TapEntry) -> bool:
+        """A tap test that was just committed: whether it is newer than all, and all others are as they were.
+
+        Where anybody else has written since, all is looked at again.
+        """
+        if self._contents is None or self._folder.journal.length != self._contents.lines + 1:
+            self.forget()
+            return False
+        self._contents = self._contents.with_one_more(entry)
+        if self._order is None or self._contents.taps[-1] is not entry:
+            self._order = None
+            return False
+        self._order.add(entry)
+        return True
+
+    def forget(self) -> None:
+        """Look again."""
+        self._contents = self._order = None
+
+    def _leave_out(self, error: DamagedTapError) -> None:
+        if error.entry.id in self._left_out:
+            raise error
+        self._left_out[error.entry.id] = error.entry, error.remark
+        self._order = None
+
+    @property
+    def _all(self) -> Contents:
+        if self._contents is None:
+            self._contents = self._folder.contents()
+        return self._contents
+
+
+def _series(entry: TapEntry) -> tuple[str, str]:
+    return entry.tool, entry.direction
+
+
+def _time(entry: TapEntry) -> datetime:
+    return datetime.fromisoformat(entry.time)

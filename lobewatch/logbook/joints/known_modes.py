@@ -1,0 +1,150 @@
+"""A model fitted to the modes of several tap tests, which are looked for in it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from dsm import (
+    Spindle,
+    StiffnessFit,
+    StiffnessFitError,
+    UnreachableFrequencyError,
+    calibrate,
+    fit_stiffness,
+    modes_at,
+)
+from lobewatch.logbook.joints.groupings import Grouping, grouping_for, start_factors
+from lobewatch.logbook.joints.matching import Match, match
+from lobewatch.logbook.joints.tapped_tools import TappedTool
+
+MODES = 8
+"""Modes of the model that are compared."""
+GRID = np.geomspace(0.1, 10.0, 9)
+"""Factors on either stiffness of the joints that are tried."""
+TRIED = 2
+"""Most numberings of the modes that are fitted to."""
+ROUNDS = 2
+"""Most times that modes are looked for anew in the model that was fitted to them."""
+
+
+class Start(NamedTuple):
+    """Factors to begin with, and the modes that are found with them."""
+
+    cost: float
+    """How far all modes are from the model."""
+    bearings: float
+    """Factor on the bearings."""
+    radial: float
+    """Factor on the radial stiffness of joints."""
+    tilting: float
+    """Factor on their stiffness against tilting."""
+    matches: tuple[Match, ...]
+    """One a tap test."""
+
+
+@dataclass(frozen=True, eq=False)
+class KnownModes:
+    """Modes of tap tests by their number in the model, and the model fitted to them."""
+
+    taps: Sequence[TappedTool]
+    """The tap tests."""
+    matches: tuple[Match, ...]
+    """One a tap test."""
+    grouping: Grouping
+    """Which parts share a factor."""
+    fit: StiffnessFit
+    """The model."""
+
+
+def known_modes(taps: Sequence[TappedTool], position: float) -> KnownModes:
+    """The modes followed, and of those around them what the model has nearby, in its order and about as stiff.
+
+    position: where all were tapped, from the tool tip (m). For joints from a tenth to ten times as stiff as given, the
+    mode followed of the first tool sets the bearings, and the other modes are numbered where they fit best. Then the
+    model is fitted to all of them, and they are looked for in it anew. Raises what dsm.fit_stiffness raises.
+    """
+    starts = _distinct(sorted(_starts(taps, position), key=lambda start: start.cost))
+    if not starts:
+        return _fitted(taps, Start(0.0, 1.0, 1.0, 1.0, tuple(Match(0.0, ((t.number, t.followed),)) for t in taps)))
+    found = None
+    for start in starts[:TRIED]:
+        with suppress(StiffnessFitError, UnreachableFrequencyError):
+            now = _settled(taps, start, position)
+            found = now if found is None or (found.fit.misfits and not now.fit.misfits) else found
+        if found is not None and not found.fit.misfits:
+            break
+    return found or _fitted(taps, starts[0])
+
+
+def _starts(taps: Sequence[TappedTool], position: float) -> Iterator[Start]:
+    first = taps[0]
+    for radial, tilting in product(GRID.tolist(), GRID.tolist()):
+        with suppress(ValueError, ArithmeticError):
+            stiffer = [_with_joints(tap.spindle, radial, tilting) for tap in taps]
+            factor = calibrate(stiffer[0], first.followed.frequency, mode=first.number).factor
+            matches = _matches(taps, [_with_bearings(one, factor) for one in stiffer], position)
+            yield Start(sum(one.cost for one in matches), factor, radial, tilting, matches)
+
+
+def _distinct(starts: Sequence[Start]) -> list[Start]:
+    """The best of each numbering."""
+    return list({str(_numbers(start.matches)): start for start in reversed(starts)}.values())[::-1]
+
+
+def _with_joints(spindle: Spindle, radial: float, tilting: float) -> Spindle:
+    joints = [
+        replace(one, stiffness=radial * one.stiffness, rotational_stiffness=tilting * one.rotational_stiffness)
+        if one.group
+        else one
+        for one in spindle.joints
+    ]
+    return replace(spindle, joints=joints)
+
+
+def _with_bearings(spindle: Spindle, factor: float) -> Spindle:
+    bearings = [replace(one, stiffness=factor * one.stiffness) if one.group else one for one in spindle.bearings]
+    return replace(spindle, bearings=bearings)
+
+
+def _settled(taps: Sequence[TappedTool], start: Start, position: float) -> KnownModes:
+    """Fitted and looked for anew, until the same modes are found."""
+    found = _fitted(taps, start)
+    for _ in range(ROUNDS):
+        matches = _matches(taps, found.fit.spindles, position)
+        if _numbers(matches) == _numbers(found.matches):
+            break
+        found = _fitted(taps, start._replace(matches=matches))
+    return found
+
+
+def _matches(taps: Sequence[TappedTool], spindles: Sequence[Spindle], position: float) -> tuple[Match, ...]:
+    found = []
+    for tap, spindle in zip(taps, spindles, strict=True):
+        frequency, stiffness = modes_at(spindle, max(MODES, tap.number), position)
+        found.append(match(tap, frequency.tolist(), stiffness.tolist()))
+    return tuple(found)
+
+
+def _numbers(matches: Sequence[Match]) -> list[list[tuple[int, float]]]:
+    return [[(number, mode.frequency) for number, mode in one.modes] for one in matches]
+
+
+def _fitted(taps: Sequence[TappedTool], start: Start) -> KnownModes:
+    every = [(tap, number, mode) for tap, one in enumerate(start.matches) for number, mode in one.modes]
+    grouping = grouping_for(taps[0].spindle, len(every))
+    spindles = [grouping(tap.spindle) for tap in taps]
+    fit = fit_stiffness(
+        spindles,
+        [mode.frequency for _, _, mode in every],
+        [taps[tap].std(mode) for tap, _, mode in every],
+        [number for _, number, _ in every],
+        shaft=[tap for tap, _, _ in every],
+        start=start_factors(spindles[0], start.bearings, start.radial, start.tilting),
+    )
+    return KnownModes(taps, start.matches, grouping, fit)

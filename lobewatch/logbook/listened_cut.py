@@ -1,0 +1,100 @@
+"""A recording of a cut of a machine, listened to: what is written down of it, and what was to be expected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import numpy as np
+
+from acquisition import DataError
+from acquisition.files.cut_file import CutSignal
+from lobewatch.cuts.listening.expected_sound import Predicted, predicted
+from lobewatch.cuts.listening.folded import modulo
+from lobewatch.cuts.listening.listen_to import Heard, Listened, listen_to
+from lobewatch.history.assembling import or_reason
+from lobewatch.logbook.logbook import Logbook
+from lobewatch.machine.additions.keep_cut import keep_cut, software
+from lobewatch.machine.additions.observe_cut import when_cut
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.journal.heard_cut import HeardCut
+from lobewatch.machine.settings.cut_setting import CutSetting
+from lobewatch.tool.assembly import Assembly
+
+
+@dataclass(frozen=True, eq=False)
+class ListenedCut:
+    """What was heard beside what the tap tests predict."""
+
+    setting: CutSetting
+    """What was cut."""
+    heard: Heard
+    """What it sounds like."""
+    assembly: Assembly | None
+    """The tool as it was tapped; None where it was not and cannot be predicted."""
+    predicted: Predicted | None
+    """By its modes, at the speed that was heard (that was set where none was); None without them."""
+
+    @property
+    def tooth_frequency(self) -> float:
+        """Teeth a second at the speed that was heard, else as it was set (Hz)."""
+        return self.setting.cut.teeth * self.speed_rpm / 60
+
+    @property
+    def speed_rpm(self) -> float:
+        """As it was heard; as it was set where it was not."""
+        return self.heard.speed_rpm if np.isfinite(self.heard.speed_rpm) else self.setting.speed_rpm
+
+    @property
+    def lobe(self) -> int | None:
+        """Whole waves of chatter between two teeth; None without chatter."""
+        chatter = self.heard.chatter
+        return None if chatter is None else int(chatter.frequency / self.tooth_frequency)
+
+    @property
+    def apart(self) -> float | None:
+        """Chatter heard from chatter predicted, modulo tooth passing (Hz); None where one of them is not known."""
+        if self.heard.chatter is None or self.predicted is None:
+            return None
+        return float(modulo(self.predicted.frequency, self.heard.chatter.frequency, self.tooth_frequency))
+
+    def as_heard(self, at: datetime) -> HeardCut:
+        """To be written down; at: when it was cut (UTC)."""
+        chatter = self.heard.chatter
+        return HeardCut(
+            "",
+            at,
+            **self.setting.told(),
+            speed_rpm=self.speed_rpm,
+            word=self.heard.word,
+            chatter_frequency_hz=None if chatter is None else chatter.frequency,
+            chatter_frequency_std_hz=None if chatter is None else chatter.error,
+            by="accelerometer",
+            software=software(),
+            reason=self.heard.reason,
+        )
+
+
+def listened(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> ListenedCut:
+    """Listen to a recording."""
+    cut = setting.cut
+    what = Listened(
+        signal.acceleration,
+        signal.sample_rate,
+        cut.teeth,
+        cut.immersion,
+        setting.speed_rpm,
+        signal.clipped,
+        signal.lost_scans,
+    )
+    heard = listen_to(what)
+    known = or_reason(lambda: logbook.assembly(setting.tool))
+    assembly = None if isinstance(known, DataError) or not known.directions else known
+    speed = heard.speed_rpm if np.isfinite(heard.speed_rpm) else setting.speed_rpm
+    expected = None if assembly is None else predicted(setting, assembly, speed)
+    return ListenedCut(setting, heard, assembly, expected)
+
+
+def keep_listened(folder: MachineFolder, found: ListenedCut, signal: CutSignal, at: datetime | None) -> HeardCut:
+    """Write down what was heard, with its recording; at: when it was cut, None for now. Saved when this returns."""
+    return keep_cut(folder, found.as_heard(when_cut(at, datetime.now(UTC))), signal)

@@ -1,0 +1,121 @@
+"""What a replay would make of recorded files; nothing is stored."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from acquisition import DataError, Description, Recording, TapTest
+from lobewatch.logbook.logbook import Logbook
+from lobewatch.logbook.replaying.store import HERE, KnownContents, Progress, digests_of
+from lobewatch.logbook.replaying.understand import Asked, Understood, reason_of, understand, understand_file
+from lobewatch.measuring.measurement import Fitted, Measurement, measured
+from lobewatch.measuring.workers.shared import Workers, shared
+from modal import Mode
+
+
+@dataclass(frozen=True, eq=False)
+class Preview:
+    """What would become of one file."""
+
+    file: Path
+    """Where it lies."""
+    known: str = ""
+    """The tap test that it is stored as already."""
+    refused: str = ""
+    """Why it cannot be used, and what to say of it."""
+    recording: Recording | None = None
+    """How it is understood."""
+    tap: TapTest | None = None
+    """The tap test that it would be."""
+    measurement: Measurement | None = None
+    """What that says; its remarks hold the questions that would be asked."""
+
+
+def preview_recordings(
+    logbook: Logbook,
+    files: Sequence[Path],
+    said: Description,
+    progress: Progress = lambda _what, _done, _of: None,
+    workers: Workers = HERE,
+) -> list[Preview]:
+    """One a file, in order of date; those that cannot be used or are stored already first.
+
+    workers: who reads and fits; what they find is the same.
+    """
+    found, fits = list[Preview](), dict[Path, Fitted]()
+    for preview, fit in _read(logbook, files, said, progress, workers):
+        found.append(preview)
+        fits |= {preview.file: fit} if fit is not None else {}
+    found.sort(key=_time)
+    last: dict[tuple[str, str], Mode] = {}
+    previews = list[Preview]()
+    for number, one in enumerate(found, 1):
+        previews.append(one if one.tap is None else _measured(logbook, one, one.tap, fits[one.file], last))
+        progress("measure", number, len(files))
+    return previews
+
+
+def _time(one: Preview) -> float:
+    return one.tap.circumstances.created.timestamp() if one.tap else -math.inf
+
+
+def _read(
+    logbook: Logbook, files: Sequence[Path], said: Description, progress: Progress, workers: Workers
+) -> Iterator[tuple[Preview, Fitted | None]]:
+    """Each content once; in the order of the files."""
+    contents, todo = KnownContents.of(logbook.folder.taps()), dict[str, Path]()
+    digests, unread = digests_of(files)
+    for file, digest in digests.items():
+        if contents.tap_of(digest, said) is None:
+            todo.setdefault(digest, file)
+    results = dict[str, Understood | str]()
+    for digest, found in zip(todo, _all_understood(logbook, [*todo.values()], said, workers), strict=True):
+        results[digest] = found
+        progress("read", len(results), len(todo))
+    for file in files:
+        digest = digests.get(file, "")
+        one = reason_of(file, unread[file]) if file in unread else results.get(digest)
+        if one is None:
+            yield Preview(file, known=contents.tap_of(digest, said) or ""), None
+        elif isinstance(one, str):
+            yield Preview(file, refused=one), None
+        elif todo[digest] != file:
+            yield Preview(file, known=one.tap.id), None
+        else:
+            yield Preview(file, recording=one.recording, tap=one.tap), one.fit
+
+
+def _all_understood(
+    logbook: Logbook, files: Sequence[Path], said: Description, workers: Workers
+) -> Iterator[Understood | str]:
+    """Each file in turn, or why it cannot be used; DataError as `shared`."""
+    if workers.are_elsewhere:
+        toml = logbook.folder.toml.read_text("utf-8")
+        yield from shared(understand, (Asked.of(file, said, toml) for file in files), workers)
+        return
+    for file in files:
+        try:
+            yield understand_file(logbook.folder, file, said)
+        except (DataError, OSError, ValueError) as error:
+            yield reason_of(file, error)
+
+
+def _measured(logbook: Logbook, one: Preview, tap: TapTest, fit: Fitted, last: dict[tuple[str, str], Mode]) -> Preview:
+    """last: the mode followed in the newest file before it of each tool and direction."""
+    series = (tap.circumstances.tool, tap.circumstances.direction)
+    before = last.get(series) or _stored_before(logbook, tap)
+    found = measured(fit, logbook.machine, before)
+    if found.followed is not None:
+        last[series] = found.followed
+    return replace(one, measurement=found)
+
+
+def _stored_before(logbook: Logbook, tap: TapTest) -> Mode | None:
+    """The mode that the newest stored tap test before it of the same series follows."""
+    about = tap.circumstances
+    rows = [row for row in logbook.history.rows if (row.tool, row.direction) == (about.tool, about.direction)]
+    known = [row.mode for row in rows if row.time < about.created and row.mode is not None and not row.questions]
+    return known[-1] if known else None

@@ -1,0 +1,103 @@
+"""history.rows anew from the tap tests, with the word on every program after each of them."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from pathlib import Path
+
+from acquisition import DataError, read_tap
+from lobewatch.history.assembling import or_reason
+from lobewatch.logbook.logbook import Logbook
+from lobewatch.machine import Machine, TapEntry
+from lobewatch.machine.contents import fault_of
+from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.measuring.measurement import Fitted, fitted
+from lobewatch.measuring.workers.shared import Workers, shared
+from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.verdict import Verdict, judge
+
+Progress = Callable[[int, int], None]
+"""Told how many tap tests are done, and of how many."""
+
+
+@dataclass(frozen=True)
+class TapBytes:
+    """One tap file; empty where it is damaged."""
+
+    content: bytes
+    """All of it."""
+    machine_toml: str
+    """The machine as it is now."""
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What the word on each program was after a tap test."""
+
+    known: Mapping[str, Assembly | DataError]
+    """The tools as they were known then."""
+    machine_toml: str
+    """The machine as it is now."""
+
+
+def rebuild_history(logbook: Logbook, workers: Workers, progress: Progress = lambda _done, _of: None) -> int:
+    """Write it anew and say how many rows it has; equal bit by bit whoever works."""
+    logbook.folder.history.unlink(missing_ok=True)
+    toml = logbook.folder.toml.read_text("utf-8")
+    if workers.are_elsewhere:
+        entries = [place.entry for place in logbook.files.places]
+        fits = shared(modes_of, (_content(logbook, entry, toml) for entry in entries), workers)
+        logbook.fits |= {entry.id: fit for entry, fit in zip(entries, fits, strict=True) if fit is not None}
+    tap_ids = [row.tap_id for row in logbook.history.rows]
+    for number, (tap_id, verdicts) in enumerate(_all_judged(logbook, tap_ids, toml, workers), 1):
+        logbook.judged.setdefault(tap_id, verdicts)
+        logbook.rulings(tap_id)
+        logbook.judged.pop(tap_id, None)
+        progress(number, len(tap_ids))
+    return len(tap_ids)
+
+
+def _all_judged(
+    logbook: Logbook, tap_ids: list[str], toml: str, workers: Workers
+) -> Iterator[tuple[str, dict[str, Verdict]]]:
+    """The verdicts after each tap test, as far as others work them out."""
+    if not workers.are_elsewhere:
+        yield from ((tap_id, {}) for tap_id in tap_ids)
+        return
+    questions = (_question(logbook, tap_id, toml) for tap_id in tap_ids)
+    yield from zip(tap_ids, shared(verdicts_on, questions, workers), strict=True)
+
+
+def _content(logbook: Logbook, entry: TapEntry, toml: str) -> TapBytes:
+    sound = not fault_of(logbook.folder.path, entry)
+    return TapBytes((logbook.folder.path / entry.file).read_bytes() if sound else b"", toml)
+
+
+def _question(logbook: Logbook, tap_id: str, toml: str) -> Question:
+    tools = dict.fromkeys(program.tool for program in logbook.machine.program)
+    return Question({tool: or_reason(partial(logbook.assembly, tool, tap_id)) for tool in tools}, toml)
+
+
+def modes_of(tap: TapBytes) -> Fitted | None:
+    """The modes in a tap file; None where it cannot be read."""
+    with tempfile.TemporaryDirectory(prefix="lobewatch-") as work:
+        path = Path(work) / "tap.h5"
+        path.write_bytes(tap.content)
+        try:
+            return fitted(read_tap(path), _machine(tap.machine_toml))
+        except DataError:
+            return None
+
+
+def verdicts_on(question: Question) -> dict[str, Verdict]:
+    """On all programs, by their names."""
+    machine = _machine(question.machine_toml)
+    return {table.name: judge(table, question.known[table.tool], machine) for table in machine.program}
+
+
+@lru_cache(maxsize=4)
+def _machine(toml: str) -> Machine:
+    return parse_machine(toml)

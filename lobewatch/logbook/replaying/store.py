@@ -1,0 +1,156 @@
+"""Recorded files stored as tap tests of a machine, each once."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from acquisition import DataError, Description, TapTest
+from lobewatch.logbook.replaying.prepare import Prepared, all_prepared, prepared, remove_leftovers
+from lobewatch.logbook.replaying.understand import reason_of
+from lobewatch.machine import MachineFolder, TapEntry
+from lobewatch.measuring.measurement import Fitted
+from lobewatch.measuring.workers.shared import Workers
+
+Progress = Callable[[str, int, int], None]
+"""Told what is done ("read", "store"), how many of it are, and of how many."""
+
+HERE = Workers()
+
+
+@dataclass(frozen=True)
+class Stored:
+    """What came of some recorded files."""
+
+    tap_ids: Sequence[str]
+    """The tap test of each file that was not refused, in the order of the files."""
+    known: Mapping[Path, str]
+    """Files that were stored already, or stand twice among those given, and their tap test."""
+    fresh: Sequence[str]
+    """The tap tests that are new, oldest first."""
+    refused: Mapping[Path, str] = field(default_factory=dict)
+    """Files that cannot be used, and why."""
+    taken: Sequence[str] = ()
+    """What was taken for granted where files do not say it, each once."""
+    fits: Mapping[str, Fitted] = field(default_factory=dict)
+    """The modes of the new tap tests, by identity."""
+
+
+@dataclass
+class KnownContents:
+    """Which contents are stored already, and as which tap test."""
+
+    by_digest: dict[str, list[tuple[str, str]]]
+    """SHA-256 -> identities of tap tests and their directions."""
+
+    @classmethod
+    def of(cls, taps: Sequence[TapEntry]) -> KnownContents:
+        """Those of committed tap tests, by their file and by the file that they were replayed from."""
+        found = cls({})
+        for tap in taps:
+            for digest in filter(None, (tap.source_sha256, tap.sha256)):
+                found.by_digest.setdefault(digest, []).append((tap.id, tap.direction))
+        return found
+
+    def tap_of(self, digest: str, said: Description) -> str | None:
+        """The tap test of a content; one of several responses is known only where it is stored in this direction."""
+        for tap_id, direction in self.by_digest.get(digest, ()):
+            if said.response is None or direction == (said.direction or direction):
+                return tap_id
+        return None
+
+    def add(self, digest: str, tap: TapTest) -> None:
+        """A tap test that is going to be stored."""
+        self.by_digest.setdefault(digest, []).append((tap.id, tap.circumstances.direction))
+
+
+def store_recordings(
+    folder: MachineFolder,
+    files: Sequence[Path],
+    said: Description,
+    *,
+    workers: Workers = HERE,
+    keep_going: bool = False,
+    progress: Progress = lambda _what, _done, _of: None,
+) -> Stored:
+    """Commit recorded files, each once, oldest first; all are read and judged before the first one is stored.
+
+    DataError, and nothing is stored, where one cannot be used, with all of these; keep_going: the others are stored.
+    workers: who reads and fits; what they find is the same. To be called under the lock.
+    """
+    remove_leftovers(folder)
+    digests, unread = digests_of(files)
+    if unread and len(files) == 1:
+        raise unread[files[0]]
+    refused = {file: reason_of(file, error) for file, error in unread.items()}
+    contents, todo = KnownContents.of(folder.taps()), dict[str, Path]()
+    ids = {digest: contents.tap_of(digest, said) or "" for digest in digests.values()}
+    for file, digest in digests.items():
+        if not ids[digest]:
+            todo.setdefault(digest, file)
+    try:
+        ready, wrong = _made_ready(folder, todo, said, workers, alone=len(files) == 1, progress=progress)
+        refused |= {file: wrong[digest] for file, digest in digests.items() if digest in wrong}
+        if refused and not (keep_going and len(refused) < len(files)):
+            raise DataError(refusal({file: refused[file] for file in files if file in refused}, len(files)))
+        ready.sort(key=lambda one: one.created)
+        if ready:
+            folder.commit_files({one.temporary: one.entry for one in ready})
+            progress("store", len(ready), len(ready))
+    finally:
+        remove_leftovers(folder)
+    ids |= {one.digest: one.entry.id for one in ready}
+    used = {file: ids[digests[file]] for file in files if file not in refused}
+    known = {file: tap_id for file, tap_id in used.items() if todo.get(digests[file]) != file}
+    taken = dict.fromkeys(text for one in ready for text in one.taken)
+    fits = {one.entry.id: one.fit for one in ready}
+    return Stored([used[file] for file in files if file in used], known, [*fits], refused, list(taken), fits)
+
+
+def digests_of(files: Sequence[Path]) -> tuple[dict[Path, str], dict[Path, OSError]]:
+    """SHA-256 of each file, and what is wrong with those that cannot be read."""
+    found, unread = dict[Path, str](), dict[Path, OSError]()
+    for file in files:
+        try:
+            found[file] = hashlib.sha256(file.read_bytes()).hexdigest()
+        except OSError as error:
+            unread[file] = error
+    return found, unread
+
+
+def _made_ready(
+    folder: MachineFolder,
+    todo: Mapping[str, Path],
+    said: Description,
+    workers: Workers,
+    *,
+    alone: bool,
+    progress: Progress,
+) -> tuple[list[Prepared], dict[str, str]]:
+    """Files by their digests, made ready; by digest why some cannot be used, the error itself where it stands alone."""
+    if alone and not workers.scheduler:
+        return [prepared(folder, file, said) for file in todo.values()], {}
+    ready, wrong = list[Prepared](), dict[str, str]()
+    results = zip(todo, all_prepared(folder, [*todo.values()], said, workers), strict=True)
+    for number, (digest, one) in enumerate(results, 1):
+        if isinstance(one, str):
+            wrong[digest] = one
+        elif one.digest != digest:
+            wrong[digest] = "it changes while it is read; wait until it is written"
+        else:
+            ready.append(one)
+        progress("read", number, len(todo))
+    return ready, wrong
+
+
+def refusal(refused: Mapping[Path, str], n: int, *, stored: bool = False) -> str:
+    """All files that cannot be used, and what can be done; stored: the others are."""
+    lines = [f"{file}: {why}" for file, why in refused.items()]
+    if len(refused) == n:
+        return "\n".join([f"none of the {n} files can be used; nothing is stored", *lines])
+    others = "the others are stored" if stored else "nothing is stored; --keep-going stores the others"
+    if len(lines) == 1:
+        return f"{lines[0]} (1 of {n} files; {others})"
+    return "\n".join([f"{len(refused)} of {n} files cannot be used; {others}", *lines])

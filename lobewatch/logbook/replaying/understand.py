@@ -1,0 +1,134 @@
+"""What one recorded file becomes, worked out from its bytes alone: by this process or by any other, on any computer."""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from datetime import datetime
+from functools import lru_cache
+from pathlib import Path
+from typing import Self, TypeVar
+
+from acquisition import DataError, Description, Recording, TapTest
+from acquisition.files.tap_file import as_written, tap_content
+from lobewatch.logbook.replaying.read_tap_test import Setup, read_tap_test
+from lobewatch.machine import MachineFolder, TapEntry
+from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.measuring.measurement import Fitted, fitted
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, eq=False)
+class Understood:
+    """One file, before anything is made of it."""
+
+    tap: TapTest
+    """The tap test that it would be."""
+    recording: Recording
+    """How it is understood."""
+    fit: Fitted
+    """The modes in it."""
+
+
+@dataclass(frozen=True)
+class WorkedOut:
+    """One file."""
+
+    digest: str
+    """SHA-256 of the file."""
+    content: bytes
+    """Its tap file."""
+    entry: TapEntry
+    """Of that."""
+    created: datetime
+    """When it was recorded."""
+    fit: Fitted
+    """The modes in it."""
+    taken: tuple[str, ...]
+    """What was taken for granted where the file does not say it."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One file, with all that another computer has to know of it."""
+
+    file: Path
+    """Where it lies, from the root on."""
+    content: bytes
+    """All of it."""
+    said: Description
+    """What a person says of it."""
+    machine_toml: str
+    """The machine that it is of."""
+    fault: str = ""
+    """Why it cannot be read."""
+
+    @classmethod
+    def of(cls, file: Path, said: Description, machine_toml: str) -> Self:
+        """Read now."""
+        try:
+            return cls(file.absolute(), file.read_bytes(), said, machine_toml)
+        except OSError as error:
+            return cls(file.absolute(), b"", said, machine_toml, reason_of(file, error))
+
+
+def work_out_file(folder: MachineFolder, file: Path, said: Description) -> WorkedOut:
+    """A file where it lies; DataError, OSError or ValueError where it cannot be used."""
+    return _worked_out(Setup.of(folder), file, said, file.read_bytes(), file)
+
+
+def work_out(asked: Asked) -> WorkedOut | str:
+    """A file from its bytes, or why it cannot be used."""
+    return _from_bytes(asked, _worked_out)
+
+
+def understand_file(folder: MachineFolder, file: Path, said: Description) -> Understood:
+    """As `work_out_file`, and no tap file is made."""
+    return _understood(Setup.of(folder), file, said, file.read_bytes(), file)
+
+
+def understand(asked: Asked) -> Understood | str:
+    """As `work_out`, and no tap file is made."""
+    return _from_bytes(asked, _understood)
+
+
+def _from_bytes(asked: Asked, work: Callable[[Setup, Path, Description, bytes, Path], Result]) -> Result | str:
+    if asked.fault:
+        return asked.fault
+    with tempfile.TemporaryDirectory(prefix="lobewatch-") as folder:
+        at = Path(folder) / asked.file.name
+        at.write_bytes(asked.content)
+        try:
+            return work(_setup(asked.machine_toml), asked.file, asked.said, asked.content, at)
+        except (DataError, OSError, ValueError) as error:
+            return reason_of(at, error).replace(str(at), str(asked.file)).removeprefix(f"{asked.file}: ")
+
+
+def reason_of(file: Path, error: Exception) -> str:
+    """An error about a file, without its name."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return str(error).removeprefix(f"{file}: ")
+
+
+def _worked_out(setup: Setup, file: Path, said: Description, content: bytes, at: Path) -> WorkedOut:
+    """at: where the content lies."""
+    found = _understood(setup, file, said, content, at)
+    told = tuple(f"{fact.name} {fact.value}" for fact in found.recording.facts if fact.origin == "default")
+    packed, created = tap_content(found.tap), found.tap.circumstances.created
+    digest = hashlib.sha256(content).hexdigest()
+    return WorkedOut(digest, packed, TapEntry.of(found.tap, packed), created, found.fit, told)
+
+
+def _understood(setup: Setup, file: Path, said: Description, content: bytes, at: Path) -> Understood:
+    tap, recording = read_tap_test(setup, file, said, content, at)
+    return Understood(tap, replace(recording, path=file), fitted(as_written(tap), setup.machine))
+
+
+@lru_cache(maxsize=4)
+def _setup(machine_toml: str) -> Setup:
+    """Read once in a process."""
+    return Setup(parse_machine(machine_toml), machine_toml)

@@ -1,0 +1,70 @@
+"""Tap files that no journal vouches for: read where damage can do no harm.
+
+A file with a seal that fits is read here. HDF5 may crash or hang on any other that is damaged, so that is read by a
+program of its own, which is ended after a while.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from acquisition import read_tap, read_tap_hits
+from acquisition.files.seal import is_broken, is_sealed
+from lobewatch.machine.journal.tap_entry import TapEntry
+
+PATIENCE = 60.0
+"""Time that reading one file may take (s)."""
+
+
+def read_doubtful(path: Path) -> TapEntry | None:
+    """The tap test in a file; None where it is no whole one."""
+    content = path.read_bytes()
+    if is_broken(content):
+        return None
+    return _read(path) if is_sealed(content) else _read_apart(path)
+
+
+def _read(path: Path) -> TapEntry | None:
+    try:
+        return TapEntry.of(read_tap(path), path.read_bytes())
+    except (ValueError, KeyError, TypeError, RuntimeError, OSError):
+        return None
+
+
+def has_whole_hits(path: Path) -> bool:
+    """Whether the hits of a file without a seal can be read."""
+    return not is_broken(path.read_bytes()) and _asked_apart("hits", path) is not None
+
+
+def _read_apart(path: Path) -> TapEntry | None:
+    line = _asked_apart("tap", path)
+    return None if line is None else TapEntry.from_line(line)
+
+
+def _asked_apart(what: str, path: Path) -> dict[str, Any] | None:
+    command = [sys.executable, "-m", __name__, what, str(path)]
+    try:
+        said = subprocess.run(command, capture_output=True, timeout=PATIENCE, check=True)
+        found: dict[str, Any] | None = json.loads(said.stdout)
+        return found
+    except (subprocess.SubprocessError, ValueError):
+        return None
+
+
+def main() -> None:
+    """Print as JSON what is in the file that is named: of a "tap" its line, of "hits" that they can be read."""
+    _, what, name = sys.argv
+    if what == "hits":
+        read_tap_hits(name)
+        sys.stdout.write("{}")
+        return
+    found = _read(Path(name))
+    sys.stdout.write("null" if found is None else json.dumps(found.line))
+
+
+if __name__ == "__main__":
+    main()

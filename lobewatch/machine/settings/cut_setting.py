@@ -1,0 +1,103 @@
+"""What was cut, as machine.toml knows it: a program or the reference cut, at a speed and a depth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from lobes import Cut
+from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
+from lobewatch.machine.settings.machine_file import REFERENCE_CUT, Machine
+
+Table = TypeVar("Table", bound=CutTable)
+
+
+@dataclass(frozen=True)
+class CutSetting:
+    """A cut that is about to be heard."""
+
+    table: CutTable
+    """Of machine.toml."""
+    program: str | None
+    """Name of the program; None for the reference cut."""
+    tool: str
+    """In the spindle."""
+    cut: Cut
+    """In SI units, the feed along x."""
+    feed: str
+    """"x", "y" or "both"."""
+    speed_rpm: float
+    """As it is set."""
+    depth: float
+    """m."""
+
+    @property
+    def tooth_frequency(self) -> float:
+        """Teeth a second (Hz)."""
+        return self.cut.teeth * self.speed_rpm / 60
+
+    def told(self) -> dict[str, Any]:
+        """Those fields of a `HeardCut` that follow from it."""
+        feed = self.table.feed_per_tooth_mm
+        return {
+            "program": self.program,
+            "tool": self.tool,
+            "cut": self.cut,
+            "coefficients": self.table.material or "",
+            "feed": self.feed,
+            "feed_per_tooth": None if feed is None else feed / 1e3,
+            "commanded_rpm": self.speed_rpm,
+            "depth": self.depth,
+        }
+
+
+def cut_setting(machine: Machine, program: str, speed_rpm: float | None, depth_mm: float | None) -> CutSetting:
+    """A program or "reference cut" at a speed and a depth; None: those of the program.
+
+    ValueError for a name, speed or depth that is none.
+    """
+    table = _table(machine, program)
+    for option, value, unit in (("--speed", speed_rpm, "rpm"), ("--depth", depth_mm, "mm")):
+        if value is not None and not (math.isfinite(value) and value > 0):
+            raise ValueError(f"{option} {value:g}: is not above 0; give the {option[2:]} that was cut with, in {unit}")
+    own = table if isinstance(table, ProgramTable) else None
+    speed = own.speed_rpm if speed_rpm is None and own is not None else speed_rpm
+    depth = own.depth_mm if depth_mm is None and own is not None else depth_mm
+    if speed is None or depth is None:
+        missing = "--speed" if speed is None else "--depth"
+        raise ValueError(f"{missing} is missing: the {REFERENCE_CUT} has none of its own; give what was cut with")
+    if table.flute_length_mm is not None and depth > table.flute_length_mm:
+        raise ValueError(f"--depth {depth:g} mm is deeper than flute_length_mm={table.flute_length_mm:g}")
+    tool, feed = (own.tool, own.feed) if own else (machine.tap.tool, "both")
+    name = own.name if own else None
+    return CutSetting(table, name, tool, machine.build_cut(table), feed, float(speed), depth / 1e3)
+
+
+def chosen_cut(machine: Machine, program: str, cut: str, speed_rpm: float | None, depth_mm: float | None) -> CutSetting:
+    """A program, or in its place a cut with speed and depth of its own; ValueError where it is not one of both."""
+    if bool(program) == bool(cut):
+        known = ", ".join(map(repr, machine.cut_names)) or "none: add a [[program]] to machine.toml"
+        raise ValueError(
+            f"{'both' if cut else 'neither'} of --program and --cut: say which cut it is; there are {known}"
+        )
+    if cut and (speed_rpm is None or depth_mm is None):
+        missing = "--speed" if speed_rpm is None else "--depth"
+        raise ValueError(f"--cut {cut}: {missing} is missing; give speed and depth, or --program with those of its own")
+    return cut_setting(machine, program or cut, speed_rpm, depth_mm)
+
+
+def _table(machine: Machine, name: str) -> CutTable:
+    tables: dict[str, CutTable] = {REFERENCE_CUT: machine.reference_cut} if machine.reference_cut else {}
+    return named(tables | {table.name: table for table in machine.program}, name)
+
+
+def named(tables: Mapping[str, Table], name: str) -> Table:
+    """The one of this name, or the only one whose name begins so; ValueError where there is none, or are several."""
+    fitting = [one for one in tables if one == name] or [one for one in tables if one.startswith(name)]
+    if len(fitting) != 1:
+        known = ", ".join(map(repr, fitting or tables)) or "none: add a [[program]] to machine.toml"
+        why = "may be several: say more of its name" if fitting else "is not in machine.toml"
+        raise ValueError(f"program {name!r} {why}; there are {known}")
+    return tables[fitting[0]]

@@ -1,0 +1,88 @@
+"""Tables of machine.toml about the data acquisition: the device and, where it does not know them, its sensors."""
+
+from __future__ import annotations
+
+from datetime import date
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from acquisition import (
+    STANDARD_GRAVITY,
+    Channel,
+    DeviceSettings,
+    SensorInput,
+    TapDirection,
+    check_settings,
+    find_driver,
+)
+from lobewatch.machine.settings.toml_table import Positive, Table
+
+Sensitivity = Annotated[float, Meta(ge=-1e6, le=1e6)]
+"""Of either sign: an accelerometer may be mounted the other way round."""
+
+
+class ChannelTable(Table, frozen=True):
+    """[[daq.channel]]: a sensor on an input of a device that does not describe its sensors."""
+
+    input: Annotated[int, Meta(ge=0)]
+    quantity: Literal["force", "acceleration"]
+    range_v: Positive
+    sensitivity_mv_per_n: Sensitivity | None = None
+    sensitivity_mv_per_g: Sensitivity | None = None
+    gain: Positive = 1.0
+    direction: TapDirection | Literal[""] = ""
+    serial_number: str = ""
+    calibration_date: date | None = None
+    skew_us: Annotated[float, Meta(ge=-1e6, le=1e6)] = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse a sensitivity that is missing, stands twice, is zero, or belongs to another quantity."""
+        key = "sensitivity_mv_per_n" if self.quantity == "force" else "sensitivity_mv_per_g"
+        if (self.sensitivity_mv_per_n is None) == (self.sensitivity_mv_per_g is None):
+            raise ValueError("give exactly one of sensitivity_mv_per_n (force) and sensitivity_mv_per_g (acceleration)")
+        value = self.sensitivity_mv_per_n if self.quantity == "force" else self.sensitivity_mv_per_g
+        if value is None:
+            raise ValueError(f"quantity={self.quantity!r} needs {key}, not the other sensitivity")
+        if value == 0:
+            raise ValueError(f"{key}=0 is not the sensitivity of any sensor; take it from its calibration sheet")
+
+    def build(self) -> SensorInput:
+        """The input in SI units: volts at the device per N or per m/s^2."""
+        if self.sensitivity_mv_per_n is not None:
+            sensitivity = self.sensitivity_mv_per_n / 1e3
+        else:
+            sensitivity = (self.sensitivity_mv_per_g or 0.0) / 1e3 / STANDARD_GRAVITY
+        channel = Channel(
+            self.quantity,
+            sensitivity * self.gain,
+            self.range_v,
+            direction=self.direction,
+            serial_number=self.serial_number,
+            calibration_date=self.calibration_date.isoformat() if self.calibration_date else "",
+            skew=self.skew_us / 1e6,
+        )
+        return SensorInput(self.input, channel)
+
+
+class Daq(Table, frozen=True):
+    """[daq]: the port is remembered here by hand, never written by the program."""
+
+    port: str = ""
+    driver: str = "taps"
+    sample_rate_hz: Positive | None = None
+    loss_detection: bool = True
+    digital_clock: bool = False
+    accept_measured_rate: bool = False
+    calibration_interval_months: Positive = 12.0
+    channel: tuple[ChannelTable, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse a driver that is not known, and what it does not take."""
+        check_settings(find_driver(self.driver), self.settings)
+
+    @property
+    def settings(self) -> DeviceSettings:
+        """What is asked of the device, in SI units."""
+        inputs = tuple(channel.build() for channel in self.channel)
+        return DeviceSettings(self.sample_rate_hz, inputs, self.loss_detection, self.digital_clock)

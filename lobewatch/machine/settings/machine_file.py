@@ -1,0 +1,204 @@
+"""machine.toml: what is known of one machine, hand-editable, in the units of the shop (each key names its own)."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import math
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from acquisition import DataError
+from dsm import Spindle
+from lobes import Coefficients, Cut, cutting_coefficients
+from lobewatch.machine.settings.cut_tables import FEED_ANGLES, CutTable, Drive, MaterialTable, ProgramTable
+from lobewatch.machine.settings.daq_tables import ChannelTable, Daq
+from lobewatch.machine.settings.doubt_table import DoubtTable
+from lobewatch.machine.settings.messages import comma_hint, readable
+from lobewatch.machine.settings.notify_table import NotifyTable
+from lobewatch.machine.settings.setup_tables import Identity, Limits, ModeChoice, SpeedRange, TapSetup
+from lobewatch.machine.settings.spindle_tables import (
+    BearingTable,
+    JointTable,
+    MassTable,
+    SegmentTable,
+    SpindleTable,
+    ToolTable,
+)
+from lobewatch.machine.settings.toml_table import Table, check_texts
+
+REFERENCE_CUT = "reference cut"
+
+
+class Machine(Table, frozen=True):
+    """All of machine.toml."""
+
+    machine: Identity
+    tap: TapSetup = TapSetup()
+    daq: Daq = Daq()
+    mode: ModeChoice = ModeChoice()
+    limits: Limits = Limits()
+    speed: SpeedRange = SpeedRange()
+    drive: Drive = Drive()
+    doubt: DoubtTable = DoubtTable()
+    notify: NotifyTable = NotifyTable()
+    material: tuple[MaterialTable, ...] = ()
+    reference_cut: CutTable | None = None
+    program: tuple[ProgramTable, ...] = ()
+    spindle: SpindleTable | None = None
+    tool: tuple[ToolTable, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Refuse programs and tools that cannot be told apart, and what lies outside the speed range."""
+        self._check_tools()
+        names = [program.name for program in self.program]
+        for i, program in enumerate(self.program, 1):
+            if program.name in (*names[: i - 1], REFERENCE_CUT):
+                raise ValueError(f"program {i}: name={program.name!r} stands twice; give each program its own")
+            if not self.speed.low_rpm <= program.speed_rpm <= self.speed.high_rpm:
+                raise ValueError(
+                    f"program {i}: speed_rpm={program.speed_rpm:g} is outside [speed] "
+                    f"{self.speed.low_rpm:g}..{self.speed.high_rpm:g} rpm"
+                )
+        names = [material.name for material in self.material]
+        for i, name in enumerate(names, 1):
+            if name in names[: i - 1]:
+                raise ValueError(f"material {i}: name={name!r} stands twice; give each its own")
+        for table in (*([self.reference_cut] if self.reference_cut else []), *self.program):
+            self.coefficients(table)
+
+    def coefficients(self, table: CutTable) -> Coefficients:
+        """Cutting coefficients of a cut: its own, or those of its material; ValueError for one that is not known."""
+        if table.material is None:
+            tangential, radial = (1e6 * (k or 0) for k in (table.tangential_n_per_mm2, table.radial_n_per_mm2))
+            return Coefficients("", tangential, radial, source="machine.toml")
+        known = {one.material: one for one in cutting_coefficients()} | {one.name: one.build() for one in self.material}
+        if table.material not in known:
+            near = difflib.get_close_matches(table.material, known, n=1, cutoff=0.0)[0]
+            raise ValueError(f"material={table.material!r} is not known; is {near!r} meant? Or add a [[material]]")
+        return known[table.material]
+
+    def build_cut(self, table: CutTable) -> Cut:
+        """A cut in SI units."""
+        coefficients, diameter = self.coefficients(table), table.tool_diameter_mm / 1e3
+        return Cut(
+            teeth=table.teeth,
+            immersion=table.radial_depth_mm / table.tool_diameter_mm,
+            direction=table.direction,
+            tangential=coefficients.tangential,
+            radial=coefficients.radial,
+            helix_lag=2 * math.tan(math.radians(table.helix_deg)) / diameter,
+        )
+
+    def _check_tools(self) -> None:
+        taken = [self.tap.tool]
+        for i, tool in enumerate(self.tool, 1):
+            if tool.name in taken:
+                raise ValueError(f"tool {i}: name={tool.name!r} stands twice ([tap] tool counts); give each its own")
+            taken.append(tool.name)
+            if self.spindle is None or self.spindle.tool_length_mm is None:
+                raise ValueError(
+                    f"tool {i}: needs [spindle] tool_length_mm, the part of the shaft that is {self.tap.tool!r}"
+                )
+            try:
+                self.model(tool.name)
+            except ValueError as error:
+                raise ValueError(f"tool {i}: {error} (here in SI units)") from error
+        length = self.spindle.build().length * 1e3 if self.spindle else math.inf
+        if self.tap.position_mm > length:
+            raise ValueError(f"tap: position_mm={self.tap.position_mm:g} is off the shaft, 0 to {length:g} mm")
+
+    def model(self, tool: str) -> Spindle:
+        """The spindle with a tool in it, in SI units; DataError where there is no model of it."""
+        if self.spindle is None:
+            raise DataError("no model: add a [spindle] table (lobewatch init FOLDER --example shows one)")
+        spindle = self.spindle.build()
+        if tool == self.tap.tool:
+            return spindle
+        return self.tool_named(tool).put_into(spindle, self.spindle.tool_length_mm or 0.0)
+
+    def tool_named(self, name: str) -> ToolTable:
+        """A [[tool]]; DataError where there is none of this name."""
+        for tool in self.tool:
+            if tool.name == name:
+                return tool
+        known = ", ".join(repr(known) for known in [self.tap.tool, *(tool.name for tool in self.tool)])
+        raise DataError(f"tool {name!r} has no model; modelled are {known}: add a [[tool]] table")
+
+    def cuts(self, tool: str) -> dict[str, tuple[Cut, ...]]:
+        """The reference cut and the programs that run with a tool, by name, fed along x, y or both."""
+        tables = {REFERENCE_CUT: self.reference_cut} if self.reference_cut else {}
+        tables |= {program.name: program for program in self.program if program.tool == tool}
+        return {
+            name: tuple(replace(self.build_cut(table), feed_angle=FEED_ANGLES[feed]) for feed in table.feeds)
+            for name, table in tables.items()
+        }
+
+    @property
+    def cut_names(self) -> list[str]:
+        """The reference cut and all programs, whatever their tool."""
+        return [*([REFERENCE_CUT] if self.reference_cut else []), *(program.name for program in self.program)]
+
+    @property
+    def settings_hash(self) -> str:
+        """SHA-256 of all that decides what follows from a tap test but for the words on programs."""
+        return _hash(
+            "questions, K against the model", self.mode, self.spindle, self.tool, self.tap.tool, self.tap.position_mm
+        )
+
+    @property
+    def program_hashes(self) -> dict[str, str]:
+        """SHA-256 of all that decides the word on a program beside `settings_hash`, by its name."""
+        return {
+            one.name: _hash("four words over the doubt", one, self.coefficients(one), self.doubt)
+            for one in self.program
+        }
+
+
+def _hash(*settings: object) -> str:
+    return hashlib.sha256(msgspec.json.encode(settings)).hexdigest()
+
+
+def read_machine(path: Path) -> Machine:
+    """The machine file; DataError with the place for what is wrong in it."""
+    try:
+        return parse_machine(path.read_text(encoding="utf-8"), str(path))
+    except UnicodeDecodeError as error:
+        raise DataError(f"{path}: no UTF-8 text at byte {error.start}; save it as UTF-8") from error
+
+
+def parse_machine(text: str, name: str = "machine.toml") -> Machine:
+    """The machine file from its text; DataError with the place for what is wrong in it."""
+    tables: dict[str, Any] = {}
+    try:
+        tables = tomllib.loads(text)
+        check_texts(tables)
+        return msgspec.convert(tables, Machine)
+    except tomllib.TOMLDecodeError as error:
+        raise DataError(f"{name}: {error}{comma_hint(text)}") from error
+    except msgspec.ValidationError as error:
+        raise DataError(f"{name}: {readable(str(error), tables, _known_keys())}") from error
+    except ValueError as error:
+        raise DataError(f"{name}: {error}") from error
+
+
+def _known_keys() -> set[str]:
+    tables = [
+        Machine,
+        Identity,
+        TapSetup,
+        Daq,
+        ChannelTable,
+        ModeChoice,
+        Limits,
+        SpeedRange,
+        Drive,
+        DoubtTable,
+        NotifyTable,
+    ]
+    tables += [MaterialTable, ProgramTable, SpindleTable, SegmentTable, BearingTable, MassTable, JointTable, ToolTable]
+    return {field for table in tables for field in table.__struct_fields__}

@@ -1,0 +1,72 @@
+"""Tables of machine.toml about the machine itself: name, how it is tapped, what is followed, from when it alarms."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from acquisition import Conditions
+from lobewatch.machine.settings.toml_table import NotNegative, Positive, Table
+
+
+class Identity(Table, frozen=True):
+    """[machine]."""
+
+    name: Annotated[str, Meta(min_length=1)]
+    tap_interval_days: Positive = 30.0
+
+
+class TapSetup(Table, frozen=True):
+    """[tap]: how the tap test is done; record_s and trigger_n that are not given are chosen by trial hits."""
+
+    tool: str = "reference"
+    hits: Annotated[int, Meta(ge=3, le=1000)] = 10
+    record_s: Positive | None = None
+    pre_trigger_s: Positive = 0.02
+    trigger_n: Positive | None = None
+    position_mm: NotNegative = 0.0
+    stick_out_mm: float | None = None
+    drawbar_kn: float | None = None
+    state: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse what no spindle has."""
+        self.conditions(self.tool)
+
+    def conditions(self, tool: str) -> Conditions:
+        """What is known of a tap test with a tool; the stick-out of `tool` alone."""
+        stick_out = self.stick_out_mm if tool == self.tool else None
+        return Conditions(stick_out_mm=stick_out, drawbar_kn=self.drawbar_kn, state=self.state)
+
+
+class ModeChoice(Table, frozen=True):
+    """[mode]: which mode is followed."""
+
+    band_hz: tuple[NotNegative, Positive] | None = None
+    model_mode: Annotated[int, Meta(ge=1, le=50)] = 1
+
+    def __post_init__(self) -> None:
+        """Refuse an empty band."""
+        if self.band_hz is not None and not self.band_hz[0] < self.band_hz[1]:
+            raise ValueError(f"band_hz={list(self.band_hz)} does not rise; give [lowest, highest] in Hz")
+
+
+class Limits(Table, frozen=True):
+    """[limits]: fall of the frequency that calls for attention; the defaults are the paper's."""
+
+    frequency_warn_percent: Positive = 5.0
+    frequency_alarm_percent: Positive = 10.0
+
+
+class SpeedRange(Table, frozen=True):
+    """[speed]: the range of the lobe diagrams."""
+
+    low_rpm: Positive = 1000.0
+    high_rpm: Positive = 24000.0
+    steps: Annotated[int, Meta(ge=50, le=100_000)] = 1151
+
+    def __post_init__(self) -> None:
+        """Refuse an empty range."""
+        if not self.low_rpm < self.high_rpm:
+            raise ValueError(f"low_rpm={self.low_rpm:g} is not below high_rpm={self.high_rpm:g}")

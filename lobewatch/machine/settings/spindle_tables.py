@@ -1,0 +1,197 @@
+"""[spindle] and [[tool]] of machine.toml: the model, in the units of a drawing."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Callable, Sequence
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory, change_tool
+from lobewatch.machine.settings.toml_table import NotNegative, Positive, PositiveOrInfinite, Table
+
+
+class SegmentTable(Table, frozen=True):
+    """One of segments."""
+
+    length_mm: Positive
+    outer_mm: Positive
+    bore_mm: NotNegative = 0.0
+    end_outer_mm: Positive | None = None
+    end_bore_mm: NotNegative | None = None
+    mass_outer_mm: Positive | None = None
+    material: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse a bore that leaves no wall, and a material that is not known."""
+        _check_wall(self.bore_mm, self.outer_mm, "bore_mm", "outer_mm")
+        if self.end_outer_mm is not None or self.end_bore_mm is not None:
+            outer = self.outer_mm if self.end_outer_mm is None else self.end_outer_mm
+            bore = self.bore_mm if self.end_bore_mm is None else self.end_bore_mm
+            _check_wall(bore, outer, "end_bore_mm", "end_outer_mm")
+        if self.mass_outer_mm is not None:
+            _check_wall(self.bore_mm, self.mass_outer_mm, "bore_mm", "mass_outer_mm")
+        if self.material and self.material not in MATERIALS:
+            near = difflib.get_close_matches(self.material, MATERIALS, n=1)
+            hint = f"; is {near[0]!r} meant?" if near else ""
+            raise ValueError(f"material={self.material!r} is none of {', '.join(MATERIALS)}{hint}")
+
+    def build(self) -> Segment:
+        """The segment in SI units."""
+        return Segment(
+            self.length_mm / 1e3,
+            self.outer_mm / 1e3,
+            self.bore_mm / 1e3,
+            material=MATERIALS[self.material] if self.material else None,
+            end_outer_diameter=_metres(self.end_outer_mm),
+            end_bore_diameter=_metres(self.end_bore_mm),
+            mass_diameter=_metres(self.mass_outer_mm),
+        )
+
+
+class BearingTable(Table, frozen=True):
+    """One of bearings."""
+
+    position_mm: NotNegative
+    stiffness_n_per_um: PositiveOrInfinite | None = None
+    damping_n_s_per_m: NotNegative = 0.0
+    rotational_stiffness_n_m_per_rad: NotNegative = 0.0
+    housing_stiffness_n_per_um: PositiveOrInfinite = math.inf
+    group: str = "bearings"
+    rolling_elements: Literal["balls", "rollers"] = "balls"
+
+    def build(self, stiffness_n_per_um: float) -> Bearing:
+        """The bearing in SI units; stiffness_n_per_um: where it has none of its own."""
+        stiffness = stiffness_n_per_um if self.stiffness_n_per_um is None else self.stiffness_n_per_um
+        return Bearing(
+            self.position_mm / 1e3,
+            stiffness * 1e6,
+            damping=self.damping_n_s_per_m,
+            rotational_stiffness=self.rotational_stiffness_n_m_per_rad,
+            housing_stiffness=self.housing_stiffness_n_per_um * 1e6,
+            group=self.group,
+            rolling_elements=self.rolling_elements,
+        )
+
+
+class MassTable(Table, frozen=True):
+    """One of masses: a pulley, a balance ring."""
+
+    position_mm: NotNegative
+    mass_kg: NotNegative
+    diametral_inertia_kg_mm2: NotNegative = 0.0
+    polar_inertia_kg_mm2: NotNegative = 0.0
+
+    def build(self) -> LumpedMass:
+        """The mass in SI units."""
+        inertias = self.diametral_inertia_kg_mm2 / 1e6, self.polar_inertia_kg_mm2 / 1e6
+        return LumpedMass(self.position_mm / 1e3, self.mass_kg, *inertias)
+
+
+class JointTable(Table, frozen=True):
+    """One of joints: tool in holder, holder in spindle."""
+
+    position_mm: Positive
+    stiffness_n_per_um: Positive
+    rotational_stiffness_n_m_per_rad: Positive
+    group: str = ""
+
+    def build(self) -> Joint:
+        """The joint in SI units."""
+        stiffness = self.stiffness_n_per_um * 1e6
+        return Joint(self.position_mm / 1e3, stiffness, self.rotational_stiffness_n_m_per_rad, group=self.group)
+
+
+class SpindleTable(Table, frozen=True):
+    """[spindle]: the model; optional."""
+
+    segments: Annotated[list[SegmentTable], Meta(min_length=1)]
+    bearings: Annotated[list[BearingTable], Meta(min_length=1)]
+    bearing_stiffness_n_per_um: Positive
+    masses: tuple[MassTable, ...] = ()
+    joints: tuple[JointTable, ...] = ()
+    theory: Theory = "euler-bernoulli"
+    youngs_modulus_gpa: Positive = 210.0
+    shear_modulus_gpa: Positive | None = None
+    density_kg_per_m3: Positive = 7850.0
+    damping_ratio: Annotated[float, Meta(gt=0, lt=1)] = 0.03
+    tool_length_mm: Positive | None = None
+    label: str = ""
+
+    def __post_init__(self) -> None:
+        """Refuse parts off the shaft, a tool as long as the shaft, and whatever else is no spindle."""
+        length = sum(segment.length_mm for segment in self.segments)
+        kinds: dict[str, Sequence[BearingTable | MassTable | JointTable]] = {
+            "bearing": self.bearings,
+            "mass": self.masses,
+            "joint": self.joints,
+        }
+        for kind, parts in kinds.items():
+            for i, part in enumerate(parts, 1):
+                if part.position_mm > length:
+                    raise ValueError(
+                        f"{kind} {i}: position_mm={part.position_mm:g} is off the shaft, 0 to {length:g} mm"
+                    )
+        first = min(bearing.position_mm for bearing in self.bearings)
+        if self.tool_length_mm is not None and self.tool_length_mm > first:
+            raise ValueError(
+                f"tool_length_mm={self.tool_length_mm:g} reaches beyond the first bearing, at {first:g} mm; "
+                "give the length of the tool alone"
+            )
+        _in_mm(self.build)
+
+    def build(self) -> Spindle:
+        """The spindle in SI units."""
+        return Spindle(
+            [segment.build() for segment in self.segments],
+            [bearing.build(self.bearing_stiffness_n_per_um) for bearing in self.bearings],
+            youngs_modulus=self.youngs_modulus_gpa * 1e9,
+            density=self.density_kg_per_m3,
+            theory=self.theory,
+            shear_modulus=None if self.shear_modulus_gpa is None else self.shear_modulus_gpa * 1e9,
+            masses=[mass.build() for mass in self.masses],
+            joints=[joint.build() for joint in self.joints],
+        )
+
+
+class ToolTable(Table, frozen=True):
+    """[[tool]]: a tool other than the one that is tapped, from its tip to where it leaves the holder."""
+
+    name: Annotated[str, Meta(min_length=1)]
+    segments: Annotated[list[SegmentTable], Meta(min_length=1)]
+    masses: tuple[MassTable, ...] = ()
+
+    def build(self, spindle: Spindle) -> Spindle:
+        """The tool as a free shaft in SI units, of the spindle's theory and material where it names none."""
+        return Spindle(
+            [segment.build() for segment in self.segments],
+            (),
+            youngs_modulus=spindle.youngs_modulus,
+            density=spindle.density,
+            theory=spindle.theory,
+            shear_modulus=spindle.shear_modulus,
+            masses=[mass.build() for mass in self.masses],
+        )
+
+    def put_into(self, spindle: Spindle, tool_length_mm: float) -> Spindle:
+        """The whole spindle with this tool in place of the one drawn."""
+        return change_tool(spindle, tool_length_mm / 1e3, self.build(spindle))
+
+
+def _check_wall(bore: float, outer: float, bore_key: str, outer_key: str) -> None:
+    if bore >= outer:
+        raise ValueError(f"{bore_key}={bore:g} is not smaller than {outer_key}={outer:g}")
+
+
+def _metres(millimetres: float | None) -> float | None:
+    return None if millimetres is None else millimetres / 1e3
+
+
+def _in_mm(build: Callable[[], Spindle]) -> None:
+    """What is left to refuse, in the words of dsm, which are in SI units."""
+    try:
+        build()
+    except ValueError as error:
+        raise ValueError(f"{error} (here in SI units)") from error

@@ -1,0 +1,28 @@
+"""One tap test or one recorded file to what it measures: modes, followed mode, calibrated model; questions; workers."""
+
+from .estimate import Estimate
+from .file_modes import FileModes, modes_of_file, remarks_on_all
+from .measurement import Measurement, measure
+from .model_calibration import ModelCalibration, calibrate_model
+from .model_state import ModelState, first_critical_speed, model_frf, model_state
+from .model_summary import ModelMode, ModelSummary, model_summary
+from .one_file.recorded_window import Window
+
+__all__ = [
+    "Estimate",
+    "FileModes",
+    "Measurement",
+    "ModelCalibration",
+    "ModelMode",
+    "ModelState",
+    "ModelSummary",
+    "Window",
+    "calibrate_model",
+    "first_critical_speed",
+    "measure",
+    "model_frf",
+    "model_state",
+    "model_summary",
+    "modes_of_file",
+    "remarks_on_all",
+]

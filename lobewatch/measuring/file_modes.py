@@ -1,0 +1,144 @@
+"""The modes of one recorded file."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from acquisition import Description, Fact, Frf, Remark, windowed_receptance
+from dsm import plus_minus
+from lobewatch.measuring.one_file.own_window import ringing_modes_windowed, without_own_window
+from lobewatch.measuring.one_file.recorded import recorded
+from lobewatch.measuring.one_file.recorded_window import Window, window_over
+from modal import (
+    Extraction,
+    Mode,
+    common_delay,
+    cut_edges,
+    extract,
+    modes_of,
+    peaks_beyond,
+    pick_peaks,
+    remove_window,
+    with_windowed_noise,
+)
+
+MOST_NAMED = 6
+"""Peaks beyond the usable band that are named one by one."""
+
+
+@dataclass(frozen=True, eq=False)
+class FileModes:
+    """The modes of one recorded file."""
+
+    path: Path
+    """Where it was read from."""
+    frf: Frf
+    """The average of its hits."""
+    extraction: Extraction
+    """How the modes were found."""
+    as_recorded: tuple[Mode, ...]
+    """By least squares, the damping of an exponential window still in them."""
+    fitted: tuple[Mode, ...]
+    """The same without it."""
+    picked: tuple[Mode, ...]
+    """By the peak picking of the paper, for comparison."""
+    remarks: tuple[Remark, ...]
+    """On all modes together, and on those that are missing."""
+    facts: tuple[Fact, ...] = ()
+    """What is known of the file, and from where."""
+
+
+def modes_of_file(
+    path: Path,
+    band: tuple[float, float] | None = None,
+    *,
+    window: Window | None = None,
+    conjugate: bool = False,
+    accept: Collection[str] = (),
+    said: Description | None = None,
+) -> FileModes:
+    """Modes between two frequencies (Hz), with standard errors over the hits where the file holds three or more.
+
+    window: exponential window on the response, to be corrected; else that which the file names. conjugate: the file
+    holds the complex conjugate of response over force. accept: verdicts on hits ("not-decayed") that do not count.
+    said: what the file does not say; the hits that an FRF was averaged from are inferred where nobody says. What
+    still rings when the record ends gets an exponential window, which is corrected: all hits where none is good
+    otherwise, else the modes that do.
+
+    Raises ValueError for a window whose hit is not known or comes before it, averages that no coherence belongs to, and
+    verdicts that cannot be accepted.
+    """
+    made = recorded(path, accept, said or Description())
+    frf = replace(made.frf, receptance=made.frf.receptance.conj()) if conjugate else made.frf
+    hits = () if conjugate else made.hits
+    window = window_over(made.named_window, window)
+    delay = None if window is None else window.delay(made.hits)
+    frf = frf if window is None else windowed_receptance(frf, window.time_constant)
+    state = extract([frf], band)
+    found = fitted = tuple(modes_of(state, [hits]))
+    own: tuple[Remark, ...] = ()
+    if window is not None and delay is not None:
+        record = 1 / float(np.mean(np.diff(frf.frequency)))
+        wider = (with_windowed_noise(mode, window.time_constant, record) for mode in found)
+        fitted = tuple(remove_window(mode, window.time_constant, delay) for mode in wider)
+    elif made.time_constant is not None:
+        fitted = tuple(without_own_window(found, made.time_constant))
+    elif not accept:
+        fitted, own = ringing_modes_windowed(found, hits, band)
+    return FileModes(
+        path=path,
+        frf=frf,
+        extraction=state,
+        as_recorded=found,
+        fitted=fitted,
+        picked=tuple(pick_peaks(frf, band)),
+        remarks=(*made.remarks, *own, *_remarks(found, frf, band)),
+        facts=made.facts,
+    )
+
+
+def _remarks(found: Sequence[Mode], frf: Frf, band: tuple[float, float] | None) -> Iterator[Remark]:
+    yield from remarks_on_all(found)
+    for edge in cut_edges(frf, found, band):
+        text = "a peak may be cut by the edge of the lines, its mode missing"
+        yield Remark("mode-missing-at-edge", f"{edge:.0f} Hz", text, "widen the band (a harder tip reaches higher)")
+    if band is None:
+        yield from _beyond(frf)
+    if not found:
+        yield Remark("no-mode", "", "no mode found", "look whether the band is right and the hit was hard enough")
+
+
+def _beyond(frf: Frf) -> Iterator[Remark]:
+    """Peaks that are not fitted because the force hardly reached them."""
+    peaks = peaks_beyond(frf)
+    if frf.usable_band is None or not peaks:
+        return
+    where = ", ".join(f"{frequency:.0f}" for frequency in peaks)
+    if len(peaks) > MOST_NAMED:
+        where = f"{len(peaks)} places from {peaks[0]:.0f} to {peaks[-1]:.0f}"
+    text = f"peaks at {where} Hz lie beyond the usable band, which ends at {frf.usable_band[1]:.0f} Hz: not fitted"
+    yield Remark("peaks-beyond", "", text, "a harder tip reaches higher")
+
+
+def remarks_on_all(modes: Sequence[Mode]) -> list[Remark]:
+    """What speaks against all modes of an FRF together."""
+    return [*_wrong_sign(modes), *_delayed(modes)]
+
+
+def _wrong_sign(modes: Sequence[Mode]) -> Iterator[Remark]:
+    if len(modes) > 1 and not any(mode.is_driving_point for mode in modes):
+        text = "every K is negative: hammer or sensor is mounted or wired the other way round"
+        yield Remark("sign-swapped", "", text, "turn it, or give its sensitivity the other sign")
+
+
+def _delayed(modes: Sequence[Mode]) -> Iterator[Remark]:
+    delay = common_delay(modes)
+    if delay is not None:
+        late = plus_minus(delay.skew, delay.skew_std, 1e-6)
+        text = f"the phases of all modes grow with frequency: the response is sampled {late} us late"
+        cure = "measure it with lobewatch sensors --skew, or add that to skew_us of the accelerometer in machine.toml"
+        yield Remark("channel-delay", "", text, cure)

@@ -1,0 +1,107 @@
+"""The model as the newest tap test left it, with one tool or another in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import DataError, Frf
+from dsm import (
+    Spindle,
+    couple_tool,
+    critical_speed,
+    natural_frequencies,
+    receptance,
+    spindle_side,
+)
+from lobewatch.machine import Machine
+from lobewatch.measuring.measurement import Measurement
+
+_Float = NDArray[np.float64]
+POINTS = 400
+"""Of each curve."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModelState:
+    """The model with a tool in it."""
+
+    machine: Machine
+    """machine.toml."""
+    tool: str
+    """What is in the spindle."""
+    spindle: Spindle
+    """The shaft with this tool and the newest bearings."""
+    reference: Spindle
+    """The same bearings with the tool that is tapped."""
+    measurement: Measurement | None
+    """That the bearings were found from; None: they are those of machine.toml."""
+    origin: str
+    """Where the bearing stiffness comes from, in words."""
+
+    @property
+    def title(self) -> str:
+        """Machine, its label and the tool."""
+        spindle = self.machine.spindle
+        label = f" ({spindle.label})" if spindle and spindle.label else ""
+        return f"{self.machine.machine.name}{label}, tool {self.tool}"
+
+
+def model_state(machine: Machine, newest: Measurement | None, tool: str | None = None) -> ModelState:
+    """The model with a tool (None: the one that is tapped); DataError where there is none.
+
+    newest: the measurement that sets the bearings (`Logbook.calibrated`).
+    """
+    wanted = machine.tap.tool if tool is None else tool
+    drawn, reference = machine.model(wanted), machine.model(machine.tap.tool)
+    calibration = newest.calibration if newest else None
+    if newest is None or calibration is None:
+        return ModelState(machine, wanted, drawn, reference, None, "machine.toml, not calibrated yet")
+    origin = f"tap test {newest.tap_id}: {calibration.bearing_stiffness / 1e6:.1f} N/um on average"
+    drawn, reference = (_with_bearings_of(calibration.spindle, shaft) for shaft in (drawn, reference))
+    return ModelState(machine, wanted, drawn, reference, newest, origin)
+
+
+def _with_bearings_of(calibrated: Spindle, shaft: Spindle) -> Spindle:
+    pairs = zip(shaft.bearings, calibrated.bearings, strict=True)
+    return replace(shaft, bearings=[replace(bearing, stiffness=found.stiffness) for bearing, found in pairs])
+
+
+def first_critical_speed(spindle: Spindle) -> float | None:
+    """The lowest critical speed (rpm); None where gyroscopic moments leave none."""
+    try:
+        return critical_speed(spindle)
+    except ArithmeticError:
+        return None
+
+
+def model_frf(state: ModelState) -> Frf:
+    """Around the first modes, where it is tapped; of another tool at its tip, by coupling to the calibrated spindle."""
+    machine = state.machine
+    table = machine.spindle
+    if table is None:
+        raise DataError("no model: add a [spindle] table")
+    first = float(natural_frequencies(state.spindle, 1)[0])
+    frequency = np.linspace(0.3 * first, 3.0 * first, 2 * POINTS)
+    followed = state.measurement.followed if state.measurement else None
+    loss_factor = 2 * (table.damping_ratio if followed is None else followed.damping_ratio)
+    spindle, reference = state.spindle, state.reference
+    if followed is not None:
+        spindle, reference = _undamped(spindle), _undamped(reference)
+    if state.tool == machine.tap.tool or table.tool_length_mm is None:
+        return Frf(frequency, receptance(spindle, frequency, tap_position(state), loss_factor))
+    side = spindle_side(reference, frequency, table.tool_length_mm / 1e3, loss_factor)
+    return Frf(frequency, couple_tool(side, machine.tool_named(state.tool).build(state.reference)))
+
+
+def _undamped(spindle: Spindle) -> Spindle:
+    """Without dampers: a measured damping ratio holds what they do already."""
+    return replace(spindle, bearings=[replace(bearing, damping=0.0) for bearing in spindle.bearings])
+
+
+def tap_position(state: ModelState) -> float:
+    """From the tool tip (m); another tool than the one that is always tapped is looked at where it cuts."""
+    tap = state.machine.tap
+    return tap.position_mm / 1e3 if state.tool == tap.tool else 0.0

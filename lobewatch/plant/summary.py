@@ -1,0 +1,131 @@
+"""How a machine stands, in short, for many at once: what follows from its files, and what the date adds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+
+from acquisition import Remark
+from lobewatch.decay.light import (
+    UNREADABLE,
+    Light,
+    about_dates,
+    about_unreadable,
+    days_left,
+    in_order,
+    light_of,
+    next_step,
+    with_files,
+)
+
+
+class Ahead(msgspec.Struct, frozen=True):
+    """When a series has fallen by one of the fixed limits."""
+
+    percent: float
+    """Fall from where the series started (%)."""
+    earliest: float | None = None
+    """Days since 1970, at 10 %; the day it was foretold on where that is past; None where it is not foretold."""
+    probable: float | None = None
+    """At 50 %."""
+    latest: float | None = None
+    """At 90 %."""
+    foretold_to: float | None = None
+    """Last day that was looked at; None where nothing can be foretold."""
+
+
+class Course(msgspec.Struct, frozen=True):
+    """One tool in one direction."""
+
+    name: str
+    """Tool and direction."""
+    tool: str
+    """What is in the spindle."""
+    direction: str
+    """Direction at the tool tip, "x" or "y"."""
+    fall: float | None
+    """Fall of the frequency from the start of the series (%); None where it is not known."""
+    fall_std: float | None
+    """Its standard error (%); None where it is not known."""
+    frequency: float | None
+    """Of the newest test that knows it (Hz)."""
+    alarm: str = ""
+    """"step" or "slope" where the watch over the series is on alarm."""
+    points: tuple[tuple[float, float], ...] = ()
+    """Day since 1970 and change from the start (%), thinned out."""
+    limits: tuple[Ahead, ...] = ()
+    """Those of machine.toml."""
+
+
+class Dated(NamedTuple):
+    """How it stands at a time."""
+
+    light: Light
+    """Of the worst reason."""
+    remarks: tuple[Remark, ...]
+    """The reasons, in order of harm."""
+    next_step: str
+    """What to do now, one sentence."""
+    days_left: float | None
+    """Until the next test is due; negative where it is overdue; None before the first."""
+
+
+class Summary(msgspec.Struct, frozen=True, dict=True):
+    """How a machine stands, without what the date of today adds."""
+
+    name: str
+    """In machine.toml."""
+    remarks: tuple[Remark, ...]
+    """The reasons that hold at any time, in order of harm."""
+    otherwise: str
+    """What to do where no reason says it."""
+    path: str = ""
+    """Of the folder as it was named, which commands in the reasons repeat."""
+    interval_days: float = 0.0
+    """From tap test to tap test."""
+    has_port: bool = False
+    """Whether machine.toml names a port, so that a test can be started."""
+    newest: str = ""
+    """Identity of the newest tap test; empty where there is none."""
+    last_tap: str = ""
+    """When that was (ISO 8601)."""
+    tap_tests: int = 0
+    """Rows of the history."""
+    programs: dict[str, str] = {}
+    """The word on each program."""
+    series: tuple[Course, ...] = ()
+    """The one that fell most first."""
+
+    @cached_property
+    def time(self) -> datetime | None:
+        """When it was tapped last."""
+        return datetime.fromisoformat(self.last_tap) if self.last_tap else None
+
+    @property
+    def newest_file(self) -> str:
+        """The file of the newest tap test in the folder; empty where there is none."""
+        return f"taps/{self.newest}.h5" if self.newest else ""
+
+    def at(self, now: datetime, path: Path | str, damage: Sequence[Remark] = ()) -> Dated:
+        """At a time, with what is known to be damaged besides; path: of the folder."""
+        left, remarks = None, self.remarks
+        if self.time is not None:
+            left = days_left(self.time, self.interval_days, now)
+            remarks = in_order([*remarks, *about_dates(self.newest, self.time, self.interval_days, now, path)])
+        if damage:
+            remarks = with_files(remarks, damage)
+        return Dated(light_of(remarks), remarks, next_step(remarks, self.otherwise), left)
+
+    def speaks_of(self, path: str) -> bool:
+        """Whether a reason names the folder."""
+        return any(path in text for remark in self.remarks for text in (remark.text, remark.cure))
+
+
+def unreadable_summary(name: str, reason: str) -> Summary:
+    """Of a machine whose files cannot be read."""
+    return Summary(name, (about_unreadable(reason),), UNREADABLE)

@@ -1,0 +1,1 @@
+"""Ports, devices and sensors for people and as JSON."""

@@ -1,0 +1,130 @@
+"""Sensors as tables, sentences and JSON."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from rich.markup import escape
+from rich.table import Table
+
+from acquisition import STANDARD_GRAVITY, Channel
+from dsm import plus_minus
+from lobewatch.sensors import MassCheck, SensorList, SkewCheck
+from lobewatch.show.terminal.output import table
+
+
+def list_json(found: SensorList) -> dict[str, Any]:
+    """The device, its channels and its rate."""
+    measured = found.measured_rate
+    return {
+        "model": found.identity.model,
+        "serial": found.identity.serial,
+        "channels": [_channel_json(channel) for channel in found.channels],
+        "sample_rate_hz": found.nominal_rate,
+        "measured_rate_hz": measured.rate if measured else None,
+        "measured_rate_hz_std": measured.std if measured else None,
+        "remarks": [asdict(remark) for remark in found.remarks],
+        "errors": [asdict(remark) for remark in found.errors],
+    }
+
+
+def list_texts(found: SensorList) -> list[str | Table]:
+    """The device, a table of its channels, its rate, and what is wrong."""
+    measured = found.measured_rate
+    rate = "not measured" if measured is None else f"measured {plus_minus(measured.rate, measured.std)} Hz"
+    rate += ", which is worked with" if found.replaces_nominal else ""
+    return [
+        f"{found.identity.model}, serial number {found.identity.serial or 'not known'}",
+        _channel_table(found.channels),
+        f"rate: {found.nominal_rate:g} Hz, {rate}",
+        *(f"{'error' if remark in found.errors else 'warning'}: {remark}" for remark in found.remarks),
+    ]
+
+
+def _channel_json(channel: Channel) -> dict[str, Any]:
+    return {
+        "quantity": channel.quantity,
+        "sensitivity_v_per_si": channel.sensitivity,
+        "full_scale_v": channel.full_scale,
+        "full_scale_si": channel.full_scale / abs(channel.sensitivity),
+        "adc_bits": channel.adc_bits,
+        "serial_number": channel.serial_number,
+        "calibration_date": channel.calibration_date,
+        "skew_us": channel.skew * 1e6,
+    }
+
+
+def _channel_table(channels: tuple[Channel, ...]) -> Table:
+    made = table("channel", "<quantity", "sensitivity", "range", "input", "bits", "skew (us)", "<serial", "<calibrated")
+    for i, channel in enumerate(channels):
+        unit, si = ("N", 1.0) if channel.quantity == "force" else ("g", STANDARD_GRAVITY)
+        made.add_row(
+            str(i),
+            channel.quantity,
+            f"{channel.sensitivity * 1e3 * si:.4g} mV/{unit}",
+            f"±{channel.full_scale / abs(channel.sensitivity) / si:.4g} {unit}",
+            f"±{channel.full_scale:g} V",
+            str(channel.adc_bits),
+            f"{channel.skew * 1e6:.4g}",
+            escape(channel.serial_number or "-"),
+            channel.calibration_date or "-",
+        )
+    return made
+
+
+def mass_json(check: MassCheck) -> dict[str, Any]:
+    """F/(m a) and what follows from it."""
+    found = check.calibration
+    return {
+        "mass_kg": found.mass,
+        "ratio": found.ratio,
+        "ratio_std": found.ratio_std,
+        "phase_deg": found.phase,
+        "inverted": found.inverted,
+        "flatness": found.flatness,
+        "band_hz": found.band,
+        "hits": found.n_hits,
+        "agrees": found.agrees,
+        "force_sensitivity_v_per_n": found.force_sensitivity,
+        "acceleration_sensitivity_v_per_m_s2": found.acceleration_sensitivity,
+        "remarks": [asdict(remark) for remark in found.remarks],
+    }
+
+
+def mass_texts(check: MassCheck) -> list[str]:
+    """The verdict, and what to change where."""
+    ratio = check.calibration.ratio
+    if check.calibration.sizes_agree:
+        return [str(check.calibration)]
+    if check.place is None:
+        force, acceleration, place = "sensitivity_mv_per_n", "sensitivity_mv_per_g", "[[daq.channel]] of machine.toml"
+    else:
+        force, acceleration = f"{check.place.sensitivity} of the force channel", "that of the acceleration channel"
+        place = check.place.place
+    change = f"To change in {place}: multiply {force} by {ratio:.4f}, or divide {acceleration} by {ratio:.4f}."
+    return [str(check.calibration), change]
+
+
+def skew_json(check: SkewCheck) -> dict[str, Any]:
+    """The skew and how sure it is."""
+    return {
+        "skew_us": check.found.skew * 1e6,
+        "skew_us_std": check.found.std * 1e6,
+        "skew_samples": check.found.skew * check.sample_rate,
+        "coherent_share": check.found.coherent_share,
+    }
+
+
+def skew_texts(check: SkewCheck) -> list[str]:
+    """The skew, and where to enter it."""
+    found, channel = check.found, check.channel
+    if check.place is None:
+        entry = f"skew_us = {found.skew * 1e6:.3f} in its [[daq.channel]] of machine.toml"
+    else:
+        entry = f"{check.place.skew} = {found.skew:.3e} in {check.place.place}"
+    return [
+        f"channel 1 ({channel.quantity}) is sampled {plus_minus(found.skew, found.std, 1e-6)} us "
+        f"({found.skew * check.sample_rate:.4f} samples) after channel 0; entered is {channel.skew * 1e6:.3f} us",
+        f"To enter: {entry}; 0 for channel 0",
+    ]

@@ -1,1 +1,0 @@
-"""Joints and bearings found from several tools, for people and as JSON."""

@@ -1,1 +1,0 @@
-"""What test cuts have taught, and the next of them, for people and as JSON."""

@@ -1,1 +1,0 @@
-"""The modes of a file for people: table, remarks, JSON."""

@@ -1,0 +1,145 @@
+"""Pockets, their shifts and cutting coefficients as JSON objects and as lines for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from acquisition import Remark, joined
+from lobes import Pocket, PocketShift, StabilityLobes, cutting_coefficients
+from lobewatch.logbook import LobeComparison
+from lobewatch.logbook.lobe_comparison import NO_POCKET
+from lobewatch.machine import REFERENCE_CUT, Machine
+from lobewatch.show.programs.doubts import at_speed_line
+from lobewatch.show.programs.settings import setting_json
+from lobewatch.show.programs.verdicts import programs_json, verdict_table
+from lobewatch.show.terminal.output import table
+from lobewatch.show.terminal.remarks import remark_json, remark_lines
+from lobewatch.verdicts import Setting
+from lobewatch.verdicts.setting_search import LEFT
+
+
+def comparison_json(found: LobeComparison, remarks: Sequence[Remark]) -> dict[str, Any]:
+    """The diagram now, its pockets, and the verdicts on the programs with this cut."""
+    lobes = found.now.lobes
+    return lobes_json(found.now.name, lobes) | {
+        "tap_id": found.now.assembly.tap_id,
+        "source": str(found.now.source),
+        "speed_rpm": lobes.speed_rpm,
+        "depth_mm": lobes.depth * 1e3,
+        "chatter_frequencies_hz": lobes.chatter_frequency,
+        "kind": lobes.kind,
+        "pockets": [setting_json(pocket) for pocket in found.pockets],
+        "pocket_shifts": [shift_json(shift) for shift in found.shifts],
+        "programs": programs_json(found.verdicts),
+        "remarks": [remark_json(remark) for remark in joined(remarks)],
+    }
+
+
+def comparison_texts(found: LobeComparison, remarks: Sequence[Remark]) -> list[str | Table]:
+    """The same for people."""
+    now = found.now
+    texts: list[str | Table] = [
+        f"{now.name}: {now.lobes.stated_method}, from the {now.source} of {now.assembly.tap_id}",
+        _limit_line(found),
+        *shift_lines(found.shifts),
+    ]
+    if found.pockets:
+        texts += ["safe now and until the next tap tests, the largest removal rate first:", pocket_table(found.pockets)]
+    texts += [str(remark) for remark in remarks if remark.code == NO_POCKET]
+    if found.verdicts:
+        texts += [verdict_table(found.verdicts), f"verdicts by {found.verdicts[0].method}, as lobewatch check"]
+        texts += _at_speed(found)
+    return [*texts, *remark_lines([remark for remark in remarks if remark.code != NO_POCKET])]
+
+
+def _at_speed(found: LobeComparison) -> list[str]:
+    """What holds at rest and what at speed, where test cuts have taught of a program."""
+    taught = [one for one in found.verdicts if one.assembly and one.assembly.cuts]
+    if not taught:
+        return []
+    still = "the diagram and its pockets are" if found.now.name == REFERENCE_CUT else "the diagram is"
+    return [f"{at_speed_line(taught)}; {still} of the spindle at rest"]
+
+
+def _limit_line(found: LobeComparison) -> str:
+    lobes, low = found.now.lobes, found.now.lobes.minimum
+    if not np.isfinite(low.depth):
+        return f"no limit in this speed range ({lobes.stated_method})"
+    return (
+        f"lowest limit {low.depth * 1e3:.3f} mm at {low.speed_rpm:.0f} rpm, chatter at {low.chatter_frequency:.1f} Hz"
+    )
+
+
+def pocket_table(pockets: Sequence[Setting]) -> Table:
+    """Settings that can be recommended, a line each."""
+    made = table("pocket: speed (rpm)", "window (rpm)", "depth (mm)", "depth to spare", "f_n may fall by")
+    for one in pockets:
+        low, high = one.window_rpm
+        left = f"{100 * one.frequency_left:.0f} %{' or more' if one.frequency_left >= LEFT[-1] else ''}"
+        spare = f"{math.floor(100 * one.depth_margin + 1e-6)} %"
+        made.add_row(f"{one.speed_rpm:.0f}", f"{low:.0f}..{high:.0f}", f"{one.depth_mm:.2f}", spare, left)
+    return made
+
+
+def shift_json(shift: PocketShift) -> dict[str, Any]:
+    """A pocket of the diagram then and now."""
+    return {
+        "then": _tip_json(shift.then),
+        "now": _tip_json(shift.now),
+        "speed_change": shift.speed_change,
+        "depth_change": shift.depth_change,
+    }
+
+
+def _tip_json(tip: Pocket) -> dict[str, float]:
+    return {"speed_rpm": tip.speed_rpm, "depth_mm": tip.depth * 1e3, "from_rpm": tip.from_rpm, "to_rpm": tip.to_rpm}
+
+
+def shift_lines(shifts: Sequence[PocketShift]) -> Iterator[str]:
+    """The three fastest pockets that moved, a line each."""
+    for shift in sorted(shifts, key=lambda one: one.then.speed_rpm, reverse=True)[:3]:
+        yield (
+            f"pocket of the diagram moved from {shift.then.speed_rpm:.0f} to {shift.now.speed_rpm:.0f} rpm "
+            f"({100 * shift.speed_change:+.1f} %), its tip from {shift.then.depth * 1e3:.2f} to "
+            f"{shift.now.depth * 1e3:.2f} mm ({100 * shift.depth_change:+.1f} %)"
+        )
+
+
+def materials_json(machine: Machine) -> list[dict[str, Any]]:
+    """Cutting coefficients of one's own, then the published ones."""
+    return [
+        {
+            "material": one.material,
+            "tangential_n_per_mm2": one.tangential / 1e6,
+            "radial_n_per_mm2": one.radial / 1e6,
+            "note": one.note,
+            "source": one.source,
+        }
+        for one in (*(own.build() for own in machine.material), *cutting_coefficients())
+    ]
+
+
+def material_lines(machine: Machine) -> Iterator[str]:
+    """The same, a line each."""
+    for one in materials_json(machine):
+        kt, kr = one["tangential_n_per_mm2"], one["radial_n_per_mm2"]
+        about = "; ".join(filter(None, (one["note"], one["source"])))
+        yield f"{one['material']:<42} Kt {kt:5.0f}  Kr {kr:4.0f} N/mm²  {about}"
+
+
+def lobes_json(name: str, lobes: StabilityLobes) -> dict[str, Any]:
+    """The lowest point of a diagram."""
+    low = lobes.minimum
+    return {
+        "cut": name,
+        "method": lobes.method,
+        "method_detail": lobes.detail,
+        "minimum_depth_mm": low.depth * 1e3,
+        "at_speed_rpm": low.speed_rpm,
+        "chatter_frequency_hz": low.chatter_frequency,
+    }

@@ -1,1 +1,0 @@
-"""Rebuilt machines for people: what was mended, and how far it is."""

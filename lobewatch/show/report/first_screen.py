@@ -1,0 +1,97 @@
+"""The first screen of the report: light, what changed, which programs until when, what instead, when to tap."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from datetime import timedelta
+from typing import Any
+
+from acquisition import joined
+from lobewatch.decay import Light, SeriesStanding, Standing
+from lobewatch.logbook.outlook import Fate, Outlook
+from lobewatch.machine import Machine
+from lobewatch.show.programs.advice import Advised
+from lobewatch.show.programs.settings import rpm
+from lobewatch.show.programs.verdicts import WORDS
+from lobewatch.show.trends.dates import dates_text
+from lobewatch.show.trends.describe_trend import rate_text, short_text
+from lobewatch.verdicts import Word
+
+LIGHTS = {Light.ALARM: "✗ ALARM", Light.UNKNOWN: "? UNKNOWN", Light.WARN: "! WARNING", Light.GOOD: "✓ GOOD"}
+KINDS = {Light.GOOD: "ok", Light.ALARM: "bad"}
+"""How a light looks; the others are doubtful."""
+FEW = 3
+"""Reasons on the first screen; the others stand below it."""
+
+
+def first_screen(found: Outlook, programs: Sequence[Advised], machine: Machine) -> dict[str, Any]:
+    """What the first screen shows, as the template takes it."""
+    return {
+        **light_of(found.standing),
+        "changed": [_changed(one) for one in found.standing.series],
+        "programs": [_program(one, found) for one in programs],
+        "tap": _tap(found.standing, machine),
+    }
+
+
+def light_of(standing: Standing) -> dict[str, Any]:
+    """The light in words, the reasons, the next step."""
+    reasons = [remark.finding for remark in joined(standing.remarks)]
+    kind = KINDS.get(standing.light, "doubt")
+    return {
+        "light": LIGHTS[standing.light],
+        "kind": kind,
+        "reasons": reasons[:FEW],
+        "others": reasons[FEW:],
+        "next_step": standing.next_step,
+    }
+
+
+def _changed(series: SeriesStanding) -> str:
+    said = f"{series.name}: {short_text(series)}, {series.first:%Y-%m-%d}"
+    if series.trend is None or series.trend.rate is None:
+        return said
+    since, fall = series.trend.fallen_since, series.trend.watch.fall
+    if since is None or fall is None:
+        return f"{said}; {rate_text(series.trend)}"
+    how = "fell at once before" if fall.kind == "step" else "falling since"
+    return f"{said}; {how} {since:%Y-%m-%d}; {rate_text(series.trend)}"
+
+
+def _program(one: Advised, found: Outlook) -> dict[str, str]:
+    name, word = one.verdict.program.name, one.verdict.word
+    return {
+        "name": name,
+        "kind": WORDS[word].kind,
+        "word": f"{WORDS[word].symbol} {word}",
+        "until": _until(word, found.programs[name], found.horizon),
+        "instead": instead_text(one),
+    }
+
+
+def _until(word: Word, fate: Fate, end: float) -> str:
+    if word is Word.STABLE:
+        return f"doubtful {dates_text(fate.doubtful, end, seen=False)}"
+    if word is Word.DOUBTFUL:
+        return f"not stable {dates_text(fate.not_stable, end, seen=False)}"
+    return "not stable already" if word is Word.NOT_STABLE else "not known"
+
+
+def instead_text(one: Advised) -> str:
+    """Speed and depth to go to, in a few words."""
+    known, settings = one.verdict.assembly, (one.advice.best, one.advice.here)
+    if one.verdict.word is Word.STABLE:
+        return "as it is"
+    if one.verdict.word is Word.UNKNOWN or known is None or not known.is_sure:
+        return "not known: see below"
+    told = [f"{rpm(setting.speed_rpm)} rpm, {setting.depth_mm:g} mm" for setting in settings if setting is not None]
+    return " or ".join(dict.fromkeys(told)) or "no safe speed: another tool"
+
+
+def _tap(standing: Standing, machine: Machine) -> str:
+    left, last = standing.days_left, standing.last_tap
+    if left is None or last is None:
+        return "now: it was never tapped"
+    due = f"{last + timedelta(days=math.floor(machine.machine.tap_interval_days)):%Y-%m-%d}"
+    return f"now: overdue since {due}" if left < 0 else f"by {due}"

@@ -1,0 +1,1 @@
+"""Modes and model of a spindle for people and as JSON."""

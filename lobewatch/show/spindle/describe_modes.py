@@ -1,0 +1,196 @@
+"""Modes as JSON objects and as text for people: the trusted ones first, the others with what speaks against them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from rich.table import Table
+
+from acquisition import Remark, joined
+from dsm import plus_minus
+from lobewatch.measuring import FileModes
+from lobewatch.show.terminal.output import table
+from modal import Mode, Trust, trust_of, trust_rules
+
+ORDER = (Trust.TRUSTED, Trust.DOUBTFUL, Trust.REJECTED)
+"""In which modes are shown."""
+LEAST_PHASE = 1.0
+"""Phase of a modal constant worth a column (degrees)."""
+HIGH_CORRELATION = 0.5
+"""Of errors, that a person should know."""
+
+
+def mode_json(mode: Mode) -> dict[str, Any]:
+    """One mode."""
+    frequency, damping, stiffness = mode.standard_error
+    by_fit = mode.fit_error
+    return {
+        "frequency_hz": mode.frequency,
+        "frequency_hz_std": frequency,
+        "frequency_hz_std_of_fit": by_fit[0],
+        "damping_ratio": mode.damping_ratio,
+        "damping_ratio_std": damping,
+        "damping_ratio_std_of_fit": by_fit[1],
+        "stiffness_n_per_m": mode.stiffness,
+        "stiffness_n_per_m_std": stiffness,
+        "stiffness_n_per_m_std_of_fit": by_fit[2],
+        "interval_95": mode.interval(),
+        "correlation": mode.correlation,
+        "hits": mode.n_hits,
+        "driving_point": mode.is_driving_point,
+        "phase_deg": mode.phase_deg,
+        "phase_deg_std": mode.phase_deg_std,
+        "coherence": mode.coherence,
+        "misfit": mode.misfit,
+        "misfit_share": mode.misfit_share,
+        "trust": trust_of(mode),
+        "half_power_damping_ratio": mode.half_power_damping,
+        "remarks": [asdict(remark) for remark in mode.remarks],
+        "method": mode.method,
+    }
+
+
+def in_order(modes: Iterable[Mode], *, rejected: bool = True) -> list[Mode]:
+    """Trusted modes by rising frequency, then doubtful ones, then rejected ones where they are wanted."""
+    wanted = ORDER if rejected else ORDER[:-1]
+    kept = [(wanted.index(trust), mode) for mode in modes if (trust := trust_of(mode)) in wanted]
+    return [mode for _, mode in sorted(kept, key=lambda one: (one[0], one[1].frequency))]
+
+
+def mode_table(modes: Sequence[Mode]) -> Table:
+    """Modes, a line each, value ± standard error (in percent), the phase where there is any, and how far to believe."""
+    with_phase = any(abs(mode.phase_deg) > LEAST_PHASE for mode in modes)
+    made = table("f_n (Hz)", "zeta (%)", "K (N/um)", *(["phase (deg)"] if with_phase else []), "<")
+    for mode in modes:
+        values = (mode.frequency, mode.damping_ratio, mode.stiffness)
+        cells = [
+            plus_minus(value, std, scale, percent=scale == 1e6 or not with_phase)
+            for value, std, scale in zip(values, mode.standard_error, (1.0, 0.01, 1e6), strict=True)
+        ]
+        made.add_row(*cells, *([_phase(mode)] if with_phase else []), _notes(mode))
+    return made
+
+
+def _phase(mode: Mode) -> str:
+    return plus_minus(mode.phase_deg, mode.phase_deg_std or None) if mode.phase_deg else "0"
+
+
+def _notes(mode: Mode) -> str:
+    trust = trust_of(mode)
+    worth = [] if trust is Trust.TRUSTED else [str(trust)]
+    return "; ".join([*worth, *([] if mode.is_driving_point else ["not a driving point"])])
+
+
+def mode_lines(modes: Sequence[Mode]) -> list[str]:
+    """What stands below a table of modes: where ± comes from, and correlated errors."""
+    hits = max((mode.n_hits for mode in modes), default=0)
+    lines = [f"± is the standard error over the {hits} hits (jackknife, {hits - 1} degrees of freedom)"] if hits else []
+    for (i, j), names in (((0, 1), "f_n and zeta"), ((0, 2), "f_n and K"), ((1, 2), "zeta and K")):
+        of = [(mode.correlation[i, j], mode.frequency) for mode in modes]
+        high = [f"{value:+.2f} ({at:.0f} Hz)" for value, at in of if abs(value) > HIGH_CORRELATION]
+        if high:
+            lines.append(f"correlation of the errors of {names}: {', '.join(high)}")
+    return lines
+
+
+def remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> list[str]:
+    """Remarks on single modes and further ones, a line each; what several modes have in common is one."""
+    return [str(remark) for remark in joined([*(one for mode in modes for one in mode.remarks), *remarks])]
+
+
+def short_remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> list[str]:
+    """A line for each code: that of the first mode that has it, and which others have it, too."""
+    by_code: dict[str, list[Remark]] = {}
+    for remark in [*(one for mode in modes for one in mode.remarks), *remarks]:
+        by_code.setdefault(remark.code, []).append(remark)
+    return [line for same in by_code.values() for line in _one_line(joined(same))]
+
+
+def _one_line(same: list[Remark]) -> list[str]:
+    first, *others = same
+    about = ", ".join(remark.about for remark in others)
+    if others and not about:
+        return [str(remark) for remark in same]
+    return [f"{first}{f' (the like of {about})' if about else ''}"]
+
+
+def summary(modes: Sequence[Mode], *, everything: bool) -> str:
+    """How many modes are trusted, doubtful and rejected, in a line."""
+    count = Counter(trust_of(mode) for mode in modes)
+    counts = ", ".join(f"{count[trust]} {trust}" for trust in ORDER)
+    return counts + (" (--all shows each, with every remark)" if modes and not everything else "")
+
+
+def reasons(modes: Sequence[Mode]) -> list[str]:
+    """Which modes are doubtful and rejected by which rules, a line each verdict."""
+    lines = []
+    for trust in ORDER[1:]:
+        each = [
+            f"{mode.frequency:.0f} Hz ({', '.join(code for code, _ in trust_rules(mode))})"
+            for mode in modes
+            if trust_of(mode) is trust
+        ]
+        lines += [f"{trust}: {', '.join(each)}"] if each else []
+    return lines
+
+
+def picked_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
+    """Modes by peak picking, and how far each is from the fitted mode nearest to it."""
+    made = table("f_n (Hz)", "zeta (%)", "K (N/um)", "<against the fit")
+    for mode in picked:
+        near = min(fitted, key=lambda other: abs(other.frequency - mode.frequency), default=None)
+        same = near is not None and abs(near.frequency - mode.frequency) < mode.damping_ratio * mode.frequency
+        made.add_row(
+            f"{mode.frequency:.5g}",
+            f"{100 * mode.damping_ratio:.5g}",
+            f"{mode.stiffness / 1e6:.5g}",
+            _difference(mode, near) if same and near is not None else "not fitted",
+        )
+    return made
+
+
+def _difference(mode: Mode, fit: Mode) -> str:
+    zeta, k = mode.damping_ratio / fit.damping_ratio - 1, mode.stiffness / fit.stiffness - 1
+    return f"f_n {mode.frequency - fit.frequency:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
+
+
+def file_modes_json(found: FileModes) -> dict[str, Any]:
+    """The modes of one file."""
+    return {
+        "file": str(found.path),
+        "n_averages": found.frf.n_averages,
+        "usable_band_hz": found.frf.usable_band,
+        "facts": [asdict(fact) for fact in found.facts],
+        "modes": [mode_json(mode) for mode in found.fitted],
+        "peak_picking": [mode_json(mode) for mode in found.picked],
+        "remarks": [asdict(remark) for remark in found.remarks],
+    }
+
+
+def file_modes_texts(found: FileModes, *, everything: bool = False) -> list[str | Table]:
+    """The modes of one file for people; those that are rejected, and each single remark, where everything is wanted."""
+    frf, shown = found.frf, in_order(found.fitted, rejected=everything)
+    usable = "" if frf.usable_band is None else f", usable {frf.usable_band[0]:.0f} to {frf.usable_band[1]:.0f} Hz"
+    lines = f"{frf.frequency.size} lines {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
+    remarks = remark_lines if everything else short_remark_lines
+    return [
+        f"{found.path.name}: {frf.n_averages} hit(s) averaged, {lines}{usable}",
+        *_not_in_file(found),
+        mode_table(shown),
+        summary(found.fitted, everything=everything),
+        *reasons(shown),
+        *mode_lines(shown if everything else [mode for mode in shown if trust_of(mode) is Trust.TRUSTED]),
+        *remarks(shown, found.remarks),
+        "peak picking (eqs. 28, 29), for comparison:",
+        picked_table(found.picked, found.as_recorded),
+    ]
+
+
+def _not_in_file(found: FileModes) -> list[str]:
+    """What is known of it by option, or was taken."""
+    words = {"option": "by option", "default": "nobody says, taken"}
+    told = {origin: [f"{one.name} {one.value}" for one in found.facts if one.origin == origin] for origin in words}
+    return [f"{words[origin]}: {'; '.join(texts)}" for origin, texts in told.items() if texts]

@@ -1,0 +1,75 @@
+"""What the tap tests of several tools say of joints and bearings, and of tools that were not tapped."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import Any
+
+from rich.table import Table
+
+from dsm import Joint, plus_minus
+from lobewatch.logbook.joints.tools_calibration import ToolsCalibration
+from lobewatch.show.spindle.describe_model import stiffness_fit_json
+from lobewatch.show.terminal.output import table
+
+NOT_FIT = "the tools do not fit one spindle: nothing is to be written into machine.toml"
+OPEN = "no measured mode feels the joints: nothing is to be written into machine.toml"
+
+
+def tools_json(found: ToolsCalibration) -> dict[str, Any]:
+    """The fit, what it rests on, and other tools as it has them."""
+    return stiffness_fit_json(found.fit) | {
+        "taps": {tap.tool: tap.tap_id for tap in found.taps},
+        "tool": [found.taps[i].tool for i in found.fit.shaft],
+        "fits_one_spindle": not found.fit.misfits,
+        "not_counted_hz": found.left_out,
+        "machine_toml": _joint_lines(found.joints),
+        "predicted": {name: mode._asdict() for name, mode in found.predicted.items()},
+        "remarks": [*map(asdict, found.fit.remarks), *map(asdict, found.remarks)],
+    }
+
+
+def tools_texts(found: ToolsCalibration) -> list[str | Table]:
+    """The same for people."""
+    label = [f"model: {found.label}"] if found.label else []
+    taps = [
+        f"spindle {number}: tool {tap.tool}, {tap.tap_id}, mode {tap.number} is followed"
+        for number, tap in enumerate(found.taps, 1)
+    ]
+    left = [
+        f"not counted: {', '.join(f'{one:.1f}' for one in frequencies)} Hz of tool {tool}, nothing of the model is near"
+        for tool, frequencies in found.left_out.items()
+    ]
+    warnings = [f"warning: {remark}" for remark in found.remarks]
+    return [*label, *taps, str(found.fit), *left, *warnings, *_to_enter(found), *_predicted(found)]
+
+
+def _to_enter(found: ToolsCalibration) -> list[str]:
+    if found.joints:
+        unsure = ", ".join(sorted(found.fit.open_groups))
+        said = f" (open: {unsure}; good only together with the others)" if unsure else ""
+        return [f"for [spindle] of machine.toml{said}:", *_joint_lines(found.joints)]
+    return [NOT_FIT if found.fit.misfits else OPEN]
+
+
+def _joint_lines(joints: tuple[Joint, ...]) -> list[str]:
+    """As they stand in machine.toml."""
+    if not joints:
+        return []
+    lines = [
+        f"    {{ position_mm = {joint.position * 1e3:.6g}, stiffness_n_per_um = {joint.stiffness / 1e6:.4g}, "
+        f"rotational_stiffness_n_m_per_rad = {joint.rotational_stiffness:.4g}, group = {json.dumps(joint.group)} }},"
+        for joint in joints
+    ]
+    return ["joints = [", *lines, "]"]
+
+
+def _predicted(found: ToolsCalibration) -> list[Table]:
+    if not found.predicted or found.fit.misfits:
+        return []
+    made = table("~tool, not tapped here", "softest mode (Hz)", "K at the tip (N/um)")
+    for name, mode in found.predicted.items():
+        frequency = plus_minus(mode.frequency, mode.frequency_std)
+        made.add_row(name, frequency, plus_minus(mode.stiffness, mode.stiffness_std, 1e6))
+    return [made]

@@ -1,0 +1,1 @@
+"""The terminal: tables, notes and progress, keys, the operator's screen in characters."""

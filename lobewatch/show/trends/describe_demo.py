@@ -1,0 +1,82 @@
+"""The demo's tap tests as a JSON object and as text: the truth, and what was found beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import astuple
+from pathlib import Path
+from typing import Any
+
+from rich.table import Table
+
+from lobewatch.decay.trend import date
+from lobewatch.show.terminal.output import table
+from lobewatch.show.trends.dates import dates_json, dates_text
+from lobewatch.tap.stories.demo import DemoTap, SpindleState
+from lobewatch.tap.stories.truth import Foretold
+
+KEYS = ("frequency_hz", "damping_ratio", "stiffness_n_per_m", "bearing_stiffness_n_per_m")
+"""Names of the figures of a SpindleState in JSON ..."""
+NAMES = ("f_1", "zeta", "K", "bearing stiffness")
+"""... and for people."""
+COLUMNS = (("f_1 Hz", 1.0, 2), ("zeta %", 0.01, 3), ("K N/um", 1e6, 3), ("k_b N/um", 1e6, 1))
+"""Heading, size of the unit and decimals."""
+
+
+def demo_json(taps: Sequence[DemoTap], told: Sequence[Foretold], report: Path) -> dict[str, Any]:
+    """All tap tests, and the forecast beside the truth."""
+    forecast = {one.what: {**dates_json(one.reached), "truth": _date(one.truth)} for one in told}
+    return {"taps": [_entry(tap) for tap in taps], "forecast": forecast, "report": str(report)}
+
+
+def _date(days: float | None) -> str | None:
+    return None if days is None else f"{date(days):%Y-%m-%d}"
+
+
+def _entry(tap: DemoTap) -> dict[str, Any]:
+    about = {"date": tap.plan.date.isoformat(), "direction": tap.plan.direction}
+    return about | {"truth": _json(tap.plan.truth), "found": _json(tap.found)}
+
+
+def _json(state: SpindleState) -> dict[str, float]:
+    return dict(zip(KEYS, astuple(state), strict=True))
+
+
+def demo_texts(taps: Sequence[DemoTap], told: Sequence[Foretold], scatter: float, report: Path) -> list[str | Table]:
+    """Tap tests, worst errors, and the forecast beside the truth, for people; scatter: of f_1, as a share of it."""
+    in_x = [tap for tap in taps if tap.plan.direction == "x"]
+    first, last = in_x[0], in_x[-1]
+    found = last.found.relative_to(first.found).stiffness
+    true = last.plan.truth.relative_to(first.plan.truth).stiffness
+    return [
+        "Emulated, and found beside it (f_1 natural frequency, zeta damping ratio, K stiffness at the tool tip,",
+        f"k_b stiffness of each bearing); before each test the tool is remounted: f_1 scatters by {100 * scatter:g} %.",
+        _table(taps),
+        "worst error: " + ", ".join(_worst(taps)),
+        f"K over the whole demo, in x: {100 * found:+.2f} % found, {100 * true:+.2f} % true",
+        *([] if not told else ["Foretold after the last test, and what the emulated spindle does if it goes on so:"]),
+        *(f"{one.what}: {dates_text(one.reached, one.horizon, seen=False)}; true {_truth(one)}" for one in told),
+        f"report: {report}",
+    ]
+
+
+def _truth(one: Foretold) -> str:
+    return _date(one.truth) or "never, or not for years"
+
+
+def _table(taps: Sequence[DemoTap]) -> Table:
+    made = table("<test", *(word for heading, _, _ in COLUMNS for word in (heading, "found")))
+    for tap in taps:
+        pairs = zip(astuple(tap.plan.truth), astuple(tap.found), strict=True)
+        cells = [
+            f"{value / scale:.{digits}f}"
+            for pair, (_, scale, digits) in zip(pairs, COLUMNS, strict=True)
+            for value in pair
+        ]
+        made.add_row(f"{tap.plan.date:%Y-%m} {tap.plan.direction}", *cells)
+    return made
+
+
+def _worst(taps: Sequence[DemoTap]) -> list[str]:
+    errors = zip(*(astuple(tap.found.relative_to(tap.plan.truth)) for tap in taps), strict=True)
+    return [f"{name} {100 * max(map(abs, values)):.2g} %" for name, values in zip(NAMES, errors, strict=True)]

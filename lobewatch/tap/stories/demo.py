@@ -1,0 +1,169 @@
+"""A spindle that ages, tapped every month: what was emulated beside what was found."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import astuple, dataclass
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from acquisition import UNSAID, Circumstances, Conditions, DataError, Structure, TapDirection
+from dsm import Spindle
+from lobewatch.logbook import Logbook
+from lobewatch.machine import MachineFolder
+from lobewatch.machine.additions.correct import add_event
+from lobewatch.measuring import Measurement
+from lobewatch.tap.connection import Connector
+from lobewatch.tap.emulated_spindle import device_in_step, emulated_structure
+from lobewatch.tap.hit_loop import HitLoop, Wishes
+from lobewatch.tap.in_progress import begin_tap
+from lobewatch.tap.judged_hits import JudgedHits
+from lobewatch.tap.phases import Phases
+from lobewatch.tap.publisher import Publisher
+from lobewatch.tap.state import TapState, Word
+from lobewatch.tap.stories.mounting import Mounting, remounted
+from lobewatch.tap.stories.story import Story, Wear
+
+SCATTERS = Mounting()
+"""Tests that differ by their scatter alone."""
+DIRECTIONS: dict[TapDirection, int] = {"x": 0, "y": 30}
+"""Of the tests of a month, and the minute of the hour at which each is taken."""
+
+
+@dataclass(frozen=True)
+class SpindleState:
+    """A spindle in four figures."""
+
+    frequency: float
+    """First natural frequency (Hz)."""
+    damping_ratio: float
+    """Its damping ratio (-)."""
+    stiffness: float
+    """Its stiffness at the tool tip (N/m)."""
+    bearing_stiffness: float
+    """Of each bearing (N/m)."""
+
+    def relative_to(self, other: SpindleState) -> SpindleState:
+        """Relative differences (-)."""
+        return SpindleState(*(mine / its - 1 for mine, its in zip(astuple(self), astuple(other), strict=True)))
+
+
+@dataclass(frozen=True)
+class PlannedTap:
+    """One tap test of the demo before it is taken."""
+
+    date: datetime
+    """Of the simulated calendar; the two of a month differ."""
+    direction: TapDirection
+    """In which is tapped."""
+    structure: Structure
+    """What the hammer meets."""
+    truth: SpindleState
+    """The same in four figures."""
+    conditions: Conditions = UNSAID
+    """What is said of the test."""
+
+
+@dataclass(frozen=True)
+class TakenTap:
+    """One tap test of the demo, committed."""
+
+    plan: PlannedTap
+    """What was emulated."""
+    id: str
+    """In the journal."""
+
+
+@dataclass(frozen=True)
+class DemoTap:
+    """One tap test of the demo."""
+
+    plan: PlannedTap
+    """What was emulated."""
+    found: SpindleState
+    """What the pipeline made of the hits."""
+
+
+def plan_taps(
+    folder: MachineFolder,
+    months: int,
+    random: np.random.Generator,
+    scatter: float,
+    story: Story = Story.STEADY,
+    mounting: Mounting = SCATTERS,
+) -> list[PlannedTap]:
+    """Tap tests in x and y every month of a story; the tool is remounted before each test.
+
+    scatter: standard deviation of f_1 from test to test, as a share of it (-), in place of that of `mounting`: every
+    test has bearings whose stiffness puts f_1 where remounting has moved it. DataError without [spindle].
+    """
+    wear, mounting = Wear.of(folder, months, story), mounting._replace(scatter=scatter)
+    shifts, warmth = mounting.shifts(months, len(DIRECTIONS), random), mounting.temperatures(months)
+    plans = []
+    for month in range(months):
+        spindle = wear.spindle(month)
+        under = UNSAID if warmth is None else Conditions(temperature_c=round(float(warmth[month]), 1))
+        for (direction, minute), shift in zip(DIRECTIONS.items(), shifts[month].tolist(), strict=True):
+            date = datetime(2024 + month // 12, month % 12 + 1, 15, 9, minute, tzinfo=UTC)
+            plans.append(_plan(folder, date, direction, remounted(spindle, shift), under))
+    return plans
+
+
+def age_spindle(
+    folder: MachineFolder,
+    months: int,
+    seed: int,
+    scatter: float,
+    story: Story = Story.STEADY,
+    mounting: Mounting = SCATTERS,
+) -> Iterator[TakenTap]:
+    """Take the tap tests of `plan_taps`, each through a real serial port (a pseudo-terminal)."""
+    random = np.random.default_rng(seed)
+    plans = plan_taps(folder, months, random, scatter, story, mounting)
+    replaced = Wear.of(folder, months, story).replaced_at
+    for number, (plan, hammering) in enumerate(zip(plans, random.spawn(len(plans)), strict=True)):
+        if replaced is not None and number == len(DIRECTIONS) * replaced:
+            add_event(folder, "bearings replaced", plan.date - timedelta(days=1), new_baseline=True)
+        yield TakenTap(plan, _take(folder, plan, hammering))
+
+
+def compare_with_truth(logbook: Logbook, taken: Iterable[TakenTap]) -> list[DemoTap]:
+    """What all these tests say, beside what was emulated; DataError where one does not show the mode followed.
+
+    The history is worked out once, after the last test, and not anew after every one with a word on every program.
+    """
+    return [DemoTap(tap.plan, _found(logbook.measurement(tap.id))) for tap in taken]
+
+
+def _plan(
+    folder: MachineFolder, date: datetime, direction: TapDirection, spindle: Spindle, under: Conditions
+) -> PlannedTap:
+    damping = folder.machine.spindle.damping_ratio if folder.machine.spindle else 0.0
+    structure = emulated_structure(spindle, damping)
+    truth = (structure.frequency[0], damping, structure.stiffness[0], spindle.bearings[0].stiffness)
+    return PlannedTap(date, direction, structure, SpindleState(*map(float, truth)), under)
+
+
+def _take(folder: MachineFolder, plan: PlannedTap, random: np.random.Generator) -> str:
+    """Take and commit one tap test as a session without a person does; its id."""
+    machine, toml = folder.machine, folder.toml.read_text("utf-8")
+    where = machine.machine.name, plan.date, machine.tap.tool, plan.direction
+    about = Circumstances(*where, "the demo", toml, conditions=plan.conditions)
+    publisher = Publisher(TapState(0, Word.CHECKING, "", wanted=machine.tap.hits), time.monotonic)
+    with device_in_step(plan.structure, random) as open_device, threadpool_limits(limits=1), folder.locked():
+        hits = JudgedHits(begin_tap(folder, about, resume=False), machine)
+        loop = HitLoop(hits, publisher, Wishes(), guided=False)
+        Phases(folder, hits, loop, publisher, guided=False).run(Connector(folder, open_device, publisher, time.sleep))
+        folder.commit(hits.tap.finish())
+    return hits.tap.id
+
+
+def _found(measurement: Measurement) -> SpindleState:
+    mode, calibration = measurement.followed, measurement.calibration
+    if mode is None or calibration is None:
+        why = "; ".join(map(str, measurement.remarks))
+        raise DataError(f"tap {measurement.tap_id}: {why}; take a smaller --scatter")
+    return SpindleState(mode.frequency, mode.damping_ratio, mode.stiffness, calibration.bearing_stiffness)

@@ -1,0 +1,162 @@
+"""One tool in the spindle as it is known at some time: the newest tap in x and the newest in y, or a prediction."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Remark
+from dsm import Calibration
+from lobes import Cut, StabilityLobes, lowest_of, zero_order
+from lobewatch.machine import Machine
+from lobewatch.measuring.measurement import Measurement
+from lobewatch.measuring.questions.asked import in_question, open_questions
+from lobewatch.tool.series import Point, Scatter, frequency_at, scatter_of
+from modal import Mode
+
+if TYPE_CHECKING:
+    from lobewatch.verdicts.doubt import Doubt
+
+Modes = Sequence[Mode] | None
+"""Of one direction at the tool tip; None where neither direction is known."""
+ABOUT_DIRECTIONS = ("one-direction", "older-direction")
+"""Codes of the remarks on what is known in x and y."""
+TOGETHER = timedelta(hours=24)
+"""Taps in x and y further apart than this are called so."""
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """What lobes and verdicts of one tool are computed from."""
+
+    tool: str
+    """What is in the spindle."""
+    time: datetime
+    """Of its newest tap test; of the one that the bearings come from where it is predicted."""
+    tap_id: str
+    """Of the same, or where the prediction comes from."""
+    x: Modes
+    """At the tool tip in x of the machine; like y where x was not tapped."""
+    y: Modes
+    """The same in y."""
+    directions: tuple[str, ...]
+    """Those that are known; what is not is taken like the other one, never as rigid."""
+    calibration: Calibration | None
+    """The model with the newest bearings."""
+    taps: Mapping[str, str]
+    """Tap test by direction; empty where it is predicted."""
+    predicted: bool
+    """Whether all of it comes from the model, for a tool that was never tapped."""
+    remarks: tuple[Remark, ...]
+    """What is not known, and what is in doubt."""
+    series: Mapping[str, Sequence[Point]] = field(default_factory=dict)
+    """Tap tests of the same tool up to then, by direction; empty where it is predicted."""
+
+    cuts: int = 0
+    """Test cuts that its modes at speed were learnt from; 0 where it stands for the spindle at rest."""
+    doubt: Doubt | None = None
+    """What these have left open; None at rest."""
+    questions: tuple[Remark, ...] = ()
+    """What nobody has answered of these tap tests; until then nothing is sure."""
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether both directions are known, from tap tests that nothing is asked about."""
+        return len(self.directions) == 2 and not self.questions
+
+    @property
+    def label(self) -> str:
+        """What a legend says."""
+        return f"predicted, bearings of {self.time:%Y-%m-%d}" if self.predicted else f"{self.time:%Y-%m-%d}"
+
+    def scatter(self, direction: str) -> Scatter | None:
+        """From tap test to tap test; None where there are too few."""
+        return scatter_of(self.series.get(direction, ()))
+
+
+def assemble(newest: Measurement, other: Measurement | None, series: Mapping[str, Sequence[Point]]) -> Assembly:
+    """From the newest tap test of a tool and the newest one in the other direction, however old, where there is one.
+
+    series: tap tests of both directions up to the newest. The frequencies of an older direction are moved by as much as
+    those of the newest one have changed since.
+    """
+    seen = [newest, *([other] if other is not None else [])]
+    modes: dict[str, Modes] = {one.direction: one.at_tip for one in seen if one.at_tip}
+    moved = None if other is None else _change_since(other.time, series.get(newest.direction, ()))
+    if other is not None and moved is not None and newest.time - other.time > TOGETHER:
+        modes |= {other.direction: [mode.scaled(moved, 1.0, "moved with the other direction") for mode in other.at_tip]}
+    directions = tuple(name for name in ("x", "y") if modes.get(name))
+    calibration = next((one.calibration for one in seen if one.calibration is not None), None)
+    return Assembly(
+        tool=newest.tool,
+        time=newest.time,
+        tap_id=newest.tap_id,
+        x=modes.get("x") or modes.get("y"),
+        y=modes.get("y") or modes.get("x"),
+        directions=directions,
+        calibration=calibration,
+        taps={one.direction: one.tap_id for one in seen},
+        predicted=False,
+        remarks=(*newest.remarks, *_about_directions(newest, other, directions, moved)),
+        series=series,
+        questions=tuple(in_question(one.tap_id, asked) for one in seen for asked in open_questions(one.remarks)),
+    )
+
+
+def untapped(tool: str, known: str) -> Remark:
+    """That one direction alone is known."""
+    missing = "y" if known == "x" else "x"
+    text = f"modes in the {known} direction alone, {missing} taken like {known}"
+    return Remark("one-direction", tool, text, f"tap direction {missing} of the same tool too")
+
+
+def _change_since(time: datetime, series: Sequence[Point]) -> float | None:
+    """Frequency of the newest test of a series over that at a time."""
+    then = frequency_at(series, time)
+    return None if then is None else series[-1].frequency / then
+
+
+def _about_directions(
+    newest: Measurement, other: Measurement | None, directions: Sequence[str], moved: float | None
+) -> tuple[Remark, ...]:
+    if len(directions) == 1:
+        return (untapped(newest.tool, directions[0]),)
+    if other is None or newest.time - other.time <= TOGETHER:
+        return ()
+    days = round((newest.time - other.time) / timedelta(days=1))
+    text = f"direction {other.direction} is that of {other.time:%Y-%m-%d}, {days} day{'s' if days > 1 else ''} older"
+    if moved is not None:
+        text += f", its f_n moved by {100 * (moved - 1):+.1f} % as that of {newest.direction} since"
+    return (Remark("older-direction", newest.tool, text, f"tap direction {other.direction} again"),)
+
+
+def speed_grid(machine: Machine) -> NDArray[np.float64]:
+    """The common speeds of all diagrams of a machine (rpm), shape ([speed] steps,)."""
+    return np.linspace(machine.speed.low_rpm, machine.speed.high_rpm, machine.speed.steps)
+
+
+def lobes_of(assembly: Assembly, machine: Machine) -> dict[str, StabilityLobes]:
+    """Diagrams by zero order, by name of the cut: the reference cut and every program of the tool. A chart, no verdict.
+
+    Each shows the lower one of its directions of feed. Empty where no modes are known.
+    """
+    return tip_lobes(assembly.tool, assembly.x, assembly.y, machine)
+
+
+def tip_lobes(
+    tool: str, x: Modes, y: Modes, machine: Machine, names: Collection[str] | None = None
+) -> dict[str, StabilityLobes]:
+    """The same of modes at the tip; names: of these cuts alone. Cuts that are alike are worked out once."""
+    if not x and not y:
+        return {}
+    speeds, known = speed_grid(machine), dict[tuple[Cut, ...], StabilityLobes]()
+    wanted = {name: cuts for name, cuts in machine.cuts(tool).items() if names is None or name in names}
+    for cuts in wanted.values():
+        if cuts not in known:
+            known[cuts] = lowest_of([zero_order(x, y, cut, speeds) for cut in cuts])
+    return {name: known[cuts] for name, cuts in wanted.items()}

@@ -1,0 +1,88 @@
+"""Stability lobes by the method and from the dynamics that are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Frf
+from lobes import Cut, StabilityLobes, average_angle, lowest_of, stability_boundary, zero_order
+from lobes.tip_response import Tip
+from lobewatch.machine import REFERENCE_CUT, CutTable, Machine
+from lobewatch.tool.assembly import Assembly
+
+MOST_SPEEDS = 400
+"""Speeds of a chart by semi-discretisation."""
+DEEPEST = 12.0
+"""Depth up to which it looks, as a multiple of the lowest limit by zero order."""
+
+
+class Method(StrEnum):
+    """How limits are found."""
+
+    ZERO_ORDER = "zero-order"
+    AVERAGE_ANGLE = "average-angle"
+    SEMI_DISCRETISATION = "semi-discretisation"
+
+
+class Dynamics(StrEnum):
+    """What the lobes are computed from."""
+
+    MODES = "modes"
+    FRF = "frf"
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """The lobes of one cut, and what they came from."""
+
+    name: str
+    """Of the cut."""
+    table: CutTable
+    """The cut as it stands in machine.toml."""
+    assembly: Assembly
+    """The tool in the spindle, as measured or predicted."""
+    source: Dynamics
+    """What of it was used."""
+    x: Tip | None
+    """Dynamics at the tool tip in the feed direction; None where they are not known."""
+    y: Tip | None
+    """The same normal to the feed."""
+    cuts: tuple[Cut, ...]
+    """The cut in SI units, one a direction of feed."""
+    lobes: StabilityLobes
+    """Its limits."""
+
+
+def cut_table(machine: Machine, name: str) -> CutTable:
+    """The reference cut or a program by its name; KeyError for one that is not there."""
+    for table in machine.program:
+        if table.name == name:
+            return table
+    if name != REFERENCE_CUT or machine.reference_cut is None:
+        raise KeyError(name)
+    return machine.reference_cut
+
+
+def chart(
+    method: Method, x: Tip | None, y: Tip | None, cuts: Sequence[Cut], speed_rpm: NDArray[np.float64]
+) -> StabilityLobes:
+    """The lowest lobes of a cut in its directions of feed over speeds (rpm), fewer of them by semi-discretisation."""
+    return lowest_of([_chart(method, x, y, cut, speed_rpm) for cut in cuts])
+
+
+def _chart(method: Method, x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: NDArray[np.float64]) -> StabilityLobes:
+    if method is Method.AVERAGE_ANGLE:
+        return average_angle(x, y, cut, speed_rpm)
+    mean = zero_order(x, y, cut, speed_rpm)
+    if method is Method.ZERO_ORDER:
+        return mean
+    if isinstance(x, Frf) or isinstance(y, Frf):
+        raise ValueError("--method semi-discretisation works from the modes; leave --source frf out")
+    speeds = np.linspace(speed_rpm[0], speed_rpm[-1], min(MOST_SPEEDS, speed_rpm.size))
+    lowest = mean.minimum.depth
+    return stability_boundary(x, y, cut, speeds, DEEPEST * lowest if np.isfinite(lowest) else 0.1)

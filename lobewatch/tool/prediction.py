@@ -1,0 +1,73 @@
+"""One tap, every tool: what the calibrated model says of a tool that was never tapped."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from acquisition import DataError, Remark
+from dsm import Calibration, calibrate, modes_at
+from lobewatch.machine import Machine
+from lobewatch.measuring.measurement import Measurement
+from lobewatch.measuring.model_state import model_state
+from lobewatch.tool.assembly import Assembly, Modes, untapped
+from modal import Mode
+
+MODES = 8
+"""Modes worked out; those in which the tip is next to at rest are left out."""
+AT_REST = 50.0
+"""A mode so many times stiffer at the tip than the softest one does not move a limit by more than a few percent."""
+
+
+def predict(machine: Machine, newest: Sequence[Measurement], tool: str) -> Assembly:
+    """A tool as the model has it, in each direction with the bearings of the newest calibrated measurement of it.
+
+    newest: those measurements, the newest of all first. The damping ratio is that of the mode followed, and so is the
+    phase of the softest mode, since the same bearings and joints damp it; the others are real, as the model has them.
+    DataError where there is no model of the tool, or no tap test that the bearings could be found from.
+    """
+    if not newest:
+        model_state(machine, None, tool)
+        raise DataError(f"tool {tool!r} was never tapped, and no tap test has set the bearings of the model yet")
+    found = {one.direction: _in_direction(machine, one, tool) for one in newest}
+    modes: dict[str, Modes] = {direction: seen for direction, (seen, _) in found.items()}
+    ids = " and ".join(one.tap_id for one in newest)
+    remark = Remark("predicted", f"tool {tool!r}", f"predicted by the model with the bearings of {ids}", "tap it")
+    known = tuple(name for name in ("x", "y") if name in modes)
+    return Assembly(
+        tool=tool,
+        time=newest[0].time,
+        tap_id=f"prediction from {newest[0].tap_id}",
+        x=modes.get("x") or modes.get("y"),
+        y=modes.get("y") or modes.get("x"),
+        directions=known,
+        calibration=found[newest[0].direction][1],
+        taps={},
+        predicted=True,
+        remarks=(remark, *([untapped(tool, known[0])] if len(known) == 1 else [])),
+    )
+
+
+def _in_direction(machine: Machine, one: Measurement, tool: str) -> tuple[list[Mode], Calibration]:
+    """The modes that the model shows in the band that was looked at, moved along with the softest one."""
+    state, followed = model_state(machine, one, tool), one.followed
+    if followed is None:
+        raise DataError(f"{one.tap_id}: no mode is followed")
+    frequency, stiffness = modes_at(state.spindle, MODES)
+    softest = int(np.argmin(stiffness))
+    seen = stiffness < AT_REST * stiffness[softest]
+    if machine.mode.band_hz is not None:
+        low, high = (edge / followed.frequency * frequency[softest] for edge in machine.mode.band_hz)
+        seen &= (frequency >= low) & (frequency <= high)
+    modes = [
+        Mode(
+            float(frequency[i]),
+            followed.damping_ratio,
+            float(stiffness[i]),
+            method=f"model, bearings of {one.tap_id}",
+            phase_deg=followed.phase_deg if i == softest else 0.0,
+        )
+        for i in np.flatnonzero(seen).tolist()
+    ]
+    return modes, calibrate(state.spindle, float(frequency[softest]), mode=softest + 1)

@@ -1,0 +1,19 @@
+"""What a tool allows: doubt, word and limit of each program, why, and settings that would be safe."""
+
+from .advice import Advice, advise
+from .doubt import Doubt, doubt_of
+from .robust_pockets import robust_pockets
+from .setting_search import Setting
+from .verdict import Ruling, Verdict, Word
+
+__all__ = [
+    "Advice",
+    "Doubt",
+    "Ruling",
+    "Setting",
+    "Verdict",
+    "Word",
+    "advise",
+    "doubt_of",
+    "robust_pockets",
+]

@@ -1,0 +1,169 @@
+"""What is not known of a program on a spindle, as numbers: made here from tap tests and machine.toml, drawn from here.
+
+Half-widths of independent uniform distributions. Whatever is said of a program over its doubt comes from these draws.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobes import MillingRows, cutting_coefficients
+from lobewatch.machine import CutTable, DoubtTable, Machine
+from lobewatch.tool.assembly import Assembly
+from lobewatch.tool.series import Scatter
+from modal import Mode
+
+SCATTER = Scatter(0.003, 0.10, 0.03)
+"""From tap test to tap test, until a series tells its own."""
+LEAST = 0.02
+"""Nothing is drawn below this share of its middle value ..."""
+MOST_TURNED = np.radians(89)
+"""... and no phase beyond this (rad)."""
+
+Floats = NDArray[np.float64]
+
+
+class Span(NamedTuple):
+    """Lowest and highest value over the middle one."""
+
+    low: float
+    """At most 1."""
+    high: float
+    """At least 1."""
+
+
+@dataclass(frozen=True, eq=False)
+class Doubt:
+    """What is not known, by what it comes from."""
+
+    modes: Mapping[str, Floats]
+    """Half-widths of frequency, damping ratio and stiffness (relative) and phase (rad) of the modes in x, then y, shape
+    (n, 4), by cause: "tap" (the error of the tap test), "clamping" (from tap test to tap test), "prediction" (a tool
+    that was never tapped), "untapped" (a direction that was not)."""
+    mixing: Floats
+    """Roots of the correlations of the error of the tap test, lower triangular, shape (n, 4, 4); 1 where none count."""
+    speed: float
+    """Relative half-width of the spindle speed."""
+    tangential: Span
+    """Of the cutting coefficient Kt."""
+    ratio: Span
+    """Of Kr/Kt, the direction of the force."""
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """All that it comes from."""
+        return (*self.modes, "speed", "coefficients")
+
+    def draw(self, middle: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
+        """Systems within the doubt (count rows) around one (a row), the same for a seed whatever is left out.
+
+        without: a cause that is taken as known.
+        """
+        random, phases = np.random.default_rng(seed), np.random.default_rng((seed, 1))
+        factor = np.ones((count, middle.frequency.shape[1], 3))
+        turned = np.zeros(factor.shape[:2])
+        for cause, widths in self.modes.items():
+            uniform = random.uniform(-1, 1, factor.shape), phases.uniform(-1, 1, (*turned.shape, 1))
+            moved = widths * self._mixed(cause, np.concatenate(uniform, axis=-1))
+            if cause != without:
+                factor *= np.maximum(1 + moved[..., :3], LEAST)
+                turned += moved[..., 3]
+        speed = 1 + self.speed * random.uniform(-1, 1, count) * (without != "speed")
+        tangential, ratio = (span.low + (span.high - span.low) * random.uniform(0, 1, count) for span in self._spans)
+        if without == "coefficients":
+            tangential, ratio = np.ones((2, count))
+        all_of_them = middle[np.zeros(count, dtype=np.intp)]
+        return replace(
+            all_of_them,
+            frequency=all_of_them.frequency * factor[..., 0],
+            damping_ratio=all_of_them.damping_ratio * factor[..., 1],
+            stiffness=all_of_them.stiffness * factor[..., 2],
+            phase=np.clip(all_of_them.phase + turned, -MOST_TURNED, MOST_TURNED),
+            speed_rpm=all_of_them.speed_rpm * np.maximum(speed, LEAST),
+            tangential=all_of_them.tangential * np.maximum(tangential, LEAST),
+            radial=all_of_them.radial * np.maximum(tangential, LEAST) * np.maximum(ratio, 0.0),
+        )
+
+    def _mixed(self, cause: str, uniform: Floats) -> Floats:
+        """Correlated where the cause is the error of the tap test, shape (count, n, 4)."""
+        return np.einsum("nij,cnj->cni", self.mixing, uniform) if cause == "tap" else uniform
+
+    @property
+    def _spans(self) -> tuple[Span, Span]:
+        return self.tangential, self.ratio
+
+
+def doubt_of(assembly: Assembly, table: CutTable, machine: Machine) -> Doubt:
+    """The doubt of a cut with a tool as it is known at some time; where test cuts have taught, what they left."""
+    if assembly.doubt is not None:
+        return assembly.doubt
+    tangential, ratio = _coefficients(table, machine)
+    modes = [*(assembly.x or ()), *(assembly.y or ())]
+    mixing = np.array([_mixing(mode) for mode in modes])
+    return Doubt(_modes(assembly, machine.doubt), mixing, machine.doubt.speed_percent / 100, tangential, ratio)
+
+
+def _modes(assembly: Assembly, given: DoubtTable) -> dict[str, Floats]:
+    x, y = assembly.x or (), assembly.y or ()
+    absent = np.zeros((len(x) + len(y), 4))
+    if assembly.predicted:
+        made = {"prediction": np.array([_of_prediction(mode, given) for mode in (*x, *y)])}
+    else:
+        sides = (("x", len(x)), ("y", len(y)))
+        clamping = [np.tile(scatter_in(assembly, side, given), (count, 1)) for side, count in sides]
+        clamping = [widths * [1, 1, 1, np.pi / 180] for widths in clamping]
+        made = {"tap": np.array([_error(mode) for mode in (*x, *y)]), "clamping": np.vstack(clamping)}
+    if len(assembly.directions) == 1:
+        unknown = slice(len(x), None) if assembly.directions[0] == "x" else slice(0, len(x))
+        made["untapped"] = absent
+        absent[unknown] = given.untapped_frequency_percent / 100, 0.0, given.untapped_stiffness_percent / 100, 0.0
+    return made
+
+
+def scatter_in(assembly: Assembly, side: str, given: DoubtTable) -> Scatter:
+    """Scatter of the tap tests of a tool in a direction: what machine.toml says, else the series, else the default."""
+    known = side if side in assembly.directions else assembly.directions[0]
+    found = assembly.scatter(known) or SCATTER
+    asked = (given.frequency_percent, given.damping_percent, given.stiffness_percent)
+    sizes = [own if wish is None else wish / 100 for own, wish in zip(found[:3], asked, strict=True)]
+    return Scatter(sizes[0], sizes[1], sizes[2], found.phase_deg)
+
+
+def _of_prediction(mode: Mode, given: DoubtTable) -> tuple[float, float, float, float]:
+    """The phase may be none at all, or twice what it is taken for."""
+    frequency, damping = given.predicted_frequency_percent / 100, given.predicted_damping_percent / 100
+    return frequency, damping, given.predicted_stiffness_percent / 100, abs(np.radians(mode.phase_deg))
+
+
+def _error(mode: Mode) -> Floats:
+    """95 % of the error of the tap test, relative, of the phase in rad; 0 where it is not known."""
+    values = np.array([mode.frequency, mode.damping_ratio, mode.stiffness, 180 / np.pi])
+    error = np.append(mode.standard_error, mode.phase_deg_std)
+    return np.asarray(np.nan_to_num(mode.quantile() * error / values))
+
+
+def _mixing(mode: Mode) -> Floats:
+    """Root of the correlations of the errors of a mode whose phase was fitted, shape (4, 4); else 1."""
+    error = np.sqrt(np.diag(mode.joint_covariance))
+    if not np.all(error > 0):
+        return np.eye(4)
+    value, vector = np.linalg.eigh(mode.joint_covariance / np.outer(error, error))
+    _, triangle = np.linalg.qr((vector * np.sqrt(np.maximum(value, 0.0))).T)
+    return np.asarray((triangle * np.where(np.diag(triangle) < 0, -1.0, 1.0)[:, np.newaxis]).T)
+
+
+def _coefficients(table: CutTable, machine: Machine) -> tuple[Span, Span]:
+    """Kt and Kr/Kt over the middle: the published range of an alloy with several tests, else that of [doubt]."""
+    own = machine.coefficients(table)
+    alike = [one for one in cutting_coefficients() if own.alloy and one.alloy == own.alloy]
+    if len(alike) < 2 or own.radial == 0:
+        share = machine.doubt.coefficients_percent / 100
+        return Span(1 - share, 1 + share), Span(1 - share, 1 + share)
+    tangential = [one.tangential / own.tangential for one in alike]
+    ratio = [one.radial / one.tangential * own.tangential / own.radial for one in alike]
+    return Span(min(tangential), max(tangential)), Span(min(ratio), max(ratio))

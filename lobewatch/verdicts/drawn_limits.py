@@ -1,0 +1,71 @@
+"""The deepest stable depth of each draw, well enough for quantiles."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobes.program_limit import DEEPEST
+from lobewatch.verdicts.drawn import Drawn
+
+TRIED = np.array([0.75, 1.0, 1.4])
+"""Shares of the limit in the middle, for its own cutting coefficient, at which each draw is looked at ..."""
+BEYOND = np.array([2.0, 3.0])
+"""... and those that are stable at all of them too."""
+FREE = np.array([0.05, 0.2, 0.5, 1.0])
+"""Shares of the deepest of interest where there is no limit in the middle."""
+EXTREMES = 9
+"""So many of the lowest and highest limits are then refined, in all directions of feed that count."""
+STEPS = 3
+"""Of that refinement."""
+ALIKE = 1.15
+"""Directions of feed whose limit is at most so many times the lowest one count ..."""
+MOST = 3
+"""... the lowest of them."""
+
+Floats = NDArray[np.float64]
+
+
+def drawn_limits(drawn: Drawn, depth: float) -> Floats:
+    """Deepest stable depth of each draw (m), shape (draws,); inf beyond what is looked at.
+
+    Of the other draws than the lowest and highest it is the first change between the depths that are looked at,
+    linearly interpolated. depth: that of the program (m).
+    """
+    limit, worst = float(drawn.limits[0]), drawn.fed(0.0)
+    near = drawn.fed(ALIKE * limit, MOST)
+    own = (drawn.rows.tangential[0] / drawn.rows.tangential)[:, np.newaxis]
+    tried = own * limit * TRIED if np.isfinite(limit) else np.tile(DEEPEST * depth * FREE, (len(own), 1))
+    low, high, at_low, at_high = _brackets(tried, worst.growth(tried))
+    open_ones = np.flatnonzero(np.isinf(high)) if np.isfinite(limit) else np.empty(0, dtype=np.intp)
+    if open_ones.size:
+        further = np.hstack((low[open_ones, np.newaxis], own[open_ones] * limit * BEYOND))
+        known = _brackets(further, worst.some(open_ones).growth(further))
+        low[open_ones], high[open_ones], at_low[open_ones], at_high[open_ones] = known
+    found = _between(low, high, at_low, at_high)
+    order = np.argsort(found)
+    ends = np.unique(np.concatenate((order[:EXTREMES], order[-EXTREMES:])))
+    ends = ends[np.isfinite(found[ends])]
+    for _ in range(STEPS if ends.size else 0):
+        value = near.some(ends).growth(found[ends, np.newaxis])[:, 0]
+        above = value >= 0
+        low[ends], at_low[ends] = np.where(above, low[ends], found[ends]), np.where(above, at_low[ends], value)
+        high[ends], at_high[ends] = np.where(above, found[ends], high[ends]), np.where(above, value, at_high[ends])
+        found[ends] = _between(low[ends], high[ends], at_low[ends], at_high[ends])
+    return found
+
+
+def _brackets(tried: Floats, grown: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Depths on both sides of the first change to growth in each row, and growth there; inf where there is none."""
+    depth = np.pad(tried, ((0, 0), (1, 1)))
+    depth[:, -1] = np.inf
+    value = np.pad(grown, ((0, 0), (1, 1)), constant_values=1.0)
+    value[:, 0] = -np.abs(grown[:, 0])
+    first, row = np.argmax(value >= 0, axis=1), np.arange(len(value))
+    return depth[row, first - 1], depth[row, first], value[row, first - 1], value[row, first]
+
+
+def _between(low: Floats, high: Floats, at_low: Floats, at_high: Floats) -> Floats:
+    """Where growth is zero on a line."""
+    share = -at_low / (at_high - at_low)
+    return np.where(np.isfinite(high), low + share * (np.where(np.isfinite(high), high, low) - low), np.inf)

@@ -1,0 +1,73 @@
+"""How far what is not known of spindle and cut moves the line of a diagram."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobes import Cut, MillingRows, Program, StabilityLobes
+from lobewatch.machine import Machine
+from lobewatch.tool.assembly import Assembly
+from lobewatch.tool.charts import cut_table
+from lobewatch.verdicts.doubt import doubt_of
+from lobewatch.verdicts.drawn import middle_row
+from lobewatch.verdicts.mean_force import MeanForce
+from lobewatch.verdicts.verdict import QUANTILES
+
+DRAWS = 64
+"""From the doubt."""
+SPEEDS = 81
+"""Of the diagrams of the draws."""
+DEEP = 1e3
+"""Stands for no limit (m)."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class LimitBand:
+    """Between 1 and 99 % of the limits over the doubt, at the speeds of a diagram."""
+
+    speed_rpm: Floats
+    """Spindle speeds (rpm), shape (n,)."""
+    low: Floats
+    """1 % quantile of the limit, the line itself where that is lower (m), shape (n,)."""
+    high: Floats
+    """99 % quantile, or the line (m), shape (n,); inf where there is no limit."""
+
+
+def limit_band(line: StabilityLobes, cut: str, assembly: Assembly, machine: Machine) -> LimitBand:
+    """The band around the line of a cut (its name), by draws from the doubt (`doubt_of`).
+
+    Each draw is worked out by zero order. Of a line by another method it is the same line at the speed that belongs to
+    the frequency of the draw, times what zero order says of the rest: that holds to a per cent for a line by zero
+    order, and for any method as to spindle speed, cutting coefficient, and changes that all modes share.
+    """
+    cuts = machine.cuts(assembly.tool)[cut]
+    rows = middle_row(Program(cuts[0], 1.0, 1.0), assembly)
+    drawn = doubt_of(assembly, cut_table(machine, cut), machine).draw(rows, DRAWS)
+    softest = int(np.argmin(rows.stiffness[0] * rows.damping_ratio[0]))
+    moved = (drawn.speed_rpm / (drawn.frequency[:, softest] / rows.frequency[0, softest]))[:, np.newaxis]
+    low, high = float(np.min(line.speed_rpm)), float(np.max(line.speed_rpm))
+    speeds, middle = np.geomspace(low, high, SPEEDS), rows[np.zeros(DRAWS, np.intp)]
+    own = _depths(drawn, cuts, drawn.speed_rpm[:, np.newaxis] * speeds)
+    rest = own / _depths(middle, cuts, np.clip(moved * speeds, low, high))
+    order = np.argsort(line.speed_rpm)
+    known = line.speed_rpm[order], np.minimum(line.depth[order], DEEP)
+    limits = np.interp(np.clip(moved * line.speed_rpm, low, high), *known)
+    limits *= [np.interp(line.speed_rpm, speeds, ratio) for ratio in rest]
+    lowest, highest = np.quantile(limits, QUANTILES, axis=0)
+    return LimitBand(
+        line.speed_rpm,
+        np.minimum(lowest, line.depth),
+        np.maximum(np.where(highest < DEEP / 2, highest, np.inf), line.depth),
+    )
+
+
+def _depths(rows: MillingRows, cuts: Sequence[Cut], speed_rpm: Floats) -> Floats:
+    """Limit of each row in the worst of some cuts at speeds (rpm) of its own (r, s), DEEP where there is none."""
+    found = [MeanForce.of(replace(rows, cut=cut).fed_at(cut.feed_angle)).limits(speed_rpm)[0] for cut in cuts]
+    return np.asarray(np.minimum(np.min(found, axis=0), DEEP))

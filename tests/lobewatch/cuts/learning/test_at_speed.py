@@ -1,0 +1,109 @@
+"""Verdicts, advice and history where test cuts have taught, and as before where they have not."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from lobewatch.cli import app
+from lobewatch.cuts.learning.at_speed import LearntDoubt
+from lobewatch.logbook import Logbook
+from lobewatch.machine.additions.correct import exclude
+from lobewatch.machine.additions.keep_cut import keep_cut
+from lobewatch.machine.additions.observe_cut import observed
+from lobewatch.machine.journal.heard_cut import HeardCut
+from lobewatch.machine.settings.cut_setting import cut_setting
+from lobewatch.verdicts import Word
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+
+
+def hear(shop: Shop, speed: float, depth_mm: float, word: Any, frequency: float | None = None) -> HeardCut:
+    setting = cut_setting(shop.folder.machine, "A", speed, depth_mm)
+    return keep_cut(shop.folder, observed(setting, word, frequency, at=shop.start + timedelta(days=1)))
+
+
+def judged(shop: Shop, name: str = "A") -> Any:
+    (found,) = (one for one in shop.logbook.verdicts() if one.program.name == name)
+    return found
+
+
+def test_verdicts_are_at_speed_from_the_first_cut_on_and_narrower_with_more(shop: Shop) -> None:
+    shop.tap_both()
+    rest = judged(shop)
+    assert rest.assembly.cuts == 0
+    hear(shop, 12900, 3.0, "stable")
+    one = judged(shop)
+    for speed, depth in ((8700, 2.2), (12900, 3.4)):
+        hear(shop, speed, depth, "stable")
+    hear(shop, 8700, 3.0, "chatter", 1710.0)
+    four = judged(shop)
+    assert (one.assembly.cuts, four.assembly.cuts) == (1, 4)
+    assert isinstance(four.drawn.doubt, LearntDoubt)
+    assert four.limit_high / four.limit_low < one.limit_high / one.limit_low
+    assert four.limit_low > one.limit_low
+    assert four.word is Word.STABLE
+    assert four.chance_turning < rest.chance_turning
+    assert four.program.tangential_n_per_mm2 < rest.program.tangential_n_per_mm2
+    assert [two.rows.tangential[0] for two in (rest.drawn, four.drawn)] == pytest.approx(
+        [1.4e9, four.program.tangential_n_per_mm2 * 1e6]
+    )
+
+
+def test_what_holds_at_rest_and_what_at_speed_stands_below_the_diagram(shop: Shop) -> None:
+    shop.tap_both()
+    assert "at rest" not in CliRunner().invoke(app, ["lobes", str(shop.path)]).stdout
+    hear(shop, 12900, 3.0, "stable")
+    told = " ".join(CliRunner().invoke(app, ["lobes", str(shop.path)]).stdout.split())
+    assert "as it turns, from 1 cut" in told
+    assert "the diagram and its pockets are of the spindle at rest" in told
+    assert "the diagram is of the spindle at rest" in " ".join(
+        CliRunner().invoke(app, ["lobes", str(shop.path), "--cut", "A"]).stdout.split()
+    )
+
+
+def test_the_history_keeps_the_word_that_the_cuts_have_made_and_forgets_it_with_them(shop: Shop) -> None:
+    shop.tap_both()
+    before = shop.logbook.verdicts()
+    assert words(shop.logbook) == {one.program.name: one.word for one in before}
+    cut = hear(shop, 12900, 1.5, "chatter")
+    after = shop.logbook.verdicts()
+    assert words(shop.logbook) == {one.program.name: one.word for one in after}
+    assert judged(shop).word is not Word.STABLE
+    exclude(shop.folder, cut.id, "a chip was stuck")
+    again = shop.logbook.verdicts()
+    assert words(shop.logbook) == {one.program.name: one.word for one in before}
+    for then, now in zip(before, again, strict=True):
+        assert (now.limit, now.limit_low, now.limit_high) == (then.limit, then.limit_low, then.limit_high)
+        assert np.array_equal(now.drawn.rows.frequency, then.drawn.rows.frequency)
+
+
+def words(logbook: Logbook) -> dict[str, Word]:
+    rulings = logbook.rulings(logbook.history.rows[-1].tap_id)
+    return {name: ruling.word for name, ruling in rulings.items()}
+
+
+def test_cuts_of_another_tool_say_nothing_and_what_contradicts_is_said(shop: Shop) -> None:
+    shop.tap_both()
+    shop.tap(0.2, 1500.0, tool="long")
+    for depth, word in ((3.0, "stable"), (3.1, "stable"), (0.3, "chatter")):
+        hear(shop, 12900, depth, word)
+    found = judged(shop)
+    assert found.assembly.cuts == 2
+    assert [remark.about for remark in found.remarks if remark.code == "cut-unexplained"] == ["c3"]
+    shop.edit('tool = "reference"', 'tool = "long"')
+    assert judged(shop).assembly.cuts == 0
+
+
+def test_cuts_do_not_settle_a_direction_that_was_not_tapped(shop: Shop) -> None:
+    """Even where no spindle that explains them chatters at the program."""
+    shop.run(("A", 12900, 0.5))
+    shop.tap(0, 1713.0)
+    hear(shop, 12900, 1.0, "stable")
+    verdict = judged(shop)
+    assert (verdict.word, verdict.decided_by) == (Word.DOUBTFUL, "untapped")

@@ -1,0 +1,236 @@
+"""When programs stop holding: the fall at which they do, and the date of that fall."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from dataclasses import replace
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from dsm import calibrate
+from lobewatch.cli import app
+from lobewatch.decay.trend import date, day
+from lobewatch.logbook import Logbook
+from lobewatch.logbook.outlook import outlook
+from lobewatch.verdicts import Word
+from lobewatch.verdicts.aging import softening, tolerable_decay
+from lobewatch.verdicts.critical import critical_fall
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
+
+
+@pytest.fixture
+def worn(shop: Shop) -> Shop:
+    """One program, two directions that fall by 0.3 % every 15 days, ten times."""
+    shop.run(("A", 12900, 1.5))
+    for i in range(11):
+        shop.tap_both(15 * i, 1 - 0.003 * i + 0.0003 * (-1) ** i)
+    return shop
+
+
+def words_after(shop: Shop, fall: float) -> dict[str, Word]:
+    """The words with both directions fallen by so much of what they are now."""
+    shop.tap_both(160.0, (1 - 0.03 + 0.0003) * (1 - fall))
+    return {one.program.name: one.word for one in shop.logbook.verdicts()}
+
+
+def test_a_program_holds_up_to_its_critical_fall_and_not_beyond(worn: Shop) -> None:
+    critical = outlook(worn.logbook).programs["A"].critical
+    assert 0.0 <= critical.doubtful < critical.not_stable < 0.1
+    assert words_after(worn, critical.not_stable - 0.002)["A"] is Word.DOUBTFUL
+    worn.tap_both(170.0, (1 - 0.03 + 0.0003) * (1 - critical.not_stable - 0.002))
+    assert {one.program.name: one.word for one in worn.logbook.verdicts()}["A"] is Word.NOT_STABLE
+
+
+def test_the_date_is_that_of_the_critical_fall_on_the_line(worn: Shop) -> None:
+    logbook = worn.logbook
+    now = logbook.history.rows[-1].time
+    found = outlook(logbook, now)
+    fate, (x,) = found.programs["A"], [one for one in found.standing.series if one.direction == "x"]
+    assert fate.not_stable is not None
+    assert x.trend is not None
+    last = x.trend.points[-1]
+    a_day = -100 * math.log1p(-0.03) / 150
+    expected = last.time + timedelta(days=-100 * math.log1p(-fate.critical.not_stable) / a_day)
+    assert fate.not_stable.earliest < fate.not_stable.probable < fate.not_stable.latest
+    assert abs((date(fate.not_stable.probable) - expected).days) < 40
+    assert fate.doubtful is not None
+    assert fate.doubtful.probable < fate.not_stable.probable
+    paper = found.limits[5.0]
+    assert paper is not None
+    years_of_five_percent = (-100 * math.log1p(-0.05)) / a_day
+    assert paper.probable - day(worn.start) == pytest.approx(years_of_five_percent, rel=0.1)
+
+
+def test_critical_falls_are_worked_out_once_and_kept(worn: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = outlook(worn.logbook).programs["A"]
+
+    def again(*_: object) -> None:
+        raise AssertionError("judged again")
+
+    monkeypatch.setattr("lobewatch.logbook.logbook.judge_at_speed", again)
+    assert outlook(worn.logbook).programs["A"] == first
+    worn.edit("depth_mm = 1.5", "depth_mm = 1.4")
+    with pytest.raises(AssertionError, match="judged again"):
+        outlook(worn.logbook)
+
+
+def test_a_change_of_damping_and_stiffness_is_a_remark(shop: Shop) -> None:
+    shop.put("")
+    for i in range(14):
+        shop.tap(
+            15.0 * i,
+            1713.0 + (-1) ** i,
+            damping_ratio=0.029 * (1 + 0.002 * (-1) ** i) * (1.2 if i > 8 else 1),
+            stiffness=3.5e7 * (1 + 0.002 * (-1) ** i) * (0.9 if i > 9 else 1),
+        )
+    found = shop.logbook.standing(shop.logbook.history.rows[-1].time)
+    said = [str(remark) for remark in found.remarks if remark.code == "value-changed"]
+    assert found.light == "good"
+    assert any("damping ratio rose at once before 2026-05-30, by 19." in one for one in said)
+    assert any("stiffness K fell at once before 2026-06-14, by 10." in one for one in said)
+    assert not any("bearing" in one for one in said)
+
+
+def test_a_short_history_foretells_nothing(shop: Shop) -> None:
+    shop.tap_both()
+    shop.run(("A", 12900, 1.5))
+    found = outlook(shop.logbook)
+    assert found.programs["A"].not_stable is None
+    assert found.limits == {5.0: None, 10.0: None}
+    told = run("trend", shop.path)
+    assert "history too short" in told.stdout
+    assert "after 1 point; from 8 points on there is a forecast" in told.stdout
+
+
+def test_trend_in_json(worn: Shop) -> None:
+    told = run("trend", worn.path, "--direction", "x", "--json")
+    found = json.loads(told.stdout)
+    assert (found["tool"], found["direction"]) == ("reference", "x")
+    assert [one["used"] for one in found["points"]] == [True] * 11
+    assert found["points"][10]["percent"] == pytest.approx(100 * np.log((1 - 0.03 + 0.0003) / 1.0003), abs=0.01)
+    assert found["score"] > 3.3
+    assert found["alarm"]["kind"] == "slope"
+    assert found["light"] == Logbook.open(worn.path).standing().light
+    assert told.exit_code == int(found["light"] == "alarm") == 1
+    rate = found["rate_percent_per_month"]
+    assert rate["low"] < rate["value"] < rate["high"] < 0
+    assert rate["value"] == pytest.approx(100 * np.log(0.97) / 150 * 30.44, rel=0.05)
+    assert set(found["forecast"]) == {"A", "5 %", "10 %"}
+    assert set(found["forecast"]["A"]) == {"doubtful", "not stable"}
+    assert set(found["forecast"]["5 %"]["reached"]) == {"p10", "p50", "p90"}
+
+
+def test_trend_as_text_and_csv(worn: Shop) -> None:
+    text = run("trend", worn.path).stdout
+    lines = text.splitlines()
+    assert sum(line.count("o") for line in lines[:12]) >= 9
+    assert lines[0].startswith("   +0.0")
+    assert "falling steadily since 2026-01-15; scatter 0.03 %" in text
+    assert "-5 % (fixed limit" in text
+    rows = [*csv.DictReader(io.StringIO(run("trend", worn.path, "--csv").stdout))]
+    assert len(rows) == 11
+    assert rows[0]["score"] == ""
+    assert float(rows[-1]["score"]) > 3.3
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--tool", "other"], "no such series; there are: --tool reference --direction x"),
+        (["--direction", "z"], "no such series"),
+        (["--csv", "--json"], "give one of them"),
+    ],
+)
+def test_what_is_not_there_is_refused_in_a_sentence(shop: Shop, options: list[str], said: str) -> None:
+    shop.tap(0, 1713.0)
+    shop.put("")
+    told = CliRunner().invoke(app, ["trend", str(shop.path), *options])
+    assert said in str(told.exception)
+
+
+def test_a_machine_that_was_never_tapped_has_no_trend(shop: Shop) -> None:
+    told = CliRunner().invoke(app, ["trend", str(shop.path)])
+    assert "no tap test yet" in str(told.exception)
+
+
+def test_the_report_says_until_when_and_draws_the_line(worn: Shop) -> None:
+    assert run("report", worn.path).exit_code == 0
+    html = (worn.path / "report.html").read_text("utf-8")
+    assert "<h2>Until when</h2>" in html
+    assert "falling steadily since 2026-01-15" in html
+    assert "-5 % (fixed limit, as in the paper)" in html
+    assert "Line: fitted; band: where it goes, 80 %." in html
+
+
+def test_a_tool_that_was_never_tapped_holds_as_far_as_is_looked(worn: Shop) -> None:
+    worn.run(("shallow", 12900, 0.02), tool="long end mill")
+    assert run("report", worn.path).exit_code == 0
+    last = f"not before {date(outlook(worn.logbook).horizon):%Y-%m}"
+    assert f"doubtful {last}" in (worn.path / "report.html").read_text("utf-8")
+
+
+def test_a_program_holds_as_far_as_is_looked_beside_a_tool_that_foretells_nothing(worn: Shop) -> None:
+    worn.run(("shallow", 12900, 0.02))
+    for days in (161.0, 171.0, 181.0):
+        worn.tap(days, 1500.0, tool="other")
+    found = outlook(worn.logbook)
+    assert date(found.horizon) > worn.logbook.history.rows[-1].time
+    told = run("trend", worn.path, "--tool", "other").stdout
+    (line,) = [line for line in told.splitlines() if line.startswith("shallow")]
+    assert line.count(f"not before {date(found.horizon):%Y-%m}") == 2
+
+
+def preload_in_trend(shop: Shop) -> list[float] | None:
+    """Of direction x, as `lobewatch trend --json` has it."""
+    found: list[float] | None = json.loads(run("trend", shop.path, "--direction", "x", "--json").stdout)["preload_left"]
+    return found
+
+
+def test_trend_and_report_state_the_preload_left(shop: Shop) -> None:
+    for days, share in ((0, 1.0), (30, 0.98)):
+        shop.tap(days, 1713.0 * share)
+    model = shop.folder.machine.model("reference")
+    new, worn = (calibrate(model, 1713.0 * share).bearing_stiffness for share in (1.0, 0.98))
+    assert preload_in_trend(shop) == pytest.approx([(worn / new) ** 3, (worn / new) ** 2], rel=1e-3)
+    said = f"preload left: {(worn / new) ** 3:.2g} to {(worn / new) ** 2:.2g} of that at the start, if balls roll"
+    assert said in " ".join(run("trend", shop.path).stdout.split())
+    run("report", shop.path)
+    assert f"P{said[1:]}" in (shop.path / "report.html").read_text("utf-8")
+
+
+def test_nothing_is_said_of_the_preload_of_rollers_or_of_a_single_test(shop: Shop) -> None:
+    shop.tap(0, 1713.0)
+    assert preload_in_trend(shop) is None
+    shop.edit("{ position_mm = 617 }", '{ position_mm = 617, rolling_elements = "rollers" }')
+    shop.tap(30, 1680.0)
+    assert preload_in_trend(shop) is None
+    assert "preload" not in run("trend", shop.path).stdout
+    run("report", shop.path)
+    assert "reload left" not in (shop.path / "report.html").read_text("utf-8")
+
+
+def test_the_error_of_the_critical_fall_is_its_scatter_over_damping_and_stiffness(shop: Shop) -> None:
+    shop.run(("A", 12900, 1.5))
+    shop.tap_both()
+    (found,) = shop.logbook.verdicts()
+    drawn, (stiffness_at, _) = found.drawn, softening(found.assembly)
+    middle, falls = drawn.rows[np.array([0])], []
+    for i in range(1, 13):
+        one = drawn.rows[np.array([i])]
+        rows = replace(middle, damping_ratio=one.damping_ratio, stiffness=one.stiffness)
+        falls.append(tolerable_decay(replace(drawn, rows=rows), 1.5e-3, stiffness_at))
+    assert np.all(np.isfinite(falls))
+    assert critical_fall(found).error == pytest.approx(np.std(falls), rel=0.3)

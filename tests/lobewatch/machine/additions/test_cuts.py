@@ -1,0 +1,202 @@
+"""Test cuts as lines of the journal, their recordings beside the tap tests, and what damage does to them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from acquisition import Channel, DataError
+from acquisition.files.cut_file import CutSignal, read_cut_signal
+from lobewatch.cli import app
+from lobewatch.logbook import Logbook
+from lobewatch.machine import MachineFolder
+from lobewatch.machine.additions.correct import exclude, include
+from lobewatch.machine.additions.keep_cut import keep_cut
+from lobewatch.machine.additions.observe_cut import observed
+from lobewatch.machine.archive.rebuild import rebuild_files
+from lobewatch.machine.archive.verify import verify
+from lobewatch.machine.journal.heard_cut import HeardCut
+from lobewatch.machine.settings.cut_setting import cut_setting, named
+from lobewatch.show.history.describe_cut import about_tool
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+CHANNEL = Channel("acceleration", 1.02e-2, 5.0)
+CODES = np.random.default_rng(0).integers(-900, 900, 3000).astype(np.int32)
+
+
+def run(shop: Shop, command: str, *arguments: object) -> Result:
+    return CliRunner().invoke(app, [command, str(shop.path), *map(str, arguments)])
+
+
+def heard(shop: Shop, speed: float = 12000.0, depth: float = 2.0) -> HeardCut:
+    setting = cut_setting(shop.folder.machine, "A", speed, depth)
+    return replace(observed(setting, "chatter", 1650.0), by="accelerometer", speed_rpm=speed * 1.004)
+
+
+def signal() -> CutSignal:
+    return CutSignal(np.asarray(CODES * CHANNEL.scale, np.float64), 51200.0, CODES, CHANNEL, lost_scans=3)
+
+
+def test_a_program_is_found_by_how_its_name_begins() -> None:
+    tables: dict[str, Any] = {"A": 1, "A: slot": 2, "B: rib": 3, "B: slot": 4}
+    assert [named(tables, name) for name in ("A", "A:", "B: r")] == [1, 2, 3]
+    with pytest.raises(ValueError, match="'B' may be several: say more of its name; there are 'B: rib', 'B: slot'"):
+        named(tables, "B")
+
+
+def test_what_was_heard_stands_in_both_copies_with_all_that_it_is_judged_by(shop: Shop) -> None:
+    told = ("--speed", 12000, "--depth", 2, "--chatter", "--frequency", 1650, "--date", "2026-02-01T10:00:00")
+    assert run(shop, "observe", "--program", "A", *told, "--json").exit_code == 0
+    (cut,) = shop.logbook.cuts
+    assert (cut.id, cut.program, cut.tool, cut.word, cut.by) == ("c1", "A", "reference", "chatter", "ear")
+    assert (cut.speed_rpm, cut.depth, cut.chatter_frequency_hz) == (12000.0, 0.002, 1650.0)
+    assert cut.at == datetime(2026, 2, 1, 10).astimezone(UTC)
+    assert (cut.cut.teeth, cut.cut.immersion, cut.cut.tangential, cut.feed) == (4, 1.0, 1400e6, "both")
+    lines = (shop.path / "journal.jsonl").read_bytes()
+    assert lines == (shop.path / "journal.copy.jsonl").read_bytes()
+    assert json.loads(lines.splitlines()[-1])["kind"] == "cut"
+
+
+def test_a_cut_keeps_what_it_was_cut_with_when_the_machine_file_changes(shop: Shop) -> None:
+    assert run(shop, "observe", "--program", "A", "--stable").exit_code == 0
+    shop.edit("tangential_n_per_mm2 = 1400", "tangential_n_per_mm2 = 2800")
+    assert shop.logbook.cuts[0].cut.tangential == 1400e6
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--program", "A", "--stable", "--speed", 0), "--speed 0: is not above 0"),
+        (("--program", "A", "--stable", "--depth", 0), "--depth 0: is not above 0"),
+        (("--program", "A", "--stable", "--depth", "nan"), "--depth nan"),
+        (("--program", "A"), "neither of --stable and --chatter"),
+        (("--program", "A", "--stable", "--chatter"), "both of --stable and --chatter"),
+        (("--program", "A", "--stable", "--frequency", 1650), "a stable cut has none"),
+        (("--program", "A", "--chatter", "--frequency", -5), "--frequency -5"),
+        (("--program", "A", "--chatter", "--speed", 12000, "--frequency", 1601), "2 times the tooth passing"),
+        (("--program", "Q", "--stable"), "program 'Q' is not in machine.toml; there are 'reference cut', 'A', 'B'"),
+        (("--program", "A", "--stable", "--date", "2126-01-01"), "lies in the future"),
+    ],
+)
+def test_what_cannot_be_is_refused_in_a_sentence_and_not_kept(
+    shop: Shop, arguments: tuple[object, ...], said: str
+) -> None:
+    result = run(shop, "observe", *arguments)
+    assert result.exit_code != 0
+    assert said in str(result.exception)
+    assert not (shop.path / "journal.jsonl").exists()
+
+
+def test_a_tool_never_tapped_and_an_earlier_word_at_the_same_point_are_said_and_all_is_kept(shop: Shop) -> None:
+    first = run(shop, "observe", "--program", "A", "--stable", "--json")
+    again = run(shop, "observe", "--program", "A", "--chatter", "--speed", 12910, "--json")
+    other = run(shop, "observe", "--program", "A", "--chatter", "--speed", 12500, "--json")
+    shop.tap(0, 1713.0)
+    said = [json.loads(one.stdout)["remarks"] for one in (first, again, other)]
+    assert said == [["tool-not-tapped"], ["tool-not-tapped", "cuts-contradict"], ["tool-not-tapped"]]
+    assert [cut.word for cut in shop.logbook.cuts] == ["stable", "chatter", "chatter"]
+    assert about_tool(shop.logbook, shop.logbook.cuts[0]) == []
+
+
+def test_a_cut_is_taken_out_and_back_and_listed_each_time(shop: Shop) -> None:
+    run(shop, "observe", "--program", "A", "--chatter", "--frequency", 1650, "--speed", 12000)
+    assert run(shop, "exclude", "c1", "--reason", "chips in the flutes").exit_code == 0
+    assert shop.logbook.cuts == ()
+    assert "excluded" in (text := run(shop, "history").stdout)
+    assert "chips in the flutes" in text
+    assert run(shop, "include", "c1").exit_code == 0
+    assert len(shop.logbook.cuts) == 1
+    (listed,) = json.loads(run(shop, "history", "--json").stdout)["cuts"]
+    assert (listed["id"], listed["speed_rpm"], listed["depth_mm"]) == ("c1", 12000.0, 1.5)
+    (row,) = csv.DictReader(io.StringIO(run(shop, "history", "--csv").stdout))
+    assert row["kind"] == "cut"
+    assert "chatter at 1650 Hz, by ear" in row["text"]
+    assert "A at 12000 rpm, 1.5 mm: chatter at 1650 Hz, by ear" in run(shop, "history").stdout
+
+
+def test_excluding_a_cut_that_is_none_or_twice_is_refused(shop: Shop) -> None:
+    keep_cut(shop.folder, heard(shop))
+    exclude(shop.folder, "c1", "no")
+    with pytest.raises(ValueError, match="c1: excluded already"):
+        exclude(shop.folder, "c1", "no")
+    with pytest.raises(ValueError, match="no such tap test"):
+        include(shop.folder, "c2")
+
+
+def test_a_recording_is_the_one_that_was_kept_and_its_line_vouches_for_it(shop: Shop) -> None:
+    kept = keep_cut(shop.folder, heard(shop), signal())
+    assert shop.logbook.cuts == (kept,)
+    assert kept.recording is not None
+    assert kept.recording.file == "cuts/c1.h5"
+    found, about = read_cut_signal(shop.path / kept.recording.file)
+    assert found.codes is not None
+    assert found.codes.tolist() == CODES.tolist()
+    assert np.array_equal(found.acceleration, signal().acceleration)
+    assert (found.sample_rate, found.channel, found.lost_scans) == (51200.0, CHANNEL, 3)
+    assert about["id"] == "c1"
+    assert about["commanded_rpm"] == 12000.0
+    assert verify(shop.path).damage == ()
+
+
+def damaged(path: Path) -> None:
+    content = path.read_bytes()
+    path.write_bytes(content[:900] + bytes([content[900] ^ 1]) + content[901:])
+
+
+@pytest.mark.parametrize("harm", [damaged, Path.unlink])
+def test_a_damaged_recording_is_named_and_mended_and_its_word_goes_on_to_count(shop: Shop, harm: Any) -> None:
+    keep_cut(shop.folder, heard(shop), signal())
+    path = shop.path / "cuts" / "c1.h5"
+    harm(path)
+    assert [(one.code, one.about) for one in verify(shop.path).damage] == [("cut-damaged", "cuts/c1.h5")]
+    assert [cut.id for cut in shop.logbook.cuts] == ["c1"]
+    assert rebuild_files(shop.path) == ["cuts/c1.h5: lost; what was heard in it goes on to count"]
+    assert verify(shop.path).damage == ()
+    assert "cut-lost" in [one.code for one in verify(shop.path).remarks]
+    assert [cut.id for cut in shop.logbook.cuts] == ["c1"]
+    assert keep_cut(shop.folder, heard(shop), signal()).id == "c2"
+
+
+def test_a_recording_whose_line_a_crash_has_kept_away_is_entered_by_rebuild_and_never_overwritten(shop: Shop) -> None:
+    keep_cut(shop.folder, heard(shop), signal())
+    kept = shop.logbook.cuts[0]
+    for name in ("journal.jsonl", "journal.copy.jsonl"):
+        (shop.path / name).unlink()
+    assert keep_cut(shop.folder, heard(shop, 9000.0)).id == "c2"
+    assert [one.code for one in verify(shop.path).damage] == ["cut-unlisted"]
+    assert rebuild_files(shop.path) == ["cuts/c1.h5: entered in the journal"]
+    assert kept in shop.logbook.cuts
+    assert verify(shop.path).damage == ()
+
+
+def test_a_foreign_file_among_the_recordings_is_put_aside(shop: Shop) -> None:
+    keep_cut(shop.folder, heard(shop), signal())
+    (shop.path / "cuts" / "c7.h5").write_bytes((shop.path / "cuts" / "c1.h5").read_bytes())
+    assert [one.code for one in verify(shop.path).damage] == ["cut-unlisted"]
+    assert rebuild_files(shop.path) == ["cuts/c7.h5: put into damaged/c7.h5"]
+    assert verify(shop.path).damage == ()
+
+
+def test_nothing_is_kept_while_the_journal_is_damaged(shop: Shop) -> None:
+    keep_cut(shop.folder, heard(shop))
+    (shop.path / "journal.jsonl").write_bytes(b"{}\n")
+    with pytest.raises(DataError, match="damaged"):
+        keep_cut(MachineFolder(shop.path), heard(shop), signal())
+    assert not (shop.path / "cuts").exists()
+
+
+def test_what_cannot_be_told_teaches_nothing_and_is_kept(shop: Shop) -> None:
+    keep_cut(shop.folder, replace(heard(shop), word="cannot tell", chatter_frequency_hz=None, reason="overload"))
+    logbook = Logbook.open(shop.path)
+    assert logbook.cuts == ()
+    assert len(logbook.files.cuts) == 1

@@ -1,0 +1,131 @@
+"""[daq] and [[daq.channel]] of machine.toml: units at the door, and every mistake told with its table and key."""
+
+from __future__ import annotations
+
+import re
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+from acquisition import Channel, DataError, SensorInput
+from lobewatch.machine.settings.machine_file import parse_machine
+
+PLUGIN = Path(__file__).parents[3] / "plugins" / "dummy_device"
+HEAD = '[machine]\nname = "mill 3"\n'
+DAQ = """
+[daq]
+driver = "dataq"
+
+[[daq.channel]]
+input = 2
+quantity = "force"
+sensitivity_mv_per_n = 2.25
+range_v = 5
+
+[[daq.channel]]
+input = 3
+quantity = "acceleration"
+sensitivity_mv_per_g = -10
+gain = 10
+range_v = 0.5
+direction = "x"
+serial_number = "A-0815"
+calibration_date = 2026-01-15
+skew_us = 6.5
+"""
+
+
+def test_channels_are_converted_at_the_door() -> None:
+    force, acceleration = (channel.build() for channel in parse_machine(HEAD + DAQ).daq.channel)
+    assert force == SensorInput(2, Channel("force", 2.25e-3, 5.0))
+    assert acceleration.number == 3
+    channel = acceleration.channel
+    assert channel.sensitivity == pytest.approx(-10e-3 * 10 / 9.80665)  # V at the device per m/s^2
+    assert (channel.full_scale, channel.direction, channel.serial_number) == (0.5, "x", "A-0815")
+    assert channel.calibration_date == "2026-01-15"
+    assert channel.skew == pytest.approx(6.5e-6)
+    assert -9.80665 / 10 * channel.full_scale / 32768 / 10e-3 == pytest.approx(channel.scale)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("input = 2", "input = 8", "daq: input=8 is none of 0 to 7"),
+        ("input = 2", "input = 3", "daq: channel 2: input=3 is that of channel 1"),
+        ("input = 2\n", "", "daq channel 1: Object missing required field `input`"),
+        ('"force"', '"acceleration"', "daq channel 1: quantity='acceleration' needs sensitivity_mv_per_g"),
+        ('"force"', '"temperature"', "daq channel 1 quantity: Invalid enum value 'temperature'"),
+        ("sensitivity_mv_per_n = 2.25\n", "", "daq channel 1: give exactly one of sensitivity_mv_per_n"),
+        (
+            "sensitivity_mv_per_n = 2.25",
+            "sensitivity_mv_per_n = 2\nsensitivity_mv_per_g = 1",
+            "daq channel 1: give exactly",
+        ),
+        ("sensitivity_mv_per_n = 2.25", "sensitivity_mv_per_n = 0", "daq channel 1: sensitivity_mv_per_n=0 is not the"),
+        ("sensitivity_mv_per_n = 2.25", "sensitivity_mv_per_n = nan", "daq channel 1 sensitivity_mv_per_n: "),
+        ("sensitivity_mv_per_n", "sensitivity_v_per_n", "unknown key 'sensitivity_v_per_n'; is 'sensitivity_mv_per_n'"),
+        ("gain = 10", "gain = -1", "daq channel 2 gain: "),
+        ("range_v = 0.5", "range_v = 0", "daq channel 2 range_v: "),
+        ('"x"', '"z"', "daq channel 2 direction: Invalid enum value 'z'"),
+        ("2026-01-15", '"last spring"', "daq channel 2 calibration_date: "),
+        ("skew_us = 6.5", "skew_us = inf", "daq channel 2 skew_us: "),
+        (
+            'driver = "dataq"',
+            'driver = "ni"',
+            "daq: driver='ni' is none of taps, dataq; correct the name, or install",
+        ),
+        ('driver = "dataq"', "", "daq: channel: a TAPS/1 device names its own sensors"),
+        ('driver = "dataq"', "loss_detection = false", "daq: channel: a TAPS/1 device names its own sensors"),
+    ],
+)
+def test_every_mistake_is_told_with_its_table_and_key(old: str, new: str, message: str) -> None:
+    assert old in DAQ
+    with pytest.raises(DataError) as caught:
+        parse_machine(HEAD + DAQ.replace(old, new, 1))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_dataq_device_needs_its_sensors_and_a_taps_device_its_loss_detection() -> None:
+    with pytest.raises(
+        DataError, match=r"needs two \[\[daq.channel\]\], one of force and one of acceleration; here are no"
+    ):
+        parse_machine(HEAD + '[daq]\ndriver = "dataq"\n')
+    with pytest.raises(DataError, match="daq: loss_detection=false: a TAPS/1 device always numbers its scans"):
+        parse_machine(HEAD + "[daq]\nloss_detection = false\n")
+    with pytest.raises(DataError, match="daq: digital_clock=true: a TAPS/1 device numbers its scans"):
+        parse_machine(HEAD + "[daq]\ndigital_clock = true\n")
+    clock = HEAD + DAQ.replace('driver = "dataq"', 'driver = "dataq"\ndigital_clock = true')
+    assert parse_machine(clock).daq.settings.digital_clock
+    with pytest.raises(DataError, match="daq: digital_clock=true: the clock stands in the digital word"):
+        parse_machine(clock.replace("digital_clock", "loss_detection = false\ndigital_clock"))
+
+
+def test_the_driver_of_a_package_checks_its_own_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    dummy = HEAD + '[daq]\ndriver = "dummy"\n'
+    with pytest.raises(DataError, match="daq: driver='dummy' is none of taps, dataq; correct the name, or install"):
+        parse_machine(dummy)
+    monkeypatch.syspath_prepend(PLUGIN)
+    assert parse_machine(dummy).daq.driver == "dummy"
+    with pytest.raises(DataError, match="daq: sample_rate_hz=1000 is not 25600, the only rate of a dummy device"):
+        parse_machine(dummy + "sample_rate_hz = 1000\n")
+    with pytest.raises(DataError, match=r"daq: channel: a dummy device names its own sensors: leave \[\[daq.channel"):
+        parse_machine(HEAD + DAQ.replace('"dataq"', '"dummy"'))
+
+
+@pytest.mark.parametrize("name", ["new_machine.toml", "surrogate_machine.toml"])
+def test_what_the_machine_files_show_in_comments_is_right(name: str) -> None:
+    text = resources.files("sim_data").joinpath(name).read_text("utf-8")
+    start, end = text.index('# driver = "dataq"'), text.index("[mode]")
+    shown = re.sub("^# ", "", text[start:end], flags=re.MULTILINE)
+    daq = parse_machine(text[:start] + shown + text[end:]).daq
+    assert [channel.build().channel.quantity for channel in daq.channel] == ["force", "acceleration"]
+
+
+def test_the_example_in_the_documentation_is_right() -> None:
+    page = (Path(__file__).parents[4] / "docs" / "devices.md").read_text("utf-8")
+    (shown,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    daq = parse_machine(HEAD + shown).daq
+    assert daq.driver == "dataq"
+    assert [channel.build().channel.full_scale for channel in daq.channel] == [5.0, 5.0]

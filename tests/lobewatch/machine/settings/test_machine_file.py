@@ -1,0 +1,205 @@
+"""machine.toml: what is read, and that every mistake is told with its place."""
+
+from __future__ import annotations
+
+import math
+import re
+from importlib import resources
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from acquisition import DataError
+from dsm import MATERIALS
+from lobewatch.machine.settings.doubt_table import DoubtTable
+from lobewatch.machine.settings.machine_file import REFERENCE_CUT, parse_machine, read_machine
+from lobewatch.verdicts.doubt import SCATTER
+
+EXAMPLE = resources.files("sim_data").joinpath("surrogate_machine.toml").read_text("utf-8")
+FRESH = resources.files("sim_data").joinpath("new_machine.toml").read_text("utf-8")
+
+
+def test_the_example_is_the_surrogate_in_si() -> None:
+    machine = parse_machine(EXAMPLE)
+    assert machine.spindle is not None
+    assert "surrogate" in machine.spindle.label
+    spindle = machine.spindle.build()
+    assert (len(spindle.segments), len(spindle.bearings)) == (26, 10)
+    assert spindle.segments[6].length == pytest.approx(17.5e-3)
+    assert spindle.segments[6].outer_diameter == pytest.approx(78e-3)
+    assert spindle.segments[6].bore_diameter == pytest.approx(30e-3)
+    assert spindle.bearings[0].position == pytest.approx(166e-3)
+    assert spindle.bearings[0].stiffness == pytest.approx(1.28e9)
+    assert (spindle.youngs_modulus, spindle.density) == (210e9, 7850.0)
+    cut, across = machine.cuts("reference")["A: slot at 12 600 rpm"]
+    assert (cut.teeth, cut.immersion, cut.direction, cut.tangential, cut.radial) == (4, 1.0, "down", 1400e6, 500e6)
+    assert [cut.feed_angle, across.feed_angle] == pytest.approx([0.0, math.pi / 2])
+
+
+def test_a_fresh_machine_needs_no_spindle() -> None:
+    machine = parse_machine(FRESH)
+    assert machine.spindle is None
+    assert machine.tap.hits == 10
+    assert list(machine.cuts("anything")) == [REFERENCE_CUT]
+
+
+@pytest.mark.parametrize("text", [EXAMPLE, FRESH], ids=["example", "fresh"])
+def test_the_doubt_in_comments_is_the_default_and_complete(text: str) -> None:
+    block = text[text.index("# [doubt]") :].partition("\n\n")[0]
+    shown = parse_machine('[machine]\nname = "m"\n' + re.sub("^# ", "", block, flags=re.MULTILINE)).doubt
+    own = {"frequency_percent": 0.3, "damping_percent": 10.0, "stiffness_percent": 3.0}
+    assert msgspec.structs.asdict(shown) == msgspec.structs.asdict(DoubtTable()) | own
+    assert pytest.approx([value / 100 for value in own.values()]) == SCATTER[:3]
+    assert len(re.findall(r"_percent = [\d.]+ +# \S", block)) == len(DoubtTable.__struct_fields__)
+
+
+@pytest.mark.parametrize("text", [EXAMPLE, FRESH], ids=["example", "fresh"])
+@pytest.mark.parametrize("key", ['feed = "both"', "flute_length_mm = 40", "helix_deg = 30", "feed_per_tooth_mm = 0.1"])
+def test_optional_keys_of_a_program_are_shown_and_right(text: str, key: str) -> None:
+    assert re.search(rf"^# {re.escape(key)}", text, re.MULTILINE)
+    changed = parse_machine(EXAMPLE.replace('direction = "down"\n', f'direction = "down"\n{key}\n', 2))
+    assert str(getattr(changed.program[0], key.partition(" ")[0])).rstrip(".0") in key
+
+
+def test_what_the_fresh_machine_file_shows_in_comments_is_right() -> None:
+    start = FRESH.index("# [spindle]")
+    shown = "\n".join(line.removeprefix("#").removeprefix(" ") for line in FRESH[start:].splitlines())
+    text = shown.replace("A tool that is not tapped", "# A tool")
+    machine = parse_machine(FRESH[:start] + text)
+    spindle = machine.model("reference")
+    assert spindle.theory == "timoshenko"
+    assert spindle.segments[0].material == MATERIALS["carbide"]
+    assert spindle.segments[0].mass_diameter == pytest.approx(0.018)
+    assert spindle.segments[1].diameters_at(1.0) == pytest.approx((0.06, 0.02))
+    assert spindle.shear_modulus == pytest.approx(80.8e9)
+    front, damped, rear = spindle.bearings
+    assert (front.stiffness, front.group, front.housing_stiffness) == (500e6, "front", math.inf)
+    assert (damped.damping, damped.rotational_stiffness) == (500.0, 1e4)
+    assert (rear.stiffness, rear.housing_stiffness) == pytest.approx((200e6, 800e6))
+    (pulley,), (taper,) = spindle.masses, spindle.joints
+    assert (pulley.mass, pulley.diametral_inertia, pulley.polar_inertia) == pytest.approx((2.1, 3e-3, 5.5e-3))
+    assert (taper.stiffness, taper.rotational_stiffness, taper.group) == (2e9, 1e6, "taper")
+    short = machine.model("end mill 12")
+    assert short.length == pytest.approx(spindle.length - 0.010)
+    assert short.bearings[0].position == pytest.approx(0.150)
+    with pytest.raises(DataError, match="'end mill 13' has no model; modelled are 'reference', 'end mill 12'"):
+        machine.model("end mill 13")
+
+
+def test_programs_belong_to_their_tool() -> None:
+    machine = parse_machine(EXAMPLE.replace('tool = "reference"\nteeth', 'tool = "T7"\nteeth', 1))
+    assert "A: slot at 12 600 rpm" not in machine.cuts("reference")
+    assert list(machine.cuts("T7")) == [REFERENCE_CUT, "A: slot at 12 600 rpm"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("trigger_n = 20", "triger_n = 20", "tap: unknown key 'triger_n'; is 'trigger_n' meant?"),
+        ("outer_mm = 31.5", "outter_mm = 31.5", "spindle segment 1: unknown key 'outter_mm'; is 'outer_mm' meant?"),
+        ("bore_mm = 30.0", "bore_mm = 78.0", "spindle segment 7: bore_mm=78 is not smaller than outer_mm=78"),
+        ("length_mm = 26.5", "length_mm = 0", "spindle segment 1 length_mm: "),
+        ("length_mm = 26.5", "length_mm = -3", "spindle segment 1 length_mm: Expected `float` > 0.0, not -3"),
+        ("length_mm = 26.5", 'length_mm = "26.5"', "spindle segment 1 length_mm: Expected `float`, got `str`"),
+        ("length_mm = 26.5", "length_mm = 26,5", "write 26.5 with a point"),
+        ("length_mm = 26.5", "length_mm = nan", "length_mm"),
+        ("position_mm = 166", "position_mm = 16600", "bearing 1: position_mm=16600 is off the shaft, 0 to 672 mm"),
+        ("radial_depth_mm = 20 ", "radial_depth_mm = 25 ", "reference_cut: radial_depth_mm=25 is larger"),
+        ('direction = "down"', 'direction = "climb"', "direction: Invalid enum value 'climb'"),
+        ("band_hz = [1200, 2200]", "band_hz = [2200, 1200]", "mode: band_hz=[2200.0, 1200.0] does not rise"),
+        ("speed_rpm = 12600", "speed_rpm = 126000", "program 1: speed_rpm=126000 is outside [speed] 3000..24000 rpm"),
+        ("high_rpm = 24000", "high_rpm = 500", "speed: low_rpm=3000 is not below high_rpm=500"),
+        ("hits = 10", "hits = 1", "tap hits: Expected `int` >= 3"),
+        ("B: slot at 6 200 rpm", "A: slot at 12 600 rpm", "program 2: name='A: slot at 12 600 rpm' stands twice"),
+        ('name = "MACHINE_NAME"', 'name = ""', "machine name: "),
+        ("[machine]", "[machin]", "unknown key 'machin'; is 'machine' meant?"),
+        ("[machine]", "[machine", "at line 2"),
+        ('theory = "euler-bernoulli"', 'theory = "rayleigh"', "spindle theory: Invalid enum value 'rayleigh'"),
+        ("outer_mm = 31.5", 'material = "carbid", outer_mm = 31.5', "spindle segment 1: material='carbid' is none of"),
+        ("outer_mm = 31.5", "end_bore_mm = 40, outer_mm = 31.5", "segment 1: end_bore_mm=40 is not smaller than"),
+        ("outer_mm = 31.5", "mass_outer_mm = -1, outer_mm = 31.5", "spindle segment 1 mass_outer_mm: "),
+        ("position_mm = 203.5 ", "position_mm = 166 ", "bearing 2: position=0.166 m is that of bearing 1"),
+        (
+            "tool_length_mm = 93.5",
+            "tool_length_mm = 935",
+            "tool_length_mm=935 reaches beyond the first bearing, at 166 mm",
+        ),
+        ("tool_length_mm = 93.5", "", "tool 1: needs [spindle] tool_length_mm"),
+        ('name = "long end mill"', 'name = "reference"', "tool 1: name='reference' stands twice"),
+        ("outer_mm = 17.0", "outer_mm = 0", "tool 1 segment 1 outer_mm: Expected `float` > 0.0, not 0"),
+        ("band_hz = [1200, 2200]", "band_hz = [1200, -1]", "mode band_hz 2: Expected `float` > 0.0, not -1"),
+        (
+            "mass_outer_mm = 18.0",
+            "mass_outer_mm = 18.0, end_outer_mm = 16",
+            "tool 1: segment 1: mass_diameter=0.018 m",
+        ),
+        ("position_mm = 0 ", "position_mm = 5000 ", "tap: position_mm=5000 is off the shaft, 0 to 672 mm"),
+        ("tool_length_mm = 93.5", "tool_length_mm = 200", "tool_length_mm=200 reaches beyond the first bearing"),
+        ("high_rpm = 24000", "high_rpm = inf", "speed high_rpm: Expected `float` <= 1"),
+        ("depth_mm = 2.5", "depth_mm = inf", "program 1 depth_mm: Expected `float` <= 1"),
+    ],
+)
+def test_every_mistake_is_told_with_its_place(old: str, new: str, message: str) -> None:
+    assert old in EXAMPLE
+    with pytest.raises(DataError) as caught:
+        parse_machine(EXAMPLE.replace(old, new, 1))
+    assert str(caught.value).startswith("machine.toml: ")
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("escaped", ["\\u001b", "\\u0000", "\\n", "\\t", "\\u007f", "\\u009b", "\\u2028"])
+@pytest.mark.parametrize(
+    ("old", "place"),
+    [
+        ('name = "MACHINE_NAME"', "machine: name='x"),
+        ('tool = "reference"', "tap: tool='x"),
+        ('name = "A: slot at 12 600 rpm"', "program 1: name='x"),
+        ('name = "long end mill"', "tool 1: name='x"),
+        ("length_mm = 26.5", "spindle: segment 1: material='x"),
+    ],
+)
+def test_control_characters_in_names_are_refused_with_their_place(old: str, place: str, escaped: str) -> None:
+    key = old.split(" ")[0].replace("length_mm", "material")
+    with pytest.raises(DataError) as caught:
+        parse_machine(EXAMPLE.replace(old, f'{key} = "x{escaped}y"', 1))
+    assert str(caught.value).startswith(f"machine.toml: {place}")
+    assert "holds the control character '\\" in str(caught.value)
+    assert str(caught.value).isprintable()
+
+
+def test_control_characters_in_a_material_are_refused() -> None:
+    material = '[[material]]\nname = "soft\\u001b"\ntangential_n_per_mm2 = 1500\nradial_n_per_mm2 = 500\n'
+    with pytest.raises(DataError, match=r"material 1: name='soft.*' holds the control character"):
+        parse_machine(f"{EXAMPLE}\n{material}")
+
+
+def test_materials_have_names_of_their_own() -> None:
+    material = '[[material]]\nname = "my steel"\ntangential_n_per_mm2 = 1500\nradial_n_per_mm2 = 500\n'
+    assert len(parse_machine(f"{EXAMPLE}\n{material}").material) == 1
+    with pytest.raises(DataError, match="material 2: name='my steel' stands twice"):
+        parse_machine(f"{EXAMPLE}\n{material}{material}")
+
+
+def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "machine.toml"
+    path.write_bytes(EXAMPLE.replace("SURROGATE", "SURROGÄTE").encode("latin-1"))
+    with pytest.raises(DataError, match="no UTF-8 text"):
+        read_machine(path)
+
+
+def test_hashes_change_with_what_a_history_depends_on_and_with_nothing_else() -> None:
+    machine = parse_machine(EXAMPLE)
+    for old, new, same, same_words in (
+        ("tap_interval_days = 30", "tap_interval_days = 60", True, True),
+        ("depth_mm = 2.5", "depth_mm = 2.0", True, False),
+        ("bearing_stiffness_n_per_um = 1280.0", "bearing_stiffness_n_per_um = 1000.0", False, True),
+        ("band_hz = [1200, 2200]", "band_hz = [1200, 2300]", False, True),
+        ("high_rpm = 24000", "high_rpm = 20000", True, True),
+        ("[speed]", "[doubt]\nspeed_percent = 2\n\n[speed]", True, False),
+    ):
+        assert old in EXAMPLE
+        changed = parse_machine(EXAMPLE.replace(old, new))
+        assert (changed.settings_hash == machine.settings_hash) is same
+        assert (changed.program_hashes == machine.program_hashes) is same_words

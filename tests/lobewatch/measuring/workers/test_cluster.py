@@ -1,0 +1,110 @@
+"""Work shared with a Dask cluster: the same results bit by bit, though a worker is killed in the middle."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from distributed import Client, LocalCluster
+from typer.testing import CliRunner
+
+from acquisition import DataError, Description
+from lobewatch import Logbook
+from lobewatch.cli import app
+from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.measuring.workers.shared import Workers, shared
+from lobewatch.measuring.workers.software import SOFTWARE
+from tests.lobewatch.logbook.replaying.test_replaying import text_files, values
+
+SAID = Description(date_pattern="%Y-%m-%d")
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[LocalCluster]:
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as made:
+        yield made
+
+
+def plain_machine(path: Path) -> None:
+    """Without programs, which take their time."""
+    make_machine_folder(path, "surrogate_machine.toml")
+    toml = path / "machine.toml"
+    toml.write_text(toml.read_text().split("[[program]]")[0])
+
+
+class Killer:
+    """Told how far a replay is, it ends one of the workers once, with work in its hands."""
+
+    def __init__(self, cluster: LocalCluster) -> None:
+        with Client(cluster, set_as_default=False) as client:
+            self.pids: list[int] = [*client.run(os.getpid).values()]
+        self.killed = 0
+
+    def __call__(self, step: str, done: int, _of: int) -> None:
+        if step == "read" and done == 1:
+            self.killed = self.pids[0]
+            os.kill(self.killed, signal.SIGKILL)
+
+
+def test_a_replay_on_a_cluster_finds_the_same_though_a_worker_is_killed(cluster: LocalCluster, tmp_path: Path) -> None:
+    files = text_files(tmp_path / "files", 9)
+    files[4].write_text("Freq (Hz),Real (m/N),Imag\n1,2,3\n2,x,3\n")
+    killer, found, refused = Killer(cluster), [], []
+    for name, workers in (("alone", Workers()), ("cluster", Workers(scheduler=cluster.scheduler_address))):
+        plain_machine(tmp_path / name)
+        logbook = Logbook.open(tmp_path / name)
+        progress = killer if workers.scheduler else lambda *_: None
+        stored = logbook.replay_all(files, SAID, workers=workers, keep_going=True, progress=progress)
+        found.append([*map(values, logbook.history.rows)])
+        refused.append(dict(stored.refused))
+        assert {path.name for path in (tmp_path / name / "taps").iterdir()} == {f"{one}.h5" for one in stored.fresh}
+    assert killer.killed
+    assert len(found[0]) == 8
+    assert found[0] == found[1]
+    assert refused[0] == refused[1] == {files[4]: "line 3: '2,x,3' is no row of numbers"}
+
+
+def test_a_folder_of_machines_is_rebuilt_on_a_cluster_as_it_was(cluster: LocalCluster, tmp_path: Path) -> None:
+    files, plant = text_files(tmp_path / "files", 2), tmp_path / "mills"
+    for name, n_programs in (("a", 1), ("b", 0)):
+        make_machine_folder(plant / name, "surrogate_machine.toml")
+        toml = plant / name / "machine.toml"
+        toml.write_text("[[program]]".join(toml.read_text().split("[[program]]")[: 1 + n_programs]))
+        Logbook.open(plant / name).replay_all(files[: 1 + n_programs], SAID)
+    histories = []
+    for options in ([], ["--scheduler", cluster.scheduler_address]):
+        said = CliRunner().invoke(app, ["rebuild", str(plant), *options], catch_exceptions=False).stdout
+        assert "a: history.rows: made anew from 2 tap test(s)" in said
+        assert "2 of 2 machines rebuilt" in said
+        histories.append([repr(row) for name in ("a", "b") for row in Logbook.open(plant / name).history.rows])
+    assert len(histories[0]) == 3
+    assert "rulings=None" not in histories[0][0]
+    assert histories[0] == histories[1]
+    (plant / "b" / "machine.toml").write_text("[machine")
+    with pytest.raises(DataError, match=r"1 of 2 machines cannot be rebuilt\n.*machine\.toml"):
+        CliRunner().invoke(app, ["rebuild", str(plant)], catch_exceptions=False)
+
+
+def test_what_a_cluster_cannot_do_is_one_sentence(cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(ValueError, match="--jobs 2 and --scheduler tcp://x: give one of them"):
+        Workers(2, "tcp://x")
+    monkeypatch.setattr("lobewatch.measuring.workers.cluster.ANSWER", 0.3)
+    with pytest.raises(DataError, match=r"--scheduler tcp://127\.0\.0\.1:9: no Dask scheduler answers there"):
+        [*shared(abs, [1], Workers(scheduler="tcp://127.0.0.1:9"))]
+    monkeypatch.setattr("lobewatch.measuring.workers.cluster.ANSWER", 10.0)
+    workers = Workers(scheduler=cluster.scheduler_address)
+    assert [*shared(abs, [-1, -2], workers)] == [1, 2]
+    other = SOFTWARE._replace(numpy="1.0")
+    monkeypatch.setattr("lobewatch.measuring.workers.shared.SOFTWARE", other)
+    with pytest.raises(
+        DataError, match=r"a worker has lobewatch .*, here is lobewatch .*, numpy 1\.0, .* the same on all"
+    ):
+        [*shared(abs, [-1], workers)]
+
+
+def test_a_process_that_is_ended_from_outside_is_one_sentence() -> None:
+    with pytest.raises(DataError, match="one of the 2 processes was ended from outside; nothing is stored; try again"):
+        [*shared(os._exit, [1, 1], Workers(2))]

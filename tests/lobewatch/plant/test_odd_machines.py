@@ -1,0 +1,56 @@
+"""Machines as they ought not to be: what stands of them, and that none costs the others anything."""
+
+from __future__ import annotations
+
+import shutil
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from lobewatch.cli import app
+from lobewatch.decay.light import Light
+from lobewatch.plant.plant import Plant, find_machines
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+
+
+def codes(shop: Shop, days: float) -> set[str]:
+    """Of the reasons at a time."""
+    ((_, _, _, dated),) = Plant({"m": shop.path}).standings(shop.start + timedelta(days=days))
+    return {one.code for one in dated.remarks}
+
+
+@pytest.mark.parametrize("count", [1, 9])
+def test_equal_frequencies_are_good_however_many(shop: Shop, count: int) -> None:
+    shop.put("")
+    for number in range(count):
+        shop.tap(number, 1713.0)
+    assert codes(shop, count) <= {"one-direction"}
+
+
+def test_an_event_before_the_first_tap_takes_nothing_away(shop: Shop) -> None:
+    shop.put("")
+    for number in range(2):
+        shop.tap(number, 1713.0 * 0.88**number)
+    assert "frequency-alarm" in codes(shop, 2)
+    command = ["event", str(shop.path), "delivered", "--date", "2020-01-01", "--new-baseline"]
+    assert CliRunner().invoke(app, command, catch_exceptions=False).exit_code == 0
+    assert "frequency-alarm" in codes(shop, 2)
+
+
+def test_one_damaged_machine_among_many_costs_its_own_line_alone(shop: Shop, tmp_path: Path) -> None:
+    shop.put("")
+    shop.tap_both()
+    assert codes(shop, 1) == set()
+    for number in range(30):
+        shutil.copytree(shop.path, tmp_path / "mills" / f"{number:03d}")
+    (tmp_path / "mills" / "017" / "machine.toml").write_bytes(b"\0" * 100)
+    (tmp_path / "mills" / "021" / "standing.json").write_bytes(b"")
+    (tmp_path / "mills" / "022" / "history.rows").write_bytes(b"x")
+    found = Plant(find_machines(tmp_path / "mills")).standings(shop.start + timedelta(days=1))
+    assert [one.key for one in found if one.dated.light is not Light.GOOD] == ["017"]
+    assert len(found) == 30

@@ -1,0 +1,132 @@
+"""Test cuts in the diagram of a cut: which belong there, where they stand, and that the report has them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+import pytest
+
+from lobes import Cut, StabilityLobes
+from lobewatch.cuts.learning.lobes_at_speed import LobesAtSpeed, lobes_at_speed
+from lobewatch.machine.additions.keep_cut import keep_cut
+from lobewatch.machine.journal.heard_cut import CutWord, HeardCut
+from lobewatch.show.figures.heard_cuts import heard_of
+from lobewatch.show.figures.lobe_figures import lobes_figure
+from lobewatch.show.report.report import render_report
+from lobewatch.tool import lobes_of
+from lobewatch.verdicts.limit_band import LimitBand
+
+SLOT = Cut(4, 1.0, "down", 1.4e9, 5e8)
+
+
+def heard(word: CutWord, speed_rpm: float, depth: float, **changes: Any) -> HeardCut:
+    made = HeardCut(
+        id=f"c{speed_rpm:.0f}",
+        at=datetime(2026, 2, 1, tzinfo=UTC),
+        program="A",
+        tool="reference",
+        cut=SLOT,
+        coefficients="",
+        feed="both",
+        feed_per_tooth=None,
+        commanded_rpm=speed_rpm,
+        speed_rpm=speed_rpm,
+        depth=depth,
+        word=word,
+        chatter_frequency_hz=None,
+        by="ear",
+        software="lobewatch 1",
+    )
+    return replace(made, **changes)
+
+
+def test_cuts_stand_where_they_were_made_and_say_what_they_chattered_at() -> None:
+    cuts = [
+        heard("stable", 1200.0, 1e-3),
+        heard("chatter", 1500.0, 4e-3, chatter_frequency_hz=1650.4),
+        heard("flip", 1700.0, 2e-3),
+    ]
+    speed = np.linspace(1000.0, 2000.0, 5)
+    figure = lobes_figure(speed, {"now": np.full(5, 0.2e-3)}, heard=cuts)
+    (axes,) = figure.axes
+    stable, chatter = axes.lines[-2:]
+    assert np.asarray(stable.get_xydata()).tolist() == [[1200.0, 1.0]]
+    assert np.asarray(chatter.get_xydata()).tolist() == [[1500.0, 4.0], [1700.0, 2.0]]
+    assert stable.get_marker() != chatter.get_marker()
+    assert [line.get_label() for line in (stable, chatter)] == ["heard stable", "heard to chatter"]
+    assert [text.get_text() for text in axes.texts] == ["1650 Hz"]
+    assert axes.get_ylim()[1] > 4.0
+
+
+def test_what_cuts_have_taught_is_a_line_in_a_band_of_its_own() -> None:
+    speed, depth = np.linspace(1000.0, 2000.0, 5), np.full(5, 1e-3)
+    lobes = StabilityLobes(speed, depth, depth, np.full(5, "hopf"), depth[:, np.newaxis], "zero order")
+    learnt = LobesAtSpeed(4, lobes, LimitBand(speed, 0.5 * depth, 3 * depth))
+    (axes,) = lobes_figure(speed, {"now": 2 * depth}, learnt=learnt).axes
+    (line,) = [one for one in axes.lines if one.get_label() == "at speed, learnt from 4 test cuts"]
+    assert line.get_ydata() == pytest.approx(1.0)
+    (band,) = [one for one in axes.collections if "left open" in str(one.get_label())]
+    edge = np.asarray(band.get_paths()[0].vertices)[:, 1]
+    assert (edge.min(), edge.max()) == pytest.approx((0.5, 3.0))
+
+
+def test_lobes_at_speed_are_those_of_modes_and_coefficients_that_were_learnt(shop: Any) -> None:
+    shop.run(("A", 12900, 1.5))
+    shop.tap_both(0, 1.0)
+    logbook = shop.logbook
+    (rest,) = logbook.verdicts()
+    assert lobes_at_speed([rest], logbook.machine) is None
+    for number in range(3):
+        made = heard("stable", 12900.0, 1e-3 + 1e-4 * number, program="A", cut=logbook.machine.build_cut(rest.program))
+        keep_cut(logbook.folder, made)
+    logbook = shop.logbook
+    (taught,) = logbook.verdicts()
+    found = lobes_at_speed([taught], logbook.machine)
+    assert found is not None
+    assert found.cuts == 3
+    assert taught.assembly is not None
+    softer = float(np.min(lobes_of(taught.assembly, logbook.machine)["A"].depth))
+    push = (taught.program.tangential_n_per_mm2 or 0) / (rest.program.tangential_n_per_mm2 or 1)
+    assert float(np.min(found.lobes.depth)) == pytest.approx(softer / push, rel=0.1)
+    assert np.all(found.band.low <= found.lobes.depth)
+    html = render_report(logbook, "reference", "x")
+    assert ">at speed, learnt from 3 test cuts</text>" in html
+    assert "at speed: limiting depth (mm)" in html
+
+
+@pytest.mark.parametrize(
+    ("changes", "shown"),
+    [
+        ({}, True),
+        ({"program": "B"}, True),
+        ({"program": "B", "cut": replace(SLOT, tangential=1e9)}, False),
+        ({"cut": replace(SLOT, tangential=1e9)}, True),
+        ({"cut": replace(SLOT, immersion=0.5)}, False),
+        ({"tool": "other"}, False),
+        ({"excluded": "wrong depth"}, False),
+        ({"word": "cannot tell"}, False),
+    ],
+)
+def test_a_diagram_has_the_cuts_of_its_tool_cutter_and_immersion(changes: dict[str, Any], shown: bool) -> None:
+    cut = replace(heard("stable", 1200.0, 1e-3), **changes)
+    assert heard_of([cut], "A", "reference", SLOT) == ([cut] if shown else [])
+
+
+def test_the_report_shows_and_lists_test_cuts(shop: Any) -> None:
+    shop.run(("A <1>", 12900, 1.5))
+    shop.tap(0, 1713.0)
+    html = render_report(shop.logbook, "reference", "x")
+    assert "Test cuts" not in html
+    cut = shop.logbook.machine.build_cut(shop.logbook.machine.program[0])
+    made = heard("chatter", 9000.0, 2e-3, program="A <1>", cut=cut, chatter_frequency_hz=1725.0)
+    keep_cut(shop.logbook.folder, made)
+    html = render_report(shop.logbook, "reference", "x")
+    assert (
+        "<td>A &lt;1&gt;</td><td>reference</td><td>9000</td><td>2</td><td>chatter at 1725 Hz</td><td>ear</td>" in html
+    )
+    assert "Rings and crosses: 1 test cut, as heard." in html
+    assert ">heard to chatter</text>" in html
+    assert ">1725 Hz</text>" in html

@@ -1,0 +1,159 @@
+"""Tables of verdicts: the four words, and no number that is cut, however narrow the terminal."""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lobewatch.machine import ProgramTable
+from lobewatch.show.programs.settings import rpm
+from lobewatch.show.programs.verdicts import (
+    WORDS,
+    is_safe,
+    limits_text,
+    turning_text,
+    verdict_json,
+    verdict_table,
+    verdict_text,
+)
+from lobewatch.show.terminal.output import Terminal, emit
+from lobewatch.verdicts import Verdict, Word
+
+
+def program(name: str = "A", speed: float = 12900.0, depth: float = 2.0) -> ProgramTable:
+    return ProgramTable(
+        name=name,
+        speed_rpm=speed,
+        depth_mm=depth,
+        teeth=2,
+        radial_depth_mm=5,
+        tool_diameter_mm=10,
+        direction="up",
+        material="any",
+    )
+
+
+def found(
+    word: Word = Word.STABLE,
+    limit: float = 3e-3,
+    low: float = 2e-3,
+    high: float = 4e-3,
+    chance: float = 0.1,
+    **more: float,
+) -> Verdict:
+    return Verdict(program(), word, limit=limit, limit_low=low, limit_high=high, chance_turning=chance, **more)  # type: ignore[arg-type]
+
+
+def printed(*verdicts: Verdict, width: int = 80) -> list[str]:
+    to = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("COLUMNS", str(width))
+        patch.setattr(
+            "lobewatch.show.terminal.output.results", Terminal(file=to, width=max(width, 120), soft_wrap=True)
+        )
+        emit({}, False, verdict_table(verdicts, ["> 20 %"] * len(verdicts)))
+    return [line.rstrip() for line in to.getvalue().splitlines()]
+
+
+def test_there_is_one_table_of_words() -> None:
+    assert list(WORDS) == list(Word)
+    assert [str(word) for word in WORDS] == ["stable", "doubtful", "not stable", "unknown"]
+    assert len({look.symbol for look in WORDS.values()}) == 4
+
+
+@pytest.mark.parametrize("width", [40, 80, 200])
+@given(
+    name=st.text(st.characters(categories=["L", "N", "Zs", "P"]), min_size=1, max_size=90),
+    speed=st.floats(100, 240_000),
+    depth=st.floats(0.05, 300),
+    limit=st.one_of(st.floats(1e-5, 2.0), st.just(math.inf)),
+    spread=st.floats(1.05, 3),
+    word=st.sampled_from(list(Word)),
+)
+def test_no_number_of_a_table_is_cut(
+    width: int, name: str, speed: float, depth: float, limit: float, spread: float, word: Word
+) -> None:
+    one = Verdict(
+        program(name, speed, depth),
+        word,
+        limit=limit,
+        limit_low=min(limit, 2.0) / spread,
+        limit_high=limit * spread,
+        chance_turning=0.004,
+    )
+    lines = printed(one, width=width)
+    numbers = (f"{speed:g}", f"{depth:g}", limits_text(one), "< 1 %", "> 20 %")
+    assert re.search(" +".join(map(re.escape, numbers)), "\n".join(lines)), lines
+    assert max(map(len, lines)) <= max(width, 94)
+    assert "…" not in "".join(lines) or "…" in name
+    if width >= 200:
+        assert "".join(name.split()) in "".join("".join(lines).split())
+
+
+def test_long_names_and_large_numbers_fit_80_columns() -> None:
+    name = "bracket 4711, roughing, slot with the long end mill, left side, 2nd clamping"
+    large = Verdict(
+        program(name, 120000.0, 123.45),
+        Word.NOT_STABLE,
+        limit=0.0987654,
+        limit_low=0.0543211,
+        limit_high=math.inf,
+        chance_turning=0.999,
+    )
+    lines = printed(large, found())
+    assert max(map(len, lines)) <= 80
+    row = next(line for line in lines if "120000" in line)
+    assert re.search(r"120000 +123\.45 +98\.77 \(54\.32\.\.> 2469\) +> 99 % +> 20 % +not stable$", row), row
+    said = " ".join(line[: lines[0].index("speed") - 1].strip() for line in lines[2:])
+    assert re.sub(r"\s", "", name) in re.sub(r"\s", "", said)
+
+
+@pytest.mark.parametrize(
+    ("one", "text"),
+    [
+        (found(), "3.00 (2.00..4.00)"),
+        (found(limit=0.12345, low=0.1, high=1.23456), "123.5 (100.0..1235)"),
+        (found(limit=math.inf, low=30e-3, high=math.inf), "> 40.00 (30.00..> 40.00)"),
+        (found(limit=math.inf, low=math.inf, high=math.inf), "> 40.00"),
+        (found(Word.UNKNOWN, math.nan, math.nan, math.nan), "-"),
+    ],
+)
+def test_limits_with_their_band(one: Verdict, text: str) -> None:
+    assert limits_text(one) == text
+
+
+@pytest.mark.parametrize(
+    ("chance", "text"), [(0.0, "< 1 %"), (0.004, "< 1 %"), (0.18, "18 %"), (1.0, "> 99 %"), (math.nan, "-")]
+)
+def test_chance_of_chatter_once_it_turns(chance: float, text: str) -> None:
+    assert turning_text(found(chance=chance)) == text
+
+
+def test_a_word_says_what_it_must_in_the_same_breath() -> None:
+    beyond = found(drive_limit=1e-3)
+    assert verdict_text(beyond) == "stable, beyond the drive (predicted)"
+    assert [is_safe(one) for one in (found(), beyond, found(Word.DOUBTFUL), found(Word.UNKNOWN))] == [True] + [
+        False
+    ] * 3
+    assert verdict_text(found(Word.UNKNOWN)) == "unknown"
+
+
+def test_json_of_what_is_not_known() -> None:
+    said = verdict_json(Verdict(program(), Word.UNKNOWN))
+    assert (said["stable"], said["verdict"], said["decided_by"], said["doubt"], said["cuts"]) == (
+        None,
+        "unknown",
+        None,
+        None,
+        0,
+    )
+    assert all(math.isnan(said[key]) for key in ("limit_mm", "limit_low_mm", "limit_high_mm", "chance_turning"))
+
+
+def test_speeds_are_read_in_groups() -> None:
+    assert [rpm(speed) for speed in (950.0, 12640.0, 12640.5, 123456.0)] == ["950", "12 640", "12 640.5", "123 456"]

@@ -1,0 +1,146 @@
+"""The report: its first screen, the numbers that go with it, the page of all machines, one light everywhere."""
+
+from __future__ import annotations
+
+import json
+import re
+from datetime import UTC, datetime, timedelta
+from html import unescape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from lobewatch.cli import app
+from lobewatch.plant.plant import Plant
+from lobewatch.show.report.fleet import render_fleet, spark
+from lobewatch.show.report.page import page
+from lobewatch.show.report.report import render_report
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [*map(str, arguments)])
+
+
+def numbers(html: str, name: str) -> tuple[list[str], list[list[Any]]]:
+    """Of the figure with this button."""
+    found = re.search(rf'data-numbers="([^"]+)" data-name="{name}"', html)
+    assert found is not None, name
+    block = re.search(rf'id="{found[1]}">(.*?)</script>', html, re.DOTALL)
+    assert block is not None
+    made = json.loads(block[1])
+    assert all(len(line) == len(made["heads"]) for line in made["lines"])
+    return made["heads"], made["lines"]
+
+
+@pytest.fixture
+def worn(shop: Shop) -> Shop:
+    """One program, two directions that fall by 0.3 % every 15 days, ten times, and stand at -3.0 %."""
+    shop.run(("A <1>", 12900, 1.5))
+    for i in range(11):
+        shop.tap_both(15 * i, 1 - 0.003 * i + 0.0003 * (-1) ** i)
+    return shop
+
+
+def test_a_report_says_first_what_matters_and_holds_its_numbers(worn: Shop) -> None:
+    logbook = worn.logbook
+    now = logbook.history.rows[-1].time + timedelta(days=1)
+    html = render_report(logbook, "reference", "x", now)
+    first = html[html.index('<div class="first">') : html.index("<h2")]
+    standing = logbook.standing(now)
+    light = {"alarm": "✗ ALARM", "warn": "! WARNING"}[standing.light]
+    for said in (light, "falling since 2026-01-", " % a month now (", "A &lt;1&gt;", "Tap next by 2026-07-14"):
+        assert said in first, said
+    assert standing.next_step in unescape(first)
+    assert re.search(r"<td>(not stable|doubtful) (between|not before) .*?</td><td>", first)
+    heads, lines = numbers(html, "natural-frequency")
+    assert heads[:3] == ["what", "date", "natural frequency (Hz)"]
+    tests = [line for line in lines if line[0] == "test"]
+    assert [line[2] for line in tests[:2]] == pytest.approx([1713.5, 1713.0 * 0.9967], abs=0.05)
+    assert {line[0] for line in lines} == {"test", "fitted", "forecast"}
+    heads, lines = numbers(html, "stability-lobes-over-time")
+    assert len(heads) == 1 + 11 + 1  # every test, and where it will be in six months
+    lobes = np.array([[np.nan if depth is None else depth for depth in line] for line in lines])
+    pockets = [lobes[np.nanargmax(np.where(lobes[:, 0] < 15000, depth, 0)), 0] for depth in lobes.T[1:]]
+    assert pockets[0] > pockets[10] > pockets[-1]  # the deepest pocket moves down with the frequency, and goes on to
+    assert len(numbers(html, "tap-tests")[1]) == 22
+    assert len(numbers(html, "frequency-response")[1]) > 100
+    data = sum(map(len, re.findall(r'<script type="application/json".*?</script>', html, re.DOTALL)))
+    assert len(html) - data < 500_000
+    assert "http" not in re.sub(r"https?://(www\.w3|matplotlib|purl|creativecommons)\.org", "", html)
+
+
+def test_a_report_of_one_tap_has_no_forecast_and_says_so(shop: Shop) -> None:
+    shop.tap(0, 1713.0)
+    html = render_report(shop.logbook, "reference", "x")
+    assert "history too short" in html
+    assert "from 8 points on" in html
+    assert "lobes-plot" not in html.replace("#lobes-plot", "").replace('"lobes-plot"', "")
+
+
+def test_all_machines_of_a_folder_are_one_page(shop: Shop, tmp_path: Path) -> None:
+    shop.put("")
+    shop.tap(0, 1713.0)
+    shop.tap(40, 1500.0)
+    type(shop)(tmp_path / "fresh")
+    (tmp_path / "torn").mkdir()
+    (tmp_path / "torn" / "machine.toml").write_text("x =")
+    told = run("report", tmp_path)
+    assert told.exit_code == 0, told.output
+    html = (tmp_path / "report.html").read_text("utf-8")
+    assert re.findall(r'<th scope="row"><strong>(.*?)</strong>', html)[0] == "m"
+    assert "3 machines" in html
+    assert "✗ ALARM" in html
+    assert html.count("? UNKNOWN") == 2
+    assert "<polyline" in html
+    refused = run("report", tmp_path, "--tool", "reference")
+    assert "name one of the machines" in str(refused.exception)
+    (tmp_path / "empty").mkdir()
+    assert run("report", tmp_path / "empty").exit_code != 0
+
+
+def test_a_course_falls_on_paper_as_it_does() -> None:
+    assert spark([(0.0, 0.0)]) == ""
+    assert spark([(0.0, 0.0), (10.0, -2.0)]) == "0.0,0.0 140.0,32.0"
+    assert spark([(5.0, 0.0), (5.0, 0.0)]) == "0.0,0.0 0.0,0.0"
+
+
+def test_a_name_cannot_end_the_style_sheet() -> None:
+    html = render_fleet([], 'x"; } </style><script>alert(1)</script>', datetime(2026, 1, 1, tzinfo=UTC))
+    assert "alert(1)</script>" not in html
+    assert html.count("</style>") == 1
+    assert callable(page)
+
+
+def lights(shop: Shop, path: Path, seed: int) -> tuple[str, str, str]:
+    """Of dashboard, report and page of all machines, for a machine tapped at random."""
+    random = np.random.default_rng(seed)
+    one = type(shop)(path / "m")
+    one.put("")
+    frequency, days = 1713.0, float(random.uniform(-900, -600))
+    for _ in range(int(random.integers(1, 6))):
+        days += random.exponential(60)
+        frequency *= 1 - float(random.choice([0.0, 0.002, 0.06]) * random.random())
+        one.tap(days, frequency, "xy"[random.integers(2)], stiffness=3.5e7 * float(random.choice([1.0, 1.0, 5.0])))
+    plant = Plant({"m": one.path}).standings()
+    newest = one.logbook.newest()
+    html = render_report(one.logbook, newest.tool, newest.direction)
+    assert run("report", path).exit_code == 0
+    fleet = (path / "report.html").read_text("utf-8")
+    words = {"✗ ALARM": "alarm", "? UNKNOWN": "unknown", "! WARNING": "warn", "✓ GOOD": "good"}
+    shown = re.search(r"<strong>(.*?)</strong>", html[html.index('<div class="verdict') :])
+    listed = re.search(r'<td><span class="\w+">(.*?)</span>', fleet)
+    assert shown is not None
+    assert listed is not None
+    return plant[0].dated.light.value, words[shown[1]], words[listed[1]]
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(1, 50))])
+def test_dashboard_and_report_show_the_same_light(shop: Shop, tmp_path: Path, seed: int) -> None:
+    dashboard, *reports = lights(shop, tmp_path / "folder", seed)
+    assert reports == [dashboard, dashboard]

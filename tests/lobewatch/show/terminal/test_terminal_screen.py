@@ -1,0 +1,217 @@
+"""The terminal screen and the lines for a log: words, symbols, keys, bells, colours that may be off."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+from rich.console import Console
+
+from acquisition import HitFlags
+from lobewatch.show.terminal.keys import letters
+from lobewatch.show.terminal.printer import TapPrinter
+from lobewatch.show.terminal.terminal_screen import TerminalScreen, picture
+from lobewatch.tap.state import Check, Outcome, TakenHit, TapState, Word
+
+GOOD = TakenHit(1, HitFlags.OK, 231.4)
+DOUBLE = TakenHit(
+    2, HitFlags.DOUBLE_HIT, 310.0, reason="Second peak 12 ms after the first (18 %): let it bounce [back]."
+)
+STATE = TapState(
+    1, Word.TAP, "mill-3, tool T1, direction x", device="TAPS, 25600 Hz", good=1, hits=(GOOD,), levels=(0.1, 2.0)
+)
+
+
+class Session:
+    """A test that somebody else moves on, and that counts what it is asked for."""
+
+    def __init__(self, state: TapState = STATE) -> None:
+        self.state = state
+        self.asked: list[str] = []
+        self.called = threading.Event()
+
+    def undo(self) -> None:
+        self.asked.append("undo")
+        self.called.set()
+
+    def stop(self) -> None:
+        self.asked.append("stop")
+        self.called.set()
+
+
+def seen(state: TapState, width: int = 100, **options: bool) -> str:
+    console = Console(file=io.StringIO(), width=width, force_terminal=True, **options)  # type: ignore[arg-type]
+    console.print(picture(state, muted=False))
+    text = console.file.getvalue()  # type: ignore[attr-defined]
+    return str(text)
+
+
+def plain(state: TapState, width: int = 100) -> str:
+    return re.sub(r"\x1b\[[0-9;]*m", "", seen(state, width))
+
+
+SYMBOLS = dict(zip(Word, ("…", "▼", "…", "✓", "✗", "!", "■", "✗"), strict=True))
+
+
+@pytest.mark.parametrize("word", Word)
+def test_every_word_has_a_symbol_and_how_far_it_is(word: Word) -> None:
+    text = plain(replace(STATE, word=word, verdict="good" if word is Word.GOOD else "double hit"))
+    shown = "DOUBLE HIT" if word is Word.REFUSED else str(word)
+    assert f"{SYMBOLS[word]}  {shown}   1 / 10" in text
+    assert "mill-3, tool T1, direction x - TAPS, 25600 Hz" in text
+    assert "u undo   q stop   m mute" in text
+
+
+def test_a_trial_hit_is_told_from_a_good_one() -> None:
+    assert "✓  GOOD (trial hit)   0 / 10" in plain(
+        replace(STATE, word=Word.GOOD, verdict="good", trial=True, good=0, hits=())
+    )
+
+
+def test_what_was_wrong_and_how_far_the_mean_has_come() -> None:
+    state = replace(STATE, hits=(GOOD, DOUBLE), reason=DOUBLE.reason, mean_change=0.0123, settled=True)
+    text = plain(state)
+    assert text.count(DOUBLE.reason) == 2
+    assert "2     310 N  ✗ DOUBLE HIT  Second peak" in text
+    assert "1     231 N  ✓ GOOD" in text
+    assert "force 0.1 N rms, response 2 m/s^2 rms   the last good hit moved the mean by 1.2 %; it has settled" in text
+    undone = plain(replace(STATE, hits=(replace(GOOD, flags=HitFlags.UNDONE, undone=True),)))
+    assert "↶ UNDONE" in undone
+
+
+def test_a_long_reason_is_not_cut_off_on_a_narrow_terminal() -> None:
+    text = " ".join(plain(replace(STATE, reason="a long reason " * 12 + "end"), width=50).split())
+    assert text.count("a long reason") == 12
+    assert "end" in text
+
+
+def test_checks_before_the_first_hit_and_the_result_after_the_last() -> None:
+    checks = (Check("disk", True, "78 GB free"), Check("hum", False, "1 N rms at 50 Hz"))
+    text = plain(replace(STATE, hits=(), good=0, checks=checks))
+    assert "✓ disk: 78 GB free" in text
+    assert "✗ hum: 1 N rms at 50 Hz" in text
+    later = plain(replace(STATE, checks=checks))
+    assert "disk" not in later
+    assert "✗ hum: 1 N rms at 50 Hz" in later
+    done = plain(replace(STATE, word=Word.DONE, outcome=Outcome("warn", ["f_n 1700 Hz."], "Tap again.")))
+    assert "! WARN" in done
+    assert "f_n 1700 Hz. Tap again." in done
+
+
+def test_colours_go_without_and_the_words_stay() -> None:
+    colour = re.compile(r"\x1b\[[0-9;]*(?:[34]8;|3[0-7]|4[0-7])[0-9;]*m")
+    assert colour.search(seen(STATE))
+    without = seen(STATE, no_color=True)
+    assert not colour.search(without)
+    assert "▼  TAP" in without
+
+
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """A keyboard: what is written to it arrives at standard input."""
+    pty = pytest.importorskip("pty")
+    keyboard, end = pty.openpty()
+    with os.fdopen(end, "r") as stdin:
+        monkeypatch.setattr("sys.stdin", stdin)
+        yield keyboard
+    os.close(keyboard)
+
+
+def screen_of(session: Session) -> tuple[TerminalScreen, io.StringIO]:
+    file = io.StringIO()
+    return TerminalScreen(session, Console(file=file, width=80, force_terminal=True)), file
+
+
+@pytest.mark.parametrize(("key", "asked"), [(b"u", "undo"), (b"Q", "stop"), (b"\x1b[5~", "undo")])
+def test_keys_reach_the_test(terminal: int, key: bytes, asked: str) -> None:
+    session = Session()
+    with screen_of(session)[0]:
+        os.write(terminal, key)
+        assert session.called.wait(5)
+    assert session.asked == [asked]
+
+
+def test_a_key_held_down_counts_once_and_arrows_for_nothing() -> None:
+    session = Session()
+    screen = screen_of(session)[0]
+    for key in letters("uuuuu\x1bOq\x1b[1;5Q\x1b[A\xe0uU"):
+        screen.press(key)
+    assert session.asked == ["undo"]
+
+
+def test_undo_again_after_a_while(monkeypatch: pytest.MonkeyPatch) -> None:
+    session = Session()
+    screen = screen_of(session)[0]
+    for now in (10.0, 10.4, 11.2, 12.0):
+        monkeypatch.setattr("lobewatch.show.terminal.terminal_screen.time.monotonic", lambda now=now: now)
+        screen.press("u")
+    assert session.asked == ["undo"] * 3
+
+
+def test_the_terminal_is_left_as_it_was(terminal: int) -> None:
+    termios = pytest.importorskip("termios")
+    before = termios.tcgetattr(terminal)
+    with screen_of(Session())[0]:
+        assert termios.tcgetattr(terminal) != before
+    assert termios.tcgetattr(terminal) == before
+
+
+@pytest.mark.parametrize(("word", "bells"), [(Word.GOOD, 1), (Word.REFUSED, 2), (Word.NO_DEVICE, 3), (Word.WAIT, 0)])
+def test_each_verdict_has_its_number_of_bells_unless_muted(terminal: int, word: Word, bells: int) -> None:
+    screen, file = screen_of(Session())
+    screen.ring(STATE, replace(STATE, word=word))
+    assert file.getvalue().count("\a") == bells
+    screen.press("m")
+    screen.ring(STATE, replace(STATE, word=word))
+    assert file.getvalue().count("\a") == bells
+
+
+def test_lines_for_a_log_tell_everything_once() -> None:
+    session = Session(replace(STATE, hits=(), device=""))
+    console = Console(file=io.StringIO(), width=200)
+    printer = TapPrinter(session, console)
+    earlier = replace(GOOD, earlier=True)
+    away = "the DAQ was unplugged; the test goes on at this hit"
+    checks = (Check("hum", False, "1 N rms at 50 Hz"), Check("disk", True, "full of room"))
+    states = (
+        replace(STATE, hits=(earlier,), resumed="going on with the test begun today", checks=checks),
+        replace(STATE, hits=(earlier, DOUBLE), checks=checks, resumed="going on with the test begun today"),
+        replace(STATE, hits=(earlier, DOUBLE), word=Word.NO_DEVICE, reason=away, checks=checks, resumed="going on"),
+    )
+    for state in states:
+        for _ in range(2):
+            printer.show(state)
+    said = console.file.getvalue()  # type: ignore[attr-defined]
+    assert said.count("TAPS, 25600 Hz. TAP the tool") == 1
+    assert said.count("going on with the test begun today") == 1
+    assert said.count("! hum: 1 N rms at 50 Hz") == 1
+    assert "full of room" not in said
+    assert said.count(" / 10") == 1
+    assert "  1 / 10  ✗ DOUBLE HIT  Second peak 12 ms after the first (18 %): let it bounce [back].  (310 N)" in said
+    assert said.count(away) == 1
+
+
+def test_what_a_trial_hit_says_is_a_line_of_its_own_as_it_is_in_no_list() -> None:
+    console = Console(file=io.StringIO(), width=200)
+    printer = TapPrinter(Session(replace(STATE, hits=())), console)
+    printer.show(replace(STATE, word=Word.REFUSED, verdict="double hit", trial=True, reason="Bounce back.", hits=()))
+    printer.show(replace(STATE, word=Word.REFUSED, verdict="too soft", reason="Hit harder.", hits=(GOOD,)))
+    said = console.file.getvalue()  # type: ignore[attr-defined]
+    assert said.splitlines() == ["Bounce back.", "  1 / 10  ✓ GOOD  (231 N)"]
+
+
+def test_a_word_ahead_of_its_hit_rings_once_and_the_next_hit_again(terminal: int) -> None:
+    screen, file = screen_of(Session())
+    word = replace(STATE, word=Word.GOOD)
+    first = replace(word, hits=(*STATE.hits, GOOD))
+    second = replace(first, hits=(*first.hits, GOOD))
+    bells = []
+    for before, state in ((STATE, word), (word, first), (first, second)):
+        screen.ring(before, state)
+        bells.append(file.getvalue().count("\a"))
+    assert bells == [1, 1, 2]

@@ -1,0 +1,163 @@
+"""Stories of an emulated spindle: each is told as it is meant, and recognised by the watch and the forecast."""
+
+from __future__ import annotations
+
+import math
+from datetime import timedelta
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from dsm import natural_frequencies
+from lobewatch.cli import app
+from lobewatch.decay.trend import MONTH, Tapped, Trend, day, trend_of
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap.stories.demo import PlannedTap, plan_taps
+from lobewatch.tap.stories.mounted import mounted_at
+from lobewatch.tap.stories.mounting import Mounting
+from lobewatch.tap.stories.story import Story, Wear
+
+MONTHS = 24
+
+
+def planned(
+    folder: MachineFolder, story: Story, seed: int = 1, scatter: float = 0.001, **more: Any
+) -> list[PlannedTap]:
+    """The tests in x."""
+    taps = plan_taps(folder, MONTHS, np.random.default_rng(seed), scatter, story, Mounting(**more))
+    return [tap for tap in taps if tap.direction == "x"]
+
+
+def judged(taps: list[PlannedTap]) -> Trend:
+    """What is made of the true frequencies, which scatter."""
+    warmth = [tap.conditions.known.get("temperature_c", math.nan) for tap in taps]
+    series = [Tapped(tap.date, tap.truth.frequency, 0.01, warm) for tap, warm in zip(taps, warmth, strict=True)]
+    return trend_of(series, taps[-1].date)
+
+
+def reached(trend: Trend, percent: float) -> tuple[float, float, float]:
+    """Months after the last test at which it has fallen by so much more."""
+    assert trend.forecast is not None
+    last = day(trend.points[-1].time)
+    level = float(trend.forecast.fitted[-1]) - percent
+    earliest, probable, latest = ((when - last) / MONTH for when in trend.forecast.reached(level))
+    return earliest, probable, latest
+
+
+def test_a_steady_fall_is_an_alarm_and_its_date_is_foretold(folder: MachineFolder) -> None:
+    found = judged(planned(folder, Story.STEADY))
+    assert found.watch.fall is not None
+    assert found.watch.fall.kind == "slope"
+    assert found.forecast is not None
+    now = found.first * math.exp(found.forecast.fitted[-1] / 100)
+    true = Wear.of(folder, MONTHS, Story.STEADY).month_of(now * math.exp(-0.02))
+    assert true is not None
+    assert reached(found, 2.0)[1] == pytest.approx(true - (MONTHS - 1), abs=0.5)
+
+
+def test_a_step_is_called_one_and_nothing_is_foretold(folder: MachineFolder) -> None:
+    found = judged(planned(folder, Story.STEP))
+    assert found.watch.fall is not None
+    assert (found.watch.fall.kind, found.watch.fall.point) == ("step", 12)
+    assert found.watch.fall.size == pytest.approx(-100 * math.log(0.98), abs=0.15)
+    assert reached(found, 2.0) == (math.inf, math.inf, math.inf)
+
+
+def test_an_accelerating_fall_is_foretold_earlier_than_its_mean_rate_says(folder: MachineFolder) -> None:
+    found = judged(planned(folder, Story.ACCELERATING))
+    assert found.watch.fall is not None
+    assert found.watch.fall.kind == "slope"
+    assert found.rate is not None
+    mean = found.points[-1].percent / (MONTHS - 1)
+    assert found.rate.high < 2 * mean < 0
+    wear = Wear.of(folder, MONTHS, Story.ACCELERATING)
+    true = wear.month_of(wear.frequency(MONTHS - 1) * math.exp(-0.02))
+    assert true is not None
+    assert reached(found, 2.0)[1] == pytest.approx(true - (MONTHS - 1), abs=0.5)
+
+
+def test_replaced_bearings_bring_the_frequency_back_and_wear_anew(folder: MachineFolder) -> None:
+    wear, taps = Wear.of(folder, MONTHS, Story.REPLACED), planned(folder, Story.REPLACED)
+    at = wear.replaced_at
+    assert at == 15
+    before, after = judged(taps[:at]), judged(taps[at:])
+    assert after.first / before.first == pytest.approx(1, abs=0.004)
+    assert before.points[-1].percent < -5
+    assert before.watch.fall is not None
+    assert after.watch.asks_again  # of nine points the last one is the first that is judged
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_where_nothing_happens_nothing_is_said(folder: MachineFolder, seed: int) -> None:
+    found = judged(planned(folder, Story.NONE, seed))
+    assert found.watch.fall is None
+    assert reached(found, 2.0) == (math.inf, math.inf, math.inf)
+
+
+def test_a_swing_of_the_temperature_is_recorded_and_no_decay(folder: MachineFolder) -> None:
+    taps = planned(folder, Story.NONE, scatter=0.0002, swing=10.0)
+    frequencies = np.array([tap.truth.frequency for tap in taps])
+    warmth = np.array([tap.conditions.temperature_c for tap in taps], float)
+    assert warmth[[0, 6]] == pytest.approx([12.0, 32.0])
+    assert np.polyfit(warmth, 100 * np.log(frequencies), 1)[0] == pytest.approx(-0.015, abs=0.003)
+    assert judged(taps).watch.fall is None
+
+
+def test_bad_clampings_are_lower_and_as_many_as_asked(folder: MachineFolder) -> None:
+    plain, bad = planned(folder, Story.NONE, scatter=0.0), planned(folder, Story.NONE, scatter=0.0, bad=0.3)
+    shifts = np.array([one.truth.frequency / other.truth.frequency - 1 for one, other in zip(bad, plain, strict=True)])
+    assert set(np.round(shifts, 6)) == {0.0, -0.02}
+    assert 2 <= np.sum(shifts < -0.01) <= 14
+
+
+def test_an_emulated_month_is_seeded_and_falls_with_the_story(folder: MachineFolder) -> None:
+    def frequency(month: int, seed: int = 1) -> float:
+        spindle = mounted_at(folder, Story.STEADY, MONTHS, month, Mounting(0.001), seed)
+        return float(natural_frequencies(spindle, 1)[0])
+
+    assert frequency(5) == frequency(5) != frequency(5, seed=2)
+    assert frequency(23) / frequency(0) == pytest.approx(0.9, abs=0.005)
+
+
+def test_the_truth_is_looked_up_by_the_story(folder: MachineFolder) -> None:
+    wear = Wear.of(folder, MONTHS, Story.STEADY)
+    month = wear.month_of(0.88 * wear.frequency(0))
+    assert month is not None
+    assert wear.frequency(month) == pytest.approx(0.88 * wear.frequency(0), rel=1e-5)
+    assert Wear.of(folder, MONTHS, Story.STEP).month_of(0.88 * wear.frequency(0)) is None
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--story", "sudden"], "'sudden'"),
+        (["--bad-clampings", "51"], "--bad-clampings 51 is not between 0 and 50 %"),
+        (["--temperature", "-1"], "--temperature -1 is not between 0 and 30 K"),
+        (["--story", "replaced", "--taps", "31"], "at most, not 31"),
+    ],
+)
+def test_a_story_that_cannot_be_is_refused(folder: MachineFolder, options: list[str], said: str) -> None:
+    out = folder.path / "new"
+    told = CliRunner().invoke(app, ["demo", "--out", str(out), *options])
+    assert told.exit_code != 0
+    assert said in f"{told.output}{told.exception}"
+    assert not out.exists()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("story", [*Story])
+def test_each_story_is_recognised_through_the_whole_chain(folder: MachineFolder, story: Story) -> None:
+    out = folder.path.parent / story
+    options = ["--taps", "20", "--story", story, "--scatter", "0.1"]
+    made = CliRunner().invoke(app, ["demo", "--out", str(out), *options], catch_exceptions=False)
+    assert "Foretold after the last test" in made.output
+    assert ("true never" in made.output) == (story in (Story.STEP, Story.NONE))
+    from lobewatch.logbook import Logbook
+
+    logbook = Logbook.open(out)
+    standing = logbook.standing(logbook.history.rows[-1].time + timedelta(days=1))
+    codes = {remark.code for remark in standing.remarks}
+    assert ("decay" in codes) == (story not in (Story.NONE, Story.REPLACED))
+    assert any("fell at once" in str(one) for one in standing.remarks) == (story is Story.STEP)

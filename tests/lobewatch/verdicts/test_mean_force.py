@@ -1,0 +1,51 @@
+"""Zero order of many spindles at once: beside lobes.zero_order, and beyond the limit beside semi-discretisation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lobes import Cut, milling_system, rows_of, zero_order
+from lobes.floquet import largest_multipliers, piece_numbers
+from lobewatch.cuts.listening.folded import folded
+from lobewatch.verdicts.mean_force import MeanForce, is_constant
+from modal import Mode
+
+X = [Mode(1713.0, 0.029, 3.5e7), Mode(2400.0, 0.02, 9e7, phase_deg=20.0)]
+Y = [Mode(1400.0, 0.035, 2.5e7)]
+SPEEDS = np.geomspace(4000, 24000, 60)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+@pytest.mark.parametrize("cut", [Cut(4, 1.0, "down", 1.4e9, 5e8), Cut(3, 0.5, "up", 7e8, 1e8)])
+def test_limits_are_those_of_zero_order(cut: Cut, angle: float) -> None:
+    cut = replace(cut, feed_angle=angle)
+    rows = rows_of(milling_system(X, Y), cut, np.ones(2))
+    rows.tangential[1] *= 2
+    rows.radial[1] *= 2
+    depth, chatter = MeanForce.of(rows).limits(SPEEDS)
+    wanted = zero_order(X, Y, cut, SPEEDS)
+    assert depth[0] == pytest.approx(wanted.depth, rel=0.02)
+    assert chatter[0] == pytest.approx(wanted.chatter_frequency, rel=2e-3)
+    assert depth[1] == pytest.approx(depth[0] / 2)
+
+
+def test_growth_and_frequency_beyond_the_limit_are_those_of_semi_discretisation() -> None:
+    cut = Cut(4, 1.0, "down", 1.4e9, 5e8)
+    rows = rows_of(milling_system(X, Y), cut, SPEEDS)
+    depth = 3e-3
+    multiplier = largest_multipliers(rows, np.full((60, 1), depth), piece_numbers(rows, depth))[:, 0]
+    grown, frequency = MeanForce.of(rows).loudest(SPEEDS, depth)
+    teeth = 1 / rows.tooth_period
+    far = np.abs(multiplier) > 1.02
+    assert np.sum(far) > 40
+    assert (grown / teeth)[far] == pytest.approx(np.log(np.abs(multiplier[far])), abs=2e-3)
+    base = np.abs(np.angle(multiplier)) / (2 * np.pi) * teeth
+    assert folded(frequency, teeth)[far] == pytest.approx(base[far], abs=0.5)
+
+
+def test_the_force_of_a_slot_with_four_teeth_is_constant_and_that_of_three_or_of_half_a_slot_is_not() -> None:
+    kinds = ((4, 1.0), (6, 1.0), (3, 1.0), (4, 0.5))
+    assert [is_constant(Cut(teeth, share, "up", 7e8, 2e8)) for teeth, share in kinds] == [True, True, False, False]

@@ -38,7 +38,7 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen import ScreenServer
 from lobewatch.tap.session import TapSession, TapStopped
-from lobewatch.tap.state import Word
+from lobewatch.tap.state import TapStep
 
 RATE = 102_400.0
 CHANNELS = (Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0))
@@ -128,7 +128,7 @@ def live(seconds: float) -> None:
             line_of(page)
             test = threading.Thread(target=until_stopped, args=(session,))
             test.start()
-            while session.state.word is not Word.TAP and test.is_alive():
+            while session.state.word is not TapStep.TAP and test.is_alive():
                 time.sleep(0.05)
             wall, cpu = time.monotonic(), time.process_time()
             test.join(seconds)

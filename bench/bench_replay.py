@@ -52,7 +52,7 @@ from lobewatch.machine import TapEntry
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.machine.settings.machine_file import parse_machine
-from lobewatch.measuring.measurement import fitted
+from lobewatch.measuring.measurement import fit_tap
 from lobewatch.plant.plant import Plant
 from modal import Mode, synthesize
 
@@ -252,7 +252,7 @@ def ten_hits() -> None:
         path = Path(work) / "tap.h5"
         print(f"{len(hits)} hits of 2 x 16384: {len(write_tap(path, tap)) / 1e3:.0f} kB")
         for _ in range(3):
-            told("read and fitted", lambda: fitted(read_tap(path), machine))
+            told("read and fitted", lambda: fit_tap(read_tap(path), machine))
         other = Path(work) / "m"
         make_machine_folder(other, "surrogate_machine.toml")
         replayed = Logbook(MachineFolder(other)).replay_all([path], Description()).tap_ids[0]

@@ -105,6 +105,26 @@ class House:
         takes = {taken.file for taken in self.imports if taken.target == module}
         return {name for name in takes if self.paths[name].name != "__init__.py"}
 
+    def generic_names(self, package: str) -> list[str]:
+        """Names bound in a package that say nothing of what they hold, as `module:name`."""
+        bound = ((module, name) for module in self.lines(package) for name in bound_names(self.trees[module]))
+        return [f"{module}:{name}" for module, name in bound if name.strip("_") in GENERIC]
+
+    def share_without_noun(self, package: str) -> float:
+        """Share of the docstrings of fields that do not begin with a noun."""
+        texts = [text for module in self.lines(package) for _, text in field_docstrings(self.trees[module])]
+        return sum(map(begins_without_a_noun, texts)) / max(len(texts), 1)
+
+    @cached_property
+    def classes(self) -> Mapping[str, list[str]]:
+        """Modules by the names of the classes that they define."""
+        where = defaultdict[str, list[str]](list)
+        for module, tree in self.trees.items():
+            for node in tree.body:
+                if isinstance(node, ast.ClassDef):
+                    where[node.name].append(module)
+        return where
+
     def _taken(self, module: str) -> Iterator[Import]:
         functions = [node for node in ast.walk(self.trees[module]) if isinstance(node, ast.FunctionDef)]
         inner = {id(node) for function in functions for node in ast.walk(function)}
@@ -155,30 +175,23 @@ def _handed_on(module: str, path: Path, tree: ast.Module) -> dict[str, tuple[str
 
 
 def _circles(arrows: Iterable[tuple[str, str]]) -> list[list[str]]:
-    """Strongly connected components of more than one node (Tarjan, SIAM J. Comput. 1 (1972) 146-160)."""
+    """Sets of more than one node that all reach each other, the largest first."""
     follows = defaultdict[str, set[str]](set)
     for start, end in arrows:
         follows[start].add(end)
-    number, low, stack, circles = dict[str, int](), dict[str, int](), list[str](), list[list[str]]()
+    reach = {node: _reached(node, follows) for node in sorted(follows)}
+    circles = {frozenset(other for other in reach[node] if node in reach.get(other, ())) for node in reach}
+    return sorted((sorted(circle) for circle in circles if len(circle) > 1), key=len, reverse=True)
 
-    def visit(node: str) -> None:
-        number[node] = low[node] = len(number)
-        stack.append(node)
-        for after in sorted(follows.get(node, ())):
-            if after not in number:
-                visit(after)
-            if after in stack:
-                low[node] = min(low[node], low[after])
-        if low[node] == number[node]:
-            place = stack.index(node)
-            if len(stack) - place > 1:
-                circles.append(sorted(stack[place:]))
-            del stack[place:]
 
-    for node in sorted(follows):
-        if node not in number:
-            visit(node)
-    return sorted(circles, key=len, reverse=True)
+def _reached(start: str, follows: Mapping[str, set[str]]) -> set[str]:
+    """All nodes that some arrows lead to from one."""
+    reached, ahead = set[str](), [start]
+    while ahead:
+        fresh = follows.get(ahead.pop(), set()) - reached
+        reached |= fresh
+        ahead += fresh
+    return reached
 
 
 def bound_names(tree: ast.AST) -> Iterator[str]:
@@ -211,49 +224,45 @@ def begins_without_a_noun(docstring: str) -> bool:
     return docstring.startswith("...") or (word is not None and word[1].lower() in NO_NOUN)
 
 
-def classes(house: House) -> dict[str, list[str]]:
-    """Modules by the names of the classes that they define."""
-    where = defaultdict[str, list[str]](list)
-    for module, tree in house.trees.items():
-        for node in tree.body:
-            if isinstance(node, ast.ClassDef):
-                where[node.name].append(module)
-    return where
+HEADINGS = (
+    "package", "rooms", "circles of rooms", "of files", "files", "lines", "below 50 lines", "generic names / 1000 lines",
+    "field docstrings without a noun (%)",
+)  # fmt: skip
 
 
-def report(root: Path, verbose: bool) -> None:
-    """Print the table."""
-    house = House(root)
-    print(
-        "| package | rooms | circles of rooms | of files | files | lines | under 50 lines | generic names / 1000 lines "
-        "| field docstrings without a noun |"
+def figures(house: House, package: str) -> tuple[object, ...]:
+    """One line of the table."""
+    lines = house.lines(package)
+    total = sum(lines.values())
+    return (
+        package,
+        sum(room.split(".")[0] == package for room in house.rooms),
+        ", ".join(str(len(circle)) for circle in house.circles(package)) or "0",
+        ", ".join(str(len(circle)) for circle in house.file_circles(package)) or "0",
+        len(lines),
+        total,
+        sum(count < 50 for count in lines.values()),
+        f"{1000 * len(house.generic_names(package)) / total:.0f}",
+        f"{100 * house.share_without_noun(package):.0f}",
     )
-    print("|---|---|---|---|---|---|---|---|---|")
+
+
+def report(house: House, verbose: bool) -> None:
+    """Print the table."""
+    print("|", *" | ".join(HEADINGS).splitlines(), "|")
+    print("|" + "---|" * len(HEADINGS))
     for package in PACKAGES:
-        lines = house.lines(package)
-        bound = [name for module in lines for name in bound_names(house.trees[module])]
-        generic = sum(name.strip("_") in GENERIC for name in bound)
-        told = [text for module in lines for _, text in field_docstrings(house.trees[module])]
-        odd = sum(map(begins_without_a_noun, told))
-        rooms = sum(room.split(".")[0] == package for room in house.rooms)
-        sizes = ", ".join(str(len(circle)) for circle in house.circles(package)) or "0"
-        files = ", ".join(str(len(circle)) for circle in house.file_circles(package)) or "0"
-        total = sum(lines.values())
-        print(
-            f"| {package} | {rooms} | {sizes} | {files} | {len(lines)} | {total} | "
-            f"{sum(n < 50 for n in lines.values())} | {1000 * generic / total:.0f} | {100 * odd / max(len(told), 1):.0f} % |"
-        )
-    named = classes(house)
-    twice = {name: modules for name, modules in named.items() if len(modules) > 1}
-    print(f"\nClass names: {len(named)}, with two meanings: {len(twice)}")
-    if verbose:
-        for name, modules in twice.items():
-            print(" ", name, *modules)
-        for circle in house.circles():
-            print("circle:", *circle)
-            for ends, imports in sorted(house.arrows.items()):
-                if set(ends) <= set(circle):
-                    print("  ", " -> ".join(ends), *(f"\n       {t.file}: {t.name} of {t.target}" for t in imports))
+        print("|", " | ".join(map(str, figures(house, package))), "|")
+    named = house.classes
+    ambiguous = {name: modules for name, modules in named.items() if len(modules) > 1}
+    print(f"\nClass names: {len(named)}, with two meanings: {len(ambiguous)}")
+    for name, modules in ambiguous.items() if verbose else ():
+        print(" ", name, *modules)
+    for circle in house.circles() if verbose else ():
+        print("circle:", *circle)
+        for (start, end), imports in sorted(house.arrows.items()):
+            if {start, end} <= set(circle):
+                print(f"  {start} -> {end}", *(f"\n      {one.file}: {one.name} of {one.target}" for one in imports))
 
 
 if __name__ == "__main__":
@@ -261,4 +270,4 @@ if __name__ == "__main__":
     parser.add_argument("--root", type=Path, default=Path(__file__).parents[1])
     parser.add_argument("--verbose", action="store_true")
     arguments = parser.parse_args()
-    report(arguments.root, arguments.verbose)
+    report(House(arguments.root), arguments.verbose)

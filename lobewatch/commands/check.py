@@ -34,7 +34,7 @@ def check(
     from acquisition import DataError
     from lobewatch.logbook import Logbook
     from lobewatch.show.programs.advice import (
-        Advised,
+        ProgramAdvice,
         advised,
         advised_json,
         advised_lines,
@@ -50,7 +50,7 @@ def check(
     if not logbook.machine.program:
         raise DataError(f"{logbook.folder.toml}: no [[program]] to check; add one for each cut that the shop runs")
     logbook.newest()
-    begin, told, programs = monotonic(), False, list[Advised]()
+    begin, told, programs = monotonic(), False, list[ProgramAdvice]()
     for verdict in logbook.verdicts():
         if not told and monotonic() - begin > PATIENCE:
             count = len(logbook.machine.program)

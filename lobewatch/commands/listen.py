@@ -55,7 +55,7 @@ def listen(
       lobewatch listen mill-3 --cut "reference cut" --speed 12000 --depth 2
     """
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.listened_cut import keep_listened
+    from lobewatch.logbook.cut_comparison import keep_listened
     from lobewatch.machine.additions.observe_cut import contradicted
     from lobewatch.machine.settings.cut_setting import chosen_cut
     from lobewatch.notify.telling import telling

@@ -59,7 +59,7 @@ class Watch:
         return self.alarm_at is None and self.scores.size > 0 and bool(self.scores[-1] >= SURE)
 
 
-class Found(NamedTuple):
+class LikeliestChange(NamedTuple):
     """The likeliest change in the points up to each of some of them."""
 
     score: Floats
@@ -109,7 +109,7 @@ def watch_both(y: Floats, temperature: Floats | None = None) -> tuple[Watch, Wat
     return _watch(base, falls, 1), _watch(base, rises, -1)
 
 
-def _watch(base: Base, best: Found, sign: int) -> Watch:
+def _watch(base: Base, best: LikeliestChange, sign: int) -> Watch:
     """best: of all points that are judged; sign: 1 for falls, -1 for rises."""
     scores = np.full(base.y.size, np.nan)
     scores[FIRST_JUDGED - 1 :] = best.score
@@ -122,7 +122,7 @@ def _watch(base: Base, best: Found, sign: int) -> Watch:
     return Watch(scores, at, _fall(base, best, at - FIRST_JUDGED + 1, sign))
 
 
-def _best(base: Base, last: NDArray[np.intp]) -> tuple[Found, Found]:
+def _best(base: Base, last: NDArray[np.intp]) -> tuple[LikeliestChange, LikeliestChange]:
     """The likeliest fall, and the likeliest rise, in the points up to each of these, which follow one another."""
     blocks = [_farthest(base, last[begin : begin + ROWS] + 1) for begin in range(0, last.size, ROWS)]
     points, leans = (np.concatenate(parts, axis=2) for parts in zip(*blocks, strict=True))
@@ -145,15 +145,15 @@ def _farthest(base: Base, n: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats
     return points, leans
 
 
-def _likeliest(base: Base, n: NDArray[np.intp], points: NDArray[np.intp], leans: Floats) -> Found:
+def _likeliest(base: Base, n: NDArray[np.intp], points: NDArray[np.intp], leans: Floats) -> LikeliestChange:
     """The likelier of two changes in the first n (r,), one of each kind at a point (2, r), that explain so much."""
     t = [base.t_of(lean, n) for lean in leans]
     scores = -ndtri(stdtr(n - 2, -np.maximum(*t)))
     fell = t[0] >= t[1]
-    return Found(scores, fell, np.where(fell, points[0], points[1]))
+    return LikeliestChange(scores, fell, np.where(fell, points[0], points[1]))
 
 
-def _fall(base: Base, found: Found, at: int, sign: int) -> Fall:
+def _fall(base: Base, found: LikeliestChange, at: int, sign: int) -> Fall:
     """at: which of those found."""
     kind: Kind = "step" if found.fell[at] else "slope"
     n, point = base.y.size, int(found.point[at])

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from acquisition import Remark
 from lobewatch.decay.change_point import newest_change
-from lobewatch.decay.trend import Tapped, Trend, newest_percents, trend_of
+from lobewatch.decay.trend import TapValue, Trend, newest_percents, trend_of
 from lobewatch.history.columns.series_columns import SeriesColumns, series_columns
 from lobewatch.history.history import WATCHED, Row
 from lobewatch.machine import Limits
@@ -56,14 +56,14 @@ def _trend(rows: tuple[Row, ...], name: str) -> Trend | None:
     return trend_of(taps, taps[-1].time) if taps else None
 
 
-def _taps(rows: tuple[Row, ...], name: str) -> list[Tapped]:
+def _taps(rows: tuple[Row, ...], name: str) -> list[TapValue]:
     """The temperature counts for the frequency alone: of the others nothing is known beforehand."""
     found, values = _positive(rows, name)
     errors = np.where(np.isfinite(values[:, 1]), 100 * values[:, 1] / values[:, 0], math.nan).tolist()
     warmth = [row.conditions.temperature_c if name == "frequency" else None for row in found]
     temperatures = [math.nan if one is None else one for one in warmth]
     times = [row.time for row in found]
-    return [*map(Tapped, times, values[:, 0].tolist(), errors, temperatures)]
+    return [*map(TapValue, times, values[:, 0].tolist(), errors, temperatures)]
 
 
 def _positive(rows: tuple[Row, ...], name: str) -> tuple[tuple[Row, ...], NDArray[np.float64]]:

@@ -39,7 +39,7 @@ HALVINGS = 40
 Floats = NDArray[np.float64]
 
 
-class Reached(NamedTuple):
+class DateRange(NamedTuple):
     """When a level is reached, as dates of the series."""
 
     earliest: float
@@ -100,10 +100,10 @@ class Forecast:
         away /= np.hypot(self.error, error) if error else self.error
         return np.asarray(self.weight @ _below(self.freedom, away))
 
-    def reached(self, level: float, error: float = 0.0) -> Reached:
+    def reached(self, level: float, error: float = 0.0) -> DateRange:
         """When a level (with its standard error) is reached."""
         chance = np.maximum.accumulate(self.probability(level, error))
-        return Reached(*(self._first(chance, quantile) for quantile in QUANTILES))
+        return DateRange(*(self._first(chance, quantile) for quantile in QUANTILES))
 
     def _first(self, chance: Floats, quantile: float) -> float:
         above = int(np.searchsorted(chance, quantile))

@@ -26,7 +26,7 @@ HORIZON_DAYS = 36 * MONTH
 Floats = NDArray[np.float64]
 
 
-class Tapped(NamedTuple):
+class TapValue(NamedTuple):
     """One value of a series."""
 
     time: datetime
@@ -39,7 +39,7 @@ class Tapped(NamedTuple):
     """Of the spindle (degC)."""
 
 
-class Point(NamedTuple):
+class DayPoint(NamedTuple):
     """Tap tests of one day."""
 
     time: datetime
@@ -58,7 +58,7 @@ class Point(NamedTuple):
 class Trend:
     """One series, judged."""
 
-    points: tuple[Point, ...]
+    points: tuple[DayPoint, ...]
     """Oldest first; one at least."""
     first: float
     """The value that the percents are of: that of the first tap test."""
@@ -137,7 +137,7 @@ class Trend:
         return None if self.watch.fall is None else self.points[self.watched + self.watch.fall.point].time
 
 
-def trend_of(series: Sequence[Tapped], now: datetime, events: Sequence[datetime] = ()) -> Trend:
+def trend_of(series: Sequence[TapValue], now: datetime, events: Sequence[datetime] = ()) -> Trend:
     """Judge a series, oldest first, one value at least; an event after an alarm ends that alarm.
 
     Foretold from the day of `now` on; the same for all of a day.
@@ -146,19 +146,19 @@ def trend_of(series: Sequence[Tapped], now: datetime, events: Sequence[datetime]
     return Trend(points, series[0].value, _past(points), int(day(now)), tuple(events))
 
 
-def _newest_points(series: Sequence[Tapped]) -> tuple[Point, ...]:
+def _newest_points(series: Sequence[TapValue]) -> tuple[DayPoint, ...]:
     """Of a series, oldest first."""
     times, values, errors, temperatures = zip(*series, strict=True)
     own = Series(times, _percents(values), temperatures)
     return tuple(_point(own, errors, span) for span in together(own, MOST)[-MOST:])
 
 
-def _point(own: Series, errors: Sequence[float], span: Span) -> Point:
+def _point(own: Series, errors: Sequence[float], span: Span) -> DayPoint:
     first, end = span
     if end - first == 1:
-        return Point(own.times[first], own.percents[first], errors[first], own.temperatures[first], (first,))
+        return DayPoint(own.times[first], own.percents[first], errors[first], own.temperatures[first], (first,))
     error = math.sqrt(sum(error**2 for error in errors[first:end])) / (end - first)
-    return Point(own.times[first], own.percent(span), error, own.temperature(span), tuple(range(first, end)))
+    return DayPoint(own.times[first], own.percent(span), error, own.temperature(span), tuple(range(first, end)))
 
 
 def newest_percents(times: Sequence[datetime], values: Sequence[float]) -> tuple[list[datetime], list[float]]:
@@ -174,14 +174,14 @@ def _percents(values: Sequence[float]) -> list[float]:
     return [100 * log(value / first) for value in values]
 
 
-def _past(points: Sequence[Point]) -> Past | None:
+def _past(points: Sequence[DayPoint]) -> Past | None:
     if len(points) < ENOUGH:
         return None
     y, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
     return past(days_of(points), y, warmth)
 
 
-def days_of(points: Sequence[Point]) -> Floats:
+def days_of(points: Sequence[DayPoint]) -> Floats:
     """Days since 1970, shape (n,)."""
     return np.array([point.time.timestamp() for point in points]) / 86400
 

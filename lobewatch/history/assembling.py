@@ -14,7 +14,7 @@ from lobewatch.measuring.questions.asked import open_questions
 from lobewatch.tool.assembly import Assembly, assemble
 from lobewatch.tool.order import Place
 from lobewatch.tool.prediction import predict
-from lobewatch.tool.series import Point
+from lobewatch.tool.series import FollowedMode
 from modal import Mode
 
 Measured = Callable[[Place], Measurement]
@@ -32,16 +32,16 @@ def or_reason(work: Callable[[], Assembly]) -> Assembly | NotTappedError:
         return error
 
 
-class Followed:
+class FollowedModes:
     """The modes followed in the rows of a history, by series and direction, each row looked at once."""
 
     def __init__(self) -> None:
         """No row yet."""
-        self._points: dict[str, dict[str, list[Point]]] = {}
+        self._points: dict[str, dict[str, list[FollowedMode]]] = {}
         self._numbers: dict[str, dict[str, list[int]]] = {}
         self._rows = 0
 
-    def before(self, place: Place, rows: Sequence[Row]) -> dict[str, list[Point]]:
+    def before(self, place: Place, rows: Sequence[Row]) -> dict[str, list[FollowedMode]]:
         """Those of the same series before a tap test, by direction; rows: the history before it at least."""
         for number in range(self._rows, len(rows)):
             self._add(number, rows[number])
@@ -56,11 +56,15 @@ class Followed:
     def _add(self, number: int, row: Row) -> None:
         values = row.followed
         if math.isfinite(values[0]) and not row.questions:
-            self._points.setdefault(row.series, {}).setdefault(row.direction, []).append(Point(row.time, *values))
+            self._points.setdefault(row.series, {}).setdefault(row.direction, []).append(
+                FollowedMode(row.time, *values)
+            )
             self._numbers.setdefault(row.series, {}).setdefault(row.direction, []).append(number)
 
 
-def tapped(place: Place, places: Sequence[Place], points: dict[str, list[Point]], measured: Measured) -> Assembly:
+def assemble_tapped(
+    place: Place, places: Sequence[Place], points: dict[str, list[FollowedMode]], measured: Measured
+) -> Assembly:
     """The assembly after a tap test; points: those before it of the same series, by direction."""
     newest, other = measured(place), None if place.other is None else measured(places[place.other])
     if newest.followed is not None and not open_questions(newest.remarks):
@@ -68,7 +72,7 @@ def tapped(place: Place, places: Sequence[Place], points: dict[str, list[Point]]
     return assemble(newest, other, points)
 
 
-def predicted(
+def predict_untapped(
     machine: Machine, places: Sequence[Place], rows: Sequence[Row], measured: Measured, tool: str
 ) -> Assembly:
     """A tool that was not tapped in these places; NotTappedError where it cannot be predicted."""
@@ -104,5 +108,5 @@ def first_like(
     return None
 
 
-def _point(one: Measurement, mode: Mode) -> Point:
-    return Point(one.time, mode.frequency, mode.damping_ratio, mode.stiffness, mode.phase_deg)
+def _point(one: Measurement, mode: Mode) -> FollowedMode:
+    return FollowedMode(one.time, mode.frequency, mode.damping_ratio, mode.stiffness, mode.phase_deg)

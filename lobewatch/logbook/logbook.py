@@ -15,14 +15,14 @@ from lobewatch.decay.standing import Standing, stand
 from lobewatch.history.assembling import first_like, or_reason
 from lobewatch.history.cache.history_cache import HistoryCache
 from lobewatch.history.cache.kept_rows import of_older_versions
-from lobewatch.history.cache.tap_measurements import WorkedOut
+from lobewatch.history.cache.tap_measurements import TapMeasurements
 from lobewatch.history.damage.usable import Result, UsableTaps
 from lobewatch.history.history import History, without_last_word
-from lobewatch.logbook.replaying.store import Stored, store_recordings
+from lobewatch.logbook.replaying.store import ReplayOutcome, store_recordings
 from lobewatch.machine import Machine, MachineFolder, TapEntry
 from lobewatch.machine.archive.verify import enter_explained
 from lobewatch.machine.journal.heard_cut import HeardCut
-from lobewatch.measuring.measurement import Fitted, Measurement
+from lobewatch.measuring.measurement import Measurement, TapFit
 from lobewatch.measuring.questions.accepting import accept
 from lobewatch.measuring.questions.clock import clock_questions
 from lobewatch.tool.assembly import Assembly
@@ -46,8 +46,8 @@ class Logbook:
         self._said: list[Remark] = []
         self._mark, self._cache = folder.mark, HistoryCache(folder)
         self._history: History | None = None
-        self._worked_out: WorkedOut | None = None
-        self.fits: dict[str, Fitted] = {}
+        self._worked_out: TapMeasurements | None = None
+        self.fits: dict[str, TapFit] = {}
         self.judged: dict[str | None, dict[str, Verdict]] = {}
         """By tap test: its modes, and the verdict on each program as it was then, where others have worked them out."""
 
@@ -116,7 +116,7 @@ class Logbook:
         self.files.refuse_excluded(tap_id)
         return self.measurement(tap_id)
 
-    def replay_all(self, files: Sequence[Path], said: Description, **how: Any) -> Stored:
+    def replay_all(self, files: Sequence[Path], said: Description, **how: Any) -> ReplayOutcome:
         """Store recorded files, each once; how: workers, keep_going and progress of `store_recordings`."""
         with self.folder.locked():
             enter_explained(self.folder)  # else what an interrupted replay has stored would be stored twice
@@ -244,7 +244,7 @@ class Logbook:
         return replace(found, questions=(*found.questions, *doubts))
 
     @property
-    def _all(self) -> WorkedOut:
+    def _all(self) -> TapMeasurements:
         if self._worked_out is None:
-            self._worked_out = WorkedOut(self.folder, self.files.places, self.fits)
+            self._worked_out = TapMeasurements(self.folder, self.files.places, self.fits)
         return self._worked_out

@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from acquisition import DataError
-from lobewatch.decay.forecast import Reached
+from lobewatch.decay.forecast import DateRange
 from lobewatch.decay.standing import SeriesStanding, Standing
 from lobewatch.decay.trend import Trend
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.verdicts.critical import critical_fall
 from lobewatch.verdicts.verdict import CriticalFall
 
-ALREADY = Reached(-math.inf, -math.inf, -math.inf)
-NEVER = Reached(math.inf, math.inf, math.inf)
+ALREADY = DateRange(-math.inf, -math.inf, -math.inf)
+NEVER = DateRange(math.inf, math.inf, math.inf)
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Fate:
 
     critical: CriticalFall
     """How far the frequency of its newest tap tests may fall."""
-    doubtful: Reached | None
+    doubtful: DateRange | None
     """When it becomes doubtful; None where nothing can be foretold."""
-    not_stable: Reached | None
+    not_stable: DateRange | None
     """When it is not stable any more; None where nothing can be foretold."""
 
 
@@ -39,7 +39,7 @@ class Outlook:
     """As it stands now."""
     programs: Mapping[str, Fate]
     """By name."""
-    limits: Mapping[float, Reached | None]
+    limits: Mapping[float, DateRange | None]
     """When the worst of its series has fallen by so much (%), those of machine.toml; None where it cannot be told."""
 
     @property
@@ -90,7 +90,7 @@ def _fate(critical: CriticalFall, tool: str, series: Sequence[SeriesStanding]) -
     return Fate(critical, doubtful, _first(_after(trend, critical.not_stable, critical.error) for trend in trends))
 
 
-def _after(trend: Trend, fall: float, error: float) -> Reached | None:
+def _after(trend: Trend, fall: float, error: float) -> DateRange | None:
     """When the frequency of the last point, which the word rests on, has fallen by a share.
 
     error: standard error of the share.
@@ -105,17 +105,17 @@ def _after(trend: Trend, fall: float, error: float) -> Reached | None:
     return trend.forecast.reached(level, 100 * error / (1 - fall))
 
 
-def of_limit(trend: Trend, percent: float) -> Reached | None:
+def of_limit(trend: Trend, percent: float) -> DateRange | None:
     """When a series has fallen by so much (%) from where it started; None where it cannot be told."""
     if trend.forecast is None or trend.is_stale:
         return None
     return trend.forecast.reached(trend.start + 100 * math.log1p(-percent / 100))
 
 
-def _first(found: Iterator[Reached | None]) -> Reached | None:
+def _first(found: Iterator[DateRange | None]) -> DateRange | None:
     """The earliest of several series; None where one of them cannot be foretold and none is past it."""
     dates = [*found]
     if ALREADY in dates:
         return ALREADY
     known = [one for one in dates if one is not None]
-    return Reached(*map(min, zip(*known, strict=True))) if known and len(known) == len(dates) else None
+    return DateRange(*map(min, zip(*known, strict=True))) if known and len(known) == len(dates) else None

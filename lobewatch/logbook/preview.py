@@ -11,7 +11,7 @@ from acquisition import DataError, Description, Recording, TapTest
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.replaying.store import HERE, KnownContents, Progress, digests_of
 from lobewatch.logbook.replaying.understand import Asked, Understood, reason_of, understand, understand_file
-from lobewatch.measuring.measurement import Fitted, Measurement, measured
+from lobewatch.measuring.measurement import Measurement, TapFit, measure_fit
 from lobewatch.measuring.workers.shared import Workers, shared
 from modal import Mode
 
@@ -45,7 +45,7 @@ def preview_recordings(
 
     workers: who reads and fits; what they find is the same.
     """
-    found, fits = list[Preview](), dict[Path, Fitted]()
+    found, fits = list[Preview](), dict[Path, TapFit]()
     for preview, fit in _read(logbook, files, said, progress, workers):
         found.append(preview)
         fits |= {preview.file: fit} if fit is not None else {}
@@ -64,7 +64,7 @@ def _time(one: Preview) -> float:
 
 def _read(
     logbook: Logbook, files: Sequence[Path], said: Description, progress: Progress, workers: Workers
-) -> Iterator[tuple[Preview, Fitted | None]]:
+) -> Iterator[tuple[Preview, TapFit | None]]:
     """Each content once; in the order of the files."""
     contents, todo = KnownContents.of(logbook.folder.taps()), dict[str, Path]()
     digests, unread = digests_of(files)
@@ -103,11 +103,11 @@ def _all_understood(
             yield reason_of(file, error)
 
 
-def _measured(logbook: Logbook, one: Preview, tap: TapTest, fit: Fitted, last: dict[tuple[str, str], Mode]) -> Preview:
+def _measured(logbook: Logbook, one: Preview, tap: TapTest, fit: TapFit, last: dict[tuple[str, str], Mode]) -> Preview:
     """last: the mode followed in the newest file before it of each tool and direction."""
     series = (tap.circumstances.tool, tap.circumstances.direction)
     before = last.get(series) or _stored_before(logbook, tap)
-    found = measured(fit, logbook.machine, before)
+    found = measure_fit(fit, logbook.machine, before)
     if found.followed is not None:
         last[series] = found.followed
     return replace(one, measurement=found)

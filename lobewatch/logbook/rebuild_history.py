@@ -14,7 +14,7 @@ from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import Machine, TapEntry
 from lobewatch.machine.contents import fault_of
 from lobewatch.machine.settings.machine_file import parse_machine
-from lobewatch.measuring.measurement import Fitted, fitted
+from lobewatch.measuring.measurement import TapFit, fit_tap
 from lobewatch.measuring.workers.shared import Workers, shared
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.verdict import Verdict, judge
@@ -81,13 +81,13 @@ def _question(logbook: Logbook, tap_id: str, toml: str) -> Question:
     return Question({tool: or_reason(partial(logbook.assembly, tool, tap_id)) for tool in tools}, toml)
 
 
-def modes_of(tap: TapBytes) -> Fitted | None:
+def modes_of(tap: TapBytes) -> TapFit | None:
     """The modes in a tap file; None where it cannot be read."""
     with tempfile.TemporaryDirectory(prefix="lobewatch-") as work:
         path = Path(work) / "tap.h5"
         path.write_bytes(tap.content)
         try:
-            return fitted(read_tap(path), _machine(tap.machine_toml))
+            return fit_tap(read_tap(path), _machine(tap.machine_toml))
         except DataError:
             return None
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from acquisition import Remark
 from lobewatch.machine.journal.doubtful import read_doubtful
-from lobewatch.machine.journal.event import Event, events_of
+from lobewatch.machine.journal.event import MaintenanceEvent, events_of
 from lobewatch.machine.journal.exclusion import reasons_of
 from lobewatch.machine.journal.heard_cut import HeardCut, RecordedAs, cuts_of
 from lobewatch.machine.journal.journal import JOURNAL, Reading, command, journal_damage
@@ -24,7 +24,7 @@ more bytes nor more files; lobewatch verify takes all."""
 
 
 @dataclass(frozen=True)
-class Contents:
+class FolderContents:
     """What a folder holds."""
 
     taps: tuple[TapEntry, ...]
@@ -33,14 +33,14 @@ class Contents:
     """Committed ones that cannot be used, likewise."""
     remarks: tuple[Remark, ...]
     """What is wrong."""
-    events: tuple[Event, ...] = ()
+    events: tuple[MaintenanceEvent, ...] = ()
     """What was done to the machine, oldest first."""
     lines: int = 0
     """Of the journal."""
     cuts: tuple[HeardCut, ...] = ()
     """Test cuts, oldest first, those that a person has taken out too."""
 
-    def with_one_more(self, entry: TapEntry) -> Contents:
+    def with_one_more(self, entry: TapEntry) -> FolderContents:
         """The same with a tap test that was just committed, and nothing else since."""
         is_newest = not self.taps or _time(self.taps[-1]) <= _time(entry)
         taps = (*self.taps, entry) if is_newest else _oldest_first([*self.taps, entry])
@@ -52,7 +52,7 @@ class Contents:
         return [event.time for event in self.events if event.new_baseline]
 
 
-def contents_of(folder: Path, reading: Reading) -> Contents:
+def contents_of(folder: Path, reading: Reading) -> FolderContents:
     """What the journal and taps/ say together; reading: of the journal."""
     committed = listed(reading)
     remarks, taps, lost = [*reading.damage], list[TapEntry](), list[TapEntry]()
@@ -77,7 +77,7 @@ def contents_of(folder: Path, reading: Reading) -> Contents:
     else:
         cure = f"{command('verify', folder)} says what it is and what to do"
         remarks += [unlisted(path, "not in the journal, does not count", cure) for path in extra]
-    return Contents(tuple(taps), _oldest_first(lost), tuple(remarks), events, len(reading.lines), heard(reading))
+    return FolderContents(tuple(taps), _oldest_first(lost), tuple(remarks), events, len(reading.lines), heard(reading))
 
 
 def heard(reading: Reading) -> tuple[HeardCut, ...]:

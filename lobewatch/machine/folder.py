@@ -16,7 +16,7 @@ from filelock import FileLock, Timeout
 from acquisition import DataError, Remark, TapTest, read_tap, write_tap
 from acquisition.atomic import make_folder, sync_folder
 from acquisition.errors import NOT_ALLOWED
-from lobewatch.machine.contents import Contents, about_lost, contents_of, fault_of, listed, no_journal, tap_files
+from lobewatch.machine.contents import FolderContents, about_lost, contents_of, fault_of, listed, no_journal, tap_files
 from lobewatch.machine.journal.journal import Journal, Reading, command
 from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
 from lobewatch.machine.mark import mark_of
@@ -99,7 +99,7 @@ class MachineFolder:
         finally:
             lock.release()
 
-    def contents(self) -> Contents:
+    def contents(self) -> FolderContents:
         """The committed tap tests and their files: which can be used, which cannot, and why."""
         return contents_of(self.path, self.journal.read())
 

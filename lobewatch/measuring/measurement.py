@@ -50,7 +50,7 @@ class Measurement:
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class TapFit:
     """What one tap test says by itself, whatever others said."""
 
     tap_id: str
@@ -77,23 +77,23 @@ def _threads() -> ThreadpoolController:
 
 def measure(tap: TapTest, machine: Machine, last: Mode | None = None) -> Measurement:
     """All that follows from one tap test; last: the mode that was followed in the test before."""
-    return measured(fitted(tap, machine), machine, last)
+    return measure_fit(fit_tap(tap, machine), machine, last)
 
 
-def fitted(tap: TapTest, machine: Machine) -> Fitted:
+def fit_tap(tap: TapTest, machine: Machine) -> TapFit:
     """The modes of one tap test: most of the work, and the part that needs no other tap test."""
     about, band = tap.circumstances, other_band(tap.frf, machine)
     remarks = () if band is None else (band,)
     named = (tap.id, about.created, about.tool, about.direction)
     with _threads().limit(limits=1):
         try:
-            return Fitted(*named, fit_modes(tap.frf, hits=tap.accepted), remarks)
+            return TapFit(*named, fit_modes(tap.frf, hits=tap.accepted), remarks)
         except ValueError as error:
             none = Remark("no-modes", "", f"no modes: {error}")
-            return Fitted(*named, (), (*remarks, none, no_mode_in_band((), machine)), failed=True)
+            return TapFit(*named, (), (*remarks, none, no_mode_in_band((), machine)), failed=True)
 
 
-def measured(fit: Fitted, machine: Machine, last: Mode | None) -> Measurement:
+def measure_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
     """What follows from these modes; last: the mode that was followed in the test before."""
     remarks, modes = [*fit.remarks], fit.modes
     named = (fit.tap_id, fit.time, fit.tool, fit.direction)

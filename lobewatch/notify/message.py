@@ -6,7 +6,7 @@ from datetime import datetime, timedelta
 
 import msgspec
 
-from lobewatch.plant.plant import Standings
+from lobewatch.plant.plant import MachineStanding
 from lobewatch.plant.standing_file import software
 from lobewatch.show.plant.plant_rows import next_limit
 
@@ -19,7 +19,7 @@ def topic_of(prefix: str, key: str) -> str:
     return f"{prefix}/{key.translate(NOT_IN_TOPICS)}/standing"
 
 
-def message_of(one: Standings, now: datetime) -> bytes:
+def message_of(one: MachineStanding, now: datetime) -> bytes:
     """JSON; what is not known is null."""
     summary, dated = one.summary, one.dated
     worst = summary.series[0] if summary.series else None

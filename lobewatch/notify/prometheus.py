@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from lobewatch.decay.light import Light
-from lobewatch.plant.plant import Standings
+from lobewatch.plant.plant import MachineStanding
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 DAY = 86400.0
@@ -22,7 +22,7 @@ class Sample(NamedTuple):
     """In the unit that the name of the family says."""
 
 
-def prometheus_text(found: Sequence[Standings]) -> str:
+def prometheus_text(found: Sequence[MachineStanding]) -> str:
     """All families, those without a value too."""
     return "".join(
         f"# HELP {name} {told}\n# TYPE {name} gauge\n" + "".join(_line(name, one) for one in samples(found))
@@ -39,24 +39,24 @@ def _escaped(text: str) -> str:
     return text.replace("\\", r"\\").replace('"', r"\"").replace("\n", r"\n")
 
 
-def _machine(one: Standings) -> tuple[tuple[str, str], ...]:
+def _machine(one: MachineStanding) -> tuple[tuple[str, str], ...]:
     return ("folder", one.key), ("machine", one.summary.name)
 
 
-def _lights(found: Iterable[Standings]) -> Iterator[Sample]:
+def _lights(found: Iterable[MachineStanding]) -> Iterator[Sample]:
     for one in found:
         for light in Light:
             yield Sample((*_machine(one), ("light", light.value)), float(one.dated.light is light))
 
 
-def _reasons(found: Iterable[Standings]) -> Iterator[Sample]:
+def _reasons(found: Iterable[MachineStanding]) -> Iterator[Sample]:
     for one in found:
         for code in dict.fromkeys(remark.code for remark in one.dated.remarks):
             count = sum(remark.code == code for remark in one.dated.remarks)
             yield Sample((*_machine(one), ("code", code)), float(count))
 
 
-def _falls(found: Iterable[Standings]) -> Iterator[Sample]:
+def _falls(found: Iterable[MachineStanding]) -> Iterator[Sample]:
     for one in found:
         for course in one.summary.series:
             if course.fall is not None:
@@ -65,7 +65,7 @@ def _falls(found: Iterable[Standings]) -> Iterator[Sample]:
                 )
 
 
-def _frequencies(found: Iterable[Standings]) -> Iterator[Sample]:
+def _frequencies(found: Iterable[MachineStanding]) -> Iterator[Sample]:
     for one in found:
         for course in one.summary.series:
             if course.frequency is not None:
@@ -73,17 +73,17 @@ def _frequencies(found: Iterable[Standings]) -> Iterator[Sample]:
                 yield Sample(labels, course.frequency)
 
 
-def _taps(found: Iterable[Standings]) -> Iterator[Sample]:
+def _taps(found: Iterable[MachineStanding]) -> Iterator[Sample]:
     return (Sample(_machine(one), one.summary.time.timestamp()) for one in found if one.summary.time is not None)
 
 
-def _due(found: Iterable[Standings]) -> Iterator[Sample]:
+def _due(found: Iterable[MachineStanding]) -> Iterator[Sample]:
     for one in found:
         if one.summary.time is not None:
             yield Sample(_machine(one), one.summary.time.timestamp() + DAY * one.summary.interval_days)
 
 
-def _limits(found: Iterable[Standings]) -> Iterator[Sample]:
+def _limits(found: Iterable[MachineStanding]) -> Iterator[Sample]:
     for one in found:
         for course in one.summary.series:
             for limit in course.limits:
@@ -92,7 +92,7 @@ def _limits(found: Iterable[Standings]) -> Iterator[Sample]:
                     yield Sample((*labels, ("fall_percent", f"{limit.percent:g}")), DAY * limit.probable)
 
 
-def _programs(found: Iterable[Standings]) -> Iterator[Sample]:
+def _programs(found: Iterable[MachineStanding]) -> Iterator[Sample]:
     for one in found:
         for program, word in one.summary.programs.items():
             yield Sample((*_machine(one), ("program", program), ("word", word)), 1.0)

@@ -13,7 +13,7 @@ from lobewatch.machine.settings.machine_file import read_machine
 from lobewatch.machine.settings.notify_table import Broker
 from lobewatch.notify.message import message_of, topic_of
 from lobewatch.notify.unsent import deliver
-from lobewatch.plant.plant import Standings
+from lobewatch.plant.plant import MachineStanding
 from lobewatch.plant.summarise import summarise
 from lobewatch.show.terminal.output import notes
 
@@ -25,16 +25,22 @@ def tell(logbook: Logbook) -> None:
         current = logbook if logbook.is_current else Logbook.open(logbook.folder.path)
         summary, path = summarise(current, now), current.folder.path
         if current.machine.notify.broker is not None:
-            notify([Standings(path.resolve().name, path, summary, summary.at(now, path))], {path: current.machine}, now)
+            notify(
+                [MachineStanding(path.resolve().name, path, summary, summary.at(now, path))],
+                {path: current.machine},
+                now,
+            )
     except (ValueError, OSError, ArithmeticError, LookupError):
         return  # whoever looks at the machine next is told why
 
 
-def notify(found: Iterable[Standings], known: Mapping[Path, Machine] | None = None, now: datetime | None = None) -> int:
+def notify(
+    found: Iterable[MachineStanding], known: Mapping[Path, Machine] | None = None, now: datetime | None = None
+) -> int:
     """Send the standings of machines whose machine.toml names a broker; how many brokers could not be told, and why
     stands in a note."""
     now, known = now or datetime.now(UTC), known or {}
-    by_broker: dict[Broker, list[Standings]] = {}
+    by_broker: dict[Broker, list[MachineStanding]] = {}
     for one in found:
         try:
             machine: Machine = known.get(one.path) or read_machine(one.path / "machine.toml")

@@ -12,13 +12,13 @@ from acquisition import DataError, Remark
 from lobewatch.decay.light import Light
 from lobewatch.machine.mark import mark_of
 from lobewatch.plant.standing_file import KEPT, read_standing
-from lobewatch.plant.summary import Dated, Summary, unreadable_summary
+from lobewatch.plant.summary import DatedStanding, Summary, unreadable_summary
 
 VERIFY_EVERY = 6 * 3600.0
 """Time between two looks at every byte (s)."""
 
 
-class Standings(NamedTuple):
+class MachineStanding(NamedTuple):
     """One machine."""
 
     key: str
@@ -27,7 +27,7 @@ class Standings(NamedTuple):
     """Its folder."""
     summary: Summary
     """What follows from its files."""
-    dated: Dated
+    dated: DatedStanding
     """How it stands now."""
 
 
@@ -52,7 +52,7 @@ class Plant:
         self._anew: set[str] = set()
         self._lock = threading.Lock()
 
-    def standings(self, now: datetime | None = None) -> list[Standings]:
+    def standings(self, now: datetime | None = None) -> list[MachineStanding]:
         """One a machine, worst first; who asks meanwhile waits."""
         now = now or datetime.now(UTC)
         with self._lock:
@@ -80,9 +80,9 @@ class Plant:
             if end.wait(VERIFY_EVERY):
                 return
 
-    def _standing(self, key: str, path: Path, now: datetime) -> Standings:
+    def _standing(self, key: str, path: Path, now: datetime) -> MachineStanding:
         summary = self._summary(key, path, now)
-        return Standings(key, path, summary, summary.at(now, path, self._damage.get(key, ())))
+        return MachineStanding(key, path, summary, summary.at(now, path, self._damage.get(key, ())))
 
     def _summary(self, key: str, path: Path, now: datetime) -> Summary:
         known = self._known.get(key)

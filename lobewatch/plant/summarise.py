@@ -16,7 +16,7 @@ from lobewatch.logbook.outlook import of_limit
 from lobewatch.machine import BusyError, Limits
 from lobewatch.machine.mark import mark_of
 from lobewatch.plant.standing_file import write_standing
-from lobewatch.plant.summary import Ahead, Course, Summary
+from lobewatch.plant.summary import Ahead, SeriesSummary, Summary
 
 MOST = 60
 """Points kept of a series."""
@@ -56,10 +56,10 @@ def _summary(logbook: Logbook, standing: Standing) -> Summary:
     )
 
 
-def _course(one: SeriesStanding, limits: Limits) -> Course:
+def _course(one: SeriesStanding, limits: Limits) -> SeriesSummary:
     trend, fall = one.trend, one.fall
     percents = limits.frequency_warn_percent, limits.frequency_alarm_percent
-    return Course(
+    return SeriesSummary(
         name=one.name,
         tool=one.tool,
         direction=one.direction,

@@ -39,7 +39,7 @@ class Ahead(msgspec.Struct, frozen=True):
     """Last day that was looked at; None where nothing can be foretold."""
 
 
-class Course(msgspec.Struct, frozen=True):
+class SeriesSummary(msgspec.Struct, frozen=True):
     """One tool in one direction."""
 
     name: str
@@ -62,7 +62,7 @@ class Course(msgspec.Struct, frozen=True):
     """Those of machine.toml."""
 
 
-class Dated(NamedTuple):
+class DatedStanding(NamedTuple):
     """How it stands at a time."""
 
     light: Light
@@ -98,7 +98,7 @@ class Summary(msgspec.Struct, frozen=True, dict=True):
     """Rows of the history."""
     programs: dict[str, str] = {}
     """The word on each program."""
-    series: tuple[Course, ...] = ()
+    series: tuple[SeriesSummary, ...] = ()
     """The one that fell most first."""
 
     @cached_property
@@ -111,7 +111,7 @@ class Summary(msgspec.Struct, frozen=True, dict=True):
         """The file of the newest tap test in the folder; empty where there is none."""
         return f"taps/{self.newest}.h5" if self.newest else ""
 
-    def at(self, now: datetime, path: Path | str, damage: Sequence[Remark] = ()) -> Dated:
+    def at(self, now: datetime, path: Path | str, damage: Sequence[Remark] = ()) -> DatedStanding:
         """At a time, with what is known to be damaged besides; path: of the folder."""
         left, remarks = None, self.remarks
         if self.time is not None:
@@ -119,7 +119,7 @@ class Summary(msgspec.Struct, frozen=True, dict=True):
             remarks = in_order([*remarks, *about_dates(self.newest, self.time, self.interval_days, now, path)])
         if damage:
             remarks = with_files(remarks, damage)
-        return Dated(light_of(remarks), remarks, next_step(remarks, self.otherwise), left)
+        return DatedStanding(light_of(remarks), remarks, next_step(remarks, self.otherwise), left)
 
     def speaks_of(self, path: str) -> bool:
         """Whether a reason names the folder."""

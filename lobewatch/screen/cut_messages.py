@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from lobewatch.logbook.listened_cut import ListenedCut
+from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.screen.messages import finite
 from lobewatch.show.cuts.describe_listened import listened_texts, next_step, why
 from lobewatch.tap.listening.cut_state import CutState
@@ -30,7 +30,7 @@ def cut_message(state: CutState) -> str:
     )
 
 
-def _heard(found: ListenedCut) -> dict[str, Any]:
+def _heard(found: CutComparison) -> dict[str, Any]:
     chatter = found.heard.chatter
     return {
         "chatter_frequency_hz": None if chatter is None else chatter.frequency,

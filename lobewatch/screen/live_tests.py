@@ -11,7 +11,7 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.notify.telling import tell
 from lobewatch.tap.plan_session import plan_session
 from lobewatch.tap.session import TapStopped
-from lobewatch.tap.state import TapState, Word
+from lobewatch.tap.state import TapState, TapStep
 
 
 class LiveTest:
@@ -56,6 +56,6 @@ class LiveTest:
         except TapStopped:
             state = self._session.state
             reason = f"Stopped with {state.good} good hits: START goes on with them."
-            self._end = replace(state, word=Word.FAILED, reason=reason)
+            self._end = replace(state, word=TapStep.FAILED, reason=reason)
         except (OSError, RuntimeError, ValueError):
             pass  # the session shows its failure itself

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.plant.plant import Plant, Standings
+from lobewatch.plant.plant import MachineStanding, Plant
 from lobewatch.show.plant.plant_rows import plant_row
 from lobewatch.tap.spool import interrupted_tests
 
@@ -26,7 +26,7 @@ def machine_list(plant: Plant, running: Collection[str], may_alter: bool, known:
     return msgspec.json.encode({"version": version, "machines": machines, "may_alter": may_alter})
 
 
-def _row(one: Standings) -> dict[str, Any]:
+def _row(one: MachineStanding) -> dict[str, Any]:
     """Days to a tenth, rounded down: what changes with every look would be sent with every look."""
     row = plant_row(one)
     left = row["days_left"]

@@ -7,7 +7,7 @@ from lobewatch.tap.plug import Plug, open_source
 from lobewatch.tap.self_check import quiet_stretch
 from lobewatch.tap.sensor_doubts import sensor_doubts
 from lobewatch.tap.session import TapSession, TapStopped
-from lobewatch.tap.state import Plots, TakenHit, TapState, Word
+from lobewatch.tap.state import Plots, TakenHit, TapState, TapStep
 from lobewatch.tap.stories.demo import DemoTap, SpindleState, age_spindle
 from lobewatch.tap.trial import Trial
 
@@ -20,9 +20,9 @@ __all__ = [
     "TakenHit",
     "TapSession",
     "TapState",
+    "TapStep",
     "TapStopped",
     "Trial",
-    "Word",
     "age_spindle",
     "emulate_machine",
     "emulated_structure",

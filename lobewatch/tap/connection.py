@@ -11,7 +11,7 @@ from lobewatch.machine.known_devices import checked_rate, has_clock, known_rate
 from lobewatch.tap.in_progress import TapInProgress
 from lobewatch.tap.live_signal import LiveSignal, description
 from lobewatch.tap.publisher import Publisher
-from lobewatch.tap.state import Word
+from lobewatch.tap.state import TapStep
 
 RETRY_TIME = 0.5
 """Pause between two tries to find the device again (s)."""
@@ -123,7 +123,7 @@ class Connector:
         """Wait for the device, as long as it takes; `serve` is called meanwhile."""
         while True:
             reason = f"{error.text}; plug it in: the test goes on at this hit"
-            self._publisher.show(word=Word.NO_DEVICE, reason=reason, levels=None)
+            self._publisher.show(word=TapStep.NO_DEVICE, reason=reason, levels=None)
             self._sleep(RETRY_TIME)
             serve()
             try:
@@ -131,7 +131,7 @@ class Connector:
             except DeviceError as again:
                 error = again
             else:
-                self._publisher.show(word=Word.WAIT, reason="")
+                self._publisher.show(word=TapStep.WAIT, reason="")
                 return connection
 
     def _check_rate(self, device: Device) -> None:

@@ -11,7 +11,7 @@ from lobewatch.tap.judged_hits import JudgedHits
 from lobewatch.tap.live_signal import LEVEL_TIME
 from lobewatch.tap.plots import plots_of
 from lobewatch.tap.publisher import Publisher
-from lobewatch.tap.state import Word
+from lobewatch.tap.state import TapStep
 
 VERDICT_TIME = 0.8
 """How long a verdict is shown at least (s); the trigger may be armed before."""
@@ -54,7 +54,7 @@ class HitLoop:
     def __init__(self, hits: JudgedHits, publisher: Publisher, wishes: Wishes, *, guided: bool) -> None:
         """guided False leaves out the curves and the time to take back the last hit."""
         self._hits, self._publisher, self._wishes, self._guided = hits, publisher, wishes, guided
-        self._verdict = Word.TAP
+        self._verdict = TapStep.TAP
         self._heard = 0
         self._verdict_at: int | None = None
 
@@ -105,7 +105,7 @@ class HitLoop:
 
     def show_verdict(self, flags: HitFlags, reason: str, *, trial: bool = False) -> None:
         """Say at once what became of a hit."""
-        self._verdict, self._verdict_at = Word.REFUSED if flags else Word.GOOD, self._heard
+        self._verdict, self._verdict_at = TapStep.REFUSED if flags else TapStep.GOOD, self._heard
         self._publisher.show(word=self._verdict, verdict=flags.words, trial=trial, reason=reason)
 
     def draw(self, hit: Hit) -> None:
@@ -119,7 +119,7 @@ class HitLoop:
 
     def _follow(self, search: HitSearch, sample_rate: float) -> None:
         """The word for where the trigger stands."""
-        word = Word.TAP if search.armed else Word.WAIT
+        word = TapStep.TAP if search.armed else TapStep.WAIT
         fresh = self._verdict_age(sample_rate) < VERDICT_TIME or not self._hits.missing
         if self._verdict_at is not None and fresh and not search.recording:
             word = self._verdict
@@ -148,6 +148,6 @@ class HitLoop:
         """A hit that was good counts no more: the word GOOD must not stand there any longer."""
         self._verdict_at = None
         word = self._publisher.state.word
-        word = Word.WAIT if word in (Word.GOOD, Word.REFUSED) else word
+        word = TapStep.WAIT if word in (TapStep.GOOD, TapStep.REFUSED) else word
         self._publisher.show_hits(self._hits, word=word, verdict=flags.words, trial=False, reason=reason)
         self.draw(self._hits.tap.hits[-1])

@@ -14,7 +14,7 @@ from lobewatch.tap.judged_hits import JudgedHits
 from lobewatch.tap.live_signal import resting_rms
 from lobewatch.tap.publisher import Publisher
 from lobewatch.tap.self_check import calibration_check, quiet_stretch, self_check
-from lobewatch.tap.state import Check, Word
+from lobewatch.tap.state import Check, TapStep
 from lobewatch.tap.trial import Trial, trigger_of
 
 BASELINE_TIME = 1.0
@@ -53,7 +53,7 @@ class Phases:
         trigger = self._tap.trigger or trigger_of(machine.tap, connection.sample_rate)
         if self._tap.baseline is not None or (trigger is not None and not self._guided):
             return
-        self._publisher.show(word=Word.CHECKING, reason="Keep the hammer away for a second.")
+        self._publisher.show(word=TapStep.CHECKING, reason="Keep the hammer away for a second.")
         self._tap.baseline = quiet_stretch(connection.signal.record(self._loop.blocks(connection), BASELINE_TIME))
         free = shutil.disk_usage(self._folder.path).free
         calibration = calibration_check(connection.signal.channels, machine.daq.calibration_interval_months)

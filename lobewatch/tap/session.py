@@ -20,7 +20,7 @@ from lobewatch.tap.judged_hits import JudgedHits
 from lobewatch.tap.outcome import outcome_of
 from lobewatch.tap.phases import Phases
 from lobewatch.tap.publisher import Publisher
-from lobewatch.tap.state import TapState, Word
+from lobewatch.tap.state import TapState, TapStep
 
 __all__ = ["TapSession", "TapStopped"]
 
@@ -46,7 +46,7 @@ class TapSession:
         self._accept = checked_codes(accept)
         self._folder, self._about, self._resume, self._guided = folder, circumstances, resume, guided
         about = f"{circumstances.machine}, tool {circumstances.tool}, direction {circumstances.direction}"
-        first = TapState(0, Word.CHECKING, about, wanted=folder.machine.tap.hits)
+        first = TapState(0, TapStep.CHECKING, about, wanted=folder.machine.tap.hits)
         self._publisher, self._wishes = Publisher(first, clock), Wishes()
         self._connector = Connector(folder, open_device, self._publisher, sleep)
         self._measurement: Measurement | None = None
@@ -93,7 +93,7 @@ class TapSession:
             raise
         except Exception as error:
             told = _told(error)
-            self._publisher.show(word=Word.FAILED, reason=str(told))
+            self._publisher.show(word=TapStep.FAILED, reason=str(told))
             if told is error:
                 raise
             raise told from error
@@ -114,7 +114,7 @@ class TapSession:
 
     def _finish(self, hits: JudgedHits) -> TapTest:
         """Average, commit, and say what it means."""
-        self._publisher.show(word=Word.DONE, reason="The result is being worked out.", levels=None)
+        self._publisher.show(word=TapStep.DONE, reason="The result is being worked out.", levels=None)
         tap = hits.tap.finish()
         logbook = Logbook(self._folder)
         logbook.commit(tap, datetime.now(UTC) if self._guided else None)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from acquisition import HitFlags
 
 
-class Word(enum.StrEnum):
+class TapStep(enum.StrEnum):
     """The word that can be read from 3 m."""
 
     CHECKING = "CHECKING"
@@ -105,7 +105,7 @@ class TapState:
 
     revision: int
     """Rises with every change."""
-    word: Word
+    word: TapStep
     """See Word."""
     title: str
     """Machine, tool and direction."""
@@ -142,6 +142,6 @@ class TapState:
     @property
     def shown_word(self) -> str:
         """The word as a screen shows it: the verdict in place of REFUSED."""
-        if self.word is not Word.REFUSED or not self.verdict:
+        if self.word is not TapStep.REFUSED or not self.verdict:
             return self.word.value
         return f"{self.verdict}{', trial hit' if self.trial else ''}".upper()

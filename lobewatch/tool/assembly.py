@@ -16,7 +16,7 @@ from lobes import Cut, StabilityLobes, lowest_of, zero_order
 from lobewatch.machine import Machine
 from lobewatch.measuring.measurement import Measurement
 from lobewatch.measuring.questions.asked import in_question, open_questions
-from lobewatch.tool.series import Point, Scatter, frequency_at, scatter_of
+from lobewatch.tool.series import FollowedMode, Scatter, frequency_at, scatter_of
 from modal import Mode
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class Assembly:
     """Whether all of it comes from the model, for a tool that was never tapped."""
     remarks: tuple[Remark, ...]
     """What is not known, and what is in doubt."""
-    series: Mapping[str, Sequence[Point]] = field(default_factory=dict)
+    series: Mapping[str, Sequence[FollowedMode]] = field(default_factory=dict)
     """Tap tests of the same tool up to then, by direction; empty where it is predicted."""
 
     cuts: int = 0
@@ -79,7 +79,7 @@ class Assembly:
         return scatter_of(self.series.get(direction, ()))
 
 
-def assemble(newest: Measurement, other: Measurement | None, series: Mapping[str, Sequence[Point]]) -> Assembly:
+def assemble(newest: Measurement, other: Measurement | None, series: Mapping[str, Sequence[FollowedMode]]) -> Assembly:
     """From the newest tap test of a tool and the newest one in the other direction, however old, where there is one.
 
     series: tap tests of both directions up to the newest. The frequencies of an older direction are moved by as much as
@@ -115,7 +115,7 @@ def untapped(tool: str, known: str) -> Remark:
     return Remark("one-direction", tool, text, f"tap direction {missing} of the same tool too")
 
 
-def _change_since(time: datetime, series: Sequence[Point]) -> float | None:
+def _change_since(time: datetime, series: Sequence[FollowedMode]) -> float | None:
     """Frequency of the newest test of a series over that at a time."""
     then = frequency_at(series, time)
     return None if then is None else series[-1].frequency / then

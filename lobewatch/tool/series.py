@@ -16,7 +16,7 @@ RECENT = 12
 """Tap tests that the rate of the fall is taken from, at most; three at least."""
 
 
-class Point(NamedTuple):
+class FollowedMode(NamedTuple):
     """The mode followed in one tap test."""
 
     time: datetime
@@ -44,7 +44,7 @@ class Scatter(NamedTuple):
     """Of the phase of the modal constant (degrees)."""
 
 
-def scatter_of(series: Sequence[Point]) -> Scatter | None:
+def scatter_of(series: Sequence[FollowedMode]) -> Scatter | None:
     """From the steps between neighbours, so that a slow fall does not count; None below 8 tap tests."""
     if len(series) < ENOUGH:
         return None
@@ -55,7 +55,7 @@ def scatter_of(series: Sequence[Point]) -> Scatter | None:
     return Scatter(*width.tolist())
 
 
-def fall_in(series: Sequence[Point], days: float) -> float | None:
+def fall_in(series: Sequence[FollowedMode], days: float) -> float | None:
     """Relative fall of the frequency within so many days at the rate of the last tests; None where it is not known.
 
     A rise counts as none.
@@ -70,7 +70,7 @@ def fall_in(series: Sequence[Point], days: float) -> float | None:
     return float(max(-slope * days, 0.0))
 
 
-def frequency_at(series: Sequence[Point], time: datetime) -> float | None:
+def frequency_at(series: Sequence[FollowedMode], time: datetime) -> float | None:
     """Natural frequency (Hz) at a time, linear between the tests before and after; None before the first."""
     behind = bisect_right(series, time, key=lambda point: point.time)
     if not behind:

@@ -1,6 +1,6 @@
 """Looking for settings that would be called stable, with something to spare.
 
-A diagram by zero order says where to look. What is recommended has been judged like any program: `judged` calls it
+A diagram by zero order says where to look. What is recommended has been judged like any program: `weigh` calls it
 stable, and the same draws are stable as the spindle will be when it is tapped again.
 """
 
@@ -22,7 +22,7 @@ from lobewatch.verdicts.aging import StiffnessAt, aged, softening
 from lobewatch.verdicts.drawn import Drawn
 from lobewatch.verdicts.drawn_limits import ALIKE
 from lobewatch.verdicts.promise import Promise
-from lobewatch.verdicts.verdict import Word, judged
+from lobewatch.verdicts.verdict import Word, weigh
 
 SPARE = 0.20
 """Depth that a recommended setting has to spare in the middle of the doubt."""
@@ -157,7 +157,7 @@ class SettingSearch:
         if not self._lasts(speed, depth_mm / 1e3):
             return None
         depth, deepest = depth_mm / 1e3, drive_limit(self.machine, table, np.array([speed]))[0]
-        found = judged(table, self.assembly, self.machine)
+        found = weigh(table, self.assembly, self.machine)
         margin = found.found.limit / depth - 1
         if found.word is not Word.STABLE or margin < SPARE or depth > deepest:
             return None

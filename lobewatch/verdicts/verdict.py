@@ -131,7 +131,7 @@ class Verdict:
         return Ruling(self.word, self.limit)
 
 
-class Judged(NamedTuple):
+class Judgement(NamedTuple):
     """The word on a program and what it rests on."""
 
     word: Word
@@ -155,7 +155,7 @@ def judge(table: ProgramTable, known: Assembly | DataError, machine: Machine) ->
     return verdict(table, known, machine)
 
 
-def judged(table: ProgramTable, assembly: Assembly, machine: Machine) -> Judged:
+def weigh(table: ProgramTable, assembly: Assembly, machine: Machine) -> Judgement:
     """The word on a program by semi-discretisation over its doubt; charts by other methods decide nothing."""
     program = as_program(table, machine)
     found = program_limit(program, assembly.x, assembly.y, table.feed_angles)
@@ -164,14 +164,14 @@ def judged(table: ProgramTable, assembly: Assembly, machine: Machine) -> Judged:
     low, high = np.quantile(limits, QUANTILES, method="closest_observation")
     near = drawn.fed(SURELY * program.depth * found.limit / low if np.isfinite(found.limit) else 0.0)
     chatters = (near.growth(program.depth)[1:, 0] >= 0) | (limits <= program.depth)
-    return Judged(_word(found.stable, chatters, assembly), found, float(low), float(high), drawn, chatters)
+    return Judgement(_word(found.stable, chatters, assembly), found, float(low), float(high), drawn, chatters)
 
 
 def verdict(table: ProgramTable, assembly: Assembly, machine: Machine) -> Verdict:
     """The word on a program, and what goes with it."""
     if not assembly.directions:
         return unknown(table, assembly.remarks, assembly)
-    word, found, low, high, drawn, chatters = judged(table, assembly, machine)
+    word, found, low, high, drawn, chatters = weigh(table, assembly, machine)
     program, cause, remarks = as_program(table, machine), "", [*_remarks(table, assembly, machine)]
     if word is Word.DOUBTFUL:
         middle = middle_row(program, assembly)

@@ -56,7 +56,9 @@ def test_commands_only_parse_and_show() -> None:
     assert mean(map(lines, commands)) <= 65
 
 
-@pytest.mark.parametrize("room", ["machine", "measuring", "tool", "verdicts", "cuts", "history", "decay", "logbook", "plant"])
+@pytest.mark.parametrize(
+    "room", ["machine", "measuring", "tool", "verdicts", "cuts", "history", "decay", "logbook", "plant"]
+)
 def test_the_domain_never_prints(room: str) -> None:
     for path in sources(f"lobewatch/{room}"):
         names = {node.id for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Name)}

@@ -10,9 +10,9 @@ from enum import StrEnum
 import numpy as np
 
 from acquisition import Remark
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.learnt import Expecting, Learnt
 from lobewatch.cuts.learning.likelihood import FREQUENCY, MISJUDGED
-from lobewatch.cuts.learning.observed import Observed
 
 CHANCE = MISJUDGED + 0.01
 """What was heard is beyond chance where all else gives it less."""
@@ -37,7 +37,7 @@ class Contradiction(StrEnum):
 class Contradicting:
     """A cut that is left out."""
 
-    cut: Observed
+    cut: CutEvidence
     why: Contradiction
 
 
@@ -54,12 +54,12 @@ def contradiction(expecting: Expecting) -> Contradiction | None:
     return Contradiction.FREQUENCY if np.sum(weights * near) < NONE else None
 
 
-def learn_from_sound(start: Learnt, cuts: Sequence[Observed]) -> tuple[Learnt, tuple[Contradicting, ...]]:
+def learn_from_sound(start: Learnt, cuts: Sequence[CutEvidence]) -> tuple[Learnt, tuple[Contradicting, ...]]:
     """Learn from those cuts that do not contradict what was learnt before them; and the others.
 
     A cut that contradicts those before it is asked again once all others are learnt.
     """
-    learnt, odd = start, list[Observed]()
+    learnt, odd = start, list[CutEvidence]()
     for cut in cuts:
         expecting = learnt.expecting(cut)
         if contradiction(expecting) is None:

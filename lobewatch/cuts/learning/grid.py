@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes import Cut, lowest_of, stability_boundary, zero_order
-from lobewatch.cuts.learning.observed import Observed
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.machine.journal.heard_cut import CutWord
 from lobewatch.verdicts.mean_force import is_constant
 from modal import Mode
@@ -43,9 +43,9 @@ class Grid:
     trust: Floats
     """True limit in the middle over that by zero order, at each speed, shape (s,)."""
 
-    def seen(self, speed: float, depth: float, word: CutWord = "stable") -> Observed:
+    def seen(self, speed: float, depth: float, word: CutWord = "stable") -> CutEvidence:
         """A cut of it."""
-        return Observed(self.cut, speed, depth, word, feed_angles=self.feed_angles)
+        return CutEvidence(self.cut, speed, depth, word, feed_angles=self.feed_angles)
 
 
 def speeds_between(low: float, high: float) -> Floats:

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes import MillingRows
-from lobewatch.cuts.learning.likelihood import Predicted, log_likelihood, most_likely, predicted
-from lobewatch.cuts.learning.observed import Observed
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
+from lobewatch.cuts.learning.likelihood import CutPrediction, log_likelihood, most_likely, predict_cut
 from lobewatch.cuts.learning.priors import Draws, drawn
 from lobewatch.verdicts.doubt import Doubt
 
@@ -58,7 +58,7 @@ class Learnt:
     draws: Draws
     log: Floats
     """Logarithm of the weight of each, up to a constant, shape (r,)."""
-    cuts: tuple[Observed, ...] = ()
+    cuts: tuple[CutEvidence, ...] = ()
     """What they were learnt from."""
     refreshed: int = 0
     """How often the draws were made anew."""
@@ -94,15 +94,15 @@ class Learnt:
         beside = [(USUAL[0] < ratios[name]) & (ratios[name] < USUAL[1]) for name in ("frequency_x", "frequency_y")]
         return self.frequencies >= SETTLED and float(np.sum(self.weights * np.all(beside, axis=0))) < 1 / 2
 
-    def hearing(self, cut: Observed) -> Learnt:
+    def hearing(self, cut: CutEvidence) -> Learnt:
         """What is known after one more cut."""
         return self.expecting(cut).heard()
 
-    def expecting(self, cut: Observed) -> Expecting:
+    def expecting(self, cut: CutEvidence) -> Expecting:
         """A cut, and what it would sound like on the spindles that are not ruled out."""
         looked = np.flatnonzero(self.log > np.max(self.log) + np.log(NEGLIGIBLE))
         draws = self.draws[looked].with_materials(cut.material + 1, self.seed)
-        return Expecting(replace(self, draws=draws, log=self.log[looked]), cut, predicted(cut, draws))
+        return Expecting(replace(self, draws=draws, log=self.log[looked]), cut, predict_cut(cut, draws))
 
     def sample(self, count: int) -> Draws:
         """Draws of equal weight."""
@@ -115,8 +115,8 @@ class Expecting:
 
     learnt: Learnt
     """Without it: draws that have any weight left, with coefficients of its material."""
-    cut: Observed
-    guess: Predicted
+    cut: CutEvidence
+    guess: CutPrediction
     """What each of these draws would do in it."""
 
     def heard(self) -> Learnt:
@@ -137,17 +137,17 @@ def prior(middle: MillingRows, doubt: Doubt, count: int = COUNT, seed: int = 0) 
     return Learnt(drawn(middle, doubt, count, seed=seed), np.zeros(count), seed=seed)
 
 
-def learn(middle: MillingRows, doubt: Doubt, cuts: Sequence[Observed], count: int = COUNT, seed: int = 0) -> Learnt:
+def learn(middle: MillingRows, doubt: Doubt, cuts: Sequence[CutEvidence], count: int = COUNT, seed: int = 0) -> Learnt:
     """Learn from cuts in the order in which they were made; the same for a seed."""
     return reduce(Learnt.hearing, cuts, prior(middle, doubt, count, seed))
 
 
-def _log(cut: Observed, guess: Predicted) -> Floats:
+def _log(cut: CutEvidence, guess: CutPrediction) -> Floats:
     """Logarithm of the likelihood of one cut; an old one counts less, the more the frequency has moved since."""
     return cut.weight * log_likelihood(cut, guess, _teeth(cut))
 
 
-def _teeth(cut: Observed) -> float:
+def _teeth(cut: CutEvidence) -> float:
     """Tooth frequency (Hz)."""
     return cut.cut.teeth * cut.speed_rpm / 60
 
@@ -157,7 +157,9 @@ def _weights(log: Floats) -> Floats:
     return np.asarray(weights / np.sum(weights))
 
 
-def _refresh(draws: Draws, log: Floats, cuts: Sequence[Observed], random: np.random.Generator) -> tuple[Draws, Floats]:
+def _refresh(
+    draws: Draws, log: Floats, cuts: Sequence[CutEvidence], random: np.random.Generator
+) -> tuple[Draws, Floats]:
     """Draws of equal weight, each moved a few times by Metropolis and Hastings."""
     weights = _weights(log)
     spread = np.cov(draws.normal.T, aweights=weights) + 1e-4 * np.eye(draws.normal.shape[1])
@@ -176,7 +178,7 @@ def _refresh(draws: Draws, log: Floats, cuts: Sequence[Observed], random: np.ran
     return draws, np.zeros(len(draws))
 
 
-def _joint(draws: Draws, cuts: Sequence[Observed], least: Floats) -> Floats:
+def _joint(draws: Draws, cuts: Sequence[CutEvidence], least: Floats) -> Floats:
     """Logarithm of prior times likelihood of all cuts; -inf where that is not more than the least (r,).
 
     A draw that cannot come to more any more is not asked about further cuts.
@@ -187,7 +189,7 @@ def _joint(draws: Draws, cuts: Sequence[Observed], least: Floats) -> Floats:
         value[value + sum(hope[k:]) <= least] = -np.inf
         asked = np.flatnonzero(np.isfinite(value))
         if asked.size:
-            value[asked] += _log(cut, predicted(cut, draws[asked]))
+            value[asked] += _log(cut, predict_cut(cut, draws[asked]))
     return value
 
 

@@ -11,7 +11,7 @@ from scipy.special import ndtr
 
 from lobes import MillingRows, piece_numbers
 from lobes.floquet import largest_multipliers
-from lobewatch.cuts.learning.observed import Observed
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.priors import Draws
 from lobewatch.cuts.listening.folded import folded
 from lobewatch.verdicts.mean_force import MeanForce, is_constant
@@ -34,7 +34,7 @@ REAL = 1e-3
 Floats = NDArray[np.float64]
 
 
-class Predicted(NamedTuple):
+class CutPrediction(NamedTuple):
     """What each spindle would do in a cut, shape (r,) each."""
 
     excess: Floats
@@ -51,7 +51,7 @@ class Predicted(NamedTuple):
         """That it is heard to chatter."""
         return np.asarray(MISJUDGED + (1 - 2 * MISJUDGED) * ndtr(self.excess / EDGE))
 
-    def off(self, seen: Observed, tooth_frequency: float) -> Floats:
+    def off(self, seen: CutEvidence, tooth_frequency: float) -> Floats:
         """How far what was heard is from both frequencies (Hz), shape (2, r).
 
         Chatter that has grown leaves the cut, and sounds like what grows most or like what is at the limit: beyond the
@@ -61,7 +61,7 @@ class Predicted(NamedTuple):
         return np.asarray(np.abs(heard - np.array([self.base, self.at_limit])))
 
 
-def predicted(seen: Observed, draws: Draws) -> Predicted:
+def predict_cut(seen: CutEvidence, draws: Draws) -> CutPrediction:
     """In the worst of its directions of feed, at its own depth."""
     rows = draws.rows(seen.speed_rpm, seen.cut.tangential, seen.cut.radial, seen.material)
     speed = rows.speed_rpm if seen.speed_found else rows.speed_rpm * draws.rest.speed_rpm
@@ -69,26 +69,26 @@ def predicted(seen: Observed, draws: Draws) -> Predicted:
     way = _by_mean_force if is_constant(seen.cut) else _by_multipliers
     found = [way(rows.fed_at(angle), seen) for angle in seen.feed_angles]
     worst = np.argmax([one.excess for one in found], axis=0)[np.newaxis]
-    return Predicted(*(np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*found, strict=True)))
+    return CutPrediction(*(np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*found, strict=True)))
 
 
-def log_likelihood(seen: Observed, guess: Predicted, tooth_frequency: float) -> Floats:
+def log_likelihood(seen: CutEvidence, guess: CutPrediction, tooth_frequency: float) -> Floats:
     """Logarithm of the likelihood of what was heard, shape (r,)."""
     if not seen.chatters:
         return np.asarray(np.log(1 - guess.chance))
     return np.asarray(np.log(guess.chance) + _log_of_sound(seen, guess, tooth_frequency))
 
 
-def most_likely(seen: Observed, tooth_frequency: float) -> float:
+def most_likely(seen: CutEvidence, tooth_frequency: float) -> float:
     """The largest that `log_likelihood` can be: of a spindle that would do what was heard."""
     if not seen.has_frequency:
         return 0.0
     base = np.atleast_1d(folded(_heard_base(seen, tooth_frequency), tooth_frequency))
-    same = Predicted(np.array([np.inf]), base, base, np.array([seen.word == "flip"]))
+    same = CutPrediction(np.array([np.inf]), base, base, np.array([seen.word == "flip"]))
     return float(log_likelihood(seen, same, tooth_frequency)[0])
 
 
-def _log_of_sound(seen: Observed, guess: Predicted, tooth_frequency: float) -> Floats:
+def _log_of_sound(seen: CutEvidence, guess: CutPrediction, tooth_frequency: float) -> Floats:
     """Of kind and frequency, where it chatters; 0 where neither was told."""
     if not seen.has_frequency:
         return np.zeros(guess.excess.shape)
@@ -102,12 +102,12 @@ def _log_of_sound(seen: Observed, guess: Predicted, tooth_frequency: float) -> F
     return np.asarray(np.log(kind * ((1 - STRANGE) * near + STRANGE * anywhere) / anywhere))
 
 
-def _heard_base(seen: Observed, tooth_frequency: float) -> float:
+def _heard_base(seen: CutEvidence, tooth_frequency: float) -> float:
     """Chatter frequency that was heard (Hz), or that of period two where none was told."""
     return seen.frequency if np.isfinite(seen.frequency) else tooth_frequency / 2
 
 
-def _by_mean_force(rows: MillingRows, seen: Observed) -> Predicted:
+def _by_mean_force(rows: MillingRows, seen: CutEvidence) -> CutPrediction:
     """Where that is all of the force."""
     mean = MeanForce.of(rows)
     limit, at_limit = (table[:, 0] for table in mean.limits(rows.speed_rpm[:, np.newaxis]))
@@ -118,10 +118,10 @@ def _by_mean_force(rows: MillingRows, seen: Observed) -> Predicted:
         _, own = MeanForce(mean.rows[beyond], mean.force[beyond]).loudest(rows.speed_rpm[beyond], seen.depth)
         frequency[beyond] = np.where(np.isfinite(own), own, frequency[beyond])
     teeth = 1 / rows.tooth_period
-    return Predicted(excess, folded(frequency, teeth), folded(at_limit, teeth), np.zeros(len(rows), dtype=bool))
+    return CutPrediction(excess, folded(frequency, teeth), folded(at_limit, teeth), np.zeros(len(rows), dtype=bool))
 
 
-def _by_multipliers(rows: MillingRows, seen: Observed) -> Predicted:
+def _by_multipliers(rows: MillingRows, seen: CutEvidence) -> CutPrediction:
     """By semi-discretisation at the depth of the cut; how far it is from the limit by its growth over that at rest."""
     depth = np.full((len(rows), 1), seen.depth)
     multiplier = largest_multipliers(rows, depth, piece_numbers(rows, seen.depth), ACCURACY)[:, 0]
@@ -131,4 +131,4 @@ def _by_multipliers(rows: MillingRows, seen: Observed) -> Predicted:
     teeth, at_limit = 1 / rows.tooth_period, np.full(len(rows), np.nan)
     if seen.has_frequency:
         at_limit = MeanForce.of(rows).limits(rows.speed_rpm[:, np.newaxis])[1][:, 0]
-    return Predicted(excess, angle / (2 * np.pi) * teeth, folded(at_limit, teeth), np.pi - angle < REAL)
+    return CutPrediction(excess, angle / (2 * np.pi) * teeth, folded(at_limit, teeth), np.pi - angle < REAL)

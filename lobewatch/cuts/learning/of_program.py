@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from lobewatch.cuts.learning.contradicting import Contradicting, learn_from_sound
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.grid import Grid, speeds_between, trusted
 from lobewatch.cuts.learning.learnt import Learnt, prior
-from lobewatch.cuts.learning.observed import Observed
-from lobewatch.cuts.learning.suggest import Suggested, best_heard, suggest
+from lobewatch.cuts.learning.suggest import Suggestion, best_heard, suggest
 from lobewatch.machine import Machine, ProgramTable, drive_limit
 from lobewatch.machine.journal.heard_cut import HeardCut, geometry
 from lobewatch.machine.settings.cut_setting import named
@@ -34,7 +34,7 @@ class Lesson:
     """What is known with them."""
     contradicting: tuple[Contradicting, ...]
     """Cuts that were left out."""
-    own: tuple[Observed, ...]
+    own: tuple[CutEvidence, ...]
     """Those that were cuts of this very program, at whatever speed and depth."""
 
 
@@ -43,7 +43,7 @@ class NextCut:
     """What to cut next, and what it rests on."""
 
     lesson: Lesson
-    suggested: Suggested | None
+    suggested: Suggestion | None
     """None where nothing more is to be gained, or all cuts are made."""
     left: int
     """Test cuts that are still to be made."""
@@ -89,7 +89,7 @@ def grid_of(table: ProgramTable, assembly: Assembly, machine: Machine) -> Grid:
 
 def observed(
     cuts: Sequence[HeardCut], table: ProgramTable, assembly: Assembly, machine: Machine
-) -> tuple[Observed, ...]:
+) -> tuple[CutEvidence, ...]:
     """The cuts of the same tool that count, oldest first."""
     own = table.material or "", machine.build_cut(table).tangential, machine.build_cut(table).radial
     materials = [own]
@@ -104,9 +104,9 @@ def observed(
     return tuple(found)
 
 
-def _observed(cut: HeardCut, material: int, assembly: Assembly) -> Observed:
+def _observed(cut: HeardCut, material: int, assembly: Assembly) -> CutEvidence:
     feeds = FEED_ANGLES if cut.feed == "both" else (cut.feed,)
-    return Observed(
+    return CutEvidence(
         cut=cut.cut,
         speed_rpm=cut.speed_rpm,
         depth=cut.depth,

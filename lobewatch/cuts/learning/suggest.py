@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.cuts.learning.chart import LIKELY, Chart
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.grid import Grid, floored
 from lobewatch.cuts.learning.learnt import Learnt
-from lobewatch.cuts.learning.likelihood import predicted
-from lobewatch.cuts.learning.observed import Observed
+from lobewatch.cuts.learning.likelihood import predict_cut
+from lobewatch.cuts.learning.limit_charts import LIKELY, LimitCharts
 from lobewatch.cuts.learning.priors import Draws
 from lobewatch.verdicts.mean_force import is_constant
 
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Suggested:
+class Suggestion:
     """A test cut that is worth making."""
 
     speed_rpm: float
@@ -43,12 +43,12 @@ class Suggested:
     """By how many of its standard deviations the two outcomes differ there."""
 
 
-def best_heard(cuts: Sequence[Observed]) -> float:
+def best_heard(cuts: Sequence[CutEvidence]) -> float:
     """Largest speed times depth (rpm m) that was heard stable; 0 where none was."""
     return max((cut.speed_rpm * cut.depth for cut in cuts if not cut.chatters), default=0.0)
 
 
-def suggest(learnt: Learnt, grid: Grid, heard: Sequence[Observed], left: int = 1) -> Suggested | None:
+def suggest(learnt: Learnt, grid: Grid, heard: Sequence[CutEvidence], left: int = 1) -> Suggestion | None:
     """The next test cut; None where nothing more is to be gained.
 
     heard: the cuts of this very program; left: test cuts that are still to be made, this one with them. With more than
@@ -56,7 +56,7 @@ def suggest(learnt: Learnt, grid: Grid, heard: Sequence[Observed], left: int = 1
     proposes; what is chosen was judged by semi-discretisation.
     """
     best, draws = best_heard(heard), learnt.sample(DRAWS)
-    chart = Chart.of(draws, grid)
+    chart = LimitCharts.of(draws, grid)
     most = float(np.max(chart.chips))
     least = GAINED * max(best, 1e-3 * most)
     worth = {place: chart.worth(place[0], place[1], best, left) for place in chart.candidates(best)}
@@ -69,15 +69,15 @@ def suggest(learnt: Learnt, grid: Grid, heard: Sequence[Observed], left: int = 1
     return None
 
 
-def _judged(grid: Grid, speed: float, depth: float, best: float, draws: Draws) -> Suggested | None:
+def _judged(grid: Grid, speed: float, depth: float, best: float, draws: Draws) -> Suggestion | None:
     """The cut, or one not as deep where it is more likely to chatter than not."""
     for share in (1.0,) if is_constant(grid.cut) else NEARBY:
         deep = floored(share * depth)
-        chance = predicted(grid.seen(speed, deep), draws).chance
+        chance = predict_cut(grid.seen(speed, deep), draws).chance
         if deep > 0 and np.mean(chance) < 1 - LIKELY:
             gain = float(1 - np.mean(chance)) * (speed * deep - best)
             settles = _settles(draws.ratios(), chance)
-            return Suggested(speed, deep, float(np.mean(chance)), gain / best if best else np.inf, *settles)
+            return Suggestion(speed, deep, float(np.mean(chance)), gain / best if best else np.inf, *settles)
     return None
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from lobewatch.cuts.listening.folded import modulo
 from lobewatch.cuts.listening.sorted_lines import WIDE
-from lobewatch.cuts.listening.spectrum import Floats, Lines
+from lobewatch.cuts.listening.spectrum import Floats, SpectralLines
 
 LOUD = 0.1
 """Share of the loudest amplitude that a line has that names chatter ..."""
@@ -32,11 +32,11 @@ class ChatterLines:
     """Of the line with the largest displacement (Hz)."""
     error: float
     """Standard error (Hz)."""
-    lines: Lines
+    lines: SpectralLines
     """All lines f_c + k tooth passing."""
 
 
-def chatter_lines(left: Lines, tooth_frequency: float, bin_: float) -> ChatterLines:
+def chatter_lines(left: SpectralLines, tooth_frequency: float, bin_: float) -> ChatterLines:
     """The family that chatter is named by; left: one line at least. All in Hz.
 
     Chatter that leaves the cut sounds with 2 f_c and 3 f_c and their side bands too. So that of the loudest lines is
@@ -58,7 +58,7 @@ def chatter_lines(left: Lines, tooth_frequency: float, bin_: float) -> ChatterLi
     return ChatterLines(float(left.frequency[top]), float(error), left[best & part])
 
 
-def _explained(left: Lines, frequency: float, tooth_frequency: float, bin_: float) -> Floats:
+def _explained(left: SpectralLines, frequency: float, tooth_frequency: float, bin_: float) -> Floats:
     """Which lines are multiples of a frequency or side bands of those, 0 or 1, shape (n,)."""
     found = np.zeros(len(left))
     for order in range(1, MULTIPLES + 1):

@@ -15,7 +15,7 @@ from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.tool.assembly import Assembly
 
 
-class Predicted(NamedTuple):
+class ExpectedSound(NamedTuple):
     """In the direction of feed that is worst."""
 
     stable: bool
@@ -24,7 +24,7 @@ class Predicted(NamedTuple):
     """Of the largest multiplier (Hz): what chatter would sound with at this depth."""
 
 
-def predicted(setting: CutSetting, assembly: Assembly, speed_rpm: float) -> Predicted:
+def expected_sound(setting: CutSetting, assembly: Assembly, speed_rpm: float) -> ExpectedSound:
     """At a speed (rpm): that at the limit is more than 1 % off in many cuts far beyond it.
 
     The multiplier is that of the cut's own depth. ValueError for an assembly without modes.
@@ -40,4 +40,4 @@ def predicted(setting: CutSetting, assembly: Assembly, speed_rpm: float) -> Pred
     worst = int(np.argmax([abs(one[0]) for one in found]))
     tooth = np.array([setting.cut.teeth * speed_rpm / 60])
     frequency = chatter_frequency(system, cuts[worst], found[worst], depth[0], tooth)
-    return Predicted(bool(abs(found[worst][0]) < 1), float(frequency[0]))
+    return ExpectedSound(bool(abs(found[worst][0]) < 1), float(frequency[0]))

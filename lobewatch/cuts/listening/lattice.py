@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.cuts.listening.spectrum import Floats, Lines
+from lobewatch.cuts.listening.spectrum import Floats, SpectralLines
 
 FAMILIES = 4
 """Frequencies that are no multiples, with their side bands."""
@@ -32,7 +32,7 @@ class Family:
 
 
 @dataclass(frozen=True)
-class Turning:
+class SpindleSpeed:
     """How fast the spindle turns."""
 
     frequency: float
@@ -47,9 +47,9 @@ class Turning:
     """Mean square distance of all lines from it, in standard errors of each, at most `STRAY` squared."""
 
 
-def refined(frequency: float, lines: Lines, bin_: float) -> Turning:
+def refined(frequency: float, lines: SpectralLines, bin_: float) -> SpindleSpeed:
     """A spindle frequency (Hz) made exact by least squares over its lattice; bin_: of the spectrum (Hz)."""
-    found = Turning(frequency, np.inf, 0.0, 0, STRAY**2)
+    found = SpindleSpeed(frequency, np.inf, 0.0, 0, STRAY**2)
     for tolerance in (1.2, 0.6, 0.6, 0.6):
         families = families_of(found.frequency, lines, tolerance * bin_)
         rows = np.concatenate([_rows(family, number, len(families)) for number, family in enumerate(families)])
@@ -64,11 +64,11 @@ def refined(frequency: float, lines: Lines, bin_: float) -> Turning:
         error = float(np.sqrt(np.linalg.inv(scaled.T @ scaled)[0, 0]))
         away = np.minimum(np.abs(scaled @ solution - heard), STRAY)
         misfit = float(np.sum(away**2) + (len(lines) - which.size) * STRAY**2) / len(lines)
-        found = Turning(float(solution[0]), error, which.size / len(lines), which.size - len(families), misfit)
+        found = SpindleSpeed(float(solution[0]), error, which.size / len(lines), which.size - len(families), misfit)
     return found
 
 
-def families_of(frequency: float, lines: Lines, tolerance: float) -> list[Family]:
+def families_of(frequency: float, lines: SpectralLines, tolerance: float) -> list[Family]:
     """Multiples of a frequency (Hz), then the families of the clearest lines that are left; tolerance in Hz."""
     heard = lines.frequency
     order = np.round(heard / frequency)

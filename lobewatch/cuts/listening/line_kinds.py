@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from lobewatch.cuts.listening.listen_to import Heard
-from lobewatch.cuts.listening.spectrum import Lines
+from lobewatch.cuts.listening.listen_to import CutSound
+from lobewatch.cuts.listening.spectrum import SpectralLines
 
 
-def line_kinds(heard: Heard) -> dict[str, Lines]:
+def line_kinds(heard: CutSound) -> dict[str, SpectralLines]:
     """Lines that are there, under "turns" of the spindle, "tooth" passing, "air" (there without a cut), "chatter"."""
     lines, chatter = heard.lines, heard.chatter
-    named: dict[str, Lines] = {}
+    named: dict[str, SpectralLines] = {}
     if lines is not None:
         tooth = lines.tooth == 0
         named = {"turns": lines.comb[~tooth], "tooth": lines.comb[tooth], "air": lines.foreign}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from lobewatch.cuts.listening.chatter_lines import ChatterLines, chatter_lines
 from lobewatch.cuts.listening.find_cut import CutParts, find_cut
-from lobewatch.cuts.listening.lattice import Turning
+from lobewatch.cuts.listening.lattice import SpindleSpeed
 from lobewatch.cuts.listening.sorted_lines import SortedLines, is_foreign, sort_lines
 from lobewatch.cuts.listening.spectrum import Floats, Spectrum, lines_of, spectrum_of
 from lobewatch.cuts.listening.steadiness import unsteadiness
@@ -38,7 +38,7 @@ SLOT = 0.95
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class CutSound:
     """What was heard, and what it rests on; arrays are empty where it did not get so far."""
 
     word: CutWord
@@ -47,7 +47,7 @@ class Heard:
     """Why it cannot be told, a code; empty where it can."""
     parts: CutParts
     """Which part of the recording is the cut."""
-    turning: Turning | None = None
+    turning: SpindleSpeed | None = None
     """How fast the spindle turns."""
     ratio: float = np.nan
     """Energy of what is left, at the end of the cut, over that of the multiples of the spindle."""
@@ -64,7 +64,7 @@ class Heard:
         return np.nan if self.turning is None else 60 * self.turning.frequency
 
 
-class Listened(NamedTuple):
+class CutRecording(NamedTuple):
     """A recording that is to be listened to."""
 
     signal: Floats
@@ -83,7 +83,7 @@ class Listened(NamedTuple):
     """How many are missing."""
 
 
-def listen_to(what: Listened) -> Heard:
+def listen_to(what: CutRecording) -> CutSound:
     """Tell a recording of a cut, with some air before or after it.
 
     Reasons why it cannot be told: "too-short", "no-cut", "no-air", "two-cuts", "knock", "overload", "lost-scans",
@@ -94,19 +94,19 @@ def listen_to(what: Listened) -> Heard:
     parts = find_cut(signal, rate, 60 / what.commanded_rpm)
     reason = _fault(what, parts)
     if reason:
-        return Heard("cannot tell", reason, parts)
+        return CutSound("cannot tell", reason, parts)
     spectrum, air = spectrum_of(signal[parts.cut], rate), spectrum_of(signal[parts.air], rate)
     every = lines_of(spectrum)
     turning = true_speed(every[~is_foreign(every, air)], every, spectrum, what.teeth, what.commanded_rpm / 60)
     if turning is None:
-        return Heard("cannot tell", "speed-not-found", parts, spectrum=spectrum)
+        return CutSound("cannot tell", "speed-not-found", parts, spectrum=spectrum)
     unsteady = unsteadiness(signal[parts.cut], rate, every, turning, spectrum.bin)
     lines = sort_lines(every, spectrum, air, turning, what.teeth, unsteady)
-    found = Heard("stable", "", parts, turning, 0.0, None, lines, spectrum)
+    found = CutSound("stable", "", parts, turning, 0.0, None, lines, spectrum)
     return _judged(found, what)
 
 
-def _fault(what: Listened, parts: CutParts) -> str:
+def _fault(what: CutRecording, parts: CutParts) -> str:
     """Why the signal cannot be trusted, a code; empty where it can."""
     if parts.reason == "too-short":
         return parts.reason
@@ -115,7 +115,7 @@ def _fault(what: Listened, parts: CutParts) -> str:
     return "lost-scans" if what.lost_scans else parts.reason
 
 
-def _judged(found: Heard, what: Listened) -> Heard:
+def _judged(found: CutSound, what: CutRecording) -> CutSound:
     """The word on a cut whose lines are known."""
     lines, turning, spectrum = found.lines, found.turning, found.spectrum
     if lines is None or turning is None or spectrum is None:
@@ -143,7 +143,7 @@ def _power(chatter: ChatterLines) -> float:
     return float(chatter.lines.amplitude[at] ** 2)
 
 
-def _without_chatter(found: Heard, what: Listened) -> Heard:
+def _without_chatter(found: CutSound, what: CutRecording) -> CutSound:
     """Stable, unless multiples of the spindle are louder than run-out and teeth make them."""
     if found.lines is None:
         return found

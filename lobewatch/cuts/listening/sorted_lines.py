@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobewatch.cuts.listening.folded import folded
-from lobewatch.cuts.listening.lattice import Turning
-from lobewatch.cuts.listening.spectrum import Lines, Spectrum
+from lobewatch.cuts.listening.lattice import SpindleSpeed
+from lobewatch.cuts.listening.spectrum import SpectralLines, Spectrum
 
 WIDE = 1.2
 """A line belongs to a frequency that is no further away than this (bins)."""
@@ -28,23 +28,23 @@ LOUDER = 1.5
 class SortedLines:
     """All lines of a cut."""
 
-    comb: Lines
+    comb: SpectralLines
     """Multiples of the frequency of the spindle, the first left out: it is there in air."""
     tooth: NDArray[np.int64]
     """Order of each of these, modulo the number of teeth; 0 is tooth passing."""
-    foreign: Lines
+    foreign: SpectralLines
     """Those that are there in air."""
-    left: Lines
+    left: SpectralLines
     """All others: chatter, where there is any."""
 
 
-def is_foreign(lines: Lines, air: Spectrum) -> NDArray[np.bool_]:
+def is_foreign(lines: SpectralLines, air: Spectrum) -> NDArray[np.bool_]:
     """Whether lines are there in air too."""
     return np.asarray(lines.amplitude**2 <= FOREIGN * air.loudest_near(lines.frequency, AIR_WIDE))
 
 
 def sort_lines(
-    lines: Lines, spectrum: Spectrum, air: Spectrum, turning: Turning, teeth: int, unsteady: float
+    lines: SpectralLines, spectrum: Spectrum, air: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
 ) -> SortedLines:
     """Where each line comes from; a multiple of the spindle above half the sample rate is where it is folded to.
 
@@ -63,7 +63,7 @@ def sort_lines(
     return SortedLines(lines[kept], tooth, lines[foreign], lines[~(comb | foreign | back)])
 
 
-def _near_folded(lines: Lines, spectrum: Spectrum, turning: Turning) -> NDArray[np.bool_]:
+def _near_folded(lines: SpectralLines, spectrum: Spectrum, turning: SpindleSpeed) -> NDArray[np.bool_]:
     rate = spectrum.sample_rate
     orders = np.arange(int(rate / 2 / turning.frequency) + 1, int(HIGHEST * rate / turning.frequency) + 1)
     if not orders.size:

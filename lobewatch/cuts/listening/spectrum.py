@@ -47,7 +47,7 @@ class Spectrum:
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class SpectralLines:
     """Single frequencies in a spectrum."""
 
     frequency: Floats
@@ -57,9 +57,9 @@ class Lines:
     clearness: Floats
     """Power over that of the noise, shape (n,)."""
 
-    def __getitem__(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> Lines:
+    def __getitem__(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> SpectralLines:
         """Some of them."""
-        return Lines(self.frequency[which], self.amplitude[which], self.clearness[which])
+        return SpectralLines(self.frequency[which], self.amplitude[which], self.clearness[which])
 
     def __len__(self) -> int:
         """How many."""
@@ -70,7 +70,7 @@ class Lines:
         """Of all of them ((m/s^2)^2)."""
         return float(np.sum(self.amplitude**2))
 
-    def loudest(self, count: int) -> Lines:
+    def loudest(self, count: int) -> SpectralLines:
         """So many at most, the loudest first."""
         return self[np.argsort(-self.amplitude)[:count]]
 
@@ -95,7 +95,7 @@ def _noise(power: Floats) -> Floats:
     return np.asarray(np.maximum(np.interp(np.arange(power.size), middle, level), least))
 
 
-def lines_of(spectrum: Spectrum) -> Lines:
+def lines_of(spectrum: Spectrum) -> SpectralLines:
     """The lines that stand clear of the noise; frequency and amplitude by a parabola through log power."""
     power = spectrum.power
     wide = 2 * max(round(APART * spectrum.bin / spectrum.frequency[1]), 1) + 1
@@ -105,4 +105,4 @@ def lines_of(spectrum: Spectrum) -> Lines:
     bend = before - 2 * top + after
     shift = 0.5 * (before - after) / np.where(bend < 0, bend, -1.0)
     amplitude = np.sqrt(np.exp(top - 0.25 * (before - after) * shift))
-    return Lines((at + shift) * spectrum.frequency[1], amplitude, power[at] / spectrum.noise[at])
+    return SpectralLines((at + shift) * spectrum.frequency[1], amplitude, power[at] / spectrum.noise[at])

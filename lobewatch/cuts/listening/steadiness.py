@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from lobewatch.cuts.listening.lattice import Turning
-from lobewatch.cuts.listening.spectrum import Floats, Lines, lines_of, spectrum_of
+from lobewatch.cuts.listening.lattice import SpindleSpeed
+from lobewatch.cuts.listening.spectrum import Floats, SpectralLines, lines_of, spectrum_of
 
 PARTS = 4
 """Of the cut."""
@@ -21,7 +21,7 @@ AGREEING = 3
 """Multiples that must have changed alike."""
 
 
-def unsteadiness(signal: Floats, sample_rate: float, lines: Lines, turning: Turning, bin_: float) -> float:
+def unsteadiness(signal: Floats, sample_rate: float, lines: SpectralLines, turning: SpindleSpeed, bin_: float) -> float:
     """By how much the speed varies, relative; signal of the cut, its lines and their bin (Hz)."""
     order = np.round(lines.frequency / turning.frequency)
     comb = (np.abs(lines.frequency - order * turning.frequency) < bin_ + MOST * lines.frequency / WIDER) & (order > 1)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from lobewatch.cuts.listening.lattice import Turning, refined
-from lobewatch.cuts.listening.spectrum import Floats, Lines, Spectrum
+from lobewatch.cuts.listening.lattice import SpindleSpeed, refined
+from lobewatch.cuts.listening.spectrum import Floats, SpectralLines, Spectrum
 
 AROUND = 0.021
 """Relative distance from the speed that was set up to which it is looked for."""
@@ -31,7 +31,9 @@ LEAST_AGREEING = 3
 """... and so many of them must agree: a pump that is switched on has lines of its own."""
 
 
-def true_speed(own: Lines, all_lines: Lines, spectrum: Spectrum, teeth: int, commanded: float) -> Turning | None:
+def true_speed(
+    own: SpectralLines, all_lines: SpectralLines, spectrum: Spectrum, teeth: int, commanded: float
+) -> SpindleSpeed | None:
     """Turns a second, near those that were set (Hz); None where too few lines agree.
 
     own: lines that are not there in air; all_lines: with those that are. Each distance between two lines, each sum
@@ -59,7 +61,7 @@ def true_speed(own: Lines, all_lines: Lines, spectrum: Spectrum, teeth: int, com
     return found if is_sure else None
 
 
-def _spaced(lines: Lines, frequency: float, teeth: int, bin_: float) -> float:
+def _spaced(lines: SpectralLines, frequency: float, teeth: int, bin_: float) -> float:
     """Share of lines with another one or two turns or teeth away: a wrong frequency may fit multiples, not these."""
     apart = np.abs(lines.frequency[:, np.newaxis] - lines.frequency)
     steps = (step * frequency for step in (1, 2, teeth, 2 * teeth))
@@ -72,7 +74,7 @@ def _peaks(votes: Floats) -> NDArray[np.intp]:
     return places[np.argsort(-votes[places])[:PEAKS]]
 
 
-def _votes(lines: Lines, grid: Floats, teeth: int, sharpness: float) -> Floats:
+def _votes(lines: SpectralLines, grid: Floats, teeth: int, sharpness: float) -> Floats:
     """For each frequency of a grid (Hz); sharpness: of one line (Hz)."""
     weight, step = np.log10(lines.clearness), grid[1] - grid[0]
     i, j = np.triu_indices(len(lines), 1)

@@ -15,13 +15,13 @@ from datetime import datetime
 from typing import NamedTuple
 
 from acquisition import Remark
-from lobewatch.history.assembling import Followed
+from lobewatch.history.assembling import FollowedModes
 from lobewatch.history.columns.stored_row import packed
 from lobewatch.history.history import Row, Values
 from lobewatch.machine import TapEntry
 from lobewatch.tool.assembly import TOGETHER
 from lobewatch.tool.order import Place, earlier, places
-from lobewatch.tool.series import Point
+from lobewatch.tool.series import FollowedMode
 
 
 def is_of(row: Row, place: Place) -> bool:
@@ -40,7 +40,7 @@ class _Ground(NamedTuple):
     """The mode followed before it."""
     other: str
     """Tap test that the other direction is taken from; empty without any."""
-    near: tuple[Point, ...]
+    near: tuple[FollowedMode, ...]
     """Where that is so old that it is moved: what it is moved by."""
 
 
@@ -49,7 +49,7 @@ class _Archive:
 
     def __init__(self, ordered: Sequence[Place], rows: Sequence[Row]) -> None:
         self.places, self.rows = ordered, rows
-        self._followed = Followed()
+        self._followed = FollowedModes()
 
     def ground(self, place: Place) -> _Ground:
         before = (self.rows[number] for number in earlier(place, self.places))
@@ -59,7 +59,7 @@ class _Archive:
         other = self.places[place.other].entry
         return _Ground(place.said, last, other.id, self._near(place, datetime.fromisoformat(other.time)))
 
-    def _near(self, place: Place, then: datetime) -> tuple[Point, ...]:
+    def _near(self, place: Place, then: datetime) -> tuple[FollowedMode, ...]:
         if datetime.fromisoformat(place.entry.time) - then <= TOGETHER:
             return ()
         points = self._followed.before(place, self.rows)[place.entry.direction]

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from lobewatch.history.assembling import Followed, predicted, tapped
+from lobewatch.history.assembling import FollowedModes, assemble_tapped, predict_untapped
 from lobewatch.history.cache.kept_rows import kept_in_place
 from lobewatch.history.cache.still_holding import StillHolding
 from lobewatch.history.history import Row, row_of
 from lobewatch.machine import DamagedTapError, MachineFolder
-from lobewatch.measuring.measurement import Fitted, Measurement, measure, measured
+from lobewatch.measuring.measurement import Measurement, TapFit, measure, measure_fit
 from lobewatch.measuring.questions.asked import answered
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.order import Place, earlier
@@ -20,14 +20,14 @@ KEPT = 500
 """Measurements kept in memory, those asked for last."""
 
 
-class WorkedOut:
+class TapMeasurements:
     """Measurements and assemblies of one machine from its tap files; rows: the history before a place at least."""
 
-    def __init__(self, folder: MachineFolder, places: Sequence[Place], fits: Mapping[str, Fitted]) -> None:
+    def __init__(self, folder: MachineFolder, places: Sequence[Place], fits: Mapping[str, TapFit]) -> None:
         """places: all tap tests, oldest first; fits: of those that were fitted already. Nothing is worked out yet."""
         self._folder, self._places, self._fits = folder, places, fits
         self._measurements: dict[str, Measurement] = {}
-        self._followed = Followed()
+        self._followed = FollowedModes()
 
     def measured(self, place: Place, rows: Sequence[Row]) -> Measurement:
         """What one tap test says."""
@@ -46,20 +46,20 @@ class WorkedOut:
     def _measured(self, place: Place, last: Mode | None) -> Measurement:
         fit = self._fits.get(place.entry.id)
         if fit is not None:
-            return measured(fit, self._folder.machine, last)
+            return measure_fit(fit, self._folder.machine, last)
         return measure(self._folder.read(place.entry), self._folder.machine, last)
 
     def assembled(self, place: Place, rows: Sequence[Row]) -> Assembly:
         """The tool of one tap test as it was known then."""
         points = self._followed.before(place, rows)
-        return tapped(place, self._places, points, lambda one: self.measured(one, rows))
+        return assemble_tapped(place, self._places, points, lambda one: self.measured(one, rows))
 
     def tool_in(self, known: Sequence[Place], rows: Sequence[Row], tool: str) -> Assembly:
         """A tool as the newest of these tap tests with it tells, predicted where none is of it."""
         newest = next((place for place in reversed(known) if place.entry.tool == tool), None)
         if newest is not None:
             return self.assembled(newest, rows)
-        return predicted(self._folder.machine, known, rows, lambda place: self.measured(place, rows), tool)
+        return predict_untapped(self._folder.machine, known, rows, lambda place: self.measured(place, rows), tool)
 
     def with_all(
         self, rows: Sequence[Row], others: Mapping[str, Row], behind: StillHolding | None = None

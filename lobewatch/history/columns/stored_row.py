@@ -17,7 +17,7 @@ from lobewatch.measuring.questions.asked import ACCEPTED, QUESTIONS
 from lobewatch.verdicts.verdict import Ruling
 
 
-class Stored(msgspec.Struct, array_like=True, gc=False):
+class RowRecord(msgspec.Struct, array_like=True, gc=False):
     """A row with its place, times as text, which keep their zone, and each ruling with the hash of its program."""
 
     number: int
@@ -44,7 +44,7 @@ class Stored(msgspec.Struct, array_like=True, gc=False):
 
 
 PLAIN = tuple(
-    name for name in Stored.__struct_fields__ if name not in ("number", "time", "baseline", "conditions", "rulings")
+    name for name in RowRecord.__struct_fields__ if name not in ("number", "time", "baseline", "conditions", "rulings")
 )
 """Fields that are in a row just so."""
 LATER = ("modes", "x", "y", "remarks", "rulings")
@@ -52,12 +52,12 @@ LATER = ("modes", "x", "y", "remarks", "rulings")
 _KINDS: dict[str, Any] = dict.fromkeys(ESTIMATES, tuple[float, float]) | dict.fromkeys(LATER, msgspec.Raw)
 _Brief = msgspec.defstruct(
     "_Brief",
-    [(name, _KINDS.get(name, kind)) for name, kind in get_type_hints(Stored).items()],
+    [(name, _KINDS.get(name, kind)) for name, kind in get_type_hints(RowRecord).items()],
     array_like=True,
     gc=False,
 )
 """A row with those as they lie there, estimates as numbers."""
-_encode, _decode = msgspec.msgpack.Encoder().encode, msgspec.msgpack.Decoder(Stored).decode
+_encode, _decode = msgspec.msgpack.Encoder().encode, msgspec.msgpack.Decoder(RowRecord).decode
 _put = object.__setattr__
 _watched = attrgetter(*WATCHED)
 _decode_brief: Callable[[bytes], Any] = msgspec.msgpack.Decoder(_Brief).decode
@@ -151,7 +151,7 @@ def packed(number: int, row: Row, hashes: Mapping[str, str]) -> bytes:
     rulings = {name: (hashes[name], ruling) for name, ruling in (row.rulings or {}).items()}
     plain = {name: getattr(row, name) for name in PLAIN}
     others: dict[str, Any] = {"baseline": baseline, "conditions": row.conditions.known, "rulings": rulings}
-    return _encode(Stored(number=number, time=row.time.isoformat(), **others, **plain))
+    return _encode(RowRecord(number=number, time=row.time.isoformat(), **others, **plain))
 
 
 def unpacked(content: bytes, hashes: Mapping[str, str], software: str = "") -> tuple[int, Row]:

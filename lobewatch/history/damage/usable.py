@@ -9,8 +9,8 @@ from typing import TypeVar
 from acquisition import DataError, Remark
 from lobewatch.history.assembling import NotTappedError
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
-from lobewatch.machine.contents import Contents
-from lobewatch.machine.journal.event import Event
+from lobewatch.machine.contents import FolderContents
+from lobewatch.machine.journal.event import MaintenanceEvent
 from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.machine.journal.journal import command
 from lobewatch.tool.order import Order, Place
@@ -25,7 +25,7 @@ class UsableTaps:
     def __init__(self, folder: MachineFolder) -> None:
         """Nothing is read yet."""
         self._folder = folder
-        self._contents: Contents | None = None
+        self._contents: FolderContents | None = None
         self._order: Order | None = None
         self._left_out: dict[str, tuple[TapEntry, Remark]] = {}
         self._works = False
@@ -73,7 +73,7 @@ class UsableTaps:
         return [*known, *(remark for _, remark in self._left_out.values())]
 
     @property
-    def events(self) -> Sequence[Event]:
+    def events(self) -> Sequence[MaintenanceEvent]:
         """What was done to the machine, oldest first."""
         return self._all.events
 
@@ -181,7 +181,7 @@ class UsableTaps:
         self._order = None
 
     @property
-    def _all(self) -> Contents:
+    def _all(self) -> FolderContents:
         if self._contents is None:
             self._contents = self._folder.contents()
         return self._contents

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from acquisition import DataError, Description
 from acquisition.atomic import make_folder
-from lobewatch.logbook.replaying.understand import Asked, WorkedOut, reason_of, work_out, work_out_file
+from lobewatch.logbook.replaying.understand import Asked, TapDraft, reason_of, work_out, work_out_file
 from lobewatch.machine import MachineFolder, TapEntry
-from lobewatch.measuring.measurement import Fitted
+from lobewatch.measuring.measurement import TapFit
 from lobewatch.measuring.workers.shared import Workers, shared
 
 
@@ -31,7 +31,7 @@ class Prepared:
     """Of that."""
     created: datetime
     """When it was recorded."""
-    fit: Fitted
+    fit: TapFit
     """The modes in it."""
     taken: tuple[str, ...]
     """What was taken for granted where the file does not say it."""
@@ -68,7 +68,7 @@ def _tried(folder: MachineFolder, file: Path, said: Description) -> Prepared | s
         return reason_of(file, error)
 
 
-def _on_disk(folder: MachineFolder, found: WorkedOut) -> Prepared:
+def _on_disk(folder: MachineFolder, found: TapDraft) -> Prepared:
     taps = folder.path / "taps"
     make_folder(taps)
     path = taps / f".{found.entry.id}.h5.ready"

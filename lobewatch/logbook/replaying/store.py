@@ -11,7 +11,7 @@ from acquisition import DataError, Description, TapTest
 from lobewatch.logbook.replaying.prepare import Prepared, all_prepared, prepared, remove_leftovers
 from lobewatch.logbook.replaying.understand import reason_of
 from lobewatch.machine import MachineFolder, TapEntry
-from lobewatch.measuring.measurement import Fitted
+from lobewatch.measuring.measurement import TapFit
 from lobewatch.measuring.workers.shared import Workers
 
 Progress = Callable[[str, int, int], None]
@@ -21,7 +21,7 @@ HERE = Workers()
 
 
 @dataclass(frozen=True)
-class Stored:
+class ReplayOutcome:
     """What came of some recorded files."""
 
     tap_ids: Sequence[str]
@@ -34,7 +34,7 @@ class Stored:
     """Files that cannot be used, and why."""
     taken: Sequence[str] = ()
     """What was taken for granted where files do not say it, each once."""
-    fits: Mapping[str, Fitted] = field(default_factory=dict)
+    fits: Mapping[str, TapFit] = field(default_factory=dict)
     """The modes of the new tap tests, by identity."""
 
 
@@ -74,7 +74,7 @@ def store_recordings(
     workers: Workers = HERE,
     keep_going: bool = False,
     progress: Progress = lambda _what, _done, _of: None,
-) -> Stored:
+) -> ReplayOutcome:
     """Commit recorded files, each once, oldest first; all are read and judged before the first one is stored.
 
     DataError, and nothing is stored, where one cannot be used, with all of these; keep_going: the others are stored.
@@ -106,7 +106,7 @@ def store_recordings(
     known = {file: tap_id for file, tap_id in used.items() if todo.get(digests[file]) != file}
     taken = dict.fromkeys(text for one in ready for text in one.taken)
     fits = {one.entry.id: one.fit for one in ready}
-    return Stored([used[file] for file in files if file in used], known, [*fits], refused, list(taken), fits)
+    return ReplayOutcome([used[file] for file in files if file in used], known, [*fits], refused, list(taken), fits)
 
 
 def digests_of(files: Sequence[Path]) -> tuple[dict[Path, str], dict[Path, OSError]]:

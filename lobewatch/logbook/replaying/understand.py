@@ -16,7 +16,7 @@ from acquisition.files.tap_file import as_written, tap_content
 from lobewatch.logbook.replaying.read_tap_test import Setup, read_tap_test
 from lobewatch.machine import MachineFolder, TapEntry
 from lobewatch.machine.settings.machine_file import parse_machine
-from lobewatch.measuring.measurement import Fitted, fitted
+from lobewatch.measuring.measurement import TapFit, fit_tap
 
 Result = TypeVar("Result")
 
@@ -29,12 +29,12 @@ class Understood:
     """The tap test that it would be."""
     recording: Recording
     """How it is understood."""
-    fit: Fitted
+    fit: TapFit
     """The modes in it."""
 
 
 @dataclass(frozen=True)
-class WorkedOut:
+class TapDraft:
     """One file."""
 
     digest: str
@@ -45,7 +45,7 @@ class WorkedOut:
     """Of that."""
     created: datetime
     """When it was recorded."""
-    fit: Fitted
+    fit: TapFit
     """The modes in it."""
     taken: tuple[str, ...]
     """What was taken for granted where the file does not say it."""
@@ -75,12 +75,12 @@ class Asked:
             return cls(file.absolute(), b"", said, machine_toml, reason_of(file, error))
 
 
-def work_out_file(folder: MachineFolder, file: Path, said: Description) -> WorkedOut:
+def work_out_file(folder: MachineFolder, file: Path, said: Description) -> TapDraft:
     """A file where it lies; DataError, OSError or ValueError where it cannot be used."""
     return _worked_out(Setup.of(folder), file, said, file.read_bytes(), file)
 
 
-def work_out(asked: Asked) -> WorkedOut | str:
+def work_out(asked: Asked) -> TapDraft | str:
     """A file from its bytes, or why it cannot be used."""
     return _from_bytes(asked, _worked_out)
 
@@ -114,18 +114,18 @@ def reason_of(file: Path, error: Exception) -> str:
     return str(error).removeprefix(f"{file}: ")
 
 
-def _worked_out(setup: Setup, file: Path, said: Description, content: bytes, at: Path) -> WorkedOut:
+def _worked_out(setup: Setup, file: Path, said: Description, content: bytes, at: Path) -> TapDraft:
     """at: where the content lies."""
     found = _understood(setup, file, said, content, at)
     told = tuple(f"{fact.name} {fact.value}" for fact in found.recording.facts if fact.origin == "default")
     packed, created = tap_content(found.tap), found.tap.circumstances.created
     digest = hashlib.sha256(content).hexdigest()
-    return WorkedOut(digest, packed, TapEntry.of(found.tap, packed), created, found.fit, told)
+    return TapDraft(digest, packed, TapEntry.of(found.tap, packed), created, found.fit, told)
 
 
 def _understood(setup: Setup, file: Path, said: Description, content: bytes, at: Path) -> Understood:
     tap, recording = read_tap_test(setup, file, said, content, at)
-    return Understood(tap, replace(recording, path=file), fitted(as_written(tap), setup.machine))
+    return Understood(tap, replace(recording, path=file), fit_tap(as_written(tap), setup.machine))
 
 
 @lru_cache(maxsize=4)

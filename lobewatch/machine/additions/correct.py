@@ -5,11 +5,13 @@ from __future__ import annotations
 from datetime import UTC, datetime
 
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.journal.event import Event, event_line, events_of, new_event, withdrawal
+from lobewatch.machine.journal.event import MaintenanceEvent, event_line, events_of, new_event, withdrawal
 from lobewatch.machine.journal.exclusion import Corrected, exclusion, inclusion, named
 
 
-def add_event(folder: MachineFolder, text: str, date: datetime | None = None, new_baseline: bool = False) -> Event:
+def add_event(
+    folder: MachineFolder, text: str, date: datetime | None = None, new_baseline: bool = False
+) -> MaintenanceEvent:
     """Write down what was done to the machine; date: None for now, without a zone local time.
 
     ValueError for an event that makes no sense, BusyError where another program writes.
@@ -21,7 +23,7 @@ def add_event(folder: MachineFolder, text: str, date: datetime | None = None, ne
     return event
 
 
-def withdraw_event(folder: MachineFolder, event_id: str) -> Event:
+def withdraw_event(folder: MachineFolder, event_id: str) -> MaintenanceEvent:
     """Take an event back; ValueError where there is none of that name."""
     with folder.locked():
         entries = folder.journal.read().entries

@@ -50,7 +50,7 @@ OURS = (
 
 
 @dataclass(frozen=True)
-class Verified:
+class Verification:
     """What was found."""
 
     remarks: tuple[Remark, ...]
@@ -66,7 +66,7 @@ class Verified:
         return tuple(remark for remark in self.remarks if remark.code in DAMAGE)
 
 
-def verify(path: Path) -> Verified:
+def verify(path: Path) -> Verification:
     """Look at every byte; a whole tap file that its spool or its recording explains is entered in the journal.
 
     DataError where this is no machine folder.
@@ -75,7 +75,7 @@ def verify(path: Path) -> Verified:
         cure = (
             f"put it back from a backup; without one, {command('rebuild', path)} takes the copy in the newest tap test"
         )
-        return Verified((damaged("machine.toml", "is missing beside tap tests", cure),), (), 0)
+        return Verification((damaged("machine.toml", "is missing beside tap tests", cure),), (), 0)
     folder = MachineFolder(path)
     journal = folder.journal
     adopted = enter_explained(folder)
@@ -92,7 +92,7 @@ def verify(path: Path) -> Verified:
         *about_spool(path, committed.keys() - wrong.keys()),
         *_about_others(path),
     ]
-    return Verified(tuple(remarks), tuple(adopted), len(committed) - len(wrong))
+    return Verification(tuple(remarks), tuple(adopted), len(committed) - len(wrong))
 
 
 def enter_explained(folder: MachineFolder) -> list[str]:

@@ -12,7 +12,7 @@ from lobewatch.machine.journal.tap_entry import TapEntry
 
 
 @dataclass(frozen=True)
-class Event:
+class MaintenanceEvent:
     """Something done to the machine."""
 
     id: str
@@ -25,15 +25,15 @@ class Event:
     """Whether the tap tests after it are compared with none before it."""
 
 
-def events_of(entries: Sequence[Mapping[str, Any]]) -> tuple[Event, ...]:
+def events_of(entries: Sequence[Mapping[str, Any]]) -> tuple[MaintenanceEvent, ...]:
     """The events of a journal that are not withdrawn, oldest first by their time."""
-    found: dict[str, Event] = {}
+    found: dict[str, MaintenanceEvent] = {}
     for line in entries:
         if line["kind"] == "event" and "withdraws" in line:
             found.pop(line["withdraws"], None)
         elif line["kind"] == "event":
             time = datetime.fromisoformat(line["date"])
-            found[line["id"]] = Event(line["id"], time, line["text"], line["new_baseline"])
+            found[line["id"]] = MaintenanceEvent(line["id"], time, line["text"], line["new_baseline"])
     return tuple(sorted(found.values(), key=lambda event: event.time))
 
 
@@ -44,7 +44,7 @@ def new_event(
     date: datetime | None,
     new_baseline: bool,
     now: datetime,
-) -> Event:
+) -> MaintenanceEvent:
     """An event to be written down; date: None for now, without a zone local time, at midnight the whole day.
 
     ValueError for an empty text, a date in the future, an event that is there already, and for a new baseline on a
@@ -62,7 +62,7 @@ def new_event(
     if new_baseline and date is not None and date.time() == datetime.min.time():
         _refuse_tapped_day(taps, time)
     number = sum(line["kind"] == "event" and "withdraws" not in line for line in entries) + 1
-    return Event(f"e{number}", time, text, new_baseline)
+    return MaintenanceEvent(f"e{number}", time, text, new_baseline)
 
 
 def _universal(date: datetime) -> datetime:
@@ -83,7 +83,7 @@ def _refuse_tapped_day(taps: Sequence[TapEntry], begin: datetime) -> None:
         )
 
 
-def event_line(event: Event, now: datetime) -> dict[str, Any]:
+def event_line(event: MaintenanceEvent, now: datetime) -> dict[str, Any]:
     """For the journal."""
     told = {"id": event.id, "date": event.time.isoformat(), "text": event.text, "new_baseline": event.new_baseline}
     return {"kind": "event", **told, "time": now.isoformat()}

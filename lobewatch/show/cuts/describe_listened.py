@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from lobewatch.logbook.listened_cut import ListenedCut
+from lobewatch.logbook.cut_comparison import CutComparison
 
 WHY: Mapping[str, str] = {
     "too-short": "less than 0.3 s of cut to listen to; record a second or longer, with air before it",
@@ -33,12 +33,12 @@ NEXT: Mapping[str, str] = {
 """What to do, by the word."""
 
 
-def next_step(found: ListenedCut) -> str:
+def next_step(found: CutComparison) -> str:
     """What to do now, in a line."""
     return NEXT[found.heard.word]
 
 
-def why(found: ListenedCut) -> str:
+def why(found: CutComparison) -> str:
     """What the word rests on, or why it cannot be told, in a line."""
     heard = found.heard
     return WHY[heard.reason] if heard.word == "cannot tell" else _energy(heard.ratio)
@@ -49,7 +49,7 @@ def _energy(ratio: float) -> str:
     return f"beside the lines of the spindle: {percent} % of their energy"
 
 
-def listened_text(found: ListenedCut) -> str:
+def listened_text(found: CutComparison) -> str:
     """The word, in a line."""
     heard, chatter = found.heard, found.heard.chatter
     if heard.word == "cannot tell":
@@ -60,7 +60,7 @@ def listened_text(found: ListenedCut) -> str:
     return f"{named} at {chatter.frequency:.1f} +- {max(2 * chatter.error, 0.1):.1f} Hz"
 
 
-def listened_texts(found: ListenedCut) -> list[str]:
+def listened_texts(found: CutComparison) -> list[str]:
     """The word, and what it rests on."""
     heard, chatter, told = found.heard, found.heard.chatter, [listened_text(found)]
     if heard.turning is not None:
@@ -76,7 +76,7 @@ def listened_texts(found: ListenedCut) -> list[str]:
     return told + _expected(found)
 
 
-def _expected(found: ListenedCut) -> list[str]:
+def _expected(found: CutComparison) -> list[str]:
     if found.predicted is None:
         return []
     word = "stable" if found.predicted.stable else "chatter"
@@ -84,12 +84,12 @@ def _expected(found: ListenedCut) -> list[str]:
     return [told if found.apart is None else f"{told}, {found.apart:.1f} Hz from what was heard modulo tooth passing"]
 
 
-def _seconds(found: ListenedCut) -> float:
+def _seconds(found: CutComparison) -> float:
     spectrum = found.heard.spectrum
     return math.nan if spectrum is None else 1 / spectrum.bin
 
 
-def listened_json(found: ListenedCut) -> dict[str, Any]:
+def listened_json(found: CutComparison) -> dict[str, Any]:
     """All of it."""
     heard, chatter, expected = found.heard, found.heard.chatter, found.predicted
     return {

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lobewatch.cuts.learning.of_program import NextCut
-from lobewatch.cuts.learning.suggest import Suggested
+from lobewatch.cuts.learning.suggest import Suggestion
 from lobewatch.show.cuts.describe_learnt import learnt_json
 from lobewatch.show.programs.names import NAMES
 from lobewatch.show.programs.settings import rpm
@@ -28,7 +28,7 @@ def suggestion_json(found: NextCut) -> dict[str, Any]:
     }
 
 
-def _cut_json(cut: Suggested) -> dict[str, Any]:
+def _cut_json(cut: Suggestion) -> dict[str, Any]:
     return {
         "speed_rpm": cut.speed_rpm,
         "depth_mm": round(1e3 * cut.depth, 6),

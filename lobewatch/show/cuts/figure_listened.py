@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from lobewatch.cuts.listening.line_kinds import line_kinds
-from lobewatch.logbook.listened_cut import ListenedCut
+from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.show.cuts.describe_listened import listened_text
 from lobewatch.show.figures.trend_figures import ALARM, EVENT, GOOD, NOW, THEN, new_axes, save_figure
 from lobewatch.tap.listening.cut_state import HIGHEST
@@ -26,12 +26,12 @@ SHOWN = 1e-4
 """Of the loudest amplitude, drawn downwards."""
 
 
-def save_listened(found: ListenedCut, path: Path) -> None:
+def save_listened(found: CutComparison, path: Path) -> None:
     """The same figure as a file."""
     save_figure(listened_figure(found), path)
 
 
-def listened_figure(found: ListenedCut) -> Figure:
+def listened_figure(found: CutComparison) -> Figure:
     """Amplitude over frequency; without a spectrum, where it did not get so far, the word alone."""
     figure, axes = new_axes(1, (10.0, 4.5))
     axis, spectrum = axes[0], found.heard.spectrum

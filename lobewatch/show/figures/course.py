@@ -15,7 +15,7 @@ AHEAD = 0.5
 Floats = NDArray[np.float64]
 
 
-class Course(NamedTuple):
+class TrendCurve(NamedTuple):
     """Values in the unit of the series."""
 
     days: Floats
@@ -30,7 +30,7 @@ class Course(NamedTuple):
     """Above it with a chance of 10 %, shape (m,)."""
 
 
-def course_of(trend: Trend) -> Course | None:
+def course_of(trend: Trend) -> TrendCurve | None:
     """None below 8 points."""
     found = trend.forecast
     if found is None:
@@ -39,4 +39,6 @@ def course_of(trend: Trend) -> Course | None:
     near = found.dates <= max(past[-1] + AHEAD * (past[-1] - past[0]), found.dates[1])
     low, high = (trend.first * np.exp(found.fan(quantile)[near] / 100) for quantile in (0.1, 0.9))
     line = np.append(found.fitted, found.line[near])
-    return Course(np.append(past, found.dates[near]), trend.first * np.exp(line / 100), found.dates[near], low, high)
+    return TrendCurve(
+        np.append(past, found.dates[near]), trend.first * np.exp(line / 100), found.dates[near], low, high
+    )

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from lobes import Cut
 from lobewatch.machine.journal.heard_cut import HeardCut, geometry
-from lobewatch.show.figures.labels import Labels
+from lobewatch.show.figures.labels import PictureLabels
 from lobewatch.show.figures.trend_figures import ALARM, GOOD
 
 MARKS = {False: ("heard stable", GOOD, "o"), True: ("heard to chatter", ALARM, "x")}
@@ -24,7 +24,7 @@ def heard_of(cuts: Sequence[HeardCut], name: str, tool: str, cut: Cut) -> list[H
     return [one for one in known if one.program == name or (one.cut.tangential, one.cut.radial) == force]
 
 
-def draw_heard(axes: Axes, cuts: Sequence[HeardCut], labels: Labels) -> None:
+def draw_heard(axes: Axes, cuts: Sequence[HeardCut], labels: PictureLabels) -> None:
     """A mark for each cut, with the frequency that it chattered at; before other words look for a place."""
     for chatters, (name, colour, mark) in MARKS.items():
         some = [cut for cut in cuts if cut.chatters == chatters]

@@ -34,7 +34,7 @@ class _Box(NamedTuple):
         return wide * high if wide > 0 and high > 0 else 0.0
 
 
-class Labels:
+class PictureLabels:
     """Those of one picture, whose limits are set already."""
 
     def __init__(self, axes: Axes) -> None:

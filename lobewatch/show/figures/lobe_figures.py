@@ -19,7 +19,7 @@ from lobes import RadialLobes
 from lobewatch.cuts.learning.lobes_at_speed import LobesAtSpeed
 from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.show.figures.heard_cuts import draw_heard
-from lobewatch.show.figures.labels import Labels
+from lobewatch.show.figures.labels import PictureLabels
 from lobewatch.show.figures.trend_figures import ALARM, GOOD, NOW, THEN, UNKNOWN, new_axes
 from lobewatch.verdicts import Setting, Verdict, Word
 from lobewatch.verdicts.limit_band import LimitBand
@@ -79,7 +79,7 @@ def lobes_figure(
     if learnt is not None:
         _draw_learnt(axes, learnt, 2 * top)
     axes.set(ylim=(0, top), xlim=(speed_rpm[0], speed_rpm[-1]), title=title)
-    labels = Labels(axes)
+    labels = PictureLabels(axes)
     draw_heard(axes, heard, labels)
     for i, pocket in enumerate(pockets):
         _draw_pocket(axes, pocket, labels, WINDOW if i == 0 else "")
@@ -150,7 +150,7 @@ def _draw_learnt(axes: Axes, learnt: LobesAtSpeed, deepest: float) -> None:
     axes.plot(learnt.lobes.speed_rpm, learnt.lobes.depth * 1e3, color=LEARNT, ls="-.", lw=1.6, label=told)
 
 
-def _draw_pocket(axes: Axes, pocket: Setting, labels: Labels, label: str) -> None:
+def _draw_pocket(axes: Axes, pocket: Setting, labels: PictureLabels, label: str) -> None:
     """A box as wide as the window and as high as the depth, with the numbers to set."""
     low, high = pocket.window_rpm
     box = Rectangle((low, 0), high - low, pocket.depth_mm, fc="white", ec=SAFE, lw=1.2, hatch="////", label=label)
@@ -160,7 +160,7 @@ def _draw_pocket(axes: Axes, pocket: Setting, labels: Labels, label: str) -> Non
     labels.add(text, (pocket.speed_rpm, pocket.depth_mm), SAFE, ("above",))
 
 
-def _draw_program(axes: Axes, verdict: Verdict, labels: Labels) -> None:
+def _draw_program(axes: Axes, verdict: Verdict, labels: PictureLabels) -> None:
     colour, mark = MARKS[verdict.word]
     place = (verdict.program.speed_rpm, verdict.program.depth_mm)
     axes.plot(*place, mark, color=colour, ms=9, mec="white")

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from acquisition import Frf
 from lobewatch.machine.settings.setup_tables import Limits
-from lobewatch.show.figures.course import Course
+from lobewatch.show.figures.course import TrendCurve
 from lobewatch.show.terminal.output import printable
 
 NOW = "#0072B2"
@@ -115,7 +115,7 @@ def trend_figure(
     label: str,
     limits: Limits | None = None,
     marks: Marks = NOTHING_ELSE,
-    course: Course | None = None,
+    course: TrendCurve | None = None,
 ) -> Figure:
     """A value over time with its 95 % interval; with limits, where its fall calls for attention.
 

@@ -16,7 +16,7 @@ from acquisition import Conditions
 from lobewatch.history import Row
 from lobewatch.logbook import Logbook
 from lobewatch.machine import TapEntry
-from lobewatch.machine.journal.event import Event
+from lobewatch.machine.journal.event import MaintenanceEvent
 from lobewatch.show.history.describe_cut import cut_json, cut_words
 from lobewatch.show.history.under import conditions_texts
 
@@ -27,13 +27,13 @@ UNDER = tuple(field.name for field in fields(Conditions))
 COLUMNS = ("time", "kind", "id", "tool", "direction")
 
 
-def event_text(event: Event) -> str:
+def event_text(event: MaintenanceEvent) -> str:
     """For people."""
     baseline = " (new baseline)" if event.new_baseline else ""
     return f"{event.id}: {event.time.astimezone():%Y-%m-%d %H:%M} {event.text}{baseline}"
 
 
-def event_json(event: Event) -> dict[str, Any]:
+def event_json(event: MaintenanceEvent) -> dict[str, Any]:
     """One event."""
     named = {"id": event.id, "time": _utc(event.time), "text": event.text}
     return {**named, "new_baseline": event.new_baseline}

@@ -7,20 +7,20 @@ from datetime import date, timedelta
 from typing import Any
 
 from acquisition import joined
-from lobewatch.plant.plant import Standings
-from lobewatch.plant.summary import Ahead, Course
+from lobewatch.plant.plant import MachineStanding
+from lobewatch.plant.summary import Ahead, SeriesSummary
 
 SHOWN_APART = ("frequency-alarm", "frequency-warn", "overdue")
 """Reasons that stand beside the others as the fall and the date."""
 EPOCH = date(1970, 1, 1)
 
 
-def plant_rows(found: Sequence[Standings]) -> list[dict[str, Any]]:
+def plant_rows(found: Sequence[MachineStanding]) -> list[dict[str, Any]]:
     """In the order of the standings; the series is the one that fell most."""
     return [plant_row(one) for one in found]
 
 
-def plant_row(one: Standings) -> dict[str, Any]:
+def plant_row(one: MachineStanding) -> dict[str, Any]:
     """Of one machine."""
     summary, dated = one.summary, one.dated
     worst = summary.series[0] if summary.series else None
@@ -47,7 +47,7 @@ def plant_row(one: Standings) -> dict[str, Any]:
     }
 
 
-def next_limit(series: Sequence[Course]) -> dict[str, Any] | None:
+def next_limit(series: Sequence[SeriesSummary]) -> dict[str, Any] | None:
     """The fixed limit that is reached next by any series, with its dates; None where nothing can be foretold.
 
     A limit that the fall is past already is not ahead; where none is foretold, up to when there is none.
@@ -64,7 +64,7 @@ def next_limit(series: Sequence[Course]) -> dict[str, Any] | None:
     return {"percent": first.percent, **{name: _day(days) for name, days in named.items()}}
 
 
-def _is_past(course: Course, limit: Ahead) -> bool:
+def _is_past(course: SeriesSummary, limit: Ahead) -> bool:
     return course.fall is not None and course.fall >= limit.percent
 
 

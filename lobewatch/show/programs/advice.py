@@ -27,7 +27,7 @@ ALIKE = 1.02
 
 
 @dataclass(frozen=True, eq=False)
-class Advised:
+class ProgramAdvice:
     """A program with all that is said of it."""
 
     verdict: Verdict
@@ -53,12 +53,12 @@ class Advised:
         return self.verdict.stable is False and self.then is not None and bool(self.then.stable)
 
 
-def advised(logbook: Logbook, verdict: Verdict) -> Advised:
+def advised(logbook: Logbook, verdict: Verdict) -> ProgramAdvice:
     """All that is said of one program."""
-    return Advised(verdict, logbook.advice(verdict), logbook.ruling_then(verdict))
+    return ProgramAdvice(verdict, logbook.advice(verdict), logbook.ruling_then(verdict))
 
 
-def advised_json(one: Advised) -> dict[str, Any]:
+def advised_json(one: ProgramAdvice) -> dict[str, Any]:
     """One program."""
     return verdict_json(one.verdict) | {
         "was_stable_at_first": None if one.then is None else one.then.stable,
@@ -70,7 +70,7 @@ def advised_json(one: Advised) -> dict[str, Any]:
     }
 
 
-def advised_table(programs: Sequence[Advised]) -> Table:
+def advised_table(programs: Sequence[ProgramAdvice]) -> Table:
     """Programs, a line each."""
     return verdict_table([one.verdict for one in programs], [decay_text(one.advice) for one in programs])
 
@@ -84,7 +84,7 @@ def decay_text(advice: Advice) -> str:
     return "> 20 %" if math.isinf(advice.decay) else f"{100 * advice.decay:.1f} %"
 
 
-def counts(programs: Sequence[Advised]) -> dict[str, int]:
+def counts(programs: Sequence[ProgramAdvice]) -> dict[str, int]:
     """How many there are of each that may not be run."""
     words = Counter(one.verdict.word for one in programs)
     return {
@@ -95,7 +95,7 @@ def counts(programs: Sequence[Advised]) -> dict[str, int]:
     }
 
 
-def summary(programs: Sequence[Advised]) -> str:
+def summary(programs: Sequence[ProgramAdvice]) -> str:
     """How many there are of each word."""
     words = Counter(one.verdict.word for one in programs)
     said = [f"{words[word]} {word}" for word in Word if words[word]]
@@ -104,7 +104,7 @@ def summary(programs: Sequence[Advised]) -> str:
     return f"{len(programs)} program{'s' if len(programs) > 1 else ''}: {', '.join(said)}"
 
 
-def advised_lines(one: Advised, speeds: SpeedRange) -> Iterator[str]:
+def advised_lines(one: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:
     """What is wrong and what to do, a line for each thing that is called for."""
     found = one.verdict
     name = found.program.name
@@ -120,7 +120,7 @@ def advised_lines(one: Advised, speeds: SpeedRange) -> Iterator[str]:
         yield f"{name}: [drive] allows no more than {_floored(found.drive_limit)} mm at this speed"
 
 
-def _chatter(one: Advised) -> str:
+def _chatter(one: ProgramAdvice) -> str:
     found = one.verdict
     word = "period-two chatter" if found.kind == "flip" else "chatter"
     where = f" near {found.chatter_frequency:.0f} Hz" if math.isfinite(found.chatter_frequency) else ""
@@ -137,13 +137,13 @@ def _worst_feed(found: Verdict) -> str:
     return f", worst fed along {({0: 'x', 90: 'y'}).get(degrees, f'{degrees} degrees from x')}"
 
 
-def _or_elsewhere(one: Advised, speeds: SpeedRange) -> Iterator[str]:
+def _or_elsewhere(one: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:
     """What to do until it is settled; tapping what was not tapped comes first."""
     if one.verdict.assembly is not None and one.verdict.assembly.is_sure:
         yield f"until then {_elsewhere(one, speeds)}"
 
 
-def _elsewhere(one: Advised, speeds: SpeedRange) -> str:
+def _elsewhere(one: ProgramAdvice, speeds: SpeedRange) -> str:
     """Where to go."""
     program, best, here = one.verdict.program, one.advice.best, one.advice.here
     known = one.verdict.assembly

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from lobewatch.history import Row
 from lobewatch.logbook import Logbook
-from lobewatch.logbook.replaying.store import Stored
+from lobewatch.logbook.replaying.store import ReplayOutcome
 from lobewatch.show.history.measurements import measurement_json, measurement_texts
 from lobewatch.show.programs.verdicts import program_texts, programs_json
 from lobewatch.show.terminal.output import table
@@ -19,7 +19,7 @@ IN_FULL = 3
 """So many tap tests are told in full, more of them summed up."""
 
 
-def replay_json(stored: Stored, logbook: Logbook) -> dict[str, Any]:
+def replay_json(stored: ReplayOutcome, logbook: Logbook) -> dict[str, Any]:
     """All that was stored, with the lobes of each, known and refused."""
     return {
         "measurements": [measurement_json(logbook.measurement(tap_id), logbook) for tap_id in stored.fresh],
@@ -30,7 +30,7 @@ def replay_json(stored: Stored, logbook: Logbook) -> dict[str, Any]:
     }
 
 
-def replay_texts(stored: Stored, logbook: Logbook) -> list[str | Table]:
+def replay_texts(stored: ReplayOutcome, logbook: Logbook) -> list[str | Table]:
     """A few tap tests in full, many as their series; then the programs."""
     fresh = set(stored.fresh)
     if len(fresh) <= IN_FULL:

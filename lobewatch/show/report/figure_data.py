@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from acquisition import Frf
 from lobewatch.decay.trend import date
 from lobewatch.measuring.estimate import Estimate
-from lobewatch.show.figures.course import Course
+from lobewatch.show.figures.course import TrendCurve
 
 Floats = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ def value_numbers(
     scale: float,
     known: Iterable[tuple[datetime, Estimate]],
     aside: Iterable[tuple[datetime, float]],
-    course: Course | None,
+    course: TrendCurve | None,
 ) -> Numbers:
     """Of a value over time: tests, those that do not count, fitted line, and the band of 80 % ahead.
 

@@ -11,7 +11,7 @@ from acquisition import joined
 from lobewatch.decay import Light, SeriesStanding, Standing
 from lobewatch.logbook.outlook import Fate, Outlook
 from lobewatch.machine import Machine
-from lobewatch.show.programs.advice import Advised
+from lobewatch.show.programs.advice import ProgramAdvice
 from lobewatch.show.programs.settings import rpm
 from lobewatch.show.programs.verdicts import WORDS
 from lobewatch.show.trends.dates import dates_text
@@ -25,7 +25,7 @@ FEW = 3
 """Reasons on the first screen; the others stand below it."""
 
 
-def first_screen(found: Outlook, programs: Sequence[Advised], machine: Machine) -> dict[str, Any]:
+def first_screen(found: Outlook, programs: Sequence[ProgramAdvice], machine: Machine) -> dict[str, Any]:
     """What the first screen shows, as the template takes it."""
     return {
         **light_of(found.standing),
@@ -59,7 +59,7 @@ def _changed(series: SeriesStanding) -> str:
     return f"{said}; {how} {since:%Y-%m-%d}; {rate_text(series.trend)}"
 
 
-def _program(one: Advised, found: Outlook) -> dict[str, str]:
+def _program(one: ProgramAdvice, found: Outlook) -> dict[str, str]:
     name, word = one.verdict.program.name, one.verdict.word
     return {
         "name": name,
@@ -78,7 +78,7 @@ def _until(word: Word, fate: Fate, end: float) -> str:
     return "not stable already" if word is Word.NOT_STABLE else "not known"
 
 
-def instead_text(one: Advised) -> str:
+def instead_text(one: ProgramAdvice) -> str:
     """Speed and depth to go to, in a few words."""
     known, settings = one.verdict.assembly, (one.advice.best, one.advice.here)
     if one.verdict.word is Word.STABLE:

@@ -11,7 +11,7 @@ from lobewatch.logbook import Logbook
 from lobewatch.show.figures.heard_cuts import heard_of
 from lobewatch.show.figures.lobe_figures import lobes_figure, waterfall_figure
 from lobewatch.show.figures.trend_figures import svg
-from lobewatch.show.programs.advice import Advised
+from lobewatch.show.programs.advice import ProgramAdvice
 from lobewatch.show.report.figure_data import lobe_numbers
 from lobewatch.show.report.lobe_course import LobeCourse
 from lobewatch.show.report.trend_pictures import Picture
@@ -19,7 +19,7 @@ from lobewatch.tool import Assembly, lobes_of
 from lobewatch.verdicts.limit_band import limit_band
 
 
-def lobe_figures(logbook: Logbook, assembly: Assembly, programs: Sequence[Advised]) -> list[Picture]:
+def lobe_figures(logbook: Logbook, assembly: Assembly, programs: Sequence[ProgramAdvice]) -> list[Picture]:
     """The diagram of the reference cut, or else of the first program of the tool, now and then."""
     machine = logbook.machine
     lobes = lobes_of(assembly, machine)

@@ -20,7 +20,7 @@ from lobewatch.logbook.outlook import Outlook, outlook
 from lobewatch.machine import Machine
 from lobewatch.show.figures.trend_figures import frf_figure, svg
 from lobewatch.show.history.under import conditions_texts
-from lobewatch.show.programs.advice import Advised, advised, advised_lines, decay_text
+from lobewatch.show.programs.advice import ProgramAdvice, advised, advised_lines, decay_text
 from lobewatch.show.programs.doubts import reading_lines
 from lobewatch.show.programs.verdicts import WORDS, band_text, limit_text, margin_text, turning_text, verdict_text
 from lobewatch.show.report.figure_data import response_numbers
@@ -109,7 +109,7 @@ def _content(logbook: Logbook, rows: Sequence[Row], found: Outlook) -> dict[str,
     }
 
 
-def _programs(programs: Sequence[Advised], machine: Machine) -> dict[str, Any]:
+def _programs(programs: Sequence[ProgramAdvice], machine: Machine) -> dict[str, Any]:
     """The table of programs and what stands below it."""
     checked = [one.verdict for one in programs if one.verdict.word is not Word.UNKNOWN]
     return {
@@ -187,7 +187,7 @@ def _modes(row: Row) -> list[dict[str, str]]:
     ]
 
 
-def _program(one: Advised) -> dict[str, Any]:
+def _program(one: ProgramAdvice) -> dict[str, Any]:
     """A row of the table of programs: what `lobewatch check` says."""
     found = one.verdict
     return {

@@ -12,7 +12,7 @@ from lobewatch.decay.trend import Trend
 from lobewatch.history import Row
 from lobewatch.history.damage.left_out import left_out
 from lobewatch.logbook import Logbook
-from lobewatch.machine.journal.event import Event
+from lobewatch.machine.journal.event import MaintenanceEvent
 from lobewatch.show.figures.course import course_of
 from lobewatch.show.figures.trend_figures import Marks, svg, trend_figure
 from lobewatch.show.report.figure_data import Numbers, value_numbers
@@ -51,7 +51,7 @@ def trends(logbook: Logbook, rows: Sequence[Row], standing: Standing) -> Trends:
     return Trends(_pictures(logbook, rows, out, series.trend if series else None), [line for _, line in sorted(told)])
 
 
-def event_line(event: Event) -> str:
+def event_line(event: MaintenanceEvent) -> str:
     """Day and text of an event."""
     return f"{event.time.astimezone():%Y-%m-%d}: {event.text}{' (new baseline)' if event.new_baseline else ''}"
 

@@ -9,7 +9,7 @@ from typing import Protocol, Self
 from rich.console import Console
 from rich.markup import escape
 
-from lobewatch.tap.state import TakenHit, TapState, Word
+from lobewatch.tap.state import TakenHit, TapState, TapStep
 
 INTERVAL = 0.05
 """Between two looks at the test (s)."""
@@ -70,8 +70,8 @@ class TapPrinter:
                 self._console.print(f"[bold yellow]![/] {escape(check.name)}: {escape(check.text)}")
         if state.resumed != before.resumed:
             self._console.print(state.resumed)
-        with_hit = state.word in (Word.GOOD, Word.REFUSED) and not state.trial
-        told = with_hit or state.word is Word.FAILED or state.reason == before.reason
+        with_hit = state.word in (TapStep.GOOD, TapStep.REFUSED) and not state.trial
+        told = with_hit or state.word is TapStep.FAILED or state.reason == before.reason
         if state.reason and not told:
             self._console.print(escape(state.reason))
         self._print_hits(state)

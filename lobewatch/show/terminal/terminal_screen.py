@@ -18,7 +18,7 @@ from rich.text import Text
 from lobewatch.show.terminal.keys import Keys
 from lobewatch.show.terminal.output import Terminal
 from lobewatch.show.terminal.printer import Watched, verdict
-from lobewatch.tap.state import TapState, Word
+from lobewatch.tap.state import TapState, TapStep
 
 INTERVAL = 0.05
 """Between two looks at keys and state (s)."""
@@ -28,18 +28,18 @@ BELL_PAUSE = 0.2
 """Between two bells (s)."""
 HELD_TIME = 0.7
 """Undo keys that follow each other faster (s) are one that is held down: it counts once."""
-LOOKS: Mapping[Word, tuple[str, str]] = {
-    Word.CHECKING: ("…", "black on #56b4e9"),
-    Word.TAP: ("▼", "black on #56b4e9"),
-    Word.WAIT: ("…", "black on #e69f00"),
-    Word.GOOD: ("✓", "black on #2bb48d"),
-    Word.REFUSED: ("✗", "black on #ee8238"),
-    Word.NO_DEVICE: ("!", "black on #f0e442"),
-    Word.DONE: ("■", "black on #2bb48d"),
-    Word.FAILED: ("✗", "black on #ee8238"),
+LOOKS: Mapping[TapStep, tuple[str, str]] = {
+    TapStep.CHECKING: ("…", "black on #56b4e9"),
+    TapStep.TAP: ("▼", "black on #56b4e9"),
+    TapStep.WAIT: ("…", "black on #e69f00"),
+    TapStep.GOOD: ("✓", "black on #2bb48d"),
+    TapStep.REFUSED: ("✗", "black on #ee8238"),
+    TapStep.NO_DEVICE: ("!", "black on #f0e442"),
+    TapStep.DONE: ("■", "black on #2bb48d"),
+    TapStep.FAILED: ("✗", "black on #ee8238"),
 }
 """Symbol and colours of each word, told apart by colour-blind people too."""
-BELLS: Mapping[Word, int] = {Word.GOOD: 1, Word.REFUSED: 2, Word.NO_DEVICE: 3}
+BELLS: Mapping[TapStep, int] = {TapStep.GOOD: 1, TapStep.REFUSED: 2, TapStep.NO_DEVICE: 3}
 """How often the bell rings."""
 LIGHTS: Mapping[str, tuple[str, str]] = {
     "good": ("✓", "black on #2bb48d"),
@@ -140,7 +140,7 @@ def _lines(state: TapState) -> Iterator[RenderableType]:
 def _banner(state: TapState) -> RenderableType:
     """The full-width word."""
     symbol, style = LOOKS[state.word]
-    trial = " (trial hit)" if state.trial and state.word is Word.GOOD else ""
+    trial = " (trial hit)" if state.trial and state.word is TapStep.GOOD else ""
     text = Text(f"{symbol}  {state.shown_word}{trial}   {state.good} / {state.wanted}", "bold")
     return Panel(Align.center(text), style=style, padding=(1, 1))
 

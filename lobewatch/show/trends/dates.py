@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from lobewatch.decay.forecast import Reached
+from lobewatch.decay.forecast import DateRange
 from lobewatch.decay.trend import date
 
 ASSUMED = "Dates hold if the machine is used as before; an acceleration that is not yet visible cannot be foreseen."
 
 
-def dates_text(found: Reached | None, horizon: float, *, seen: bool = True) -> str:
+def dates_text(found: DateRange | None, horizon: float, *, seen: bool = True) -> str:
     """For people; horizon: days since 1970 up to which was looked; seen: whether what is past was tapped, too."""
     if found is None:
         return "history too short or too old"
@@ -23,7 +23,7 @@ def dates_text(found: Reached | None, horizon: float, *, seen: bool = True) -> s
     return f"between {_day(found.earliest)} and {_day(found.latest)} (80 %), probably {_day(found.probable)}"
 
 
-def dates_json(found: Reached | None) -> dict[str, str | None]:
+def dates_json(found: DateRange | None) -> dict[str, str | None]:
     """Dates as "2026-03-01", null where none is known, "already"."""
     named = zip(("p10", "p50", "p90"), found or (math.inf,) * 3, strict=True)
     return {name: _or_word(days) for name, days in named}

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobewatch.cuts.listening.line_kinds import line_kinds
-from lobewatch.logbook.listened_cut import ListenedCut
+from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.tap.plots import extremes
 
 HIGHEST = 8000.0
@@ -60,7 +60,7 @@ class CutState:
     """How long a cut is still waited for (s)."""
     cut_seconds: float | None = None
     """Of cut heard so far (s)."""
-    found: ListenedCut | None = None
+    found: CutComparison | None = None
     """What was heard, at the end."""
     saved: str = ""
     """Under which name it is kept; empty where it is not, or not yet."""
@@ -68,12 +68,12 @@ class CutState:
     """Of what was heard, see cut_curves."""
 
 
-def word_of(found: ListenedCut) -> CutStep:
+def word_of(found: CutComparison) -> CutStep:
     """The word on what was heard."""
     return CutStep[found.heard.word.upper().replace(" ", "_")]
 
 
-def cut_curves(found: ListenedCut) -> dict[str, Floats]:
+def cut_curves(found: CutComparison) -> dict[str, Floats]:
     """The spectrum up to 8 kHz as `frequency` (Hz) and `amplitude` (m/s^2), thinned, no peak lost; empty without one.
 
     For each name of `marked`, its lines as `NAME` (Hz) and `NAME_amplitude`; the modes as tapped as `x` and `y` (Hz).

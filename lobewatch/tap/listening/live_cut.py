@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from acquisition.files.cut_file import CutSignal
 from lobewatch.logbook import Logbook
-from lobewatch.logbook.listened_cut import ListenedCut, listened
+from lobewatch.logbook.cut_comparison import CutComparison, compare_cut
 from lobewatch.machine.settings.cut_setting import CutSetting
 from lobewatch.tap.listening.cut_state import CutState, CutStep, cut_curves, word_of
 from lobewatch.tap.publisher import Pictures
@@ -30,9 +30,9 @@ def cut_pictures(logbook: Logbook, setting: CutSetting) -> Iterator[Pictures[Cut
         raise
 
 
-def judge_live(logbook: Logbook, setting: CutSetting, signal: CutSignal, pictures: Pictures[CutState]) -> ListenedCut:
+def judge_live(logbook: Logbook, setting: CutSetting, signal: CutSignal, pictures: Pictures[CutState]) -> CutComparison:
     """Listen to a recording, and show the word."""
     pictures.show(word=CutStep.JUDGING, reason="The cut is over.", level=None, left=None, cut_seconds=None)
-    found = listened(logbook, setting, signal)
+    found = compare_cut(logbook, setting, signal)
     pictures.show(word=word_of(found), reason="", found=found, plots=cut_curves(found))
     return found

@@ -17,7 +17,7 @@ RUNOUT = 20e-6
 """Largest eccentricity of a tool in its holder (m)."""
 
 
-class Turning(NamedTuple):
+class ModeFactors(NamedTuple):
     """Factors on the modes of one direction."""
 
     frequency: float
@@ -34,9 +34,9 @@ class Turning(NamedTuple):
 class HiddenTruth(NamedTuple):
     """What nobody has measured."""
 
-    x: Turning
+    x: ModeFactors
     """Modes in x."""
-    y: Turning
+    y: ModeFactors
     """Modes in y."""
     tangential: float
     """Factor on both cutting coefficients."""
@@ -54,7 +54,7 @@ class HiddenTruth(NamedTuple):
 def hidden_truth(seed: int) -> HiddenTruth:
     """The same for a seed, whatever is cut; modes in x and y differ apart."""
     random = np.random.default_rng([seed, 1])
-    x, y = (Turning(*(_drawn(random, *one) for one in (FREQUENCY, DAMPING, STIFFNESS))) for _ in range(2))
+    x, y = (ModeFactors(*(_drawn(random, *one) for one in (FREQUENCY, DAMPING, STIFFNESS))) for _ in range(2))
     return HiddenTruth(x, y, _drawn(random, *FORCE), 1 + random.uniform(-OFF_COMMAND, OFF_COMMAND))
 
 

@@ -23,7 +23,7 @@ from lobewatch.tap.in_progress import begin_tap
 from lobewatch.tap.judged_hits import JudgedHits
 from lobewatch.tap.phases import Phases
 from lobewatch.tap.publisher import Publisher
-from lobewatch.tap.state import TapState, Word
+from lobewatch.tap.state import TapState, TapStep
 from lobewatch.tap.stories.mounting import Mounting, remounted
 from lobewatch.tap.stories.story import Story, Wear
 
@@ -152,7 +152,7 @@ def _take(folder: MachineFolder, plan: PlannedTap, random: np.random.Generator) 
     machine, toml = folder.machine, folder.toml.read_text("utf-8")
     where = machine.machine.name, plan.date, machine.tap.tool, plan.direction
     about = Circumstances(*where, "the demo", toml, conditions=plan.conditions)
-    publisher = Publisher(TapState(0, Word.CHECKING, "", wanted=machine.tap.hits), time.monotonic)
+    publisher = Publisher(TapState(0, TapStep.CHECKING, "", wanted=machine.tap.hits), time.monotonic)
     with device_in_step(plan.structure, random) as open_device, threadpool_limits(limits=1), folder.locked():
         hits = JudgedHits(begin_tap(folder, about, resume=False), machine)
         loop = HitLoop(hits, publisher, Wishes(), guided=False)

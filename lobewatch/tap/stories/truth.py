@@ -6,7 +6,7 @@ import math
 from datetime import datetime, timedelta
 from typing import NamedTuple
 
-from lobewatch.decay.forecast import Reached
+from lobewatch.decay.forecast import DateRange
 from lobewatch.decay.trend import MONTH, Trend, day
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.outlook import outlook
@@ -21,7 +21,7 @@ class Foretold(NamedTuple):
 
     what: str
     """Which."""
-    reached: Reached | None
+    reached: DateRange | None
     """When it is reached, in days since 1970; None where nothing can be foretold."""
     horizon: float
     """Up to which was looked (days since 1970); NaN where nothing can be foretold."""

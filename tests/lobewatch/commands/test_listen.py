@@ -13,7 +13,7 @@ from typer.testing import CliRunner, Result
 from acquisition.files.read_sound import read_sound
 from lobewatch.cli import app
 from lobewatch.logbook import Logbook
-from lobewatch.logbook.listened_cut import listened
+from lobewatch.logbook.cut_comparison import compare_cut
 from lobewatch.machine.archive.verify import verify
 from lobewatch.machine.settings.cut_setting import cut_setting
 
@@ -119,7 +119,7 @@ def test_what_the_tap_tests_predict_at_this_depth_stands_beside_it(shop: Shop, t
     logbook = Logbook.open(shop.path)
     (verdict,), sound = logbook.verdicts(), read_sound(recording(tmp_path / "cut.csv", 1712.3))
     below, above = (
-        listened(logbook, cut_setting(logbook.machine, "A", None, 1e3 * share * verdict.limit), sound)
+        compare_cut(logbook, cut_setting(logbook.machine, "A", None, 1e3 * share * verdict.limit), sound)
         for share in (0.99, 1.01)
     )
     assert below.predicted is not None

@@ -23,7 +23,7 @@ from lobewatch.machine import ProgramTable, drive_limit
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.machine.settings.machine_file import parse_machine
-from lobewatch.show.figures.labels import Labels
+from lobewatch.show.figures.labels import PictureLabels
 from lobewatch.show.figures.lobe_figures import BAND, lobes_figure, radial_figure, waterfall_figure
 from lobewatch.show.figures.lobe_pictures import lobes_picture
 from lobewatch.show.figures.trend_figures import new_axes, svg
@@ -465,7 +465,7 @@ def test_band_boxes_and_marks_stand_where_the_numbers_say() -> None:
 def test_words_in_a_picture_do_not_cover_one_another() -> None:
     figure, (axes,) = new_axes(1, (8.0, 4.2))
     axes.set(xlim=(0, 100), ylim=(0, 10))
-    labels = Labels(axes)
+    labels = PictureLabels(axes)
     for place in ((50, 5), (52, 5), (50, 5.3)):
         labels.add("a program\nnot stable", place)
     figure.canvas.draw()

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import t as students
 
-from lobewatch.decay.forecast import Reached, forecast, past
+from lobewatch.decay.forecast import DateRange, forecast, past
 
 Floats = NDArray[np.float64]
 
@@ -36,8 +36,8 @@ def test_dates_count_from_anywhere() -> None:
 
 def test_a_level_passed_is_reached_already_and_a_far_one_not_before_the_horizon() -> None:
     found = forecast(MONTHS, FALLING, 55.0)
-    assert found.reached(-1.0) == Reached(-np.inf, -np.inf, -np.inf)
-    assert found.reached(-30.0) == Reached(np.inf, np.inf, np.inf)
+    assert found.reached(-1.0) == DateRange(-np.inf, -np.inf, -np.inf)
+    assert found.reached(-30.0) == DateRange(np.inf, np.inf, np.inf)
 
 
 def test_nothing_is_foretold_beyond_twice_the_history_or_the_horizon() -> None:
@@ -117,7 +117,7 @@ def test_too_short_a_history_foretells_nothing(dates: Floats) -> None:
 
 def test_equal_points_stay() -> None:
     found = forecast(MONTHS, np.full(20, -1.0), 55.0)
-    assert found.reached(-1.5) == Reached(np.inf, np.inf, np.inf)
+    assert found.reached(-1.5) == DateRange(np.inf, np.inf, np.inf)
     assert found.line == pytest.approx(-1.0)
     assert found.likeliest.kind == "none"
 

@@ -7,7 +7,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
-from lobewatch.decay.trend import Tapped, Trend, trend_of
+from lobewatch.decay.trend import TapValue, Trend, trend_of
 
 START = datetime(2024, 1, 15, 9, tzinfo=UTC)
 FALLING = np.fromstring(
@@ -15,15 +15,15 @@ FALLING = np.fromstring(
 )
 
 
-def tapped(days: float, percent: float) -> Tapped:
-    return Tapped(START + timedelta(days=days), 1700.0 * float(np.exp(percent / 100)), 0.01)
+def tapped(days: float, percent: float) -> TapValue:
+    return TapValue(START + timedelta(days=days), 1700.0 * float(np.exp(percent / 100)), 0.01)
 
 
-def judged(series: list[Tapped], *events: float) -> Trend:
+def judged(series: list[TapValue], *events: float) -> Trend:
     return trend_of(series, series[-1].time, [START + timedelta(days=days) for days in events])
 
 
-def monthly(percents: np.ndarray[tuple[int], np.dtype[np.float64]]) -> list[Tapped]:
+def monthly(percents: np.ndarray[tuple[int], np.dtype[np.float64]]) -> list[TapValue]:
     return [tapped(30.0 * i, percent) for i, percent in enumerate(percents)]
 
 

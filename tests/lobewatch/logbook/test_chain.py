@@ -41,7 +41,7 @@ from lobewatch.show.report.report import render_report
 from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE, emulated_structure, emulator, with_bearing_stiffness
 from lobewatch.tap.in_progress import begin_tap
 from lobewatch.tap.session import TapSession, TapStopped
-from lobewatch.tap.state import Word
+from lobewatch.tap.state import TapStep
 from lobewatch.tool.assembly import speed_grid
 from modal import Mode, synthesize
 
@@ -158,7 +158,7 @@ def test_an_unplugged_cable_costs_no_hit(folder: MachineFolder) -> None:
         session = TapSession(folder, lambda: TapsSource(device.port), about(folder), sleep=lambda _: session.stop())
         with pytest.raises(TapStopped):
             session.run()
-    assert session.state.word is Word.NO_DEVICE
+    assert session.state.word is TapStep.NO_DEVICE
     assert "unplugged" in session.state.reason
     seen = session.state.hits
     assert len(seen) >= 2

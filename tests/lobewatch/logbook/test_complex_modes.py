@@ -18,7 +18,7 @@ from lobewatch.machine import Machine
 from lobewatch.measuring.estimate import Estimate
 from lobewatch.tool import Assembly
 from lobewatch.tool.prediction import predict
-from lobewatch.tool.series import Point, scatter_of
+from lobewatch.tool.series import FollowedMode, scatter_of
 from lobewatch.verdicts.doubt import doubt_of
 from lobewatch.verdicts.drawn import middle_row
 from lobewatch.verdicts.limit_band import DRAWS, limit_band
@@ -139,7 +139,9 @@ def test_history_keeps_the_phase(shop: Shop) -> None:
 
 def test_a_series_tells_the_scatter_of_its_phases() -> None:
     phases = np.random.default_rng(0).normal(10.0, 2.0, 200)
-    series = [Point(START + timedelta(days=i), 1713.0, 0.03, 3.5e7, phase) for i, phase in enumerate(phases.tolist())]
+    series = [
+        FollowedMode(START + timedelta(days=i), 1713.0, 0.03, 3.5e7, phase) for i, phase in enumerate(phases.tolist())
+    ]
     scatter = scatter_of(series)
     assert scatter is not None
     assert scatter[:3] == (0.0, 0.0, 0.0)

@@ -16,8 +16,8 @@ from lobewatch.decay.light import Light
 from lobewatch.machine.settings.machine_file import parse_machine
 from lobewatch.notify.message import message_of
 from lobewatch.notify.prometheus import FAMILIES
-from lobewatch.plant.plant import Standings
-from lobewatch.plant.summary import Dated, Summary
+from lobewatch.plant.plant import MachineStanding
+from lobewatch.plant.summary import DatedStanding, Summary
 
 PAGE = (Path(__file__).parents[3] / "docs" / "alarms.md").read_text("utf-8")
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```", PAGE, flags=re.DOTALL | re.MULTILINE)
@@ -46,7 +46,7 @@ def test_the_table_for_machine_toml_is_taken(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_each_key_of_a_message_and_each_family_is_explained() -> None:
     summary = Summary("m", (), "tap")
-    one = Standings("m", Path("m"), summary, Dated(Light.GOOD, (), "tap", None))
+    one = MachineStanding("m", Path("m"), summary, DatedStanding(Light.GOOD, (), "tap", None))
     keys = msgspec.json.decode(message_of(one, datetime(2026, 1, 1, tzinfo=UTC)))
     rows = [line.split("|")[1] for line in PAGE.splitlines() if line.startswith("| `")]
     assert {*keys, *FAMILIES} <= {name for row in rows for name in re.findall(r"`(\w+)`", row)}

@@ -17,7 +17,7 @@ from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen import DashboardServer, ScreenServer
 from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE
 from lobewatch.tap.session import TapSession
-from lobewatch.tap.state import Word
+from lobewatch.tap.state import TapStep
 
 Browser = Any
 """Chromium on one page: Browser of conftest.py."""
@@ -31,7 +31,7 @@ def test_the_word_counter_and_reason_follow_the_test(browser: Browser, session: 
     session.check()
     browser.see("passed", "3 of 4 passed")
     browser.see("checks", "noise floor: 4.1 N rms")
-    session.show(Word.TAP, reason="Hit now.")
+    session.show(TapStep.TAP, reason="Hit now.")
     browser.see("text", "TAP")
     browser.see("reason", "Hit now.")
     session.hit()
@@ -47,7 +47,7 @@ def test_the_word_counter_and_reason_follow_the_test(browser: Browser, session: 
     for _ in range(8):
         session.hit()
     browser.see("change", "has settled")
-    session.show(Word.NO_DEVICE, reason="Plug it in.")
+    session.show(TapStep.NO_DEVICE, reason="Plug it in.")
     browser.see("text", "NO DEVICE")
     session.hit()
     session.finish()
@@ -97,7 +97,7 @@ def test_without_the_token_the_page_says_which_address_to_open(opened: Browser, 
 
 
 def test_a_lost_server_is_said_and_found_again(opened: Browser, session: Session) -> None:
-    session.show(Word.TAP)
+    session.show(TapStep.TAP)
     with ScreenServer(session) as server:
         opened.open(server.url)
         opened.see("text", "TAP")
@@ -111,7 +111,7 @@ def test_a_lost_server_is_said_and_found_again(opened: Browser, session: Session
 
 def test_a_silent_server_is_no_connection(opened: Browser, session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("lobewatch.screen.feed.SIGN_OF_LIFE", 1e9)
-    session.show(Word.TAP)
+    session.show(TapStep.TAP)
     with ScreenServer(session) as server:
         opened.open(server.url)
         opened.see("text", "TAP")

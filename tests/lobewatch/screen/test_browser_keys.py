@@ -12,7 +12,7 @@ from selenium.webdriver.common.keys import Keys
 
 from acquisition import HitFlags
 from lobewatch.screen import ScreenServer
-from lobewatch.tap.state import Word
+from lobewatch.tap.state import TapStep
 
 Browser = Any
 """Chromium on one page: Browser of conftest.py."""
@@ -44,7 +44,7 @@ def test_a_key_held_down_or_with_control_undoes_nothing_more(
         event = {"type": "keyDown", "key": "u", "code": "KeyU", "text": "u", "autoRepeat": repeated}
         browser.driver.execute_cdp_cmd("Input.dispatchKeyEvent", event)
     browser.see("good", "2")
-    session.show(Word.TAP, reason="still two")
+    session.show(TapStep.TAP, reason="still two")
     browser.see("reason", "still two")
     assert session.state.good == 2
 
@@ -100,7 +100,7 @@ def test_every_verdict_has_its_sound_and_m_mutes_it_for_good(
     for show, word, new in (
         (session.hit, "GOOD", [1320]),
         (lambda: session.hit(HitFlags.TOO_SOFT), "TOO SOFT", [220, 220]),
-        (lambda: session.show(Word.NO_DEVICE), "NO DEVICE", [160]),
+        (lambda: session.show(TapStep.NO_DEVICE), "NO DEVICE", [160]),
         (session.finish, "DONE", [660, 880, 1320]),
     ):
         show()
@@ -125,7 +125,7 @@ def test_a_verdict_in_two_pictures_sounds_once_and_one_after_another_twice(
     browser.open(server.url)
     browser.see("text", "CHECKING")
     browser.press("x")
-    session.show(Word.GOOD)
+    session.show(TapStep.GOOD)
     browser.see("text", "GOOD")
     session.hit()
     browser.see("good", "1")

@@ -8,7 +8,7 @@ import pytest
 
 from acquisition import HitFlags
 from lobewatch.screen import ScreenServer
-from lobewatch.tap.state import Word
+from lobewatch.tap.state import TapStep
 
 SIZES = ((1280, 800), (1920, 1080), (820, 1180))
 ESSENTIALS = ("text", "good", "reason", "undo", "mute", "stop", "frf", "coherence", "force", "change", "taken")
@@ -36,14 +36,14 @@ def test_everything_needed_is_in_sight_without_scrolling(
         assert box["x"] + box["width"] <= size[0], name
         assert box["y"] + box["height"] <= size[1], name
         assert box["height"] >= 16, name
-    session.show(Word.TAP)
+    session.show(TapStep.TAP)
     browser.see("text", "TAP")
     assert browser.part("text").rect["height"] >= 0.09 * size[1]
 
 
 def test_text_has_a_contrast_of_seven_to_one(browser: Browser, session: Session, server: ScreenServer) -> None:
     browser.open(server.url)
-    for word in Word:
+    for word in TapStep:
         session.show(word)
         browser.see("text", word.value)
         colours = browser.ask(

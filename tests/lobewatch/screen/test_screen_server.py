@@ -25,7 +25,7 @@ from lobewatch.screen import ScreenServer
 from lobewatch.screen.web_thread import WebThread
 from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE
 from lobewatch.tap.session import TapSession
-from lobewatch.tap.state import Plots, Word
+from lobewatch.tap.state import Plots, TapStep
 
 TOKEN = "a-token-of-the-test"
 Session = Any
@@ -228,7 +228,7 @@ def test_the_state_comes_with_every_change_and_the_curves_only_when_they_are_new
         (hit,) = shown["hits"]
         assert (hit["number"], hit["good"], hit["verdict"]) == (1, False, "double hit, too soft")
         assert (hit["peak_force"], hit["undone"]) == (312, False)
-        session.show(Word.TAP, levels=(float("nan"), 2.0))
+        session.show(TapStep.TAP, levels=(float("nan"), 2.0))
         again = await feed.receive(timeout=10)
         assert again.type is aiohttp.WSMsgType.TEXT
         assert json.loads(again.data)["levels"] == [None, 2.0]
@@ -301,7 +301,7 @@ def test_a_page_too_slow_misses_old_states_and_holds_nobody_up(session: Session)
     def acquire() -> None:
         """Nothing here waits for a page."""
         for i in range(1000):
-            session.show(Word.WAIT, reason=str(i), plots=replace(plots))
+            session.show(TapStep.WAIT, reason=str(i), plots=replace(plots))
 
     def quick_page_sees_the_end() -> None:
         async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:

@@ -13,7 +13,7 @@ from acquisition import Channel, DataError, DeviceError, Faults, HammeredStructu
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.plug import Plug
 from lobewatch.tap.session import TapSession
-from lobewatch.tap.state import TapState, Word
+from lobewatch.tap.state import TapState, TapStep
 
 RATE = 25600.0
 Tapper = Callable[..., HammeredStructure]
@@ -24,11 +24,11 @@ OpenSession = Callable[..., TapSession]
 
 
 UNPLUGGED: dict[str, Callable[[TapState], bool]] = {
-    "checking": lambda state: state.word is Word.CHECKING and "hammer away" in state.reason,
-    "trial": lambda state: state.word is Word.TAP and state.reason.startswith("Trial hit 2"),
-    "armed": lambda state: state.word is Word.TAP and state.good == 4,
-    "recording": lambda state: state.word is Word.WAIT and state.good == 4,
-    "between hits": lambda state: state.word is Word.GOOD and state.good == 4 and state.verdict == "good",
+    "checking": lambda state: state.word is TapStep.CHECKING and "hammer away" in state.reason,
+    "trial": lambda state: state.word is TapStep.TAP and state.reason.startswith("Trial hit 2"),
+    "armed": lambda state: state.word is TapStep.TAP and state.good == 4,
+    "recording": lambda state: state.word is TapStep.WAIT and state.good == 4,
+    "between hits": lambda state: state.word is TapStep.GOOD and state.good == 4 and state.verdict == "good",
 }
 
 
@@ -53,7 +53,7 @@ def test_an_unplugged_device_is_waited_for_and_the_test_goes_on_at_the_same_hit(
 
     session = session_of(open_folder, open_device, states.append)
     tap = session.run()
-    away = [state for state in states if state.word is Word.NO_DEVICE]
+    away = [state for state in states if state.word is TapStep.NO_DEVICE]
     assert {state.good for state in away} == {pulled[0]}
     reasons = list(dict.fromkeys(state.reason for state in away))
     assert [reason.partition(";")[0] for reason in reasons] == [
@@ -75,7 +75,7 @@ def test_a_cable_pulled_from_a_real_port(
         states: list[TapState] = []
         session = session_of(folder, lambda: TapsSource(next(ports)), states.append)
         tap = session.run()
-    assert Word.NO_DEVICE in {state.word for state in states}
+    assert TapStep.NO_DEVICE in {state.word for state in states}
     assert len(tap.accepted) == 10
     assert not any(hit.lost_scans for hit in tap.hits)
 
@@ -86,7 +86,7 @@ def test_a_cable_pulled_after_the_last_hit_does_not_keep_the_result_back(
     devices = iter([simulated(tapper(), channels, unplugged=lambda: session.state.good == 10)])
     session: TapSession = session_of(folder, lambda: next(devices))
     assert len(session.run().accepted) == 10
-    assert session.state.word is Word.DONE
+    assert session.state.word is TapStep.DONE
 
 
 def test_a_device_that_comes_back_elsewhere_is_found_and_a_stranger_at_its_port_is_left_alone(
@@ -105,7 +105,7 @@ def test_a_device_that_comes_back_elsewhere_is_found_and_a_stranger_at_its_port_
         ports = [SimpleNamespace(device=first.port, vid=0x16C0, serial_number="5C2B")]
 
         def plug(state: TapState) -> None:
-            if state.word is Word.NO_DEVICE:
+            if state.word is TapStep.NO_DEVICE:
                 ports[0] = SimpleNamespace(device=first.port, vid=0x16C0, serial_number="a stranger")
             if "serial number 5C2B is not plugged in; plug it in: the test goes on" in state.reason:
                 ports.append(SimpleNamespace(device=second.port, vid=0x16C0, serial_number="5C2B"))
@@ -136,7 +136,7 @@ def test_a_taken_port_is_told_at_the_start(
         session = session_of(folder, lambda: TapsSource(device.port))
         with pytest.raises(DeviceError, match="another program uses it: close that program"):
             session.run()
-    assert session.state.word is Word.FAILED
+    assert session.state.word is TapStep.FAILED
     assert "another program uses it" in session.state.reason
 
 

@@ -28,7 +28,7 @@ from acquisition import (
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.plots import plots_of
 from lobewatch.tap.session import TapSession
-from lobewatch.tap.state import TapState, Word
+from lobewatch.tap.state import TapState, TapStep
 
 RATE = 25600.0
 Tapper = Callable[..., HammeredStructure]
@@ -67,7 +67,7 @@ def test_good_is_not_said_of_a_hit_taken_back(
 ) -> None:
     def watch(state: TapState) -> None:
         states.append(state)
-        if state.word is Word.GOOD and state.good == len(state.hits) == 3:
+        if state.word is TapStep.GOOD and state.good == len(state.hits) == 3:
             session.undo()
 
     states: list[TapState] = []
@@ -75,7 +75,7 @@ def test_good_is_not_said_of_a_hit_taken_back(
     session.run()
     undone = [state for state in states if state.verdict == "undone"]
     assert undone[0].reason == "Hit 3 was taken back."
-    assert {state.word for state in undone} <= {Word.WAIT, Word.TAP}
+    assert {state.word for state in undone} <= {TapStep.WAIT, TapStep.TAP}
 
 
 def test_a_first_hit_at_another_spot_is_found_out_by_those_after_it(
@@ -97,7 +97,7 @@ def test_a_first_hit_at_another_spot_is_found_out_by_those_after_it(
     tap = session.run()
     assert tap.flags == (HitFlags.INCONSISTENT, *[HitFlags.OK] * 10)
     told = next(state for state in states if state.verdict == "inconsistent")
-    assert (told.good, len(told.hits), told.word) == (3, 4, Word.WAIT)
+    assert (told.good, len(told.hits), told.word) == (3, 4, TapStep.WAIT)
     assert re.match(r"Hit 1 does not fit the others and counts no more\. FRF \d+% away from the mean of 3", told.reason)
     assert np.array_equal(tap.frf.receptance, estimate_frf(tap.hits[1:]).receptance)
 
@@ -110,7 +110,7 @@ def test_a_verdict_does_not_wait_for_the_disk_and_counts_once_it_is_there(
     simulated: Simulate,
     session_of: OpenSession,
 ) -> None:
-    shown: list[tuple[Word, str, int]] = []
+    shown: list[tuple[TapStep, str, int]] = []
 
     def keep(*arguments: Any) -> None:
         shown.append((session.state.word, session.state.verdict, session.state.good))
@@ -119,7 +119,7 @@ def test_a_verdict_does_not_wait_for_the_disk_and_counts_once_it_is_there(
     monkeypatch.setattr("lobewatch.tap.in_progress.write_hit", keep)
     session = session_of(folder, lambda: simulated(tapper(), channels))
     session.run()
-    assert shown == [(Word.GOOD, "good", good) for good in range(10)]
+    assert shown == [(TapStep.GOOD, "good", good) for good in range(10)]
 
 
 def test_no_scan_is_lost_to_a_slow_disk_and_slow_mathematics(

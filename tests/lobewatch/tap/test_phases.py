@@ -9,7 +9,7 @@ from typing import Any
 from acquisition import Channel, HammeredStructure, HitFlags
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.session import TapSession
-from lobewatch.tap.state import TapState, Word
+from lobewatch.tap.state import TapState, TapStep
 
 Tapper = Callable[..., HammeredStructure]
 Pair = tuple[Channel, Channel]
@@ -37,9 +37,9 @@ def test_a_refused_trial_hit_says_what_is_wrong_with_it(
     open_folder: MachineFolder, tapper: Tapper, channels: Pair, simulated: Simulate, session_of: OpenSession
 ) -> None:
     states: list[TapState] = []
-    double = simulated(tapper(double_hits=1.0), channels, unplugged=lambda: session.state.word is Word.REFUSED)
+    double = simulated(tapper(double_hits=1.0), channels, unplugged=lambda: session.state.word is TapStep.REFUSED)
     devices = iter((double, simulated(tapper(), channels)))
     session: TapSession = session_of(open_folder, lambda: next(devices), states.append)
     assert len(session.run().hits) == 10
-    refused = next(state for state in states if state.word is Word.REFUSED)
+    refused = next(state for state in states if state.word is TapStep.REFUSED)
     assert (refused.shown_word, refused.reason) == ("DOUBLE HIT, TRIAL HIT", HitFlags.DOUBLE_HIT.cure)

@@ -16,7 +16,7 @@ import pytest
 from acquisition import Channel, Circumstances, DataError, HammeredStructure, TapTest, new_tap_id, write_hit
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.session import TapSession, TapStopped
-from lobewatch.tap.state import TapState, Word
+from lobewatch.tap.state import TapState, TapStep
 from modal import Mode, synthesize
 
 Tapper = Callable[..., HammeredStructure]
@@ -34,9 +34,9 @@ def test_the_words_of_a_test_and_its_result(
     tap = session.run()
     assert tap.frf.n_averages == 10
     words = [word for word, _ in groupby(state.word for state in states)]
-    assert words[0] is Word.CHECKING
-    assert words[-1] is Word.DONE
-    cycle = "".join({Word.TAP: "T", Word.WAIT: "W", Word.GOOD: "G"}.get(word, "") for word in words)
+    assert words[0] is TapStep.CHECKING
+    assert words[-1] is TapStep.DONE
+    cycle = "".join({TapStep.TAP: "T", TapStep.WAIT: "W", TapStep.GOOD: "G"}.get(word, "") for word in words)
     assert re.fullmatch(r"W?T?(WG(W?T)?)+", cycle), cycle
     assert [state.revision for state in states] == sorted(state.revision for state in states)
     done = session.state
@@ -75,7 +75,7 @@ def test_a_saved_test_is_called_saved_whatever_is_wrong_with_the_others(
     with pytest.raises(DataError, match=r"saved \S+, but what it means cannot be worked out: taps/older.h5"):
         session.run()
     assert len(folder.taps()) == 1
-    assert session.state.word is Word.FAILED
+    assert session.state.word is TapStep.FAILED
 
 
 @pytest.mark.parametrize(
@@ -104,7 +104,7 @@ def test_a_full_disk_or_a_mistake_of_ours_is_told_and_costs_no_hit(
     session = session_of(folder, lambda: simulated(tapper(), channels))
     with pytest.raises(told, match="the hits so far are kept: the same command goes on with them") as raised:
         session.run()
-    assert session.state.word is Word.FAILED
+    assert session.state.word is TapStep.FAILED
     assert session.state.reason == str(raised.value)
     assert "Errno" not in session.state.reason
     monkeypatch.undo()

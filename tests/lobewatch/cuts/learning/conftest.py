@@ -9,9 +9,9 @@ import pytest
 
 from lobes import Cut, MillingRows, milling_system, rows_of, zero_order
 from lobes.floquet import largest_multipliers, piece_numbers
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.grid import Grid, speeds_between
 from lobewatch.cuts.learning.learnt import Learnt, prior
-from lobewatch.cuts.learning.observed import Observed
 from lobewatch.verdicts.doubt import Doubt, Span
 from modal import Mode
 
@@ -63,19 +63,19 @@ class Mill:
         rows = rows_of(milling_system([x], [y]), self.pushed, np.array([speed]))
         return complex(largest_multipliers(rows, np.array([[depth]]), piece_numbers(rows, depth))[0, 0])
 
-    def hear(self, speed: float, depth: float) -> Observed:
+    def hear(self, speed: float, depth: float) -> CutEvidence:
         """What the cut sounds like; the frequency is the one that the multiplier leaves next above a natural one."""
         multiplier = self.multiplier(speed, depth)
         if abs(multiplier) < 1:
-            return Observed(self.cut, speed, depth, "stable")
+            return CutEvidence(self.cut, speed, depth, "stable")
         teeth = self.cut.teeth * speed / 60
         base = abs(np.angle(multiplier)) / (2 * np.pi) * teeth
         family = np.concatenate([np.arange(20) * teeth + base, np.arange(1, 20) * teeth - base])
         own = np.array([self.x.frequency * self.frequency[0], self.y.frequency * self.frequency[1]])
         near = np.min(np.abs(family[:, np.newaxis] / own - 1.02), axis=1)
-        return Observed(self.cut, speed, depth, "chatter", float(family[np.argmin(near)]))
+        return CutEvidence(self.cut, speed, depth, "chatter", float(family[np.argmin(near)]))
 
-    def chatter(self, speed: float) -> Observed:
+    def chatter(self, speed: float) -> CutEvidence:
         """Of a slot a tenth deeper than its limit."""
         x, y = self.turning
         return self.hear(speed, 1.1 * float(zero_order([x], [y], self.pushed, [speed]).depth[0]))

@@ -17,10 +17,10 @@ from acquisition.emulation.hammered_structure import Structure
 from acquisition.emulation.milling import simulate_cuts
 from acquisition.emulation.milling_cut import MillingCut, Passage
 from lobes import Cut, lowest_of, milling_system, rows_of, stability_boundary, zero_order
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.grid import Grid, floored, speeds_between, trusted
 from lobewatch.cuts.learning.learnt import Learnt, prior
-from lobewatch.cuts.learning.likelihood import log_likelihood, predicted
-from lobewatch.cuts.learning.observed import Observed
+from lobewatch.cuts.learning.likelihood import log_likelihood, predict_cut
 from lobewatch.cuts.learning.suggest import best_heard, suggest
 from lobewatch.machine.journal.heard_cut import CutWord
 from lobewatch.verdicts.doubt import Doubt, Span
@@ -45,7 +45,7 @@ class Hidden:
     immersion: float | None = 1.0
     frequency: float | None = None
     """At speed over that at rest, in both directions; None: drawn."""
-    cuts: list[Observed] = field(default_factory=list)
+    cuts: list[CutEvidence] = field(default_factory=list)
     share: list[float] = field(default_factory=list)
     """Largest removal rate heard stable over the optimum, after each cut."""
 
@@ -122,7 +122,7 @@ class Hidden:
     def hear(self, speed: float, depth: float, word: CutWord, frequency: float) -> None:
         """Learn from the cut."""
         pitch = frequency * (1 + NOISE * self.random.standard_normal())
-        self.cuts.append(Observed(self.cut, speed, depth, word, pitch))
+        self.cuts.append(CutEvidence(self.cut, speed, depth, word, pitch))
         self.learnt = self.learnt.hearing(self.cuts[-1])
 
 
@@ -189,8 +189,8 @@ def test_chatter_beyond_a_pocket_that_sounds_as_at_its_limit_speaks_for_the_trut
     truth.normal[:] = 0.0
     one.turn({name: float(values[0]) for name, values in truth.ratios().items()})
     ((word, pitch),) = heard([one.milling(speed, depth)])
-    seen = Observed(one.cut, speed, depth, word, pitch)
-    guess, teeth = predicted(seen, truth), one.cut.teeth * speed / 60
+    seen = CutEvidence(one.cut, speed, depth, word, pitch)
+    guess, teeth = predict_cut(seen, truth), one.cut.teeth * speed / 60
     own, at_limit = guess.off(seen, teeth)[:, 0] / pitch
     assert own > 0.1
     assert at_limit < 0.01

@@ -9,9 +9,9 @@ import pytest
 
 from lobes import Cut, stability_boundary
 from lobewatch.cuts.learning.contradicting import Contradiction, contradiction, learn_from_sound
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.learnt import Learnt
-from lobewatch.cuts.learning.likelihood import MISJUDGED, log_likelihood, most_likely, predicted
-from lobewatch.cuts.learning.observed import Observed
+from lobewatch.cuts.learning.likelihood import MISJUDGED, log_likelihood, most_likely, predict_cut
 from lobewatch.cuts.listening.folded import folded
 from lobewatch.machine.journal.heard_cut import CutWord
 from modal import Mode
@@ -21,8 +21,8 @@ TEETH = 800.0
 """Tooth frequency at 12 000 rpm (Hz)."""
 
 
-def likelihood(mill: Mill, seen: Observed, learnt: Learnt) -> np.ndarray:
-    return np.exp(log_likelihood(seen, predicted(seen, learnt.draws), TEETH))
+def likelihood(mill: Mill, seen: CutEvidence, learnt: Learnt) -> np.ndarray:
+    return np.exp(log_likelihood(seen, predict_cut(seen, learnt.draws), TEETH))
 
 
 def test_the_prior_is_that_of_the_design(mill: Mill) -> None:
@@ -37,7 +37,7 @@ def test_the_prior_is_that_of_the_design(mill: Mill) -> None:
 
 
 def test_a_shallow_cut_is_stable_and_a_deep_one_chatters_but_for_cuts_that_are_misheard(mill: Mill) -> None:
-    stable, chatters = (Observed(mill.cut, 12000, 1e-5, word) for word in ("stable", "chatter"))
+    stable, chatters = (CutEvidence(mill.cut, 12000, 1e-5, word) for word in ("stable", "chatter"))
     assert likelihood(mill, stable, mill.prior) == pytest.approx(1 - MISJUDGED)
     assert likelihood(mill, chatters, mill.prior) == pytest.approx(MISJUDGED)
     deep = replace(chatters, depth=0.05)
@@ -48,7 +48,7 @@ def test_a_shallow_cut_is_stable_and_a_deep_one_chatters_but_for_cuts_that_are_m
     ("word", "frequency"), [("chatter", 1450.0), ("chatter", np.nan), ("flip", np.nan), ("stable", np.nan)]
 )
 def test_nothing_is_likelier_than_to_do_what_was_heard(mill: Mill, word: CutWord, frequency: float) -> None:
-    seen = Observed(mill.cut, 12000, 1e-5 if word == "stable" else 0.05, word, frequency)
+    seen = CutEvidence(mill.cut, 12000, 1e-5 if word == "stable" else 0.05, word, frequency)
     most, found = most_likely(seen, TEETH), np.log(likelihood(mill, seen, mill.prior))
     assert np.max(found) <= most
     if word != "flip":
@@ -72,7 +72,7 @@ def test_the_edge_lies_at_the_limit(cut: Cut) -> None:
     pushed = replace(cut, tangential=1.1 * cut.tangential, radial=1.1 * cut.radial)
     limit = stability_boundary([x], [y], pushed, [12000.0], 0.02).depth[0]
     shares = (0.8, 1.0, 1.25)
-    chances = [predicted(Observed(cut, 12000, limit * share, "stable"), one).chance[0] for share in shares]
+    chances = [predict_cut(CutEvidence(cut, 12000, limit * share, "stable"), one).chance[0] for share in shares]
     assert chances[0] < 0.05
     assert 0.4 < chances[1] < 0.6
     assert chances[2] > 0.95
@@ -83,7 +83,7 @@ def test_a_chatter_frequency_is_compared_at_the_depth_of_the_cut_and_modulo_the_
     assert seen.chatters
     one = mill.prior.draws[:1]
     one.normal[:] = 0.0
-    guess = predicted(seen, one)
+    guess = predict_cut(seen, one)
     assert folded(seen.frequency, TEETH) == pytest.approx(guess.base[0], abs=0.01 * seen.frequency)
     said = [log_likelihood(replace(seen, frequency=seen.frequency + off), guess, TEETH)[0] for off in (0, 800, 60)]
     assert said[1] == pytest.approx(said[0], abs=0.6)
@@ -92,8 +92,8 @@ def test_a_chatter_frequency_is_compared_at_the_depth_of_the_cut_and_modulo_the_
 
 def test_a_deep_stable_cut_lowers_kt_and_chatter_in_a_shallow_one_raises_it(mill: Mill) -> None:
     before = mill.prior.intervals["tangential"].mean
-    stable = mill.prior.hearing(Observed(mill.cut, 12000, 2.2e-3, "stable"))
-    chatter = mill.prior.hearing(Observed(mill.cut, 12000, 0.8e-3, "chatter"))
+    stable = mill.prior.hearing(CutEvidence(mill.cut, 12000, 2.2e-3, "stable"))
+    chatter = mill.prior.hearing(CutEvidence(mill.cut, 12000, 0.8e-3, "chatter"))
     assert stable.intervals["tangential"].mean < 0.85 * before
     assert chatter.intervals["tangential"].mean > 1.05 * before
     assert stable.frequencies == chatter.frequencies == 0
@@ -159,12 +159,12 @@ def test_learning_is_the_same_again_and_few_draws_are_made_anew() -> None:
 
 
 def test_what_contradicts_is_named_and_left_out(mill: Mill) -> None:
-    cuts = [Observed(mill.cut, 12000, depth, "stable") for depth in (1e-3, 1.4e-3, 1.5e-3)]
-    odd = Observed(mill.cut, 12000, 0.3e-3, "chatter")
+    cuts = [CutEvidence(mill.cut, 12000, depth, "stable") for depth in (1e-3, 1.4e-3, 1.5e-3)]
+    odd = CutEvidence(mill.cut, 12000, 0.3e-3, "chatter")
     learnt, left_out = learn_from_sound(mill.prior, [*cuts, odd])
     assert learnt.cuts == tuple(cuts)
     assert [(one.cut, one.why) for one in left_out] == [(odd, Contradiction.CHATTERS)]
-    deep = Observed(mill.cut, 8000, 0.03, "stable")
+    deep = CutEvidence(mill.cut, 8000, 0.03, "stable")
     assert contradiction(learnt.expecting(deep)) is Contradiction.STABLE
     seen = mill.hear(20000, 4e-3)
     assert contradiction(learnt.expecting(seen)) is None

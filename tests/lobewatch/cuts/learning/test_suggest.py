@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from lobes import Cut, stability_boundary, zero_order
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.grid import floored, trusted
-from lobewatch.cuts.learning.likelihood import predicted
-from lobewatch.cuts.learning.observed import Observed
+from lobewatch.cuts.learning.likelihood import predict_cut
 from lobewatch.cuts.learning.suggest import suggest
 from tests.lobewatch.cuts.learning.conftest import Mill
 
@@ -25,14 +25,14 @@ def test_a_suggested_cut_can_be_set_and_is_more_likely_stable_than_not(mill: Mil
         assert found.depth * 1e3 / 0.05 == pytest.approx(round(found.depth * 1e3 / 0.05))
         assert found.depth <= 0.012
         assert found.chance < 0.5
-        chance = predicted(grid.seen(found.speed_rpm, found.depth), learnt.draws).chance
+        chance = predict_cut(grid.seen(found.speed_rpm, found.depth), learnt.draws).chance
         assert found.chance == pytest.approx(np.mean(chance), abs=0.07)
         assert found.settles in learnt.intervals
 
 
 def test_cuts_lead_to_more_chips_and_end_where_nothing_is_to_be_gained(mill: Mill) -> None:
     mill.force = 0.9
-    learnt, grid, cuts = mill.prior, mill.grid, list[Observed]()
+    learnt, grid, cuts = mill.prior, mill.grid, list[CutEvidence]()
     for left in (4, 3, 2, 1):
         found = suggest(learnt, grid, cuts, left)
         if found is None:
@@ -44,7 +44,7 @@ def test_cuts_lead_to_more_chips_and_end_where_nothing_is_to_be_gained(mill: Mil
     truly = replace(mill.cut, tangential=0.9 * mill.cut.tangential, radial=0.9 * mill.cut.radial)
     limits = np.minimum(zero_order([x], [y], truly, grid.speeds).depth, grid.deepest)
     assert best > 0.85 * max(speed * floored(limit) for speed, limit in zip(grid.speeds, limits, strict=True))
-    ceiling = Observed(mill.cut, 20000, 0.012, "stable")
+    ceiling = CutEvidence(mill.cut, 20000, 0.012, "stable")
     assert suggest(learnt, grid, [*cuts, ceiling], 1) is None
 
 

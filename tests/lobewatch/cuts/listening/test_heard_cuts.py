@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from acquisition.emulation import MillingCut, Passage, Structure, TipMotion, hear, random_housing, simulate_cuts
 from lobes import Cut, stability_boundary
 from lobewatch.cuts.listening.folded import modulo
-from lobewatch.cuts.listening.listen_to import Heard, Listened, listen_to
+from lobewatch.cuts.listening.listen_to import CutRecording, CutSound, listen_to
 from modal import Mode
 
 PASSAGE = Passage(before=0.4, ramp=0.05, steady=1.05, after=0.2)
@@ -134,9 +134,9 @@ def moved(motion: TipMotion, turn: float, depth: float) -> Moved:
     return Moved(float(frequency[np.argmax(beside)]), float(np.sum(beside)) / total, math.sqrt(total) / depth)
 
 
-def told(signal: NDArray[Any], case: Case, rate: float, random: Random) -> Heard:
+def told(signal: NDArray[Any], case: Case, rate: float, random: Random) -> CutSound:
     commanded = case.speed_rpm * (1 + random.uniform(-0.015, 0.015))
-    return listen_to(Listened(signal, rate, case.cut.teeth, case.cut.immersion, commanded))
+    return listen_to(CutRecording(signal, rate, case.cut.teeth, case.cut.immersion, commanded))
 
 
 @dataclass
@@ -152,7 +152,7 @@ class Judged:
     frequencies: list[float] = field(default_factory=list)
     """Relative errors of the chatter frequency modulo tooth passing."""
 
-    def add(self, case: Case, heard: Heard, motions: list[Moved]) -> None:
+    def add(self, case: Case, heard: CutSound, motions: list[Moved]) -> None:
         """One more cut; motions: at each of its shares."""
         own, *beside, quiet = motions
         chatters = own.chatters(quiet)
@@ -167,7 +167,7 @@ class Judged:
             self.frequencies.append(float(modulo(heard.chatter.frequency, own.frequency, tooth)) / own.frequency)
 
 
-def _mark(heard: Heard, chatters: bool) -> str:
+def _mark(heard: CutSound, chatters: bool) -> str:
     if heard.word == "cannot tell":
         return "not told"
     return "right" if (heard.word != "stable") == chatters else "wrong"
@@ -179,7 +179,7 @@ def judge(seed: int, count: int, judged: Judged) -> None:
     drawn = list(cases(random, count))
     places = [(case, share) for case in drawn for share in case.shares]
     motions: dict[int, Moved] = {}
-    heard: dict[int, Heard] = {}
+    heard: dict[int, CutSound] = {}
     for place, motion in simulate_cuts([case.milled(share) for case, share in places], PASSAGE):
         case, share = places[place]
         motions[place] = moved(motion, case.speed_rpm / 60, share * case.limit)
@@ -229,7 +229,7 @@ def test_idle_runs_and_pumps_are_never_chatter() -> None:
                 pump, loud = random.uniform(100, 6000), 10 ** random.uniform(-1, 0.8)
                 signal[inside] += loud * np.sin(2 * np.pi * pump * time + random.uniform(0, 6.28))
         commanded = speed * (1 + random.uniform(-0.015, 0.015))
-        heard = listen_to(Listened(signal, rate, int(random.integers(1, 7)), 1.0, commanded))
+        heard = listen_to(CutRecording(signal, rate, int(random.integers(1, 7)), 1.0, commanded))
         words[f"{heard.word} {heard.reason}"] += 1
     print(dict(words))  # noqa: T201
     assert not [word for word in words if not word.startswith("cannot tell")]

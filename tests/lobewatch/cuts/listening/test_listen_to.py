@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lobewatch.cuts.listening.listen_to import Heard, Listened, listen_to
+from lobewatch.cuts.listening.listen_to import CutRecording, CutSound, listen_to
 
 Floats = NDArray[np.float64]
 RATE = 25600.0
@@ -60,8 +60,8 @@ def a_cut(teeth: int = 4, chatter: float | None = None, loud: float = 20.0, **op
     return sines(lines, round(CUT * RATE), random)
 
 
-def told(signal: Floats, teeth: int = 4, **options: Any) -> Heard:
-    return listen_to(Listened(signal, RATE, teeth, 0.5, SET, **options))
+def told(signal: Floats, teeth: int = 4, **options: Any) -> CutSound:
+    return listen_to(CutRecording(signal, RATE, teeth, 0.5, SET, **options))
 
 
 def test_a_quiet_cut_is_stable_and_its_speed_is_found() -> None:
@@ -76,7 +76,7 @@ def test_a_quiet_cut_is_stable_and_its_speed_is_found() -> None:
 
 @pytest.mark.parametrize("off", [-0.019, 0.019])
 def test_a_speed_two_percent_beside_the_one_that_was_set_is_found(off: float) -> None:
-    heard = listen_to(Listened(recorded(a_cut()), RATE, 4, 0.5, SPEED / (1 + off)))
+    heard = listen_to(CutRecording(recorded(a_cut()), RATE, 4, 0.5, SPEED / (1 + off)))
     assert heard.speed_rpm == pytest.approx(SPEED, rel=2e-5)
 
 
@@ -156,7 +156,7 @@ def test_a_pump_that_is_switched_on_is_no_chatter(count: int) -> None:
 
 
 def test_a_speed_far_from_the_one_that_was_set_is_not_found() -> None:
-    heard = listen_to(Listened(recorded(a_cut()), RATE, 4, 0.5, SPEED * 1.045))
+    heard = listen_to(CutRecording(recorded(a_cut()), RATE, 4, 0.5, SPEED * 1.045))
     assert (heard.word, heard.reason) == ("cannot tell", "speed-not-found")
 
 

@@ -21,7 +21,7 @@ from acquisition import Circumstances, Hit, HitFlags, Remark, SourceFile, TapTes
 from lobewatch.cli import app
 from lobewatch.machine.additions.correct import add_event, exclude
 from lobewatch.machine.archive.rebuild import rebuild_files
-from lobewatch.machine.archive.verify import Verified, verify
+from lobewatch.machine.archive.verify import Verification, verify
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import KnownDevice
 from lobewatch.machine.rows import read_rows, write_rows
@@ -319,7 +319,7 @@ def one_round(
     folder = MachineFolder(work)
     results = results_of(folder)
     name = harm(folder, random.Random(seed))
-    found: Verified = verify(work)
+    found: Verification = verify(work)
     if any(name in remark.about for remark in found.remarks):
         for remark in found.damage:
             if remark.about in {one.about for one in verify(work).damage}:

@@ -16,14 +16,14 @@ from acquisition import HitFlags
 from lobewatch.show.terminal.keys import letters
 from lobewatch.show.terminal.printer import TapPrinter
 from lobewatch.show.terminal.terminal_screen import TerminalScreen, picture
-from lobewatch.tap.state import Check, Outcome, TakenHit, TapState, Word
+from lobewatch.tap.state import Check, Outcome, TakenHit, TapState, TapStep
 
 GOOD = TakenHit(1, HitFlags.OK, 231.4)
 DOUBLE = TakenHit(
     2, HitFlags.DOUBLE_HIT, 310.0, reason="Second peak 12 ms after the first (18 %): let it bounce [back]."
 )
 STATE = TapState(
-    1, Word.TAP, "mill-3, tool T1, direction x", device="TAPS, 25600 Hz", good=1, hits=(GOOD,), levels=(0.1, 2.0)
+    1, TapStep.TAP, "mill-3, tool T1, direction x", device="TAPS, 25600 Hz", good=1, hits=(GOOD,), levels=(0.1, 2.0)
 )
 
 
@@ -55,13 +55,13 @@ def plain(state: TapState, width: int = 100) -> str:
     return re.sub(r"\x1b\[[0-9;]*m", "", seen(state, width))
 
 
-SYMBOLS = dict(zip(Word, ("…", "▼", "…", "✓", "✗", "!", "■", "✗"), strict=True))
+SYMBOLS = dict(zip(TapStep, ("…", "▼", "…", "✓", "✗", "!", "■", "✗"), strict=True))
 
 
-@pytest.mark.parametrize("word", Word)
-def test_every_word_has_a_symbol_and_how_far_it_is(word: Word) -> None:
-    text = plain(replace(STATE, word=word, verdict="good" if word is Word.GOOD else "double hit"))
-    shown = "DOUBLE HIT" if word is Word.REFUSED else str(word)
+@pytest.mark.parametrize("word", TapStep)
+def test_every_word_has_a_symbol_and_how_far_it_is(word: TapStep) -> None:
+    text = plain(replace(STATE, word=word, verdict="good" if word is TapStep.GOOD else "double hit"))
+    shown = "DOUBLE HIT" if word is TapStep.REFUSED else str(word)
     assert f"{SYMBOLS[word]}  {shown}   1 / 10" in text
     assert "mill-3, tool T1, direction x - TAPS, 25600 Hz" in text
     assert "u undo   q stop   m mute" in text
@@ -69,7 +69,7 @@ def test_every_word_has_a_symbol_and_how_far_it_is(word: Word) -> None:
 
 def test_a_trial_hit_is_told_from_a_good_one() -> None:
     assert "✓  GOOD (trial hit)   0 / 10" in plain(
-        replace(STATE, word=Word.GOOD, verdict="good", trial=True, good=0, hits=())
+        replace(STATE, word=TapStep.GOOD, verdict="good", trial=True, good=0, hits=())
     )
 
 
@@ -98,7 +98,7 @@ def test_checks_before_the_first_hit_and_the_result_after_the_last() -> None:
     later = plain(replace(STATE, checks=checks))
     assert "disk" not in later
     assert "✗ hum: 1 N rms at 50 Hz" in later
-    done = plain(replace(STATE, word=Word.DONE, outcome=Outcome("warn", ["f_n 1700 Hz."], "Tap again.")))
+    done = plain(replace(STATE, word=TapStep.DONE, outcome=Outcome("warn", ["f_n 1700 Hz."], "Tap again.")))
     assert "! WARN" in done
     assert "f_n 1700 Hz. Tap again." in done
 
@@ -161,8 +161,10 @@ def test_the_terminal_is_left_as_it_was(terminal: int) -> None:
     assert termios.tcgetattr(terminal) == before
 
 
-@pytest.mark.parametrize(("word", "bells"), [(Word.GOOD, 1), (Word.REFUSED, 2), (Word.NO_DEVICE, 3), (Word.WAIT, 0)])
-def test_each_verdict_has_its_number_of_bells_unless_muted(terminal: int, word: Word, bells: int) -> None:
+@pytest.mark.parametrize(
+    ("word", "bells"), [(TapStep.GOOD, 1), (TapStep.REFUSED, 2), (TapStep.NO_DEVICE, 3), (TapStep.WAIT, 0)]
+)
+def test_each_verdict_has_its_number_of_bells_unless_muted(terminal: int, word: TapStep, bells: int) -> None:
     screen, file = screen_of(Session())
     screen.ring(STATE, replace(STATE, word=word))
     assert file.getvalue().count("\a") == bells
@@ -181,7 +183,7 @@ def test_lines_for_a_log_tell_everything_once() -> None:
     states = (
         replace(STATE, hits=(earlier,), resumed="going on with the test begun today", checks=checks),
         replace(STATE, hits=(earlier, DOUBLE), checks=checks, resumed="going on with the test begun today"),
-        replace(STATE, hits=(earlier, DOUBLE), word=Word.NO_DEVICE, reason=away, checks=checks, resumed="going on"),
+        replace(STATE, hits=(earlier, DOUBLE), word=TapStep.NO_DEVICE, reason=away, checks=checks, resumed="going on"),
     )
     for state in states:
         for _ in range(2):
@@ -199,15 +201,15 @@ def test_lines_for_a_log_tell_everything_once() -> None:
 def test_what_a_trial_hit_says_is_a_line_of_its_own_as_it_is_in_no_list() -> None:
     console = Console(file=io.StringIO(), width=200)
     printer = TapPrinter(Session(replace(STATE, hits=())), console)
-    printer.show(replace(STATE, word=Word.REFUSED, verdict="double hit", trial=True, reason="Bounce back.", hits=()))
-    printer.show(replace(STATE, word=Word.REFUSED, verdict="too soft", reason="Hit harder.", hits=(GOOD,)))
+    printer.show(replace(STATE, word=TapStep.REFUSED, verdict="double hit", trial=True, reason="Bounce back.", hits=()))
+    printer.show(replace(STATE, word=TapStep.REFUSED, verdict="too soft", reason="Hit harder.", hits=(GOOD,)))
     said = console.file.getvalue()  # type: ignore[attr-defined]
     assert said.splitlines() == ["Bounce back.", "  1 / 10  ✓ GOOD  (231 N)"]
 
 
 def test_a_word_ahead_of_its_hit_rings_once_and_the_next_hit_again(terminal: int) -> None:
     screen, file = screen_of(Session())
-    word = replace(STATE, word=Word.GOOD)
+    word = replace(STATE, word=TapStep.GOOD)
     first = replace(word, hits=(*STATE.hits, GOOD))
     second = replace(first, hits=(*first.hits, GOOD))
     bells = []

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from dsm import natural_frequencies
 from lobewatch.cli import app
-from lobewatch.decay.trend import MONTH, Tapped, Trend, day, trend_of
+from lobewatch.decay.trend import MONTH, TapValue, Trend, day, trend_of
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.stories.demo import PlannedTap, plan_taps
 from lobewatch.tap.stories.mounted import mounted_at
@@ -33,7 +33,7 @@ def planned(
 def judged(taps: list[PlannedTap]) -> Trend:
     """What is made of the true frequencies, which scatter."""
     warmth = [tap.conditions.known.get("temperature_c", math.nan) for tap in taps]
-    series = [Tapped(tap.date, tap.truth.frequency, 0.01, warm) for tap, warm in zip(taps, warmth, strict=True)]
+    series = [TapValue(tap.date, tap.truth.frequency, 0.01, warm) for tap, warm in zip(taps, warmth, strict=True)]
     return trend_of(series, taps[-1].date)
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from acquisition import DataError
 from acquisition.files.cut_file import CutSignal
-from lobewatch.cuts.listening.expected_sound import Predicted, predicted
+from lobewatch.cuts.listening.expected_sound import ExpectedSound, expected_sound
 from lobewatch.cuts.listening.folded import modulo
-from lobewatch.cuts.listening.listen_to import Heard, Listened, listen_to
+from lobewatch.cuts.listening.listen_to import CutRecording, CutSound, listen_to
 from lobewatch.history.assembling import or_reason
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine.additions.keep_cut import keep_cut, software
@@ -23,16 +23,16 @@ from lobewatch.tool.assembly import Assembly
 
 
 @dataclass(frozen=True, eq=False)
-class ListenedCut:
+class CutComparison:
     """What was heard beside what the tap tests predict."""
 
     setting: CutSetting
     """What was cut."""
-    heard: Heard
+    heard: CutSound
     """What it sounds like."""
     assembly: Assembly | None
     """The tool as it was tapped; None where it was not and cannot be predicted."""
-    predicted: Predicted | None
+    predicted: ExpectedSound | None
     """By its modes, at the speed that was heard (that was set where none was); None without them."""
 
     @property
@@ -75,10 +75,10 @@ class ListenedCut:
         )
 
 
-def listened(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> ListenedCut:
+def compare_cut(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> CutComparison:
     """Listen to a recording."""
     cut = setting.cut
-    what = Listened(
+    what = CutRecording(
         signal.acceleration,
         signal.sample_rate,
         cut.teeth,
@@ -91,10 +91,10 @@ def listened(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> Listen
     known = or_reason(lambda: logbook.assembly(setting.tool))
     assembly = None if isinstance(known, DataError) or not known.directions else known
     speed = heard.speed_rpm if np.isfinite(heard.speed_rpm) else setting.speed_rpm
-    expected = None if assembly is None else predicted(setting, assembly, speed)
-    return ListenedCut(setting, heard, assembly, expected)
+    expected = None if assembly is None else expected_sound(setting, assembly, speed)
+    return CutComparison(setting, heard, assembly, expected)
 
 
-def keep_listened(folder: MachineFolder, found: ListenedCut, signal: CutSignal, at: datetime | None) -> HeardCut:
+def keep_listened(folder: MachineFolder, found: CutComparison, signal: CutSignal, at: datetime | None) -> HeardCut:
     """Write down what was heard, with its recording; at: when it was cut, None for now. Saved when this returns."""
     return keep_cut(folder, found.as_heard(when_cut(at, datetime.now(UTC))), signal)

@@ -13,7 +13,7 @@ AGED = 0.02
 
 
 @dataclass(frozen=True)
-class Observed:
+class CutEvidence:
     """One test cut in SI units."""
 
     cut: Cut

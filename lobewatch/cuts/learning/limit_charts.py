@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Chart:
+class LimitCharts:
     """Limits of draws of equal weight over the speeds of a grid."""
 
     grid: Grid
@@ -45,7 +45,7 @@ class Chart:
     """Speed times the deepest depth that can be set and is stable (rpm m) for each of them, shape (r, s)."""
 
     @classmethod
-    def of(cls, draws: Draws, grid: Grid) -> Chart:
+    def of(cls, draws: Draws, grid: Grid) -> LimitCharts:
         """Of draws at speed."""
         rows = replace(draws.rows(1.0, grid.cut.tangential, grid.cut.radial), cut=grid.cut)
         deepest = 1e-6 + float(np.max(grid.deepest / grid.trust))

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from dsm.calibration.fit_remark import FitRemark
 from dsm.calibration.identifiability import LEAST_SHARE
 from dsm.calibration.plus_minus import plus_minus
 from dsm.calibration.preload_left import PreloadLeft, preload_left
-from dsm.calibration.remark import Remark
 from dsm.calibration.stiffness_groups import scale_parts
 from dsm.modes.modal_stiffness import modal_stiffness
 from dsm.modes.natural_frequencies import natural_frequencies
@@ -73,13 +73,13 @@ class Calibration:
         return preload_left([new for old, new in pairs if old != new] or self.spindle.bearings, self.factor)
 
     @property
-    def remarks(self) -> tuple[Remark, ...]:
+    def remarks(self) -> tuple[FitRemark, ...]:
         """What makes the stiffness doubtful: a mode that feels next to nothing of these bearings."""
         if self.energy_share >= LEAST_SHARE:
             return ()
         text = f"{100 * self.energy_share:.2g} % of the strain energy of mode {self.mode} is in them: they are open"
         return (
-            Remark(
+            FitRemark(
                 "bearings-not-felt", "bearings", text, "measure another mode; the model may be too soft or too stiff"
             ),
         )

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dsm.calibration.calibration import UnreachableFrequencyError
+from dsm.calibration.fit_remark import FitRemark
 from dsm.calibration.identifiability import CURE, FARTHEST, LEAST_SHARE, Allowed, identifiability, rival_solution
-from dsm.calibration.least_squares import LIMIT, Problem, State, minimize
+from dsm.calibration.least_squares import LIMIT, Iterate, Problem, minimize
 from dsm.calibration.measured import check_measured
-from dsm.calibration.remark import Remark
 from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
 from dsm.calibration.stiffness_groups import chosen_groups, scale_groups
 from dsm.modes.natural_frequencies import natural_frequencies
@@ -88,7 +88,7 @@ def fit_stiffness(
     return result
 
 
-def _search(problem: Problem, begin: _Float | None) -> tuple[State, bool]:
+def _search(problem: Problem, begin: _Float | None) -> tuple[Iterate, bool]:
     """The best state, and whether it is a minimum: that of the given start, or of others where that one is poor."""
     size = len(problem.names)
     state, found = minimize(problem, np.zeros(size) if begin is None else begin)
@@ -103,11 +103,11 @@ def _search(problem: Problem, begin: _Float | None) -> tuple[State, bool]:
     return state, found
 
 
-def _without_unfelt(problem: Problem, state: State) -> tuple[State, bool]:
+def _without_unfelt(problem: Problem, state: Iterate) -> tuple[Iterate, bool]:
     """A fit with the factors of which next to nothing is felt at what was given, or as near as the frequencies allow.
 
-    Such factors run off, to the end of what is allowed or to where rounding ends the search. State and False where
-    there are none, or nothing fits.
+    Such factors run off, to the end of what is allowed or to where rounding ends the search. What was given and False
+    where there are none, or nothing fits.
     """
     away = np.flatnonzero(np.max(state.share, axis=0) < LEAST_SHARE)
     if away.size == 0:
@@ -121,7 +121,7 @@ def _without_unfelt(problem: Problem, state: State) -> tuple[State, bool]:
     return state, False
 
 
-def _better(problem: Problem, state: State) -> tuple[State, State | None]:
+def _better(problem: Problem, state: Iterate) -> tuple[Iterate, Iterate | None]:
     """The solution, or a rival that fits better by more than 95 % intervals allow; with it what rival is left."""
     for _ in range(OTHER_STARTS):
         rival = rival_solution(problem, state, _covariance(problem, state))
@@ -131,7 +131,7 @@ def _better(problem: Problem, state: State) -> tuple[State, State | None]:
     return state, rival
 
 
-def _result(problem: Problem, state: State, found: bool, rival: State | None) -> StiffnessFit:
+def _result(problem: Problem, state: Iterate, found: bool, rival: Iterate | None) -> StiffnessFit:
     measured = problem.measured
     covariance = _covariance(problem, state)
     unsure = identifiability(problem, state, rival, covariance) if found else []
@@ -151,7 +151,7 @@ def _result(problem: Problem, state: State, found: bool, rival: State | None) ->
     )
 
 
-def _covariance(problem: Problem, state: State) -> _Float | None:
+def _covariance(problem: Problem, state: Iterate) -> _Float | None:
     """(J^T J)^-1, times the variance of the residuals where no standard errors were given.
 
     A group that is not felt, known to a factor of 30 at best, counts as known to that and independent of all others.
@@ -177,7 +177,7 @@ def _inverse(slope: _Float) -> _Float:
     return np.asarray(root @ root.T)
 
 
-def _alike(problem: Problem, state: State) -> list[Remark]:
+def _alike(problem: Problem, state: Iterate) -> list[FitRemark]:
     """Groups that change the frequencies in the same ratio, however much they do."""
     if np.any(np.max(state.share, axis=0) < LEAST_SHARE):
         return []
@@ -188,10 +188,10 @@ def _alike(problem: Problem, state: State) -> list[Remark]:
     weakest = np.abs(np.linalg.svd(ratio)[2][-1])
     mixed = ", ".join(name for name, part in zip(problem.names, weakest, strict=True) if part > 0.3)
     text = f"the measured modes hardly tell their stiffness apart (condition number {condition:.2g})"
-    return [Remark("groups-alike", mixed, text, CURE)]
+    return [FitRemark("groups-alike", mixed, text, CURE)]
 
 
-def _close_modes(problem: Problem, state: State) -> list[Remark]:
+def _close_modes(problem: Problem, state: Iterate) -> list[FitRemark]:
     """Pairs of neighbours with a measured one among them."""
     measured = problem.measured
     remarks = []
@@ -199,7 +199,7 @@ def _close_modes(problem: Problem, state: State) -> list[Remark]:
         gap, seen = np.diff(frequency) / frequency[1:], measured.mode[measured.shaft == number]
         where = f" of spindle {number + 1}" if len(state.frequency) > 1 else ""
         remarks += [
-            Remark(
+            FitRemark(
                 "modes-exchange-shapes",
                 f"modes {low} and {low + 1}{where}",
                 f"they are {100 * gap[low - 1]:.2g} % apart in the fitted model and exchange shapes there: standard "
@@ -212,13 +212,13 @@ def _close_modes(problem: Problem, state: State) -> list[Remark]:
     return remarks
 
 
-def _misfit(problem: Problem, state: State) -> list[Remark]:
+def _misfit(problem: Problem, state: Iterate) -> list[FitRemark]:
     if problem.fits(state):
         return []
     measured = problem.measured
     worst = float(np.max(np.abs(state.residual * measured.scale / measured.frequency)))
     text = f"the frequencies do not fit, by up to {100 * worst:.2g} %; standard errors leave a wrong model out"
-    return [Remark("frequencies-misfit", "", text, "check geometry, mode numbers and standard errors")]
+    return [FitRemark("frequencies-misfit", "", text, "check geometry, mode numbers and standard errors")]
 
 
 def _require_reachable(problem: Problem) -> None:

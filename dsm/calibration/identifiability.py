@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri, stdtrit
 
-from dsm.calibration.least_squares import Problem, State, minimize
-from dsm.calibration.remark import Remark
+from dsm.calibration.fit_remark import FitRemark
+from dsm.calibration.least_squares import Iterate, Problem, minimize
 
 _Float = NDArray[np.float64]
 
@@ -46,7 +46,7 @@ class Allowed(NamedTuple):
     """Student's t^2."""
 
     @classmethod
-    def of(cls, problem: Problem, best: State) -> Allowed:
+    def of(cls, problem: Problem, best: Iterate) -> Allowed:
         """For a fit with a covariance."""
         given = problem.measured.std is not None
         variance = 1.0 if given else best.cost / problem.spare
@@ -58,7 +58,9 @@ class Allowed(NamedTuple):
         return self.variance * self.rise
 
 
-def identifiability(problem: Problem, best: State, rival: State | None, log_covariance: _Float | None) -> list[Remark]:
+def identifiability(
+    problem: Problem, best: Iterate, rival: Iterate | None, log_covariance: _Float | None
+) -> list[FitRemark]:
     """Remarks on groups whose factor the frequencies leave open.
 
     For each group the least sum of squares over all other factors, S(v), belongs to the logarithm v of its own. The
@@ -77,18 +79,18 @@ def identifiability(problem: Problem, best: State, rival: State | None, log_cova
         share = float(np.max(best.share[:, index]))
         if share < LEAST_SHARE:
             text = f"at most {100 * share:.2g} % of the strain energy of the measured modes is in it"
-            found.append(Remark("group-not-felt", name, text, CURE))
+            found.append(FitRemark("group-not-felt", name, text, CURE))
         elif log_covariance is not None:
             text = _open(problem, best, log_covariance, index, felt[index] < LITTLE_SHARE)
-            found += [Remark("stiffness-ambiguous", name, text, CURE)] if text else []
+            found += [FitRemark("stiffness-ambiguous", name, text, CURE)] if text else []
     if not found and rival is not None:
         factors = ", ".join(f"{math.exp(value):.3g}" for value in rival.log_factor)
         text = f"another solution fits as well: factors {factors}"
-        found = [Remark("stiffness-ambiguous", ", ".join(problem.names), text, CURE)]
+        found = [FitRemark("stiffness-ambiguous", ", ".join(problem.names), text, CURE)]
     return found
 
 
-def rival_solution(problem: Problem, best: State, log_covariance: _Float | None) -> State | None:
+def rival_solution(problem: Problem, best: Iterate, log_covariance: _Float | None) -> Iterate | None:
     """The best other minimum, far outside the intervals of the factors found, whose sum of squares they do not exclude.
 
     Such as that of a nearly symmetric shaft; it is looked for along the direction that is known least. It may fit
@@ -108,7 +110,7 @@ def rival_solution(problem: Problem, best: State, log_covariance: _Float | None)
     return min(rivals, key=lambda state: state.cost, default=None)
 
 
-def _felt(problem: Problem, best: State) -> _Float:
+def _felt(problem: Problem, best: Iterate) -> _Float:
     """Least share, of what was found, what was given and half-way, of each group in the mode that has most of it."""
     states = [best]
     for share in (0.0, 0.5):
@@ -117,7 +119,7 @@ def _felt(problem: Problem, best: State) -> _Float:
     return np.asarray(np.min([np.max(state.share, axis=0) for state in states], axis=0))
 
 
-def _open(problem: Problem, best: State, log_covariance: _Float, index: int, far: bool) -> str:
+def _open(problem: Problem, best: Iterate, log_covariance: _Float, index: int, far: bool) -> str:
     """What is wrong with the interval of one factor, in words; empty where nothing is."""
     allowed = Allowed.of(problem, best)
     half = math.sqrt(allowed.rise * float(log_covariance[index, index]))
@@ -146,7 +148,7 @@ def _held(rises: Sequence[float]) -> float:
     return float(1 - ndtr(-deviates[0]) - ndtr(-deviates[1]))
 
 
-def _elsewhere(problem: Problem, best: State, fixed: Sequence[int], ends: Sequence[State], limit: float) -> str:
+def _elsewhere(problem: Problem, best: Iterate, fixed: Sequence[int], ends: Sequence[Iterate], limit: float) -> str:
     """Where beyond its ends the first fixed factor fits as well, in words; empty where it does not."""
     for side, end in zip((-1, 1), ends, strict=True):
         for place, cost in _beyond(problem, best, end, fixed, side):
@@ -155,13 +157,13 @@ def _elsewhere(problem: Problem, best: State, fixed: Sequence[int], ends: Sequen
     return ""
 
 
-def _tolerance(problem: Problem, best: State) -> float:
+def _tolerance(problem: Problem, best: Iterate) -> float:
     error = math.sqrt(best.cost / problem.spare) if problem.measured.std is None else 1.0
     return TOLERANCE * error * float(np.min(problem.measured.scale / problem.measured.frequency))
 
 
 def _beyond(
-    problem: Problem, best: State, end: State, fixed: Sequence[int], side: int
+    problem: Problem, best: Iterate, end: Iterate, fixed: Sequence[int], side: int
 ) -> Iterator[tuple[float, float]]:
     """Distances from the factor found (logarithm) beyond an end of its interval, and the least cost there."""
     index = fixed[0]

@@ -31,7 +31,7 @@ UNLIKELY = 1e-3
 """A chi-square with less probability than this is reported; where there is none, a larger relative residual."""
 
 
-class State(NamedTuple):
+class Iterate(NamedTuple):
     """The model at one choice of factors."""
 
     log_factor: _Float
@@ -70,7 +70,7 @@ class Problem(NamedTuple):
         """Modes less factors."""
         return self.measured.frequency.size - len(self.names)
 
-    def evaluate(self, log_factor: _Float) -> State:
+    def evaluate(self, log_factor: _Float) -> Iterate:
         """The model with these factors; certified modes."""
         measured, factors = self.measured, dict(zip(self.names, np.exp(log_factor).tolist(), strict=True))
         scaled = tuple(scale_groups(spindle, factors) for spindle in self.spindles)
@@ -83,9 +83,9 @@ class Problem(NamedTuple):
             known.append(modes.frequency)
             fitted[here], share[here] = modes.frequency[wanted], group_shares(modes, self.names)[wanted]
         residual, slope = (fitted - measured.frequency) / measured.scale, fitted / measured.scale / 2
-        return State(log_factor, scaled, tuple(known), fitted, share, residual, slope[:, np.newaxis] * share)
+        return Iterate(log_factor, scaled, tuple(known), fitted, share, residual, slope[:, np.newaxis] * share)
 
-    def fits(self, state: State) -> bool:
+    def fits(self, state: Iterate) -> bool:
         """Whether the residuals are of the size that is to be expected."""
         measured = self.measured
         if measured.std is None:
@@ -95,7 +95,7 @@ class Problem(NamedTuple):
 
 def minimize(
     problem: Problem, start: _Float, fixed: int | Sequence[int] = (), converged: float = CONVERGED
-) -> tuple[State, bool]:
+) -> tuple[Iterate, bool]:
     """The last state on the way down from a start by Levenberg and Marquardt, and whether it is a minimum.
 
     fixed: indices of factors that stay. converged: the change of frequencies that ends it.
@@ -123,14 +123,14 @@ def minimize(
     return state, False
 
 
-def _hidden(problem: Problem, state: State, free: NDArray[np.int_]) -> bool:
+def _hidden(problem: Problem, state: Iterate, free: NDArray[np.int_]) -> bool:
     """Whether the sum of squares falls, by the step of Gauss and Newton, by no more than rounding changes it."""
     left = state.residual + state.slope @ _step(state, free, 0.0)
     blur = ROUNDING * float(np.linalg.norm(state.fitted / problem.measured.scale))
     return state.cost - float(left @ left) <= 2 * math.sqrt(state.cost) * blur + blur**2
 
 
-def _step(state: State, free: NDArray[np.int_], damping: float) -> _Float:
+def _step(state: Iterate, free: NDArray[np.int_], damping: float) -> _Float:
     """Step of Levenberg and Marquardt; with damping 0 that of Gauss and Newton."""
     slope = state.slope[:, free]
     weight = math.sqrt(damping) * np.linalg.norm(slope, 2)

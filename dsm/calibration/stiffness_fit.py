@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dsm.calibration.fit_remark import FitRemark
 from dsm.calibration.plus_minus import plus_minus
-from dsm.calibration.remark import Remark
 from dsm.calibration.stiffness_groups import group_stiffness, is_tilting, scale_groups
 from dsm.spindle.spindle import Spindle
 
@@ -46,7 +46,7 @@ class StiffnessFit:
     """
     energy_share: _Float
     """Share of each group in the strain energy of each mode (-), shape (n, g); twice d ln f / d ln factor."""
-    remarks: tuple[Remark, ...]
+    remarks: tuple[FitRemark, ...]
     """What makes the result doubtful, and what to do about it."""
     shaft: NDArray[np.int_]
     """Which spindle each mode was measured on, shape (n,); 0 is the first."""

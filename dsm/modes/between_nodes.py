@@ -14,7 +14,7 @@ from dsm.spindle.spindle import Theory
 _Float = NDArray[np.float64]
 
 
-class State(NamedTuple):
+class StateVectors(NamedTuple):
     """Motion and internal forces of modes at places, shape (n_modes, n_places) each."""
 
     deflection: _Float
@@ -35,7 +35,7 @@ def between_nodes(
     shape: tuple[_Float, _Float],
     places: _Float,
     left: NDArray[np.int_],
-) -> State:
+) -> StateVectors:
     """The modes of a shaft at rest inside its elements, exact.
 
     frequency (Hz), shape (n_modes,); position of the nodes (m) and the shape (deflection, slope) there, (n_modes,
@@ -51,4 +51,4 @@ def between_nodes(
     near, far = (np.stack([values[:, node] for values in shape], axis=-1) for node in (left, left + 1))
     strain = far[..., np.newaxis] - whole[..., :2, :2] @ near[..., np.newaxis]
     forces = np.linalg.solve(whole[..., :2, 2:], strain)
-    return State(*np.moveaxis((part @ np.concatenate([near[..., np.newaxis], forces], axis=2))[..., 0], 2, 0))
+    return StateVectors(*np.moveaxis((part @ np.concatenate([near[..., np.newaxis], forces], axis=2))[..., 0], 2, 0))

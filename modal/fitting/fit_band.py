@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from modal.fitting.band_fit import Array, BandFit, ComplexArray
-from modal.fitting.projected_band import ProjectedBand, State, projected_band
+from modal.fitting.projected_band import FitAtPoles, ProjectedBand, projected_band
 from modal.fitting.residual_terms import LEAST_TERMS
 
 AKAIKE = 2.0
@@ -77,7 +77,7 @@ def _poles_of_real(fit: BandFit) -> Array:
     return moved if np.all(moved > 0) and np.all(moved[1] < 1) else fit.poles
 
 
-def _fit_of(state: State, influence: Array) -> BandFit:
+def _fit_of(state: FitAtPoles, influence: Array) -> BandFit:
     return BandFit(
         state.poles[0],
         state.poles[1],
@@ -89,7 +89,7 @@ def _fit_of(state: State, influence: Array) -> BandFit:
     )
 
 
-def _solved(band: ProjectedBand, starts: Array, is_complex: bool) -> State | None:
+def _solved(band: ProjectedBand, starts: Array, is_complex: bool) -> FitAtPoles | None:
     """Levenberg-Marquardt; None where it does not converge."""
     state, damping = band.at(starts, is_complex), 1e-4
     for _ in range(MOST_TRIALS):
@@ -108,7 +108,7 @@ def _solved(band: ProjectedBand, starts: Array, is_complex: bool) -> State | Non
     return None
 
 
-def _step(state: State, damping: float) -> tuple[Array, float]:
+def _step(state: FitAtPoles, damping: float) -> tuple[Array, float]:
     """Damped Gauss-Newton step in units of the scale, shape (2 m,), and the fall of the cost that it promises."""
     jacobian = state.jacobian
     gram = jacobian.T @ jacobian
@@ -119,7 +119,7 @@ def _step(state: State, damping: float) -> tuple[Array, float]:
     return step, float(step @ gram @ step)
 
 
-def _influence(state: State) -> Array | None:
+def _influence(state: FitAtPoles) -> Array | None:
     """Of the weighted FRFs on the errors of a complex fit; None where an unknown cannot be told from the others."""
     jacobian = state.jacobian
     norm = np.linalg.norm(jacobian, axis=0)

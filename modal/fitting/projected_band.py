@@ -39,7 +39,7 @@ class Projected:
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class FitAtPoles:
     """All FRFs of a band at given poles."""
 
     poles: Array
@@ -93,9 +93,9 @@ class ProjectedBand:
     data: list[Array]
     """What they leave of each weighted FRF, (2 n,)."""
 
-    def at(self, poles: Array, is_complex: bool) -> State:
+    def at(self, poles: Array, is_complex: bool) -> FitAtPoles:
         """The best modal constants at these poles, (2, m)."""
-        return State(poles, list(self._projected(poles, is_complex)))
+        return FitAtPoles(poles, list(self._projected(poles, is_complex)))
 
     def _projected(self, poles: Array, is_complex: bool) -> Iterator[Projected]:
         columns, slopes = _columns(self.frequency, poles, is_complex)

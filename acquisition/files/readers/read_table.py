@@ -53,7 +53,7 @@ class Layout:
 
 
 @dataclass(frozen=True)
-class Lines:
+class NumberedLines:
     """Some lines of a file."""
 
     texts: Sequence[str]
@@ -61,9 +61,9 @@ class Lines:
     numbers: Sequence[int]
     """Of each, from 1 on."""
 
-    def __getitem__(self, part: slice) -> Lines:
+    def __getitem__(self, part: slice) -> NumberedLines:
         """Some of them."""
-        return Lines(self.texts[part], self.numbers[part])
+        return NumberedLines(self.texts[part], self.numbers[part])
 
 
 def read_table(path: Path) -> Contents:
@@ -83,18 +83,18 @@ def read_table(path: Path) -> Contents:
     return _contents(path, layout, values)
 
 
-def _lines(text: str) -> tuple[Lines, list[str]]:
+def _lines(text: str) -> tuple[NumberedLines, list[str]]:
     """Those that are not empty, and what stands behind # in others."""
     texts = text.splitlines()
     if "#" not in text and all(map(str.strip, texts)):
-        return Lines(texts, range(1, len(texts) + 1)), []
+        return NumberedLines(texts, range(1, len(texts) + 1)), []
     there = [(line, number) for number, line in enumerate(texts, 1) if line.strip()]
     comments = [line.strip()[1:] for line, _ in there if line.lstrip().startswith("#")]
     there = [one for one in there if not one[0].lstrip().startswith("#")]
-    return Lines([line for line, _ in there], [number for _, number in there]), comments
+    return NumberedLines([line for line, _ in there], [number for _, number in there]), comments
 
 
-def _layout(path: Path, lines: Lines) -> tuple[int, Layout]:
+def _layout(path: Path, lines: NumberedLines) -> tuple[int, Layout]:
     """Where the rows begin, how they are written, and the heading above them."""
     texts = lines.texts
     first = next((i for i, line in enumerate(texts) if _starts_with_number(_dialect([line]), line)), None)
@@ -158,7 +158,7 @@ def _behind(layout: Layout, rows: Sequence[str]) -> list[str]:
     return names if len(names) == width else []
 
 
-def _values(path: Path, layout: Layout, rows: Lines, width: int) -> NDArray[np.float64]:
+def _values(path: Path, layout: Layout, rows: NumberedLines, width: int) -> NDArray[np.float64]:
     """Shape (n_columns, n_rows)."""
     known = _at_once(layout, rows.texts, width)
     return _one_by_one(path, layout, rows, width) if known is None else known
@@ -180,7 +180,7 @@ def _at_once(layout: Layout, rows: Sequence[str], width: int) -> NDArray[np.floa
     return np.array(values).reshape(len(rows), width).T
 
 
-def _one_by_one(path: Path, layout: Layout, rows: Lines, width: int) -> NDArray[np.float64]:
+def _one_by_one(path: Path, layout: Layout, rows: NumberedLines, width: int) -> NDArray[np.float64]:
     values = np.empty((len(rows.texts), width))
     for i, (line, number) in enumerate(zip(rows.texts, rows.numbers, strict=True)):
         words = _trimmed(layout, line)

@@ -28,7 +28,7 @@ _DATES = ("%d-%b-%y %H:%M:%S", "%d-%b-%Y %H:%M:%S", "%d-%b-%y", "%d-%b-%Y", "%Y-
 
 
 @dataclass(frozen=True)
-class Found:
+class DataSets:
     """What the data sets of a file hold."""
 
     functions: Sequence[Function]
@@ -41,7 +41,7 @@ class Found:
 
 def read_uff(path: Path) -> Contents:
     """Its FRFs with their coherence, or its signals over time; DataError with the data set where it is damaged."""
-    found = _found(path, path.read_bytes())
+    found = _data_sets(path, path.read_bytes())
     frfs = [one for one in found.functions if one.type == _FRF]
     kinds = sorted({one.type for one in found.functions} - {_TIME, _FRF, _COHERENCE})
     signals = list(_frf_signals(found, frfs)) if frfs else list(_time_signals(found))
@@ -62,7 +62,7 @@ def read_uff(path: Path) -> Contents:
     )
 
 
-def _found(path: Path, content: bytes) -> Found:
+def _data_sets(path: Path, content: bytes) -> DataSets:
     functions, system, models, at = list[Function](), None, dict[str, None](), 0
     while (opening := _MARK.match(content, at)) is not None:
         begin = opening.end()
@@ -86,10 +86,10 @@ def _found(path: Path, content: bytes) -> Found:
         at = closing.end()
     if content[at:].strip():
         raise DataError(f"{path}: {content[at:].strip()[:20]!r} stands behind its last data set; it is damaged")
-    return Found(functions, system, tuple(models))
+    return DataSets(functions, system, tuple(models))
 
 
-def _frf_signals(found: Found, frfs: Sequence[Function]) -> Iterator[Signal]:
+def _frf_signals(found: DataSets, frfs: Sequence[Function]) -> Iterator[Signal]:
     """Each in a record of its own, turned to the positive direction of both axes."""
     for record, one in enumerate(frfs):
         unit, quantity = _frf_unit(one, found.system)
@@ -113,7 +113,7 @@ def _frf_unit(one: Function, system: tuple[str, str] | None) -> tuple[str, str]:
     return (f"({top})/({below})" if top and below else top), quantity
 
 
-def _time_signals(found: Found) -> Iterator[Signal]:
+def _time_signals(found: DataSets) -> Iterator[Signal]:
     """Channels; where one comes again, the next hit begins."""
     record, seen = 0, set[tuple[object, ...]]()
     for one in (function for function in found.functions if function.type == _TIME):
@@ -131,7 +131,7 @@ def _time_signals(found: Found) -> Iterator[Signal]:
             yield Signal("time", one.abscissa, "time", one.abscissa_axis.unit or "s", record=record)
 
 
-def _direction(found: Found) -> str:
+def _direction(found: DataSets) -> str:
     """At the tool tip, where all responses have the same."""
     responses = {abs(one.response_direction) for one in found.functions if one.ordinate.type in _MOTIONS}
     return {1: "x", 2: "y", 3: "z"}.get(responses.pop(), "") if len(responses) == 1 else ""

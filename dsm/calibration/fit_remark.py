@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Remark:
+class FitRemark:
     """One thing to know. Programs look at `code` and `about`; `text` and `cure` are for people and may be reworded."""
 
     code: str

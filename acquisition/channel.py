@@ -29,7 +29,7 @@ class Channel:
     """One sensor on one input: all that turns a voltage into a force or an acceleration."""
 
     quantity: ChannelQuantity
-    """What the sensor measures."""
+    """Quantity that the sensor measures."""
     sensitivity: float
     """V per N (force) or V per m/s^2 (acceleration); signed."""
     full_scale: float
@@ -39,11 +39,11 @@ class Channel:
     direction: TapDirection | Literal[""] = ""
     """Direction at the tool tip; empty where it is not fixed."""
     serial_number: str = ""
-    """Of the sensor."""
+    """Serial number of the sensor."""
     calibration_date: str = ""
     """ISO date of the sensor's calibration; empty where not known."""
     skew: float = 0.0
-    """This channel is sampled so much later than channel 0 (s): its value k is taken at t_k + skew."""
+    """Delay of sampling against channel 0 (s): value k of this channel is taken at t_k + skew."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be a channel."""
@@ -91,7 +91,7 @@ class SensorInput:
     """A sensor on a numbered input of a device that does not know what is plugged in there."""
 
     number: int
-    """As printed beside the terminals."""
+    """Number of the input, as printed beside the terminals."""
     channel: Channel
     """The sensor; its full scale is the range to set."""
 

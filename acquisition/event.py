@@ -23,6 +23,6 @@ class Event:
     begins: bool = True
     """Pressed, or a fault has come; False: released, or the fault has gone."""
     channel: int | None = None
-    """Whose cable or sensor; None for none."""
+    """Channel of the cable or sensor; None for none."""
     scan: int = 0
-    """When: scans taken since the start of the stream."""
+    """Time of the event, in scans taken since the start of the stream."""

@@ -99,7 +99,7 @@ class Hit:
     codes: NDArray[np.int32] | None = None
     """Raw ADC codes, shape (2, n), force first; None where the recording has none."""
     overload: int = 0
-    """What the device itself reports as overloaded: bit 0 the force, bit 1 the response."""
+    """Overloads that the device itself reports: bit 0 the force, bit 1 the response."""
 
     def __post_init__(self) -> None:
         """Convert to arrays and check them."""

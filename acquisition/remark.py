@@ -11,13 +11,13 @@ class Remark:
     """One thing to know. Programs look at `code` and `about`; `text` and `cure` are for people and may be reworded."""
 
     code: str
-    """What kind of remark it is: words in lower case joined by hyphens, listed in docs/remarks.md, never changed."""
+    """Kind of remark: words in lower case joined by hyphens, listed in docs/remarks.md, never changed."""
     about: str
-    """What it concerns: a program, a tap test, a mode ("1713 Hz"), a channel, a file; empty for the whole."""
+    """Thing it concerns: a program, a tap test, a mode ("1713 Hz"), a channel, a file; empty for the whole."""
     text: str
-    """What is so, with figures and units, without a full stop."""
+    """Finding, with figures and units, without a full stop."""
     cure: str = ""
-    """What to do about it; empty where nothing can be done or need be."""
+    """Advice what to do about it; empty where nothing can be done or need be."""
 
     def __str__(self) -> str:
         """One sentence."""

@@ -24,17 +24,17 @@ class Conditions:
     """What a tap test was taken under, as the shop says it and in its units; None or empty where nobody said."""
 
     temperature_c: float | None = None
-    """Of the spindle (degC)."""
+    """Temperature of the spindle (degC)."""
     stick_out_mm: float | None = None
-    """Of the tool (mm)."""
+    """Stick-out of the tool (mm)."""
     drawbar_kn: float | None = None
     """Force of the drawbar (kN)."""
     state: str = ""
-    """Of the machine, in a word or two of the shop's: "warm", "gearbox low"."""
+    """State of the machine, in a word or two of the shop's: "warm", "gearbox low"."""
     reclamped: bool = False
     """Whether the tool was clamped anew for it; False: nobody said so."""
     note: str = ""
-    """What else is to be remembered."""
+    """Anything else that is to be remembered."""
 
     def __post_init__(self) -> None:
         """Refuse values that no spindle has, and control characters."""
@@ -72,17 +72,17 @@ class Circumstances:
     machine: str
     """Name of the machine."""
     created: datetime
-    """When (timezone-aware)."""
+    """Time of the tap test (timezone-aware)."""
     tool: str = ""
     """Name of the tool or assembly."""
     direction: TapDirection = "x"
     """Direction at the tool tip."""
     operator: str = ""
-    """Who held the hammer."""
+    """Name of the person who held the hammer."""
     machine_toml: str = ""
     """Text of the machine file at that time."""
     device: str = ""
-    """What recorded it: model, serial number and firmware of the DAQ, and how lost scans were found."""
+    """Recording device: model, serial number and firmware of the DAQ, and how lost scans were found."""
     conditions: Conditions = UNSAID
     """Temperature, clamping, state; of files without them, unknown."""
 
@@ -98,11 +98,11 @@ class SourceFile:
     """The recording that a replayed tap test was read from."""
 
     name: str
-    """Its name, without folder."""
+    """Name of the file, without folder."""
     content: bytes
-    """Its bytes; none where it was a live tap test of ours, all of whose hits the replayed one holds."""
+    """Bytes of the file; none where it was a live tap test of ours, all of whose hits the replayed one holds."""
     digest: str = ""
-    """Its SHA-256 where the bytes are not kept."""
+    """SHA-256 of the file where the bytes are not kept."""
 
     @property
     def sha256(self) -> str:
@@ -122,7 +122,7 @@ class TapTest:
     id: str
     """UTC time to the microsecond, machine, tool, direction and four random hex digits."""
     circumstances: Circumstances
-    """Who, what, when."""
+    """Circumstances: who, what, when."""
     frf: Frf
     """The averaged FRF."""
     hits: tuple[Hit, ...] = ()
@@ -130,7 +130,7 @@ class TapTest:
     flags: tuple[HitFlags, ...] = ()
     """The verdict on each hit."""
     source: SourceFile | None = None
-    """Where it was read from, for a replay."""
+    """File it was read from, for a replay."""
 
     @property
     def accepted(self) -> tuple[Hit, ...]:

@@ -25,9 +25,9 @@ class Coefficients:
     radial_edge: float = float("nan")
     """Radial edge coefficient Kre (N/m); nan where not published."""
     note: str = ""
-    """What to know before use."""
+    """Note on what to know before use."""
     source: str = ""
-    """Where it was published."""
+    """Publication that they stand in."""
     alloy: str = ""
     """The material without temper, tool and coolant, e.g. "Al 7075"; empty where it is not known."""
 

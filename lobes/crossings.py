@@ -61,9 +61,9 @@ class _Steps:
     at_low: Floats
     at_high: Floats
     before: Floats
-    """Steepness of growth in the step before ..."""
+    """Steepness of growth in the step before."""
     after: Floats
-    """... and in the one after."""
+    """Steepness of growth in the step after."""
 
     def __getitem__(self, which: NDArray[np.bool_]) -> _Steps:
         return _Steps(*(getattr(self, field.name)[which] for field in fields(self)))

@@ -26,7 +26,7 @@ class Cut:
     immersion: float
     """Radial depth of cut over cutter diameter, above 0 up to 1 (a slot)."""
     direction: Direction
-    """"up" (conventional) or "down" (climb) milling; no difference in a slot."""
+    """Direction of milling, "up" (conventional) or "down" (climb); no difference in a slot."""
     tangential: float
     """Tangential cutting coefficient Kt (Pa)."""
     radial: float

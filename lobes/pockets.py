@@ -20,20 +20,20 @@ class Pocket(NamedTuple):
     speed_rpm: float
     """Speed of its deepest point (rpm), the middle of a flat one."""
     depth: float
-    """Its limit (m), or the deepest cut of interest where that is less."""
+    """Limit at that speed (m), or the deepest cut of interest where that is less."""
     from_rpm: float
-    """Slowest speed around it from which on the limit is SHARE of its depth or more (rpm) ..."""
+    """Slowest speed around it from which on the limit is SHARE of its depth or more (rpm)."""
     to_rpm: float
-    """... and the fastest up to which it is; an end of the range of speeds where it is so up to there."""
+    """Fastest speed around it up to which it is (rpm); an end of the range of speeds where it is so up to there."""
 
 
 class PocketShift(NamedTuple):
     """A pocket then and now."""
 
     then: Pocket
-    """Where it was."""
+    """Pocket as it was."""
     now: Pocket
-    """Where it is."""
+    """Pocket as it is."""
 
     @property
     def speed_change(self) -> float:

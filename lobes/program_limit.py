@@ -30,11 +30,11 @@ class ProgramLimit:
     chatter_frequency: float
     """Frequency that is heard at the limit (Hz); nan where there is none."""
     kind: str
-    """"hopf", "flip" or ""."""
+    """Kind of instability: "hopf", "flip" or ""."""
     method: MethodName
-    """How it was found."""
+    """Method it was found by."""
     detail: str
-    """Into how many pieces the tooth period was divided."""
+    """Detail of the method: into how many pieces the tooth period was divided."""
     pieces: int
     """The same as a number."""
     feed_angle: float

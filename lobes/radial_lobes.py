@@ -24,9 +24,9 @@ class RadialLobes:
     depth: NDArray[np.float64]
     """Limiting depths (m), shape (r, n); inf where there is no limit."""
     method: MethodName
-    """How the limits were found."""
+    """Method that the limits were found by."""
     remarks: tuple[Remark, ...]
-    """What is wrong with the method at the smallest immersion."""
+    """Remarks on what is wrong with the method at the smallest immersion."""
 
 
 def radial_lobes(limits: Callable[[Cut], StabilityLobes], cut: Cut, immersion: ArrayLike) -> RadialLobes:

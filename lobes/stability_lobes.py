@@ -59,13 +59,13 @@ class StabilityLobes:
     crossings: NDArray[np.float64]
     """Depths where stability changes, rising in each row and filled up with inf (m), shape (n, k)."""
     method: MethodName
-    """How the limits were found."""
+    """Method that the limits were found by."""
     curves: Callable[[], Iterable[Lobe]] = tuple
-    """Works out `lobes`."""
+    """Function that works out `lobes`."""
     remarks: tuple[Remark, ...] = ()
-    """Why the method or the FRF is out of its range for this cut, and what to do."""
+    """Reasons why the method or the FRF is out of its range for this cut, and what to do."""
     detail: str = ""
-    """What else is to be known of the method: into how many pieces the tooth period was divided."""
+    """Detail of the method: into how many pieces the tooth period was divided."""
 
     def __post_init__(self) -> None:
         """Check shapes and values."""

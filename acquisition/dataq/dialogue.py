@@ -29,13 +29,13 @@ class DataqIdentity:
     """What `info` says."""
 
     model: str
-    """A key of RANGES, e.g. "4108"."""
+    """Model, a key of RANGES, e.g. "4108"."""
     serial: str
     """Serial number."""
     firmware: str
-    """As the device writes it."""
+    """Firmware, as the device writes it."""
     dividend: int
-    """Of the rate formula (Hz)."""
+    """Dividend of the rate formula (Hz)."""
 
     @property
     def identity(self) -> DeviceIdentity:

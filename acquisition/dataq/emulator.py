@@ -44,7 +44,7 @@ class DataqTraits:
     trailing_nul: bool = False
     """Lines end with CR NUL, not with CR alone."""
     digital_word: int = 0x7F00
-    """What the digital inputs give: pulled up where nothing is connected."""
+    """Word of the digital inputs: pulled up where nothing is connected."""
     clock_hz: float | None = None
     """Frequency of a square wave on digital input 0 (Hz)."""
     bits: int = 16
@@ -54,7 +54,7 @@ class DataqTraits:
     echoes_stop: bool = False
     """A `stop` that ends scanning is echoed."""
     stop_takes: float = 0.0
-    """It sends nothing for so long before that echo and what it still had to send (s)."""
+    """Time that it sends nothing before that echo and what it still had to send (s)."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class DataqFaults:
     drop_at: int | None = None
     """Byte of the stream at which bytes are lost."""
     drop_bytes: int = 64
-    """How many."""
+    """Number of bytes that are lost there."""
     stall_after: int | None = None
     """Send nothing more after so many scans."""
     unplug_after: int | None = None

@@ -48,21 +48,22 @@ class Driver:
     """One kind of device. Its functions import what they need when they are called: a list of drivers costs nothing."""
 
     name: str
-    """As in [daq] driver of machine.toml and in `lobewatch emulate NAME`."""
+    """Name, as in [daq] driver of machine.toml and in `lobewatch emulate NAME`."""
     title: str
-    """A device of this kind, e.g. "a TAPS/1 device"."""
+    """Words for a device of this kind, e.g. "a TAPS/1 device"."""
     open: Callable[[str, DeviceSettings], Device]
-    """A connected device on a port; DeviceError where none is there, ValueError for settings that it does not have."""
+    """Function that connects to a device on a port; DeviceError where none is there, ValueError for settings that it
+    does not have."""
     probe: Callable[[SerialLink], DeviceIdentity | None]
-    """Who answers on an open link, asked once; None where no device of this kind does."""
+    """Function that asks once who answers on an open link; None where no device of this kind does."""
     check: Callable[[DeviceSettings], None] = anything_goes
-    """ValueError for settings that no device of this kind has; its sensors are checked already."""
+    """Function that raises ValueError for settings that no device of this kind has; its sensors are checked already."""
     sensors: SensorPlace | None = None
-    """Where the device keeps the data of its sensors; None: it has none, [[daq.channel]] must name them."""
+    """Place of the data of its sensors in the device; None: it has none, [[daq.channel]] must name them."""
     vendors: frozenset[int] = frozenset()
     """USB vendors of such devices, to which no other question is put; none where they may be of any vendor, or of one
     whose boards others build on too."""
     emulate: Callable[[Bench], EmulatorThread] | None = None
-    """A device of this kind made of software."""
+    """Function that makes a device of this kind of software."""
     emulates_fast: bool = False
     """Whether the emulated device can tell the host that its scans do not follow the clock."""

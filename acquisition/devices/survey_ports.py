@@ -18,13 +18,13 @@ class SeenPort:
     """A port and what came of asking there."""
 
     port: PortInfo
-    """What the system knows of it."""
+    """Port, as the system knows it."""
     answer: Answer | None = None
-    """Who answers; None for nobody."""
+    """Answer of the device there; None for nobody."""
     text: str = ""
-    """Why nobody does, in a few words."""
+    """Reason why nobody answers, in a few words."""
     problem: str = ""
-    """Why it could not be asked, a sentence with the cure."""
+    """Reason why it could not be asked, a sentence with the cure."""
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class PortSurvey:
     """All ports that were looked at."""
 
     seen: tuple[SeenPort, ...]
-    """One each."""
+    """Ports, and what came of asking at each."""
     remarks: tuple[Remark, ...] = ()
-    """On drivers that cannot be loaded."""
+    """Remarks on drivers that cannot be loaded."""
 
 
 def survey_ports(only: str = "") -> PortSurvey:

@@ -14,14 +14,14 @@ class Bench:
     """What is on the inputs of an emulated device, and how it is to be served."""
 
     signal_at: Callable[[float], Signal]
-    """For a sample rate (Hz): what the sensors feel."""
+    """Function that makes, for a sample rate (Hz), the signal that the sensors feel."""
     inputs: tuple[SensorInput, ...]
     """The sensors, in the order of the signal's rows."""
     sample_rate: float
-    """Of a device that has only one (Hz)."""
+    """Sample rate of a device that has only one (Hz)."""
     realtime: bool = True
-    """False sends as fast as the host reads."""
+    """Whether it sends by the clock; False sends as fast as the host reads."""
     tcp: bool = False
-    """On a TCP port of this computer instead of a pseudo-terminal."""
+    """Whether it serves a TCP port of this computer instead of a pseudo-terminal."""
     digital_clock: bool = False
-    """A square wave is on digital input 0."""
+    """Whether a square wave is on digital input 0."""

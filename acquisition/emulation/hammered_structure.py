@@ -86,13 +86,13 @@ class HammeredStructure:
     """Signal function: (first_scan, n) -> force (N) and acceleration (m/s^2), shape (2, n); call it in order."""
 
     structure: Structure
-    """What is hit."""
+    """Structure that is hit."""
     sample_rate: float
     """Samples a second (Hz)."""
     random: np.random.Generator
     """Source of every random number."""
     hammering: Hammering = field(default_factory=Hammering)
-    """How it is hit."""
+    """Way in which it is hit."""
     _noise: np.random.Generator = field(init=False)
     _next_hit: float = field(default=0.0, init=False)
     _waves: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list, init=False)

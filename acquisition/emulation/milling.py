@@ -42,10 +42,11 @@ class TipMotion:
     sample_rate: float
     """Steps a second (Hz)."""
     acceleration: Floats
-    """Along x and y of the machine (m/s^2), shape (2, n)."""
+    """Acceleration along x and y of the machine (m/s^2), shape (2, n)."""
     wander: float = 0.0
-    """What did not repeat from turn to turn late at full depth, as a share of the rms: 0 for a stable cut, and for a
-    flip of an even number of teeth. A cut above its limit may be stable where run-out keeps teeth out of it."""
+    """Part of the motion that did not repeat from turn to turn late at full depth, as a share of the rms: 0 for a
+    stable cut, and for a flip of an even number of teeth. A cut above its limit may be stable where run-out keeps teeth
+    out of it."""
 
 
 def simulate_cut(cut: MillingCut, passage: Passage | None = None) -> TipMotion:

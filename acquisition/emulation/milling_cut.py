@@ -20,9 +20,9 @@ class MillingCut:
     teeth: int
     """Number of evenly spaced teeth."""
     entry_angle: float
-    """Where a tooth enters the cut (rad), 0 to pi."""
+    """Angle at which a tooth enters the cut (rad), 0 to pi."""
     exit_angle: float
-    """Where it leaves (rad), entry_angle to pi."""
+    """Angle at which it leaves (rad), entry_angle to pi."""
     tangential: float
     """Tangential cutting coefficient Kt (Pa)."""
     radial: float
@@ -36,9 +36,9 @@ class MillingCut:
     x: Structure | None
     """Modes of the tip in x as it turns, its residual left out; None for rigid."""
     y: Structure | None
-    """In y."""
+    """Modes of the tip in y, likewise."""
     runout: tuple[float, ...] = ()
-    """How far each tooth stands out (m), `teeth` of them; none where all stand alike."""
+    """Distance that each tooth stands out (m), `teeth` of them; none where all stand alike."""
     tangential_edge: float = 0.0
     """Tangential force of an edge wherever it is in the arc of cut, whatever its chip (N/m)."""
     radial_edge: float = 0.0
@@ -46,7 +46,7 @@ class MillingCut:
     helix_lag: float = 0.0
     """Lag of a helical tooth along the axis (rad/m); 0 for straight teeth."""
     feed_angle: float = 0.0
-    """From x to the feed (rad)."""
+    """Angle from x to the feed (rad)."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated."""
@@ -79,13 +79,13 @@ class Passage:
     """How the tool goes through the part; raises ValueError for times below 0 and for no cut at all."""
 
     before: float = 0.4
-    """Spindle turning, no cut (s)."""
+    """Time that the spindle turns without a cut (s)."""
     ramp: float = 0.05
-    """While the depth grows from 0 to all of it, and again while it falls (s)."""
+    """Time in which the depth grows from 0 to all of it, and in which it falls again (s)."""
     steady: float = 1.1
-    """At full depth (s)."""
+    """Time at full depth (s)."""
     after: float = 0.2
-    """No cut again (s)."""
+    """Time without a cut again (s)."""
 
     def __post_init__(self) -> None:
         """Refuse times that are none."""

@@ -84,9 +84,9 @@ class CutSound:
     """
 
     motion: TipMotion
-    """Of the tip, from rest to rest."""
+    """Motion of the tip, from rest to rest."""
     housing: Housing
-    """Where the sensor is."""
+    """Housing that the sensor is on."""
     speed_rpm: float
     """True spindle speed (rpm)."""
     sample_rate: float

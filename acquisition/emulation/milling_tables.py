@@ -42,7 +42,7 @@ class ModeTables:
     flight: NDArray[np.complex128]
     """Factor of z over a step, shape (c, m)."""
     axis: Floats
-    """What each mode moves along x and y of the machine, shape (c, 2, m)."""
+    """Motion of the tip along x and y of the machine by each mode, shape (c, 2, m)."""
     step: Floats
     """Length of a step (s), shape (c,)."""
 
@@ -59,13 +59,13 @@ class ToothTables:
     thick: Floats
     """Chip of a rigid tool (m), shape (s, c, e)."""
     place: NDArray[np.int64]
-    """Which pitch after angle 0 the tooth is in, shape (s, c, e)."""
+    """Number of the pitch after angle 0 that the tooth is in, shape (s, c, e)."""
     reach: Floats
-    """How much further a tooth reaches into the part for each mode's displacement, shape (s, c, e, m)."""
+    """Reach of a tooth further into the part by each mode's displacement, shape (s, c, e, m)."""
     push: Floats
-    """What z.real gains in a step from each chip at full depth, shape (s, c, m, e)."""
+    """Gain of z.real in a step from each chip at full depth, shape (s, c, m, e)."""
     rub: Floats
-    """What it gains from all edges in the cut, shape (s, c, m)."""
+    """Gain of z.real in a step from all edges in the cut, shape (s, c, m)."""
 
 
 def tables(cuts: Sequence[MillingCut], steps: int) -> tuple[ModeTables, ToothTables]:

@@ -14,7 +14,7 @@ class Wire(Protocol):
     """Bytes both ways."""
 
     port: str
-    """What the host opens."""
+    """Port that the host opens."""
     pending: bytearray
     """Bytes that wait to be sent."""
 

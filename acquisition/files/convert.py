@@ -26,13 +26,13 @@ class Writer:
     """How a format is written."""
 
     title: str
-    """What people call it."""
+    """Name of the format for people."""
     of_hits: Callable[[Sequence[Hit], Labels], bytes]
-    """Signals over time."""
+    """Function that writes signals over time."""
     of_frf: Callable[[Frf, Labels], bytes] | None
-    """An FRF; None where the format has none."""
+    """Function that writes an FRF; None where the format has none."""
     precision: str
-    """How exact it is, for people."""
+    """Precision of its numbers, for people."""
 
 
 _UFF = Writer("universal file", uff_of_hits, uff_of_frf, "12 digits")
@@ -51,15 +51,15 @@ class Converted:
     """What was written."""
 
     path: Path
-    """Where."""
+    """Path of the new file."""
     title: str
-    """Its format."""
+    """Name of its format, for people."""
     what: str
     """FRF or hits, for people."""
     precision: str
-    """How exact its numbers are."""
+    """Precision of its numbers, for people."""
     recording: Recording
-    """What it was made from."""
+    """Recording that it was made from."""
 
 
 def convert(path: Path | str, out: Path | str, said: Description, *, hits: bool = False) -> Converted:

@@ -29,15 +29,15 @@ class CutSignal:
     """The accelerometer during a cut."""
 
     acceleration: NDArray[np.float64]
-    """m/s^2, shape (n,)."""
+    """Acceleration (m/s^2), shape (n,)."""
     sample_rate: float
-    """Hz."""
+    """Samples a second (Hz)."""
     codes: NDArray[np.int32] | None = None
-    """As the converter gave them, shape (n,); None where a recording of another program holds values."""
+    """Codes of the converter, shape (n,); None where a recording of another program holds values."""
     channel: Channel | None = None
-    """What turns codes into m/s^2."""
+    """Channel that turns codes into m/s^2; None where there are no codes."""
     lost_scans: int = 0
-    """How many are missing in it."""
+    """Number of scans that are missing in it."""
     overload: bool = False
     """Whether the device has told that its input was overloaded."""
 

@@ -17,7 +17,7 @@ class WindowedForce:
     """The samples about the pulse of a hit, tapered; all others are taken as zero."""
 
     samples: slice
-    """Where in the hit."""
+    """Place in the hit."""
     force: NDArray[np.float64]
     """Baseline's mean taken off, times window (N), shape (m,)."""
     window: NDArray[np.float64]

@@ -12,15 +12,15 @@ class PortInfo:
     """What the system knows of a port; pseudo-terminals are never listed."""
 
     device: str
-    """What is opened, e.g. /dev/ttyACM0 or COM3."""
+    """Path or name to open, e.g. /dev/ttyACM0 or COM3."""
     vendor: int | None = None
     """USB vendor; None where it is no USB device."""
     product: int | None = None
     """USB product."""
     serial_number: str = ""
-    """Of the USB device."""
+    """Serial number of the USB device."""
     description: str = ""
-    """In the system's words."""
+    """Description in the system's words."""
 
 
 def list_ports() -> list[PortInfo]:

@@ -33,7 +33,7 @@ class Faults:
     start_streaming: bool = False
     """The device streams already when the host connects."""
     cut_infos: int = 0
-    """So many INFO answers lack their second half."""
+    """Number of INFO answers that lack their second half."""
     overload: int = 0
     """Mask of the channels that every DATA frame reports as overloaded."""
 

@@ -52,13 +52,13 @@ class Frame:
     """One TAPS/1 frame."""
 
     type: int
-    """A MessageType; unknown ones are passed on."""
+    """Number of a MessageType; unknown ones are passed on."""
     seq: int = 0
-    """Counts the frames of one sender, modulo 2^32."""
+    """Count of the frames of one sender, modulo 2^32."""
     body: bytes = b""
-    """What follows the header."""
+    """Bytes behind the header."""
     session: int = 0
-    """Changes at each START."""
+    """Number of the session, another one at each START."""
     flags: int = 0
     """Bit 0: samples were lost before this frame."""
 
@@ -74,9 +74,9 @@ class Status:
     buffer_peak_percent: int
     """Highest filling of the device's buffer (%)."""
     overruns: int
-    """How often that buffer ran over."""
+    """Number of times that buffer ran over."""
     temperature: float
-    """Of the board (degC)."""
+    """Temperature of the board (degC)."""
 
     def encode(self) -> bytes:
         """The body."""

@@ -28,9 +28,9 @@ class Overload:
     """A cut-off signal."""
 
     level: float
-    """Where it was cut off (N or m/s^2)."""
+    """Level at which it was cut off (N or m/s^2)."""
     samples: int
-    """Samples there."""
+    """Number of samples there."""
     inferred: bool
     """Whether this is told by the shape of the signal, not by the codes at the rail of the converter."""
 

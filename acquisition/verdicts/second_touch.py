@@ -31,7 +31,7 @@ class SecondTouch:
     delay: float
     """Samples from the peak of the main pulse, negative where it came before."""
     share: float
-    """Its height against the main pulse."""
+    """Height over that of the main pulse (-)."""
 
 
 def find_second_touch(pulse: Pulse) -> SecondTouch | None:

@@ -45,7 +45,7 @@ class DampingCalibration:
     damping_ratio: float
     """Measured damping ratio (-)."""
     damping_ratio_std: float | None
-    """Its standard error (-); None where it was not given."""
+    """Standard error of the measured damping ratio (-); None where it was not given."""
     mode: int
     """Number of the mode it belongs to; 1 is the lowest without damping."""
     frequency: float
@@ -57,7 +57,7 @@ class DampingCalibration:
     bearing_damping: float
     """Mean viscous damping of the calibrated bearings (N s/m)."""
     bearing_damping_std: float | None
-    """Its standard error from that of the damping ratio (N s/m); None where that was not given."""
+    """Standard error of the bearing damping from that of the damping ratio (N s/m); None where that was not given."""
     sensitivity: float
     """d zeta / d ln c of the mode (-): 1 % more of these dampers adds a hundredth of it to the damping ratio."""
     given: Spindle

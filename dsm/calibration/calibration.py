@@ -37,7 +37,7 @@ class Calibration:
     frequency: float
     """Measured frequency (Hz)."""
     frequency_std: float | None
-    """Its standard error (Hz); None where it was not given."""
+    """Standard error of the measured frequency (Hz); None where it was not given."""
     mode: int
     """Number of the mode it belongs to; 1 is the lowest."""
     bearing_stiffness: float
@@ -46,7 +46,7 @@ class Calibration:
     An equivalent number of this model: compare it only with others of the same geometry and beam theory.
     """
     bearing_stiffness_std: float | None
-    """Its standard error from that of the frequency (N/m); None where that was not given."""
+    """Standard error of the bearing stiffness from that of the frequency (N/m); None where that was not given."""
     factor: float
     """Bearing stiffness after over before, the same for all calibrated bearings (-)."""
     sensitivity: float
@@ -54,7 +54,7 @@ class Calibration:
     given: Spindle
     """The spindle as given."""
     parts: tuple[int, ...]
-    """What was calibrated: places in (*bearings, *joints)."""
+    """Places of the calibrated parts in (*bearings, *joints)."""
 
     @cached_property
     def spindle(self) -> Spindle:

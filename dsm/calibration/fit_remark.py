@@ -10,13 +10,13 @@ class FitRemark:
     """One thing to know. Programs look at `code` and `about`; `text` and `cure` are for people and may be reworded."""
 
     code: str
-    """What kind of remark it is: words in lower case joined by hyphens, never changed."""
+    """Kind of remark: words in lower case joined by hyphens, never changed."""
     about: str
-    """The groups or modes that it concerns; empty for the whole."""
+    """Groups or modes that it concerns; empty for the whole."""
     text: str
-    """What is so, with figures and units, without a full stop."""
+    """Finding, with figures and units, without a full stop."""
     cure: str
-    """What to do about it."""
+    """Advice what to do about it."""
 
     def __str__(self) -> str:
         """One sentence."""

@@ -41,7 +41,7 @@ class Allowed(NamedTuple):
     """By how much a sum of squares may exceed the least one with a factor still inside its 95 % interval."""
 
     variance: float
-    """Of the scaled residuals: 1, or from their scatter where no standard errors were given."""
+    """Variance of the scaled residuals: 1, or from their scatter where no standard errors were given."""
     rise: float
     """Student's t^2."""
 

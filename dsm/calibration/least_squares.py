@@ -39,9 +39,9 @@ class Iterate(NamedTuple):
     spindles: tuple[Spindle, ...]
     """The spindles scaled by them."""
     frequency: tuple[_Float, ...]
-    """Of all modes of each spindle up to the one beyond the highest measured (Hz)."""
+    """Frequencies of all modes of each spindle up to the one beyond the highest measured (Hz)."""
     fitted: _Float
-    """Of the measured modes (Hz), (n,)."""
+    """Frequencies that the model gives the measured modes (Hz), (n,)."""
     share: _Float
     """Energy shares (n, g) of the measured modes."""
     residual: _Float
@@ -59,7 +59,7 @@ class Problem(NamedTuple):
     """Which factors are sought from which frequencies."""
 
     spindles: tuple[Spindle, ...]
-    """As given; those of one group have the same factor in all of them."""
+    """Spindles as given; parts of one group have the same factor in all of them."""
     names: tuple[str, ...]
     """Groups, each with a factor."""
     measured: Measured

@@ -19,11 +19,11 @@ class Measured(NamedTuple):
     mode: NDArray[np.int_]
     """Numbers of the modes, shape (n,); 1 is the lowest."""
     frequency: _Float
-    """Hz, shape (n,)."""
+    """Frequencies (Hz), shape (n,)."""
     std: _Float | None
     """Standard errors (Hz), shape (n,); None where not given."""
     shaft: NDArray[np.int_]
-    """Which of the spindles each belongs to, shape (n,); 0 is the first."""
+    """Number of the spindle that each belongs to, shape (n,); 0 is the first."""
 
     @property
     def scale(self) -> _Float:

@@ -25,11 +25,11 @@ class PredictedMode(NamedTuple):
     frequency: float
     """Natural frequency (Hz)."""
     frequency_std: float | None
-    """Its standard error from those of the stiffnesses (Hz); None where these are not known."""
+    """Standard error of the frequency from those of the stiffnesses (Hz); None where these are not known."""
     stiffness: float
     """Modal stiffness where it is looked at (N/m)."""
     stiffness_std: float | None
-    """Its standard error, likewise (N/m)."""
+    """Standard error of the modal stiffness, likewise (N/m)."""
 
 
 def predict_mode(fit: StiffnessFit, spindle: Spindle, mode: int = 1, position: float = 0.0) -> PredictedMode:

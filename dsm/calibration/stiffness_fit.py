@@ -47,9 +47,9 @@ class StiffnessFit:
     energy_share: _Float
     """Share of each group in the strain energy of each mode (-), shape (n, g); twice d ln f / d ln factor."""
     remarks: tuple[FitRemark, ...]
-    """What makes the result doubtful, and what to do about it."""
+    """Remarks on what makes the result doubtful, and what to do about it."""
     shaft: NDArray[np.int_]
-    """Which spindle each mode was measured on, shape (n,); 0 is the first."""
+    """Number of the spindle that each mode was measured on, shape (n,); 0 is the first."""
     given: tuple[Spindle, ...]
     """The spindles as given."""
     spindles: tuple[Spindle, ...]

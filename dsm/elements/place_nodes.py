@@ -34,7 +34,7 @@ class Nodes(NamedTuple):
     segment: _Indices
     """Index of the segment that each element is part of, shape (n - 1,)."""
     short: NDArray[np.bool_]
-    """Which elements are so short that stiffness alone would drown all else in rounding, shape (n - 1,)."""
+    """Whether an element is so short that stiffness alone would drown all else in rounding, shape (n - 1,)."""
 
 
 def place_nodes(

@@ -46,7 +46,7 @@ class DynamicStiffness:
     held: NDArray[np.bool_]
     """Dofs that cannot move, shape (n_nodes, 2)."""
     scale: NDArray[np.float64]
-    """What rows and columns of a full matrix are multiplied by to be of one size, shape (2 n_nodes,)."""
+    """Factors on rows and columns of a full matrix that make them of one size, shape (2 n_nodes,)."""
     top_frequency: float
     """Highest frequency of interest (Hz)."""
     spin: float | None = None

@@ -24,13 +24,13 @@ class SpindleSide:
     frequency: NDArray[np.float64]
     """Frequencies (Hz), shape (n,)."""
     force_over_deflection: _Complex
-    """N/m, shape (n,)."""
+    """Force over deflection (N/m), shape (n,)."""
     force_over_slope: _Complex
-    """N, shape (n,); the same as moment over deflection."""
+    """Force over slope (N), shape (n,); the same as moment over deflection."""
     moment_over_slope: _Complex
-    """N m, shape (n,)."""
+    """Moment over slope (N m), shape (n,)."""
     loss_factor: float
-    """Of all stiffness; the tool gets the same."""
+    """Loss factor of all stiffness (-); the tool gets the same."""
     theory: Theory
     """Beam theory, which that of the tool must be."""
 

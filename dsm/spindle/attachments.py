@@ -38,7 +38,7 @@ class Bearing:
     """Bearings of one group are calibrated together, in their given ratio; an empty name: known, never calibrated."""
 
     rolling_elements: RollingElements = field(default="balls", kw_only=True)
-    """What rolls in it; of balls, the stiffness says in which range the preload left lies."""
+    """Kind of rolling elements; of balls, the stiffness says in which range the preload left lies."""
 
     @property
     def support_stiffness(self) -> float:

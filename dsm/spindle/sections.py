@@ -57,7 +57,7 @@ class Sections:
     """The segments of a shaft as arrays, from the tool tip on."""
 
     ends: _Float
-    """Where segments begin and end (m), shape (n_segments + 1,)."""
+    """Places where segments begin and end (m), shape (n_segments + 1,)."""
     diameters: _Float
     """Outer at both ends, bore at both ends, outer of the mass at both ends (m), shape (6, n_segments)."""
     material: _Float

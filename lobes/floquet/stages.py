@@ -17,7 +17,7 @@ class Stages(NamedTuple):
     """For s nodes in a piece of length 1."""
 
     node: NDArray[np.float64]
-    """Where they lie, shape (s,)."""
+    """Places of the nodes, shape (s,)."""
     weight: NDArray[np.float64]
     """Integral over the whole piece, shape (s,)."""
     integral: NDArray[np.float64]

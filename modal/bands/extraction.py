@@ -25,11 +25,11 @@ class BandLines:
     """The lines of a band, and what is to be fitted to them."""
 
     lines: slice
-    """Where on the frequency axis."""
+    """Place on the frequency axis."""
     frequency: Array
-    """Of the lines (Hz), shape (lines,)."""
+    """Frequencies of the lines (Hz), shape (lines,)."""
     weight: Array
-    """Of each FRF, shape (p, lines)."""
+    """Weights of each FRF, shape (p, lines)."""
     own: ComplexArray
     """The receptances without the modes of all other bands (m/N), shape (p, lines)."""
 
@@ -44,11 +44,11 @@ class FittedBand:
     """Some neighbouring modes that were fitted together."""
 
     data: BandLines
-    """What they were fitted to."""
+    """Lines and receptances that they were fitted to."""
     resonances: tuple[Resonance, ...]
     """The peaks that the band was laid around."""
     height: Array
-    """What the mobility of each mode is measured against, its own peak or the highest of the band (m/s/N), (m,)."""
+    """Mobility that the one of each mode is measured against, its own peak or the highest of the band (m/s/N), (m,)."""
     fit: BandFit
     """Their values."""
     terms: int
@@ -71,7 +71,7 @@ class Extraction:
     weight: Array
     """Their weights, shape (p, n)."""
     bands: tuple[FittedBand, ...]
-    """By rising frequency."""
+    """Bands by rising frequency."""
 
     @property
     def frf(self) -> Frf:

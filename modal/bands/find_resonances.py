@@ -44,11 +44,11 @@ class Resonance:
     """One peak of the mobility."""
 
     frequency: float
-    """Its highest line (Hz)."""
+    """Frequency of its highest line (Hz)."""
     half_width: float
-    """From there to the nearer half-power point, roughly zeta f_n (Hz)."""
+    """Distance from there to the nearer half-power point, roughly zeta f_n (Hz)."""
     height: float
-    """Of the mobility (m/s/N)."""
+    """Height of the mobility (m/s/N)."""
 
 
 @dataclass(frozen=True)

@@ -24,9 +24,9 @@ class LocalBand:
     """Resonances that are fitted together."""
 
     resonances: tuple[Resonance, ...]
-    """By rising frequency."""
+    """Resonances by rising frequency."""
     lines: slice
-    """Where on the frequency axis."""
+    """Place on the frequency axis."""
 
     @property
     def height(self) -> float:

@@ -23,11 +23,13 @@ class Systematic:
     """What is to be added to the errors of a band."""
 
     factor: float
-    """On the covariance from the residual: real values fitted over those that count as independent; 1 where white."""
+    """Factor on the covariance from the residual: real values fitted over those that count as independent; 1 where
+    white."""
     freedom: float
     """Degrees of freedom that are left."""
     covariance: Array
-    """Of the errors in the order of `BandFit`, by how far other bands and residual terms move them; 0 where white."""
+    """Covariance of the errors in the order of `BandFit`, by how far other bands and residual terms move them; 0 where
+    white."""
 
 
 def systematic(band: FittedBand) -> Systematic:

@@ -31,7 +31,7 @@ class BandFit:
     influence: Array
     """Errors by a change of the weighted FRFs, one Gauss-Newton step with complex constants, (2 m + 2 p m, 2 n p)."""
     residual: Array
-    """Of the weighted FRFs, each its real and then its imaginary part, shape (2 n p,)."""
+    """Residuals of the weighted FRFs, each its real and then its imaginary part, shape (2 n p,)."""
     unasked: Array
     """Phases (rad) that complex constants would have where they were not asked for, shape (p, m); else 0."""
 

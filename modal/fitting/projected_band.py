@@ -30,7 +30,7 @@ class Projected:
     unknowns: int
     """Modal constants and residual terms, real and imaginary parts."""
     slope: Array
-    """By frequencies (in shares of zeta f) and damping ratios (in shares of zeta) of the model, (2 n, 2 m)."""
+    """Slope of the model by frequencies (in shares of zeta f) and damping ratios (in shares of zeta), (2 n, 2 m)."""
 
     @property
     def jacobian(self) -> Array:
@@ -87,11 +87,11 @@ class ProjectedBand:
 
     frequency: Array
     weight: Array
-    """(p, n)."""
+    """Weights, (p, n)."""
     bases: list[Array]
     """Orthonormal basis of the residual terms of each FRF, (2 n, 2 terms)."""
     data: list[Array]
-    """What they leave of each weighted FRF, (2 n,)."""
+    """Values that they leave of each weighted FRF, (2 n,)."""
 
     def at(self, poles: Array, is_complex: bool) -> FitAtPoles:
         """The best modal constants at these poles, (2, m)."""

@@ -30,9 +30,9 @@ class Followed:
     """The mode that continues an earlier one."""
 
     mode: Mode | None
-    """None where no mode is near enough."""
+    """Mode that continues it; None where no mode is near enough."""
     remarks: tuple[Remark, ...]
-    """Why it may be another mode, or why there is none; empty where it is clear."""
+    """Reasons why it may be another mode, or why there is none; empty where it is clear."""
 
 
 def follow(last: Mode, modes: Sequence[Mode]) -> Followed:

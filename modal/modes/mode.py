@@ -41,7 +41,7 @@ class Mode:
     freedom: float = np.inf
     """Degrees of freedom of that covariance: real values fitted less unknowns, all of its band."""
     method: str = ""
-    """How it was found."""
+    """Method it was found by."""
     jackknife: NDArray[np.float64] | None = None
     """The same covariance from the scatter of the hits, whatever their errors, shape (3, 3); None without hits."""
     n_hits: int = 0
@@ -59,7 +59,7 @@ class Mode:
     misfit_share: float | None = None
     """rms of what the fit leaves in its band over the height of its peak."""
     edge_distance: float | None = None
-    """From its frequency to the nearer end of the lines, in its half-power half-widths zeta f_n."""
+    """Distance from its frequency to the nearer end of the lines, in its half-power half-widths zeta f_n."""
     left_ringing: float | None = None
     """Share of its decay that is left when the record ends; None where the length of the record is not known."""
     half_power_damping: float | None = None
@@ -67,7 +67,7 @@ class Mode:
     shape: NDArray[np.float64] | None = None
     """Mode shape over the FRFs of `fit_points`, the largest 1 or -1 and the first > 0, shape (p,); None of one FRF."""
     remarks: tuple[Remark, ...] = ()
-    """Why it may not be trusted; empty where nothing speaks against it. Their codes: docs/remarks.md."""
+    """Reasons why it may not be trusted; empty where nothing speaks against it. Their codes: docs/remarks.md."""
 
     def __post_init__(self) -> None:
         """Refuse what is no mode."""

@@ -23,9 +23,9 @@ class Believed:
     """The modes of one FRF that may be believed."""
 
     modes: tuple[Mode, ...]
-    """They may be followed, calibrated and used for lobes."""
+    """Modes that may be followed, calibrated and used for lobes."""
     against: tuple[Mode, ...]
-    """Those that would be, were their stiffness not negative: no driving point."""
+    """Modes that could be, were their stiffness not negative: no driving point."""
     remarks: tuple[Remark, ...]
     """One about each of the rest, with the reason."""
 

@@ -20,21 +20,21 @@ class Signal:
     """One column, channel or function of a file."""
 
     name: str
-    """As in the file."""
+    """Name, as in the file."""
     values: NDArray[Any]
-    """As in the file, real or complex, shape (n,)."""
+    """Values as in the file, real or complex, shape (n,)."""
     role: Role = ""
-    """What it is, where the file says so; empty where it does not."""
+    """Role of the signal, where the file says so; empty where it does not."""
     unit: str = ""
-    """As in the file; empty where it does not say. dB of a magnitude; deg or rad of a phase."""
+    """Unit as in the file; empty where it does not say. dB of a magnitude; deg or rad of a phase."""
     quantity: str = ""
-    """What is measured (displacement, velocity, acceleration, force), where the file says so beside the unit."""
+    """Quantity (displacement, velocity, acceleration, force), where the file says so beside the unit."""
     direction: str = ""
-    """x, y, z or -x, -y, -z; empty where the file does not say."""
+    """Direction: x, y, z or -x, -y, -z; empty where the file does not say."""
     rate: float | None = None
     """Samples a second that the file names (Hz)."""
     record: int = 0
-    """Signals that were recorded together have the same number."""
+    """Number of the record: signals that were recorded together have the same."""
     per_full_scale: bool = False
     """Whether the values are shares of a full scale that the file does not name."""
 
@@ -44,21 +44,21 @@ class Contents:
     """All of a file."""
 
     signals: tuple[Signal, ...]
-    """In the order of the file."""
+    """Signals in the order of the file."""
     averages: int | None = None
     """Hits that an FRF was averaged from."""
     created: datetime | None = None
-    """When it was recorded (timezone-aware)."""
+    """Time of recording (timezone-aware)."""
     direction: str = ""
-    """At the tool tip; empty where the file does not say."""
+    """Direction at the tool tip; empty where the file does not say."""
     tool: str = ""
-    """In the spindle; empty where the file does not say."""
+    """Name of the tool in the spindle; empty where the file does not say."""
     machines: tuple[str, ...] = ()
-    """What was tapped, each name once, where the file says so."""
+    """Names of what was tapped, each once, where the file says so."""
     window: str = ""
-    """Over the response, as the file names it; empty where it does not."""
+    """Window over the response, as the file names it; empty where it does not."""
     notes: tuple[str, ...] = ()
-    """What else should be known of it."""
+    """Notes on what else should be known of it."""
 
 
 def distinct(names: Iterable[str]) -> tuple[str, ...]:

@@ -18,33 +18,33 @@ class Description:
     """
 
     columns: tuple[str, ...] = ()
-    """What the columns are, in their order ("time [s]", "force [N]", "-") or by name ("frf [m/N]=H1", "frf=H:2")."""
+    """Columns, in their order ("time [s]", "force [N]", "-") or by name ("frf [m/N]=H1", "frf=H:2")."""
     quantity: str = ""
-    """Of the response: displacement, velocity or acceleration."""
+    """Quantity of the response: displacement, velocity or acceleration."""
     unit: str = ""
-    """Of the response (m/s^2, g, um), or of the FRF (m/N, g/N)."""
+    """Unit of the response (m/s^2, g, um), or of the FRF (m/N, g/N)."""
     force_unit: str = ""
-    """Of the force (N, lbf)."""
+    """Unit of the force (N, lbf)."""
     rate: float | None = None
     """Samples a second (Hz)."""
     averages: int | None = None
     """Hits that an FRF was averaged from."""
     response: int | None = None
-    """Which response is meant where there are several, from 1."""
+    """Number of the response that is meant where there are several, from 1."""
     full_scale: tuple[float, ...] = ()
-    """Of each channel in its unit, where values are shares of it."""
+    """Full scale of each channel in its unit, where values are shares of it."""
     sensitivity: tuple[str, ...] = ()
-    """Of each channel in volts: "2.25 mV/N", "10.2 mV/g"."""
+    """Sensitivity of each channel in volts: "2.25 mV/N", "10.2 mV/g"."""
     date: datetime | None = None
-    """When it was recorded; of local time where it has no zone."""
+    """Time of recording; local time where it has no zone."""
     date_pattern: str = ""
-    """How the date stands in the file's name, as for strptime ("%Y%m%d"); with "/" in its path."""
+    """Pattern of the date in the file's name, as for strptime ("%Y%m%d"); with "/" in its path."""
     tool: str = ""
-    """In the spindle."""
+    """Name of the tool in the spindle."""
     direction: str = ""
-    """At the tool tip, x or y."""
+    """Direction at the tool tip, x or y."""
     conditions: Conditions = UNSAID
-    """What it was taken under."""
+    """Conditions it was taken under."""
 
     def of_signals(self) -> list[str]:
         """The options that were given and that say something of the signals in the file."""

@@ -13,11 +13,11 @@ class Fact:
     """Something known of a recording."""
 
     name: str
-    """What it is about: "sample rate", "unit", ..."""
+    """Name of the fact: "sample rate", "unit", ..."""
     value: str
-    """For people."""
+    """Value, as text for people."""
     origin: Origin
-    """The file, an option, or nobody ("default")."""
+    """Origin: the file, an option, or nobody ("default")."""
 
 
 @dataclass
@@ -25,11 +25,11 @@ class Ledger:
     """Filled while a file is understood."""
 
     facts: list[Fact] = field(default_factory=list)
-    """What is known."""
+    """Facts that are known."""
     missing: list[str] = field(default_factory=list)
-    """What the file does not say, each with the option that says it."""
+    """Facts that the file does not say, each with the option that says it."""
     faults: list[str] = field(default_factory=list)
-    """What stands in the way."""
+    """Faults that stand in the way."""
 
     def know(self, name: str, value: str, origin: Origin = "file") -> None:
         """A fact."""

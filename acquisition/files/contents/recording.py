@@ -25,29 +25,29 @@ class Recording:
     """A recorded file, understood as far as it can be."""
 
     path: Path
-    """Where it was read from."""
+    """File it was read from."""
     title: str
-    """What people call its format."""
+    """Name of its format, for people."""
     hits: tuple[Hit, ...] = ()
-    """In SI units; empty where it holds only an FRF, or where something is missing or wrong."""
+    """Hits in SI units; empty where it holds only an FRF, or where something is missing or wrong."""
     frf: Frf | None = None
     """The FRF that it holds; None where there is none, or where something is missing or wrong."""
     facts: tuple[Fact, ...] = ()
-    """What is known, each from the file, by option or by default."""
+    """Facts that are known, each from the file, by option or by default."""
     complaint: str = ""
-    """What is missing, with the options that say it, and what is wrong; empty where nothing is."""
+    """Text on what is missing, with the options that say it, and what is wrong; empty where nothing is."""
     created: datetime | None = None
-    """When it was recorded, where the file says so (timezone-aware)."""
+    """Time of recording, where the file says so (timezone-aware)."""
     tool: str = ""
-    """In the spindle, where the file says so."""
+    """Name of the tool in the spindle, where the file says so."""
     direction: str = ""
-    """At the tool tip, where the file says so."""
+    """Direction at the tool tip, where the file says so."""
     operator: str = ""
-    """Who held the hammer, where the file says so."""
+    """Name of the person who held the hammer, where the file says so."""
     device: str = ""
-    """What recorded it, where the file says so."""
+    """Recording device, where the file says so."""
     conditions: Conditions | None = None
-    """What it was taken under; None where it is no tap file of ours."""
+    """Conditions it was taken under; None where it is no tap file of ours."""
     window: float | None = None
     """Time constant (s) of the exponential window over the response that the file names; NaN where it does not say how
     its window falls, None where there is none."""

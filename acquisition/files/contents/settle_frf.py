@@ -26,7 +26,7 @@ class Candidate:
     """One FRF of a file, in the unit of the file."""
 
     signal: Signal
-    """That names it: the complex values, the real part or the magnitude."""
+    """Signal that names it: the complex values, the real part or the magnitude."""
     partner: Signal | None = None
     """The imaginary part or the phase."""
 

@@ -85,9 +85,9 @@ class Unit:
     """A unit that is known."""
 
     quantity: Measured
-    """What is measured in it; empty where that is nothing a tap test has."""
+    """Quantity that is measured in it; empty where that is nothing a tap test has."""
     factor: float
-    """SI values are so many times as large."""
+    """SI value of one such unit."""
 
 
 def unit_of(text: str) -> Unit | None:

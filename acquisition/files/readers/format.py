@@ -23,14 +23,16 @@ class Format:
     name: str
     """Short name, in lower case, of its own among all formats."""
     title: str
-    """What people call it."""
+    """Name for people."""
     extensions: tuple[str, ...]
-    """How names of such files mostly end, with the dot: for messages, and for what of a folder is read at all."""
+    """Endings that names of such files mostly have, with the dot: for messages, and for what of a folder is read at
+    all."""
     is_it: Callable[[bytes, Path], bool]
     """Whether a file is of this kind, from its first 4096 bytes (it has at least one) and, where need be, all of it."""
     read: Callable[[Path], Contents | list[Hit] | Frf]
-    """What stands in it; hits in SI units, at least one, or an FRF, where the format leaves nothing open."""
+    """Function that reads it: its contents, or hits in SI units, at least one, or an FRF, where the format leaves
+    nothing open."""
     recorded_as: Callable[[Path], Circumstances | None] = _says_nothing
-    """What it says of when, where and by whom it was recorded, beside its Contents; None where it says nothing."""
+    """Function that reads when, where and by whom it was recorded, beside its Contents; None where it says nothing."""
     read_frf: Callable[[Path], Frf] | None = None
-    """The FRF that it holds beside its hits; None where it is to be estimated from them."""
+    """Function that reads the FRF it holds beside its hits; None where that is to be estimated from them."""

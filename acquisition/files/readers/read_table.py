@@ -32,13 +32,13 @@ class Layout:
     """How the rows of a table are written."""
 
     separator: str
-    """A pattern."""
+    """Pattern between two words of a row."""
     comma: bool
     """Whether the decimal sign is a comma."""
     heading: list[str] = field(default_factory=list)
     """Words above the columns, or behind the first row; empty where there are none."""
     keys: dict[str, str] = field(default_factory=dict)
-    """What lines that begin with # say, the last of each."""
+    """Values by the keys of lines that begin with #, the last of each."""
     machines: tuple[str, ...] = ()
     """All machines that these lines name."""
 
@@ -57,9 +57,9 @@ class NumberedLines:
     """Some lines of a file."""
 
     texts: Sequence[str]
-    """Without their ends."""
+    """Lines without their ends."""
     numbers: Sequence[int]
-    """Of each, from 1 on."""
+    """Number of each line, from 1 on."""
 
     def __getitem__(self, part: slice) -> NumberedLines:
         """Some of them."""

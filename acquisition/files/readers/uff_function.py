@@ -22,9 +22,9 @@ class Axis:
     """Abscissa, ordinate or its denominator."""
 
     type: int
-    """What is measured: 8 displacement, 11 velocity, 12 acceleration, 13 force, 17 time, 18 frequency, ..."""
+    """Code of the quantity: 8 displacement, 11 velocity, 12 acceleration, 13 force, 17 time, 18 frequency, ..."""
     unit: str
-    """Empty where it says none."""
+    """Unit; empty where the file says none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,27 +34,27 @@ class Function:
     lines: tuple[str, ...]
     """The five lines of identification."""
     type: int
-    """1 over time, 4 FRF, 6 coherence."""
+    """Code of the function: 1 over time, 4 FRF, 6 coherence."""
     name: str
-    """For people: where it was measured."""
+    """Name for people: where it was measured."""
     response_direction: int
-    """+-1 x, +-2 y, +-3 z; 0 where it does not say."""
+    """Direction of the response: +-1 x, +-2 y, +-3 z; 0 where it does not say."""
     reference_direction: int
-    """Of the hammer."""
+    """Direction of the hammer, likewise."""
     place: tuple[object, ...]
     """Nodes and directions: the same for an FRF and its coherence."""
     abscissa: NDArray[np.float64]
-    """In its unit, shape (n,)."""
+    """Abscissa in its unit, shape (n,)."""
     step: float
-    """Of an even abscissa; 0 where it is not even."""
+    """Step of an even abscissa; 0 where it is not even."""
     values: NDArray[np.float64] | NDArray[np.complex128]
-    """Shape (n,)."""
+    """Values of the function in their unit, shape (n,)."""
     abscissa_axis: Axis
-    """Of the abscissa."""
+    """Quantity and unit of the abscissa."""
     ordinate: Axis
-    """Of the values."""
+    """Quantity and unit of the values."""
     denominator: Axis
-    """What they were divided by."""
+    """Quantity and unit that the values were divided by."""
 
     @property
     def keys(self) -> dict[str, str]:

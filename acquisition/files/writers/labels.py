@@ -16,15 +16,15 @@ class Labels:
     """Of a tap test that is written for other programs."""
 
     created: datetime | None = None
-    """When it was recorded (timezone-aware)."""
+    """Time of recording (timezone-aware)."""
     direction: str = ""
-    """At the tool tip, x or y."""
+    """Direction at the tool tip, x or y."""
     tool: str = ""
-    """In the spindle."""
+    """Name of the tool in the spindle."""
     name: str = "tap test"
-    """For people."""
+    """Title for people."""
     window: str = "none"
-    """Over the response, as it was read: "exponential 0.05 s"."""
+    """Window over the response, as it was read: "exponential 0.05 s"."""
 
     @property
     def plain_tool(self) -> str:

@@ -29,7 +29,7 @@ from threadpoolctl import threadpool_limits
 
 from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id, write_tap
 from lobewatch.history import History
-from lobewatch.history.cache.history_cache import HistoryCache
+from lobewatch.history.history_cache import HistoryCache
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.journal.tap_entry import TapEntry

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from acquisition import Remark
 from lobewatch.decay.change_point import newest_change
 from lobewatch.decay.trend import TapValue, Trend, newest_percents, trend_of
-from lobewatch.history.columns.series_columns import SeriesColumns, series_columns
+from lobewatch.history.series_columns import (SeriesColumns, series_columns)
 from lobewatch.history.history import WATCHED, Row
 from lobewatch.machine import Limits
 from lobewatch.measuring.estimate import UNKNOWN, Estimate

@@ -13,10 +13,10 @@ from acquisition import UNSAID, Conditions, Description, Remark, TapTest
 from lobewatch.cuts.learning.at_speed import judge_at_speed
 from lobewatch.decay.standing import Standing, stand
 from lobewatch.history.assembling import first_like, or_reason
-from lobewatch.history.cache.history_cache import HistoryCache
-from lobewatch.history.cache.kept_rows import of_older_versions
-from lobewatch.history.cache.tap_measurements import TapMeasurements
-from lobewatch.history.damage.usable import Result, UsableTaps
+from lobewatch.history.history_cache import HistoryCache
+from lobewatch.history.kept_rows import of_older_versions
+from lobewatch.history.tap_measurements import TapMeasurements
+from lobewatch.history.usable_taps import (Result, UsableTaps)
 from lobewatch.history.history import History, without_last_word
 from lobewatch.logbook.replaying.store import ReplayOutcome, store_recordings
 from lobewatch.machine import Machine, MachineFolder, TapEntry

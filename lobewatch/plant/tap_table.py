@@ -145,7 +145,7 @@ def _decoded(contents: Sequence[bytes]) -> list[_Stored]:
 
 
 def _worked_out(path: Path, now: datetime) -> tuple[Summary, list[_Stored]]:
-    from lobewatch.history.columns.stored_row import packed
+    from lobewatch.history.row_bytes import packed
     from lobewatch.logbook.logbook import Logbook
     from lobewatch.plant.summarise import summarise
 

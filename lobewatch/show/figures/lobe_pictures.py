@@ -13,7 +13,7 @@ from acquisition import DataError, Remark
 from lobes import Cut, StabilityLobes, radial_lobes
 from lobewatch.cuts.learning.lobes_at_speed import lobes_at_speed
 from lobewatch.history import Row
-from lobewatch.history.columns.row_lobes import row_lobes
+from lobewatch.history.row_lobes import row_lobes
 from lobewatch.logbook import LobeComparison, Logbook
 from lobewatch.machine import Machine
 from lobewatch.machine.journal.heard_cut import HeardCut

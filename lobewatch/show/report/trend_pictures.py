@@ -10,7 +10,7 @@ import numpy as np
 from lobewatch.decay import Standing
 from lobewatch.decay.trend import Trend
 from lobewatch.history import Row
-from lobewatch.history.damage.left_out import left_out
+from lobewatch.history.left_out import left_out
 from lobewatch.logbook import Logbook
 from lobewatch.machine.journal.event import MaintenanceEvent
 from lobewatch.show.figures.course import course_of

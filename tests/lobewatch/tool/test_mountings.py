@@ -158,7 +158,7 @@ def test_the_stick_out_is_that_of_one_tool_and_a_tap_file_says_its_own(shop: Sho
 
 
 def test_of_a_file_of_version_1_nothing_is_known() -> None:
-    for file in (Path(__file__).parents[3] / "data" / "version_1" / "machine" / "taps").iterdir():
+    for file in (Path(__file__).parents[2] / "data" / "version_1" / "machine" / "taps").iterdir():
         assert read_tap(file).circumstances.conditions.known == {}
 
 

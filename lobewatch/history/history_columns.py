@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes import SldHistory
-from lobewatch.history.columns.condition_columns import NUMBERS, condition_columns
-from lobewatch.history.columns.row_lobes import row_lobes
-from lobewatch.history.columns.ruling_columns import limits, words
+from lobewatch.history.condition_columns import (NUMBERS, condition_columns)
+from lobewatch.history.row_lobes import row_lobes
+from lobewatch.history.ruling_columns import (limits, words)
 from lobewatch.history.history import ESTIMATES, MAX_MODES, MODELLED, History
 from lobewatch.machine import Machine
 from lobewatch.tool.assembly import speed_grid

@@ -27,7 +27,7 @@ def analysed(monkeypatch: pytest.MonkeyPatch) -> Analysed:
         found.append((tap.circumstances.created - START).days)
         return measure(tap, *others)
 
-    monkeypatch.setattr("lobewatch.history.cache.tap_measurements.measure", counting)
+    monkeypatch.setattr("lobewatch.history.tap_measurements.measure", counting)
 
     def told() -> list[int]:
         known = sorted(set(found))

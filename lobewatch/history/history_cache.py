@@ -9,10 +9,10 @@ from operator import is_
 
 from acquisition import Remark
 from acquisition.errors import system_failure
-from lobewatch.history.cache.kept_rows import kept_aside
-from lobewatch.history.cache.still_holding import StillHolding, is_of
-from lobewatch.history.columns.stored_row import is_of_this_make, packed, unpacked
-from lobewatch.history.damage.usable import UsableTaps
+from lobewatch.history.kept_rows import kept_aside
+from lobewatch.history.still_holding import (StillHolding, is_of)
+from lobewatch.history.row_bytes import (is_of_this_make, packed, unpacked)
+from lobewatch.history.usable_taps import UsableTaps
 from lobewatch.history.history import History, Row, empty_history
 from lobewatch.machine import BusyError, Machine, MachineFolder
 from lobewatch.machine.journal.heard_cut import HeardCut

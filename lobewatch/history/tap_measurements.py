@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from lobewatch.history.assembling import FollowedModes, assemble_tapped, predict_untapped
-from lobewatch.history.cache.kept_rows import kept_in_place
-from lobewatch.history.cache.still_holding import StillHolding
+from lobewatch.history.kept_rows import kept_in_place
+from lobewatch.history.still_holding import StillHolding
 from lobewatch.history.history import Row, row_of
 from lobewatch.machine import DamagedTapError, MachineFolder
 from lobewatch.measuring.measurement import Measurement, TapFit, measure, measure_fit

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from acquisition import Remark
 from lobewatch.history.assembling import FollowedModes
-from lobewatch.history.columns.stored_row import packed
+from lobewatch.history.row_bytes import packed
 from lobewatch.history.history import Row, Values
 from lobewatch.machine import TapEntry
 from lobewatch.tool.assembly import TOGETHER

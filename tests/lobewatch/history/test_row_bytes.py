@@ -9,7 +9,7 @@ import pytest
 
 from acquisition import Circumstances, Conditions, Remark, TapTest, from_accelerance, new_tap_id
 from lobewatch.history import Row
-from lobewatch.history.columns.stored_row import packed, unpacked
+from lobewatch.history.row_bytes import (packed, unpacked)
 from lobewatch.logbook import Logbook
 from lobewatch.measuring.estimate import Estimate
 from lobewatch.measuring.questions.asked import QUESTIONS

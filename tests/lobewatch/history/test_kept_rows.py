@@ -37,7 +37,7 @@ def tapped(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> Shop:
 
     with monkeypatch.context() as patch:
         patch.setattr("lobewatch.history.history.SOFTWARE", SOFTWARE._replace(lobewatch="0.0.1"))
-        patch.setattr("lobewatch.history.cache.tap_measurements.measure", otherwise)
+        patch.setattr("lobewatch.history.tap_measurements.measure", otherwise)
         assert frequencies(shop.logbook.history) == [1813, 1812, 1811]
     return shop
 
@@ -58,7 +58,7 @@ def refuse(monkeypatch: pytest.MonkeyPatch, tap_id: str) -> None:
             raise ArithmeticError("no convergence")
         return measure(tap, *others)
 
-    monkeypatch.setattr("lobewatch.history.cache.tap_measurements.measure", refusing)
+    monkeypatch.setattr("lobewatch.history.tap_measurements.measure", refusing)
 
 
 def file_of(shop: Shop, number: int) -> Path:

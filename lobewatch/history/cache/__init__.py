@@ -1,1 +1,0 @@
-"""history.rows: what it still holds, what is to be added, and its place on the disk."""

@@ -1,1 +1,0 @@
-"""Rows of the history as bytes, as columns and as diagrams."""

@@ -14,7 +14,7 @@ from dsm import Calibration
 from lobewatch.machine import Machine
 from lobewatch.measuring.estimate import UNKNOWN, Estimate
 from lobewatch.measuring.measurement import Measurement
-from lobewatch.measuring.questions.asked import accepted_codes, open_questions
+from lobewatch.measuring.questions import accepted_codes, open_questions
 from lobewatch.measuring.workers.software import SOFTWARE
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.order import Place

@@ -9,11 +9,11 @@ from operator import is_
 
 from acquisition import Remark
 from acquisition.errors import system_failure
-from lobewatch.history.kept_rows import kept_aside
-from lobewatch.history.still_holding import (StillHolding, is_of)
-from lobewatch.history.row_bytes import (is_of_this_make, packed, unpacked)
-from lobewatch.history.usable_taps import UsableTaps
 from lobewatch.history.history import History, Row, empty_history
+from lobewatch.history.kept_rows import kept_aside
+from lobewatch.history.row_bytes import decode_row, encode_row
+from lobewatch.history.still_holding import StillHolding, is_of
+from lobewatch.history.usable_taps import UsableTaps
 from lobewatch.machine import BusyError, Machine, MachineFolder
 from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.machine.rows import add_rows, read_rows, write_rows
@@ -32,33 +32,35 @@ class HistoryCache:
         """Nothing is read yet."""
         self._folder = folder
         self._rows: list[Row] = []
-        self._packed: list[bytes] = []
+        self._contents: list[bytes] = []
         self._others: dict[str, Row] = {}
         self._aside: list[bytes] = []
         self._size = self._length = 0
         self._stamp: tuple[int, ...] | None = None
         self._fitting: tuple[Sequence[Place], int] = (), 0
         self._hashes: dict[str, str] = {}
+        self.remarks: list[Remark] = []
+        """Reasons why something was not written."""
         self.behind: StillHolding | None = None
-        """Of what was read behind the rows that `read` gave; None where that is nothing."""
+        """Rows that were read behind those that `read` gave; None where there are none."""
 
     @property
     def others(self) -> Mapping[str, Row]:
-        """What was read beside the rows of these settings and this version, by tap test."""
+        """Rows that were read beside those of these settings and this version, by tap test."""
         return self._others
 
     def read(self, files: UsableTaps) -> History:
         """The rows of the oldest taps on, as far as they were made with these settings and this version.
 
-        What is known of tap tests whose files cannot be used is kept.
+        Rows of tap tests whose files cannot be used are kept aside.
         """
-        empty, lost = empty_history(self._folder.machine), {entry.id for entry in files.lost}
+        empty, lost_ids = empty_history(self._folder.machine), {entry.id for entry in files.lost}
         hashes = _hashes(self._folder.machine, files.cuts)
         if self._stamp is None or self._stamp != self._stamp_now or hashes != self._hashes:
             self._hashes = hashes
             self._read(_head(empty))
-        known = {row.tap_id: row for row in self._rows} | self._others if lost else {}
-        kept = tuple(kept_aside(known[tap_id], empty.software) for tap_id in known if tap_id in lost)
+        stored = {row.tap_id: row for row in self._rows} | self._others if lost_ids else {}
+        kept = tuple(kept_aside(stored[tap_id], empty.software) for tap_id in stored if tap_id in lost_ids)
         valid = tuple(self._rows[: self._count_fitting(files.places)])
         changed = len(valid) < min(len(self._rows), len(files.places))
         self.behind = StillHolding(self._rows, files.by_id, files.baselines) if changed else None
@@ -66,8 +68,8 @@ class HistoryCache:
 
     def _count_fitting(self, places: Sequence[Place]) -> int:
         """Rows that are those of these tap tests; places: those that were compared before are not looked at again."""
-        known, count = self._fitting
-        count = min(count, len(self._rows)) if known is places else 0
+        compared, count = self._fitting
+        count = min(count, len(self._rows)) if compared is places else 0
         for row, place in zip(self._rows[count:], places[count:], strict=False):
             if not is_of(row, place):
                 break
@@ -75,48 +77,46 @@ class HistoryCache:
         self._fitting = places, count
         return count
 
-    def store(self, history: History) -> list[Remark]:
-        """What is new of it, under the lock where that can be had at once; else say so."""
+    def store(self, history: History) -> None:
+        """Write what is new of it, under the lock where that can be had at once; else a remark says so."""
         try:
             with self._folder.locked():
                 self._store(history)
         except (BusyError, OSError) as error:
             reason = system_failure(error) if isinstance(error, OSError) else str(error)
             text = f"not brought up to date on the disk, worked out in memory: {reason}"
-            return [Remark("history-in-memory", self._folder.history.name, text)]
-        return []
+            remark = Remark("history-in-memory", self._folder.history.name, text)
+            self.remarks += [] if remark in self.remarks else [remark]
 
     @property
     def _stamp_now(self) -> tuple[int, ...] | None:
         """Another one where somebody else has written the file; None where there is none."""
         try:
-            found = self._folder.history.stat()
+            status = self._folder.history.stat()
         except OSError:
             return None
-        return found.st_size, found.st_mtime_ns, found.st_ino
+        return status.st_size, status.st_mtime_ns, status.st_ino
 
     def _read(self, head: bytes) -> None:
         self._stamp, self._fitting = self._stamp_now, ((), 0)
-        self._rows, self._packed, self._size, self._length = [], [], 0, 0
+        self._rows, self._contents, self._size, self._length = [], [], 0, 0
         self._others, self._aside, hashes = {}, [], self._hashes
         try:
-            found = read_rows(self._folder.history)
-            if found.rows[1:] and not is_of_this_make(found.rows[-1]):
-                raise ValueError("rows of another make")
-            is_own = found.rows[:1] == (head,)
-            software = "" if is_own else b"".join(found.rows[:1]).decode().partition(" ")[2]
-            for content in found.rows[1:]:
-                number, row = unpacked(content, hashes, software)
-                if number < 0 or not is_own:
+            stored = read_rows(self._folder.history)
+            is_current = stored.rows[:1] == (head,)
+            software = "" if is_current else b"".join(stored.rows[:1]).decode().partition(" ")[2]
+            for content in stored.rows[1:]:
+                number, row = decode_row(content, hashes, software)
+                if number < 0 or not is_current:
                     self._others[row.tap_id] = row
                     self._aside.append(content)
                 else:
                     self._rows[number : number + 1] = [row]
-                    self._packed[number : number + 1] = [content]
+                    self._contents[number : number + 1] = [content]
         except (ValueError, OSError):
-            self._rows, self._packed, self._others = [], [], {}
+            self._rows, self._contents, self._others, self._aside = [], [], {}, []
         else:
-            self._size, self._length = found.size if is_own else 0, found.length
+            self._size, self._length = stored.size if is_current else 0, stored.length
 
     def _store(self, history: History) -> None:
         path, hashes = self._folder.history, self._hashes or self._folder.machine.program_hashes
@@ -125,36 +125,36 @@ class HistoryCache:
         same = [*map(is_, history.rows, self._rows), False].index(False)
         self._fitting = self._fitting[0], min(self._fitting[1], same)
         later = [
-            self._packed[n] if n < len(self._rows) and self._rows[n] is row else packed(n, row, hashes)
+            self._contents[n] if n < len(self._rows) and self._rows[n] is row else encode_row(n, row, hashes)
             for n, row in enumerate(history.rows[same:], same)
         ]
-        contents = self._packed[:same] + later
-        known = zip_longest(later, self._packed[same : len(contents)])
-        fresh = [content for content, there in known if content is not there and content != there]
-        aside = [packed(ASIDE, row, hashes) for row in history.kept]
+        contents = self._contents[:same] + later
+        pairs = zip_longest(later, self._contents[same : len(contents)])
+        fresh = [content for content, stored in pairs if content is not stored and content != stored]
+        aside = [encode_row(ASIDE, row, hashes) for row in history.kept]
         most = 2 * sum(map(len, contents)) + MOST_DEAD
         if (
             self._size
             and aside == self._aside
             and path.exists()
             and self._size + sum(map(len, fresh)) < most
-            and contents[len(self._packed) - 1 :]
+            and contents[len(self._contents) - 1 :]
         ):
             self._length = add_rows(path, self._size, fresh) if fresh else self._length
         else:
             self._length = write_rows(path, [_head(history), *contents, *aside])
         self._aside = aside
-        self._rows, self._packed, self._size = list(history.rows), contents, self._length
+        self._rows, self._contents, self._size = list(history.rows), contents, self._length
         self._stamp = self._stamp_now
 
 
 def _hashes(machine: Machine, cuts: Sequence[HeardCut]) -> dict[str, str]:
-    """Of all that decides the word on a program beside the settings, by its name: test cuts of its tool too."""
+    """Hash of all that decides the word on a program beside the settings, by its name: test cuts of its tool too."""
     taught = {
-        one.name: "".join(f" {cut.id}" for cut in cuts if cut.counts and cut.tool == one.tool)
-        for one in machine.program
+        program.name: "".join(f" {cut.id}" for cut in cuts if cut.counts and cut.tool == program.tool)
+        for program in machine.program
     }
-    return {name: known + taught[name] for name, known in machine.program_hashes.items()}
+    return {name: text + taught[name] for name, text in machine.program_hashes.items()}
 
 
 def _head(history: History) -> bytes:

@@ -15,9 +15,9 @@ from datetime import datetime
 from typing import NamedTuple
 
 from acquisition import Remark
-from lobewatch.history.assembling import FollowedModes
-from lobewatch.history.row_bytes import packed
+from lobewatch.history.followed_modes import FollowedModes
 from lobewatch.history.history import Row, Values
+from lobewatch.history.row_bytes import encode_row
 from lobewatch.machine import TapEntry
 from lobewatch.tool.assembly import TOGETHER
 from lobewatch.tool.order import Place, earlier, places
@@ -116,4 +116,4 @@ class StillHolding:
 
 
 def _content(row: Row) -> bytes:
-    return packed(0, replace(row, rulings=None), {})
+    return encode_row(0, replace(row, rulings=None), {})

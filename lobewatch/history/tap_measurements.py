@@ -1,19 +1,23 @@
-"""What follows from each tap test of a machine, one after the other, each worked out once."""
+"""What follows from each tap test of a machine, one after the other; each tap file is read and worked out once."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from lobewatch.history.assembling import FollowedModes, assemble_tapped, predict_untapped
+from acquisition import DataError
+from lobewatch.history.followed_modes import FollowedModes
+from lobewatch.history.history import Row, row_of
 from lobewatch.history.kept_rows import kept_in_place
 from lobewatch.history.still_holding import StillHolding
-from lobewatch.history.history import Row, row_of
+from lobewatch.history.usable_taps import NotTappedError
 from lobewatch.machine import DamagedTapError, MachineFolder
 from lobewatch.measuring.measurement import Measurement, TapFit, measure, measure_fit
-from lobewatch.measuring.questions.asked import answered
-from lobewatch.tool.assembly import Assembly
+from lobewatch.measuring.questions import answered, open_questions
+from lobewatch.tool.assembly import Assembly, assemble
 from lobewatch.tool.order import Place, earlier
+from lobewatch.tool.prediction import predict
+from lobewatch.tool.series import FollowedMode
 from modal import Mode
 
 KEPT = 500
@@ -21,47 +25,65 @@ KEPT = 500
 
 
 class TapMeasurements:
-    """Measurements and assemblies of one machine from its tap files; rows: the history before a place at least."""
+    """Measurements and assemblies of one machine from its tap files; rows: the history before a place at least.
+
+    DamagedTapError for a file that turns out to be damaged.
+    """
 
     def __init__(self, folder: MachineFolder, places: Sequence[Place], fits: Mapping[str, TapFit]) -> None:
-        """places: all tap tests, oldest first; fits: of those that were fitted already. Nothing is worked out yet."""
+        """places: all tap tests, oldest first; fits: of those that were fitted already. Nothing is read yet."""
         self._folder, self._places, self._fits = folder, places, fits
         self._measurements: dict[str, Measurement] = {}
         self._followed = FollowedModes()
 
-    def measured(self, place: Place, rows: Sequence[Row]) -> Measurement:
+    def measurement(self, place: Place, rows: Sequence[Row]) -> Measurement:
         """What one tap test says."""
-        known = self._measurements
-        found = known.pop(place.entry.id, None)
-        if found is None:
+        measurement = self._measurements.pop(place.entry.id, None)
+        if measurement is None:
             before = (rows[number] for number in earlier(place, self._places))
             last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
-            found = self._measured(place, last)
-            found = replace(found, remarks=answered((*found.remarks, *place.said), place.entry))
-        known[place.entry.id] = found
-        if len(known) > KEPT:
-            del known[next(iter(known))]
-        return found
+            measurement = self._measure(place, last)
+            measurement = replace(measurement, remarks=answered((*measurement.remarks, *place.said), place.entry))
+        self._measurements[place.entry.id] = measurement
+        if len(self._measurements) > KEPT:
+            del self._measurements[next(iter(self._measurements))]
+        return measurement
 
-    def _measured(self, place: Place, last: Mode | None) -> Measurement:
+    def _measure(self, place: Place, last: Mode | None) -> Measurement:
         fit = self._fits.get(place.entry.id)
         if fit is not None:
             return measure_fit(fit, self._folder.machine, last)
         return measure(self._folder.read(place.entry), self._folder.machine, last)
 
-    def assembled(self, place: Place, rows: Sequence[Row]) -> Assembly:
+    def assembly_after(self, place: Place, rows: Sequence[Row]) -> Assembly:
         """The tool of one tap test as it was known then."""
-        points = self._followed.before(place, rows)
-        return assemble_tapped(place, self._places, points, lambda one: self.measured(one, rows))
+        newest = self.measurement(place, rows)
+        other = None if place.other is None else self.measurement(self._places[place.other], rows)
+        series = self._followed.before(place, rows)
+        if newest.followed is not None and not open_questions(newest.remarks):
+            series[newest.direction].append(_followed_mode(newest, newest.followed))
+        return assemble(newest, other, series)
 
-    def tool_in(self, known: Sequence[Place], rows: Sequence[Row], tool: str) -> Assembly:
-        """A tool as the newest of these tap tests with it tells, predicted where none is of it."""
-        newest = next((place for place in reversed(known) if place.entry.tool == tool), None)
-        if newest is not None:
-            return self.assembled(newest, rows)
-        return predict_untapped(self._folder.machine, known, rows, lambda place: self.measured(place, rows), tool)
+    def assembly_of(self, tool: str, places: Sequence[Place], rows: Sequence[Row]) -> Assembly:
+        """A tool as the newest of these tap tests with it tells, predicted where none is of it.
 
-    def with_all(
+        NotTappedError where it cannot be predicted.
+        """
+        newest = next((place for place in reversed(places) if place.entry.tool == tool), None)
+        return self._prediction(tool, places, rows) if newest is None else self.assembly_after(newest, rows)
+
+    def _prediction(self, tool: str, places: Sequence[Place], rows: Sequence[Row]) -> Assembly:
+        newest: dict[str, Measurement] = {}
+        for place in reversed(places):
+            row = rows[place.number]
+            if row.bearing_stiffness.is_known and not row.questions and row.direction not in newest:
+                newest[row.direction] = self.measurement(place, rows)
+        try:
+            return predict(self._folder.machine, list(newest.values()), tool)
+        except DataError as error:
+            raise NotTappedError(f"no tap test with tool {tool!r}, and no prediction: {error}") from error
+
+    def all_rows(
         self, rows: Sequence[Row], others: Mapping[str, Row], behind: StillHolding | None = None
     ) -> tuple[Row, ...]:
         """These rows, and those of all tap tests after them.
@@ -69,21 +91,28 @@ class TapMeasurements:
         others: rows of older versions by tap test, for those that cannot be worked out anew; behind: of those that may
         not have to be.
         """
-        found = list(rows)
-        for place in self._places[len(found) :]:
-            held = behind.row(place, self._places, found) if behind is not None else None
+        rows = list(rows)
+        for place in self._places[len(rows) :]:
+            held = behind.row(place, self._places, rows) if behind is not None else None
             if held is not None:
-                found.append(held)
+                rows.append(held)
                 continue
-            try:
-                assembly = self.assembled(place, found)
-                found.append(row_of(self.measured(place, found), assembly, place))
-            except DamagedTapError:
-                raise
-            except (ArithmeticError, LookupError, ValueError) as error:
-                if place.entry.id not in others:
-                    raise
-                found.append(kept_in_place(others[place.entry.id], place, error))
+            rows.append(self._row(place, rows, others))
             if behind is not None:
-                behind.note(found[-1])
-        return tuple(found)
+                behind.note(rows[-1])
+        return tuple(rows)
+
+    def _row(self, place: Place, rows: Sequence[Row], others: Mapping[str, Row]) -> Row:
+        try:
+            assembly = self.assembly_after(place, rows)
+            return row_of(self.measurement(place, rows), assembly, place)
+        except DamagedTapError:
+            raise
+        except (ArithmeticError, LookupError, ValueError) as error:
+            if place.entry.id not in others:
+                raise
+            return kept_in_place(others[place.entry.id], place, error)
+
+
+def _followed_mode(measurement: Measurement, mode: Mode) -> FollowedMode:
+    return FollowedMode(measurement.time, mode.frequency, mode.damping_ratio, mode.stiffness, mode.phase_deg)

@@ -1,13 +1,11 @@
-"""The tap tests of a machine that can be used; where one turns out to be damaged, all is done again without it."""
+"""The tap tests of a machine that can be used; one whose file turns out to be damaged is left out from then on."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import TypeVar
 
 from acquisition import DataError, Remark
-from lobewatch.history.assembling import NotTappedError
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.contents import FolderContents
 from lobewatch.machine.journal.event import MaintenanceEvent
@@ -15,8 +13,11 @@ from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.machine.journal.journal import command
 from lobewatch.tool.order import Order, Place
 
-Result = TypeVar("Result")
 BEFORE_ALL = datetime.min.replace(tzinfo=UTC)
+
+
+class NotTappedError(DataError):
+    """A tool was neither tapped nor can it be predicted."""
 
 
 class UsableTaps:
@@ -28,7 +29,6 @@ class UsableTaps:
         self._contents: FolderContents | None = None
         self._order: Order | None = None
         self._left_out: dict[str, tuple[TapEntry, Remark]] = {}
-        self._works = False
 
     @property
     def places(self) -> Sequence[Place]:
@@ -140,21 +140,6 @@ class UsableTaps:
         text = "newer than all of its tool and direction that can be used, but its file is damaged"
         return tuple(Remark("newest-damaged", f"tap test {one.id}", text, "tap again") for one in newer)
 
-    def from_the_rest(self, work: Callable[[], Result], forget: Callable[[], None]) -> Result:
-        """What some work gives; where it meets a damaged tap file, without that, all that was known forgotten."""
-        if self._works:
-            return work()
-        self._works = True
-        try:
-            while True:
-                try:
-                    return work()
-                except DamagedTapError as error:
-                    self._leave_out(error)
-                    forget()
-        finally:
-            self._works = False
-
     def add(self, entry: TapEntry) -> bool:
         """A tap test that was just committed: whether it is newer than all, and all others are as they were.
 
@@ -174,7 +159,8 @@ class UsableTaps:
         """Look again."""
         self._contents = self._order = None
 
-    def _leave_out(self, error: DamagedTapError) -> None:
+    def leave_out(self, error: DamagedTapError) -> None:
+        """Go on without a tap test whose file is damaged; the error again where it was left out before."""
         if error.entry.id in self._left_out:
             raise error
         self._left_out[error.entry.id] = error.entry, error.remark

@@ -10,12 +10,12 @@ import numpy as np
 from acquisition import DataError
 from acquisition.files.cut_file import CutSignal
 from lobewatch.cuts.listening.expected_sound import ExpectedSound, expected_sound
-from lobewatch.cuts.listening.folded import modulo
+from lobewatch.cuts.listening.fold_frequency import modulo
 from lobewatch.cuts.listening.listen_to import CutRecording, CutSound, listen_to
-from lobewatch.history.assembling import or_reason
+from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine.additions.keep_cut import keep_cut, software
-from lobewatch.machine.additions.observe_cut import when_cut
+from lobewatch.machine.additions.observe_cut import cutting_time
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.machine.settings.cut_setting import CutSetting
@@ -88,7 +88,7 @@ def compare_cut(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> Cut
         signal.lost_scans,
     )
     heard = listen_to(what)
-    known = or_reason(lambda: logbook.assembly(setting.tool))
+    known = logbook.ask(Analysis.assembly_or_reason, setting.tool)
     assembly = None if isinstance(known, DataError) or not known.directions else known
     speed = heard.speed_rpm if np.isfinite(heard.speed_rpm) else setting.speed_rpm
     expected = None if assembly is None else expected_sound(setting, assembly, speed)
@@ -97,4 +97,4 @@ def compare_cut(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> Cut
 
 def keep_listened(folder: MachineFolder, found: CutComparison, signal: CutSignal, at: datetime | None) -> HeardCut:
     """Write down what was heard, with its recording; at: when it was cut, None for now. Saved when this returns."""
-    return keep_cut(folder, found.as_heard(when_cut(at, datetime.now(UTC))), signal)
+    return keep_cut(folder, found.as_heard(cutting_time(at, datetime.now(UTC))), signal)

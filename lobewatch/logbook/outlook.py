@@ -11,6 +11,7 @@ from acquisition import DataError
 from lobewatch.decay.forecast import DateRange
 from lobewatch.decay.standing import SeriesStanding, Standing
 from lobewatch.decay.trend import Trend
+from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.verdicts.critical import critical_fall
 from lobewatch.verdicts.verdict import CriticalFall
@@ -60,24 +61,28 @@ class Outlook:
 def outlook(logbook: Logbook, now: datetime | None = None) -> Outlook:
     """The outlook of a machine; DataError where it was never tapped."""
     logbook.newest()
-    standing = logbook.standing(now or datetime.now(UTC))
-    fixed = logbook.machine.limits
+    return logbook.ask(_outlook, now or datetime.now(UTC))
+
+
+def _outlook(analysis: Analysis, now: datetime) -> Outlook:
+    standing, machine = analysis.standing(now), analysis.machine
+    fixed = machine.limits
     percents = (fixed.frequency_warn_percent, fixed.frequency_alarm_percent)
     series = [one.trend for one in standing.series if one.trend is not None]
-    falls = logbook.from_the_rest(lambda: _critical_falls(logbook))
+    falls = _critical_falls(analysis)
     return Outlook(
         standing,
-        {one.name: _fate(falls[one.name], one.tool, standing.series) for one in logbook.machine.program},
+        {one.name: _fate(falls[one.name], one.tool, standing.series) for one in machine.program},
         {percent: _first(of_limit(trend, percent) for trend in series) for percent in percents},
     )
 
 
-def _critical_falls(logbook: Logbook) -> Mapping[str, CriticalFall]:
+def _critical_falls(analysis: Analysis) -> Mapping[str, CriticalFall]:
     """By program; kept in the history where there is a tap test to keep them with."""
-    history = logbook.history
+    history = analysis.history
     if not history.current:
-        return {one.program.name: critical_fall(one) for one in logbook.verdicts()}
-    kept = logbook.rulings(history.rows[-1].tap_id, falls=True)
+        return {one.program.name: critical_fall(one) for one in analysis.verdicts()}
+    kept = analysis.rulings(history.rows[-1].tap_id, falls=True)
     return {name: ruling.critical for name, ruling in kept.items() if ruling.critical is not None}
 
 

@@ -12,7 +12,7 @@ from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.replaying.store import HERE, KnownContents, Progress, digests_of
 from lobewatch.logbook.replaying.understand import Asked, Understood, reason_of, understand, understand_file
 from lobewatch.measuring.measurement import Measurement, TapFit, measure_fit
-from lobewatch.measuring.workers.shared import Workers, shared
+from lobewatch.measuring.workers.share_work import (Workers, shared)
 from modal import Mode
 
 

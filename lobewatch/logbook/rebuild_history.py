@@ -5,17 +5,17 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 
 from acquisition import DataError, read_tap
-from lobewatch.history.assembling import or_reason
+from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import Machine, TapEntry
 from lobewatch.machine.contents import fault_of
 from lobewatch.machine.settings.machine_file import parse_machine
 from lobewatch.measuring.measurement import TapFit, fit_tap
-from lobewatch.measuring.workers.shared import Workers, shared
+from lobewatch.measuring.workers.share_work import (Workers, shared)
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.verdict import Verdict, judge
 
@@ -53,9 +53,7 @@ def rebuild_history(logbook: Logbook, workers: Workers, progress: Progress = lam
         logbook.fits |= {entry.id: fit for entry, fit in zip(entries, fits, strict=True) if fit is not None}
     tap_ids = [row.tap_id for row in logbook.history.rows]
     for number, (tap_id, verdicts) in enumerate(_all_judged(logbook, tap_ids, toml, workers), 1):
-        logbook.judged.setdefault(tap_id, verdicts)
-        logbook.rulings(tap_id)
-        logbook.judged.pop(tap_id, None)
+        logbook.ask(Analysis.rulings, tap_id, verdicts=verdicts)
         progress(number, len(tap_ids))
     return len(tap_ids)
 
@@ -78,7 +76,7 @@ def _content(logbook: Logbook, entry: TapEntry, toml: str) -> TapBytes:
 
 def _question(logbook: Logbook, tap_id: str, toml: str) -> Question:
     tools = dict.fromkeys(program.tool for program in logbook.machine.program)
-    return Question({tool: or_reason(partial(logbook.assembly, tool, tap_id)) for tool in tools}, toml)
+    return Question({tool: logbook.ask(Analysis.assembly_or_reason, tool, tap_id) for tool in tools}, toml)
 
 
 def modes_of(tap: TapBytes) -> TapFit | None:

@@ -145,13 +145,13 @@ def _decoded(contents: Sequence[bytes]) -> list[_Stored]:
 
 
 def _worked_out(path: Path, now: datetime) -> tuple[Summary, list[_Stored]]:
-    from lobewatch.history.row_bytes import packed
+    from lobewatch.history.row_bytes import encode_row
     from lobewatch.logbook.logbook import Logbook
     from lobewatch.plant.summarise import summarise
 
     logbook = Logbook.open(path)
     summary, hashes = summarise(logbook, now), logbook.machine.program_hashes
-    return summary, _decoded([packed(number, row, hashes) for number, row in enumerate(logbook.history.rows)])
+    return summary, _decoded([encode_row(number, row, hashes) for number, row in enumerate(logbook.history.rows)])
 
 
 def all_tables(machines: Mapping[str, Path], damaged: dict[str, str]) -> Iterator[TapTable]:

@@ -11,7 +11,7 @@ from acquisition import DataError
 from dsm import Spindle
 from lobewatch.history.history import Row
 from lobewatch.logbook.logbook import Logbook
-from lobewatch.measuring.questions.asked import open_questions
+from lobewatch.measuring.questions import open_questions
 from lobewatch.verdicts.doubt import scatter_in
 from modal import Mode, believed
 

@@ -6,7 +6,7 @@ import re
 from datetime import UTC, datetime
 from pathlib import Path
 
-from lobewatch.measuring.questions.clock import is_ahead
+from lobewatch.measuring.clock import is_ahead
 
 _PARTS = {"%Y": r"\d{4}", "%y": r"\d{2}", "%m": r"\d{1,2}", "%d": r"\d{1,2}", "%H": r"\d{1,2}", "%M": r"\d{1,2}"}
 _PARTS |= {"%S": r"\d{1,2}", "%b": r"[^\W\d]{3,4}", "%B": r"[^\W\d]+", "%j": r"\d{3}", "%%": "%"}

@@ -16,7 +16,7 @@ from acquisition.atomic import make_folder
 from lobewatch.logbook.replaying.understand import Asked, TapDraft, reason_of, work_out, work_out_file
 from lobewatch.machine import MachineFolder, TapEntry
 from lobewatch.measuring.measurement import TapFit
-from lobewatch.measuring.workers.shared import Workers, shared
+from lobewatch.measuring.workers.share_work import (Workers, shared)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from lobewatch.logbook.replaying.prepare import Prepared, all_prepared, prepared
 from lobewatch.logbook.replaying.understand import reason_of
 from lobewatch.machine import MachineFolder, TapEntry
 from lobewatch.measuring.measurement import TapFit
-from lobewatch.measuring.workers.shared import Workers
+from lobewatch.measuring.workers.share_work import Workers
 
 Progress = Callable[[str, int, int], None]
 """Told what is done ("read", "store"), how many of it are, and of how many."""

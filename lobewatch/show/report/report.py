@@ -58,7 +58,7 @@ def write_report(logbook: Logbook, path: Path | None = None, tool: str = "", dir
 
 def render_report(logbook: Logbook, tool: str, direction: str, now: datetime | None = None) -> str:
     """HTML of one series (tool and direction); ValueError where it holds no tap test. now: None for the clock's."""
-    return page("report.html", **logbook.from_the_rest(lambda: _content_of(logbook, tool, direction, now)))
+    return page("report.html", **_content_of(logbook, tool, direction, now))
 
 
 def _content_of(logbook: Logbook, tool: str, direction: str, now: datetime | None) -> dict[str, Any]:

@@ -9,10 +9,10 @@ import pytest
 
 from acquisition import Circumstances, Conditions, Remark, TapTest, from_accelerance, new_tap_id
 from lobewatch.history import Row
-from lobewatch.history.row_bytes import (packed, unpacked)
+from lobewatch.history.row_bytes import decode_row, encode_row
 from lobewatch.logbook import Logbook
 from lobewatch.measuring.estimate import Estimate
-from lobewatch.measuring.questions.asked import QUESTIONS
+from lobewatch.measuring.questions import QUESTIONS
 from lobewatch.verdicts.verdict import Ruling, Word
 from modal import Mode, synthesize
 from tests.lobewatch.conftest import LINES, START, Shop
@@ -42,12 +42,12 @@ PLAIN = replace(ROW, remarks=(), conditions=Conditions(), baseline=None, rulings
 def test_each_field_is_as_it_was_stored_whichever_is_asked_for_first(row: Row) -> None:
     names = [one.name for one in fields(Row)] + ["questions", "accepted", "mode", "followed"]
     for name in names:
-        number, read = unpacked(packed(7, row, HASHES), HASHES)
+        number, read = decode_row(encode_row(7, row, HASHES), HASHES)
         assert number == 7
         assert repr(getattr(read, name)) == repr(getattr(row, name)), name
         assert repr(read) == repr(row)
-        assert packed(7, read, HASHES) == packed(7, row, HASHES)
-    changed = replace(unpacked(packed(7, row, HASHES), HASHES)[1], tool="other")
+        assert encode_row(7, read, HASHES) == encode_row(7, row, HASHES)
+    changed = replace(decode_row(encode_row(7, row, HASHES), HASHES)[1], tool="other")
     assert repr(changed) == repr(replace(row, tool="other"))
     assert (changed.followed, changed.questions, changed.accepted) == (row.followed, row.questions, row.accepted)
 
@@ -55,7 +55,7 @@ def test_each_field_is_as_it_was_stored_whichever_is_asked_for_first(row: Row) -
 @pytest.mark.parametrize("code", QUESTIONS)
 def test_no_question_is_overlooked(code: str) -> None:
     asked = replace(PLAIN, remarks=(Remark("one-direction", "reference", "x alone"), Remark(code, "", "is it?")))
-    assert [one.code for one in unpacked(packed(0, asked, HASHES), HASHES)[1].questions] == [code]
+    assert [one.code for one in decode_row(encode_row(0, asked, HASHES), HASHES)[1].questions] == [code]
 
 
 def test_a_logbook_that_goes_on_after_commits_is_as_one_that_is_opened_anew(shop: Shop) -> None:

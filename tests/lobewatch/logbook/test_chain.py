@@ -29,9 +29,8 @@ from acquisition import (
 from dsm import modal_stiffness, modes_at, receptance, static_stiffness
 from lobes import SldHistory, lowest_of, zero_order
 from lobewatch.history import History
-from lobewatch.history.columns.history_columns import to_columns
-from lobewatch.history.columns.row_lobes import row_lobes
 from lobewatch.history.history import Row
+from lobewatch.history.history_columns import row_lobes, to_columns
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder

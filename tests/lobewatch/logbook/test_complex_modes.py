@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from lobes import lowest_of, program_limit, read_history, write_history, zero_order
-from lobewatch.history.columns.history_columns import to_columns
-from lobewatch.history.columns.stored_row import packed, unpacked
 from lobewatch.history.history import Row, empty_history
+from lobewatch.history.history_columns import to_columns
+from lobewatch.history.row_bytes import decode_row, encode_row
 from lobewatch.machine import Machine
 from lobewatch.measuring.estimate import Estimate
 from lobewatch.tool import Assembly
@@ -128,7 +128,7 @@ def test_history_keeps_the_phase(shop: Shop) -> None:
     path = shop.path / "history.h5"
     write_history(path, to_columns(replace(empty_history(machine), rows=(row,)), machine))
     stored = read_history(path)
-    number, read = unpacked(packed(3, row, {}), {})
+    number, read = decode_row(encode_row(3, row, {}), {})
     assert number == 3
     assert stored.columns["mode_phase_deg"][0, :2].tolist() == [-12.5, 8.0]
     assert (stored.units["phase_deg"], stored.units["mode_phase_deg"]) == ("deg", "deg")

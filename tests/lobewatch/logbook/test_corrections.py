@@ -76,7 +76,7 @@ def analysed(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return measure(tap, *others)
 
     with monkeypatch.context() as patch:
-        patch.setattr("lobewatch.history.cache.tap_measurements.measure", counted)
+        patch.setattr("lobewatch.history.tap_measurements.measure", counted)
         assert shop.logbook.history.rows
     return seen
 

@@ -25,7 +25,7 @@ from lobes import Program, ProgramLimit, program_limit, zero_order
 from lobes.program import Modes
 from lobewatch import Logbook
 from lobewatch.cli import app
-from lobewatch.history.cache.history_cache import HistoryCache
+from lobewatch.history.history_cache import HistoryCache
 from lobewatch.logbook import compare_lobes
 from lobewatch.machine import Machine, MachineFolder, ProgramTable
 from lobewatch.machine.new_folder import make_machine_folder
@@ -96,7 +96,7 @@ def analysed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         found.append(tap.id)
         return measure(tap, machine, last)
 
-    monkeypatch.setattr("lobewatch.history.cache.tap_measurements.measure", counting)
+    monkeypatch.setattr("lobewatch.history.tap_measurements.measure", counting)
     return found
 
 

@@ -30,7 +30,7 @@ from lobewatch import Logbook
 from lobewatch.history import Row
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.measuring.workers.shared import Workers
+from lobewatch.measuring.workers.share_work import Workers
 from modal import Mode, synthesize
 from tests.lobewatch.conftest import Shop
 

@@ -1,0 +1,174 @@
+"""What follows from the tap tests of one machine, each answer worked out once."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+
+from lobewatch.cuts.learning.at_speed import judge_at_speed
+from lobewatch.decay.standing import Standing, stand
+from lobewatch.history.history import History, without_last_word
+from lobewatch.history.history_cache import HistoryCache
+from lobewatch.history.tap_measurements import TapMeasurements
+from lobewatch.history.usable_taps import NotTappedError, UsableTaps
+from lobewatch.machine import Machine, MachineFolder, TapEntry
+from lobewatch.machine.journal.heard_cut import HeardCut
+from lobewatch.measuring.measurement import Measurement
+from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.advice import Advice, advise
+from lobewatch.verdicts.critical import is_missing, ruling_of
+from lobewatch.verdicts.verdict import Ruling, Verdict
+
+KEPT = 8
+"""Tap tests whose verdicts are kept in memory, those asked for last."""
+
+
+class Analysis:
+    """Answers from the files of a machine as they were when it was made, with those tap tests that can be used.
+
+    DamagedTapError ends a question that meets a damaged file: `Logbook.ask` asks it again of an analysis without that.
+    """
+
+    def __init__(
+        self, folder: MachineFolder, files: UsableTaps, cache: HistoryCache, measurements: TapMeasurements
+    ) -> None:
+        """Nothing is worked out yet."""
+        self.folder, self.files, self.measurements = folder, files, measurements
+        self._cache = cache
+        self._history: History | None = None
+        self._verdicts: dict[str | None, dict[str, Verdict]] = {}
+
+    @property
+    def machine(self) -> Machine:
+        """machine.toml."""
+        return self.folder.machine
+
+    @property
+    def taps(self) -> Sequence[TapEntry]:
+        """The committed tap tests whose files can be used, oldest first by their time."""
+        return [place.entry for place in self.files.places]
+
+    @property
+    def cuts(self) -> tuple[HeardCut, ...]:
+        """The test cuts that something can be learnt from, oldest first."""
+        return tuple(cut for cut in self.files.cuts if cut.counts)
+
+    @property
+    def history(self) -> History:
+        """All measurements in order of time, up to date; on the disk too where that could be written."""
+        if self._history is None:
+            self._history = self._history_up_to_date()
+            if self._history.rows:
+                self.rulings(self._history.rows[-1].tap_id)
+        return self._history
+
+    @property
+    def history_so_far(self) -> History | None:
+        """The history; None where nobody has asked for it."""
+        return self._history
+
+    def _history_up_to_date(self) -> History:
+        """The stored rows as far as they still hold, and those that are missing."""
+        history = self._cache.read(self.files)
+        rows = self.measurements.all_rows(history.rows, self._cache.others, self._cache.behind)
+        history = replace(history, rows=rows)
+        return without_last_word(history) if history.rows and self.files.doubts() else history
+
+    def measurement(self, tap_id: str) -> Measurement:
+        """What a tap test says; KeyError for one that is not in the journal or is left out."""
+        rows = self.history.rows
+        return self.measurements.measurement(self.files.place(tap_id), rows)
+
+    @property
+    def calibrated(self) -> Measurement | None:
+        """The newest measurement that the bearings of the model could be found from; None where there is none."""
+        newest = self.history.newest_calibrated
+        return None if newest is None else self.measurement(newest.tap_id)
+
+    def assembly(self, tool: str | None = None, until: str | None = None) -> Assembly:
+        """The newest x and y of a tool (None: of the newest tap test), as they were after the tap test `until`.
+
+        Predicted by the model where the tool was not tapped by then; DataError where there is no model of it.
+        """
+        places = self.files.until(until)
+        if not places:
+            self.files.newest(tool)
+        tool, rows = places[-1].entry.tool if tool is None else tool, self.history.rows
+        assembly = self.measurements.assembly_of(tool, places, rows)
+        is_now = places[-1] is self.files.places[-1]
+        doubts = self.files.doubts("" if assembly.predicted else tool) if is_now else ()
+        return replace(assembly, questions=(*assembly.questions, *doubts))
+
+    def assembly_or_reason(self, tool: str, until: str | None = None) -> Assembly | NotTappedError:
+        """A tool as `assembly` has it, or why it is not known."""
+        try:
+            return self.assembly(tool, until)
+        except NotTappedError as error:
+            return error
+
+    def first_assembly(self, now: Assembly) -> Assembly | None:
+        """The earliest of the same tool that knows the same directions; None where that is itself or a prediction."""
+        directions, questions = set[str](), self.history.questions
+        for tap in self.files.since(now.tap_id):
+            if tap.id == now.tap_id:
+                return None
+            if tap.tool != now.tool or tap.id in questions:
+                continue
+            directions.add(tap.direction)
+            if directions >= set(now.directions):
+                then = self.assembly(tap.tool, tap.id)
+                if then.directions == now.directions:
+                    return then
+        return None
+
+    def verdicts(self, until: str | None = None, names: Collection[str] | None = None) -> list[Verdict]:
+        """One a program (of these names), from the newest tap tests of its tool as they were after the test `until`."""
+        tables = [table for table in self.machine.program if names is None or table.name in names]
+        rows = self.history.rows
+        until = rows[-1].tap_id if until is None and self.history.current else until
+        verdicts = self._verdicts_after(until)
+        missing = [table for table in tables if table.name not in verdicts]
+        tools = {tool: self.assembly_or_reason(tool, until) for tool in {table.tool for table in missing}}
+        cuts = self.cuts if until in (None, *(row.tap_id for row in rows[-1:])) else ()
+        verdicts |= {table.name: judge_at_speed(table, tools[table.tool], self.machine, cuts) for table in missing}
+        return [verdicts[table.name] for table in tables]
+
+    def _verdicts_after(self, tap_id: str | None) -> dict[str, Verdict]:
+        """Verdicts that are kept, by program."""
+        verdicts = self._verdicts[tap_id] = self._verdicts.pop(tap_id, {})
+        if len(self._verdicts) > KEPT:
+            del self._verdicts[next(iter(self._verdicts))]
+        return verdicts
+
+    def rulings(
+        self, tap_id: str, falls: bool = False, verdicts: Mapping[str, Verdict] | None = None
+    ) -> Mapping[str, Ruling]:
+        """Word, limit and critical `falls` of every program after a tap test; the history keeps what was asked for.
+
+        verdicts: by program, where others have worked them out.
+        """
+        stored = self.history.rows[number := self.files.place(tap_id).number].rulings
+        rulings = dict(stored or {})
+        names = [table.name for table in self.machine.program if is_missing(rulings.get(table.name), falls)]
+        if names or stored is None:
+            judged = [verdicts[name] for name in names] if verdicts else self.verdicts(tap_id, names)
+            rulings |= {verdict.program.name: ruling_of(verdict, falls) for verdict in judged}
+            rulings = {table.name: rulings[table.name] for table in self.machine.program}
+            self._history = self.history.with_rulings(number, rulings)
+            self._cache.store(without_last_word(self._history) if self.files.doubts() else self._history)
+        return rulings
+
+    def ruling_then(self, now: Verdict) -> Ruling | None:
+        """Word and limit of a program at the first tap tests of its tool in the same directions; None without them."""
+        then = None if now.assembly is None else self.first_assembly(now.assembly)
+        return None if then is None else self.rulings(then.tap_id)[now.program.name]
+
+    def advice(self, verdict: Verdict) -> Advice:
+        """What goes beyond a verdict; it takes longer than the verdict itself."""
+        return advise(verdict, self.machine)
+
+    def standing(self, now: datetime | None = None) -> Standing:
+        """The light of the machine, the reasons, and one next step."""
+        now, files = now or datetime.now(UTC), self.files
+        return stand(self.machine, self.history, now, self.folder.path, files.remarks, files.event_times)

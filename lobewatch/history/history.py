@@ -140,7 +140,7 @@ class History:
     @property
     def questions(self) -> dict[str, tuple[str, ...]]:
         """Codes of what is asked and not answered, by tap test."""
-        return {row.tap_id: tuple(one.code for one in row.questions) for row in self.rows if row.questions}
+        return {row.tap_id: tuple(question.code for question in row.questions) for row in self.rows if row.questions}
 
     def with_rulings(self, number: int, rulings: Mapping[str, Ruling]) -> History:
         """The same with the word on every program after one of its rows."""
@@ -210,4 +210,4 @@ def _of_bearings(calibration: Calibration | None) -> Estimate:
 
 
 def _values(modes: Sequence[Mode]) -> tuple[Values, ...]:
-    return tuple((one.frequency, one.damping_ratio, one.stiffness, one.phase_deg) for one in modes)
+    return tuple((mode.frequency, mode.damping_ratio, mode.stiffness, mode.phase_deg) for mode in modes)

@@ -16,7 +16,7 @@ def left_out(folder: MachineFolder, excluded: Sequence[TapEntry], rows: Sequence
 
     rows: one series, oldest first, at least one. A tap test before its baseline is none of it.
     """
-    found = []
+    rows_out = []
     for entry in excluded:
         if (entry.tool, entry.direction) != (rows[-1].tool, rows[-1].direction):
             continue
@@ -27,6 +27,6 @@ def left_out(folder: MachineFolder, excluded: Sequence[TapEntry], rows: Sequence
         time, baseline = tap.circumstances.created, rows[-1].baseline
         if baseline is None or time >= baseline:
             before = [row.mode for row in rows if row.time < time and row.mode is not None]
-            said = measure(tap, folder.machine, before[-1] if before else None)
-            found.append(row_of(said, assemble(said, None, {}), Place(0, entry, None, None, baseline)))
-    return found
+            measurement = measure(tap, folder.machine, before[-1] if before else None)
+            rows_out.append(row_of(measurement, assemble(measurement, None, {}), Place(0, entry, None, None, baseline)))
+    return rows_out

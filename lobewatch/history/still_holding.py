@@ -27,8 +27,8 @@ from lobewatch.tool.series import FollowedMode
 def is_of(row: Row, place: Place) -> bool:
     """Whether a row was made of this tap test, with all that was accepted of it, since the same baseline."""
     tap = place.entry
-    made = row.tap_id, row.baseline, row.series, row.accepted
-    return made == (tap.id, place.baseline, place.series, frozenset(tap.accepted))
+    ground_of_row = row.tap_id, row.baseline, row.series, row.accepted
+    return ground_of_row == (tap.id, place.baseline, place.series, frozenset(tap.accepted))
 
 
 class _Ground(NamedTuple):

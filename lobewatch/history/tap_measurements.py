@@ -12,8 +12,8 @@ from lobewatch.history.kept_rows import kept_in_place
 from lobewatch.history.still_holding import StillHolding
 from lobewatch.history.usable_taps import NotTappedError
 from lobewatch.machine import DamagedTapError, MachineFolder
-from lobewatch.measuring.measurement import Measurement, TapFit, measure, measure_fit
-from lobewatch.measuring.questions import answered, open_questions
+from lobewatch.measuring.measurement import Measurement, TapFit, interpret_fit, measure
+from lobewatch.measuring.questions import open_questions, with_answers
 from lobewatch.tool.assembly import Assembly, assemble
 from lobewatch.tool.order import Place, earlier
 from lobewatch.tool.prediction import predict
@@ -43,7 +43,7 @@ class TapMeasurements:
             before = (rows[number] for number in earlier(place, self._places))
             last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
             measurement = self._measure(place, last)
-            measurement = replace(measurement, remarks=answered((*measurement.remarks, *place.said), place.entry))
+            measurement = replace(measurement, remarks=with_answers((*measurement.remarks, *place.said), place.entry))
         self._measurements[place.entry.id] = measurement
         if len(self._measurements) > KEPT:
             del self._measurements[next(iter(self._measurements))]
@@ -52,7 +52,7 @@ class TapMeasurements:
     def _measure(self, place: Place, last: Mode | None) -> Measurement:
         fit = self._fits.get(place.entry.id)
         if fit is not None:
-            return measure_fit(fit, self._folder.machine, last)
+            return interpret_fit(fit, self._folder.machine, last)
         return measure(self._folder.read(place.entry), self._folder.machine, last)
 
     def assembly_after(self, place: Place, rows: Sequence[Row]) -> Assembly:
@@ -84,7 +84,7 @@ class TapMeasurements:
             raise NotTappedError(f"no tap test with tool {tool!r}, and no prediction: {error}") from error
 
     def all_rows(
-        self, rows: Sequence[Row], others: Mapping[str, Row], behind: StillHolding | None = None
+        self, rows: Sequence[Row], older_rows: Mapping[str, Row], behind: StillHolding | None = None
     ) -> tuple[Row, ...]:
         """These rows, and those of all tap tests after them.
 
@@ -97,21 +97,21 @@ class TapMeasurements:
             if held is not None:
                 rows.append(held)
                 continue
-            rows.append(self._row(place, rows, others))
+            rows.append(self._row(place, rows, older_rows))
             if behind is not None:
                 behind.note(rows[-1])
         return tuple(rows)
 
-    def _row(self, place: Place, rows: Sequence[Row], others: Mapping[str, Row]) -> Row:
+    def _row(self, place: Place, rows: Sequence[Row], older_rows: Mapping[str, Row]) -> Row:
         try:
             assembly = self.assembly_after(place, rows)
             return row_of(self.measurement(place, rows), assembly, place)
         except DamagedTapError:
             raise
         except (ArithmeticError, LookupError, ValueError) as error:
-            if place.entry.id not in others:
+            if place.entry.id not in older_rows:
                 raise
-            return kept_in_place(others[place.entry.id], place, error)
+            return kept_in_place(older_rows[place.entry.id], place, error)
 
 
 def _followed_mode(measurement: Measurement, mode: Mode) -> FollowedMode:

@@ -58,8 +58,8 @@ class UsableTaps:
         """Those up to one of them, since the baseline that counted then; None: up to now."""
         last = None if tap_id is None else self.place(tap_id)
         baseline = self.baseline if last is None else last.baseline
-        known = self.places if last is None else self.places[: last.number + 1]
-        return [place for place in known if place.baseline == baseline]
+        places = self.places if last is None else self.places[: last.number + 1]
+        return [place for place in places if place.baseline == baseline]
 
     def since(self, tap_id: str) -> list[TapEntry]:
         """Those that are compared with one of them; none with what is none of them, a prediction."""
@@ -69,8 +69,8 @@ class UsableTaps:
     @property
     def remarks(self) -> list[Remark]:
         """What is wrong with the files, as far as it is known by now."""
-        known = () if self._contents is None else self._contents.remarks
-        return [*known, *(remark for _, remark in self._left_out.values())]
+        of_files = () if self._contents is None else self._contents.remarks
+        return [*of_files, *(remark for _, remark in self._left_out.values())]
 
     @property
     def events(self) -> Sequence[MaintenanceEvent]:
@@ -95,8 +95,8 @@ class UsableTaps:
     @property
     def lost(self) -> Sequence[TapEntry]:
         """Those whose files cannot be used, but for those that a person has taken out."""
-        found = [*self._all.lost, *(entry for entry, _ in self._left_out.values())]
-        return [entry for entry in found if not entry.excluded]
+        lost = [*self._all.lost, *(entry for entry, _ in self._left_out.values())]
+        return [entry for entry in lost if not entry.excluded]
 
     @property
     def by_id(self) -> dict[str, TapEntry]:
@@ -115,30 +115,34 @@ class UsableTaps:
 
     def newest(self, tool: str | None) -> TapEntry:
         """The newest one since the baseline, of a tool where one is named; NotTappedError where there is none."""
-        known = [place.entry for place in self.places if place.baseline == self.baseline]
-        found = [tap for tap in known if tool in (None, tap.tool)]
-        if found:
-            return found[-1]
-        which = "" if tool is None else f" with tool {tool!r}"
+        current = [place.entry for place in self.places if place.baseline == self.baseline]
+        fitting = [tap for tap in current if tool in (None, tap.tool)]
+        if fitting:
+            return fitting[-1]
+        tool_text = "" if tool is None else f" with tool {tool!r}"
         damaged = [str(remark) for remark in self.remarks]
         if damaged:
-            raise NotTappedError(f"{self._folder.path}: no tap test{which} that can be used: {'; '.join(damaged)}")
+            raise NotTappedError(f"{self._folder.path}: no tap test{tool_text} that can be used: {'; '.join(damaged)}")
         cure = "take one with lobewatch tap, or replay a recorded file"
         since = "yet" if self.baseline is None else f"since the new baseline of {self.baseline.astimezone():%Y-%m-%d}"
         if self.excluded:
             since += f", but {len(self.excluded)} excluded"
             cure += f"; {command('include', self._folder.path)} TAP takes one back"
-        raise NotTappedError(f"{self._folder.path}: no tap test{which} {since}; {cure}")
+        raise NotTappedError(f"{self._folder.path}: no tap test{tool_text} {since}; {cure}")
 
     def doubts(self, tool: str = "") -> tuple[Remark, ...]:
         """Damaged ones (of a tool; "": of any) that are newer than all of their series that can be used."""
         if not self.lost:
             return ()
-        known = {_series(place.entry): _time(place.entry) for place in self.places}
-        lost = [one for one in self.lost if _time(one) >= (self.baseline or BEFORE_ALL)]
-        newer = [one for one in lost if tool in ("", one.tool) and _time(one) > known.get(_series(one), BEFORE_ALL)]
+        newest_usable = {_series(place.entry): _time(place.entry) for place in self.places}
+        lost = [entry for entry in self.lost if _time(entry) >= (self.baseline or BEFORE_ALL)]
+        newer = [
+            entry
+            for entry in lost
+            if tool in ("", entry.tool) and _time(entry) > newest_usable.get(_series(entry), BEFORE_ALL)
+        ]
         text = "newer than all of its tool and direction that can be used, but its file is damaged"
-        return tuple(Remark("newest-damaged", f"tap test {one.id}", text, "tap again") for one in newer)
+        return tuple(Remark("newest-damaged", f"tap test {entry.id}", text, "tap again") for entry in newer)
 
     def add(self, entry: TapEntry) -> bool:
         """A tap test that was just committed: whether it is newer than all, and all others are as they were.

@@ -10,7 +10,7 @@ import numpy as np
 from acquisition import DataError
 from acquisition.files.cut_file import CutSignal
 from lobewatch.cuts.listening.expected_sound import ExpectedSound, expected_sound
-from lobewatch.cuts.listening.fold_frequency import modulo
+from lobewatch.cuts.listening.fold_frequency import family_distance
 from lobewatch.cuts.listening.listen_to import CutRecording, CutSound, listen_to
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
@@ -56,7 +56,7 @@ class CutComparison:
         """Chatter heard from chatter predicted, modulo tooth passing (Hz); None where one of them is not known."""
         if self.heard.chatter is None or self.predicted is None:
             return None
-        return float(modulo(self.predicted.frequency, self.heard.chatter.frequency, self.tooth_frequency))
+        return float(family_distance(self.predicted.frequency, self.heard.chatter.frequency, self.tooth_frequency))
 
     def as_heard(self, at: datetime) -> HeardCut:
         """To be written down; at: when it was cut (UTC)."""
@@ -64,7 +64,7 @@ class CutComparison:
         return HeardCut(
             "",
             at,
-            **self.setting.told(),
+            **self.setting.heard_cut_fields,
             speed_rpm=self.speed_rpm,
             word=self.heard.word,
             chatter_frequency_hz=None if chatter is None else chatter.frequency,
@@ -78,7 +78,7 @@ class CutComparison:
 def compare_cut(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> CutComparison:
     """Listen to a recording."""
     cut = setting.cut
-    what = CutRecording(
+    recording = CutRecording(
         signal.acceleration,
         signal.sample_rate,
         cut.teeth,
@@ -87,14 +87,14 @@ def compare_cut(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> Cut
         signal.clipped,
         signal.lost_scans,
     )
-    heard = listen_to(what)
-    known = logbook.ask(Analysis.assembly_or_reason, setting.tool)
-    assembly = None if isinstance(known, DataError) or not known.directions else known
+    heard = listen_to(recording)
+    tool = logbook.ask(Analysis.assembly_or_reason, setting.tool)
+    assembly = None if isinstance(tool, DataError) or not tool.directions else tool
     speed = heard.speed_rpm if np.isfinite(heard.speed_rpm) else setting.speed_rpm
     expected = None if assembly is None else expected_sound(setting, assembly, speed)
     return CutComparison(setting, heard, assembly, expected)
 
 
-def keep_listened(folder: MachineFolder, found: CutComparison, signal: CutSignal, at: datetime | None) -> HeardCut:
+def keep_listened(folder: MachineFolder, comparison: CutComparison, signal: CutSignal, at: datetime | None) -> HeardCut:
     """Write down what was heard, with its recording; at: when it was cut, None for now. Saved when this returns."""
-    return keep_cut(folder, found.as_heard(cutting_time(at, datetime.now(UTC))), signal)
+    return keep_cut(folder, comparison.as_heard(cutting_time(at, datetime.now(UTC))), signal)

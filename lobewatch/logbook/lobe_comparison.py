@@ -47,14 +47,15 @@ def compare_lobes(logbook: Logbook, tool: str | None, cut: str, source: Dynamics
 
     DataError with the reason where there are no lobes.
     """
-    own = next((program.tool for program in logbook.machine.program if program.name == cut), None)
-    assembly = logbook.assembly(own if tool is None else tool)
+    program_tool = next((program.tool for program in logbook.machine.program if program.name == cut), None)
+    assembly = logbook.assembly(program_tool if tool is None else tool)
     now = _charted(logbook, assembly, cut, source, method)
     first = logbook.first_assembly(assembly)
     then = None if first is None else _charted(logbook, first, cut, source, method)
     cuts = logbook.machine.cuts(assembly.tool)
-    same = logbook.verdicts(names=[name for name, other in cuts.items() if other == now.cuts])
-    pockets = robust_pockets(*at_speed(now.table, assembly, logbook.machine, logbook.cuts), logbook.machine)
+    same = logbook.verdicts(names=[name for name, program_cuts in cuts.items() if program_cuts == now.cuts])
+    learnt = at_speed(now.table, assembly, logbook.machine, logbook.cuts)
+    pockets = robust_pockets(now.table, assembly, logbook.machine, learnt)
     remarks = [*assembly.remarks, *(replace(remark, about=cut) for remark in now.lobes.remarks)]
     remarks += [] if pockets else [_no_pocket(now, logbook.machine)]
     return LobeComparison(now, then, pockets, _shifts(then, now), same, remarks)
@@ -71,8 +72,8 @@ def _charted(logbook: Logbook, assembly: Assembly, cut: str, source: Dynamics, m
     y: Tip | None = assembly.y
     if source is Dynamics.FRF:
         x, y = _frfs(logbook, assembly)
-    found = chart(method, x, y, cuts[cut], speed_grid(machine))
-    return Chart(cut, cut_table(machine, cut), assembly, source, x, y, cuts[cut], found)
+    lobes = chart(method, x, y, cuts[cut], speed_grid(machine))
+    return Chart(cut, cut_table(machine, cut), assembly, source, x, y, cuts[cut], lobes)
 
 
 def _frfs(logbook: Logbook, assembly: Assembly) -> tuple[Frf, Frf]:
@@ -84,9 +85,9 @@ def _frfs(logbook: Logbook, assembly: Assembly) -> tuple[Frf, Frf]:
             "use --source modes, which the model carries to the tip"
         )
     read = _predicted_frf if assembly.predicted else _measured_frf
-    known = {name: read(logbook, assembly, name) for name in assembly.directions}
-    other = known[assembly.directions[0]]
-    return known.get("x", other), known.get("y", other)
+    frfs = {name: read(logbook, assembly, name) for name in assembly.directions}
+    other = frfs[assembly.directions[0]]
+    return frfs.get("x", other), frfs.get("y", other)
 
 
 def _predicted_frf(logbook: Logbook, assembly: Assembly, direction: str) -> Frf:
@@ -109,9 +110,9 @@ def _measured_frf(logbook: Logbook, assembly: Assembly, direction: str) -> Frf:
 
 def _no_pocket(now: Chart, machine: Machine) -> Remark:
     """Why nothing is recommended."""
-    known, speeds = "".join(now.assembly.directions), machine.speed
-    if len(known) == 1:
-        missing = "y" if known == "x" else "x"
+    directions, speeds = "".join(now.assembly.directions), machine.speed
+    if len(directions) == 1:
+        missing = "y" if directions == "x" else "x"
         text = f"no speed and depth can be called safe: direction {missing} was not tapped"
         return Remark(NO_POCKET, now.name, text, f"tap direction {missing} of tool {now.assembly.tool!r} too")
     text = f"no safe speed and depth found in {speeds.low_rpm:g}..{speeds.high_rpm:g} rpm"

@@ -73,8 +73,8 @@ def _curve(spindle: Spindle, mode: int) -> tuple[_Float, _Float]:
 
 
 def _points(logbook: Logbook, tool: str) -> tuple[_Float, _Float]:
-    mine = [row for row in logbook.history.current if row.tool == tool and row.bearing_stiffness.is_known]
-    points = np.array([(row.bearing_stiffness.value, row.frequency.value) for row in mine]).reshape(-1, 2)
+    calibrated_rows = [row for row in logbook.history.current if row.tool == tool and row.bearing_stiffness.is_known]
+    points = np.array([(row.bearing_stiffness.value, row.frequency.value) for row in calibrated_rows]).reshape(-1, 2)
     return points[:, 0], points[:, 1]
 
 

@@ -46,15 +46,21 @@ class Outlook:
     @property
     def horizon(self) -> float:
         """Last day that is foretold of all its series, in days since 1970; NaN where nothing is foretold."""
-        foretold = (one.trend.forecast for one in self.standing.series if one.trend and not one.trend.is_stale)
+        foretold = (
+            series.trend.forecast for series in self.standing.series if series.trend and not series.trend.is_stale
+        )
         return min((float(forecast.dates[-1]) for forecast in foretold if forecast), default=math.nan)
 
     def series(self, tool: str | None = None, direction: str | None = None) -> SeriesStanding:
         """The series of a tool and direction, the one that fell most where several fit; DataError where none does."""
-        fits = [one for one in self.standing.series if tool in (None, one.tool) and direction in (None, one.direction)]
+        fits = [
+            series
+            for series in self.standing.series
+            if tool in (None, series.tool) and direction in (None, series.direction)
+        ]
         if not fits:
-            there = "; ".join(f"--tool {one.tool} --direction {one.direction}" for one in self.standing.series)
-            raise DataError(f"tool {tool or 'any'}, direction {direction or 'any'}: no such series; there are: {there}")
+            names = "; ".join(f"--tool {series.tool} --direction {series.direction}" for series in self.standing.series)
+            raise DataError(f"tool {tool or 'any'}, direction {direction or 'any'}: no such series; there are: {names}")
         return fits[0]
 
 
@@ -68,12 +74,12 @@ def _outlook(analysis: Analysis, now: datetime) -> Outlook:
     standing, machine = analysis.standing(now), analysis.machine
     fixed = machine.limits
     percents = (fixed.frequency_warn_percent, fixed.frequency_alarm_percent)
-    series = [one.trend for one in standing.series if one.trend is not None]
+    trends = [series.trend for series in standing.series if series.trend is not None]
     falls = _critical_falls(analysis)
     return Outlook(
         standing,
-        {one.name: _fate(falls[one.name], one.tool, standing.series) for one in machine.program},
-        {percent: _first(of_limit(trend, percent) for trend in series) for percent in percents},
+        {program.name: _fate(falls[program.name], program.tool, standing.series) for program in machine.program},
+        {percent: _first(of_limit(trend, percent) for trend in trends) for percent in percents},
     )
 
 
@@ -81,7 +87,7 @@ def _critical_falls(analysis: Analysis) -> Mapping[str, CriticalFall]:
     """By program; kept in the history where there is a tap test to keep them with."""
     history = analysis.history
     if not history.current:
-        return {one.program.name: critical_fall(one) for one in analysis.verdicts()}
+        return {verdict.program.name: critical_fall(verdict) for verdict in analysis.verdicts()}
     kept = analysis.rulings(history.rows[-1].tap_id, falls=True)
     return {name: ruling.critical for name, ruling in kept.items() if ruling.critical is not None}
 
@@ -89,8 +95,8 @@ def _critical_falls(analysis: Analysis) -> Mapping[str, CriticalFall]:
 def _fate(critical: CriticalFall, tool: str, series: Sequence[SeriesStanding]) -> Fate:
     if math.isnan(critical.not_stable):
         return Fate(critical, None, None)
-    own = [one for one in series if one.tool == tool] or series
-    trends = [one.trend for one in own if one.trend is not None]
+    of_tool = [standing for standing in series if standing.tool == tool] or series
+    trends = [standing.trend for standing in of_tool if standing.trend is not None]
     doubtful = _first(_after(trend, critical.doubtful, 0.0) for trend in trends)
     return Fate(critical, doubtful, _first(_after(trend, critical.not_stable, critical.error) for trend in trends))
 
@@ -117,10 +123,10 @@ def of_limit(trend: Trend, percent: float) -> DateRange | None:
     return trend.forecast.reached(trend.start + 100 * math.log1p(-percent / 100))
 
 
-def _first(found: Iterator[DateRange | None]) -> DateRange | None:
+def _first(date_ranges: Iterator[DateRange | None]) -> DateRange | None:
     """The earliest of several series; None where one of them cannot be foretold and none is past it."""
-    dates = [*found]
+    dates = [*date_ranges]
     if ALREADY in dates:
         return ALREADY
-    known = [one for one in dates if one is not None]
-    return DateRange(*map(min, zip(*known, strict=True))) if known and len(known) == len(dates) else None
+    foreseen = [date for date in dates if date is not None]
+    return DateRange(*map(min, zip(*foreseen, strict=True))) if foreseen and len(foreseen) == len(dates) else None

@@ -10,9 +10,9 @@ from pathlib import Path
 from acquisition import DataError, Description, Recording, TapTest
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.replaying.store import HERE, KnownContents, Progress, digests_of
-from lobewatch.logbook.replaying.understand import Asked, Understood, reason_of, understand, understand_file
-from lobewatch.measuring.measurement import Measurement, TapFit, measure_fit
-from lobewatch.measuring.workers.share_work import (Workers, shared)
+from lobewatch.logbook.replaying.tap_draft import FileReading, FileRequest, read_file, read_requested_file, reason_of
+from lobewatch.measuring.measurement import Measurement, TapFit, interpret_fit
+from lobewatch.measuring.workers.share_work import Workers, share_work
 from modal import Mode
 
 
@@ -37,7 +37,7 @@ class Preview:
 def preview_recordings(
     logbook: Logbook,
     files: Sequence[Path],
-    said: Description,
+    description: Description,
     progress: Progress = lambda _what, _done, _of: None,
     workers: Workers = HERE,
 ) -> list[Preview]:
@@ -45,77 +45,80 @@ def preview_recordings(
 
     workers: who reads and fits; what they find is the same.
     """
-    found, fits = list[Preview](), dict[Path, TapFit]()
-    for preview, fit in _read(logbook, files, said, progress, workers):
-        found.append(preview)
+    read_files, fits = list[Preview](), dict[Path, TapFit]()
+    for preview, fit in _read(logbook, files, description, progress, workers):
+        read_files.append(preview)
         fits |= {preview.file: fit} if fit is not None else {}
-    found.sort(key=_time)
+    read_files.sort(key=_time)
     last: dict[tuple[str, str], Mode] = {}
     previews = list[Preview]()
-    for number, one in enumerate(found, 1):
-        previews.append(one if one.tap is None else _measured(logbook, one, one.tap, fits[one.file], last))
+    for number, preview in enumerate(read_files, 1):
+        tap = preview.tap
+        previews.append(preview if tap is None else _measured(logbook, preview, tap, fits[preview.file], last))
         progress("measure", number, len(files))
     return previews
 
 
-def _time(one: Preview) -> float:
-    return one.tap.circumstances.created.timestamp() if one.tap else -math.inf
+def _time(preview: Preview) -> float:
+    return preview.tap.circumstances.created.timestamp() if preview.tap else -math.inf
 
 
 def _read(
-    logbook: Logbook, files: Sequence[Path], said: Description, progress: Progress, workers: Workers
+    logbook: Logbook, files: Sequence[Path], description: Description, progress: Progress, workers: Workers
 ) -> Iterator[tuple[Preview, TapFit | None]]:
     """Each content once; in the order of the files."""
     contents, todo = KnownContents.of(logbook.folder.taps()), dict[str, Path]()
     digests, unread = digests_of(files)
     for file, digest in digests.items():
-        if contents.tap_of(digest, said) is None:
+        if contents.tap_of(digest, description) is None:
             todo.setdefault(digest, file)
-    results = dict[str, Understood | str]()
-    for digest, found in zip(todo, _all_understood(logbook, [*todo.values()], said, workers), strict=True):
-        results[digest] = found
+    results = dict[str, FileReading | str]()
+    for digest, understood in zip(todo, _all_understood(logbook, [*todo.values()], description, workers), strict=True):
+        results[digest] = understood
         progress("read", len(results), len(todo))
     for file in files:
         digest = digests.get(file, "")
-        one = reason_of(file, unread[file]) if file in unread else results.get(digest)
-        if one is None:
-            yield Preview(file, known=contents.tap_of(digest, said) or ""), None
-        elif isinstance(one, str):
-            yield Preview(file, refused=one), None
+        result = reason_of(file, unread[file]) if file in unread else results.get(digest)
+        if result is None:
+            yield Preview(file, known=contents.tap_of(digest, description) or ""), None
+        elif isinstance(result, str):
+            yield Preview(file, refused=result), None
         elif todo[digest] != file:
-            yield Preview(file, known=one.tap.id), None
+            yield Preview(file, known=result.tap.id), None
         else:
-            yield Preview(file, recording=one.recording, tap=one.tap), one.fit
+            yield Preview(file, recording=result.recording, tap=result.tap), result.fit
 
 
 def _all_understood(
-    logbook: Logbook, files: Sequence[Path], said: Description, workers: Workers
-) -> Iterator[Understood | str]:
-    """Each file in turn, or why it cannot be used; DataError as `shared`."""
+    logbook: Logbook, files: Sequence[Path], description: Description, workers: Workers
+) -> Iterator[FileReading | str]:
+    """Each file in turn, or why it cannot be used; DataError as `share_work`."""
     if workers.are_elsewhere:
         toml = logbook.folder.toml.read_text("utf-8")
-        yield from shared(understand, (Asked.of(file, said, toml) for file in files), workers)
+        yield from share_work(read_requested_file, (FileRequest.of(file, description, toml) for file in files), workers)
         return
     for file in files:
         try:
-            yield understand_file(logbook.folder, file, said)
+            yield read_file(logbook.folder, file, description)
         except (DataError, OSError, ValueError) as error:
             yield reason_of(file, error)
 
 
-def _measured(logbook: Logbook, one: Preview, tap: TapTest, fit: TapFit, last: dict[tuple[str, str], Mode]) -> Preview:
+def _measured(
+    logbook: Logbook, preview: Preview, tap: TapTest, fit: TapFit, last: dict[tuple[str, str], Mode]
+) -> Preview:
     """last: the mode followed in the newest file before it of each tool and direction."""
     series = (tap.circumstances.tool, tap.circumstances.direction)
     before = last.get(series) or _stored_before(logbook, tap)
-    found = measure_fit(fit, logbook.machine, before)
-    if found.followed is not None:
-        last[series] = found.followed
-    return replace(one, measurement=found)
+    measurement = interpret_fit(fit, logbook.machine, before)
+    if measurement.followed is not None:
+        last[series] = measurement.followed
+    return replace(preview, measurement=measurement)
 
 
 def _stored_before(logbook: Logbook, tap: TapTest) -> Mode | None:
     """The mode that the newest stored tap test before it of the same series follows."""
     about = tap.circumstances
     rows = [row for row in logbook.history.rows if (row.tool, row.direction) == (about.tool, about.direction)]
-    known = [row.mode for row in rows if row.time < about.created and row.mode is not None and not row.questions]
-    return known[-1] if known else None
+    modes = [row.mode for row in rows if row.time < about.created and row.mode is not None and not row.questions]
+    return modes[-1] if modes else None

@@ -15,7 +15,7 @@ from lobewatch.machine import Machine, TapEntry
 from lobewatch.machine.contents import fault_of
 from lobewatch.machine.settings.machine_file import parse_machine
 from lobewatch.measuring.measurement import TapFit, fit_tap
-from lobewatch.measuring.workers.share_work import (Workers, shared)
+from lobewatch.measuring.workers.share_work import Workers, share_work
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.verdict import Verdict, judge
 
@@ -37,8 +37,8 @@ class TapBytes:
 class Question:
     """What the word on each program was after a tap test."""
 
-    known: Mapping[str, Assembly | DataError]
-    """The tools as they were known then."""
+    tools: Mapping[str, Assembly | DataError]
+    """Tools as they were known then, or why one was not, by name."""
     machine_toml: str
     """The machine as it is now."""
 
@@ -49,7 +49,7 @@ def rebuild_history(logbook: Logbook, workers: Workers, progress: Progress = lam
     toml = logbook.folder.toml.read_text("utf-8")
     if workers.are_elsewhere:
         entries = [place.entry for place in logbook.files.places]
-        fits = shared(modes_of, (_content(logbook, entry, toml) for entry in entries), workers)
+        fits = share_work(modes_of, (_content(logbook, entry, toml) for entry in entries), workers)
         logbook.fits |= {entry.id: fit for entry, fit in zip(entries, fits, strict=True) if fit is not None}
     tap_ids = [row.tap_id for row in logbook.history.rows]
     for number, (tap_id, verdicts) in enumerate(_all_judged(logbook, tap_ids, toml, workers), 1):
@@ -66,7 +66,7 @@ def _all_judged(
         yield from ((tap_id, {}) for tap_id in tap_ids)
         return
     questions = (_question(logbook, tap_id, toml) for tap_id in tap_ids)
-    yield from zip(tap_ids, shared(verdicts_on, questions, workers), strict=True)
+    yield from zip(tap_ids, share_work(verdicts_on, questions, workers), strict=True)
 
 
 def _content(logbook: Logbook, entry: TapEntry, toml: str) -> TapBytes:
@@ -93,7 +93,7 @@ def modes_of(tap: TapBytes) -> TapFit | None:
 def verdicts_on(question: Question) -> dict[str, Verdict]:
     """On all programs, by their names."""
     machine = _machine(question.machine_toml)
-    return {table.name: judge(table, question.known[table.tool], machine) for table in machine.program}
+    return {table.name: judge(table, question.tools[table.tool], machine) for table in machine.program}
 
 
 @lru_cache(maxsize=4)

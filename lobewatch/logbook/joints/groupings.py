@@ -14,12 +14,12 @@ Grouping = Callable[[Spindle], Spindle]
 
 def grouping_for(spindle: Spindle, modes: int) -> Grouping:
     """The finest one that needs no more factors than there are modes; two at least are needed."""
-    return next((one for one in (divided, as_named) if len(_groups(one(spindle))) <= modes), merged)
+    return next((grouping for grouping in (divided, as_named) if len(_groups(grouping(spindle))) <= modes), merged)
 
 
 def start_factors(spindle: Spindle, bearings: float, radial: float, tilting: float) -> list[float]:
     """A factor for each group, bearings first, in order of appearance; both of a joint that has one: the middle."""
-    springs = [(one.group, bearings) for one in spindle.bearings]
+    springs = [(bearing.group, bearings) for bearing in spindle.bearings]
     for joint in spindle.joints:
         alone = [(joint.group, radial), (joint.rotational_group, tilting)]
         springs += alone if joint.rotational_group else [(joint.group, math.sqrt(radial * tilting))]
@@ -28,8 +28,15 @@ def start_factors(spindle: Spindle, bearings: float, radial: float, tilting: flo
 
 def divided(spindle: Spindle) -> Spindle:
     """The same with a group of its own for the stiffness of each joint against tilting."""
-    named = [(one, one.rotational_group or f"{one.group} tilting") for one in spindle.joints]
-    return replace(spindle, joints=[replace(one, rotational_group=name) if one.group else one for one, name in named])
+    return replace(
+        spindle,
+        joints=[
+            replace(joint, rotational_group=joint.rotational_group or f"{joint.group} tilting")
+            if joint.group
+            else joint
+            for joint in spindle.joints
+        ],
+    )
 
 
 def as_named(spindle: Spindle) -> Spindle:
@@ -41,8 +48,8 @@ def merged(spindle: Spindle) -> Spindle:
     """The same with one group for all bearings that are calibrated and one for all joints."""
     return replace(
         spindle,
-        bearings=[replace(one, group="bearings" if one.group else "") for one in spindle.bearings],
-        joints=[replace(one, group="joint" if one.group else "", rotational_group="") for one in spindle.joints],
+        bearings=[replace(bearing, group="bearings" if bearing.group else "") for bearing in spindle.bearings],
+        joints=[replace(joint, group="joint" if joint.group else "", rotational_group="") for joint in spindle.joints],
     )
 
 

@@ -72,14 +72,14 @@ def known_modes(taps: Sequence[TappedTool], position: float) -> KnownModes:
     starts = _distinct(sorted(_starts(taps, position), key=lambda start: start.cost))
     if not starts:
         return _fitted(taps, Start(0.0, 1.0, 1.0, 1.0, tuple(Match(0.0, ((t.number, t.followed),)) for t in taps)))
-    found = None
+    best = None
     for start in starts[:TRIED]:
         with suppress(StiffnessFitError, UnreachableFrequencyError):
-            now = _settled(taps, start, position)
-            found = now if found is None or (found.fit.misfits and not now.fit.misfits) else found
-        if found is not None and not found.fit.misfits:
+            settled = _settled(taps, start, position)
+            best = settled if best is None or (best.fit.misfits and not settled.fit.misfits) else best
+        if best is not None and not best.fit.misfits:
             break
-    return found or _fitted(taps, starts[0])
+    return best or _fitted(taps, starts[0])
 
 
 def _starts(taps: Sequence[TappedTool], position: float) -> Iterator[Start]:
@@ -88,8 +88,8 @@ def _starts(taps: Sequence[TappedTool], position: float) -> Iterator[Start]:
         with suppress(ValueError, ArithmeticError):
             stiffer = [_with_joints(tap.spindle, radial, tilting) for tap in taps]
             factor = calibrate(stiffer[0], first.followed.frequency, mode=first.number).factor
-            matches = _matches(taps, [_with_bearings(one, factor) for one in stiffer], position)
-            yield Start(sum(one.cost for one in matches), factor, radial, tilting, matches)
+            matches = _matches(taps, [_with_bearings(spindle, factor) for spindle in stiffer], position)
+            yield Start(sum(match.cost for match in matches), factor, radial, tilting, matches)
 
 
 def _distinct(starts: Sequence[Start]) -> list[Start]:
@@ -99,52 +99,55 @@ def _distinct(starts: Sequence[Start]) -> list[Start]:
 
 def _with_joints(spindle: Spindle, radial: float, tilting: float) -> Spindle:
     joints = [
-        replace(one, stiffness=radial * one.stiffness, rotational_stiffness=tilting * one.rotational_stiffness)
-        if one.group
-        else one
-        for one in spindle.joints
+        replace(joint, stiffness=radial * joint.stiffness, rotational_stiffness=tilting * joint.rotational_stiffness)
+        if joint.group
+        else joint
+        for joint in spindle.joints
     ]
     return replace(spindle, joints=joints)
 
 
 def _with_bearings(spindle: Spindle, factor: float) -> Spindle:
-    bearings = [replace(one, stiffness=factor * one.stiffness) if one.group else one for one in spindle.bearings]
+    bearings = [
+        replace(bearing, stiffness=factor * bearing.stiffness) if bearing.group else bearing
+        for bearing in spindle.bearings
+    ]
     return replace(spindle, bearings=bearings)
 
 
 def _settled(taps: Sequence[TappedTool], start: Start, position: float) -> KnownModes:
     """Fitted and looked for anew, until the same modes are found."""
-    found = _fitted(taps, start)
+    fitted = _fitted(taps, start)
     for _ in range(ROUNDS):
-        matches = _matches(taps, found.fit.spindles, position)
-        if _numbers(matches) == _numbers(found.matches):
+        matches = _matches(taps, fitted.fit.spindles, position)
+        if _numbers(matches) == _numbers(fitted.matches):
             break
-        found = _fitted(taps, start._replace(matches=matches))
-    return found
+        fitted = _fitted(taps, start._replace(matches=matches))
+    return fitted
 
 
 def _matches(taps: Sequence[TappedTool], spindles: Sequence[Spindle], position: float) -> tuple[Match, ...]:
-    found = []
+    matches = []
     for tap, spindle in zip(taps, spindles, strict=True):
         frequency, stiffness = modes_at(spindle, max(MODES, tap.number), position)
-        found.append(match(tap, frequency.tolist(), stiffness.tolist()))
-    return tuple(found)
+        matches.append(match(tap, frequency.tolist(), stiffness.tolist()))
+    return tuple(matches)
 
 
 def _numbers(matches: Sequence[Match]) -> list[list[tuple[int, float]]]:
-    return [[(number, mode.frequency) for number, mode in one.modes] for one in matches]
+    return [[(number, mode.frequency) for number, mode in match.modes] for match in matches]
 
 
 def _fitted(taps: Sequence[TappedTool], start: Start) -> KnownModes:
-    every = [(tap, number, mode) for tap, one in enumerate(start.matches) for number, mode in one.modes]
-    grouping = grouping_for(taps[0].spindle, len(every))
+    numbered = [(tap, number, mode) for tap, match in enumerate(start.matches) for number, mode in match.modes]
+    grouping = grouping_for(taps[0].spindle, len(numbered))
     spindles = [grouping(tap.spindle) for tap in taps]
     fit = fit_stiffness(
         spindles,
-        [mode.frequency for _, _, mode in every],
-        [taps[tap].std(mode) for tap, _, mode in every],
-        [number for _, number, _ in every],
-        shaft=[tap for tap, _, _ in every],
+        [mode.frequency for _, _, mode in numbered],
+        [taps[tap].std(mode) for tap, _, mode in numbered],
+        [number for _, number, _ in numbered],
+        shaft=[tap for tap, _, _ in numbered],
         start=start_factors(spindles[0], start.bearings, start.radial, start.tilting),
     )
     return KnownModes(taps, start.matches, grouping, fit)

@@ -44,7 +44,7 @@ def match(tap: TappedTool, frequency: Sequence[float], stiffness: Sequence[float
             pair = _cost(mode, *model) if (mode is tap.followed) == (number == tap.number) else math.inf
             taken = Match(best[number - 1].cost + pair, (*best[number - 1].modes, (number, mode)))
             left = Match(best[number].cost + skipped, best[number].modes)
-            row.append(min(taken, left, row[-1], key=lambda one: one.cost))
+            row.append(min(taken, left, row[-1], key=lambda candidate: candidate.cost))
         best = row
     return best[-1]
 

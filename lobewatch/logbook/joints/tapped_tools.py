@@ -42,8 +42,8 @@ class TappedTool:
 
     def std(self, mode: Mode) -> float:
         """Standard error of a frequency of this tap test (Hz), that of mounting the tool included."""
-        own = float(mode.standard_error[0])
-        return math.hypot(own if math.isfinite(own) else 0.0, self.scatter * mode.frequency)
+        own_error = float(mode.standard_error[0])
+        return math.hypot(own_error if math.isfinite(own_error) else 0.0, self.scatter * mode.frequency)
 
 
 def tapped_tools(
@@ -81,20 +81,20 @@ def _newest(rows: Sequence[Row], tool: str, direction: str | None) -> Row:
     fits = [row for row in rows if row.tool == tool and direction in (None, row.direction)]
     if fits:
         return fits[-1]
-    known = sorted({f"{row.tool}, {row.direction}" for row in rows})
+    tapped = sorted({f"{row.tool}, {row.direction}" for row in rows})
     where = "" if direction is None else f" in direction {direction}"
-    raise DataError(f"tool {tool!r} was never tapped{where}; tapped are: {'; '.join(known) or 'none'}; tap it first")
+    raise DataError(f"tool {tool!r} was never tapped{where}; tapped are: {'; '.join(tapped) or 'none'}; tap it first")
 
 
 def _tapped(logbook: Logbook, row: Row, number: int) -> TappedTool:
-    found, machine = logbook.measurement(row.tap_id), logbook.machine
-    if found.followed is None:
+    measurement, machine = logbook.measurement(row.tap_id), logbook.machine
+    if measurement.followed is None:
         raise DataError(f"{row.tap_id}: no mode is followed in the newest test of tool {row.tool!r}; tap it again")
-    if asked := open_questions(found.remarks):
+    if asked := open_questions(measurement.remarks):
         codes = ", ".join(remark.code for remark in asked)
         raise DataError(f"{row.tap_id}: the newest test of tool {row.tool!r} is in question ({codes}); answer first")
     low, high = machine.mode.band_hz or (0.0, math.inf)
-    seen = [mode for mode in found.modes if low <= mode.frequency <= high]
+    in_band = [mode for mode in measurement.modes if low <= mode.frequency <= high]
     scatter = scatter_in(logbook.assembly(row.tool, row.tap_id), row.direction, machine.doubt)
     return TappedTool(
         row.tool,
@@ -102,7 +102,7 @@ def _tapped(logbook: Logbook, row: Row, number: int) -> TappedTool:
         row.time,
         machine.model(row.tool),
         number,
-        found.followed,
-        tuple(mode for mode in believed(seen).modes if mode is not found.followed),
+        measurement.followed,
+        tuple(mode for mode in believed(in_band).modes if mode is not measurement.followed),
         scatter.frequency / IN_95_PERCENT,
     )

@@ -66,18 +66,18 @@ def calibrate_tools(
         )
     taps = tapped_tools(logbook, tools, direction, mode)
     try:
-        known = known_modes(taps, machine.tap.position_mm / 1e3)
+        fitted_modes = known_modes(taps, machine.tap.position_mm / 1e3)
     except (StiffnessFitError, UnreachableFrequencyError) as error:
         raise DataError(f"tools {' and '.join(map(repr, tools))} do not fit one spindle: {error}") from error
-    fit, grouping = known.fit, known.grouping
+    fit, grouping = fitted_modes.fit, fitted_modes.grouping
     return ToolsCalibration(
         machine.spindle.label if machine.spindle else "",
         tuple(taps),
         fit,
         dict(_predictions(machine, fit, grouping, tools)) if grouping is divided else {},
         _to_enter(fit, grouping, machine.model(machine.tap.tool)),
-        dict(_left_out(known)),
-        (*_shared(known), *_apart(taps, machine)),
+        dict(_left_out(fitted_modes)),
+        (*_shared(fitted_modes), *_apart(taps, machine)),
     )
 
 
@@ -95,26 +95,27 @@ def _predictions(
 
 def _to_enter(fit: StiffnessFit, grouping: Grouping, drawn: Spindle) -> tuple[Joint, ...]:
     """All joints of machine.toml as found; none where the tools do not fit one spindle, or no joint is felt."""
-    found = fit.applied_to(grouping(drawn)).joints
-    names = {name for joint in found for name in (joint.group, joint.rotational_group) if name}
+    joints = fit.applied_to(grouping(drawn)).joints
+    names = {name for joint in joints for name in (joint.group, joint.rotational_group) if name}
     if fit.misfits or names & {*fit.groups} <= fit.open_groups:
         return ()
-    return tuple(replace(one, group=old.group) for one, old in zip(found, drawn.joints, strict=True))
+    return tuple(replace(joint, group=old.group) for joint, old in zip(joints, drawn.joints, strict=True))
 
 
-def _left_out(known: KnownModes) -> Iterator[tuple[str, tuple[float, ...]]]:
-    for tap, match in zip(known.taps, known.matches, strict=True):
+def _left_out(fitted_modes: KnownModes) -> Iterator[tuple[str, tuple[float, ...]]]:
+    for tap, match in zip(fitted_modes.taps, fitted_modes.matches, strict=True):
         counted = [mode for _, mode in match.modes]
-        left = [mode.frequency for mode in nearest(tap) if not any(mode is one for one in counted)]
+        left = [mode.frequency for mode in nearest(tap) if not any(mode is counted_mode for counted_mode in counted)]
         if left:
             yield tap.tool, tuple(left)
 
 
-def _shared(known: KnownModes) -> Iterator[Remark]:
+def _shared(fitted_modes: KnownModes) -> Iterator[Remark]:
     """Fewer factors than stiffnesses."""
-    if known.grouping is not divided:
-        shared = "all bearings share a factor, and " if known.grouping is merged else ""
-        text = f"{known.fit.mode.size} modes are too few: {shared}all stiffnesses of the joint keep their given ratio; "
+    if fitted_modes.grouping is not divided:
+        shared = "all bearings share a factor, and " if fitted_modes.grouping is merged else ""
+        count = fitted_modes.fit.mode.size
+        text = f"{count} modes are too few: {shared}all stiffnesses of the joint keep their given ratio; "
         cure = "measure more modes: a wider [mode] band_hz, a harder hammer tip"
         yield Remark("factors-shared", "", f"{text}other tools are not predicted", cure)
 

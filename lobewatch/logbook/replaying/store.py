@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from acquisition import DataError, Description, TapTest
-from lobewatch.logbook.replaying.prepare import Prepared, all_prepared, prepared, remove_leftovers
-from lobewatch.logbook.replaying.understand import reason_of
+from lobewatch.logbook.replaying.ready_tap import ReadyTap, make_all_ready, make_ready, remove_leftovers
+from lobewatch.logbook.replaying.tap_draft import reason_of
 from lobewatch.machine import MachineFolder, TapEntry
 from lobewatch.measuring.measurement import TapFit
 from lobewatch.measuring.workers.share_work import Workers
@@ -48,16 +48,16 @@ class KnownContents:
     @classmethod
     def of(cls, taps: Sequence[TapEntry]) -> KnownContents:
         """Those of committed tap tests, by their file and by the file that they were replayed from."""
-        found = cls({})
+        contents = cls({})
         for tap in taps:
             for digest in filter(None, (tap.source_sha256, tap.sha256)):
-                found.by_digest.setdefault(digest, []).append((tap.id, tap.direction))
-        return found
+                contents.by_digest.setdefault(digest, []).append((tap.id, tap.direction))
+        return contents
 
-    def tap_of(self, digest: str, said: Description) -> str | None:
+    def tap_of(self, digest: str, description: Description) -> str | None:
         """The tap test of a content; one of several responses is known only where it is stored in this direction."""
         for tap_id, direction in self.by_digest.get(digest, ()):
-            if said.response is None or direction == (said.direction or direction):
+            if description.response is None or direction == (description.direction or direction):
                 return tap_id
         return None
 
@@ -69,7 +69,7 @@ class KnownContents:
 def store_recordings(
     folder: MachineFolder,
     files: Sequence[Path],
-    said: Description,
+    description: Description,
     *,
     workers: Workers = HERE,
     keep_going: bool = False,
@@ -86,61 +86,61 @@ def store_recordings(
         raise unread[files[0]]
     refused = {file: reason_of(file, error) for file, error in unread.items()}
     contents, todo = KnownContents.of(folder.taps()), dict[str, Path]()
-    ids = {digest: contents.tap_of(digest, said) or "" for digest in digests.values()}
+    ids = {digest: contents.tap_of(digest, description) or "" for digest in digests.values()}
     for file, digest in digests.items():
         if not ids[digest]:
             todo.setdefault(digest, file)
     try:
-        ready, wrong = _made_ready(folder, todo, said, workers, alone=len(files) == 1, progress=progress)
+        ready, wrong = _make_ready(folder, todo, description, workers, alone=len(files) == 1, progress=progress)
         refused |= {file: wrong[digest] for file, digest in digests.items() if digest in wrong}
         if refused and not (keep_going and len(refused) < len(files)):
             raise DataError(refusal({file: refused[file] for file in files if file in refused}, len(files)))
-        ready.sort(key=lambda one: one.created)
+        ready.sort(key=lambda tap: tap.created)
         if ready:
-            folder.commit_files({one.temporary: one.entry for one in ready})
+            folder.commit_files({tap.temporary: tap.entry for tap in ready})
             progress("store", len(ready), len(ready))
     finally:
         remove_leftovers(folder)
-    ids |= {one.digest: one.entry.id for one in ready}
+    ids |= {tap.digest: tap.entry.id for tap in ready}
     used = {file: ids[digests[file]] for file in files if file not in refused}
     known = {file: tap_id for file, tap_id in used.items() if todo.get(digests[file]) != file}
-    taken = dict.fromkeys(text for one in ready for text in one.taken)
-    fits = {one.entry.id: one.fit for one in ready}
+    taken = dict.fromkeys(text for tap in ready for text in tap.taken)
+    fits = {tap.entry.id: tap.fit for tap in ready}
     return ReplayOutcome([used[file] for file in files if file in used], known, [*fits], refused, list(taken), fits)
 
 
 def digests_of(files: Sequence[Path]) -> tuple[dict[Path, str], dict[Path, OSError]]:
     """SHA-256 of each file, and what is wrong with those that cannot be read."""
-    found, unread = dict[Path, str](), dict[Path, OSError]()
+    digests, unread = dict[Path, str](), dict[Path, OSError]()
     for file in files:
         try:
-            found[file] = hashlib.sha256(file.read_bytes()).hexdigest()
+            digests[file] = hashlib.sha256(file.read_bytes()).hexdigest()
         except OSError as error:
             unread[file] = error
-    return found, unread
+    return digests, unread
 
 
-def _made_ready(
+def _make_ready(
     folder: MachineFolder,
     todo: Mapping[str, Path],
-    said: Description,
+    description: Description,
     workers: Workers,
     *,
     alone: bool,
     progress: Progress,
-) -> tuple[list[Prepared], dict[str, str]]:
+) -> tuple[list[ReadyTap], dict[str, str]]:
     """Files by their digests, made ready; by digest why some cannot be used, the error itself where it stands alone."""
     if alone and not workers.scheduler:
-        return [prepared(folder, file, said) for file in todo.values()], {}
-    ready, wrong = list[Prepared](), dict[str, str]()
-    results = zip(todo, all_prepared(folder, [*todo.values()], said, workers), strict=True)
-    for number, (digest, one) in enumerate(results, 1):
-        if isinstance(one, str):
-            wrong[digest] = one
-        elif one.digest != digest:
+        return [make_ready(folder, file, description) for file in todo.values()], {}
+    ready, wrong = list[ReadyTap](), dict[str, str]()
+    results = zip(todo, make_all_ready(folder, [*todo.values()], description, workers), strict=True)
+    for number, (digest, result) in enumerate(results, 1):
+        if isinstance(result, str):
+            wrong[digest] = result
+        elif result.digest != digest:
             wrong[digest] = "it changes while it is read; wait until it is written"
         else:
-            ready.append(one)
+            ready.append(result)
         progress("read", number, len(todo))
     return ready, wrong
 
@@ -150,7 +150,7 @@ def refusal(refused: Mapping[Path, str], n: int, *, stored: bool = False) -> str
     lines = [f"{file}: {why}" for file, why in refused.items()]
     if len(refused) == n:
         return "\n".join([f"none of the {n} files can be used; nothing is stored", *lines])
-    others = "the others are stored" if stored else "nothing is stored; --keep-going stores the others"
+    rest_text = "the others are stored" if stored else "nothing is stored; --keep-going stores the others"
     if len(lines) == 1:
-        return f"{lines[0]} (1 of {n} files; {others})"
-    return "\n".join([f"{len(refused)} of {n} files cannot be used; {others}", *lines])
+        return f"{lines[0]} (1 of {n} files; {rest_text})"
+    return "\n".join([f"{len(refused)} of {n} files cannot be used; {rest_text}", *lines])

@@ -14,7 +14,7 @@ from lobewatch.logbook import Logbook
 from lobewatch.plant.plant import Plant
 from lobewatch.show.plant.plant_rows import plant_rows
 from lobewatch.show.report.report import render_report
-from lobewatch.tap.outcome import outcome_of
+from lobewatch.tap.session import outcome_of
 from lobewatch.verdicts import Word
 
 Shop = Any

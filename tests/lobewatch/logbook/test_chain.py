@@ -38,8 +38,9 @@ from lobewatch.machine.settings.machine_file import REFERENCE_CUT, parse_machine
 from lobewatch.measuring import Measurement, measure
 from lobewatch.show.report.report import render_report
 from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE, emulated_structure, emulator, with_bearing_stiffness
+from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.in_progress import begin_tap
-from lobewatch.tap.session import TapSession, TapStopped
+from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapStep
 from lobewatch.tool.assembly import speed_grid
 from modal import Mode, synthesize

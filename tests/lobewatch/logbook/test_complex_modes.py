@@ -22,7 +22,7 @@ from lobewatch.tool.series import FollowedMode, scatter_of
 from lobewatch.verdicts.doubt import doubt_of
 from lobewatch.verdicts.drawn import middle_row
 from lobewatch.verdicts.limit_band import DRAWS, limit_band
-from lobewatch.verdicts.verdict import QUANTILES, as_program, verdict
+from lobewatch.verdicts.verdict import QUANTILES, as_program, judge
 from modal import Mode
 
 Shop = Any
@@ -90,7 +90,7 @@ def test_the_verdict_is_that_of_the_complex_modes(machine: Machine) -> None:
     (table,) = machine.program
     limits = {}
     for phase in (-30.0, 0.0, 30.0):
-        found = verdict(table, of([turned(phase)]), machine)
+        found = judge(table, of([turned(phase)]), machine)
         program = as_program(table, machine)
         assert found.limit == program_limit(program, [turned(phase)], [turned(phase)], table.feed_angles).limit
         assert 0.97 * found.limit < found.limit_low < found.limit < found.limit_high < 1.03 * found.limit

@@ -35,11 +35,10 @@ from lobewatch.plant.plant import Plant
 from lobewatch.show.plant.plant_rows import plant_rows
 from lobewatch.show.programs.verdicts import WORDS
 from lobewatch.show.report.report import render_report
-from lobewatch.tap.outcome import outcome_of
-from lobewatch.tool import Assembly
+from lobewatch.tap.session import outcome_of
 from lobewatch.tool.charts import Dynamics, Method
 from lobewatch.verdicts import Advice, Verdict, Word
-from lobewatch.verdicts.verdict import as_program, verdict
+from lobewatch.verdicts.verdict import as_program, judge
 from modal import Mode, synthesize
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
@@ -290,11 +289,11 @@ def test_older_rows_are_judged_on_demand_and_kept(shop: Shop) -> None:
 def test_a_program_is_judged_once_in_an_opened_logbook(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
 
-    def counting(table: ProgramTable, assembly: Assembly, machine: Machine) -> Verdict:
+    def counting(table: ProgramTable, *known: Any) -> Verdict:
         asked.append(table.name)
-        return verdict(table, assembly, machine)
+        return judge(table, *known)
 
-    monkeypatch.setattr("lobewatch.verdicts.verdict.verdict", counting)
+    monkeypatch.setattr("lobewatch.cuts.learning.at_speed.judge", counting)
     shop.tap_both()
     logbook = shop.logbook
     words = [found.word for found in logbook.verdicts()]

@@ -22,7 +22,7 @@ Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, eq=False)
-class Understood:
+class FileReading:
     """One file, before anything is made of it."""
 
     tap: TapTest
@@ -52,7 +52,7 @@ class TapDraft:
 
 
 @dataclass(frozen=True)
-class Asked:
+class FileRequest:
     """One file, with all that another computer has to know of it."""
 
     file: Path
@@ -67,35 +67,35 @@ class Asked:
     """Why it cannot be read."""
 
     @classmethod
-    def of(cls, file: Path, said: Description, machine_toml: str) -> Self:
+    def of(cls, file: Path, description: Description, machine_toml: str) -> Self:
         """Read now."""
         try:
-            return cls(file.absolute(), file.read_bytes(), said, machine_toml)
+            return cls(file.absolute(), file.read_bytes(), description, machine_toml)
         except OSError as error:
-            return cls(file.absolute(), b"", said, machine_toml, reason_of(file, error))
+            return cls(file.absolute(), b"", description, machine_toml, reason_of(file, error))
 
 
-def work_out_file(folder: MachineFolder, file: Path, said: Description) -> TapDraft:
+def draft_tap(folder: MachineFolder, file: Path, description: Description) -> TapDraft:
     """A file where it lies; DataError, OSError or ValueError where it cannot be used."""
-    return _worked_out(Setup.of(folder), file, said, file.read_bytes(), file)
+    return _draft(Setup.of(folder), file, description, file.read_bytes(), file)
 
 
-def work_out(asked: Asked) -> TapDraft | str:
+def draft_requested_tap(asked: FileRequest) -> TapDraft | str:
     """A file from its bytes, or why it cannot be used."""
-    return _from_bytes(asked, _worked_out)
+    return _from_bytes(asked, _draft)
 
 
-def understand_file(folder: MachineFolder, file: Path, said: Description) -> Understood:
-    """As `work_out_file`, and no tap file is made."""
-    return _understood(Setup.of(folder), file, said, file.read_bytes(), file)
+def read_file(folder: MachineFolder, file: Path, description: Description) -> FileReading:
+    """As `draft_tap`, and no tap file is made."""
+    return _reading(Setup.of(folder), file, description, file.read_bytes(), file)
 
 
-def understand(asked: Asked) -> Understood | str:
-    """As `work_out`, and no tap file is made."""
-    return _from_bytes(asked, _understood)
+def read_requested_file(asked: FileRequest) -> FileReading | str:
+    """As `draft_requested_tap`, and no tap file is made."""
+    return _from_bytes(asked, _reading)
 
 
-def _from_bytes(asked: Asked, work: Callable[[Setup, Path, Description, bytes, Path], Result]) -> Result | str:
+def _from_bytes(asked: FileRequest, work: Callable[[Setup, Path, Description, bytes, Path], Result]) -> Result | str:
     if asked.fault:
         return asked.fault
     with tempfile.TemporaryDirectory(prefix="lobewatch-") as folder:
@@ -114,18 +114,18 @@ def reason_of(file: Path, error: Exception) -> str:
     return str(error).removeprefix(f"{file}: ")
 
 
-def _worked_out(setup: Setup, file: Path, said: Description, content: bytes, at: Path) -> TapDraft:
+def _draft(setup: Setup, file: Path, description: Description, content: bytes, at: Path) -> TapDraft:
     """at: where the content lies."""
-    found = _understood(setup, file, said, content, at)
-    told = tuple(f"{fact.name} {fact.value}" for fact in found.recording.facts if fact.origin == "default")
-    packed, created = tap_content(found.tap), found.tap.circumstances.created
+    understood = _reading(setup, file, description, content, at)
+    defaults = tuple(f"{fact.name} {fact.value}" for fact in understood.recording.facts if fact.origin == "default")
+    packed, created = tap_content(understood.tap), understood.tap.circumstances.created
     digest = hashlib.sha256(content).hexdigest()
-    return TapDraft(digest, packed, TapEntry.of(found.tap, packed), created, found.fit, told)
+    return TapDraft(digest, packed, TapEntry.of(understood.tap, packed), created, understood.fit, defaults)
 
 
-def _understood(setup: Setup, file: Path, said: Description, content: bytes, at: Path) -> Understood:
-    tap, recording = read_tap_test(setup, file, said, content, at)
-    return Understood(tap, replace(recording, path=file), fit_tap(as_written(tap), setup.machine))
+def _reading(setup: Setup, file: Path, description: Description, content: bytes, at: Path) -> FileReading:
+    tap, recording = read_tap_test(setup, file, description, content, at)
+    return FileReading(tap, replace(recording, path=file), fit_tap(as_written(tap), setup.machine))
 
 
 @lru_cache(maxsize=4)

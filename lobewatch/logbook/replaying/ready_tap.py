@@ -13,14 +13,14 @@ from pathlib import Path
 
 from acquisition import DataError, Description
 from acquisition.atomic import make_folder
-from lobewatch.logbook.replaying.understand import Asked, TapDraft, reason_of, work_out, work_out_file
+from lobewatch.logbook.replaying.tap_draft import FileRequest, TapDraft, draft_requested_tap, draft_tap, reason_of
 from lobewatch.machine import MachineFolder, TapEntry
 from lobewatch.measuring.measurement import TapFit
-from lobewatch.measuring.workers.share_work import (Workers, shared)
+from lobewatch.measuring.workers.share_work import Workers, share_work
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
+class ReadyTap:
     """One file."""
 
     digest: str
@@ -37,22 +37,22 @@ class Prepared:
     """What was taken for granted where the file does not say it."""
 
 
-def prepared(folder: MachineFolder, file: Path, said: Description) -> Prepared:
+def make_ready(folder: MachineFolder, file: Path, description: Description) -> ReadyTap:
     """One file; DataError, OSError or ValueError where it cannot be used."""
-    return _on_disk(folder, work_out_file(folder, file, said))
+    return _write(folder, draft_tap(folder, file, description))
 
 
-def all_prepared(
-    folder: MachineFolder, files: Sequence[Path], said: Description, workers: Workers
-) -> Iterator[Prepared | str]:
-    """Each file in turn, or why it cannot be used; DataError as `shared`."""
+def make_all_ready(
+    folder: MachineFolder, files: Sequence[Path], description: Description, workers: Workers
+) -> Iterator[ReadyTap | str]:
+    """Each file in turn, or why it cannot be used; DataError as `share_work`."""
     if not workers.are_elsewhere:
-        yield from (_tried(folder, file, said) for file in files)
+        yield from (_ready_or_reason(folder, file, description) for file in files)
         return
     toml = folder.toml.read_text("utf-8")
-    asked = (Asked.of(file, said, toml) for file in files)
-    for found in shared(work_out, asked, workers):
-        yield found if isinstance(found, str) else _on_disk(folder, found)
+    asked = (FileRequest.of(file, description, toml) for file in files)
+    for draft in share_work(draft_requested_tap, asked, workers):
+        yield draft if isinstance(draft, str) else _write(folder, draft)
 
 
 def remove_leftovers(folder: MachineFolder) -> None:
@@ -61,19 +61,19 @@ def remove_leftovers(folder: MachineFolder) -> None:
         path.unlink()
 
 
-def _tried(folder: MachineFolder, file: Path, said: Description) -> Prepared | str:
+def _ready_or_reason(folder: MachineFolder, file: Path, description: Description) -> ReadyTap | str:
     try:
-        return prepared(folder, file, said)
+        return make_ready(folder, file, description)
     except (DataError, OSError, ValueError) as error:
         return reason_of(file, error)
 
 
-def _on_disk(folder: MachineFolder, found: TapDraft) -> Prepared:
+def _write(folder: MachineFolder, draft: TapDraft) -> ReadyTap:
     taps = folder.path / "taps"
     make_folder(taps)
-    path = taps / f".{found.entry.id}.h5.ready"
+    path = taps / f".{draft.entry.id}.h5.ready"
     with path.open("xb") as file:
-        file.write(found.content)
+        file.write(draft.content)
         file.flush()
         os.fsync(file.fileno())
-    return Prepared(found.digest, path, found.entry, found.created, found.fit, found.taken)
+    return ReadyTap(draft.digest, path, draft.entry, draft.created, draft.fit, draft.taken)

@@ -10,33 +10,33 @@ from acquisition import DataError, known_formats
 from acquisition.files.readers.text import is_prose
 
 
-def found_files(places: Sequence[Path | str]) -> tuple[list[Path], list[Path]]:
+def find_files(places: Sequence[Path | str]) -> tuple[list[Path], list[Path]]:
     """Each file once, those of a folder and all below it by name, and those of folders that are passed over.
 
     Passed over is what lies in a folder and has an extension that no known format has, or is a text without a row of
     numbers; what is named is taken.
     DataError for a folder or a pattern without any file; a name is taken as it is, whether or not it is there.
     """
-    found, passed = dict[Path, None](), list[Path]()
+    files, passed_over = dict[Path, None](), list[Path]()
     for place in places:
         path = Path(place)
         if path.is_dir():
             taken, left = _in_folder(path)
-            found |= dict.fromkeys(taken)
-            passed += left
+            files |= dict.fromkeys(taken)
+            passed_over += left
         elif path.exists() or not glob.has_magic(str(place)):
-            found[path] = None
+            files[path] = None
         else:
-            found |= dict.fromkeys(_matching(str(place)))
-    return list(found), passed
+            files |= dict.fromkeys(_matching(str(place)))
+    return list(files), passed_over
 
 
 def _in_folder(folder: Path) -> tuple[list[Path], list[Path]]:
     files = sorted(file for file in folder.rglob("*") if file.is_file() and not _is_hidden(file.relative_to(folder)))
-    known = {extension for one in known_formats() for extension in one.extensions}
-    taken = [file for file in files if file.suffix.lower() in known and not is_prose(file)]
+    extensions = {extension for file_format in known_formats() for extension in file_format.extensions}
+    taken = [file for file in files if file.suffix.lower() in extensions and not is_prose(file)]
     if not taken:
-        kinds = ", ".join(sorted(known))
+        kinds = ", ".join(sorted(extensions))
         raise DataError(f"{folder}: none of the {len(files)} files in this folder is a recording (looked for {kinds})")
     left = set(files).difference(taken)
     return taken, [file for file in files if file in left]
@@ -48,7 +48,7 @@ def _is_hidden(path: Path) -> bool:
 
 def _matching(pattern: str) -> list[Path]:
     names = glob.glob(pattern, recursive=True)  # noqa: PTH207 - that of pathlib takes no absolute pattern
-    found = sorted(path for path in map(Path, names) if path.is_file())
-    if not found:
+    files = sorted(path for path in map(Path, names) if path.is_file())
+    if not files:
         raise DataError(f"{pattern}: no file matches this pattern")
-    return found
+    return files

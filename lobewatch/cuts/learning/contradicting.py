@@ -11,8 +11,8 @@ import numpy as np
 
 from acquisition import Remark
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.learnt import Expecting, Learnt
 from lobewatch.cuts.learning.likelihood import FREQUENCY, MISJUDGED
+from lobewatch.cuts.learning.posterior import NewEvidence, Posterior
 
 CHANCE = MISJUDGED + 0.01
 """What was heard is beyond chance where all else gives it less."""
@@ -34,14 +34,14 @@ class Contradiction(StrEnum):
 
 
 @dataclass(frozen=True)
-class Contradicting:
+class ContradictingCut:
     """A cut that is left out."""
 
     cut: CutEvidence
     why: Contradiction
 
 
-def contradiction(expecting: Expecting) -> Contradiction | None:
+def contradiction(expecting: NewEvidence) -> Contradiction | None:
     """Whether a cut contradicts what was learnt from others; None where it may be chance."""
     cut, guess, weights = expecting.cut, expecting.guess, expecting.learnt.weights
     chatters = float(np.sum(weights * guess.chance))
@@ -54,36 +54,38 @@ def contradiction(expecting: Expecting) -> Contradiction | None:
     return Contradiction.FREQUENCY if np.sum(weights * near) < NONE else None
 
 
-def learn_from_sound(start: Learnt, cuts: Sequence[CutEvidence]) -> tuple[Learnt, tuple[Contradicting, ...]]:
+def learn_from_consistent(
+    start: Posterior, cuts: Sequence[CutEvidence]
+) -> tuple[Posterior, tuple[ContradictingCut, ...]]:
     """Learn from those cuts that do not contradict what was learnt before them; and the others.
 
     A cut that contradicts those before it is asked again once all others are learnt.
     """
     learnt, odd = start, list[CutEvidence]()
     for cut in cuts:
-        expecting = learnt.expecting(cut)
+        expecting = learnt.predict(cut)
         if contradiction(expecting) is None:
-            learnt = expecting.heard()
+            learnt = expecting.learn()
         else:
             odd.append(cut)
-    still = list[Contradicting]()
+    still = list[ContradictingCut]()
     for cut in odd:
-        expecting = learnt.expecting(cut)
+        expecting = learnt.predict(cut)
         why = contradiction(expecting)
-        learnt = expecting.heard() if why is None else learnt
-        still += [] if why is None else [Contradicting(cut, why)]
+        learnt = expecting.learn() if why is None else learnt
+        still += [] if why is None else [ContradictingCut(cut, why)]
     return learnt, tuple(still)
 
 
-def remarks_on(learnt: Learnt, odd: Sequence[Contradicting], about: str) -> Iterator[Remark]:
+def contradiction_remarks(learnt: Posterior, odd: Sequence[ContradictingCut], about: str) -> Iterator[Remark]:
     """What was left out, and where the spindle is not what it was tapped as; about: the program."""
-    yield from map(unexplained, odd)
+    yield from map(contradiction_remark, odd)
     if learnt.is_far_off:
         text = "f_n at speed is further from that at rest than between 0.945 and 1.025 times it, as test cuts sound"
         yield Remark("frequency-far-off", about, text, "tap again, warm, with this very tool and stick-out")
 
 
-def unexplained(odd: Contradicting) -> Remark:
+def contradiction_remark(odd: ContradictingCut) -> Remark:
     """A cut that no spindle explains which explains the others."""
     cut = odd.cut
     at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"

@@ -43,7 +43,7 @@ class Grid:
     trust: Floats
     """True limit in the middle over that by zero order, at each speed, shape (s,)."""
 
-    def seen(self, speed: float, depth: float, word: CutWord = "stable") -> CutEvidence:
+    def evidence(self, speed: float, depth: float, word: CutWord = "stable") -> CutEvidence:
         """A cut of it."""
         return CutEvidence(self.cut, speed, depth, word, feed_angles=self.feed_angles)
 
@@ -54,12 +54,14 @@ def speeds_between(low: float, high: float) -> Floats:
     return np.unique(np.clip(np.round(np.geomspace(low, high, number) / RPM) * RPM, low, high))
 
 
-def floored(depth: float) -> float:
+def floor_depth(depth: float) -> float:
     """The deepest depth (m) that can be set and is not deeper."""
     return round(math.floor(depth * 1e3 / MM + 1e-6) * MM, 6) / 1e3
 
 
-def trusted(x: Tip, y: Tip, cut: Cut, feed_angles: tuple[float, ...], speeds: Floats, deepest: float) -> Floats:
+def zero_order_trust(
+    x: Tip, y: Tip, cut: Cut, feed_angles: tuple[float, ...], speeds: Floats, deepest: float
+) -> Floats:
     """True limit over that by zero order at speeds (rpm), shape (s,); 1 where neither is less than a depth (m).
 
     x and y: modes of the spindle in the middle. Semi-discretisation at fewer speeds, between them interpolated.

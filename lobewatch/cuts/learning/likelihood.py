@@ -13,7 +13,7 @@ from lobes import MillingRows, piece_numbers
 from lobes.floquet import largest_multipliers
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.priors import Draws
-from lobewatch.cuts.listening.folded import folded
+from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.verdicts.mean_force import MeanForce, is_constant
 
 EDGE = 0.05
@@ -57,14 +57,14 @@ class CutPrediction(NamedTuple):
         Chatter that has grown leaves the cut, and sounds like what grows most or like what is at the limit: beyond the
         limit of a pocket these are two modes or lobes.
         """
-        heard = folded(_heard_base(seen, tooth_frequency), tooth_frequency)
+        heard = fold_frequency(_heard_base(seen, tooth_frequency), tooth_frequency)
         return np.asarray(np.abs(heard - np.array([self.base, self.at_limit])))
 
 
 def predict_cut(seen: CutEvidence, draws: Draws) -> CutPrediction:
     """In the worst of its directions of feed, at its own depth."""
     rows = draws.rows(seen.speed_rpm, seen.cut.tangential, seen.cut.radial, seen.material)
-    speed = rows.speed_rpm if seen.speed_found else rows.speed_rpm * draws.rest.speed_rpm
+    speed = rows.speed_rpm if seen.speed_found else rows.speed_rpm * draws.at_rest.speed_rpm
     rows = replace(rows, cut=seen.cut, frequency=rows.frequency * seen.moved, speed_rpm=speed)
     way = _by_mean_force if is_constant(seen.cut) else _by_multipliers
     found = [way(rows.fed_at(angle), seen) for angle in seen.feed_angles]
@@ -83,7 +83,7 @@ def most_likely(seen: CutEvidence, tooth_frequency: float) -> float:
     """The largest that `log_likelihood` can be: of a spindle that would do what was heard."""
     if not seen.has_frequency:
         return 0.0
-    base = np.atleast_1d(folded(_heard_base(seen, tooth_frequency), tooth_frequency))
+    base = np.atleast_1d(fold_frequency(_heard_base(seen, tooth_frequency), tooth_frequency))
     same = CutPrediction(np.array([np.inf]), base, base, np.array([seen.word == "flip"]))
     return float(log_likelihood(seen, same, tooth_frequency)[0])
 
@@ -118,7 +118,9 @@ def _by_mean_force(rows: MillingRows, seen: CutEvidence) -> CutPrediction:
         _, own = MeanForce(mean.rows[beyond], mean.force[beyond]).loudest(rows.speed_rpm[beyond], seen.depth)
         frequency[beyond] = np.where(np.isfinite(own), own, frequency[beyond])
     teeth = 1 / rows.tooth_period
-    return CutPrediction(excess, folded(frequency, teeth), folded(at_limit, teeth), np.zeros(len(rows), dtype=bool))
+    return CutPrediction(
+        excess, fold_frequency(frequency, teeth), fold_frequency(at_limit, teeth), np.zeros(len(rows), dtype=bool)
+    )
 
 
 def _by_multipliers(rows: MillingRows, seen: CutEvidence) -> CutPrediction:
@@ -131,4 +133,4 @@ def _by_multipliers(rows: MillingRows, seen: CutEvidence) -> CutPrediction:
     teeth, at_limit = 1 / rows.tooth_period, np.full(len(rows), np.nan)
     if seen.has_frequency:
         at_limit = MeanForce.of(rows).limits(rows.speed_rpm[:, np.newaxis])[1][:, 0]
-    return CutPrediction(excess, angle / (2 * np.pi) * teeth, folded(at_limit, teeth), np.pi - angle < REAL)
+    return CutPrediction(excess, angle / (2 * np.pi) * teeth, fold_frequency(at_limit, teeth), np.pi - angle < REAL)

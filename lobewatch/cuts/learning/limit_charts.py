@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.cuts.learning.grid import MM, Grid, floored
+from lobewatch.cuts.learning.grid import MM, Grid, floor_depth
 from lobewatch.cuts.learning.likelihood import FREQUENCY
 from lobewatch.cuts.learning.priors import Draws
-from lobewatch.cuts.listening.folded import folded
+from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.verdicts.mean_force import MeanForce
 
 LIKELY = 0.5
@@ -57,7 +57,7 @@ class LimitCharts:
         depth = np.floor(np.take_along_axis(limit, order, axis=0) * 1e3 / MM + 1e-6) * MM / 1e3
         typical = float(np.mean(rows.frequency)) / (2 * np.pi)
         teeth = grid.cut.teeth * grid.speeds / 60
-        return cls(grid, limit, folded(frequency, teeth), order, typical, grid.speeds * depth)
+        return cls(grid, limit, fold_frequency(frequency, teeth), order, typical, grid.speeds * depth)
 
     def gains(self, weights: Floats, best: float) -> Floats:
         """Expected gain of removal rate (rpm m) by the best cut at each speed, shape (s,)."""
@@ -79,7 +79,7 @@ class LimitCharts:
             if len(taken) == PLACES:
                 break
         for row in taken:
-            depths = {floored(float(np.quantile(self.limits[:, row], 1 - chance))) for chance in CHANCES}
+            depths = {floor_depth(float(np.quantile(self.limits[:, row], 1 - chance))) for chance in CHANCES}
             yield from ((row, depth) for depth in sorted(depths) if depth > 0)
 
     def worth(self, row: int, depth: float, best: float, left: int) -> float:

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lobewatch.cuts.learning.contradicting import Contradicting, learn_from_sound
+from lobewatch.cuts.learning.contradicting import ContradictingCut, learn_from_consistent
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.grid import Grid, speeds_between, trusted
-from lobewatch.cuts.learning.learnt import Learnt, prior
-from lobewatch.cuts.learning.suggest import Suggestion, best_heard, suggest
+from lobewatch.cuts.learning.grid import Grid, speeds_between, zero_order_trust
+from lobewatch.cuts.learning.posterior import Posterior, prior
+from lobewatch.cuts.learning.suggest import Suggestion, best_removal_rate, suggest
 from lobewatch.machine import Machine, ProgramTable, drive_limit
 from lobewatch.machine.journal.heard_cut import HeardCut, geometry
-from lobewatch.machine.settings.cut_setting import named
+from lobewatch.machine.settings.cut_setting import find_named
 from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.series import frequency_at
@@ -28,11 +28,11 @@ class Lesson:
     """What was learnt for one program."""
 
     program: ProgramTable
-    before: Learnt
+    before: Posterior
     """What is known without any cut."""
-    learnt: Learnt
+    learnt: Posterior
     """What is known with them."""
-    contradicting: tuple[Contradicting, ...]
+    contradicting: tuple[ContradictingCut, ...]
     """Cuts that were left out."""
     own: tuple[CutEvidence, ...]
     """Those that were cuts of this very program, at whatever speed and depth."""
@@ -51,19 +51,19 @@ class NextCut:
     @property
     def best(self) -> float:
         """Largest speed times depth that was heard stable (rpm m); 0 where none was."""
-        return best_heard(self.lesson.own)
+        return best_removal_rate(self.lesson.own)
 
 
 def program_named(machine: Machine, name: str) -> ProgramTable:
     """A program of machine.toml, by its name or how that begins; ValueError for one that is not there."""
-    return named({table.name: table for table in machine.program}, name)
+    return find_named({table.name: table for table in machine.program}, name)
 
 
 def lesson(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[HeardCut]) -> Lesson:
     """Learn from the cuts of a machine; those of other tools say nothing of this one."""
     seen = observed(cuts, table, assembly, machine)
     start = prior(middle_row(as_program(table, machine), assembly), doubt_of(assembly, table, machine))
-    learnt, odd = learn_from_sound(start, seen)
+    learnt, odd = learn_from_consistent(start, seen)
     cut = geometry(machine.build_cut(table))
     own = tuple(one for one in seen if one.material == 0 and geometry(one.cut) == cut)
     return Lesson(table, start, learnt, odd, own)
@@ -83,7 +83,7 @@ def grid_of(table: ProgramTable, assembly: Assembly, machine: Machine) -> Grid:
     speeds = speeds_between(machine.speed.low_rpm, machine.speed.high_rpm)
     deepest = np.minimum(table.deepest_mm / 1e3, drive_limit(machine, table, speeds))
     cut, angles = machine.build_cut(table), tuple(FEED_ANGLES[feed] for feed in table.feeds)
-    trust = trusted(assembly.x, assembly.y, cut, angles, speeds, table.deepest_mm / 1e3)
+    trust = zero_order_trust(assembly.x, assembly.y, cut, angles, speeds, table.deepest_mm / 1e3)
     return Grid(cut, angles, speeds, deepest, trust)
 
 

@@ -34,7 +34,7 @@ class Draws:
 
     normal: Floats
     """What differs from rest, each standard normal a priori, shape (r, 6 + 3 materials)."""
-    rest: MillingRows
+    at_rest: MillingRows
     """The spindles at rest, with the error of tap tests, r rows; their speeds are what a speed of 1 is truly."""
     doubt: Doubt
     """What the coefficients were drawn from."""
@@ -45,7 +45,7 @@ class Draws:
 
     def __getitem__(self, which: NDArray[np.intp] | slice) -> Draws:
         """Some of them."""
-        return replace(self, normal=self.normal[which], rest=self.rest[which])
+        return replace(self, normal=self.normal[which], at_rest=self.at_rest[which])
 
     def with_materials(self, count: int, seed: int) -> Draws:
         """The same with coefficients of so many materials at least, new ones as the prior has them."""
@@ -64,13 +64,13 @@ class Draws:
 
     def rows(self, speed_rpm: float, tangential: float, radial: float, material: int = 0) -> MillingRows:
         """Spindles with a cut of these coefficients (Pa) at a true speed (rpm), fed along x."""
-        factor, axis = self._modes(), self.rest.axes[self.rest.direction]
+        factor, axis = self._modes(), self.at_rest.axes[self.at_rest.direction]
         push, ratio = self._coefficients(material)
         return replace(
-            self.rest,
-            frequency=self.rest.frequency * factor[:, axis, 0],
-            damping_ratio=np.minimum(self.rest.damping_ratio * factor[:, axis, 1], 0.95),
-            stiffness=self.rest.stiffness * factor[:, axis, 2],
+            self.at_rest,
+            frequency=self.at_rest.frequency * factor[:, axis, 0],
+            damping_ratio=np.minimum(self.at_rest.damping_ratio * factor[:, axis, 1], 0.95),
+            stiffness=self.at_rest.stiffness * factor[:, axis, 2],
             speed_rpm=np.full(len(self), speed_rpm),
             tangential=tangential * push,
             radial=radial * push * ratio,
@@ -97,7 +97,7 @@ class Draws:
         return FORCE[0] * np.maximum(1 + FORCE[1] * at_speed, LEAST) * known, np.maximum(turned, 0.0)
 
 
-def drawn(middle: MillingRows, doubt: Doubt, count: int, seed: int = 0) -> Draws:
+def draw_prior(middle: MillingRows, doubt: Doubt, count: int, seed: int = 0) -> Draws:
     """Draws from the prior around a spindle at rest (a row), the same for a seed."""
     one = replace(middle, speed_rpm=np.ones(1))
     rest = doubt.draw(one, count, seed, without="coefficients")

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.grid import Grid, floored
-from lobewatch.cuts.learning.learnt import Learnt
+from lobewatch.cuts.learning.grid import Grid, floor_depth
 from lobewatch.cuts.learning.likelihood import predict_cut
 from lobewatch.cuts.learning.limit_charts import LIKELY, LimitCharts
+from lobewatch.cuts.learning.posterior import Posterior
 from lobewatch.cuts.learning.priors import Draws
 from lobewatch.verdicts.mean_force import is_constant
 
@@ -43,19 +43,19 @@ class Suggestion:
     """By how many of its standard deviations the two outcomes differ there."""
 
 
-def best_heard(cuts: Sequence[CutEvidence]) -> float:
+def best_removal_rate(cuts: Sequence[CutEvidence]) -> float:
     """Largest speed times depth (rpm m) that was heard stable; 0 where none was."""
     return max((cut.speed_rpm * cut.depth for cut in cuts if not cut.chatters), default=0.0)
 
 
-def suggest(learnt: Learnt, grid: Grid, heard: Sequence[CutEvidence], left: int = 1) -> Suggestion | None:
+def suggest(learnt: Posterior, grid: Grid, heard: Sequence[CutEvidence], left: int = 1) -> Suggestion | None:
     """The next test cut; None where nothing more is to be gained.
 
     heard: the cuts of this very program; left: test cuts that are still to be made, this one with them. With more than
     one a cut is worth what it gains itself and what the best next one is then expected to gain. A diagram by zero order
     proposes; what is chosen was judged by semi-discretisation.
     """
-    best, draws = best_heard(heard), learnt.sample(DRAWS)
+    best, draws = best_removal_rate(heard), learnt.sample(DRAWS)
     chart = LimitCharts.of(draws, grid)
     most = float(np.max(chart.chips))
     least = GAINED * max(best, 1e-3 * most)
@@ -72,8 +72,8 @@ def suggest(learnt: Learnt, grid: Grid, heard: Sequence[CutEvidence], left: int 
 def _judged(grid: Grid, speed: float, depth: float, best: float, draws: Draws) -> Suggestion | None:
     """The cut, or one not as deep where it is more likely to chatter than not."""
     for share in (1.0,) if is_constant(grid.cut) else NEARBY:
-        deep = floored(share * depth)
-        chance = predict_cut(grid.seen(speed, deep), draws).chance
+        deep = floor_depth(share * depth)
+        chance = predict_cut(grid.evidence(speed, deep), draws).chance
         if deep > 0 and np.mean(chance) < 1 - LIKELY:
             gain = float(1 - np.mean(chance)) * (speed * deep - best)
             settles = _settles(draws.ratios(), chance)

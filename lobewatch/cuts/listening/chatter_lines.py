@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lobewatch.cuts.listening.folded import modulo
+from lobewatch.cuts.listening.fold_frequency import family_distance
 from lobewatch.cuts.listening.sorted_lines import WIDE
 from lobewatch.cuts.listening.spectrum import Floats, SpectralLines
 
@@ -47,7 +47,7 @@ def chatter_lines(left: SpectralLines, tooth_frequency: float, bin_: float) -> C
     named = np.where(left.amplitude >= LOUD * np.max(left.amplitude), weight, 0.0)
     anchors = [i for i in np.argsort(-named)[:ANCHORS] if named[i] > 0]
     clear = np.where(part, np.log10(left.clearness), 0.0)
-    families = [modulo(left.frequency, left.frequency[i], tooth_frequency) < WIDE * bin_ for i in anchors]
+    families = [family_distance(left.frequency, left.frequency[i], tooth_frequency) < WIDE * bin_ for i in anchors]
     energy = np.array([np.sum(weight[family]) for family in families])
     explained = np.array([_explained(left, left.frequency[i], tooth_frequency, bin_) @ clear for i in anchors])
     large = energy / np.max(energy)
@@ -62,6 +62,6 @@ def _explained(left: SpectralLines, frequency: float, tooth_frequency: float, bi
     """Which lines are multiples of a frequency or side bands of those, 0 or 1, shape (n,)."""
     found = np.zeros(len(left))
     for order in range(1, MULTIPLES + 1):
-        apart = modulo(left.frequency, order * frequency, tooth_frequency)
+        apart = family_distance(left.frequency, order * frequency, tooth_frequency)
         found[apart < WIDE * bin_ * max(1.0, order / 2)] = 1.0
     return found

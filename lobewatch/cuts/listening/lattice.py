@@ -47,11 +47,11 @@ class SpindleSpeed:
     """Mean square distance of all lines from it, in standard errors of each, at most `STRAY` squared."""
 
 
-def refined(frequency: float, lines: SpectralLines, bin_: float) -> SpindleSpeed:
+def refine_speed(frequency: float, lines: SpectralLines, bin_: float) -> SpindleSpeed:
     """A spindle frequency (Hz) made exact by least squares over its lattice; bin_: of the spectrum (Hz)."""
     found = SpindleSpeed(frequency, np.inf, 0.0, 0, STRAY**2)
     for tolerance in (1.2, 0.6, 0.6, 0.6):
-        families = families_of(found.frequency, lines, tolerance * bin_)
+        families = find_families(found.frequency, lines, tolerance * bin_)
         rows = np.concatenate([_rows(family, number, len(families)) for number, family in enumerate(families)])
         which = np.concatenate([family.which for family in families])
         if np.linalg.matrix_rank(rows) < len(families):
@@ -68,7 +68,7 @@ def refined(frequency: float, lines: SpectralLines, bin_: float) -> SpindleSpeed
     return found
 
 
-def families_of(frequency: float, lines: SpectralLines, tolerance: float) -> list[Family]:
+def find_families(frequency: float, lines: SpectralLines, tolerance: float) -> list[Family]:
     """Multiples of a frequency (Hz), then the families of the clearest lines that are left; tolerance in Hz."""
     heard = lines.frequency
     order = np.round(heard / frequency)

@@ -12,7 +12,7 @@ from lobewatch.cuts.listening.chatter_lines import ChatterLines, chatter_lines
 from lobewatch.cuts.listening.find_cut import CutParts, find_cut
 from lobewatch.cuts.listening.lattice import SpindleSpeed
 from lobewatch.cuts.listening.sorted_lines import SortedLines, is_foreign, sort_lines
-from lobewatch.cuts.listening.spectrum import Floats, Spectrum, lines_of, spectrum_of
+from lobewatch.cuts.listening.spectrum import Floats, SpectralLines, Spectrum, lines_of, spectrum_of
 from lobewatch.cuts.listening.steadiness import unsteadiness
 from lobewatch.cuts.listening.true_speed import true_speed
 from lobewatch.machine.journal.heard_cut import CutWord
@@ -153,3 +153,15 @@ def _without_chatter(found: CutSound, what: CutRecording) -> CutSound:
     is_odd = other > OTHER_TEETH * float(np.sum(power[run_out & ~tooth])) and other > QUIET * float(np.sum(power))
     is_loud = what.immersion < SLOT and float(np.sum(power[~tooth])) > RUN_OUT * float(np.sum(power[tooth]))
     return replace(found, word="cannot tell", reason="on-spindle-lines") if is_odd or is_loud else found
+
+
+def line_kinds(heard: CutSound) -> dict[str, SpectralLines]:
+    """Lines that are there, under "turns" of the spindle, "tooth" passing, "air" (there without a cut), "chatter"."""
+    lines, chatter = heard.lines, heard.chatter
+    named: dict[str, SpectralLines] = {}
+    if lines is not None:
+        tooth = lines.tooth == 0
+        named = {"turns": lines.comb[~tooth], "tooth": lines.comb[tooth], "air": lines.foreign}
+    if chatter is not None:
+        named["chatter"] = chatter.lines
+    return {name: one for name, one in named.items() if len(one)}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.cuts.listening.folded import folded
+from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.cuts.listening.lattice import SpindleSpeed
 from lobewatch.cuts.listening.spectrum import SpectralLines, Spectrum
 
@@ -68,7 +68,7 @@ def _near_folded(lines: SpectralLines, spectrum: Spectrum, turning: SpindleSpeed
     orders = np.arange(int(rate / 2 / turning.frequency) + 1, int(HIGHEST * rate / turning.frequency) + 1)
     if not orders.size:
         return np.zeros(len(lines), dtype=np.bool_)
-    known = np.sort(folded(np.asarray(orders * turning.frequency), rate))
+    known = np.sort(fold_frequency(np.asarray(orders * turning.frequency), rate))
     after = np.clip(np.searchsorted(known, lines.frequency), 1, max(known.size - 1, 1)) % known.size
     nearest = np.minimum(np.abs(lines.frequency - known[after]), np.abs(lines.frequency - known[after - 1]))
     return np.asarray(nearest < WIDE * spectrum.bin)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from lobewatch.cuts.listening.lattice import SpindleSpeed, refined
+from lobewatch.cuts.listening.lattice import SpindleSpeed, refine_speed
 from lobewatch.cuts.listening.spectrum import Floats, SpectralLines, Spectrum
 
 AROUND = 0.021
@@ -52,10 +52,10 @@ def true_speed(
     best = int(np.argmax(votes))
     heard = int(np.argmax(np.where(near, votes, 0.0)))
     best = heard if near[heard] and votes[heard] > UNBALANCE * votes[best] else best
-    found = refined(float(grid[best]), loudest, spectrum.bin)
+    found = refine_speed(float(grid[best]), loudest, spectrum.bin)
     if found.misfit > FITS:
         others = grid[_peaks(votes)].tolist()
-        found = min((found, *(refined(one, loudest, spectrum.bin) for one in others)), key=lambda one: one.misfit)
+        found = min((found, *(refine_speed(one, loudest, spectrum.bin) for one in others)), key=lambda one: one.misfit)
     is_sure = min(found.share, _spaced(loudest, found.frequency, teeth, spectrum.bin)) >= LEAST_SHARE
     is_sure &= found.agreeing >= LEAST_AGREEING
     return found if is_sure else None

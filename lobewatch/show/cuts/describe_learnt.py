@@ -8,9 +8,9 @@ from typing import Any
 from rich.table import Table
 
 from acquisition import Remark
-from lobewatch.cuts.learning.contradicting import remarks_on
-from lobewatch.cuts.learning.learnt import Interval
+from lobewatch.cuts.learning.contradicting import contradiction_remarks
 from lobewatch.cuts.learning.of_program import Lesson
+from lobewatch.cuts.learning.posterior import Interval
 from lobewatch.show.programs.names import NAMES
 from lobewatch.show.terminal.output import table
 
@@ -53,7 +53,7 @@ def _text(one: Interval) -> str:
 
 def lesson_remarks(found: Lesson) -> Iterator[Remark]:
     """What was left out, and what the cuts say nothing of."""
-    yield from remarks_on(found.learnt, found.contradicting, found.program.name)
+    yield from contradiction_remarks(found.learnt, found.contradicting, found.program.name)
     if found.learnt.cuts and not found.learnt.frequencies:
         text = "f not learnt: no chatter frequency was heard yet"
         yield Remark("frequency-not-learnt", found.program.name, text, "tell what the next chatter sounds at")

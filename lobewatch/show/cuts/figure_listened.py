@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from lobewatch.cuts.listening.line_kinds import line_kinds
+from lobewatch.cuts.listening.listen_to import line_kinds
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.show.cuts.describe_listened import listened_text
 from lobewatch.show.figures.trend_figures import ALARM, EVENT, GOOD, NOW, THEN, new_axes, save_figure

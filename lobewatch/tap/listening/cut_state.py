@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.cuts.listening.line_kinds import line_kinds
+from lobewatch.cuts.listening.listen_to import line_kinds
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.tap.plots import extremes
 
 HIGHEST = 8000.0
-"""Hz."""
+"""Highest frequency of the curves (Hz)."""
 Floats = NDArray[np.float64]
 
 
@@ -45,48 +45,48 @@ class CutState:
     """One picture of listening to a cut."""
 
     revision: int
-    """Rises with every change."""
+    """Number that rises with every change."""
     word: CutStep
-    """See CutStep."""
+    """Word that can be read from 3 m."""
     title: str
-    """Machine, and what is cut."""
+    """Machine and cut."""
     device: str = ""
     """DAQ, port and rate."""
     reason: str = ""
-    """What to do, or why nothing was heard."""
+    """Sentence on what to do, or on why nothing was heard."""
     level: float | None = None
-    """rms of the acceleration over the newest 50 ms (m/s^2)."""
+    """Root mean square of the acceleration over the newest 50 ms (m/s^2)."""
     left: float | None = None
-    """How long a cut is still waited for (s)."""
+    """Time for which a cut is still waited for (s)."""
     cut_seconds: float | None = None
-    """Of cut heard so far (s)."""
+    """Length of the cut heard so far (s)."""
     found: CutComparison | None = None
-    """What was heard, at the end."""
+    """Cut as it was heard, beside what was expected of it; None before the end."""
     saved: str = ""
-    """Under which name it is kept; empty where it is not, or not yet."""
+    """Name under which it is kept; empty where it is not, or not yet."""
     plots: Mapping[str, Floats] | None = None
-    """Of what was heard, see cut_curves."""
+    """Curves of what was heard, see cut_curves."""
 
 
-def word_of(found: CutComparison) -> CutStep:
+def word_of(comparison: CutComparison) -> CutStep:
     """The word on what was heard."""
-    return CutStep[found.heard.word.upper().replace(" ", "_")]
+    return CutStep[comparison.heard.word.upper().replace(" ", "_")]
 
 
-def cut_curves(found: CutComparison) -> dict[str, Floats]:
+def cut_curves(comparison: CutComparison) -> dict[str, Floats]:
     """The spectrum up to 8 kHz as `frequency` (Hz) and `amplitude` (m/s^2), thinned, no peak lost; empty without one.
 
     For each name of `marked`, its lines as `NAME` (Hz) and `NAME_amplitude`; the modes as tapped as `x` and `y` (Hz).
     """
-    spectrum = found.heard.spectrum
+    spectrum = comparison.heard.spectrum
     if spectrum is None:
         return {}
     amplitude = np.sqrt(spectrum.power)
     at = extremes([amplitude], int(np.searchsorted(spectrum.frequency, HIGHEST, side="right")))
     curves = {"frequency": spectrum.frequency[at], "amplitude": amplitude[at]}
-    for name, lines in line_kinds(found.heard).items():
+    for name, lines in line_kinds(comparison.heard).items():
         curves |= {name: lines.frequency, f"{name}_amplitude": lines.amplitude}
-    if found.assembly is not None:
-        for name, modes in (("x", found.assembly.x), ("y", found.assembly.y)):
+    if comparison.assembly is not None:
+        for name, modes in (("x", comparison.assembly.x), ("y", comparison.assembly.y)):
             curves[name] = np.array([mode.frequency for mode in modes or ()])
     return curves

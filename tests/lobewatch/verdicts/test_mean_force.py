@@ -9,7 +9,7 @@ import pytest
 
 from lobes import Cut, milling_system, rows_of, zero_order
 from lobes.floquet import largest_multipliers, piece_numbers
-from lobewatch.cuts.listening.folded import folded
+from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.verdicts.mean_force import MeanForce, is_constant
 from modal import Mode
 
@@ -43,7 +43,7 @@ def test_growth_and_frequency_beyond_the_limit_are_those_of_semi_discretisation(
     assert np.sum(far) > 40
     assert (grown / teeth)[far] == pytest.approx(np.log(np.abs(multiplier[far])), abs=2e-3)
     base = np.abs(np.angle(multiplier)) / (2 * np.pi) * teeth
-    assert folded(frequency, teeth)[far] == pytest.approx(base[far], abs=0.5)
+    assert fold_frequency(frequency, teeth)[far] == pytest.approx(base[far], abs=0.5)
 
 
 def test_the_force_of_a_slot_with_four_teeth_is_constant_and_that_of_three_or_of_half_a_slot_is_not() -> None:

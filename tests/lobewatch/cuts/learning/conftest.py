@@ -11,7 +11,7 @@ from lobes import Cut, MillingRows, milling_system, rows_of, zero_order
 from lobes.floquet import largest_multipliers, piece_numbers
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.grid import Grid, speeds_between
-from lobewatch.cuts.learning.learnt import Learnt, prior
+from lobewatch.cuts.learning.posterior import Posterior, prior
 from lobewatch.verdicts.doubt import Doubt, Span
 from modal import Mode
 
@@ -36,7 +36,7 @@ class Mill:
         return rows_of(milling_system([self.x], [self.y]), self.cut, np.ones(1))
 
     @property
-    def prior(self) -> Learnt:
+    def prior(self) -> Posterior:
         """Before the first cut."""
         return prior(self.middle, doubt(), 700)
 

@@ -18,10 +18,10 @@ from acquisition.emulation.milling import simulate_cuts
 from acquisition.emulation.milling_cut import MillingCut, Passage
 from lobes import Cut, lowest_of, milling_system, rows_of, stability_boundary, zero_order
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.grid import Grid, floored, speeds_between, trusted
-from lobewatch.cuts.learning.learnt import Learnt, prior
+from lobewatch.cuts.learning.grid import Grid, floor_depth, speeds_between, zero_order_trust
 from lobewatch.cuts.learning.likelihood import log_likelihood, predict_cut
-from lobewatch.cuts.learning.suggest import best_heard, suggest
+from lobewatch.cuts.learning.posterior import Posterior, prior
+from lobewatch.cuts.learning.suggest import best_removal_rate, suggest
 from lobewatch.machine.journal.heard_cut import CutWord
 from lobewatch.verdicts.doubt import Doubt, Span
 from lobewatch.verdicts.mean_force import is_constant
@@ -66,9 +66,9 @@ class Hidden:
             self.ratios |= {"frequency_x": self.frequency, "frequency_y": self.frequency}
         self.turn(self.ratios)
         speeds = speeds_between(LOW, HIGH)
-        trust = trusted([self.rest[0]], [self.rest[1]], self.cut, (0.0,), speeds, DEEPEST)
+        trust = zero_order_trust([self.rest[0]], [self.rest[1]], self.cut, (0.0,), speeds, DEEPEST)
         self.grid = Grid(self.cut, (0.0,), speeds, np.full(speeds.shape, DEEPEST), trust)
-        self.learnt: Learnt = prior(
+        self.learnt: Posterior = prior(
             rows_of(milling_system([self.rest[0]], [self.rest[1]]), self.cut, np.ones(1)), DOUBT
         )
         self.optimum = self._optimum()
@@ -102,7 +102,7 @@ class Hidden:
 
     def _optimum(self) -> float:
         """Largest removal rate on the grid (rpm m)."""
-        depths = [floored(limit) for limit in self.limits(self.modes, self.truly)]
+        depths = [floor_depth(limit) for limit in self.limits(self.modes, self.truly)]
         return float(np.max(self.grid.speeds * depths))
 
     def suggested(self, left: int) -> tuple[float, float] | None:
@@ -123,7 +123,7 @@ class Hidden:
         """Learn from the cut."""
         pitch = frequency * (1 + NOISE * self.random.standard_normal())
         self.cuts.append(CutEvidence(self.cut, speed, depth, word, pitch))
-        self.learnt = self.learnt.hearing(self.cuts[-1])
+        self.learnt = self.learnt.learn_from(self.cuts[-1])
 
 
 DOUBT = Doubt({"tap": np.zeros((2, 4))}, np.tile(np.eye(4), (2, 1, 1)), 0.01, Span(0.8, 1.2), Span(0.8, 1.2))
@@ -156,7 +156,7 @@ def five_cuts(spindles: Sequence[Hidden]) -> None:
         for (one, (speed, depth)), (word, pitch) in zip(asked, words, strict=True):
             one.hear(speed, depth, word, pitch)
         for one in spindles:
-            one.share.append(best_heard(one.cuts) / one.optimum)
+            one.share.append(best_removal_rate(one.cuts) / one.optimum)
 
 
 def chattering(one: Hidden, number: int) -> list[tuple[float, float]]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from acquisition.emulation import MillingCut, Passage, Structure, TipMotion, hear, random_housing, simulate_cuts
 from lobes import Cut, stability_boundary
-from lobewatch.cuts.listening.folded import modulo
+from lobewatch.cuts.listening.fold_frequency import family_distance
 from lobewatch.cuts.listening.listen_to import CutRecording, CutSound, listen_to
 from modal import Mode
 
@@ -164,7 +164,9 @@ class Judged:
             self.speeds.append(abs(heard.speed_rpm / case.speed_rpm - 1))
         if heard.chatter is not None and own.beside > CHATTERS:
             tooth = case.speed_rpm / 60 * case.cut.teeth
-            self.frequencies.append(float(modulo(heard.chatter.frequency, own.frequency, tooth)) / own.frequency)
+            self.frequencies.append(
+                float(family_distance(heard.chatter.frequency, own.frequency, tooth)) / own.frequency
+            )
 
 
 def _mark(heard: CutSound, chatters: bool) -> str:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from lobes import MillingRows
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.likelihood import CutPrediction, log_likelihood, most_likely, predict_cut
-from lobewatch.cuts.learning.priors import Draws, drawn
+from lobewatch.cuts.learning.priors import Draws, draw_prior
 from lobewatch.verdicts.doubt import Doubt
 
 COUNT = 2000
@@ -52,7 +52,7 @@ class Interval(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Learnt:
+class Posterior:
     """Weighted draws of the turning spindle."""
 
     draws: Draws
@@ -94,15 +94,15 @@ class Learnt:
         beside = [(USUAL[0] < ratios[name]) & (ratios[name] < USUAL[1]) for name in ("frequency_x", "frequency_y")]
         return self.frequencies >= SETTLED and float(np.sum(self.weights * np.all(beside, axis=0))) < 1 / 2
 
-    def hearing(self, cut: CutEvidence) -> Learnt:
+    def learn_from(self, cut: CutEvidence) -> Posterior:
         """What is known after one more cut."""
-        return self.expecting(cut).heard()
+        return self.predict(cut).learn()
 
-    def expecting(self, cut: CutEvidence) -> Expecting:
+    def predict(self, cut: CutEvidence) -> NewEvidence:
         """A cut, and what it would sound like on the spindles that are not ruled out."""
         looked = np.flatnonzero(self.log > np.max(self.log) + np.log(NEGLIGIBLE))
         draws = self.draws[looked].with_materials(cut.material + 1, self.seed)
-        return Expecting(replace(self, draws=draws, log=self.log[looked]), cut, predict_cut(cut, draws))
+        return NewEvidence(replace(self, draws=draws, log=self.log[looked]), cut, predict_cut(cut, draws))
 
     def sample(self, count: int) -> Draws:
         """Draws of equal weight."""
@@ -110,16 +110,16 @@ class Learnt:
 
 
 @dataclass(frozen=True, eq=False)
-class Expecting:
+class NewEvidence:
     """A cut before it teaches anything."""
 
-    learnt: Learnt
+    learnt: Posterior
     """Without it: draws that have any weight left, with coefficients of its material."""
     cut: CutEvidence
     guess: CutPrediction
     """What each of these draws would do in it."""
 
-    def heard(self) -> Learnt:
+    def learn(self) -> Posterior:
         """What is known with it."""
         known, cuts = self.learnt, (*self.learnt.cuts, self.cut)
         draws, log, refreshed = known.draws, known.log + _log(self.cut, self.guess), known.refreshed
@@ -129,17 +129,19 @@ class Expecting:
         return replace(known, draws=draws, log=log, cuts=cuts, refreshed=refreshed)
 
 
-def prior(middle: MillingRows, doubt: Doubt, count: int = COUNT, seed: int = 0) -> Learnt:
+def prior(middle: MillingRows, doubt: Doubt, count: int = COUNT, seed: int = 0) -> Posterior:
     """What is known before the first cut.
 
     middle: the spindle at rest in the middle of the doubt (a row).
     """
-    return Learnt(drawn(middle, doubt, count, seed=seed), np.zeros(count), seed=seed)
+    return Posterior(draw_prior(middle, doubt, count, seed=seed), np.zeros(count), seed=seed)
 
 
-def learn(middle: MillingRows, doubt: Doubt, cuts: Sequence[CutEvidence], count: int = COUNT, seed: int = 0) -> Learnt:
+def learn(
+    middle: MillingRows, doubt: Doubt, cuts: Sequence[CutEvidence], count: int = COUNT, seed: int = 0
+) -> Posterior:
     """Learn from cuts in the order in which they were made; the same for a seed."""
-    return reduce(Learnt.hearing, cuts, prior(middle, doubt, count, seed))
+    return reduce(Posterior.learn_from, cuts, prior(middle, doubt, count, seed))
 
 
 def _log(cut: CutEvidence, guess: CutPrediction) -> Floats:

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from lobes import Cut, stability_boundary
-from lobewatch.cuts.learning.contradicting import Contradiction, contradiction, learn_from_sound
+from lobewatch.cuts.learning.contradicting import Contradiction, contradiction, learn_from_consistent
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.learnt import Learnt
 from lobewatch.cuts.learning.likelihood import MISJUDGED, log_likelihood, most_likely, predict_cut
-from lobewatch.cuts.listening.folded import folded
+from lobewatch.cuts.learning.posterior import Posterior
+from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.machine.journal.heard_cut import CutWord
 from modal import Mode
 from tests.lobewatch.cuts.learning.conftest import Mill
@@ -21,7 +21,7 @@ TEETH = 800.0
 """Tooth frequency at 12 000 rpm (Hz)."""
 
 
-def likelihood(mill: Mill, seen: CutEvidence, learnt: Learnt) -> np.ndarray:
+def likelihood(mill: Mill, seen: CutEvidence, learnt: Posterior) -> np.ndarray:
     return np.exp(log_likelihood(seen, predict_cut(seen, learnt.draws), TEETH))
 
 
@@ -84,7 +84,7 @@ def test_a_chatter_frequency_is_compared_at_the_depth_of_the_cut_and_modulo_the_
     one = mill.prior.draws[:1]
     one.normal[:] = 0.0
     guess = predict_cut(seen, one)
-    assert folded(seen.frequency, TEETH) == pytest.approx(guess.base[0], abs=0.01 * seen.frequency)
+    assert fold_frequency(seen.frequency, TEETH) == pytest.approx(guess.base[0], abs=0.01 * seen.frequency)
     said = [log_likelihood(replace(seen, frequency=seen.frequency + off), guess, TEETH)[0] for off in (0, 800, 60)]
     assert said[1] == pytest.approx(said[0], abs=0.6)
     assert said[2] < said[0] - 2
@@ -92,8 +92,8 @@ def test_a_chatter_frequency_is_compared_at_the_depth_of_the_cut_and_modulo_the_
 
 def test_a_deep_stable_cut_lowers_kt_and_chatter_in_a_shallow_one_raises_it(mill: Mill) -> None:
     before = mill.prior.intervals["tangential"].mean
-    stable = mill.prior.hearing(CutEvidence(mill.cut, 12000, 2.2e-3, "stable"))
-    chatter = mill.prior.hearing(CutEvidence(mill.cut, 12000, 0.8e-3, "chatter"))
+    stable = mill.prior.learn_from(CutEvidence(mill.cut, 12000, 2.2e-3, "stable"))
+    chatter = mill.prior.learn_from(CutEvidence(mill.cut, 12000, 0.8e-3, "chatter"))
     assert stable.intervals["tangential"].mean < 0.85 * before
     assert chatter.intervals["tangential"].mean > 1.05 * before
     assert stable.frequencies == chatter.frequencies == 0
@@ -103,7 +103,7 @@ def test_chatter_teaches_the_frequency_of_the_direction_that_it_is_of() -> None:
     mill = Mill(frequency=(0.985, 0.945))
     learnt = mill.prior
     for speed, depth in ((9500, 3e-3), (11000, 3e-3), (13500, 3e-3)):
-        learnt = learnt.hearing(mill.hear(speed, depth))
+        learnt = learnt.learn_from(mill.hear(speed, depth))
     assert learnt.frequencies == 3
     found = learnt.intervals["frequency_y"]
     assert found.low < 0.945 < found.high < 0.98
@@ -113,11 +113,11 @@ def test_chatter_teaches_the_frequency_of_the_direction_that_it_is_of() -> None:
 
 def test_three_frequencies_notice_what_is_far_from_the_prior_and_one_does_not() -> None:
     mill = Mill(frequency=(0.985, 0.905))
-    learnt = mill.prior.hearing(mill.chatter(11000))
+    learnt = mill.prior.learn_from(mill.chatter(11000))
     assert learnt.intervals["frequency_y"].low < 0.92
     assert not learnt.is_far_off
     for speed in (12000, 13500):
-        learnt = learnt.hearing(mill.chatter(speed))
+        learnt = learnt.learn_from(mill.chatter(speed))
     assert learnt.intervals["frequency_y"].high < 0.945
     assert learnt.is_far_off
 
@@ -126,7 +126,7 @@ def test_old_cuts_are_of_a_frequency_that_has_fallen_since(mill: Mill) -> None:
     now = then = mill.prior
     for speed in (9500, 13500):
         seen = mill.chatter(speed)
-        now, then = now.hearing(seen), then.hearing(replace(seen, moved=1.02))
+        now, then = now.learn_from(seen), then.learn_from(replace(seen, moved=1.02))
     assert then.intervals["frequency_y"].mean < now.intervals["frequency_y"].mean - 0.004
     assert [replace(seen, moved=moved).weight for moved in (1.0, 0.98, 1.05)] == pytest.approx(
         [1, 0.607, 0.044], abs=1e-3
@@ -137,21 +137,21 @@ def test_another_material_teaches_the_spindle_but_not_the_force_of_this_one() ->
     mill = Mill(frequency=(0.985, 0.945))
     before = other = mill.prior
     for speed in (9500, 13500):
-        other = other.hearing(replace(mill.hear(speed, 3e-3), material=1))
+        other = other.learn_from(replace(mill.hear(speed, 3e-3), material=1))
     assert other.intervals["frequency_y"].std < 0.75 * before.intervals["frequency_y"].std
     assert other.intervals["tangential"].std > 0.8 * before.intervals["tangential"].std
 
 
 def test_a_cut_in_another_material_may_come_first(mill: Mill) -> None:
     cuts = [replace(mill.hear(9500, 3e-3), material=1), mill.hear(13500, 3e-3)]
-    learnt, left_out = learn_from_sound(mill.prior, cuts)
+    learnt, left_out = learn_from_consistent(mill.prior, cuts)
     assert (learnt.cuts, left_out) == (tuple(cuts), ())
 
 
 def test_learning_is_the_same_again_and_few_draws_are_made_anew() -> None:
     mill = Mill(frequency=(0.985, 0.945))
     cuts = [mill.chatter(speed) for speed in (9500, 13500, 11000)]
-    once, again = (learn_from_sound(mill.prior, cuts)[0] for _ in range(2))
+    once, again = (learn_from_consistent(mill.prior, cuts)[0] for _ in range(2))
     assert np.array_equal(once.draws.normal, again.draws.normal)
     assert np.array_equal(once.log, again.log)
     assert once.refreshed == 1
@@ -161,11 +161,11 @@ def test_learning_is_the_same_again_and_few_draws_are_made_anew() -> None:
 def test_what_contradicts_is_named_and_left_out(mill: Mill) -> None:
     cuts = [CutEvidence(mill.cut, 12000, depth, "stable") for depth in (1e-3, 1.4e-3, 1.5e-3)]
     odd = CutEvidence(mill.cut, 12000, 0.3e-3, "chatter")
-    learnt, left_out = learn_from_sound(mill.prior, [*cuts, odd])
+    learnt, left_out = learn_from_consistent(mill.prior, [*cuts, odd])
     assert learnt.cuts == tuple(cuts)
     assert [(one.cut, one.why) for one in left_out] == [(odd, Contradiction.CHATTERS)]
     deep = CutEvidence(mill.cut, 8000, 0.03, "stable")
-    assert contradiction(learnt.expecting(deep)) is Contradiction.STABLE
+    assert contradiction(learnt.predict(deep)) is Contradiction.STABLE
     seen = mill.hear(20000, 4e-3)
-    assert contradiction(learnt.expecting(seen)) is None
-    assert contradiction(learnt.expecting(replace(seen, frequency=1150.0))) is Contradiction.FREQUENCY
+    assert contradiction(learnt.predict(seen)) is None
+    assert contradiction(learnt.predict(replace(seen, frequency=1150.0))) is Contradiction.FREQUENCY

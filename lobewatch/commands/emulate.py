@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
-from lobewatch.machine.named_folder import named_folder
+from lobewatch.machine.folder_path import named_folder
 from lobewatch.show.terminal.output import Json, notes, results
 
 if TYPE_CHECKING:

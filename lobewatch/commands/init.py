@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.named_folder import named_folder
+from lobewatch.machine.folder_path import named_folder
 from lobewatch.show.terminal.output import Json, emit
 
 

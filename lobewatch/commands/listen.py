@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.commands.file_options import Columns, FullScale, Rate, Response, Sensitivity, Unit, described
-from lobewatch.machine.named_folder import named_folder
+from lobewatch.machine.folder_path import named_folder
 from lobewatch.show.terminal.output import Json, emit, notes
 from lobewatch.show.terminal.show_address import Listen, Token, WatchToken, serving
 
@@ -56,8 +56,8 @@ def listen(
     """
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.cut_comparison import keep_listened
-    from lobewatch.machine.additions.observe_cut import contradicted
-    from lobewatch.machine.settings.cut_setting import chosen_cut
+    from lobewatch.machine.additions.observe_cut import contradicting_cuts
+    from lobewatch.machine.settings.cut_setting import choose_cut
     from lobewatch.notify.telling import telling
     from lobewatch.show.cuts.describe_listened import listened_json, listened_texts
     from lobewatch.show.history.describe_cut import about_tool, otherwise
@@ -65,7 +65,7 @@ def listen(
     from lobewatch.tap.listening.live_cut import cut_pictures, judge_live
 
     logbook = Logbook.open(machine)
-    setting = chosen_cut(logbook.machine, program, cut, speed, depth)
+    setting = choose_cut(logbook.machine, program, cut, speed, depth)
     if not dry_run:
         logbook.folder.refuse_damage()
     if screen and file is not None:
@@ -90,7 +90,7 @@ def listen(
         with telling(logbook):
             known, kept = logbook.cuts, keep_listened(logbook.folder, found, signal, date)
             pictures.show(saved=kept.id)
-            remarks = [*about_tool(logbook, kept), *map(otherwise, contradicted(kept, known) if kept.counts else ())]
+            remarks = [*about_tool(logbook, kept), *map(otherwise, contradicting_cuts(kept, known) if kept.counts else ())]
             told = {"id": kept.id, "remarks": [remark.code for remark in remarks]}
             emit(payload | told, as_json, *listened_texts(found), f"saved {kept.id}")
     notes.print(*(f"note: {remark}" for remark in remarks), sep="\n", end="\n" if remarks else "", markup=False)

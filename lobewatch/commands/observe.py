@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.machine.named_folder import named_folder
+from lobewatch.machine.folder_path import named_folder
 from lobewatch.show.terminal.output import Json, emit, notes
 
 
@@ -36,7 +36,7 @@ def observe(
     """
     from lobewatch.logbook import Logbook
     from lobewatch.machine.additions.keep_cut import keep_cut
-    from lobewatch.machine.additions.observe_cut import contradicted, observed
+    from lobewatch.machine.additions.observe_cut import contradicting_cuts, observe_cut
     from lobewatch.machine.settings.cut_setting import cut_setting
     from lobewatch.notify.telling import telling
     from lobewatch.show.history.describe_cut import about_tool, cut_json, cut_text, otherwise
@@ -45,8 +45,8 @@ def observe(
         raise ValueError(f"{'both' if stable else 'neither'} of --stable and --chatter: give one, what was heard")
     logbook = Logbook.open(machine)
     setting = cut_setting(logbook.machine, program, speed, depth)
-    heard = observed(setting, "stable" if stable else "chatter", frequency, date)
-    said = [*about_tool(logbook, heard), *map(otherwise, contradicted(heard, logbook.cuts))]
+    heard = observe_cut(setting, "stable" if stable else "chatter", frequency, date)
+    said = [*about_tool(logbook, heard), *map(otherwise, contradicting_cuts(heard, logbook.cuts))]
     with telling(logbook):
         kept = keep_cut(logbook.folder, heard)
         emit({"cut": cut_json(kept), "remarks": [remark.code for remark in said]}, as_json, f"saved {cut_text(kept)}")

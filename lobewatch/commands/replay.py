@@ -20,7 +20,7 @@ from lobewatch.commands.file_options import (
     Unit,
     described,
 )
-from lobewatch.machine.named_folder import named_folder
+from lobewatch.machine.folder_path import named_folder
 from lobewatch.show.terminal.output import Json
 
 

@@ -16,11 +16,18 @@ from filelock import FileLock, Timeout
 from acquisition import DataError, Remark, TapTest, read_tap, write_tap
 from acquisition.atomic import make_folder, sync_folder
 from acquisition.errors import NOT_ALLOWED
-from lobewatch.machine.contents import FolderContents, about_lost, contents_of, fault_of, listed, no_journal, tap_files
+from lobewatch.machine.contents import (
+    FolderContents,
+    committed_taps,
+    contents_of,
+    fault_of,
+    missing_journal,
+    tap_damage,
+    tap_files,
+)
+from lobewatch.machine.folder_path import mark_of, named_folder
 from lobewatch.machine.journal.journal import Journal, Reading, command
 from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
-from lobewatch.machine.mark import mark_of
-from lobewatch.machine.named_folder import named_folder
 from lobewatch.machine.settings.machine_file import Machine, read_machine
 
 
@@ -29,7 +36,7 @@ class BusyError(DataError):
 
 
 class MachineFolder:
-    """What stands in the folder of one machine, and the one way to add to it."""
+    """The folder of one machine, and the one way to add to it."""
 
     def __init__(self, path: Path | str) -> None:
         """DataError where this is no machine folder."""
@@ -51,17 +58,17 @@ class MachineFolder:
 
     @property
     def history(self) -> Path:
-        """What was worked out of the tap tests, a cache."""
+        """File of what was worked out of the tap tests, a cache."""
         return self.path / "history.rows"
 
     @property
     def spool(self) -> Path:
-        """Where the hits of a test in progress are kept."""
+        """Folder of the hits of tests in progress."""
         return self.path / "spool"
 
     @cached_property
     def journal(self) -> Journal:
-        """What was committed."""
+        """Record of what was committed."""
         return Journal(self.path)
 
     @cached_property
@@ -92,8 +99,8 @@ class MachineFolder:
         except OSError as error:
             if error.errno not in NOT_ALLOWED:
                 raise
-            told = f"{error.strerror}: it can be read, not written; copy it to where you may write"
-            raise OSError(error.errno, told, str(self.path)) from error
+            text = f"{error.strerror}: it can be read, not written; copy it to where you may write"
+            raise OSError(error.errno, text, str(self.path)) from error
         try:
             yield
         finally:
@@ -110,27 +117,29 @@ class MachineFolder:
     @property
     def committed(self) -> set[str]:
         """Identities of all tap tests in the journal, whatever has become of their files."""
-        return set(listed(self.journal.read()))
+        return set(committed_taps(self.journal.read()))
 
     def refuse_damage(self) -> Reading:
         """The journal; DataError where it has to be mended before anything is written here."""
         reading = self.journal.read()
         self.journal.refuse_damage(reading)
-        if not reading.lines and any(one.code == "journal-damaged" for one in self.contents().remarks):
-            self.journal.refuse_damage(replace(reading, damage=(no_journal(self.path, len(tap_files(self.path))),)))
+        if not reading.lines and any(remark.code == "journal-damaged" for remark in self.contents().remarks):
+            self.journal.refuse_damage(
+                replace(reading, damage=(missing_journal(self.path, len(tap_files(self.path))),))
+            )
         return reading
 
     def read(self, entry: TapEntry) -> TapTest:
         """A tap test, its file checked against the journal before HDF5 sees it; DamagedTapError where it is not so."""
-        wrong = fault_of(self.path, entry)
-        if wrong:
-            raise DamagedTapError(about_lost(self.path, entry, wrong), entry, self.path)
+        fault = fault_of(self.path, entry)
+        if fault:
+            raise DamagedTapError(tap_damage(self.path, entry, fault), entry, self.path)
         path = self.path / entry.file
         try:
             return read_tap(path)
         except DataError as error:
-            told = str(error).removeprefix(f"{path}: ")
-            raise DamagedTapError(Remark("tap-unreadable", entry.file, told), entry, self.path) from error
+            text = str(error).removeprefix(f"{path}: ")
+            raise DamagedTapError(Remark("tap-unreadable", entry.file, text), entry, self.path) from error
 
     def commit(self, tap: TapTest, asked: Sequence[str] = ()) -> TapEntry:
         """Write the tap file, then its journal line; saved for good when this returns.

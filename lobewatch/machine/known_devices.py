@@ -24,9 +24,9 @@ class KnownDevice(msgspec.Struct, frozen=True):
     n_scans: int
     seconds: float
     measured: str
-    """When (ISO 8601, UTC)."""
+    """Time of the measurement (ISO 8601, UTC)."""
     crc: int = 0
-    """CRC-32 of all others; 0 in the first files."""
+    """CRC-32 of all other fields; 0 in the first files."""
 
     @property
     def is_altered(self) -> bool:
@@ -42,7 +42,7 @@ class KnownDevice(msgspec.Struct, frozen=True):
 def checked_rate(
     folder: MachineFolder, device: Device, seconds: float = 5.0, clock: Callable[[], float] = time.monotonic
 ) -> float:
-    """The rate of a connected device that is not started (Hz), measured where this machine does not know it yet.
+    """Rate of a connected device that is not started (Hz), measured where this machine does not know it yet.
 
     Call it once after every connect, before device.start(), with the folder locked. The first time, for a model,
     serial number and nominal rate that are not in daq.json, it starts the device, listens for `seconds` and stops it
@@ -63,10 +63,10 @@ def has_clock(device: Device) -> bool:
 
 
 def known_rate(folder: MachineFolder, device: Device) -> MeasuredRate | None:
-    """What was measured of this device at this nominal rate; None where it is not known."""
-    for known in read_known_devices(folder):
-        if _same(known, device):
-            return MeasuredRate(known.measured_rate_hz, known.measured_rate_hz_std, known.n_scans, known.seconds)
+    """Rate measured of this device at this nominal rate; None where it is not known."""
+    for entry in read_known_devices(folder):
+        if _is_same(entry, device):
+            return MeasuredRate(entry.measured_rate_hz, entry.measured_rate_hz_std, entry.n_scans, entry.seconds)
     return None
 
 
@@ -86,29 +86,29 @@ def use_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -> f
     return rate
 
 
-def _same(known: KnownDevice, device: Device) -> bool:
-    """The nominal rate may have been replaced by the measured one already."""
-    rates = (known.nominal_rate_hz, known.measured_rate_hz)
+def _is_same(entry: KnownDevice, device: Device) -> bool:
+    """Whether an entry is of this device, whose nominal rate may have been replaced by the measured one already."""
+    rates = (entry.nominal_rate_hz, entry.measured_rate_hz)
     identity = device.identity
-    return (known.model, known.serial) == (identity.model, identity.serial) and device.sample_rate in rates
+    return (entry.model, entry.serial) == (identity.model, identity.serial) and device.sample_rate in rates
 
 
 def read_known_devices(folder: MachineFolder) -> list[KnownDevice]:
-    """Those in daq.json; DataError where that is damaged."""
+    """Devices in daq.json; DataError where that is damaged."""
     path = folder.path / "daq.json"
     try:
-        found = msgspec.json.decode(path.read_bytes(), type=list[KnownDevice])
+        entries = msgspec.json.decode(path.read_bytes(), type=list[KnownDevice])
     except FileNotFoundError:
         return []
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise DataError(f"{path}: {error}; delete this file, the DAQ's rate is then measured anew") from error
-    if any(known.is_altered for known in found):
+    if any(entry.is_altered for entry in entries):
         raise DataError(f"{path}: altered since it was written; delete this file, the DAQ's rate is then measured anew")
-    return found
+    return entries
 
 
 def _remember(folder: MachineFolder, device: Device, measured: MeasuredRate) -> None:
-    others = [known for known in read_known_devices(folder) if not _same(known, device)]
+    kept = [entry for entry in read_known_devices(folder) if not _is_same(entry, device)]
     now = datetime.now(UTC).isoformat(timespec="seconds")
     new = KnownDevice(
         device.identity.model,
@@ -121,6 +121,6 @@ def _remember(folder: MachineFolder, device: Device, measured: MeasuredRate) -> 
         now,
     )
     content = msgspec.json.format(
-        msgspec.json.encode([*others, msgspec.structs.replace(new, crc=new.right_crc)]), indent=2
+        msgspec.json.encode([*kept, msgspec.structs.replace(new, crc=new.right_crc)]), indent=2
     )
     atomic_write(folder.path / "daq.json", content + b"\n")

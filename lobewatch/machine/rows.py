@@ -20,10 +20,10 @@ _HEAD = struct.Struct("<II")
 
 @dataclass(frozen=True)
 class Rows:
-    """What a file of rows holds."""
+    """Contents of a file of rows."""
 
     rows: tuple[bytes, ...]
-    """From the first on, as far as they are sound."""
+    """Rows from the first on, as far as they are sound."""
     size: int
     """Bytes of the file up to the end of the last of them."""
     length: int
@@ -37,7 +37,7 @@ def read_rows(path: Path) -> Rows:
     content = path.read_bytes()
     if not content.startswith(MAKE):
         return Rows((), 0, len(content), not MAKE.startswith(content))
-    found, at, is_damaged = list[bytes](), len(MAKE), False
+    rows, at, is_damaged = list[bytes](), len(MAKE), False
     begin, last, crc_of = _HEAD.size, len(content) - _HEAD.size, zlib.crc32
     while at <= last:
         length, crc = _HEAD.unpack_from(content, at)
@@ -48,20 +48,20 @@ def read_rows(path: Path) -> Rows:
         is_damaged = not length or crc_of(row) != crc
         if is_damaged:
             break
-        found.append(row)
+        rows.append(row)
         at = end
-    return Rows(tuple(found), at, len(content), is_damaged)
+    return Rows(tuple(rows), at, len(content), is_damaged)
 
 
 def write_rows(path: Path, rows: Iterable[bytes]) -> int:
-    """The whole file anew, complete under its name or the old one as it was; returns its size (bytes)."""
+    """Write the whole file anew, complete under its name or the old one as it was; returns its size (bytes)."""
     content = MAKE + _packed(rows)
     atomic_write(path, content)
     return len(content)
 
 
 def add_rows(path: Path, size: int, rows: Sequence[bytes]) -> int:
-    """Rows behind the first bytes of a file, as many as `read_rows` said; returns the new size (bytes).
+    """Write rows behind the first bytes of a file, as many as `read_rows` said; returns the new size (bytes).
 
     To be called under a lock. Not made to outlast a power cut: what is worked out can be worked out again.
     """

@@ -13,15 +13,15 @@ from acquisition import DataError
 from lobewatch.machine.settings.notify_table import Broker
 
 PATIENCE = 3.0
-"""For the connection, and for the acknowledgements of all messages (s)."""
+"""Time for the connection, and for the acknowledgements of all messages (s)."""
 KEEP_ALIVE = 10
-"""Without a sign of life for half as long again the broker takes the sender for lost (s)."""
+"""Time between signs of life (s); after half as long again without one the broker takes the sender for lost."""
 LOST, DONE = ({"sender": word} for word in ("lost", "done"))
-"""What stands at PREFIX/sender: the last will of a sender that broke off, and the word of one that has told all."""
+"""Messages at PREFIX/sender: the last will of a sender that broke off, and the word of one that has told all."""
 
 
-def connected(broker: Broker) -> Any:
-    """A client of paho, connected, its last will deposited.
+def connect(broker: Broker) -> Any:
+    """Client of paho, connected, its last will deposited.
 
     DataError with the reason where the broker cannot be reached in time or refuses, and without paho.
     """
@@ -57,15 +57,15 @@ def connected(broker: Broker) -> Any:
 
 
 def send(broker: Broker, messages: Mapping[str, bytes]) -> None:
-    """Put these where they stay (by topic); DataError with the reason where not all have been acknowledged in time."""
-    client = connected(broker)
+    """Put messages, by topic, where they stay; DataError with the reason where not all were acknowledged in time."""
+    client = connect(broker)
     try:
         sent = [client.publish(topic, content, qos=1, retain=True) for topic, content in messages.items()]
         sent.append(client.publish(f"{broker.prefix}/sender", msgspec.json.encode(DONE), qos=1, retain=True))
         end = time.monotonic() + PATIENCE
-        for one in sent:
-            one.wait_for_publish(max(end - time.monotonic(), 0.0))
-        if not all(one.is_published() for one in sent):
+        for message in sent:
+            message.wait_for_publish(max(end - time.monotonic(), 0.0))
+        if not all(message.is_published() for message in sent):
             raise DataError(f"{broker.address}: has not acknowledged within {PATIENCE:g} s")
         client.disconnect()
     except (RuntimeError, ValueError) as error:  # paho: the connection is gone, the queue is full

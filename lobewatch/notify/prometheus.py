@@ -1,4 +1,4 @@
-"""How machines stand, as Prometheus reads it (text format 0.0.4)."""
+"""Standings of machines, as Prometheus reads them (text format 0.0.4)."""
 
 from __future__ import annotations
 
@@ -7,26 +7,30 @@ from typing import NamedTuple
 
 from lobewatch.decay.light import Light
 from lobewatch.plant.plant import MachineStanding
+from lobewatch.plant.summary import SeriesSummary
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 DAY = 86400.0
-"""Seconds."""
+"""Length of a day (s)."""
+Labels = tuple[tuple[str, str], ...]
+"""Names and values of labels."""
 
 
 class Sample(NamedTuple):
     """One value of a family."""
 
-    labels: tuple[tuple[str, str], ...]
-    """Names and values."""
+    labels: Labels
+    """Names and values of its labels."""
     value: float
-    """In the unit that the name of the family says."""
+    """Value in the unit that the name of the family says."""
 
 
-def prometheus_text(found: Sequence[MachineStanding]) -> str:
-    """All families, those without a value too."""
+def prometheus_text(standings: Sequence[MachineStanding]) -> str:
+    """Text of all families, those without a value too."""
     return "".join(
-        f"# HELP {name} {told}\n# TYPE {name} gauge\n" + "".join(_line(name, one) for one in samples(found))
-        for name, (told, samples) in FAMILIES.items()
+        f"# HELP {name} {meaning}\n# TYPE {name} gauge\n"
+        + "".join(_line(name, sample) for sample in samples(standings))
+        for name, (meaning, samples) in FAMILIES.items()
     )
 
 
@@ -39,63 +43,67 @@ def _escaped(text: str) -> str:
     return text.replace("\\", r"\\").replace('"', r"\"").replace("\n", r"\n")
 
 
-def _machine(one: MachineStanding) -> tuple[tuple[str, str], ...]:
-    return ("folder", one.key), ("machine", one.summary.name)
+def _machine(standing: MachineStanding) -> Labels:
+    return ("folder", standing.key), ("machine", standing.summary.name)
 
 
-def _lights(found: Iterable[MachineStanding]) -> Iterator[Sample]:
-    for one in found:
+def _labelled_series(standings: Iterable[MachineStanding]) -> Iterator[tuple[Labels, SeriesSummary]]:
+    """All series, each with its labels."""
+    for standing in standings:
+        for series in standing.summary.series:
+            yield (*_machine(standing), ("tool", series.tool), ("direction", series.direction)), series
+
+
+def _lights(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    for standing in standings:
         for light in Light:
-            yield Sample((*_machine(one), ("light", light.value)), float(one.dated.light is light))
+            yield Sample((*_machine(standing), ("light", light.value)), float(standing.dated.light is light))
 
 
-def _reasons(found: Iterable[MachineStanding]) -> Iterator[Sample]:
-    for one in found:
-        for code in dict.fromkeys(remark.code for remark in one.dated.remarks):
-            count = sum(remark.code == code for remark in one.dated.remarks)
-            yield Sample((*_machine(one), ("code", code)), float(count))
+def _reasons(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    for standing in standings:
+        for code in dict.fromkeys(remark.code for remark in standing.dated.remarks):
+            count = sum(remark.code == code for remark in standing.dated.remarks)
+            yield Sample((*_machine(standing), ("code", code)), float(count))
 
 
-def _falls(found: Iterable[MachineStanding]) -> Iterator[Sample]:
-    for one in found:
-        for course in one.summary.series:
-            if course.fall is not None:
-                yield Sample(
-                    (*_machine(one), ("tool", course.tool), ("direction", course.direction)), course.fall / 100
-                )
+def _falls(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    return (
+        Sample(labels, series.fall / 100) for labels, series in _labelled_series(standings) if series.fall is not None
+    )
 
 
-def _frequencies(found: Iterable[MachineStanding]) -> Iterator[Sample]:
-    for one in found:
-        for course in one.summary.series:
-            if course.frequency is not None:
-                labels = (*_machine(one), ("tool", course.tool), ("direction", course.direction))
-                yield Sample(labels, course.frequency)
+def _frequencies(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    return (
+        Sample(labels, series.frequency)
+        for labels, series in _labelled_series(standings)
+        if series.frequency is not None
+    )
 
 
-def _taps(found: Iterable[MachineStanding]) -> Iterator[Sample]:
-    return (Sample(_machine(one), one.summary.time.timestamp()) for one in found if one.summary.time is not None)
+def _taps(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    for standing in standings:
+        if standing.summary.time is not None:
+            yield Sample(_machine(standing), standing.summary.time.timestamp())
 
 
-def _due(found: Iterable[MachineStanding]) -> Iterator[Sample]:
-    for one in found:
-        if one.summary.time is not None:
-            yield Sample(_machine(one), one.summary.time.timestamp() + DAY * one.summary.interval_days)
+def _due(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    for standing in standings:
+        if standing.summary.time is not None:
+            yield Sample(_machine(standing), standing.summary.time.timestamp() + DAY * standing.summary.interval_days)
 
 
-def _limits(found: Iterable[MachineStanding]) -> Iterator[Sample]:
-    for one in found:
-        for course in one.summary.series:
-            for limit in course.limits:
-                if limit.probable is not None:
-                    labels = (*_machine(one), ("tool", course.tool), ("direction", course.direction))
-                    yield Sample((*labels, ("fall_percent", f"{limit.percent:g}")), DAY * limit.probable)
+def _limits(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    for labels, series in _labelled_series(standings):
+        for limit in series.limits:
+            if limit.probable is not None:
+                yield Sample((*labels, ("fall_percent", f"{limit.percent:g}")), DAY * limit.probable)
 
 
-def _programs(found: Iterable[MachineStanding]) -> Iterator[Sample]:
-    for one in found:
-        for program, word in one.summary.programs.items():
-            yield Sample((*_machine(one), ("program", program), ("word", word)), 1.0)
+def _programs(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    for standing in standings:
+        for program, word in standing.summary.programs.items():
+            yield Sample((*_machine(standing), ("program", program), ("word", word)), 1.0)
 
 
 FAMILIES = {
@@ -108,4 +116,4 @@ FAMILIES = {
     "lobewatch_limit_timestamp_seconds": ("When a fixed limit is probably reached; none where not in sight.", _limits),
     "lobewatch_program_word": ("1 for the word on each cutting program.", _programs),
 }
-"""Names, what they say, and their values."""
+"""Families by name: meaning, and function that yields the samples."""

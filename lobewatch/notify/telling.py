@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
+
+import msgspec
 
 from lobewatch.logbook import Logbook
 from lobewatch.machine import Machine
 from lobewatch.machine.settings.machine_file import read_machine
 from lobewatch.machine.settings.notify_table import Broker
-from lobewatch.notify.message import message_of, topic_of
 from lobewatch.notify.unsent import deliver
 from lobewatch.plant.plant import MachineStanding
+from lobewatch.plant.standing_file import software
 from lobewatch.plant.summarise import summarise
+from lobewatch.show.plant.plant_rows import next_limit
 from lobewatch.show.terminal.output import notes
+
+NOT_IN_TOPICS = str.maketrans("+#/\0", "____")
+"""Characters that no level of a topic may hold, each replaced."""
 
 
 def tell(logbook: Logbook) -> None:
@@ -35,31 +41,66 @@ def tell(logbook: Logbook) -> None:
 
 
 def notify(
-    found: Iterable[MachineStanding], known: Mapping[Path, Machine] | None = None, now: datetime | None = None
+    standings: Iterable[MachineStanding], machines: Mapping[Path, Machine] | None = None, now: datetime | None = None
 ) -> int:
-    """Send the standings of machines whose machine.toml names a broker; how many brokers could not be told, and why
-    stands in a note."""
-    now, known = now or datetime.now(UTC), known or {}
+    """Send the standings of machines whose machine.toml names a broker.
+
+    machines: those that are read already. Returns how many brokers could not be told; why stands in a note.
+    """
+    now, machines = now or datetime.now(UTC), machines or {}
     by_broker: dict[Broker, list[MachineStanding]] = {}
-    for one in found:
+    for standing in standings:
         try:
-            machine: Machine = known.get(one.path) or read_machine(one.path / "machine.toml")
+            machine: Machine = machines.get(standing.path) or read_machine(standing.path / "machine.toml")
         except (ValueError, OSError):
             continue  # who is to be told cannot be read
         if machine.notify.broker is not None:
-            by_broker.setdefault(machine.notify.broker, []).append(one)
+            by_broker.setdefault(machine.notify.broker, []).append(standing)
     failures = 0
-    for broker, some in by_broker.items():
-        why = deliver(broker, {one.path: (topic_of(broker.prefix, one.key), message_of(one, now)) for one in some})
+    for broker, group in by_broker.items():
+        messages = {machine.path: (topic_of(broker.prefix, machine.key), message_of(machine, now)) for machine in group}
+        why = deliver(broker, messages)
         if why:
             failures += 1
             notes.print(f"note: nobody was told by MQTT: {why}; it goes with the next command", markup=False)
     return failures
 
 
+def topic_of(prefix: str, key: str) -> str:
+    """Topic of the message of a machine; key: name of its folder."""
+    return f"{prefix}/{key.translate(NOT_IN_TOPICS)}/standing"
+
+
+def message_of(standing: MachineStanding, now: datetime) -> bytes:
+    """Standing of a machine for other programs, as JSON; what is not known is null."""
+    summary, dated = standing.summary, standing.dated
+    worst = summary.series[0] if summary.series else None
+    due = None if summary.time is None else summary.time + timedelta(days=summary.interval_days)
+    return msgspec.json.encode(
+        {
+            "folder": standing.key,
+            "machine": summary.name,
+            "light": dated.light,
+            "reasons": [{"code": remark.code, "about": remark.about, "text": remark.text} for remark in dated.remarks],
+            "next_step": dated.next_step,
+            "fall_percent": worst.fall if worst else None,
+            "fall_percent_std": worst.fall_std if worst else None,
+            "series": worst.name if worst else None,
+            "frequency_hz": worst.frequency if worst else None,
+            "next_limit": next_limit(summary.series),
+            "programs": summary.programs,
+            "last_tap": summary.last_tap or None,
+            "due": due and due.isoformat(),
+            "is_overdue": dated.days_left is not None and dated.days_left < 0,
+            "time": now.isoformat(),
+            "software": f"lobewatch {software()}",
+        }
+    )
+
+
 @contextmanager
 def telling(logbook: Logbook) -> Iterator[None]:
-    """The same at the end of work that may store something and then find fault with the rest."""
+    """Tell at the end of work that may store something and then find fault with the rest."""
     before = logbook.folder.mark
     try:
         yield

@@ -1,4 +1,4 @@
-"""What a broker could not be told: kept beside the machine, and sent with the next command."""
+"""Messages that a broker could not be told: kept beside the machine, and sent with the next command."""
 
 from __future__ import annotations
 
@@ -15,17 +15,18 @@ from lobewatch.machine.settings.notify_table import Broker
 from lobewatch.notify.mqtt import send
 
 UNSENT = "unsent.json"
+"""Name of the file of such a message, in the folder of its machine."""
 
 
 class Unsent(msgspec.Struct, frozen=True):
     """The newest message of a machine; it stands for all before it."""
 
     topic: str
-    """Where it is to stand."""
+    """Topic that it is to stand at."""
     message: msgspec.Raw
-    """JSON."""
+    """Message as JSON."""
     broker: tuple[str, str, int]
-    """Scheme, host and port."""
+    """Scheme, host and port of the broker."""
 
 
 def deliver(broker: Broker, messages: Mapping[Path, tuple[str, bytes]]) -> str:
@@ -34,30 +35,30 @@ def deliver(broker: Broker, messages: Mapping[Path, tuple[str, bytes]]) -> str:
     What does not go is kept beside its machine.
     """
     left_over = _left_over(broker, {folder.resolve().parent for folder in messages})
-    all_of_them = left_over | dict(messages)
+    pending = left_over | dict(messages)
     try:
-        send(broker, dict(all_of_them.values()))
+        send(broker, dict(pending.values()))
     except DataError as error:
         for folder, (topic, content) in messages.items():
             _keep(folder, Unsent(topic, msgspec.Raw(content), broker[:3]))
         return str(error)
-    for folder in all_of_them:
+    for folder in pending:
         with contextlib.suppress(OSError):
             (folder / UNSENT).unlink(missing_ok=True)
     return ""
 
 
 def _left_over(broker: Broker, places: Iterable[Path]) -> dict[Path, tuple[str, bytes]]:
-    """For the same broker, beside machines in these folders."""
-    found = {}
+    """Messages to the same broker, beside machines in these folders."""
+    messages = {}
     for path in sorted(path for place in places for path in place.glob(f"*/{UNSENT}")):
         try:
-            one = msgspec.json.decode(path.read_bytes(), type=Unsent)
+            unsent = msgspec.json.decode(path.read_bytes(), type=Unsent)
         except (OSError, ValueError):
             continue
-        if tuple(one.broker) == tuple(broker[:3]):
-            found[path.parent] = one.topic, bytes(one.message)
-    return found
+        if tuple(unsent.broker) == tuple(broker[:3]):
+            messages[path.parent] = unsent.topic, bytes(unsent.message)
+    return messages
 
 
 def _keep(folder: Path, unsent: Unsent) -> None:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from acquisition import DataError, Remark
 from lobewatch.decay.light import Light
-from lobewatch.machine.mark import mark_of
+from lobewatch.machine.folder_path import mark_of
 from lobewatch.plant.standing_file import KEPT, read_standing
 from lobewatch.plant.summary import DatedStanding, Summary, unreadable_summary
 

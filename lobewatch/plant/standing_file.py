@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 
 from acquisition.atomic import atomic_write
-from lobewatch.machine.mark import mark_of
+from lobewatch.machine.folder_path import mark_of
 from lobewatch.plant.summary import Summary
 
 STANDING = "standing.json"

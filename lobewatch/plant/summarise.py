@@ -14,7 +14,7 @@ from lobewatch.decay.trend import Trend, days_of
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.outlook import of_limit
 from lobewatch.machine import BusyError, Limits
-from lobewatch.machine.mark import mark_of
+from lobewatch.machine.folder_path import mark_of
 from lobewatch.plant.standing_file import write_standing
 from lobewatch.plant.summary import Ahead, SeriesSummary, Summary
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
+import math
 import secrets
 import threading
+from collections.abc import Collection
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 from urllib.parse import quote
 
 import msgspec
@@ -17,16 +20,16 @@ from acquisition import DataError, TapDirection
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.notify.prometheus import CONTENT_TYPE, prometheus_text
-from lobewatch.plant.plant import Plant, find_machines
+from lobewatch.plant.plant import MachineStanding, Plant, find_machines
 from lobewatch.screen.guard import MAY_ALTER, OPEN, WATCH
-from lobewatch.screen.live_tests import LiveTest
-from lobewatch.screen.machine_list import machine_list
-from lobewatch.screen.pages import add_pages
-from lobewatch.screen.screen_server import add_session
+from lobewatch.screen.live_test import LiveTest
+from lobewatch.screen.routes import add_pages, add_session
 from lobewatch.screen.web_thread import WebThread
+from lobewatch.show.plant.plant_rows import plant_row
 from lobewatch.show.report.page import script_sources
 from lobewatch.show.report.report import render_report
 from lobewatch.show.terminal.printer import Watched
+from lobewatch.tap.spool import interrupted_tests
 
 REPORT_POLICY = (
     f"default-src 'none'; style-src 'unsafe-inline'; script-src {script_sources()}; img-src data:; "
@@ -101,7 +104,7 @@ class DashboardServer(WebThread):
         return key, MachineFolder(self._machines[key])
 
     def _find_test(self, request: web.Request) -> Watched:
-        """The newest of a machine: a page that has watched one to its end sees the next."""
+        """Newest test of a machine: a page that has watched one to its end sees the next."""
         test = self._tests.get(request.match_info["machine"])
         if test is None:
             raise web.HTTPNotFound(text="no tap test runs on this machine; go to All machines and press START")
@@ -109,8 +112,8 @@ class DashboardServer(WebThread):
 
     async def _list(self, request: web.Request) -> web.Response:
         running = {key for key, test in self._tests.items() if test.running}
-        known = request.query.get("known", "")
-        body = await asyncio.to_thread(machine_list, self._plant, running, request[MAY_ALTER], known)
+        version_shown = request.query.get("known", "")
+        body = await asyncio.to_thread(_machine_list, self._plant, running, request[MAY_ALTER], version_shown)
         return web.Response(body=body, content_type="application/json")
 
     async def _metrics(self, _: web.Request) -> web.Response:
@@ -135,7 +138,7 @@ class DashboardServer(WebThread):
         return web.json_response({"url": f"/report/{quote(key)}/{self._reports[key][0]}"})
 
     async def _report(self, request: web.Request) -> web.Response:
-        """By a name that cannot be guessed, so that the browser can open it as a page."""
+        """Answer at a name that cannot be guessed, so that the browser can open it as a page."""
         key, html = self._reports.get(request.match_info["machine"], ("", ""))
         if not key or not secrets.compare_digest(key.encode(), request.match_info["key"].encode()):
             raise web.HTTPNotFound(text="this report is gone; open it from the list of machines")
@@ -149,3 +152,33 @@ def _render(folder: MachineFolder) -> str:
         raise DataError("no tap test yet: press START")
     newest = logbook.newest()
     return render_report(logbook, newest.tool, newest.direction)
+
+
+def _machine_list(plant: Plant, running: Collection[str], may_alter: bool, version_shown: str) -> bytes:
+    """All machines as JSON, or that nothing has changed, which is asked every few seconds.
+
+    running: machines that a test runs on; version_shown: that the page shows already.
+    """
+    machines = [_row(standing) | {"running": standing.key in running} for standing in plant.standings()]
+    body = msgspec.json.encode({"machines": machines, "may_alter": may_alter})
+    version = hashlib.sha256(body).hexdigest()[:16]
+    if version == version_shown:
+        return msgspec.json.encode({"version": version})
+    return msgspec.json.encode({"version": version, "machines": machines, "may_alter": may_alter})
+
+
+def _row(standing: MachineStanding) -> dict[str, Any]:
+    """Row of a machine, days to a tenth, rounded down: what changes with every look would be sent with every look."""
+    row = plant_row(standing)
+    left = row["days_left"]
+    row["days_left"] = left if left is None else math.floor(10 * left) / 10
+    return row | {"interrupted": _interrupted(standing.path)}
+
+
+def _interrupted(folder: Path) -> dict[str, int]:
+    try:
+        spool = folder / "spool"
+        is_empty = not spool.is_dir() or not any(path.is_dir() for path in spool.iterdir())
+        return {} if is_empty else interrupted_tests(MachineFolder(folder))
+    except (OSError, ValueError):
+        return {}  # the row says what is wrong

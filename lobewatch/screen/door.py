@@ -17,22 +17,22 @@ from dataclasses import dataclass
 from aiohttp import web
 
 MOST = 64
-"""Connections at a time."""
+"""Number of connections at a time."""
 STRANGERS = 8
-"""Connections at a time from one address that have not shown a token; a browser opens six, and one for the feed."""
+"""Number of them from one address that have not shown a token; a browser opens six, and one for the feed."""
 HEAD_TIME = 10.0
-"""A stranger may take so long for the head of a request, and to take the answer (s)."""
+"""Time that a stranger may take for the head of a request, and to take the answer (s)."""
 IDLE_TIME = 75.0
-"""Whoever has shown a token may be silent between two requests for so long (s)."""
+"""Time that whoever has shown a token may be silent between two requests (s)."""
 HELD_BACK = 64
-"""Descriptors that stay free for the disk and the device, whatever knocks."""
+"""Number of descriptors that stay free for the disk and the device, whatever knocks."""
 NO_LIMIT = 1 << 20
-"""Descriptors, where the system names no limit."""
+"""Number of descriptors where the system names no limit."""
 PACE = 0.002
-"""Between two connections that are let in, and between two answers to strangers (s): a flood of them costs little, and
-a page needs seven."""
+"""Time between two connections that are let in, and between two answers to strangers (s): a flood of them costs
+little, and a page needs seven."""
 BACKLOG = 128
-"""Connections that wait in the system to be let in."""
+"""Number of connections that wait in the system to be let in."""
 
 
 @dataclass(eq=False)
@@ -40,15 +40,15 @@ class Guest:
     """One connection."""
 
     socket: socket.socket
-    """Closed by its transport; its number is negative then."""
+    """Socket of the connection, closed by its transport; its number is negative then."""
     place: str
-    """Where it comes from; connections are counted by this."""
+    """Address or network that it comes from; connections are counted by this."""
     transport: asyncio.Transport
-    """Of the connection."""
-    known: bool = False
+    """Transport of the connection."""
+    has_token: bool = False
     """Whether it has shown a token."""
     timer: asyncio.TimerHandle | None = None
-    """Hangs up; None while a request is answered."""
+    """Timer that hangs up; None while a request is answered."""
 
     @property
     def is_here(self) -> bool:
@@ -56,13 +56,13 @@ class Guest:
         return self.socket.fileno() >= 0
 
     def wait(self) -> None:
-        """From now on it must be heard, or have taken its answer, in time."""
+        """Hang up where it is not heard, or has not taken its answer, in time."""
         self.hold()
-        patience = IDLE_TIME if self.known else HEAD_TIME
+        patience = IDLE_TIME if self.has_token else HEAD_TIME
         self.timer = asyncio.get_running_loop().call_later(patience, self.transport.abort)
 
     def hold(self) -> None:
-        """It is being answered, which may take as long as it takes."""
+        """Stop the timer: it is being answered, which may take as long as it takes."""
         if self.timer is not None:
             self.timer.cancel()
         self.timer = None
@@ -78,7 +78,7 @@ class Door:
 
     @property
     def connections(self) -> int:
-        """How many there are."""
+        """Number of connections."""
         return sum(guest.is_here for guest in self._guests)
 
     async def serve(self, listener: socket.socket, server: web.Server) -> None:
@@ -102,14 +102,14 @@ class Door:
 
     @contextlib.asynccontextmanager
     async def attending(self, request: web.Request) -> AsyncIterator[None]:
-        """While a request is answered its connection is not hung up; strangers are answered one after the other."""
+        """Keep the connection of a request while that is answered; strangers are answered one after the other."""
         guest = self._guest(request)
         if guest is None:
             yield
             return
         guest.hold()
         try:
-            if not guest.known:
+            if not guest.has_token:
                 async with self._turn:
                     await asyncio.sleep(PACE)
             yield
@@ -117,20 +117,20 @@ class Door:
             guest.wait()
 
     def trust(self, request: web.Request) -> None:
-        """Whoever sent this has shown a token."""
+        """Note that whoever sent this has shown a token."""
         guest = self._guest(request)
         if guest is not None:
-            guest.known = True
+            guest.has_token = True
 
     def _guest(self, request: web.Request) -> Guest | None:
-        return next((one for one in self._guests if one.transport is request.transport), None)
+        return next((guest for guest in self._guests if guest.transport is request.transport), None)
 
     def _has_room(self, connection: socket.socket, place: str) -> bool:
         """Whether one more may come in; for it, the one that has been silent longest without a token may have to go."""
         self._guests = [guest for guest in self._guests if guest.is_here]
         if connection.fileno() >= _most_descriptors() - HELD_BACK:  # numbers are given lowest first
             return False
-        strangers = [guest for guest in self._guests if not guest.known]
+        strangers = [guest for guest in self._guests if not guest.has_token]
         strangers.sort(key=lambda guest: guest.timer is None)
         near = [guest for guest in strangers if guest.place == place]
         if len(near) >= STRANGERS:
@@ -146,7 +146,7 @@ class Door:
 
 
 def place_of(host: str) -> str:
-    """An IPv4 address, or the network of 64 bits of an IPv6 address: one computer may have all of its addresses."""
+    """IPv4 address, or the network of 64 bits of an IPv6 address: one computer may have all of its addresses."""
     address = ipaddress.ip_address(host.partition("%")[0])
     return str(address) if address.version == 4 else str(ipaddress.ip_network((address, 64), strict=False))
 
@@ -160,7 +160,7 @@ def open_port(host: str, port: int) -> socket.socket:
 
 
 def _most_descriptors() -> int:
-    """How many this process may have."""
+    """Number of descriptors that this process may have."""
     if sys.platform == "win32":
         return NO_LIMIT
     import resource

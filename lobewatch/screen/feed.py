@@ -13,14 +13,14 @@ from lobewatch.tap.listening.cut_state import CutState
 from lobewatch.tap.state import TapState
 
 PERIOD = 0.05
-"""At most so often, but for a new word (s)."""
+"""Time between two states, but for a new word (s)."""
 LOOK = 0.01
-"""How often is looked for one (s)."""
+"""Time between two looks for one (s)."""
 SIGN_OF_LIFE = 1.0
-"""An empty message where nothing has changed for so long (s): the page takes 3 s of silence for a lost connection."""
+"""Time without a change until an empty message (s): the page takes 3 s of silence for a lost connection."""
 
 ENDING = web.AppKey("ENDING", asyncio.Event)
-"""Set when the server is about to close."""
+"""Event that is set when the server is about to close."""
 
 
 State = TypeVar("State", TapState, CutState)
@@ -28,22 +28,22 @@ State = TypeVar("State", TapState, CutState)
 
 @dataclass(frozen=True)
 class Messages(Generic[State]):
-    """How states of a kind are told to a page."""
+    """Messages that tell the states of a kind to a page."""
 
     state: Callable[[State], str]
-    """All but the curves."""
+    """Message of a state, without the curves."""
     plots: Callable[[Any], bytes]
-    """The `plots` of a state."""
+    """Message of the `plots` of a state."""
 
 
-async def feed(request: web.Request, newest: Callable[[], State], told: Messages[State]) -> web.WebSocketResponse:
+async def feed(request: web.Request, newest: Callable[[], State], messages: Messages[State]) -> web.WebSocketResponse:
     """Send what newest() gives until the page or the server closes; only here is waited for a slow page."""
     socket = web.WebSocketResponse(protocols=("lobewatch",), heartbeat=10, max_msg_size=1024, compress=False)
     await socket.prepare(request)
     ending = request.app[ENDING]
     closed = asyncio.create_task(_until_closed(socket))
     try:
-        await _send_changes(socket, newest, told, lambda: ending.is_set() or closed.done())
+        await _send_changes(socket, newest, messages, lambda: ending.is_set() or closed.done())
         await socket.close(code=WSCloseCode.GOING_AWAY)
     except ConnectionError:
         pass  # the page is gone
@@ -53,7 +53,7 @@ async def feed(request: web.Request, newest: Callable[[], State], told: Messages
 
 
 async def _send_changes(
-    socket: web.WebSocketResponse, newest: Callable[[], State], told: Messages[State], over: Callable[[], bool]
+    socket: web.WebSocketResponse, newest: Callable[[], State], messages: Messages[State], over: Callable[[], bool]
 ) -> None:
     clock = asyncio.get_running_loop().time
     sent: State | None = None
@@ -65,8 +65,8 @@ async def _send_changes(
         due = sent is None or state.word is not sent.word or clock() - last >= PERIOD or ended
         if state is not sent and due:
             if state.plots is not None and state.plots is not plots:
-                await socket.send_bytes(told.plots(state.plots))
-            await socket.send_str(told.state(state))
+                await socket.send_bytes(messages.plots(state.plots))
+            await socket.send_str(messages.state(state))
             sent, plots, last = state, state.plots, clock()
         elif clock() - last > SIGN_OF_LIFE:
             await socket.send_str("{}")
@@ -77,5 +77,5 @@ async def _send_changes(
 
 
 async def _until_closed(socket: web.WebSocketResponse) -> None:
-    """Pages send nothing; whatever comes ends the feed."""
+    """Wait for the page to close: it sends nothing; whatever comes ends the feed."""
     await socket.receive()

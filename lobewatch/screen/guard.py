@@ -16,9 +16,9 @@ from yarl import URL
 from lobewatch.screen.door import Door
 
 OPEN = "open-"
-"""A route whose name begins with this answers without a token; it must neither tell nor alter anything."""
+"""Beginning of the name of a route that answers without a token; it must neither tell nor alter anything."""
 WATCH = "watch-"
-"""A route whose name begins with this alters nothing although it is not asked by GET."""
+"""Beginning of the name of a route that alters nothing although it is not asked by GET."""
 MAY_ALTER = web.RequestKey("MAY_ALTER", bool)
 """Whether the token of a request is the full one."""
 HEADERS = {
@@ -34,7 +34,7 @@ _log = logging.getLogger(__name__)
 
 
 def checked_token(token: str | None) -> str:
-    """A token that fits into an address and a header; a new one for None. ValueError for one that does not fit."""
+    """Token that fits into an address and a header; a new one for None. ValueError for one that does not fit."""
     if token is None:
         return secrets.token_urlsafe(24)
     if not re.fullmatch(r"[A-Za-z0-9_-]{12,200}", token):
@@ -44,16 +44,16 @@ def checked_token(token: str | None) -> str:
 
 @dataclass(frozen=True)
 class Tokens:
-    """What a browser must know."""
+    """Tokens, one of which a browser must know."""
 
     full: str
-    """To see and alter."""
+    """Token to see and alter."""
     watch: str
-    """Only to see."""
+    """Token only to see."""
 
 
 def checked_tokens(full: str | None, watch: str | None) -> Tokens:
-    """Both, each a new one for None. ValueError for one that does not fit into an address, and for one twice."""
+    """Both tokens, each a new one for None. ValueError for one that does not fit into an address, and for one twice."""
     tokens = Tokens(checked_token(full), checked_token(watch))
     if tokens.full == tokens.watch:
         raise ValueError("the token to watch is the full one too; give two different ones, or leave one out")
@@ -61,7 +61,7 @@ def checked_tokens(full: str | None, watch: str | None) -> Tokens:
 
 
 def guarded_application(tokens: Tokens, listen: str, door: Door) -> web.Application:
-    """An application that answers only to its own page, tells nothing without a token, alters nothing without the
+    """Application that answers only to its own page, tells nothing without a token, alters nothing without the
     full one."""
     application = web.Application(middlewares=[_attend(door), _guard(tokens, listen, door)], client_max_size=4096)
     application.on_response_prepare.append(_add_headers)
@@ -76,7 +76,7 @@ async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:
 def _attend(door: Door) -> Middleware:
     @web.middleware
     async def attend(request: web.Request, handler: Handler) -> web.StreamResponse:
-        """The head of a request has come: its connection is not hung up before there is an answer."""
+        """Answer a request whose head has come; its connection is not hung up before."""
         async with door.attending(request):
             return await handler(request)
 
@@ -106,7 +106,7 @@ def _guard(tokens: Tokens, listen: str, door: Door) -> Middleware:
 
 
 def _check_host(request: web.Request, listen: str) -> None:
-    """An address in figures or our own name: a foreign name that points here is another page's trick."""
+    """Refuse a host that is no address in figures and not our own name: it may be another page's trick."""
     try:
         host = URL(f"http://{request.host}").host or ""
     except ValueError:
@@ -119,7 +119,7 @@ def _check_host(request: web.Request, listen: str) -> None:
 
 
 def _check_origin(request: web.Request) -> None:
-    """Requests that alter something or open a feed must come from our own page, others not from another one."""
+    """Refuse what comes from another page; what alters something or opens a feed must come from our own."""
     origin = request.headers.get("Origin")
     must = request.method != "GET" or "Upgrade" in request.headers
     if origin != f"http://{request.host}" and (must or origin is not None):
@@ -127,7 +127,7 @@ def _check_origin(request: web.Request) -> None:
 
 
 def _check_token(request: web.Request, tokens: Tokens, alters: bool) -> None:
-    """In the header Authorization, or for a WebSocket, which has none, among its protocols."""
+    """Refuse without a token in the header Authorization, or for a WebSocket, which has none, among its protocols."""
     given = [request.headers.get("Authorization", "").removeprefix("Bearer ")]
     protocols = request.headers.get("Sec-WebSocket-Protocol", "").split(",")
     given += [name.strip().removeprefix("token.") for name in protocols]
@@ -139,4 +139,4 @@ def _check_token(request: web.Request, tokens: Tokens, alters: bool) -> None:
 
 
 def _is_among(given: list[str], token: str) -> bool:
-    return any(hmac.compare_digest(one.encode("utf-8", "surrogateescape"), token.encode()) for one in given)
+    return any(hmac.compare_digest(word.encode("utf-8", "surrogateescape"), token.encode()) for word in given)

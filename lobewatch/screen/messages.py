@@ -1,4 +1,4 @@
-"""What goes to the page: the state as JSON text, the curves as one binary message."""
+"""Messages to the page of a tap test or of a cut: its state as JSON text, the curves as one binary message."""
 
 from __future__ import annotations
 
@@ -10,13 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lobewatch.logbook.cut_comparison import CutComparison
+from lobewatch.show.cuts.describe_listened import listened_texts, next_step, why
+from lobewatch.tap.listening.cut_state import CutState
 from lobewatch.tap.state import Plots, TakenHit, TapState
 
 CURVES = ("time", "force", "acceleration", "frequency", "mean", "last", "coherence", "force_spectrum")
+"""Names of the curves of `Plots`, as the page knows them."""
 
 
 def state_message(state: TapState) -> str:
-    """All of a state but its curves, as JSON; numbers that are not finite become null."""
+    """State of a tap test but for its curves, as JSON; numbers that are not finite become null."""
     return json.dumps(
         {
             "kind": state.word.name.lower().replace("_", "-"),
@@ -27,10 +31,10 @@ def state_message(state: TapState) -> str:
             "good": state.good,
             "wanted": state.wanted,
             "hits": [_hit(hit) for hit in state.hits],
-            "mean_change": finite(state.mean_change),
+            "mean_change": _finite(state.mean_change),
             "settled": state.settled,
-            "levels": [finite(level) for level in state.levels] if state.levels else None,
-            "checks": [{"name": one.name, "passed": one.passed, "text": one.text} for one in state.checks],
+            "levels": [_finite(level) for level in state.levels] if state.levels else None,
+            "checks": [{"name": check.name, "passed": check.passed, "text": check.text} for check in state.checks],
             "outcome": state.outcome
             and {
                 "light": state.outcome.light,
@@ -42,14 +46,33 @@ def state_message(state: TapState) -> str:
     )
 
 
+def cut_message(state: CutState) -> str:
+    """State of a cut that is listened to but for its curves, as JSON; numbers that are not finite become null."""
+    return json.dumps(
+        {
+            "kind": state.word.name.lower().replace("_", "-"),
+            "word": state.word.value,
+            "title": state.title,
+            "device": state.device,
+            "saved": state.saved,
+            "reason": state.reason if state.found is None else why(state.found),
+            "level": _finite(state.level),
+            "left": _finite(state.left),
+            "cut_seconds": _finite(state.cut_seconds),
+            "heard": None if state.found is None else _heard(state.found),
+        },
+        allow_nan=False,
+    )
+
+
 def plots_message(plots: Plots) -> bytes:
-    """The curves that there are, with the usable band; see curves_message."""
+    """Message of the curves that there are, with the usable band; see curves_message."""
     curves = {name: values for name in CURVES if (values := getattr(plots, name)) is not None}
     return curves_message(curves, plots.usable_band)
 
 
 def curves_message(curves: Mapping[str, NDArray[np.float64]], band: tuple[float, float] | None = None) -> bytes:
-    """Curves: length of the header (u32), header as JSON padded to 4 bytes, then float32 values, little-endian.
+    """Message of curves: length of the header (u32), JSON header padded to 4 bytes, float32 values, little-endian.
 
     The header names each curve with its number of values and gives the usable band.
     """
@@ -65,11 +88,21 @@ def _hit(hit: TakenHit) -> dict[str, Any]:
         "number": hit.number,
         "good": not hit.flags,
         "verdict": hit.flags.words,
-        "peak_force": finite(hit.peak_force),
+        "peak_force": _finite(hit.peak_force),
         "undone": hit.undone,
     }
 
 
-def finite(value: float | None) -> float | None:
+def _heard(comparison: CutComparison) -> dict[str, Any]:
+    chatter = comparison.heard.chatter
+    return {
+        "chatter_frequency_hz": None if chatter is None else chatter.frequency,
+        "speed_rpm": None if comparison.heard.turning is None else comparison.speed_rpm,
+        "texts": [text for text in listened_texts(comparison)[1:] if text != why(comparison)],
+        "next_step": next_step(comparison),
+    }
+
+
+def _finite(value: float | None) -> float | None:
     """Four figures of a number; None where it is none."""
     return float(f"{value:.4g}") if value is not None and math.isfinite(value) else None

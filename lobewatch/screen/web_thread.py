@@ -17,14 +17,14 @@ from lobewatch.screen.feed import ENDING
 from lobewatch.screen.guard import checked_tokens, guarded_application
 
 QUIET = logging.getLogger("lobewatch.screen.http")
-"""Requests that are no HTTP are answered with 400 and not logged: anybody could fill the operator's terminal."""
+"""Log of requests that are no HTTP, which goes nowhere: anybody could fill the operator's terminal."""
 QUIET.addHandler(logging.NullHandler())
 QUIET.propagate = False
 FAR_AWAY = {
     "0.0.0.0": (socket.AF_INET, "192.0.2.1", "127.0.0.1"),
     "::": (socket.AF_INET6, "2001:db8::1", "::1"),
 }
-"""All addresses of this computer: their family, an address elsewhere, and its own where it has no network."""
+"""Names of all addresses of this computer: family, an address elsewhere, and its own where it has no network."""
 
 
 class WebThread:
@@ -38,7 +38,7 @@ class WebThread:
         self.token, self.watch_token = tokens.full, tokens.watch
         self._listen = listen.lower()
         self.door = Door()
-        """Lets connections in, and counts them."""
+        """Door that lets connections in, and counts them."""
         self.application = guarded_application(tokens, self._listen, self.door)
         self._port = port
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="lobewatch screen", daemon=True)
@@ -79,7 +79,7 @@ class WebThread:
 
     @property
     def watch_url(self) -> str:
-        """The same for who may only watch."""
+        """Address for who may only watch."""
         return f"{self.origin}/#token={self.watch_token}"
 
     async def _serve(self) -> None:
@@ -112,7 +112,7 @@ async def _end(application: web.Application) -> None:
 
 
 def _own_address(listen: str) -> str:
-    """Of this computer in its network; nothing is sent for it."""
+    """Address of this computer in its network; nothing is sent for it."""
     family, far_away, alone = FAR_AWAY[listen]
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.journal.event import MaintenanceEvent, event_line, events_of, new_event, withdrawal
-from lobewatch.machine.journal.exclusion import Corrected, exclusion, inclusion, named
+from lobewatch.machine.journal.exclusion import Excludable, exclusion, find_excludable, inclusion
 
 
 def add_event(
@@ -32,25 +32,25 @@ def withdraw_event(folder: MachineFolder, event_id: str) -> MaintenanceEvent:
     return next(event for event in events_of(entries) if event.id == event_id)
 
 
-def exclude(folder: MachineFolder, name: str, reason: str) -> Corrected:
+def exclude(folder: MachineFolder, name: str, reason: str) -> Excludable:
     """Take a tap test out of the series, or a test cut out of what is learnt from.
 
     name: its identity, file, or a part that no other has.
     """
     with folder.locked():
-        tap = _named(folder, name)
-        folder.journal.append(exclusion(tap, reason, datetime.now(UTC)))
-    return tap
+        entry = _find(folder, name)
+        folder.journal.append(exclusion(entry, reason, datetime.now(UTC)))
+    return entry
 
 
-def include(folder: MachineFolder, name: str) -> Corrected:
+def include(folder: MachineFolder, name: str) -> Excludable:
     """Take a tap test back into the series, or a test cut back into what is learnt from."""
     with folder.locked():
-        tap = _named(folder, name)
-        folder.journal.append(inclusion(tap, datetime.now(UTC)))
-    return tap
+        entry = _find(folder, name)
+        folder.journal.append(inclusion(entry, datetime.now(UTC)))
+    return entry
 
 
-def _named(folder: MachineFolder, name: str) -> Corrected:
+def _find(folder: MachineFolder, name: str) -> Excludable:
     contents = folder.contents()
-    return named(name, [*contents.taps, *contents.lost], contents.cuts, str(folder.path))
+    return find_excludable(name, [*contents.taps, *contents.lost], contents.cuts, str(folder.path))

@@ -10,7 +10,7 @@ from importlib.metadata import version
 from acquisition.atomic import make_folder
 from acquisition.files.cut_file import CutSignal, write_cut_signal
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.machine.journal.heard_cut import KIND, HeardCut, RecordedAs
+from lobewatch.machine.journal.heard_cut import KIND, HeardCut, RecordingFile
 from lobewatch.machine.journal.journal import Reading
 
 
@@ -32,13 +32,13 @@ def keep_cut(folder: MachineFolder, cut: HeardCut, signal: CutSignal | None = No
             make_folder(path.parent)
             content = write_cut_signal(path, signal, named.line)
             digest = hashlib.sha256(content).hexdigest()
-            named = replace(named, recording=RecordedAs(named.id, digest, len(content)))
+            named = replace(named, recording=RecordingFile(named.id, digest, len(content)))
         folder.journal.append(named.line | {"time": datetime.now(UTC).isoformat()}, reading=reading)
     return named
 
 
 def _next_id(folder: MachineFolder, reading: Reading) -> str:
-    """The first that neither a line nor a file has had."""
+    """First identity that neither a line nor a file has had."""
     lines = [line["id"] for line in reading.others if line["kind"] == KIND]
     files = [path.stem for path in (folder.path / "cuts").glob("c*.h5")]
     numbers = [int(name[1:]) for name in (*lines, *files) if name[1:].isdigit()]

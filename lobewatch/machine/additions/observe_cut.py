@@ -11,28 +11,28 @@ from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.machine.settings.cut_setting import CutSetting
 
 NEAR_TOOTH = 0.005
-"""Of a frequency: so near to a multiple of the tooth passing frequency it is the cut itself."""
+"""Share of a frequency: so near to a multiple of the tooth passing frequency it is the cut itself; chosen."""
 SAME_SPEED, SAME_DEPTH = 2e-3, 1e-2
-"""Relative differences of what is one point."""
+"""Relative differences up to which speeds and depths are one point; chosen."""
 
 
-def observed(
+def observe_cut(
     setting: CutSetting,
     word: Literal["stable", "chatter"],
     frequency: float | None = None,
     at: datetime | None = None,
     now: datetime | None = None,
 ) -> HeardCut:
-    """What a person has heard; at: None for now. Not written down yet: it has no identity.
+    """Test cut as a person has heard it; at: None for now. Not written down yet: it has no identity.
 
     frequency: of the chatter (Hz). ValueError for one that cannot be, and for a date in the future.
     """
-    when = when_cut(at, now or datetime.now(UTC))
+    when = cutting_time(at, now or datetime.now(UTC))
     _check_frequency(setting, word, frequency)
     return HeardCut(
         "",
         when,
-        **setting.told(),
+        **setting.heard_cut_fields,
         speed_rpm=setting.speed_rpm,
         word=word,
         chatter_frequency_hz=frequency,
@@ -41,8 +41,8 @@ def observed(
     )
 
 
-def when_cut(at: datetime | None, now: datetime) -> datetime:
-    """When it was cut (UTC); at: None for now, without a zone local time. ValueError for a date in the future."""
+def cutting_time(at: datetime | None, now: datetime) -> datetime:
+    """Time of a cut (UTC); at: None for now, without a zone local time. ValueError for a date in the future."""
     when = now if at is None else at.astimezone(UTC)
     if when - now > timedelta(days=1):
         raise ValueError(f"--date {at}: lies in the future; give the day on which it was cut")
@@ -65,12 +65,12 @@ def _check_frequency(setting: CutSetting, word: str, frequency: float | None) ->
         )
 
 
-def contradicted(cut: HeardCut, others: Sequence[HeardCut]) -> list[HeardCut]:
-    """Those that count and were heard otherwise at the same point."""
-    return [one for one in others if one.counts and _is_same_point(one, cut) and one.chatters != cut.chatters]
+def contradicting_cuts(cut: HeardCut, earlier: Sequence[HeardCut]) -> list[HeardCut]:
+    """Earlier cuts that count and were heard otherwise at the same point."""
+    return [old for old in earlier if old.counts and _is_same_point(old, cut) and old.chatters != cut.chatters]
 
 
-def _is_same_point(one: HeardCut, other: HeardCut) -> bool:
-    same = (one.tool, one.cut, one.feed) == (other.tool, other.cut, other.feed)
-    near_speed = abs(one.speed_rpm - other.speed_rpm) <= SAME_SPEED * other.speed_rpm
-    return same and near_speed and abs(one.depth - other.depth) <= SAME_DEPTH * other.depth
+def _is_same_point(old: HeardCut, new: HeardCut) -> bool:
+    same = (old.tool, old.cut, old.feed) == (new.tool, new.cut, new.feed)
+    near_speed = abs(old.speed_rpm - new.speed_rpm) <= SAME_SPEED * new.speed_rpm
+    return same and near_speed and abs(old.depth - new.depth) <= SAME_DEPTH * new.depth

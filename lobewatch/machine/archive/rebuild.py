@@ -13,8 +13,8 @@ from filelock import FileLock, Timeout
 
 from acquisition import DataError, read_tap
 from acquisition.atomic import atomic_write, make_folder
-from lobewatch.machine.archive.mend_cuts import mend_cuts
-from lobewatch.machine.contents import fault_of, given_up, listed, tap_files
+from lobewatch.machine.archive.cut_recordings import mend_cuts
+from lobewatch.machine.contents import committed_taps, fault_of, ids_given_up, tap_files
 from lobewatch.machine.folder import BusyError, MachineFolder
 from lobewatch.machine.journal.doubtful import read_doubtful
 from lobewatch.machine.journal.journal import JOURNAL, Journal
@@ -22,11 +22,12 @@ from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.known_devices import read_known_devices
 
 ASIDE = "damaged"
-"""Folder of what was put out of the way."""
+"""Name of the folder of what was put out of the way."""
 ENTER_AGAIN = (
     "events, exclusions, accepted questions and cuts heard by ear that stood there are lost: enter them again "
     "(lobewatch event, exclude, replay --accept, observe)"
 )
+"""What is to be done about corrections that no copy of the journal has."""
 
 
 def rebuild_files(path: Path) -> list[str]:
@@ -39,25 +40,25 @@ def rebuild_files(path: Path) -> list[str]:
     with _locked(path):
         journal = Journal(path)
         reading = journal.read()
-        told = [*_misplaced(path, listed(reading))]
-        committed = listed(reading)
-        fresh = _unlisted(path, committed, told)
+        committed = committed_taps(reading)
+        report = [*_return_misplaced(path, committed)]
+        fresh = _take_in_unlisted(path, committed, report)
         if reading.damage or (fresh and not reading.lines):
             journal.rewrite([*reading.entries, *(entry.line for entry in fresh)])
-            told.append(f"{JOURNAL}: written anew with {len(reading.entries) + len(fresh)} lines")
-            told += _lost_lines(reading.entries, len(fresh))
+            report.append(f"{JOURNAL}: written anew with {len(reading.entries) + len(fresh)} lines")
+            report += _missing_lines(reading.entries, len(fresh))
         else:
             for entry in fresh:
                 journal.append(entry.line)
-        told += [f"{entry.file}: entered in the journal" for entry in fresh]
-        told += _go_on_without(path, journal)
-        told += mend_cuts(path, journal, lambda file: _put_aside(path, file))
-        told += [*_machine_file(path), *_devices(path)]
-    return told
+        report += [f"{entry.file}: entered in the journal" for entry in fresh]
+        report += _give_up_lost(path, journal)
+        report += mend_cuts(path, journal, lambda file: _put_aside(path, file))
+        report += [*_restore_machine_file(path), *_mend_devices(path)]
+    return report
 
 
-def _lost_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) -> Iterator[str]:
-    """What no copy of the journal tells any more; n_fresh: tap tests that were entered anew in place of their lines."""
+def _missing_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) -> Iterator[str]:
+    """Lines that no copy of the journal has; n_fresh: tap tests that were entered anew in place of theirs."""
     if not entries:
         yield f"{JOURNAL}: nothing of it or of its copy could be read; {ENTER_AGAIN}"
         return
@@ -70,7 +71,7 @@ def _lost_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) -> Iterator[
 
 @contextlib.contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """As MachineFolder.locked, also without a machine.toml."""
+    """Lock of the folder as MachineFolder.locked, also without a machine.toml."""
     try:
         with FileLock(path / ".lock", timeout=0):
             yield
@@ -78,15 +79,15 @@ def _locked(path: Path) -> Iterator[None]:
         raise BusyError(f"{path}: another lobewatch is writing here; wait until it is done") from error
 
 
-def _misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator[str]:
-    """Files with the content of another tap test: each is given back where its own is wrong, else put aside."""
-    known = {entry.sha256: entry for entry in committed.values()}
-    found: dict[Path, TapEntry] = {}
+def _return_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator[str]:
+    """Give files with the content of another tap test back to that where its own is wrong, else put them aside."""
+    by_content = {entry.sha256: entry for entry in committed.values()}
+    misplaced: dict[Path, TapEntry] = {}
     for path in tap_files(folder).values():
-        entry = known.get(hashlib.sha256(path.read_bytes()).hexdigest()) if _can_be_read(path) else None
+        entry = by_content.get(hashlib.sha256(path.read_bytes()).hexdigest()) if _can_be_read(path) else None
         if entry is not None and path != folder / entry.file:
-            found[path] = entry
-    asides = {_put_aside(folder, path): entry for path, entry in found.items()}
+            misplaced[path] = entry
+    asides = {_put_aside(folder, path): entry for path, entry in misplaced.items()}
     for aside, entry in asides.items():
         if fault_of(folder, entry):
             if (folder / entry.file).exists():
@@ -98,38 +99,38 @@ def _misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator[str]:
             yield f"{aside.relative_to(folder).as_posix()}: put there, a copy of {entry.file}"
 
 
-def _unlisted(folder: Path, committed: dict[str, TapEntry], told: list[str]) -> list[TapEntry]:
-    """Whole tap files without a line, under their own names; all others without a line are put out of the way."""
-    found = []
+def _take_in_unlisted(folder: Path, committed: dict[str, TapEntry], report: list[str]) -> list[TapEntry]:
+    """Give whole tap files without a line their own names and return them; put all others without one aside."""
+    entries = []
     for name, path in tap_files(folder).items():
         if name in committed:
             continue
         entry = read_doubtful(path)
         taken = entry is not None and entry.id != name and (folder / entry.file).exists()
         if entry is None or taken or entry.id in committed:
-            told.append(f"taps/{path.name}: put into {_put_aside(folder, path).relative_to(folder).as_posix()}")
+            report.append(f"taps/{path.name}: put into {_put_aside(folder, path).relative_to(folder).as_posix()}")
             continue
         if entry.id != name:
             path.rename(folder / entry.file)
-        found.append(entry)
-    return found
+        entries.append(entry)
+    return entries
 
 
-def _go_on_without(folder: Path, journal: Journal) -> Iterator[str]:
-    """Tap tests that cannot be had back."""
+def _give_up_lost(folder: Path, journal: Journal) -> Iterator[str]:
+    """Write down that all goes on without the tap tests that cannot be had back."""
     reading = journal.read()
-    for name, entry in listed(reading).items():
+    for name, entry in committed_taps(reading).items():
         if not fault_of(folder, entry):
             continue
         if _can_be_read(folder / entry.file):
             _put_aside(folder, folder / entry.file)
-        if name not in given_up(reading):
+        if name not in ids_given_up(reading):
             journal.append({"kind": "lost", "tap": name, "time": datetime.now(UTC).isoformat()})
             yield f"{entry.file}: lost; all goes on without it, and with it again when it is put back from a backup"
 
 
 def _can_be_read(path: Path) -> bool:
-    """What cannot be read just now may be sound, and stays where it is."""
+    """Whether a file can be read just now; one that cannot may be sound, and stays where it is."""
     try:
         path.read_bytes()
     except OSError:
@@ -137,13 +138,13 @@ def _can_be_read(path: Path) -> bool:
     return True
 
 
-def _machine_file(folder: Path) -> Iterator[str]:
-    """From the newest tap test that has a copy."""
+def _restore_machine_file(folder: Path) -> Iterator[str]:
+    """Take a missing machine.toml from the newest tap test that has a copy."""
     toml = folder / "machine.toml"
     if toml.exists():
         return
-    entries = [entry for entry in listed(Journal(folder).read()).values() if not fault_of(folder, entry)]
-    for entry in sorted(entries, key=lambda one: one.time, reverse=True):
+    entries = [entry for entry in committed_taps(Journal(folder).read()).values() if not fault_of(folder, entry)]
+    for entry in sorted(entries, key=lambda entry: entry.time, reverse=True):
         text = read_tap(folder / entry.file).circumstances.machine_toml
         if text:
             atomic_write(toml, text.encode())
@@ -152,7 +153,7 @@ def _machine_file(folder: Path) -> Iterator[str]:
     raise DataError(f"{toml}: is missing, and no tap test has a copy; put it back from a backup")
 
 
-def _devices(folder: Path) -> Iterator[str]:
+def _mend_devices(folder: Path) -> Iterator[str]:
     try:
         read_known_devices(MachineFolder(folder))
     except DataError:
@@ -161,7 +162,7 @@ def _devices(folder: Path) -> Iterator[str]:
 
 
 def _put_aside(folder: Path, path: Path) -> Path:
-    """Into the folder of what is damaged, under a name that nothing has there."""
+    """Move a file into the folder of what is damaged, under a name that nothing has there."""
     make_folder(folder / ASIDE)
     aside, number = folder / ASIDE / path.name, 1
     while aside.exists():

@@ -10,19 +10,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition import DataError, Remark
-from lobewatch.machine.archive.told import damaged, set_aside
-from lobewatch.machine.archive.verify_cuts import about_cuts
-from lobewatch.machine.archive.verify_spool import about_spool
+from lobewatch.machine.archive.cut_recordings import verify_cuts
+from lobewatch.machine.archive.verify_spool import verify_spool
 from lobewatch.machine.contents import (
-    about_lost,
+    committed_cuts,
+    committed_taps,
     fault_of,
-    given_up,
-    heard,
+    ids_given_up,
     is_explained,
-    listed,
-    no_journal,
+    missing_journal,
+    tap_damage,
     tap_files,
-    unlisted,
+    unlisted_file,
 )
 from lobewatch.machine.folder import BusyError, MachineFolder
 from lobewatch.machine.journal.doubtful import read_doubtful
@@ -32,7 +31,7 @@ from lobewatch.machine.known_devices import read_known_devices
 from lobewatch.machine.rows import read_rows
 
 DAMAGE = ("journal-damaged", "tap-damaged", "tap-unlisted", "file-damaged", "cut-damaged", "cut-unlisted")
-"""Codes of remarks that are damage; all others are to be known."""
+"""Codes of remarks that are damage; those of all others are for information."""
 OURS = (
     JOURNAL,
     COPY,
@@ -47,14 +46,15 @@ OURS = (
     "cuts",
     "spool",
 )
+"""Names in the folder of a machine that lobewatch gives."""
 
 
 @dataclass(frozen=True)
 class Verification:
-    """What was found."""
+    """State of the files of a machine."""
 
     remarks: tuple[Remark, ...]
-    """All that is to be said."""
+    """Remarks on all files, damage and information."""
     adopted: tuple[str, ...]
     """Tap files that an ended program had not entered in the journal; they are now."""
     n_taps: int
@@ -62,7 +62,7 @@ class Verification:
 
     @property
     def damage(self) -> tuple[Remark, ...]:
-        """What is not as it was written."""
+        """Remarks on what is not as it was written."""
         return tuple(remark for remark in self.remarks if remark.code in DAMAGE)
 
 
@@ -75,35 +75,36 @@ def verify(path: Path) -> Verification:
         cure = (
             f"put it back from a backup; without one, {command('rebuild', path)} takes the copy in the newest tap test"
         )
-        return Verification((damaged("machine.toml", "is missing beside tap tests", cure),), (), 0)
+        missing = Remark("file-damaged", "machine.toml", "is missing beside tap tests", cure)
+        return Verification((missing,), (), 0)
     folder = MachineFolder(path)
     journal = folder.journal
     adopted = enter_explained(folder)
     reading = journal.read()
-    committed = listed(reading)
-    wrong = {name: fault for name, entry in committed.items() if (fault := fault_of(path, entry))}
+    committed = committed_taps(reading)
+    faults = {name: fault for name, entry in committed.items() if (fault := fault_of(path, entry))}
     remarks = [
         *reading.damage,
-        *_about_taps(path, reading, committed, wrong),
-        *about_cuts(path, heard(reading), given_up(reading), command("rebuild", path)),
-        *_about_machine_file(folder, [entry for name, entry in committed.items() if name not in wrong]),
-        *_about_history(folder),
-        *_about_devices(folder),
-        *about_spool(path, committed.keys() - wrong.keys()),
-        *_about_others(path),
+        *_verify_taps(path, reading, committed, faults),
+        *verify_cuts(path, committed_cuts(reading), ids_given_up(reading), command("rebuild", path)),
+        *_verify_machine_file(folder, [entry for name, entry in committed.items() if name not in faults]),
+        *_verify_history(folder),
+        *_verify_devices(folder),
+        *verify_spool(path, committed.keys() - faults.keys()),
+        *_verify_names(path),
     ]
-    return Verification(tuple(remarks), tuple(adopted), len(committed) - len(wrong))
+    return Verification(tuple(remarks), tuple(adopted), len(committed) - len(faults))
 
 
 def enter_explained(folder: MachineFolder) -> list[str]:
-    """Enter in the journal what an ended program has stored and not entered: its files.
+    """Enter in the journal what an ended program has stored and not entered; the files entered.
 
     Nothing where another program writes, the journal is damaged, or the folder cannot be written.
     """
     journal, adopted = folder.journal, list[str]()
     try:
         with folder.locked():
-            committed = set(listed(journal.read()))
+            committed = set(committed_taps(journal.read()))
             for name, path in tap_files(folder.path).items():
                 entry = read_doubtful(path) if name not in committed else None
                 if entry is not None and entry.id == name and is_explained(folder.path, entry):
@@ -114,84 +115,85 @@ def enter_explained(folder: MachineFolder) -> list[str]:
     return adopted
 
 
-def _about_taps(
-    folder: Path, reading: Reading, committed: dict[str, TapEntry], wrong: dict[str, str]
+def _verify_taps(
+    folder: Path, reading: Reading, committed: dict[str, TapEntry], faults: dict[str, str]
 ) -> Iterator[Remark]:
-    contents, without = {entry.sha256: entry for entry in committed.values()}, given_up(reading)
+    by_content, given_up = {entry.sha256: entry for entry in committed.values()}, ids_given_up(reading)
     files = tap_files(folder)
-    late = listed(Journal(folder).read())  # what another program has committed meanwhile
+    late = committed_taps(Journal(folder).read())  # what another program has committed meanwhile
     extra = [path for name, path in files.items() if name not in committed and name not in late]
     if not reading.lines and not reading.damage and extra:
-        yield no_journal(folder, len(extra))
-    for name, fault in wrong.items():
+        yield missing_journal(folder, len(extra))
+    for name, fault in faults.items():
         entry, path = committed[name], folder / committed[name].file
-        other = contents.get(_sha256(path)) if path.is_file() else None
-        told = f"it is {other.file} under another name" if other else fault
-        yield about_lost(folder, entry, told, name in without and not path.exists())
+        namesake = by_content.get(_sha256(path)) if path.is_file() else None
+        text = f"it is {namesake.file} under another name" if namesake else fault
+        yield tap_damage(folder, entry, text, name in given_up and not path.exists())
     for path in extra:
-        other = contents.get(_sha256(path))
-        yield _about_extra(folder, path, other, other is not None and other.id in wrong)
+        original = by_content.get(_sha256(path))
+        yield _extra_file(folder, path, original, original is not None and original.id in faults)
 
 
-def _about_extra(folder: Path, path: Path, other: TapEntry | None, is_needed: bool) -> Remark:
+def _extra_file(folder: Path, path: Path, original: TapEntry | None, is_needed: bool) -> Remark:
+    """Remark on a tap file without a line; original: the committed tap test with the same content."""
     mend = command("rebuild", folder)
-    if other is not None and is_needed:
-        return unlisted(path, f"it is {other.file} under another name", f"{mend} gives it its name back")
-    if other is not None:
-        return unlisted(path, f"a copy of {other.file}", f"{mend} puts it out of the way")
+    if original is not None and is_needed:
+        return unlisted_file(path, f"it is {original.file} under another name", f"{mend} gives it its name back")
+    if original is not None:
+        return unlisted_file(path, f"a copy of {original.file}", f"{mend} puts it out of the way")
     entry = read_doubtful(path)
     if entry is None:
-        return unlisted(path, "no whole tap file, and not in the journal", f"{mend} puts it out of the way")
+        return unlisted_file(path, "no whole tap file, and not in the journal", f"{mend} puts it out of the way")
     if entry.id != path.stem:
-        return unlisted(path, f"it is tap test {entry.id}", f"{mend} gives it its name and takes it in")
+        return unlisted_file(path, f"it is tap test {entry.id}", f"{mend} gives it its name and takes it in")
     if is_explained(folder, entry):
         cure = f"{command('verify', folder)} enters it where nobody else writes"
         return Remark(
             "not-entered", f"taps/{path.name}", "not entered in the journal by the program that wrote it", cure
         )
     cure = f"take it out of taps/ where it does not belong here, else {mend} takes it in"
-    return unlisted(path, "a whole tap file that is not in the journal", cure)
+    return unlisted_file(path, "a whole tap file that is not in the journal", cure)
 
 
-def _about_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterator[Remark]:
-    """Compared with the copy in the newest tap test."""
+def _verify_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterator[Remark]:
+    """Remarks on machine.toml, compared with the copy in the newest tap test."""
     try:
         _ = folder.machine
     except (ValueError, OSError) as error:
         cure = (
             "correct it; without a way to, move it away: lobewatch rebuild then takes the copy in the newest tap test"
         )
-        yield damaged("machine.toml", str(error), cure)
+        yield Remark("file-damaged", "machine.toml", str(error), cure)
         return
     newest = max(sound, key=lambda entry: entry.time, default=None)
-    then = ""
+    copy = ""
     with contextlib.suppress(DataError):  # a newer lobewatch has written it
-        then = folder.read(newest).circumstances.machine_toml if newest else ""
-    now = folder.toml.read_text("utf-8")
-    if newest is not None and then and now != then:
-        changed = [line for line in difflib.ndiff(then.splitlines(), now.splitlines()) if line[:2] in ("+ ", "- ")]
+        copy = folder.read(newest).circumstances.machine_toml if newest else ""
+    text = folder.toml.read_text("utf-8")
+    if newest is not None and copy and text != copy:
+        changed = [line for line in difflib.ndiff(copy.splitlines(), text.splitlines()) if line[:2] in ("+ ", "- ")]
         first = changed[0] if changed else "line ends"
-        text = f"{len(changed)} lines differ from the copy in {newest.file}, first: {first}"
-        yield Remark("machine-file-edited", "machine.toml", text)
+        differing = f"{len(changed)} lines differ from the copy in {newest.file}, first: {first}"
+        yield Remark("machine-file-edited", "machine.toml", differing)
 
 
-def _about_history(folder: MachineFolder) -> Iterator[Remark]:
+def _verify_history(folder: MachineFolder) -> Iterator[Remark]:
     if folder.history.exists() and read_rows(folder.history).is_damaged:
         cure = f"{command('rebuild', folder.path)} makes it anew, and so does any command that reads it"
-        yield damaged(folder.history.name, "altered since it was written", cure)
+        yield Remark("file-damaged", folder.history.name, "altered since it was written", cure)
 
 
-def _about_devices(folder: MachineFolder) -> Iterator[Remark]:
+def _verify_devices(folder: MachineFolder) -> Iterator[Remark]:
     try:
         read_known_devices(folder)
     except DataError as error:
-        yield damaged("daq.json", str(error).removeprefix(f"{folder.path / 'daq.json'}: "))
+        yield Remark("file-damaged", "daq.json", str(error).removeprefix(f"{folder.path / 'daq.json'}: "))
 
 
-def _about_others(folder: Path) -> Iterator[Remark]:
+def _verify_names(folder: Path) -> Iterator[Remark]:
     for path in sorted(folder.iterdir()):
         if path.suffix in (".tmp", ".torn", ".damaged") or path.name == "damaged":
-            yield set_aside(path.name, "left over or set aside", "delete it when you do not need it")
+            yield Remark("set-aside", path.name, "left over or set aside", "delete it when you do not need it")
         elif path.name == "report.html":
             yield Remark(
                 "not-verified", path.name, "a report is not verified", command("report", folder) + " writes it anew"

@@ -9,47 +9,45 @@ from pathlib import Path
 
 from acquisition import Remark, Trigger
 from acquisition.files.seal import is_sealed
-from lobewatch.machine.archive.told import damaged, set_aside
 from lobewatch.machine.journal.journal import command
 
 ALTERED = "altered or cut short since it was written"
 
 
-def about_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
-    """What is wrong with the files of interrupted tests.
+def verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
+    """Remarks on the files of interrupted tests.
 
     saved: identities of tap tests that need theirs no more. What another program removes meanwhile is left out.
     """
     spool = folder / "spool"
     for path in sorted(spool.rglob("*")) if spool.is_dir() else []:
-        inside = path.relative_to(spool)
-        if inside.parts[0] in saved:
+        if path.relative_to(spool).parts[0] in saved:
             continue
         try:
-            yield from _about_test(folder, path) if path.is_dir() else _about_file(folder, path)
+            yield from _verify_test(folder, path) if path.is_dir() else _verify_file(folder, path)
         except FileNotFoundError:
             continue
 
 
-def _about_test(folder: Path, path: Path) -> Iterator[Remark]:
+def _verify_test(folder: Path, path: Path) -> Iterator[Remark]:
     cure = f"put it back from a backup, or {command('tap', folder)} goes on with the others{_or_delete(path)}"
     about = path.relative_to(folder).as_posix()
-    yield from (damaged(f"{about}/{name}", "missing", cure) for name in _missing_hits(path))
+    yield from (Remark("file-damaged", f"{about}/{name}", "missing", cure) for name in _missing_hits(path))
 
 
-def _about_file(folder: Path, path: Path) -> Iterator[Remark]:
+def _verify_file(folder: Path, path: Path) -> Iterator[Remark]:
     about, tap = path.relative_to(folder).as_posix(), command("tap", folder)
     if path.suffix == ".h5" and not is_sealed(path.read_bytes()):
         cure = f"{tap} sets it aside and goes on with the others{_or_delete(path.parent)}"
-        yield damaged(about, ALTERED, cure)
+        yield Remark("file-damaged", about, ALTERED, cure)
     elif path.name == "setup.json" and not _is_whole_set_up(path):
         cure = f"{tap} sets it aside and chooses the set-up anew{_or_delete(path.parent)}"
-        yield damaged(about, ALTERED, cure)
+        yield Remark("file-damaged", about, ALTERED, cure)
     elif path.suffix == ".tmp":
-        yield set_aside(about, "half written", f"{tap} removes it")
+        yield Remark("set-aside", about, "half written", f"{tap} removes it")
     elif path.suffix == ".damaged":
         cure = "delete it when you do not need it"
-        yield set_aside(about, "a damaged file of an interrupted test", cure)
+        yield Remark("set-aside", about, "a damaged file of an interrupted test", cure)
 
 
 def _or_delete(test: Path) -> str:
@@ -58,9 +56,9 @@ def _or_delete(test: Path) -> str:
 
 def _is_whole_set_up(path: Path) -> bool:
     try:
-        told = json.loads(path.read_bytes())
-        crc = told.pop("crc", None)
-        return bool(Trigger(**told)) and crc in (None, zlib.crc32(json.dumps(told, sort_keys=True).encode()))
+        settings = json.loads(path.read_bytes())
+        crc = settings.pop("crc", None)
+        return bool(Trigger(**settings)) and crc in (None, zlib.crc32(json.dumps(settings, sort_keys=True).encode()))
     except (ValueError, TypeError, AttributeError):
         return False
 

@@ -21,7 +21,7 @@ PATIENCE = 60.0
 
 
 def read_doubtful(path: Path) -> TapEntry | None:
-    """The tap test in a file; None where it is no whole one."""
+    """Entry of the tap test in a file; None where it is no whole one."""
     content = path.read_bytes()
     if is_broken(content):
         return None
@@ -37,33 +37,34 @@ def _read(path: Path) -> TapEntry | None:
 
 def has_whole_hits(path: Path) -> bool:
     """Whether the hits of a file without a seal can be read."""
-    return not is_broken(path.read_bytes()) and _asked_apart("hits", path) is not None
+    return not is_broken(path.read_bytes()) and _run_apart("hits", path) is not None
 
 
 def _read_apart(path: Path) -> TapEntry | None:
-    line = _asked_apart("tap", path)
+    line = _run_apart("tap", path)
     return None if line is None else TapEntry.from_line(line)
 
 
-def _asked_apart(what: str, path: Path) -> dict[str, Any] | None:
-    command = [sys.executable, "-m", __name__, what, str(path)]
+def _run_apart(part: str, path: Path) -> dict[str, Any] | None:
+    """Output of this file as a program of its own; None where it failed or took too long."""
+    command = [sys.executable, "-m", __name__, part, str(path)]
     try:
-        said = subprocess.run(command, capture_output=True, timeout=PATIENCE, check=True)
-        found: dict[str, Any] | None = json.loads(said.stdout)
-        return found
+        completed = subprocess.run(command, capture_output=True, timeout=PATIENCE, check=True)
+        output: dict[str, Any] | None = json.loads(completed.stdout)
+        return output
     except (subprocess.SubprocessError, ValueError):
         return None
 
 
 def main() -> None:
-    """Print as JSON what is in the file that is named: of a "tap" its line, of "hits" that they can be read."""
-    _, what, name = sys.argv
-    if what == "hits":
+    """Print as JSON the part of a file that is named: of a "tap" its line, of "hits" that they can be read."""
+    _, part, name = sys.argv
+    if part == "hits":
         read_tap_hits(name)
         sys.stdout.write("{}")
         return
-    found = _read(Path(name))
-    sys.stdout.write("null" if found is None else json.dumps(found.line))
+    entry = _read(Path(name))
+    sys.stdout.write("null" if entry is None else json.dumps(entry.line))
 
 
 if __name__ == "__main__":

@@ -18,23 +18,23 @@ class MaintenanceEvent:
     id: str
     """Number in the journal, "e1" on."""
     time: datetime
-    """When it was done (UTC)."""
+    """Time at which it was done (UTC)."""
     text: str
-    """What was done."""
+    """Text that says what was done."""
     new_baseline: bool
     """Whether the tap tests after it are compared with none before it."""
 
 
 def events_of(entries: Sequence[Mapping[str, Any]]) -> tuple[MaintenanceEvent, ...]:
-    """The events of a journal that are not withdrawn, oldest first by their time."""
-    found: dict[str, MaintenanceEvent] = {}
+    """Events of a journal that are not withdrawn, oldest first by their time."""
+    events: dict[str, MaintenanceEvent] = {}
     for line in entries:
         if line["kind"] == "event" and "withdraws" in line:
-            found.pop(line["withdraws"], None)
+            events.pop(line["withdraws"], None)
         elif line["kind"] == "event":
             time = datetime.fromisoformat(line["date"])
-            found[line["id"]] = MaintenanceEvent(line["id"], time, line["text"], line["new_baseline"])
-    return tuple(sorted(found.values(), key=lambda event: event.time))
+            events[line["id"]] = MaintenanceEvent(line["id"], time, line["text"], line["new_baseline"])
+    return tuple(sorted(events.values(), key=lambda event: event.time))
 
 
 def new_event(
@@ -84,14 +84,14 @@ def _refuse_tapped_day(taps: Sequence[TapEntry], begin: datetime) -> None:
 
 
 def event_line(event: MaintenanceEvent, now: datetime) -> dict[str, Any]:
-    """For the journal."""
-    told = {"id": event.id, "date": event.time.isoformat(), "text": event.text, "new_baseline": event.new_baseline}
-    return {"kind": "event", **told, "time": now.isoformat()}
+    """Line of an event for the journal."""
+    fields = {"id": event.id, "date": event.time.isoformat(), "text": event.text, "new_baseline": event.new_baseline}
+    return {"kind": "event", **fields, "time": now.isoformat()}
 
 
 def withdrawal(entries: Sequence[Mapping[str, Any]], event_id: str, now: datetime) -> dict[str, Any]:
-    """The line that withdraws an event; ValueError where there is none of that name."""
-    known = [event.id for event in events_of(entries)]
-    if event_id not in known:
-        raise ValueError(f"{event_id}: no such event; there are {', '.join(known) or 'none'}")
+    """Line that withdraws an event; ValueError where there is none of that name."""
+    ids = [event.id for event in events_of(entries)]
+    if event_id not in ids:
+        raise ValueError(f"{event_id}: no such event; there are {', '.join(ids) or 'none'}")
     return {"kind": "event", "withdraws": event_id, "time": now.isoformat()}

@@ -10,25 +10,25 @@ from typing import Any, Literal, get_args
 from lobes import Cut
 
 CutWord = Literal["stable", "chatter", "flip", "cannot tell"]
-"""What a cut sounded like; flip: chatter whose period is two teeth."""
+"""Word on the sound of a cut; flip: chatter whose period is two teeth."""
 KIND = "cut"
-"""Of its line in the journal."""
+"""Kind of its line in the journal."""
 
 
 @dataclass(frozen=True)
-class RecordedAs:
-    """The file of a recording, as the journal vouches for it."""
+class RecordingFile:
+    """File of a recording, as the journal vouches for it."""
 
     id: str
-    """Of the cut."""
+    """Identity of the cut."""
     sha256: str
-    """Of the file."""
+    """SHA-256 of the file."""
     size: int
-    """Of the file (bytes)."""
+    """Size of the file (bytes)."""
 
     @property
     def file(self) -> str:
-        """Its place in the folder of the machine."""
+        """Place of the file in the folder of the machine."""
         return f"cuts/{self.id}.h5"
 
 
@@ -39,11 +39,11 @@ class HeardCut:
     id: str
     """Number in the journal, "c1" on."""
     at: datetime
-    """When it was cut (UTC)."""
+    """Time at which it was cut (UTC)."""
     program: str | None
     """Cutting program that it was a cut of; None for the reference cut."""
     tool: str
-    """What was in the spindle."""
+    """Tool in the spindle."""
     cut: Cut
     """Teeth, immersion, direction and the coefficients that it was judged with."""
     coefficients: str
@@ -51,29 +51,29 @@ class HeardCut:
     feed: str
     """Axis of the machine that it was fed along, "x" or "y"; "both" where that is not known."""
     feed_per_tooth: float | None
-    """m; None where machine.toml does not say."""
+    """Feed per tooth (m); None where machine.toml does not say."""
     commanded_rpm: float
     """Spindle speed as it was set (rpm)."""
     speed_rpm: float
-    """As it was heard; as it was set where that was by ear."""
+    """Spindle speed as it was heard (rpm); as it was set where that was by ear."""
     depth: float
     """Axial depth of cut (m)."""
     word: CutWord
-    """What it sounded like."""
+    """Word on its sound."""
     chatter_frequency_hz: float | None
-    """What chatter was heard at; None where it was none, or nobody knows."""
+    """Chatter frequency (Hz); None where it was none, or nobody knows."""
     by: Literal["ear", "accelerometer"]
-    """Who heard it."""
+    """Ear or instrument that heard it."""
     software: str
     """Version of lobewatch that wrote it down."""
     chatter_frequency_std_hz: float | None = None
-    """Standard error; None where nobody knows."""
+    """Standard error of the chatter frequency (Hz); None where nobody knows."""
     reason: str = ""
-    """Why it cannot be told, a code; empty where it can."""
-    recording: RecordedAs | None = None
-    """None for what was heard by ear."""
+    """Code of the reason why the word cannot be told; empty where it can."""
+    recording: RecordingFile | None = None
+    """Recording of its sound; None for what was heard by ear."""
     excluded: str = ""
-    """Why a person has taken it out; empty where it counts; lines of their own."""
+    """Reason why a person has taken it out; empty where it counts; lines of their own."""
 
     def __post_init__(self) -> None:
         """Refuse a word that is none."""
@@ -92,26 +92,26 @@ class HeardCut:
 
     @property
     def line(self) -> dict[str, Any]:
-        """For the journal."""
-        told = {name: value for name, value in asdict(self).items() if name != "excluded"}
-        return {"kind": KIND, **told, "at": self.at.isoformat()}
+        """Line of the journal."""
+        fields = {name: value for name, value in asdict(self).items() if name != "excluded"}
+        return {"kind": KIND, **fields, "at": self.at.isoformat()}
 
 
 def geometry(cut: Cut) -> tuple[int, float, str, float]:
-    """What two cuts with one cutter at one immersion have alike, whatever the material and the feed."""
+    """Properties that two cuts with one cutter at one immersion have alike, whatever the material and the feed."""
     return cut.teeth, cut.immersion, cut.direction, cut.helix_lag
 
 
 def cut_of_line(line: Mapping[str, Any], excluded: str = "") -> HeardCut:
-    """From the line that `HeardCut.line` has made."""
-    told = {name: line[name] for name in HeardCut.__dataclass_fields__ if name in line}
-    told |= {"at": datetime.fromisoformat(line["at"]).astimezone(UTC), "cut": Cut(**line["cut"])}
+    """Test cut of the line that `HeardCut.line` has made."""
+    fields = {name: line[name] for name in HeardCut.__dataclass_fields__ if name in line}
+    fields |= {"at": datetime.fromisoformat(line["at"]).astimezone(UTC), "cut": Cut(**line["cut"])}
     recording = line.get("recording")
-    return HeardCut(**told | {"recording": RecordedAs(**recording) if recording else None, "excluded": excluded})
+    return HeardCut(**fields | {"recording": RecordingFile(**recording) if recording else None, "excluded": excluded})
 
 
 def cuts_of(entries: Sequence[Mapping[str, Any]], excluded: Mapping[str, str]) -> tuple[HeardCut, ...]:
-    """The test cuts of a journal, oldest first by their time; excluded: why some are, by identity."""
+    """Test cuts of a journal, oldest first by their time; excluded: reasons why some are, by identity."""
     lines = {line["id"]: line for line in entries if line["kind"] == KIND}
-    found = [cut_of_line(line, excluded.get(name, "")) for name, line in lines.items()]
-    return tuple(sorted(found, key=lambda cut: cut.at))
+    cuts = [cut_of_line(line, excluded.get(name, "")) for name, line in lines.items()]
+    return tuple(sorted(cuts, key=lambda cut: cut.at))

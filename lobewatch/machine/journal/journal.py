@@ -12,6 +12,7 @@ import hashlib
 import json
 import os
 import shlex
+import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,9 +20,8 @@ from pathlib import Path
 
 import msgspec
 
-from acquisition import DataError, Remark
+from acquisition import DataError, Remark, machine_of, named_in_id
 from acquisition.atomic import atomic_write, sync_folder
-from lobewatch.machine.journal.foreign import foreign
 from lobewatch.machine.journal.journal_text import Entry, JournalText, crc_of, scan
 from lobewatch.machine.journal.tap_entry import TAP_LINE
 
@@ -33,36 +33,36 @@ BATCH = "batch"
 
 @dataclass(frozen=True)
 class Reading:
-    """What the two files say together."""
+    """Lines that the two files prove together."""
 
     lines: tuple[bytes, ...]
     """All sound lines, oldest first, without their ends."""
     damage: tuple[Remark, ...]
-    """What is wrong with the files; until it is mended nothing is written."""
+    """Remarks on what is wrong with the files; until it is mended nothing is written."""
     torn: bytes = b""
-    """What a crash has left of a line in journal.jsonl; counts for nothing."""
+    """Remains of a line in journal.jsonl after a crash; count for nothing."""
     tidy: bool = False
     """Whether both files hold just these lines."""
 
     @cached_property
     def entries(self) -> list[Entry]:
         """The lines as JSON objects."""
-        return _decoded(self.lines)
+        return _decode(self.lines)
 
     @cached_property
     def taps(self) -> list[bytes]:
-        """Those that `tap_entries` reads."""
+        """Lines that `tap_entries` reads."""
         return [line for line in self.lines if line.startswith(TAP_LINE)]
 
     @cached_property
     def others(self) -> list[Entry]:
-        """All others as JSON objects."""
-        return _decoded(line for line in self.lines if not line.startswith(TAP_LINE))
+        """All other lines as JSON objects."""
+        return _decode(line for line in self.lines if not line.startswith(TAP_LINE))
 
 
-def _decoded(lines: Iterable[bytes]) -> list[Entry]:
-    found: list[Entry] = msgspec.json.decode(b"[" + b",".join(lines) + b"]")
-    return found
+def _decode(lines: Iterable[bytes]) -> list[Entry]:
+    entries: list[Entry] = msgspec.json.decode(b"[" + b",".join(lines) + b"]")
+    return entries
 
 
 class Journal:
@@ -72,24 +72,24 @@ class Journal:
         """Nothing is read yet."""
         self.path, self.copy = folder / JOURNAL, folder / COPY
         self.length = 0
-        """Lines that there were once this had appended its newest."""
-        self._known = JournalText(there=False)
+        """Number of lines once this had appended its newest."""
+        self._text = JournalText(exists=False)
 
     def read(self) -> Reading:
-        """All sound lines of both files, and what is wrong with these; neither need be there."""
-        journal = scan(self.path, self._known)
+        """Read all sound lines of both files, and what is wrong with these; neither need be there."""
+        journal = scan(self.path, self._text)
         copy = scan(self.copy, journal)
-        self._known = journal
+        self._text = journal
         longer, shorter = sorted((journal.chain, copy.chain), key=len, reverse=True)
         if longer[: len(shorter)] != shorter:
             longer = journal.chain
-        damage = [*self._about_journal(journal, copy), *self._about_copy(journal, copy)]
+        damage = [*self._damage_of_journal(journal, copy), *self._damage_of_copy(journal, copy)]
         loose = (*journal.chain, *copy.chain, *journal.loose, *copy.loose) if damage else ()
         lines = tuple(dict.fromkeys((*longer, *loose))) if loose else longer
-        other = foreign(self.path.parent, lines)
-        if other:
-            return Reading((), (journal_damage(self.path, other),))
-        tidy = copy.there and copy.whole == journal.whole and not (damage or journal.torn or copy.torn)
+        foreign = _foreign_fault(self.path.parent, lines)
+        if foreign:
+            return Reading((), (journal_damage(self.path, foreign),))
+        tidy = copy.exists and copy.whole == journal.whole and not (damage or journal.torn or copy.torn)
         return Reading(lines, tuple(damage), journal.torn, tidy)
 
     def append(self, *entries: Entry, reading: Reading | None = None) -> None:
@@ -102,10 +102,10 @@ class Journal:
         if not reading.tidy:
             self._put_right(reading)
         first = len(reading.lines) + 1
-        together = {BATCH: first} if len(entries) > 1 else {}
+        batch = {BATCH: first} if len(entries) > 1 else {}
         lines = [reading.lines[-1] if reading.lines else b""]
         for number, entry in enumerate(entries, first):
-            lines.append(as_line(entry | together, number, lines[-1]))
+            lines.append(as_line(entry | batch, number, lines[-1]))
         _add(self.path, lines[1:])
         self.length = len(reading.lines) + len(entries)
         try:
@@ -120,7 +120,7 @@ class Journal:
             raise DataError(f"{self.path.parent}: {'; '.join(map(str, damage))}; nothing is written before")
 
     def rewrite(self, entries: list[Entry]) -> None:
-        """Both files anew from these lines, in a chain of their own; what was there is kept beside them."""
+        """Write both files anew from these lines, in a chain of their own; what was there is kept beside them."""
         for path in (self.path, self.copy):
             if path.exists():
                 keep_aside(path, path.read_bytes(), "damaged")
@@ -132,7 +132,7 @@ class Journal:
         atomic_write(self.copy, content)
 
     def _put_right(self, reading: Reading) -> None:
-        """After a crash: the torn end is kept in a file of its own and cut away, the copy brought up."""
+        """Mend the files after a crash: keep the torn end in a file of its own and cut it away, bring up the copy."""
         whole = b"".join(line + b"\n" for line in reading.lines)
         if reading.torn:
             keep_aside(self.path, reading.torn, "torn")
@@ -140,9 +140,9 @@ class Journal:
             if (path.read_bytes() if path.exists() else b"") != whole:
                 atomic_write(path, whole)
 
-    def _about_journal(self, journal: JournalText, copy: JournalText) -> Iterator[Remark]:
+    def _damage_of_journal(self, journal: JournalText, copy: JournalText) -> Iterator[Remark]:
         missing = len(copy.chain) - len(journal.chain)
-        if not journal.there and copy.there:
+        if not journal.exists and copy.exists:
             yield journal_damage(self.path, "is missing beside its copy")
         elif journal.broken:
             yield journal_damage(self.path, f"line {journal.broken} is damaged")
@@ -154,7 +154,7 @@ class Journal:
         elif copy.chain != journal.chain[: len(copy.chain)]:
             yield journal_damage(self.path, f"it is not the journal that {COPY} is a copy of")
 
-    def _about_copy(self, journal: JournalText, copy: JournalText) -> Iterator[Remark]:
+    def _damage_of_copy(self, journal: JournalText, copy: JournalText) -> Iterator[Remark]:
         behind = len(journal.chain) - len(copy.chain)
         if copy.broken:
             yield journal_damage(self.copy, f"line {copy.broken} is damaged")
@@ -162,10 +162,37 @@ class Journal:
             yield journal_damage(self.copy, f"the end of its line {len(copy.chain)} is damaged")
         elif _are_of_one_write(journal.chain[len(copy.chain) :]):
             return
-        elif not copy.there and behind > 1 and any("number" in json.loads(line) for line in journal.chain[:-1]):
+        elif not copy.exists and behind > 1 and any("number" in json.loads(line) for line in journal.chain[:-1]):
             yield journal_damage(self.copy, "is missing")
-        elif copy.there and behind > 1:
+        elif copy.exists and behind > 1:
             yield journal_damage(self.copy, f"its last {behind} lines are missing")
+
+
+def _foreign_fault(folder: Path, lines: Sequence[bytes]) -> str:
+    """Fault of a journal whose tap tests are all missing and of another machine; else empty.
+
+    Such a folder was mixed up. Looks no farther than the first tap file that is there.
+    """
+    missing = []
+    for tap_id in (entry["id"] for entry in map(json.loads, lines) if entry["kind"] == "tap"):
+        if (folder / "taps" / f"{tap_id}.h5").exists():
+            return ""
+        missing.append(tap_id)
+    machine = _machine_name(folder) if missing else ""
+    files = [path.stem for path in (folder / "taps").glob("*.h5")] if machine else []
+    taps_here = [tap_id for tap_id in files if machine_of(tap_id) == named_in_id(machine)]
+    names = sorted(set(map(machine_of, missing)))
+    if not taps_here or named_in_id(machine) in names:
+        return ""
+    lists = f"lists {len(missing)} tap test{'s' if len(missing) > 1 else ''} of {', '.join(names)}, none of them here"
+    return f"is that of another machine: it {lists}, while taps/ holds {len(taps_here)} of {machine}"
+
+
+def _machine_name(folder: Path) -> str:
+    try:
+        return str(tomllib.loads((folder / "machine.toml").read_text("utf-8"))["machine"]["name"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""
 
 
 def _are_of_one_write(lines: Sequence[bytes]) -> bool:
@@ -175,14 +202,14 @@ def _are_of_one_write(lines: Sequence[bytes]) -> bool:
 
 
 def as_line(entry: Entry, number: int, last: bytes) -> bytes:
-    """A line without its end; last: the line before, without its end too."""
-    told = {name: value for name, value in entry.items() if name != "crc"}
-    told |= {"number": number, "previous": hashlib.sha256(last).hexdigest() if last else ""}
-    return json.dumps(told | {"crc": crc_of(told)}).encode()
+    """Line of an entry, without its end; last: the line before, without its end too."""
+    fields = {name: value for name, value in entry.items() if name != "crc"}
+    fields |= {"number": number, "previous": hashlib.sha256(last).hexdigest() if last else ""}
+    return json.dumps(fields | {"crc": crc_of(fields)}).encode()
 
 
 def keep_aside(path: Path, content: bytes, why: str) -> Path:
-    """Bytes that are to be cut away or written over, in a new file beside: PATH.1.torn, PATH.2.torn, ..."""
+    """Keep bytes that are to be cut away or written over in a new file beside: PATH.1.torn, PATH.2.torn, ..."""
     number = 1
     while (aside := path.with_name(f"{path.name}.{number}.{why}")).exists():
         number += 1
@@ -190,18 +217,18 @@ def keep_aside(path: Path, content: bytes, why: str) -> Path:
     return aside
 
 
-def journal_damage(path: Path, what: str) -> Remark:
-    """What is wrong with a file of the journal."""
-    return Remark("journal-damaged", path.name, what, f"mend it with {command('rebuild', path.parent)}")
+def journal_damage(path: Path, fault: str) -> Remark:
+    """Remark on a file of the journal."""
+    return Remark("journal-damaged", path.name, fault, f"mend it with {command('rebuild', path.parent)}")
 
 
 def command(name: str, folder: Path) -> str:
-    """A command of lobewatch for a machine, to be copied."""
+    """Command of lobewatch for a machine, to be copied."""
     return shlex.join(["lobewatch", name, str(folder)])
 
 
 def _add(path: Path, lines: Sequence[bytes]) -> None:
-    """Lines and their ends in one write."""
+    """Append lines and their ends in one write."""
     new, content = not path.exists(), b"".join(line + b"\n" for line in lines)
     try:
         handle = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT, 0o644)

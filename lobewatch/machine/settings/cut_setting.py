@@ -16,30 +16,31 @@ Table = TypeVar("Table", bound=CutTable)
 
 @dataclass(frozen=True)
 class CutSetting:
-    """A cut that is about to be heard."""
+    """Speed, depth and tool of a cut that is about to be heard."""
 
     table: CutTable
-    """Of machine.toml."""
+    """Table of machine.toml."""
     program: str | None
     """Name of the program; None for the reference cut."""
     tool: str
-    """In the spindle."""
+    """Name of the tool in the spindle."""
     cut: Cut
-    """In SI units, the feed along x."""
+    """Cut in SI units, the feed along x."""
     feed: str
-    """"x", "y" or "both"."""
+    """Axis of the feed, "x" or "y", or "both"."""
     speed_rpm: float
-    """As it is set."""
+    """Spindle speed as it is set (rpm)."""
     depth: float
-    """m."""
+    """Axial depth of cut (m)."""
 
     @property
     def tooth_frequency(self) -> float:
         """Teeth a second (Hz)."""
         return self.cut.teeth * self.speed_rpm / 60
 
-    def told(self) -> dict[str, Any]:
-        """Those fields of a `HeardCut` that follow from it."""
+    @property
+    def heard_cut_fields(self) -> dict[str, Any]:
+        """Fields of a `HeardCut` that follow from it."""
         feed = self.table.feed_per_tooth_mm
         return {
             "program": self.program,
@@ -54,7 +55,7 @@ class CutSetting:
 
 
 def cut_setting(machine: Machine, program: str, speed_rpm: float | None, depth_mm: float | None) -> CutSetting:
-    """A program or "reference cut" at a speed and a depth; None: those of the program.
+    """Setting of a program or "reference cut" at a speed and a depth; None: those of the program.
 
     ValueError for a name, speed or depth that is none.
     """
@@ -62,25 +63,25 @@ def cut_setting(machine: Machine, program: str, speed_rpm: float | None, depth_m
     for option, value, unit in (("--speed", speed_rpm, "rpm"), ("--depth", depth_mm, "mm")):
         if value is not None and not (math.isfinite(value) and value > 0):
             raise ValueError(f"{option} {value:g}: is not above 0; give the {option[2:]} that was cut with, in {unit}")
-    own = table if isinstance(table, ProgramTable) else None
-    speed = own.speed_rpm if speed_rpm is None and own is not None else speed_rpm
-    depth = own.depth_mm if depth_mm is None and own is not None else depth_mm
+    preset = table if isinstance(table, ProgramTable) else None
+    speed = preset.speed_rpm if speed_rpm is None and preset is not None else speed_rpm
+    depth = preset.depth_mm if depth_mm is None and preset is not None else depth_mm
     if speed is None or depth is None:
         missing = "--speed" if speed is None else "--depth"
         raise ValueError(f"{missing} is missing: the {REFERENCE_CUT} has none of its own; give what was cut with")
     if table.flute_length_mm is not None and depth > table.flute_length_mm:
         raise ValueError(f"--depth {depth:g} mm is deeper than flute_length_mm={table.flute_length_mm:g}")
-    tool, feed = (own.tool, own.feed) if own else (machine.tap.tool, "both")
-    name = own.name if own else None
+    tool, feed = (preset.tool, preset.feed) if preset else (machine.tap.tool, "both")
+    name = preset.name if preset else None
     return CutSetting(table, name, tool, machine.build_cut(table), feed, float(speed), depth / 1e3)
 
 
-def chosen_cut(machine: Machine, program: str, cut: str, speed_rpm: float | None, depth_mm: float | None) -> CutSetting:
-    """A program, or in its place a cut with speed and depth of its own; ValueError where it is not one of both."""
+def choose_cut(machine: Machine, program: str, cut: str, speed_rpm: float | None, depth_mm: float | None) -> CutSetting:
+    """Setting of a program, or of a cut with speed and depth of its own; ValueError where it is not one of both."""
     if bool(program) == bool(cut):
-        known = ", ".join(map(repr, machine.cut_names)) or "none: add a [[program]] to machine.toml"
+        names = ", ".join(map(repr, machine.cut_names)) or "none: add a [[program]] to machine.toml"
         raise ValueError(
-            f"{'both' if cut else 'neither'} of --program and --cut: say which cut it is; there are {known}"
+            f"{'both' if cut else 'neither'} of --program and --cut: say which cut it is; there are {names}"
         )
     if cut and (speed_rpm is None or depth_mm is None):
         missing = "--speed" if speed_rpm is None else "--depth"
@@ -90,14 +91,14 @@ def chosen_cut(machine: Machine, program: str, cut: str, speed_rpm: float | None
 
 def _table(machine: Machine, name: str) -> CutTable:
     tables: dict[str, CutTable] = {REFERENCE_CUT: machine.reference_cut} if machine.reference_cut else {}
-    return named(tables | {table.name: table for table in machine.program}, name)
+    return find_named(tables | {table.name: table for table in machine.program}, name)
 
 
-def named(tables: Mapping[str, Table], name: str) -> Table:
-    """The one of this name, or the only one whose name begins so; ValueError where there is none, or are several."""
-    fitting = [one for one in tables if one == name] or [one for one in tables if one.startswith(name)]
+def find_named(tables: Mapping[str, Table], name: str) -> Table:
+    """Table of this name, or the only one whose name begins so; ValueError where there is none, or are several."""
+    fitting = [key for key in tables if key == name] or [key for key in tables if key.startswith(name)]
     if len(fitting) != 1:
-        known = ", ".join(map(repr, fitting or tables)) or "none: add a [[program]] to machine.toml"
+        names = ", ".join(map(repr, fitting or tables)) or "none: add a [[program]] to machine.toml"
         why = "may be several: say more of its name" if fitting else "is not in machine.toml"
-        raise ValueError(f"program {name!r} {why}; there are {known}")
+        raise ValueError(f"program {name!r} {why}; there are {names}")
     return tables[fitting[0]]

@@ -37,7 +37,7 @@ class CutTable(Table, frozen=True):
 
     @property
     def deepest_mm(self) -> float:
-        """How deep the tool can cut; where the length of its flutes is not known, one diameter."""
+        """Greatest depth of cut of the tool (mm); where the length of its flutes is not known, one diameter."""
         return self.tool_diameter_mm if self.flute_length_mm is None else self.flute_length_mm
 
     def __post_init__(self) -> None:
@@ -71,7 +71,7 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
 
     @property
     def deepest_mm(self) -> float:
-        """How deep the tool can cut; where the length of its flutes is not known, one diameter or what it cuts now."""
+        """Greatest depth of cut of the tool (mm); without a known length of flutes one diameter or what it cuts now."""
         return max(super().deepest_mm, self.depth_mm)
 
     @property
@@ -129,7 +129,7 @@ class MaterialTable(Table, frozen=True):
 
 
 class Drive(Table, frozen=True):
-    """[drive]: what the spindle motor can do; optional."""
+    """[drive]: power and torque of the spindle motor; optional."""
 
     power_kw: PositiveOrInfinite = math.inf
     torque_nm: PositiveOrInfinite = math.inf

@@ -19,7 +19,7 @@ from acquisition import (
 from lobewatch.machine.settings.toml_table import Positive, Table
 
 Sensitivity = Annotated[float, Meta(ge=-1e6, le=1e6)]
-"""Of either sign: an accelerometer may be mounted the other way round."""
+"""Sensitivity of either sign: an accelerometer may be mounted the other way round."""
 
 
 class ChannelTable(Table, frozen=True):
@@ -83,6 +83,6 @@ class Daq(Table, frozen=True):
 
     @property
     def settings(self) -> DeviceSettings:
-        """What is asked of the device, in SI units."""
+        """Settings asked of the device, in SI units."""
         inputs = tuple(channel.build() for channel in self.channel)
         return DeviceSettings(self.sample_rate_hz, inputs, self.loss_detection, self.digital_clock)

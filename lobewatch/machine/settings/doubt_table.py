@@ -17,9 +17,9 @@ class DoubtTable(Table, frozen=True):
     frequency_percent: Percent | None = None
     """Natural frequency from tap test to tap test; None: the series' own scatter from 8 tests on, before that 0.3."""
     damping_percent: Percent | None = None
-    """The same of the damping ratio; before that 10."""
+    """Damping ratio from tap test to tap test; None: likewise, before that 10."""
     stiffness_percent: Percent | None = None
-    """The same of the stiffness; before that 3."""
+    """Modal stiffness from tap test to tap test; None: likewise, before that 3."""
     speed_percent: Percent = 1.0
     """Spindle speed."""
     coefficients_percent: Percent = 20.0
@@ -27,10 +27,10 @@ class DoubtTable(Table, frozen=True):
     predicted_frequency_percent: Percent = 3.0
     """Natural frequencies of a tool that was never tapped."""
     predicted_damping_percent: Percent = 30.0
-    """Its damping ratios."""
+    """Damping ratios of such a tool."""
     predicted_stiffness_percent: Percent = 15.0
-    """Its stiffnesses."""
+    """Modal stiffnesses of such a tool."""
     untapped_frequency_percent: Percent = 5.0
     """Natural frequencies in a direction that was not tapped, against the other one."""
     untapped_stiffness_percent: Percent = 30.0
-    """Stiffnesses there."""
+    """Modal stiffnesses in such a direction."""

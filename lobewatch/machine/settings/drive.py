@@ -1,4 +1,4 @@
-"""What the spindle drive allows."""
+"""The depth of cut that the spindle drive allows."""
 
 from __future__ import annotations
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import difflib
 import hashlib
 import math
+import re
 import tomllib
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +20,6 @@ from lobes import Coefficients, Cut, cutting_coefficients
 from lobewatch.machine.settings.cut_tables import FEED_ANGLES, CutTable, Drive, MaterialTable, ProgramTable
 from lobewatch.machine.settings.daq_tables import ChannelTable, Daq
 from lobewatch.machine.settings.doubt_table import DoubtTable
-from lobewatch.machine.settings.messages import comma_hint, readable
 from lobewatch.machine.settings.notify_table import NotifyTable
 from lobewatch.machine.settings.setup_tables import Identity, Limits, ModeChoice, SpeedRange, TapSetup
 from lobewatch.machine.settings.spindle_tables import (
@@ -32,10 +33,11 @@ from lobewatch.machine.settings.spindle_tables import (
 from lobewatch.machine.settings.toml_table import Table, check_texts
 
 REFERENCE_CUT = "reference cut"
+"""Name of [reference_cut] beside the names of programs."""
 
 
 class Machine(Table, frozen=True):
-    """All of machine.toml."""
+    """All tables of machine.toml."""
 
     machine: Identity
     tap: TapSetup = TapSetup()
@@ -76,11 +78,12 @@ class Machine(Table, frozen=True):
         if table.material is None:
             tangential, radial = (1e6 * (k or 0) for k in (table.tangential_n_per_mm2, table.radial_n_per_mm2))
             return Coefficients("", tangential, radial, source="machine.toml")
-        known = {one.material: one for one in cutting_coefficients()} | {one.name: one.build() for one in self.material}
-        if table.material not in known:
-            near = difflib.get_close_matches(table.material, known, n=1, cutoff=0.0)[0]
+        by_name = {published.material: published for published in cutting_coefficients()}
+        by_name |= {material.name: material.build() for material in self.material}
+        if table.material not in by_name:
+            near = difflib.get_close_matches(table.material, by_name, n=1, cutoff=0.0)[0]
             raise ValueError(f"material={table.material!r} is not known; is {near!r} meant? Or add a [[material]]")
-        return known[table.material]
+        return by_name[table.material]
 
     def build_cut(self, table: CutTable) -> Cut:
         """A cut in SI units."""
@@ -126,11 +129,11 @@ class Machine(Table, frozen=True):
         for tool in self.tool:
             if tool.name == name:
                 return tool
-        known = ", ".join(repr(known) for known in [self.tap.tool, *(tool.name for tool in self.tool)])
-        raise DataError(f"tool {name!r} has no model; modelled are {known}: add a [[tool]] table")
+        names = ", ".join(map(repr, [self.tap.tool, *(tool.name for tool in self.tool)]))
+        raise DataError(f"tool {name!r} has no model; modelled are {names}: add a [[tool]] table")
 
     def cuts(self, tool: str) -> dict[str, tuple[Cut, ...]]:
-        """The reference cut and the programs that run with a tool, by name, fed along x, y or both."""
+        """Reference cut and programs that run with a tool, by name, fed along x, y or both."""
         tables = {REFERENCE_CUT: self.reference_cut} if self.reference_cut else {}
         tables |= {program.name: program for program in self.program if program.tool == tool}
         return {
@@ -140,7 +143,7 @@ class Machine(Table, frozen=True):
 
     @property
     def cut_names(self) -> list[str]:
-        """The reference cut and all programs, whatever their tool."""
+        """Names of the reference cut and of all programs, whatever their tool."""
         return [*([REFERENCE_CUT] if self.reference_cut else []), *(program.name for program in self.program)]
 
     @property
@@ -154,8 +157,8 @@ class Machine(Table, frozen=True):
     def program_hashes(self) -> dict[str, str]:
         """SHA-256 of all that decides the word on a program beside `settings_hash`, by its name."""
         return {
-            one.name: _hash("four words over the doubt", one, self.coefficients(one), self.doubt)
-            for one in self.program
+            program.name: _hash("four words over the doubt", program, self.coefficients(program), self.doubt)
+            for program in self.program
         }
 
 
@@ -179,14 +182,14 @@ def parse_machine(text: str, name: str = "machine.toml") -> Machine:
         check_texts(tables)
         return msgspec.convert(tables, Machine)
     except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{name}: {error}{comma_hint(text)}") from error
+        raise DataError(f"{name}: {error}{_comma_hint(text)}") from error
     except msgspec.ValidationError as error:
-        raise DataError(f"{name}: {readable(str(error), tables, _known_keys())}") from error
+        raise DataError(f"{name}: {_readable(str(error), tables, _keys())}") from error
     except ValueError as error:
         raise DataError(f"{name}: {error}") from error
 
 
-def _known_keys() -> set[str]:
+def _keys() -> set[str]:
     tables = [
         Machine,
         Identity,
@@ -202,3 +205,31 @@ def _known_keys() -> set[str]:
     ]
     tables += [MaterialTable, ProgramTable, SpindleTable, SegmentTable, BearingTable, MassTable, JointTable, ToolTable]
     return {field for table in tables for field in table.__struct_fields__}
+
+
+def _comma_hint(text: str) -> str:
+    """Hint at a decimal comma, the usual cause of a text that is no TOML."""
+    match = re.search(r"=\s*(-?\d+),(\d+)\s*(#|\n|,|\})", text)
+    return f"; write {match[1]}.{match[2]} with a point" if match else ""
+
+
+def _readable(message: str, tables: Mapping[str, Any], keys: Collection[str]) -> str:
+    """Message of msgspec with its place first, the value that is refused, and a known key for a mistyped one."""
+    text, _, place = message.partition(" - at `$")
+    place = place.rstrip("`")
+    where = re.sub(r"\.?(\w+?)s?\[(\d+)\]", lambda m: f" {m[1]} {int(m[2]) + 1}", place).strip(" .")
+    unknown = re.search(r"unknown field `(\w+)`", text)
+    if unknown:
+        near = difflib.get_close_matches(unknown[1], keys, n=1)
+        text = f"unknown key {unknown[1]!r}" + (f"; is {near[0]!r} meant?" if near else "")
+    elif re.match(r"Expected `\w+` [<>]", text):
+        text += f", not {_value(tables, place)}"
+    return f"{where.replace('.', ' ')}: {text}" if where else text
+
+
+def _value(tables: Mapping[str, Any], place: str) -> object:
+    """Value at a place like ".program[0].depth_mm"."""
+    value: Any = tables
+    for key, number in re.findall(r"\.(\w+)|\[(\d+)\]", place):
+        value = value[key] if key else value[int(number)]
+    return value

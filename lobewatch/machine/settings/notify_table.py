@@ -9,30 +9,30 @@ from urllib.parse import unquote, urlsplit
 from lobewatch.machine.settings.toml_table import Table
 
 PORTS = {"mqtt": 1883, "mqtts": 8883}
-"""Where none is named; mqtts is encrypted."""
+"""Port by scheme, where the address names none; mqtts is encrypted."""
 PASSWORD = "LOBEWATCH_MQTT_PASSWORD"
 """Variable of the environment: machine.toml is copied into each tap file, so the password need not stand in it."""
 
 
 class Broker(NamedTuple):
-    """An MQTT broker, and where in it."""
+    """An MQTT broker, and the place of our topics in it."""
 
     scheme: str
-    """"mqtt" or "mqtts"."""
+    """Scheme of the address, "mqtt" or "mqtts"."""
     host: str
-    """Name or address."""
+    """Name or address of the computer."""
     port: int
-    """Of the broker."""
+    """Port of the broker."""
     user: str
-    """Empty where none is asked for."""
+    """Name of the user; empty where none is asked for."""
     password: str
-    """Empty where none is asked for."""
+    """Password of the user; empty where none is asked for."""
     prefix: str
-    """Of all topics."""
+    """First levels of all topics."""
 
     @property
     def address(self) -> str:
-        """For people: without the password."""
+        """Address for people: without the password."""
         return f"{self.scheme}://{self.host}:{self.port}"
 
 
@@ -48,23 +48,23 @@ class NotifyTable(Table, frozen=True):
 
     @property
     def broker(self) -> Broker | None:
-        """That of `mqtt`; None where there is none."""
+        """Broker of `mqtt`; None where nobody is told."""
         return broker_of(self.mqtt) if self.mqtt else None
 
 
 def broker_of(address: str) -> Broker:
-    """From mqtt://[user[:password]@]host[:port][/prefix]; ValueError for what is none."""
+    """Broker of mqtt://[user[:password]@]host[:port][/prefix]; ValueError for what is none."""
     hidden = address if "@" not in address else "...@" + address.rpartition("@")[2]
     allowed = "give mqtt://HOST, mqtt://USER@HOST:PORT/PREFIX, or mqtts:// where it is encrypted"
     wrong = f"mqtt={hidden!r} is no address of a broker; {allowed}"
-    found = urlsplit(address)
+    url = urlsplit(address)
     try:
-        port = found.port
+        port = url.port
     except ValueError:
         raise ValueError(wrong) from None
-    prefix = found.path.strip("/") or "lobewatch"
-    if found.scheme not in PORTS or not found.hostname or set(address) & set("#?") or "+" in prefix:
+    prefix = url.path.strip("/") or "lobewatch"
+    if url.scheme not in PORTS or not url.hostname or set(address) & set("#?") or "+" in prefix:
         raise ValueError(wrong)
-    password = unquote(found.password or "") or (os.environ.get(PASSWORD, "") if found.username else "")
-    user = unquote(found.username or "")
-    return Broker(found.scheme, found.hostname, port or PORTS[found.scheme], user, password, prefix)
+    password = unquote(url.password or "") or (os.environ.get(PASSWORD, "") if url.username else "")
+    user = unquote(url.username or "")
+    return Broker(url.scheme, url.hostname, port or PORTS[url.scheme], user, password, prefix)

@@ -14,7 +14,7 @@ from lobewatch.machine.settings.toml_table import NotNegative, Positive, Positiv
 
 
 class SegmentTable(Table, frozen=True):
-    """One of segments."""
+    """A segment of the shaft, by its length and diameters."""
 
     length_mm: Positive
     outer_mm: Positive
@@ -52,7 +52,7 @@ class SegmentTable(Table, frozen=True):
 
 
 class BearingTable(Table, frozen=True):
-    """One of bearings."""
+    """A bearing, by its place and stiffness."""
 
     position_mm: NotNegative
     stiffness_n_per_um: PositiveOrInfinite | None = None
@@ -77,7 +77,7 @@ class BearingTable(Table, frozen=True):
 
 
 class MassTable(Table, frozen=True):
-    """One of masses: a pulley, a balance ring."""
+    """A lumped mass: a pulley, a balance ring."""
 
     position_mm: NotNegative
     mass_kg: NotNegative
@@ -91,7 +91,7 @@ class MassTable(Table, frozen=True):
 
 
 class JointTable(Table, frozen=True):
-    """One of joints: tool in holder, holder in spindle."""
+    """A joint: tool in holder, holder in spindle."""
 
     position_mm: Positive
     stiffness_n_per_um: Positive
@@ -190,7 +190,7 @@ def _metres(millimetres: float | None) -> float | None:
 
 
 def _in_mm(build: Callable[[], Spindle]) -> None:
-    """What is left to refuse, in the words of dsm, which are in SI units."""
+    """Refuse what is left to refuse, in the words of dsm, which are in SI units."""
     try:
         build()
     except ValueError as error:

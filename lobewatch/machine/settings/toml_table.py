@@ -1,4 +1,4 @@
-"""What all tables of machine.toml share."""
+"""A table of machine.toml, and the kinds of number in it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from acquisition import check_name
 Positive = Annotated[float, Meta(gt=0, le=1e12)]
 NotNegative = Annotated[float, Meta(ge=0, le=1e12)]
 PositiveOrInfinite = Annotated[float, Meta(gt=0)]
-"""Where infinity means "rigid" or "no limit"."""
+"""Number that may be infinite, for "rigid" or "no limit"."""
 
 
 class Table(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -27,6 +27,6 @@ def check_texts(table: Mapping[str, Any], place: str = "") -> None:
         elif isinstance(value, Mapping):
             check_texts(value, f"{place}{key}: ")
         elif isinstance(value, list):
-            for i, item in enumerate(value, 1):
-                if isinstance(item, Mapping):
-                    check_texts(item, f"{place}{key.removesuffix('s')} {i}: ")
+            for i, inner in enumerate(value, 1):
+                if isinstance(inner, Mapping):
+                    check_texts(inner, f"{place}{key.removesuffix('s')} {i}: ")

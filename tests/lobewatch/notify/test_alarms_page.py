@@ -14,8 +14,8 @@ import typer
 from lobewatch.cli import app
 from lobewatch.decay.light import Light
 from lobewatch.machine.settings.machine_file import parse_machine
-from lobewatch.notify.message import message_of
 from lobewatch.notify.prometheus import FAMILIES
+from lobewatch.notify.telling import message_of
 from lobewatch.plant.plant import MachineStanding
 from lobewatch.plant.summary import DatedStanding, Summary
 

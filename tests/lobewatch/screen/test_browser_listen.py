@@ -17,7 +17,7 @@ from lobewatch.cli import main
 from lobewatch.logbook import Logbook
 from lobewatch.machine import MachineFolder, make_machine_folder
 from lobewatch.machine.settings.cut_setting import cut_setting
-from lobewatch.tap.milling.emulated_cut import emulate_cut
+from lobewatch.tap.emulated_cut import emulate_cut
 
 Browser = Any
 """Chromium on one page: Browser of conftest.py."""

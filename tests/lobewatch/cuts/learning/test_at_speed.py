@@ -14,7 +14,7 @@ from lobewatch.cuts.learning.at_speed import LearntDoubt
 from lobewatch.logbook import Logbook
 from lobewatch.machine.additions.correct import exclude
 from lobewatch.machine.additions.keep_cut import keep_cut
-from lobewatch.machine.additions.observe_cut import observed
+from lobewatch.machine.additions.observe_cut import observe_cut
 from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.machine.settings.cut_setting import cut_setting
 from lobewatch.verdicts import Word
@@ -25,7 +25,7 @@ Shop = Any
 
 def hear(shop: Shop, speed: float, depth_mm: float, word: Any, frequency: float | None = None) -> HeardCut:
     setting = cut_setting(shop.folder.machine, "A", speed, depth_mm)
-    return keep_cut(shop.folder, observed(setting, word, frequency, at=shop.start + timedelta(days=1)))
+    return keep_cut(shop.folder, observe_cut(setting, word, frequency, at=shop.start + timedelta(days=1)))
 
 
 def judged(shop: Shop, name: str = "A") -> Any:

@@ -21,11 +21,11 @@ from lobewatch.logbook import Logbook
 from lobewatch.machine import MachineFolder
 from lobewatch.machine.additions.correct import exclude, include
 from lobewatch.machine.additions.keep_cut import keep_cut
-from lobewatch.machine.additions.observe_cut import observed
+from lobewatch.machine.additions.observe_cut import observe_cut
 from lobewatch.machine.archive.rebuild import rebuild_files
 from lobewatch.machine.archive.verify import verify
 from lobewatch.machine.journal.heard_cut import HeardCut
-from lobewatch.machine.settings.cut_setting import cut_setting, named
+from lobewatch.machine.settings.cut_setting import cut_setting, find_named
 from lobewatch.show.history.describe_cut import about_tool
 
 Shop = Any
@@ -40,7 +40,7 @@ def run(shop: Shop, command: str, *arguments: object) -> Result:
 
 def heard(shop: Shop, speed: float = 12000.0, depth: float = 2.0) -> HeardCut:
     setting = cut_setting(shop.folder.machine, "A", speed, depth)
-    return replace(observed(setting, "chatter", 1650.0), by="accelerometer", speed_rpm=speed * 1.004)
+    return replace(observe_cut(setting, "chatter", 1650.0), by="accelerometer", speed_rpm=speed * 1.004)
 
 
 def signal() -> CutSignal:
@@ -49,9 +49,9 @@ def signal() -> CutSignal:
 
 def test_a_program_is_found_by_how_its_name_begins() -> None:
     tables: dict[str, Any] = {"A": 1, "A: slot": 2, "B: rib": 3, "B: slot": 4}
-    assert [named(tables, name) for name in ("A", "A:", "B: r")] == [1, 2, 3]
+    assert [find_named(tables, name) for name in ("A", "A:", "B: r")] == [1, 2, 3]
     with pytest.raises(ValueError, match="'B' may be several: say more of its name; there are 'B: rib', 'B: slot'"):
-        named(tables, "B")
+        find_named(tables, "B")
 
 
 def test_what_was_heard_stands_in_both_copies_with_all_that_it_is_judged_by(shop: Shop) -> None:

@@ -239,7 +239,7 @@ def test_a_history_that_could_not_be_stored_is_not_said_to_be_made(
     def full(*_: object) -> int:
         raise OSError(errno.ENOSPC, "No space left on device", "m/history.rows")
 
-    monkeypatch.setattr("lobewatch.history.cache.history_cache.write_rows", full)
+    monkeypatch.setattr("lobewatch.history.history_cache.write_rows", full)
     said = CliRunner().invoke(app, ["rebuild", str(folder.path)], catch_exceptions=False)
     assert "worked out in memory: m/history.rows: No space left on device; make room on that disk\n" in said.output
     assert said.stdout.endswith("history.rows: not made anew (see above); the next command that can write makes it\n")

@@ -1,4 +1,4 @@
-"""The tap tests that the dashboard has started, one a machine at a time."""
+"""A tap test that the dashboard has started, one a machine at a time."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from acquisition import DataError, TapDirection
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.notify.telling import tell
-from lobewatch.tap.plan_session import plan_session
-from lobewatch.tap.session import TapStopped
+from lobewatch.tap.hit_loop import TapStopped
+from lobewatch.tap.session import plan_session
 from lobewatch.tap.state import TapState, TapStep
 
 
@@ -29,7 +29,7 @@ class LiveTest:
 
     @property
     def state(self) -> TapState:
-        """The newest picture of it, also after its end."""
+        """Newest state of the test, also after its end."""
         return self._end or self._session.state
 
     @property

@@ -1,0 +1,77 @@
+"""Routes that servers share: pages, the feed of what is watched, undo and stop."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from importlib import resources
+
+from aiohttp import web
+
+from lobewatch.screen.feed import Messages, State, feed
+from lobewatch.screen.guard import MAY_ALTER, OPEN
+from lobewatch.screen.messages import plots_message, state_message
+from lobewatch.show.terminal.printer import Watched
+
+TYPES = {"css": "text/css", "html": "text/html", "js": "text/javascript", "svg": "image/svg+xml"}
+"""Content types of the files of pages, by the ending of their names."""
+
+
+def add_pages(application: web.Application, pages: dict[str, str]) -> None:
+    """Serve pages (path: file in static/) and, at /static/, all that they load.
+
+    The files are held in memory: nothing of the disk can be asked for by name.
+    """
+    folder = resources.files("lobewatch.screen").joinpath("static")
+    files = {file.name: file.read_bytes() for file in folder.iterdir() if file.name.rpartition(".")[2] in TYPES}
+
+    async def static(request: web.Request) -> web.Response:
+        name = request.match_info["name"]
+        if name not in files:
+            raise web.HTTPNotFound(text="there is no such file")
+        return _answer(files, name)
+
+    application.router.add_get("/static/{name}", static, name=f"{OPEN}static")
+    for i, (path, name) in enumerate(pages.items()):
+
+        async def page(_: web.Request, name: str = name) -> web.Response:
+            return _answer(files, name)
+
+        application.router.add_get(path, page, name=f"{OPEN}page{i}")
+
+
+def add_feed(
+    application: web.Application, prefix: str, newest: Callable[[web.Request], State], messages: Messages[State]
+) -> None:
+    """Serve what is only watched. `newest` raises HTTPNotFound where there is nothing."""
+
+    async def follow(request: web.Request) -> web.StreamResponse:
+        newest(request)
+        return await feed(request, lambda: newest(request), messages)
+
+    async def access(request: web.Request) -> web.Response:
+        newest(request)
+        return web.json_response({"may_alter": request[MAY_ALTER]})
+
+    application.router.add_get(f"{prefix}feed", follow)
+    application.router.add_get(f"{prefix}access", access)
+
+
+def add_session(application: web.Application, prefix: str, find: Callable[[web.Request], Watched]) -> None:
+    """Serve the screen of a session: its feed, undo and stop. `find` raises HTTPNotFound where there is none."""
+
+    async def undo(request: web.Request) -> web.Response:
+        await asyncio.to_thread(find(request).undo)
+        return web.json_response({})
+
+    async def stop(request: web.Request) -> web.Response:
+        await asyncio.to_thread(find(request).stop)
+        return web.json_response({})
+
+    add_feed(application, prefix, lambda request: find(request).state, Messages(state_message, plots_message))
+    application.router.add_post(f"{prefix}undo", undo)
+    application.router.add_post(f"{prefix}stop", stop)
+
+
+def _answer(files: dict[str, bytes], name: str) -> web.Response:
+    return web.Response(body=files[name], content_type=TYPES[name.rpartition(".")[2]], charset="utf-8")

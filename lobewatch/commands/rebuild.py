@@ -34,7 +34,7 @@ def rebuild(
       lobewatch rebuild mill-3
       lobewatch rebuild mills --scheduler tcp://10.0.0.5:8786
     """
-    from lobewatch.measuring.workers.shared import Workers
+    from lobewatch.measuring.workers.share_work import Workers
     from lobewatch.notify.telling import tell
     from lobewatch.show.replays.show_rebuild import show_rebuild
 

@@ -8,22 +8,12 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.commands.file_options import (
-    Averages,
-    Columns,
-    ForceUnit,
-    FullScale,
-    Quantity,
-    Rate,
-    Response,
-    Sensitivity,
-    Unit,
-    described,
-)
+from lobewatch.commands.file_options import FileOptions, takes_file_options
 from lobewatch.machine.folder_path import named_folder
 from lobewatch.show.terminal.output import Json
 
 
+@takes_file_options()
 def replay(
     machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
     files: Annotated[
@@ -41,15 +31,8 @@ def replay(
     date_pattern: Annotated[
         str, typer.Option(help='How the date stands in the names of the files: "%Y%m%d"; with "/" in their paths.')
     ] = "",
-    columns: Columns = "",
-    quantity: Quantity = "",
-    unit: Unit = "",
-    force_unit: ForceUnit = "",
-    rate: Rate = None,
-    averages: Averages = None,
-    response: Response = None,
-    full_scale: FullScale = "",
-    sensitivity: Sensitivity = "",
+    *,
+    file_options: FileOptions,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Say what would become of each file; store nothing.")
     ] = False,
@@ -86,21 +69,12 @@ def replay(
     """
     from acquisition import Conditions
     from lobewatch.logbook import Logbook
-    from lobewatch.logbook.replaying.found_files import found_files
-    from lobewatch.measuring.workers.shared import Workers
+    from lobewatch.logbook.replaying.find_files import find_files
+    from lobewatch.measuring.workers.share_work import Workers
     from lobewatch.notify.telling import telling
     from lobewatch.show.replays.show_replay import show_preview, show_replay
 
-    said = described(
-        columns,
-        full_scale,
-        sensitivity,
-        quantity=quantity,
-        unit=unit,
-        force_unit=force_unit,
-        rate=rate,
-        averages=averages,
-        response=response,
+    description = file_options.description(
         date=date,
         date_pattern=date_pattern,
         tool=tool,
@@ -108,9 +82,18 @@ def replay(
         conditions=Conditions(temperature_c=temperature, note=note, reclamped=reclamped),
     )
     workers = Workers(jobs, scheduler)
-    logbook, (found, passed) = Logbook.open(machine), found_files(files)
+    logbook, (recordings, passed) = Logbook.open(machine), find_files(files)
     if dry_run:
-        show_preview(logbook, found, passed, said, workers=workers, as_json=as_json)
+        show_preview(logbook, recordings, passed, description, workers=workers, as_json=as_json)
         return
     with telling(logbook):
-        show_replay(logbook, found, passed, said, accept or (), workers=workers, keep_going=keep_going, as_json=as_json)
+        show_replay(
+            logbook,
+            recordings,
+            passed,
+            description,
+            accept or (),
+            workers=workers,
+            keep_going=keep_going,
+            as_json=as_json,
+        )

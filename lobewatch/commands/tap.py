@@ -50,18 +50,19 @@ def tap(
     from acquisition import Conditions
     from lobewatch.logbook import Logbook
     from lobewatch.machine import MachineFolder
-    from lobewatch.measuring.questions.accepting import not_asked
+    from lobewatch.measuring.questions import unasked_text
     from lobewatch.notify.telling import tell
     from lobewatch.show.history.measurements import measurement_json, measurement_texts
     from lobewatch.show.programs.verdicts import program_texts, programs_json
     from lobewatch.show.terminal.printer import TapPrinter
     from lobewatch.show.terminal.terminal_screen import TerminalScreen
-    from lobewatch.tap import TapStopped, plan_session
+    from lobewatch.tap.hit_loop import TapStopped
+    from lobewatch.tap.session import plan_session
 
     folder = MachineFolder(machine)
-    said = Conditions(temperature_c=temperature, note=note, reclamped=reclamped)
+    conditions = Conditions(temperature_c=temperature, note=note, reclamped=reclamped)
     named = {"port": port, "tool": tool, "direction": direction, "operator": operator}
-    session = plan_session(folder, **named, resume=not new, accept=accept or (), conditions=said)
+    session = plan_session(folder, **named, resume=not new, accept=accept or (), conditions=conditions)
     try:
         with contextlib.ExitStack() as screens:
             if screen:
@@ -75,11 +76,11 @@ def tap(
         notes.print(f"stopped with {session.state.good} good hits; the same command goes on with them")
         raise KeyboardInterrupt from stopped
     notes.print(f"saved {done.id}")
-    told = [remark.about for remark in session.measurement.remarks if remark.code == "accepted"]
-    notes.print(*(f"accepted: {code}" for code in told), sep="\n", end="\n" if told else "")
-    logbook, found = Logbook(folder), session.measurement
+    accepted = [remark.about for remark in session.measurement.remarks if remark.code == "accepted"]
+    notes.print(*(f"accepted: {code}" for code in accepted), sep="\n", end="\n" if accepted else "")
+    logbook, measurement = Logbook(folder), session.measurement
     if session.unasked:
-        notes.print(not_asked(session.unasked, [done.id], logbook.questions), markup=False)
-    payload = measurement_json(found, logbook) | {"programs": programs_json(logbook.verdicts())}
-    emit(payload, as_json, *measurement_texts(found, logbook), *program_texts(logbook))
+        notes.print(unasked_text(session.unasked, [done.id], logbook.questions), markup=False)
+    payload = measurement_json(measurement, logbook) | {"programs": programs_json(logbook.verdicts())}
+    emit(payload, as_json, *measurement_texts(measurement, logbook), *program_texts(logbook))
     tell(logbook)

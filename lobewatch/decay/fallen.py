@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from acquisition import Remark
 from lobewatch.decay.change_point import newest_change
 from lobewatch.decay.trend import TapValue, Trend, newest_percents, trend_of
-from lobewatch.history.series_columns import (SeriesColumns, series_columns)
 from lobewatch.history.history import WATCHED, Row
+from lobewatch.history.series_columns import SeriesColumns, series_columns
 from lobewatch.machine import Limits
 from lobewatch.measuring.estimate import UNKNOWN, Estimate
 

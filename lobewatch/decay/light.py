@@ -10,7 +10,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from acquisition import Remark
-from lobewatch.measuring.questions.clock import CLOCK_QUESTIONS, about_future
+from lobewatch.measuring.clock import CLOCK_QUESTIONS, about_future
 
 
 class Light(StrEnum):

@@ -30,7 +30,7 @@ from lobewatch.decay.trend import Trend
 from lobewatch.history.history import History, Row
 from lobewatch.machine import Machine
 from lobewatch.measuring.estimate import Estimate
-from lobewatch.measuring.questions.accepting import about_questions
+from lobewatch.measuring.questions import about_questions
 from lobewatch.verdicts.verdict import Word
 
 

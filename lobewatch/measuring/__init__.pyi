@@ -1,12 +1,12 @@
 """One tap test or one recorded file to what it measures: modes, followed mode, calibrated model; questions; workers."""
 
 from .estimate import Estimate
-from .file_modes import FileModes, modes_of_file, remarks_on_all
 from .measurement import Measurement, measure
 from .model_calibration import ModelCalibration, calibrate_model
 from .model_state import ModelState, first_critical_speed, model_frf, model_state
 from .model_summary import ModelMode, ModelSummary, model_summary
-from .one_file.recorded_window import Window
+from .one_file.file_modes import FileModes, modes_of_file, remarks_on_all
+from .one_file.windows import Window
 
 __all__ = [
     "Estimate",

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 
 class Estimate(NamedTuple):
-    """What was estimated, in any unit."""
+    """A value and its standard error, in any unit."""
 
     value: float
-    """NaN where it is not known."""
+    """Value; NaN where it is not known."""
     std: float = math.nan
     """Standard error, same unit; NaN where it is not known."""
 

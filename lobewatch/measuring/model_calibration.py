@@ -11,14 +11,14 @@ from lobewatch.machine import Machine
 
 @dataclass(frozen=True)
 class ModelCalibration:
-    """What makes a model fit."""
+    """Stiffness and dampers that make a model fit."""
 
     label: str
-    """Of the model, as machine.toml has it."""
+    """Label of the model in machine.toml."""
     stiffness: Calibration | StiffnessFit
-    """One factor for all bearings, or one for each group of bearings and joints."""
+    """Calibration with one factor for all bearings, or with one for each group of bearings and joints."""
     dampers: DampingCalibration | None
-    """The dampers of the bearings; None where no damping ratio was given."""
+    """Dampers of the bearings; None where no damping ratio was given."""
 
 
 def calibrate_model(

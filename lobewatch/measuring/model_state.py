@@ -21,7 +21,9 @@ from lobewatch.measuring.measurement import Measurement
 
 _Float = NDArray[np.float64]
 POINTS = 400
-"""Of each curve."""
+"""Points of each curve; chosen, finer than a screen shows."""
+BAND = (0.3, 3.0)
+"""Band of the model's FRF, in parts of its first natural frequency; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,17 +31,17 @@ class ModelState:
     """The model with a tool in it."""
 
     machine: Machine
-    """machine.toml."""
+    """Settings of machine.toml."""
     tool: str
-    """What is in the spindle."""
+    """Tool in the spindle."""
     spindle: Spindle
-    """The shaft with this tool and the newest bearings."""
+    """Shaft with this tool and the newest bearings."""
     reference: Spindle
-    """The same bearings with the tool that is tapped."""
+    """Shaft with the same bearings and the tool that is tapped."""
     measurement: Measurement | None
-    """That the bearings were found from; None: they are those of machine.toml."""
+    """Measurement that set the bearings; None: they are those of machine.toml."""
     origin: str
-    """Where the bearing stiffness comes from, in words."""
+    """Origin of the bearing stiffness, in words."""
 
     @property
     def title(self) -> str:
@@ -66,7 +68,7 @@ def model_state(machine: Machine, newest: Measurement | None, tool: str | None =
 
 def _with_bearings_of(calibrated: Spindle, shaft: Spindle) -> Spindle:
     pairs = zip(shaft.bearings, calibrated.bearings, strict=True)
-    return replace(shaft, bearings=[replace(bearing, stiffness=found.stiffness) for bearing, found in pairs])
+    return replace(shaft, bearings=[replace(bearing, stiffness=fitted.stiffness) for bearing, fitted in pairs])
 
 
 def first_critical_speed(spindle: Spindle) -> float | None:
@@ -78,13 +80,14 @@ def first_critical_speed(spindle: Spindle) -> float | None:
 
 
 def model_frf(state: ModelState) -> Frf:
-    """Around the first modes, where it is tapped; of another tool at its tip, by coupling to the calibrated spindle."""
+    """FRF around the first modes where the spindle is tapped; that of another tool at its tip, by coupling it to the
+    calibrated spindle."""
     machine = state.machine
     table = machine.spindle
     if table is None:
         raise DataError("no model: add a [spindle] table")
     first = float(natural_frequencies(state.spindle, 1)[0])
-    frequency = np.linspace(0.3 * first, 3.0 * first, 2 * POINTS)
+    frequency = np.linspace(BAND[0] * first, BAND[1] * first, 2 * POINTS)
     followed = state.measurement.followed if state.measurement else None
     loss_factor = 2 * (table.damping_ratio if followed is None else followed.damping_ratio)
     spindle, reference = state.spindle, state.reference
@@ -97,11 +100,11 @@ def model_frf(state: ModelState) -> Frf:
 
 
 def _undamped(spindle: Spindle) -> Spindle:
-    """Without dampers: a measured damping ratio holds what they do already."""
+    """Spindle without dampers: a measured damping ratio holds what they do already."""
     return replace(spindle, bearings=[replace(bearing, damping=0.0) for bearing in spindle.bearings])
 
 
 def tap_position(state: ModelState) -> float:
-    """From the tool tip (m); another tool than the one that is always tapped is looked at where it cuts."""
+    """Distance from the tool tip (m); another tool than the one that is always tapped is looked at where it cuts."""
     tap = state.machine.tap
     return tap.position_mm / 1e3 if state.tool == tap.tool else 0.0

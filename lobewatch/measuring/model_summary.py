@@ -1,4 +1,4 @@
-"""What a model says of its spindle."""
+"""A model in figures: its first modes, stiffness and critical speed."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class ModelMode:
     bearing_share: float
     """Share of its strain energy in bearings and housings (-)."""
     segment_share: float
-    """The same of the shaft (-)."""
+    """Share of its strain energy in the shaft (-)."""
     joint_share: float
-    """The same of the joints (-)."""
+    """Share of its strain energy in the joints (-)."""
 
 
 @dataclass(frozen=True)
@@ -31,15 +31,15 @@ class ModelSummary:
     """The model in figures."""
 
     state: ModelState
-    """The model with its tool."""
+    """Model with its tool."""
     modes: tuple[ModelMode, ...]
-    """The lowest first."""
+    """First modes, the lowest first."""
     static_stiffness: float
-    """At the tool tip (N/m)."""
+    """Static stiffness at the tool tip (N/m)."""
     critical_speed: float | None
-    """The lowest one (rpm); None where gyroscopic moments leave none."""
+    """Lowest critical speed (rpm); None where gyroscopic moments leave none."""
     rigid_frequency: float
-    """Of the first mode with rigid bearings (Hz): no bearing lifts it beyond."""
+    """Natural frequency of the first mode with rigid bearings (Hz): no bearing lifts it beyond."""
 
 
 def model_summary(state: ModelState, count: int) -> ModelSummary:

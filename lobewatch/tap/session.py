@@ -6,23 +6,35 @@ import time
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 
-from acquisition import Circumstances, DataError, Device, DeviceError, Remark, TapTest
+from acquisition import (
+    UNSAID,
+    Circumstances,
+    Conditions,
+    DataError,
+    Device,
+    DeviceError,
+    Remark,
+    TapTest,
+    joined,
+    tap_direction,
+)
 from acquisition.errors import NOT_ALLOWED, system_failure
+from dsm import plus_minus
+from lobewatch.decay import SeriesStanding
+from lobewatch.decay.light import LIGHTS
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.reserve import Reserve
 from lobewatch.measuring import Measurement
-from lobewatch.measuring.questions.asked import checked_codes
+from lobewatch.measuring.questions import check_codes, open_questions
 from lobewatch.tap.connection import Connector
 from lobewatch.tap.hit_loop import HitLoop, TapStopped, Wishes
 from lobewatch.tap.in_progress import begin_tap
 from lobewatch.tap.judged_hits import JudgedHits
-from lobewatch.tap.outcome import outcome_of
 from lobewatch.tap.phases import Phases
+from lobewatch.tap.plug import Plug
 from lobewatch.tap.publisher import Publisher
-from lobewatch.tap.state import TapState, TapStep
-
-__all__ = ["TapSession", "TapStopped"]
+from lobewatch.tap.state import Outcome, TapState, TapStep
 
 
 class TapSession:
@@ -43,7 +55,7 @@ class TapSession:
         """Nothing is opened yet. guided False leaves out what only a person needs: self-check, re-arming by decay,
         curves, the time to take back the last hit, and the outcome. accept: questions about the recording that are
         answered already, by code; ValueError for one that there is not."""
-        self._accept = checked_codes(accept)
+        self._accept = check_codes(accept)
         self._folder, self._about, self._resume, self._guided = folder, circumstances, resume, guided
         about = f"{circumstances.machine}, tool {circumstances.tool}, direction {circumstances.direction}"
         first = TapState(0, TapStep.CHECKING, about, wanted=folder.machine.tap.hits)
@@ -92,24 +104,24 @@ class TapSession:
         except TapStopped:
             raise
         except Exception as error:
-            told = _told(error)
-            self._publisher.show(word=TapStep.FAILED, reason=str(told))
-            if told is error:
+            failure = _failure(error)
+            self._publisher.show(word=TapStep.FAILED, reason=str(failure))
+            if failure is error:
                 raise
-            raise told from error
+            raise failure from error
 
     def _begin(self) -> JudgedHits:
-        """What is there of an interrupted test, or nothing yet."""
+        """Hits of an interrupted test, or none yet."""
         hits = JudgedHits(begin_tap(self._folder, self._about, self._resume), self._folder.machine)
-        told = []
+        texts = []
         if hits.tap.hits:
             begun = f"{hits.tap.circumstances.created:%Y-%m-%d %H:%M} UTC"
-            told.append(f"going on with the test begun {begun}: {hits.progress} are there")
+            texts.append(f"going on with the test begun {begun}: {hits.progress} are there")
         if hits.tap.damaged:
-            told.append(f"damaged and set aside: {', '.join(str(path) for path in hits.tap.damaged)}")
-        told += hits.tap.left
-        if told:
-            self._publisher.show_hits(hits, resumed="; ".join(told))
+            texts.append(f"damaged and set aside: {', '.join(str(path) for path in hits.tap.damaged)}")
+        texts += hits.tap.left
+        if texts:
+            self._publisher.show_hits(hits, resumed="; ".join(texts))
         return hits
 
     def _finish(self, hits: JudgedHits) -> TapTest:
@@ -136,8 +148,8 @@ def _why(error: Exception, remarks: Sequence[Remark]) -> str:
     return "; ".join(map(str, remarks)) or str(error)
 
 
-def _told(error: Exception) -> Exception:
-    """What the operator can act on: an error that says so itself, else a failure of the system (a full disk) or of
+def _failure(error: Exception) -> Exception:
+    """Error that the operator can act on: one that says so itself, else a failure of the system (a full disk) or of
     the program in a sentence."""
     if isinstance(error, DeviceError | ValueError):
         return error
@@ -146,3 +158,64 @@ def _told(error: Exception) -> Exception:
         cure = "you may not write there" if error.errno in NOT_ALLOWED else kept
         return DataError(f"{system_failure(error)}; {cure}")
     return RuntimeError(f"lobewatch itself has failed ({type(error).__name__}: {error}); {kept}")
+
+
+def outcome_of(logbook: Logbook, measurement: Measurement) -> Outcome:
+    """The standing of the machine after a test, what was measured, and the next step, for the one who tapped."""
+    standing = logbook.standing(measurement.time)
+    series = standing.series_of(measurement.tool, measurement.direction)
+    questions = open_questions(measurement.remarks)
+    remarks = [*(remark for remark in measurement.remarks if remark not in questions), *joined(standing.remarks)]
+    remarks += [remark for remark in logbook.remarks if remark.code not in LIGHTS]
+    texts = [*_values(measurement, series), *(f"{remark.finding}." for remark in remarks)]
+    return Outcome(standing.light, texts, standing.next_step)
+
+
+def _values(measurement: Measurement, series: SeriesStanding | None) -> list[str]:
+    mode = measurement.followed
+    if mode is None:
+        return []
+    f_std, zeta_std, k_std = mode.standard_error.tolist()
+    against = "the first test of this tool and direction"
+    if open_questions(measurement.remarks):
+        against = "in question"
+    elif series is not None and not series.is_first:
+        sign = "+" if series.fall.value < 0 else ""
+        against = f"{sign}{plus_minus(-series.fall.value, series.fall.std)} % against the first test"
+    damping = plus_minus(mode.damping_ratio, zeta_std, 0.01)
+    return [
+        f"f_n {plus_minus(mode.frequency, f_std)} Hz, {against}.",
+        f"K {plus_minus(mode.stiffness, k_std, 1e6)} N/um, zeta {damping} %.",
+    ]
+
+
+def plan_session(
+    folder: MachineFolder,
+    *,
+    port: str = "",
+    tool: str = "",
+    direction: str = "x",
+    operator: str = "",
+    resume: bool = True,
+    accept: Sequence[str] = (),
+    conditions: Conditions = UNSAID,
+) -> TapSession:
+    """A session of today; what is left empty is taken from machine.toml. ValueError where that names no port either.
+
+    conditions: those of today; what they leave open, machine.toml says too.
+    """
+    machine = folder.machine
+    port = port or machine.daq.port
+    if not port:
+        raise ValueError(f"no port: give --port, or port in [daq] of {folder.toml}")
+    tool = tool or machine.tap.tool
+    about = Circumstances(
+        machine.machine.name,
+        datetime.now(UTC),
+        tool,
+        tap_direction(direction),
+        operator,
+        folder.toml.read_text("utf-8"),
+        conditions=conditions.over(machine.tap.conditions(tool)),
+    )
+    return TapSession(folder, Plug(machine.daq, port).open, about, resume=resume, accept=accept)

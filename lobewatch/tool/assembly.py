@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +14,9 @@ from dsm import Calibration
 from lobes import Cut, StabilityLobes, lowest_of, zero_order
 from lobewatch.machine import Machine
 from lobewatch.measuring.measurement import Measurement
-from lobewatch.measuring.questions.asked import in_question, open_questions
+from lobewatch.measuring.questions import in_question, open_questions
 from lobewatch.tool.series import FollowedMode, Scatter, frequency_at, scatter_of
 from modal import Mode
-
-if TYPE_CHECKING:
-    from lobewatch.verdicts.doubt import Doubt
 
 Modes = Sequence[Mode] | None
 """Of one direction at the tool tip; None where neither direction is known."""
@@ -56,11 +52,6 @@ class Assembly:
     """What is not known, and what is in doubt."""
     series: Mapping[str, Sequence[FollowedMode]] = field(default_factory=dict)
     """Tap tests of the same tool up to then, by direction; empty where it is predicted."""
-
-    cuts: int = 0
-    """Test cuts that its modes at speed were learnt from; 0 where it stands for the spindle at rest."""
-    doubt: Doubt | None = None
-    """What these have left open; None at rest."""
     questions: tuple[Remark, ...] = ()
     """What nobody has answered of these tap tests; until then nothing is sure."""
 

@@ -1,1 +1,1 @@
-"""What `lobewatch modes` makes of one file before and after the fit: which hits count, which windows lie over them."""
+"""The modes of one recorded file: which hits count, which windows lie over them, the fit."""

@@ -11,11 +11,13 @@ from typing import Any
 from acquisition import DataError
 
 ANSWER = 10.0
-"""A scheduler answers within this time (s)."""
+"""Time within which a scheduler answers (s); chosen."""
 PATIENCE = 60.0
-"""Time that a cluster may be without any worker (s)."""
+"""Time that a cluster may be without any worker (s); chosen."""
 LOOK_EVERY = 2.0
-"""Time between two looks whether there are workers (s)."""
+"""Time between two looks whether workers are still there (s); chosen."""
+COMING_EVERY = 0.2
+"""Time between two looks whether the first worker has come (s); chosen."""
 
 
 @contextmanager
@@ -57,7 +59,7 @@ def _wait_for_workers(client: Any, address: str) -> None:
             raise CancelledError
         if time.monotonic() - begin > PATIENCE:
             raise DataError(f"--scheduler {address}: it has no workers; start some with: dask worker {address}")
-        time.sleep(LOOK_EVERY / 10)
+        time.sleep(COMING_EVERY)
 
 
 def _result(client: Any, address: str, future: Future[Any]) -> Any:

@@ -1,4 +1,4 @@
-"""What results depend on beside their data."""
+"""The software that results depend on beside their data."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from typing import NamedTuple
 
 
 class Software(NamedTuple):
-    """Versions."""
+    """Versions of this program and of what computes for it."""
 
     lobewatch: str
     numpy: str
     scipy: str
     processor: str
-    """Its architecture."""
+    """Architecture of the processor."""
 
     @property
     def text(self) -> str:
-        """For people."""
+        """Versions for people."""
         return f"lobewatch {self.lobewatch}, numpy {self.numpy}, scipy {self.scipy} on {self.processor}"
 
 
 SOFTWARE = Software(version("lobewatch"), version("numpy"), version("scipy"), platform.machine())
-"""Of this process."""
+"""Software of this process."""

@@ -10,7 +10,7 @@ from acquisition import Conditions, Remark
 from lobewatch.logbook import Logbook
 from lobewatch.machine import REFERENCE_CUT
 from lobewatch.measuring import Measurement, remarks_on_all
-from lobewatch.measuring.questions.asked import QUESTIONS
+from lobewatch.measuring.questions import QUESTIONS
 from lobewatch.show.history.under import conditions_texts
 from lobewatch.show.programs.describe_lobes import lobes_json
 from lobewatch.show.spindle.describe_model import calibration_json
@@ -52,8 +52,8 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
     if lobes is not None:
         low = lobes.minimum
         texts.append(f"{REFERENCE_CUT}: lowest limit {low.depth * 1e3:.2f} mm at {low.speed_rpm:.0f} rpm")
-    asked = [one for one in logbook.standing().remarks if one.about == f"tap test {m.tap_id}"]
-    return [*texts, *remark_lines([one for one in assembly.remarks if one.code not in QUESTIONS]), *map(_asked, asked)]
+    asked = [remark for remark in logbook.standing().remarks if remark.about == f"tap test {m.tap_id}"]
+    return [*texts, *remark_lines([remark for remark in assembly.remarks if remark.code not in QUESTIONS]), *map(_asked, asked)]
 
 
 def _conditions(m: Measurement, logbook: Logbook) -> Conditions:

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from acquisition import Fact
 from lobewatch.logbook.preview import Preview
-from lobewatch.measuring.questions.asked import open_questions
+from lobewatch.measuring.questions import open_questions
 from lobewatch.show.spindle.describe_modes import in_order, mode_json
 from lobewatch.show.terminal.output import table
 

@@ -11,7 +11,7 @@ from lobewatch.logbook import Logbook
 from lobewatch.logbook.rebuild_history import rebuild_history
 from lobewatch.machine.archive.rebuild import rebuild_files
 from lobewatch.machine.contents import tap_files
-from lobewatch.measuring.workers.shared import Workers
+from lobewatch.measuring.workers.share_work import Workers
 from lobewatch.show.terminal.output import emit, notes
 from lobewatch.show.terminal.remarks import remark_json, remark_lines
 

@@ -9,9 +9,8 @@ from acquisition import DataError, Description
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.preview import preview_recordings
 from lobewatch.logbook.replaying.store import refusal
-from lobewatch.measuring.questions.accepting import not_asked
-from lobewatch.measuring.questions.asked import checked_codes
-from lobewatch.measuring.workers.shared import Workers
+from lobewatch.measuring.questions import check_codes, unasked_text
+from lobewatch.measuring.workers.share_work import Workers
 from lobewatch.show.replays.describe_preview import preview_json, preview_summary, preview_texts
 from lobewatch.show.replays.describe_replay import replay_json, replay_texts
 from lobewatch.show.terminal.output import emit, notes
@@ -49,7 +48,7 @@ def show_replay(
     as_json: bool,
 ) -> None:
     """Store files, accept what is asked of them, tell what they say; DataError for those that cannot be used."""
-    codes = checked_codes(accept)
+    codes = check_codes(accept)
     with ProgressBar() as progress:
         stored = logbook.replay_all(files, said, workers=workers, keep_going=keep_going, progress=progress)
     unasked = logbook.accept(stored.tap_ids, codes)
@@ -66,7 +65,7 @@ def show_replay(
     if stored.refused:
         raise DataError(refusal(stored.refused, len(files), stored=True))
     if unasked:
-        raise ValueError(not_asked(unasked, stored.tap_ids, logbook.questions))
+        raise ValueError(unasked_text(unasked, stored.tap_ids, logbook.questions))
 
 
 def _tell_known(known: Mapping[Path, str], n: int) -> None:

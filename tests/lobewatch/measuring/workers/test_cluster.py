@@ -15,7 +15,7 @@ from acquisition import DataError, Description
 from lobewatch import Logbook
 from lobewatch.cli import app
 from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.measuring.workers.shared import Workers, shared
+from lobewatch.measuring.workers.share_work import Workers, share_work
 from lobewatch.measuring.workers.software import SOFTWARE
 from tests.lobewatch.logbook.replaying.test_replaying import text_files, values
 
@@ -93,18 +93,18 @@ def test_what_a_cluster_cannot_do_is_one_sentence(cluster: LocalCluster, monkeyp
         Workers(2, "tcp://x")
     monkeypatch.setattr("lobewatch.measuring.workers.cluster.ANSWER", 0.3)
     with pytest.raises(DataError, match=r"--scheduler tcp://127\.0\.0\.1:9: no Dask scheduler answers there"):
-        [*shared(abs, [1], Workers(scheduler="tcp://127.0.0.1:9"))]
+        [*share_work(abs, [1], Workers(scheduler="tcp://127.0.0.1:9"))]
     monkeypatch.setattr("lobewatch.measuring.workers.cluster.ANSWER", 10.0)
     workers = Workers(scheduler=cluster.scheduler_address)
-    assert [*shared(abs, [-1, -2], workers)] == [1, 2]
+    assert [*share_work(abs, [-1, -2], workers)] == [1, 2]
     other = SOFTWARE._replace(numpy="1.0")
-    monkeypatch.setattr("lobewatch.measuring.workers.shared.SOFTWARE", other)
+    monkeypatch.setattr("lobewatch.measuring.workers.share_work.SOFTWARE", other)
     with pytest.raises(
         DataError, match=r"a worker has lobewatch .*, here is lobewatch .*, numpy 1\.0, .* the same on all"
     ):
-        [*shared(abs, [-1], workers)]
+        [*share_work(abs, [-1], workers)]
 
 
 def test_a_process_that_is_ended_from_outside_is_one_sentence() -> None:
     with pytest.raises(DataError, match="one of the 2 processes was ended from outside; nothing is stored; try again"):
-        [*shared(os._exit, [1, 1], Workers(2))]
+        [*share_work(os._exit, [1, 1], Workers(2))]

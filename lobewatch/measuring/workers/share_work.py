@@ -1,4 +1,4 @@
-"""One function called for many things, whoever calls it; the results come in the order of the things."""
+"""One function called for many tasks, whoever calls it; the results come in the order of the tasks."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from acquisition import DataError
 from lobewatch.measuring.workers.cluster import cluster
 from lobewatch.measuring.workers.software import SOFTWARE, Software
 
-Asked = TypeVar("Asked")
-Found = TypeVar("Found")
+Task = TypeVar("Task")
+Result = TypeVar("Result")
 AHEAD = 3
-"""Things that each worker has been given at most: what is asked and found of others is in no memory."""
+"""Tasks that each worker has been given at most: those behind them and their results are in no memory; chosen."""
 
 
 @dataclass(frozen=True)
 class Workers:
-    """Who shares the work."""
+    """The processes that share the work."""
 
     jobs: int = 1
     """Processes of this computer; 1: this one."""
@@ -32,7 +32,7 @@ class Workers:
     """Address of a Dask scheduler, whose workers do it; empty for none."""
 
     def __post_init__(self) -> None:
-        """Refuse both."""
+        """Refuse both at once."""
         if self.jobs > 1 and self.scheduler:
             raise ValueError(f"--jobs {self.jobs} and --scheduler {self.scheduler}: give one of them")
 
@@ -43,33 +43,33 @@ class Workers:
 
 
 class Team(NamedTuple):
-    """Those who do it."""
+    """The workers as they are reached."""
 
     executor: Executor
-    """That they are asked by."""
+    """Executor that gives them their tasks."""
     n: int
-    """How many they are."""
+    """Number of workers."""
     result: Callable[[Future[Any]], Any]
-    """Waits for one."""
+    """Function that waits for a result."""
 
 
-def shared(work: Callable[[Asked], Found], asked: Iterable[Asked], workers: Workers) -> Iterator[Found]:
-    """What `work`, a function of a module that depends on its argument alone, gives for each thing asked, in order.
+def share_work(work: Callable[[Task], Result], tasks: Iterable[Task], workers: Workers) -> Iterator[Result]:
+    """What `work`, a function of a module that depends on its argument alone, gives for each task, in order.
 
     DataError where a process is ended from outside, the cluster does not answer or has no workers, or runs another
     version. A worker of a cluster that dies is made up for by the others.
     """
     if not workers.are_elsewhere:
-        yield from map(work, asked)
+        yield from map(work, tasks)
         return
-    waiting = deque[Future[tuple[Software, Found]]]()
+    waiting = deque[Future[tuple[Software, Result]]]()
     with _team(workers) as team:
-        for one in asked:
-            waiting.append(team.executor.submit(_told, work, one))
+        for task in tasks:
+            waiting.append(team.executor.submit(_work_alone, work, task))
             if len(waiting) >= AHEAD * team.n:
-                yield _checked(team, waiting.popleft())
+                yield _take(team, waiting.popleft())
         while waiting:
-            yield _checked(team, waiting.popleft())
+            yield _take(team, waiting.popleft())
 
 
 @contextmanager
@@ -82,22 +82,23 @@ def _team(workers: Workers) -> Iterator[Team]:
         with ProcessPoolExecutor(workers.jobs, get_context("spawn")) as pool:
             yield Team(pool, workers.jobs, lambda future: future.result())
     except BrokenProcessPool as error:
-        told = f"one of the {workers.jobs} processes was ended from outside; nothing is stored"
-        raise DataError(f"{told}; try again with fewer --jobs") from error
+        text = f"one of the {workers.jobs} processes was ended from outside; nothing is stored"
+        raise DataError(f"{text}; try again with fewer --jobs") from error
 
 
 _alone = threading.Lock()
 
 
-def _told(work: Callable[[Asked], Found], one: Asked) -> tuple[Software, Found]:
-    """One thing at a time in a process: the threads of a worker would share the settings of its libraries."""
+def _work_alone(work: Callable[[Task], Result], task: Task) -> tuple[Software, Result]:
+    """One task at a time in a process: the threads of a worker would share the settings of its libraries."""
     with _alone:
-        return SOFTWARE, work(one)
+        return SOFTWARE, work(task)
 
 
-def _checked(team: Team, future: Future[tuple[Software, Found]]) -> Found:
-    told: tuple[Software, Found] = team.result(future)
-    software, found = told
+def _take(team: Team, future: Future[tuple[Software, Result]]) -> Result:
+    """A result, from a worker with our software; DataError from any other."""
+    answer: tuple[Software, Result] = team.result(future)
+    software, result = answer
     if software != SOFTWARE:
         raise DataError(f"a worker has {software.text}, here is {SOFTWARE.text}; install the same on all")
-    return found
+    return result

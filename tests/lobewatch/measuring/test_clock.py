@@ -14,7 +14,7 @@ from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id
 from lobewatch.cli import app
 from lobewatch.logbook import Logbook
 from lobewatch.machine.additions.correct import exclude
-from lobewatch.measuring.questions.clock import clock_questions
+from lobewatch.measuring.questions import clock_questions
 from modal import Mode, synthesize
 
 Shop = Any

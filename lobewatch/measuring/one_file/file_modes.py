@@ -10,9 +10,8 @@ import numpy as np
 
 from acquisition import Description, Fact, Frf, Remark, windowed_receptance
 from dsm import plus_minus
-from lobewatch.measuring.one_file.own_window import ringing_modes_windowed, without_own_window
-from lobewatch.measuring.one_file.recorded import recorded
-from lobewatch.measuring.one_file.recorded_window import Window, window_over
+from lobewatch.measuring.one_file.file_frf import read_file_frf
+from lobewatch.measuring.one_file.windows import Window, refit_ringing_modes, remove_own_window, window_to_correct
 from modal import (
     Extraction,
     Mode,
@@ -35,21 +34,21 @@ class FileModes:
     """The modes of one recorded file."""
 
     path: Path
-    """Where it was read from."""
+    """Path that it was read from."""
     frf: Frf
-    """The average of its hits."""
+    """Average of its hits, or the FRF that it holds."""
     extraction: Extraction
-    """How the modes were found."""
+    """Bands and models that the modes were extracted with."""
     as_recorded: tuple[Mode, ...]
-    """By least squares, the damping of an exponential window still in them."""
+    """Modes by least squares, the damping of an exponential window still in them."""
     fitted: tuple[Mode, ...]
-    """The same without it."""
+    """Modes by least squares, without the damping of the window."""
     picked: tuple[Mode, ...]
-    """By the peak picking of the paper, for comparison."""
+    """Modes by the peak picking of the paper, for comparison."""
     remarks: tuple[Remark, ...]
-    """On all modes together, and on those that are missing."""
+    """Remarks on all modes together, and on those that are missing."""
     facts: tuple[Fact, ...] = ()
-    """What is known of the file, and from where."""
+    """Facts known of the file, and where each is from."""
 
 
 def modes_of_file(
@@ -59,56 +58,57 @@ def modes_of_file(
     window: Window | None = None,
     conjugate: bool = False,
     accept: Collection[str] = (),
-    said: Description | None = None,
+    description: Description | None = None,
 ) -> FileModes:
     """Modes between two frequencies (Hz), with standard errors over the hits where the file holds three or more.
 
     window: exponential window on the response, to be corrected; else that which the file names. conjugate: the file
     holds the complex conjugate of response over force. accept: verdicts on hits ("not-decayed") that do not count.
-    said: what the file does not say; the hits that an FRF was averaged from are inferred where nobody says. What
+    description: what the file does not say; the hits that an FRF was averaged from are inferred where nobody says. What
     still rings when the record ends gets an exponential window, which is corrected: all hits where none is good
     otherwise, else the modes that do.
 
     Raises ValueError for a window whose hit is not known or comes before it, averages that no coherence belongs to, and
     verdicts that cannot be accepted.
     """
-    made = recorded(path, accept, said or Description())
-    frf = replace(made.frf, receptance=made.frf.receptance.conj()) if conjugate else made.frf
-    hits = () if conjugate else made.hits
-    window = window_over(made.named_window, window)
-    delay = None if window is None else window.delay(made.hits)
+    file_frf = read_file_frf(path, accept, description or Description())
+    frf = file_frf.frf
+    frf = replace(frf, receptance=frf.receptance.conj()) if conjugate else frf
+    hits = () if conjugate else file_frf.hits
+    window = window_to_correct(file_frf.named_window, window)
+    delay = None if window is None else window.delay(file_frf.hits)
     frf = frf if window is None else windowed_receptance(frf, window.time_constant)
-    state = extract([frf], band)
-    found = fitted = tuple(modes_of(state, [hits]))
-    own: tuple[Remark, ...] = ()
+    extraction = extract([frf], band)
+    modes = fitted = tuple(modes_of(extraction, [hits]))
+    windowed: tuple[Remark, ...] = ()
     if window is not None and delay is not None:
         record = 1 / float(np.mean(np.diff(frf.frequency)))
-        wider = (with_windowed_noise(mode, window.time_constant, record) for mode in found)
+        wider = (with_windowed_noise(mode, window.time_constant, record) for mode in modes)
         fitted = tuple(remove_window(mode, window.time_constant, delay) for mode in wider)
-    elif made.time_constant is not None:
-        fitted = tuple(without_own_window(found, made.time_constant))
+    elif file_frf.time_constant is not None:
+        fitted = tuple(remove_own_window(modes, file_frf.time_constant))
     elif not accept:
-        fitted, own = ringing_modes_windowed(found, hits, band)
+        fitted, windowed = refit_ringing_modes(modes, hits, band)
     return FileModes(
         path=path,
         frf=frf,
-        extraction=state,
-        as_recorded=found,
+        extraction=extraction,
+        as_recorded=modes,
         fitted=fitted,
         picked=tuple(pick_peaks(frf, band)),
-        remarks=(*made.remarks, *own, *_remarks(found, frf, band)),
-        facts=made.facts,
+        remarks=(*file_frf.remarks, *windowed, *_remarks(modes, frf, band)),
+        facts=file_frf.facts,
     )
 
 
-def _remarks(found: Sequence[Mode], frf: Frf, band: tuple[float, float] | None) -> Iterator[Remark]:
-    yield from remarks_on_all(found)
-    for edge in cut_edges(frf, found, band):
+def _remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | None) -> Iterator[Remark]:
+    yield from remarks_on_all(modes)
+    for edge in cut_edges(frf, modes, band):
         text = "a peak may be cut by the edge of the lines, its mode missing"
         yield Remark("mode-missing-at-edge", f"{edge:.0f} Hz", text, "widen the band (a harder tip reaches higher)")
     if band is None:
         yield from _beyond(frf)
-    if not found:
+    if not modes:
         yield Remark("no-mode", "", "no mode found", "look whether the band is right and the hit was hard enough")
 
 

@@ -1,0 +1,109 @@
+"""The FRF of a recorded file, and the hits behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from acquisition import (
+    DataError,
+    Description,
+    Fact,
+    Frf,
+    Hit,
+    HitFlags,
+    Remark,
+    check_hit,
+    estimate_frf,
+    infer_averages,
+    look,
+    read_frf,
+)
+from lobewatch.measuring.one_file.windows import about_own_window, window_ringing_hits
+
+ACCEPTABLE = (
+    HitFlags.NOT_DECAYED | HitFlags.TOO_SOFT | HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
+)
+"""Verdicts that can be accepted: a hit with others has no single pulse, or not all of its scans."""
+
+
+@dataclass(frozen=True, eq=False)
+class FileFrf:
+    """An FRF with the hits behind it."""
+
+    frf: Frf
+    """FRF as it was read, or the average of the hits."""
+    hits: tuple[Hit, ...] = ()
+    """Hits that it was averaged from; none where the file holds only an FRF."""
+    time_constant: float | None = None
+    """Time constant of the window that was laid over all hits here (s); None where none was."""
+    remarks: tuple[Remark, ...] = ()
+    """Remarks on what was done to the hits."""
+    facts: tuple[Fact, ...] = ()
+    """Facts known of the file, and where each is from."""
+    named_window: float | None = None
+    """Time constant (s) of the window over the response that the file names; NaN where it does not say how it falls."""
+
+
+def read_file_frf(path: Path, accept: Collection[str], description: Description) -> FileFrf:
+    """The FRF of a file with its hits, and how many it was averaged from where nobody says: see `modes_of_file`."""
+    accepted, averages, description = _accepted(accept), description.averages, replace(description, averages=None)
+    recording = look(path, description).checked()
+    if recording.frf is not None:
+        facts = tuple(fact for fact in recording.facts if fact.name != "averages")
+        return replace(_with_averages(path, recording.frf, averages), facts=facts, named_window=recording.window)
+    if averages is not None:
+        raise ValueError(f"--averages {averages}: {path.name} holds hits, and they are counted; leave it out")
+    frf = _average(path, recording.hits, accepted, description)
+    return replace(frf, facts=recording.facts, named_window=recording.window)
+
+
+def _average(path: Path, hits: Sequence[Hit], accepted: HitFlags, description: Description) -> FileFrf:
+    verdicts = [check_hit(hit) for hit in hits]
+    good = [hit for hit, verdict in zip(hits, verdicts, strict=True) if not verdict & ~accepted]
+    refused = sum(bool(verdict) and not verdict & ~accepted for verdict in verdicts)
+    if refused:
+        text = f"{refused} of {len(hits)} hits are averaged though they were refused"
+        return FileFrf(estimate_frf(good), tuple(good), remarks=(Remark("hits-accepted", "", text),))
+    try:
+        return FileFrf(read_frf(path, description), tuple(good))
+    except DataError:
+        ringing = [hit for hit, verdict in zip(hits, verdicts, strict=True) if verdict == HitFlags.NOT_DECAYED]
+        if not ringing:
+            raise
+        return _average_ringing(ringing)
+
+
+def _accepted(codes: Collection[str]) -> HitFlags:
+    flags = {flag.words.replace(" ", "-"): flag for flag in ACCEPTABLE}
+    accepted = HitFlags.OK
+    for code in codes:
+        if code not in flags:
+            raise ValueError(f"--accept {code}: no verdict on hits that can be accepted; give {', '.join(flags)}")
+        accepted |= flags[code]
+    return accepted
+
+
+def _average_ringing(hits: list[Hit]) -> FileFrf:
+    frf, windowed, tau = window_ringing_hits(hits)
+    remark = about_own_window("", tau, "a longer record needs none; --accept not-decayed takes the hits as they are")
+    return FileFrf(frf, windowed, tau, (remark,))
+
+
+def _with_averages(path: Path, frf: Frf, averages: int | None) -> FileFrf:
+    """An FRF of a file with the number of hits behind its coherence: as asked, else as the file says, else inferred."""
+    if averages is not None:
+        if averages < 1:
+            raise ValueError(f"--averages {averages}: give the number of hits averaged, 1 or more")
+        if frf.coherence is None:
+            raise ValueError(f"--averages {averages}: {path.name} has no coherence to use it with; leave it out")
+        return FileFrf(replace(frf, n_averages=averages))
+    if frf.coherence is None or frf.n_averages > 1:
+        return FileFrf(frf)
+    inferred, cure = infer_averages(frf), "give it with --averages"
+    if inferred is None:
+        text = "the coherence is not used: the number of averages is not known and cannot be inferred"
+        return FileFrf(frf, remarks=(Remark("averages-unknown", "", text, cure),))
+    text = f"about {inferred} averages, inferred from the coherence and the scatter from line to line"
+    return FileFrf(replace(frf, n_averages=inferred), remarks=(Remark("averages-inferred", "", text, cure),))

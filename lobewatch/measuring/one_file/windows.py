@@ -1,0 +1,138 @@
+"""Exponential windows: that which a response was recorded with, and one of our own over hits that ring on when their
+record ends; modes without them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from acquisition import (
+    Frf,
+    Hit,
+    Remark,
+    estimate_frf,
+    exponential_window,
+    time_after_hit,
+    time_of_hit,
+    windowed_receptance,
+)
+from modal import Mode, fit_modes, remove_window, with_windowed_noise
+
+SAME = 0.02
+"""Relative difference of two time constants that are taken for one; chosen."""
+LEFT = 0.005
+"""Share of the ringing that our window lets through at the end of the record; chosen."""
+MOST_LEFT = 0.005
+"""Share of the decay of a mode at the end of the record from which it is taken from the windowed hits; chosen."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """exp(-(t - start)/time_constant) from its start on; ValueError for a time constant that is not > 0."""
+
+    time_constant: float
+    """Time constant of its fall (s); NaN: as the file names it."""
+    start: float = 0.0
+    """Time of its beginning (s from the record's start)."""
+    hit_at: float | None = None
+    """Time of the hit (s from the record's start); None to see it in the hits."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no window."""
+        if not np.isnan(self.time_constant) and not (np.isfinite(self.time_constant) and self.time_constant > 0):
+            raise ValueError(f"--window: time_constant={self.time_constant} s is not a finite number > 0")
+
+    def delay(self, hits: Sequence[Hit]) -> float:
+        """Time from its start to the hit (s); ValueError where the hit is not known or comes before it."""
+        if self.hit_at is None and not hits:
+            raise ValueError(
+                f"--window {self.time_constant:g}: an FRF does not say when the hit came, and K is too high by "
+                "exp((hit - start)/window); add --hit-at with the seconds from the record's start (the pre-trigger), "
+                "0 where the window begins at the hit"
+            )
+        hit_at = float(np.mean([time_of_hit(hit) for hit in hits])) if self.hit_at is None else self.hit_at
+        if not hit_at >= self.start:
+            raise ValueError(
+                f"--window-start {self.start:g}: the window begins after the hit at {hit_at:.4g} s; "
+                "both count from the record's start"
+            )
+        return hit_at - self.start
+
+
+def window_to_correct(named: float | None, given: Window | None) -> Window | None:
+    """The window to be corrected; named: time constant (s) in the file, NaN where it does not say how its window falls.
+
+    ValueError where neither says it, or both do and differ.
+    """
+    if named is None and given is not None and np.isnan(given.time_constant):
+        raise ValueError("--hit-at, --window-start: the file names no window; add --window with its time constant (s)")
+    if named is None:
+        return given
+    window = Window(named) if given is None else given
+    if np.isnan(window.time_constant):
+        window = replace(window, time_constant=named)
+    if np.isnan(window.time_constant):
+        raise ValueError(
+            "the response lies under a window, and the file does not say how that falls; give the time constant of an "
+            "exponential one with --window, export the file anew where it is another"
+        )
+    if abs(window.time_constant / named - 1) > SAME:
+        raise ValueError(f"--window {window.time_constant:g}: the file says {named:.4g} s; leave the option out")
+    return window
+
+
+def window_ringing_hits(hits: Sequence[Hit]) -> tuple[Frf, tuple[Hit, ...], float]:
+    """FRF of hits under a window that lets next to nothing of their ringing through, the hits, its time constant (s).
+
+    What is left when the record ends stands in the FRF as if it had been cut off: K is off by about that share.
+    """
+    tau = min(time_after_hit(hit) for hit in hits) / -float(np.log(LEFT))
+    windowed = tuple(exponential_window(hit, tau) for hit in hits)
+    return windowed_receptance(estimate_frf(windowed), tau), windowed, tau
+
+
+def about_own_window(about: str, time_constant: float, cure: str) -> Remark:
+    """Remark on what was done to a mode, or to all (about nothing)."""
+    text = f"rings on when the record ends: fitted under an exponential window of {time_constant:.3g} s, corrected"
+    return Remark("windowed-here", about, text if about else f"every hit {text}", cure)
+
+
+def remove_own_window(modes: Sequence[Mode], time_constant: float) -> Iterator[Mode]:
+    """Modes without that window; one that decays no faster than it is no mode."""
+    for mode in modes:
+        if 2 * np.pi * mode.damping_ratio * mode.frequency > 1 / time_constant:
+            wider = with_windowed_noise(mode, time_constant, -time_constant * float(np.log(LEFT)))
+            yield remove_window(wider, time_constant)
+
+
+def refit_ringing_modes(
+    modes: Sequence[Mode], hits: Sequence[Hit], band: tuple[float, float] | None
+) -> tuple[tuple[Mode, ...], tuple[Remark, ...]]:
+    """Modes, those that still ring when the record ends taken from the hits under a window, and a remark on each."""
+    if not hits or not any(_rings(mode) for mode in modes):
+        return tuple(modes), ()
+    frf, windowed, tau = window_ringing_hits(hits)
+    refitted = list(remove_own_window(fit_modes(frf, band, windowed), tau))
+    best, remarks = list[Mode](), list[Remark]()
+    for mode in modes:
+        same = _same_mode(mode, refitted) if _rings(mode) else None
+        best.append(mode if same is None else same)
+        if same is not None:
+            remarks.append(about_own_window(f"{same.frequency:.0f} Hz", tau, "a longer record needs none"))
+    return tuple(best), tuple(remarks)
+
+
+def _rings(mode: Mode) -> bool:
+    return mode.left_ringing is not None and mode.left_ringing > MOST_LEFT
+
+
+def _same_mode(mode: Mode, candidates: Sequence[Mode]) -> Mode | None:
+    """The nearest candidate within a half-power half-width."""
+
+    def distance(candidate: Mode) -> float:
+        return abs(candidate.frequency - mode.frequency)
+
+    near = [candidate for candidate in candidates if distance(candidate) < mode.damping_ratio * mode.frequency]
+    return min(near, key=distance, default=None)

@@ -1,0 +1,151 @@
+"""What a recording makes one ask: whether it is of this machine at all, and what was answered."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+
+from acquisition import Frf, Remark
+from lobewatch.machine import Machine, MachineFolder, TapEntry
+from lobewatch.measuring.clock import AHEAD, BEHIND, CLOCK_QUESTIONS, RELEASED, TOO_OLD, about_clock, is_ahead
+from modal import Mode
+
+ABOUT_MODES = ("frequency-jump", "no-mode-in-band", "other-band", "no-mode-to-follow", "stiffness-off-model")
+QUESTIONS = (*ABOUT_MODES, *CLOCK_QUESTIONS)
+"""Codes of the remarks that ask a person: until each is accepted the test sets no reference, and nothing is good."""
+ACCEPTED = "accepted"
+"""Code of the remark that tells of an answer."""
+LARGEST_JUMP = 0.15
+"""Relative change of the frequency against the newest test of the series that is asked about, up or down; chosen."""
+LARGEST_MISFIT = 4.0
+"""K of the first test of a series over that of the model there, or the inverse, above which it is asked about.
+
+A spindle as it stands is not twice as stiff as its drawing says; the smallest mistake of a unit is 4.4."""
+LEAST_COVERED = 0.9
+"""Share of [mode] band_hz that a recording has to cover; chosen."""
+RESUMED = timedelta(hours=12)
+"""Time after which an interrupted test, which keeps its time, may still be gone on with, others having been taken."""
+
+
+def frequency_jump(last: Mode, now: Mode) -> Remark | None:
+    """Question about a change of the frequency that no wear makes within one interval; None where it is smaller."""
+    change = now.frequency / last.frequency - 1
+    if abs(change) <= LARGEST_JUMP:
+        return None
+    text = f"f_n {now.frequency:.1f} Hz is {100 * change:+.0f} % off the newest test of the series"
+    text += f" ({last.frequency:.1f} Hz): is this the machine, the tool and the direction it is said to be?"
+    return Remark("frequency-jump", f"{now.frequency:.0f} Hz", text)
+
+
+def stiffness_off_model(first: Mode, model: float) -> Remark | None:
+    """Question about the first test of a series whose mode is not one of this spindle; None where it may be.
+
+    model: stiffness (N/m) of the mode of the model that was calibrated to its frequency, where it was tapped.
+    """
+    ratio = first.stiffness / model
+    if 1 / LARGEST_MISFIT <= ratio <= LARGEST_MISFIT:
+        return None
+    text = f"K {first.stiffness / 1e6:.3g} N/um is {ratio:.2g} times that of the model, {model / 1e6:.3g} N/um"
+    text += ": is this the machine of [spindle], are the sensitivities of hammer and accelerometer right?"
+    return Remark("stiffness-off-model", f"{first.frequency:.0f} Hz", text)
+
+
+def no_mode_in_band(modes: Sequence[Mode], machine: Machine) -> Remark:
+    """Question about a recording that shows no mode to follow; modes: all that were found."""
+    low, high = machine.mode.band_hz or (0.0, np.inf)
+    place = "" if machine.mode.band_hz is None else f" in [mode] band_hz {low:g}..{high:g} Hz"
+    peaks = f"found are {', '.join(f'{mode.frequency:.0f}' for mode in modes)} Hz" if modes else "none was found at all"
+    return Remark("no-mode-in-band", "", f"no mode to follow: none with positive stiffness{place}; {peaks}")
+
+
+def other_band(frf: Frf, machine: Machine) -> Remark | None:
+    """Question about a recording that does not cover [mode] band_hz; None where it does, or there is none."""
+    if machine.mode.band_hz is None:
+        return None
+    usable = frf.usable_band or (0.0, np.inf)
+    low, high = max(usable[0], float(frf.frequency[0])), min(usable[1], float(frf.frequency[-1]))
+    wanted = machine.mode.band_hz
+    if min(high, wanted[1]) - max(low, wanted[0]) >= LEAST_COVERED * (wanted[1] - wanted[0]):
+        return None
+    text = f"its usable lines, {low:.0f}..{high:.0f} Hz, do not cover [mode] band_hz {wanted[0]:g}..{wanted[1]:g} Hz"
+    return Remark("other-band", "", text)
+
+
+def with_answers(remarks: Iterable[Remark], tap: TapEntry) -> tuple[Remark, ...]:
+    """The remarks on a test and on its time, with the questions that were accepted told as such, the open ones left."""
+    accepted = tap.accepted
+    remarks = (*remarks, *(about_clock(code, tap.time) for code in tap.asked))
+    asked = {remark.code: str(remark) for remark in remarks}
+    answers = [Remark(ACCEPTED, code, asked.get(code, "asked no longer")) for code in accepted]
+    return (*(remark for remark in remarks if remark.code not in accepted), *answers)
+
+
+def open_questions(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
+    """The questions among these that nobody has answered."""
+    return tuple(remark for remark in remarks if remark.code in QUESTIONS)
+
+
+def accepted_codes(remarks: Iterable[Remark]) -> frozenset[str]:
+    """Codes of the questions that were answered."""
+    return frozenset(remark.about for remark in remarks if remark.code == ACCEPTED)
+
+
+def check_codes(codes: Iterable[str]) -> list[str]:
+    """Each code once; ValueError for one that is no question."""
+    distinct = list(dict.fromkeys(codes))
+    for code in distinct:
+        if code not in QUESTIONS:
+            raise ValueError(f"--accept {code}: no such question; there are {', '.join(QUESTIONS)}")
+    return distinct
+
+
+def in_question(tap_id: str, remark: Remark) -> Remark:
+    """A question as the assembly passes it on, told of the tap test."""
+    return replace(remark, about=f"tap test {tap_id}")
+
+
+def accept(
+    folder: MachineFolder, asked: Mapping[str, Sequence[str]], tap_ids: Sequence[str], codes: Sequence[str]
+) -> list[str]:
+    """Write down each of these codes for each of these tap tests that asks it; the codes that none of them asks.
+
+    asked: codes of the open questions by tap test. ValueError, and nothing is written, where a code is no question.
+    """
+    codes = check_codes(codes)
+    answers = [(tap_id, code) for tap_id in tap_ids for code in codes if code in asked.get(tap_id, ())]
+    for tap_id, code in answers:
+        folder.accept(tap_id, code)
+    answered = {code for _, code in answers}
+    return [code for code in codes if code not in answered]
+
+
+def unasked_text(codes: Sequence[str], tap_ids: Sequence[str], asked: Mapping[str, Sequence[str]]) -> str:
+    """Sentence on codes that these tap tests do not ask, with what they do ask; asked: as for `accept`."""
+    still_open = "; ".join(f"{tap_id}: {', '.join(open_codes)}" for tap_id, open_codes in asked.items())
+    text = f"--accept {' '.join(codes)}: not asked of {', '.join(tap_ids)}, which is stored"
+    return f"{text}; open questions: {still_open or 'none'}"
+
+
+def about_questions(tap_id: str, questions: Sequence[Remark], path: Path | str) -> Iterator[Remark]:
+    """What is asked of a tap test, with the command that answers; path: of the folder."""
+    file = Path(path) / "taps" / f"{tap_id}.h5"
+    for question in questions:
+        answer = shlex.join(["lobewatch", "replay", str(path), str(file), "--accept", question.code])
+        text = f"{question.text}; it sets no reference until you say that it is right: {answer}"
+        cure = f"Tap again; if this test is right, say so: {answer}"
+        yield Remark(question.code, f"tap test {tap_id}", text, cure)
+
+
+def clock_questions(created: datetime, now: datetime | None, taps: Iterable[TapEntry]) -> tuple[str, ...]:
+    """What is asked of a test of this time, by code; now: when a live one is committed, None for any other."""
+    if now is None:
+        return ()
+    newest = max((datetime.fromisoformat(tap.time) for tap in taps if not tap.excluded), default=None)
+    behind = newest is not None and (now < newest or created < newest - RESUMED)
+    asked = {BEHIND: behind, TOO_OLD: created < RELEASED, AHEAD: is_ahead(created, now)}
+    return tuple(code for code, is_asked in asked.items() if is_asked)

@@ -7,20 +7,11 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.commands.file_options import (
-    Columns,
-    ForceUnit,
-    FullScale,
-    Quantity,
-    Rate,
-    Response,
-    Sensitivity,
-    Unit,
-    described,
-)
+from lobewatch.commands.file_options import FileOptions, takes_file_options
 from lobewatch.show.terminal.output import Json, emit
 
 
+@takes_file_options(without=["averages"])
 def modes(
     file: Annotated[
         Path, typer.Argument(help="Recorded hits or an FRF: tap file, UFF, MAT, LVM, CSV, TDMS, WAV, SEP005.")
@@ -42,14 +33,8 @@ def modes(
         int | None,
         typer.Option(help="Hits that an FRF was averaged from; else inferred from its coherence."),
     ] = None,
-    columns: Columns = "",
-    quantity: Quantity = "",
-    unit: Unit = "",
-    force_unit: ForceUnit = "",
-    rate: Rate = None,
-    response: Response = None,
-    full_scale: FullScale = "",
-    sensitivity: Sensitivity = "",
+    *,
+    file_options: FileOptions,
     accept: Annotated[
         list[str] | None, typer.Option(help="Use hits with this verdict all the same (not-decayed); may be repeated.")
     ] = None,
@@ -80,21 +65,11 @@ def modes(
 
     of_window = window is not None or hit_at is not None or window_start != 0
     taken_off = Window(float("nan") if window is None else window, window_start, hit_at) if of_window else None
-    said = described(
-        columns,
-        full_scale,
-        sensitivity,
-        quantity=quantity,
-        unit=unit,
-        force_unit=force_unit,
-        rate=rate,
-        averages=averages,
-        response=response,
-    )
-    found = modes_of_file(file, band, window=taken_off, conjugate=conjugate, accept=accept or (), said=said)
+    description = file_options.description(averages=averages)
+    file_modes = modes_of_file(file, band, window=taken_off, conjugate=conjugate, accept=accept or (), description=description)
     if figure is not None:
         from lobewatch.show.figures.mode_figures import modes_figure
         from lobewatch.show.figures.trend_figures import save_figure
 
-        save_figure(modes_figure(found.extraction, found.as_recorded, file.name), figure)
-    emit(file_modes_json(found), as_json, *file_modes_texts(found, everything=everything))
+        save_figure(modes_figure(file_modes.extraction, file_modes.as_recorded, file.name), figure)
+    emit(file_modes_json(file_modes), as_json, *file_modes_texts(file_modes, everything=everything))

@@ -15,7 +15,10 @@ from lobewatch.show.terminal.output import table
 
 def ports_json(survey: PortSurvey) -> dict[str, Any]:
     """Every port, and what is wrong with drivers."""
-    return {"ports": [_port_json(one) for one in survey.seen], "remarks": [asdict(one) for one in survey.remarks]}
+    return {
+        "ports": [_port_json(listed) for listed in survey.seen],
+        "remarks": [asdict(remark) for remark in survey.remarks],
+    }
 
 
 def ports_texts(survey: PortSurvey) -> list[str | Table]:
@@ -23,7 +26,7 @@ def ports_texts(survey: PortSurvey) -> list[str | Table]:
     remarks = [f"{remark}." for remark in survey.remarks]
     if not survey.seen:
         return [no_ports_hint(), *remarks]
-    problems = [one.problem for one in survey.seen if one.problem]
+    problems = [listed.problem for listed in survey.seen if listed.problem]
     return [_table(survey.seen), *problems, *remarks, _summary(survey.seen)]
 
 
@@ -31,36 +34,36 @@ def _usb(port: PortInfo) -> str:
     return "" if port.vendor is None else f"{port.vendor:04x}:{port.product or 0:04x}"
 
 
-def _port_json(seen: SeenPort) -> dict[str, Any]:
-    port, answer = seen.port, seen.answer
+def _port_json(listed: SeenPort) -> dict[str, Any]:
+    port, answer = listed.port, listed.answer
     return {
         "device": port.device,
         "usb": _usb(port),
         "serial_number": port.serial_number,
         "description": port.description,
         "answer": {"driver": answer.driver, **asdict(answer.identity)} if answer else None,
-        "problem": seen.problem or None,
+        "problem": listed.problem or None,
     }
 
 
-def _table(seen: tuple[SeenPort, ...]) -> Table:
-    made = table("<port", "<VID:PID", "<serial number", "<description", "<answer")
-    for one in seen:
-        port = one.port
-        made.add_row(*map(escape, (port.device, _usb(port), port.serial_number, port.description, _answer(one))))
-    return made
+def _table(ports: tuple[SeenPort, ...]) -> Table:
+    rows = table("<port", "<VID:PID", "<serial number", "<description", "<answer")
+    for listed in ports:
+        port = listed.port
+        rows.add_row(*map(escape, (port.device, _usb(port), port.serial_number, port.description, _answer(listed))))
+    return rows
 
 
-def _answer(seen: SeenPort) -> str:
-    if seen.answer is None:
-        return seen.text
-    who = seen.answer.identity
-    return f"{seen.answer.driver}: {who.model}, serial number {who.serial}, firmware {who.firmware}"
+def _answer(listed: SeenPort) -> str:
+    if listed.answer is None:
+        return listed.text
+    who = listed.answer.identity
+    return f"{listed.answer.driver}: {who.model}, serial number {who.serial}, firmware {who.firmware}"
 
 
-def _summary(seen: tuple[SeenPort, ...]) -> str:
+def _summary(ports: tuple[SeenPort, ...]) -> str:
     """How many answer, and the next step."""
-    answering = [(one.port.device, one.answer.driver) for one in seen if one.answer]
+    answering = [(listed.port.device, listed.answer.driver) for listed in ports if listed.answer]
     if not answering:
         return (
             "No DAQ answers. One that was just plugged in may need some seconds; a DATAQ device must blink yellow "
@@ -68,6 +71,6 @@ def _summary(seen: tuple[SeenPort, ...]) -> str:
         )
     port, driver = answering[0]
     return (
-        f"{len(answering)} of {len(seen)} answer; next: lobewatch tap MACHINE --port {port}, "
+        f"{len(answering)} of {len(ports)} answer; next: lobewatch tap MACHINE --port {port}, "
         f'with driver = "{driver}" in [daq] of its machine.toml'
     )

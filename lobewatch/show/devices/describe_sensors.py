@@ -14,31 +14,31 @@ from lobewatch.sensors import MassCheck, SensorList, SkewCheck
 from lobewatch.show.terminal.output import table
 
 
-def list_json(found: SensorList) -> dict[str, Any]:
+def list_json(sensors: SensorList) -> dict[str, Any]:
     """The device, its channels and its rate."""
-    measured = found.measured_rate
+    measured = sensors.measured_rate
     return {
-        "model": found.identity.model,
-        "serial": found.identity.serial,
-        "channels": [_channel_json(channel) for channel in found.channels],
-        "sample_rate_hz": found.nominal_rate,
+        "model": sensors.identity.model,
+        "serial": sensors.identity.serial,
+        "channels": [_channel_json(channel) for channel in sensors.channels],
+        "sample_rate_hz": sensors.nominal_rate,
         "measured_rate_hz": measured.rate if measured else None,
         "measured_rate_hz_std": measured.std if measured else None,
-        "remarks": [asdict(remark) for remark in found.remarks],
-        "errors": [asdict(remark) for remark in found.errors],
+        "remarks": [asdict(remark) for remark in sensors.remarks],
+        "errors": [asdict(remark) for remark in sensors.errors],
     }
 
 
-def list_texts(found: SensorList) -> list[str | Table]:
+def list_texts(sensors: SensorList) -> list[str | Table]:
     """The device, a table of its channels, its rate, and what is wrong."""
-    measured = found.measured_rate
+    measured = sensors.measured_rate
     rate = "not measured" if measured is None else f"measured {plus_minus(measured.rate, measured.std)} Hz"
-    rate += ", which is worked with" if found.replaces_nominal else ""
+    rate += ", which is worked with" if sensors.replaces_nominal else ""
     return [
-        f"{found.identity.model}, serial number {found.identity.serial or 'not known'}",
-        _channel_table(found.channels),
-        f"rate: {found.nominal_rate:g} Hz, {rate}",
-        *(f"{'error' if remark in found.errors else 'warning'}: {remark}" for remark in found.remarks),
+        f"{sensors.identity.model}, serial number {sensors.identity.serial or 'not known'}",
+        _channel_table(sensors.channels),
+        f"rate: {sensors.nominal_rate:g} Hz, {rate}",
+        *(f"{'error' if remark in sensors.errors else 'warning'}: {remark}" for remark in sensors.remarks),
     ]
 
 
@@ -56,10 +56,10 @@ def _channel_json(channel: Channel) -> dict[str, Any]:
 
 
 def _channel_table(channels: tuple[Channel, ...]) -> Table:
-    made = table("channel", "<quantity", "sensitivity", "range", "input", "bits", "skew (us)", "<serial", "<calibrated")
+    rows = table("channel", "<quantity", "sensitivity", "range", "input", "bits", "skew (us)", "<serial", "<calibrated")
     for i, channel in enumerate(channels):
         unit, si = ("N", 1.0) if channel.quantity == "force" else ("g", STANDARD_GRAVITY)
-        made.add_row(
+        rows.add_row(
             str(i),
             channel.quantity,
             f"{channel.sensitivity * 1e3 * si:.4g} mV/{unit}",
@@ -70,25 +70,25 @@ def _channel_table(channels: tuple[Channel, ...]) -> Table:
             escape(channel.serial_number or "-"),
             channel.calibration_date or "-",
         )
-    return made
+    return rows
 
 
 def mass_json(check: MassCheck) -> dict[str, Any]:
     """F/(m a) and what follows from it."""
-    found = check.calibration
+    calibration = check.calibration
     return {
-        "mass_kg": found.mass,
-        "ratio": found.ratio,
-        "ratio_std": found.ratio_std,
-        "phase_deg": found.phase,
-        "inverted": found.inverted,
-        "flatness": found.flatness,
-        "band_hz": found.band,
-        "hits": found.n_hits,
-        "agrees": found.agrees,
-        "force_sensitivity_v_per_n": found.force_sensitivity,
-        "acceleration_sensitivity_v_per_m_s2": found.acceleration_sensitivity,
-        "remarks": [asdict(remark) for remark in found.remarks],
+        "mass_kg": calibration.mass,
+        "ratio": calibration.ratio,
+        "ratio_std": calibration.ratio_std,
+        "phase_deg": calibration.phase,
+        "inverted": calibration.inverted,
+        "flatness": calibration.flatness,
+        "band_hz": calibration.band,
+        "hits": calibration.n_hits,
+        "agrees": calibration.agrees,
+        "force_sensitivity_v_per_n": calibration.force_sensitivity,
+        "acceleration_sensitivity_v_per_m_s2": calibration.acceleration_sensitivity,
+        "remarks": [asdict(remark) for remark in calibration.remarks],
     }
 
 
@@ -118,13 +118,13 @@ def skew_json(check: SkewCheck) -> dict[str, Any]:
 
 def skew_texts(check: SkewCheck) -> list[str]:
     """The skew, and where to enter it."""
-    found, channel = check.found, check.channel
+    skew, channel = check.found, check.channel
     if check.place is None:
-        entry = f"skew_us = {found.skew * 1e6:.3f} in its [[daq.channel]] of machine.toml"
+        entry = f"skew_us = {skew.skew * 1e6:.3f} in its [[daq.channel]] of machine.toml"
     else:
-        entry = f"{check.place.skew} = {found.skew:.3e} in {check.place.place}"
+        entry = f"{check.place.skew} = {skew.skew:.3e} in {check.place.place}"
     return [
-        f"channel 1 ({channel.quantity}) is sampled {plus_minus(found.skew, found.std, 1e-6)} us "
-        f"({found.skew * check.sample_rate:.4f} samples) after channel 0; entered is {channel.skew * 1e6:.3f} us",
+        f"channel 1 ({channel.quantity}) is sampled {plus_minus(skew.skew, skew.std, 1e-6)} us "
+        f"({skew.skew * check.sample_rate:.4f} samples) after channel 0; entered is {channel.skew * 1e6:.3f} us",
         f"To enter: {entry}; 0 for channel 0",
     ]

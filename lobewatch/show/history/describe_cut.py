@@ -59,8 +59,8 @@ def about_tool(logbook: Logbook, cut: HeardCut) -> list[Remark]:
     return [Remark("tool-not-tapped", cut.tool, text, f"tap it with: lobewatch tap {logbook.folder.path}")]
 
 
-def otherwise(other: HeardCut) -> Remark:
+def otherwise(cut: HeardCut) -> Remark:
     """That a cut was heard otherwise before."""
-    text = f"heard otherwise at the same point ({cut_words(other)}); both are kept"
-    cure = f"lobewatch exclude MACHINE {other.id} --reason TEXT takes out the one that is wrong"
-    return Remark("cuts-contradict", other.id, text, cure)
+    text = f"heard otherwise at the same point ({cut_words(cut)}); both are kept"
+    cure = f"lobewatch exclude MACHINE {cut.id} --reason TEXT takes out the one that is wrong"
+    return Remark("cuts-contradict", cut.id, text, cure)

@@ -61,10 +61,10 @@ def history_csv(logbook: Logbook) -> str:
     writer = csv.DictWriter(written, heads, restval="", lineterminator="\n")
     writer.writeheader()
     for line in _lines(logbook):
-        told = {key: value for key, value in line.items() if key in heads} | line.get("conditions", {})
-        told |= {verdicts[name]: word for name, word in line.get("verdicts", {}).items()}
-        told["questions"] = " ".join(line.get("questions", ()))
-        writer.writerow({key: _cell(value) for key, value in told.items()})
+        cells = {key: value for key, value in line.items() if key in heads} | line.get("conditions", {})
+        cells |= {verdicts[name]: word for name, word in line.get("verdicts", {}).items()}
+        cells["questions"] = " ".join(line.get("questions", ()))
+        writer.writerow({key: _cell(value) for key, value in cells.items()})
     return written.getvalue()
 
 
@@ -83,32 +83,32 @@ def _cells(line: Mapping[str, Any]) -> list[str]:
 
 def _lines(logbook: Logbook) -> list[dict[str, Any]]:
     """Tap tests, excluded ones, events and test cuts, oldest first."""
-    found = history_json(logbook)
-    events = [one | {"kind": "new baseline" if one["new_baseline"] else "event"} for one in found["events"]]
-    excluded = [one | {"kind": "excluded"} for one in found["excluded"]]
-    taps = [one | {"kind": kind} for kind, name in (("tap", "taps"), ("kept", "kept")) for one in found[name]]
-    cuts = [_cut_line(one) for one in found["cuts"]]
-    return sorted([*events, *excluded, *taps, *cuts], key=lambda one: one["time"])
+    history = history_json(logbook)
+    events = [event | {"kind": "new baseline" if event["new_baseline"] else "event"} for event in history["events"]]
+    excluded = [tap | {"kind": "excluded"} for tap in history["excluded"]]
+    taps = [tap | {"kind": kind} for kind, name in (("tap", "taps"), ("kept", "kept")) for tap in history[name]]
+    cuts = [_cut_line(cut) for cut in history["cuts"]]
+    return sorted([*events, *excluded, *taps, *cuts], key=lambda line: line["time"])
 
 
-def _cut_line(one: Mapping[str, Any]) -> dict[str, Any]:
+def _cut_line(cut: Mapping[str, Any]) -> dict[str, Any]:
     """A test cut as the table shows it."""
-    kind = "excluded" if one["excluded"] else "cut"
-    shown = {name: one[name] for name in ("id", "time", "tool", "text")}
-    return {**shown, "kind": kind, "reason": one["excluded"], "conditions": {}}
+    kind = "excluded" if cut["excluded"] else "cut"
+    shown = {name: cut[name] for name in ("id", "time", "tool", "text")}
+    return {**shown, "kind": kind, "reason": cut["excluded"], "conditions": {}}
 
 
 def _tap_json(row: Row, logbook: Logbook) -> dict[str, Any]:
-    found: dict[str, Any] = {"id": row.tap_id, "time": _utc(row.time), "tool": row.tool, "direction": row.direction}
-    for name, own in VALUES.items():
-        found[name], found[f"{name}_std"] = getattr(row, own)
-    found["baseline"] = None if row.baseline is None else _utc(row.baseline)
-    found["series"], found["conditions"] = row.series, row.conditions.known
-    found["software"] = row.software or logbook.history.software
-    found["questions"] = [one.code for one in row.questions]
+    entry: dict[str, Any] = {"id": row.tap_id, "time": _utc(row.time), "tool": row.tool, "direction": row.direction}
+    for name, field in VALUES.items():
+        entry[name], entry[f"{name}_std"] = getattr(row, field)
+    entry["baseline"] = None if row.baseline is None else _utc(row.baseline)
+    entry["series"], entry["conditions"] = row.series, row.conditions.known
+    entry["software"] = row.software or logbook.history.software
+    entry["questions"] = [question.code for question in row.questions]
     words = row.rulings or {}
-    found["verdicts"] = {p.name: words[p.name].word.value for p in logbook.machine.program if p.name in words}
-    return found
+    entry["verdicts"] = {p.name: words[p.name].word.value for p in logbook.machine.program if p.name in words}
+    return entry
 
 
 def _excluded_json(tap: TapEntry) -> dict[str, Any]:

@@ -53,7 +53,8 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
         low = lobes.minimum
         texts.append(f"{REFERENCE_CUT}: lowest limit {low.depth * 1e3:.2f} mm at {low.speed_rpm:.0f} rpm")
     asked = [remark for remark in logbook.standing().remarks if remark.about == f"tap test {m.tap_id}"]
-    return [*texts, *remark_lines([remark for remark in assembly.remarks if remark.code not in QUESTIONS]), *map(_asked, asked)]
+    further = [remark for remark in assembly.remarks if remark.code not in QUESTIONS]
+    return [*texts, *remark_lines(further), *map(_asked, asked)]
 
 
 def _conditions(m: Measurement, logbook: Logbook) -> Conditions:

@@ -72,9 +72,9 @@ def _program(one: ProgramAdvice, found: Outlook) -> dict[str, str]:
 
 def _until(word: Word, fate: Fate, end: float) -> str:
     if word is Word.STABLE:
-        return f"doubtful {dates_text(fate.doubtful, end, seen=False)}"
+        return f"doubtful {dates_text(fate.doubtful, end, tapped=False)}"
     if word is Word.DOUBTFUL:
-        return f"not stable {dates_text(fate.not_stable, end, seen=False)}"
+        return f"not stable {dates_text(fate.not_stable, end, tapped=False)}"
     return "not stable already" if word is Word.NOT_STABLE else "not known"
 
 

@@ -36,13 +36,13 @@ def calibration_json(calibration: Calibration) -> dict[str, Any]:
 
 def stiffness_fit_json(fit: StiffnessFit) -> dict[str, Any]:
     """Several stiffnesses from several modes; null for one that is open. Of tilting it is N m/rad."""
-    known = [group not in fit.open_groups for group in fit.groups]
+    is_fitted = [group not in fit.open_groups for group in fit.groups]
     return {
         "groups": list(fit.groups),
         "factor": fit.factor,
         "factor_std": fit.factor_std,
-        "stiffness_n_per_m": np.where(known, fit.stiffness, np.nan),
-        "stiffness_n_per_m_std": None if fit.stiffness_std is None else np.where(known, fit.stiffness_std, np.nan),
+        "stiffness_n_per_m": np.where(is_fitted, fit.stiffness, np.nan),
+        "stiffness_n_per_m_std": None if fit.stiffness_std is None else np.where(is_fitted, fit.stiffness_std, np.nan),
         "correlation": fit.correlation,
         "mode": fit.mode,
         "frequency_hz": fit.frequency,
@@ -53,35 +53,35 @@ def stiffness_fit_json(fit: StiffnessFit) -> dict[str, Any]:
     }
 
 
-def damping_json(found: DampingCalibration) -> dict[str, Any]:
+def damping_json(calibration: DampingCalibration) -> dict[str, Any]:
     """The bearings' dampers."""
     return {
-        "damping_ratio": found.damping_ratio,
-        "bearing_damping_n_s_per_m": found.bearing_damping,
-        "bearing_damping_sensitivity": found.sensitivity,
+        "damping_ratio": calibration.damping_ratio,
+        "bearing_damping_n_s_per_m": calibration.bearing_damping,
+        "bearing_damping_sensitivity": calibration.sensitivity,
     }
 
 
-def model_calibration_json(found: ModelCalibration) -> dict[str, Any]:
+def model_calibration_json(calibration: ModelCalibration) -> dict[str, Any]:
     """What makes a model fit."""
-    stiffness = found.stiffness
+    stiffness = calibration.stiffness
     payload = calibration_json(stiffness) if isinstance(stiffness, Calibration) else stiffness_fit_json(stiffness)
-    return payload if found.dampers is None else payload | damping_json(found.dampers)
+    return payload if calibration.dampers is None else payload | damping_json(calibration.dampers)
 
 
-def model_calibration_texts(found: ModelCalibration) -> list[str]:
+def model_calibration_texts(calibration: ModelCalibration) -> list[str]:
     """What makes a model fit, for people."""
-    label = [f"model: {found.label}"] if found.label else []
-    dampers = [] if found.dampers is None else [str(found.dampers)]
-    return [*label, str(found.stiffness), *dampers]
+    label = [f"model: {calibration.label}"] if calibration.label else []
+    dampers = [] if calibration.dampers is None else [str(calibration.dampers)]
+    return [*label, str(calibration.stiffness), *dampers]
 
 
-def model_json(found: ModelSummary) -> dict[str, Any]:
+def model_json(model: ModelSummary) -> dict[str, Any]:
     """A model."""
-    spindle = found.state.spindle
+    spindle = model.state.spindle
     return {
-        "tool": found.state.tool,
-        "bearings_from": found.state.origin,
+        "tool": model.state.tool,
+        "bearings_from": model.state.origin,
         "theory": spindle.theory,
         "length_mm": spindle.length * 1e3,
         "mass_kg": spindle.mass,
@@ -93,26 +93,26 @@ def model_json(found: ModelSummary) -> dict[str, Any]:
                 "segment_energy_share": mode.segment_share,
                 "joint_energy_share": mode.joint_share,
             }
-            for mode in found.modes
+            for mode in model.modes
         ],
-        "static_tip_stiffness_n_per_m": found.static_stiffness,
-        "critical_speed_rpm": found.critical_speed,
-        "first_frequency_with_rigid_bearings_hz": found.rigid_frequency,
+        "static_tip_stiffness_n_per_m": model.static_stiffness,
+        "critical_speed_rpm": model.critical_speed,
+        "first_frequency_with_rigid_bearings_hz": model.rigid_frequency,
     }
 
 
-def model_texts(found: ModelSummary) -> list[str | Table]:
+def model_texts(model: ModelSummary) -> list[str | Table]:
     """A model for people."""
-    spindle, critical = found.state.spindle, found.critical_speed
-    made = table("mode", "f (Hz)", "K at the tip (N/um)", "energy in bearings (%)", "shaft (%)", "joints (%)")
-    for number, mode in enumerate(found.modes, 1):
+    spindle, critical = model.state.spindle, model.critical_speed
+    mode_table = table("mode", "f (Hz)", "K at the tip (N/um)", "energy in bearings (%)", "shaft (%)", "joints (%)")
+    for number, mode in enumerate(model.modes, 1):
         shares = (f"{100 * share:.1f}" for share in (mode.bearing_share, mode.segment_share, mode.joint_share))
-        made.add_row(str(number), f"{mode.frequency:.2f}", f"{mode.tip_stiffness / 1e6:.4g}", *shares)
+        mode_table.add_row(str(number), f"{mode.frequency:.2f}", f"{mode.tip_stiffness / 1e6:.4g}", *shares)
     return [
-        f"{found.state.title}: {spindle.theory}, {spindle.length * 1e3:.1f} mm, {spindle.mass:.2f} kg",
-        f"bearings of {found.state.origin}",
-        made,
-        f"static stiffness at the tip  {found.static_stiffness / 1e6:.3f} N/um",
+        f"{model.state.title}: {spindle.theory}, {spindle.length * 1e3:.1f} mm, {spindle.mass:.2f} kg",
+        f"bearings of {model.state.origin}",
+        mode_table,
+        f"static stiffness at the tip  {model.static_stiffness / 1e6:.3f} N/um",
         f"critical speed               {'none' if critical is None else f'{critical:.0f} rpm'}",
-        f"with rigid bearings          {found.rigid_frequency:.1f} Hz in mode 1",
+        f"with rigid bearings          {model.rigid_frequency:.1f} Hz in mode 1",
     ]

@@ -57,21 +57,21 @@ def in_order(modes: Iterable[Mode], *, rejected: bool = True) -> list[Mode]:
     """Trusted modes by rising frequency, then doubtful ones, then rejected ones where they are wanted."""
     wanted = ORDER if rejected else ORDER[:-1]
     kept = [(wanted.index(trust), mode) for mode in modes if (trust := trust_of(mode)) in wanted]
-    return [mode for _, mode in sorted(kept, key=lambda one: (one[0], one[1].frequency))]
+    return [mode for _, mode in sorted(kept, key=lambda placed: (placed[0], placed[1].frequency))]
 
 
 def mode_table(modes: Sequence[Mode]) -> Table:
     """Modes, a line each, value ± standard error (in percent), the phase where there is any, and how far to believe."""
     with_phase = any(abs(mode.phase_deg) > LEAST_PHASE for mode in modes)
-    made = table("f_n (Hz)", "zeta (%)", "K (N/um)", *(["phase (deg)"] if with_phase else []), "<")
+    rows = table("f_n (Hz)", "zeta (%)", "K (N/um)", *(["phase (deg)"] if with_phase else []), "<")
     for mode in modes:
         values = (mode.frequency, mode.damping_ratio, mode.stiffness)
         cells = [
             plus_minus(value, std, scale, percent=scale == 1e6 or not with_phase)
             for value, std, scale in zip(values, mode.standard_error, (1.0, 0.01, 1e6), strict=True)
         ]
-        made.add_row(*cells, *([_phase(mode)] if with_phase else []), _notes(mode))
-    return made
+        rows.add_row(*cells, *([_phase(mode)] if with_phase else []), _notes(mode))
+    return rows
 
 
 def _phase(mode: Mode) -> str:
@@ -98,21 +98,21 @@ def mode_lines(modes: Sequence[Mode]) -> list[str]:
 
 def remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> list[str]:
     """Remarks on single modes and further ones, a line each; what several modes have in common is one."""
-    return [str(remark) for remark in joined([*(one for mode in modes for one in mode.remarks), *remarks])]
+    return [str(remark) for remark in joined([*(remark for mode in modes for remark in mode.remarks), *remarks])]
 
 
 def short_remark_lines(modes: Sequence[Mode], remarks: Sequence[Remark]) -> list[str]:
     """A line for each code: that of the first mode that has it, and which others have it, too."""
     by_code: dict[str, list[Remark]] = {}
-    for remark in [*(one for mode in modes for one in mode.remarks), *remarks]:
+    for remark in [*(remark for mode in modes for remark in mode.remarks), *remarks]:
         by_code.setdefault(remark.code, []).append(remark)
     return [line for same in by_code.values() for line in _one_line(joined(same))]
 
 
 def _one_line(same: list[Remark]) -> list[str]:
-    first, *others = same
-    about = ", ".join(remark.about for remark in others)
-    if others and not about:
+    first, *alike = same
+    about = ", ".join(remark.about for remark in alike)
+    if alike and not about:
         return [str(remark) for remark in same]
     return [f"{first}{f' (the like of {about})' if about else ''}"]
 
@@ -128,28 +128,28 @@ def reasons(modes: Sequence[Mode]) -> list[str]:
     """Which modes are doubtful and rejected by which rules, a line each verdict."""
     lines = []
     for trust in ORDER[1:]:
-        each = [
+        texts = [
             f"{mode.frequency:.0f} Hz ({', '.join(code for code, _ in trust_rules(mode))})"
             for mode in modes
             if trust_of(mode) is trust
         ]
-        lines += [f"{trust}: {', '.join(each)}"] if each else []
+        lines += [f"{trust}: {', '.join(texts)}"] if texts else []
     return lines
 
 
 def picked_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
     """Modes by peak picking, and how far each is from the fitted mode nearest to it."""
-    made = table("f_n (Hz)", "zeta (%)", "K (N/um)", "<against the fit")
+    rows = table("f_n (Hz)", "zeta (%)", "K (N/um)", "<against the fit")
     for mode in picked:
-        near = min(fitted, key=lambda other: abs(other.frequency - mode.frequency), default=None)
+        near = min(fitted, key=lambda fit: abs(fit.frequency - mode.frequency), default=None)
         same = near is not None and abs(near.frequency - mode.frequency) < mode.damping_ratio * mode.frequency
-        made.add_row(
+        rows.add_row(
             f"{mode.frequency:.5g}",
             f"{100 * mode.damping_ratio:.5g}",
             f"{mode.stiffness / 1e6:.5g}",
             _difference(mode, near) if same and near is not None else "not fitted",
         )
-    return made
+    return rows
 
 
 def _difference(mode: Mode, fit: Mode) -> str:
@@ -157,35 +157,35 @@ def _difference(mode: Mode, fit: Mode) -> str:
     return f"f_n {mode.frequency - fit.frequency:+.2g} Hz, zeta {100 * zeta:+.1f} %, K {100 * k:+.1f} %"
 
 
-def file_modes_json(found: FileModes) -> dict[str, Any]:
+def file_modes_json(file_modes: FileModes) -> dict[str, Any]:
     """The modes of one file."""
     return {
-        "file": str(found.path),
-        "n_averages": found.frf.n_averages,
-        "usable_band_hz": found.frf.usable_band,
-        "facts": [asdict(fact) for fact in found.facts],
-        "modes": [mode_json(mode) for mode in found.fitted],
-        "peak_picking": [mode_json(mode) for mode in found.picked],
-        "remarks": [asdict(remark) for remark in found.remarks],
+        "file": str(file_modes.path),
+        "n_averages": file_modes.frf.n_averages,
+        "usable_band_hz": file_modes.frf.usable_band,
+        "facts": [asdict(fact) for fact in file_modes.facts],
+        "modes": [mode_json(mode) for mode in file_modes.fitted],
+        "peak_picking": [mode_json(mode) for mode in file_modes.picked],
+        "remarks": [asdict(remark) for remark in file_modes.remarks],
     }
 
 
-def file_modes_texts(found: FileModes, *, everything: bool = False) -> list[str | Table]:
+def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> list[str | Table]:
     """The modes of one file for people; those that are rejected, and each single remark, where everything is wanted."""
-    frf, shown = found.frf, in_order(found.fitted, rejected=everything)
+    frf, shown = file_modes.frf, in_order(file_modes.fitted, rejected=everything)
     usable = "" if frf.usable_band is None else f", usable {frf.usable_band[0]:.0f} to {frf.usable_band[1]:.0f} Hz"
     lines = f"{frf.frequency.size} lines {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
     remarks = remark_lines if everything else short_remark_lines
     return [
-        f"{found.path.name}: {frf.n_averages} hit(s) averaged, {lines}{usable}",
-        *_not_in_file(found),
+        f"{file_modes.path.name}: {frf.n_averages} hit(s) averaged, {lines}{usable}",
+        *_not_in_file(file_modes),
         mode_table(shown),
-        summary(found.fitted, everything=everything),
+        summary(file_modes.fitted, everything=everything),
         *reasons(shown),
         *mode_lines(shown if everything else [mode for mode in shown if trust_of(mode) is Trust.TRUSTED]),
-        *remarks(shown, found.remarks),
+        *remarks(shown, file_modes.remarks),
         "peak picking (eqs. 28, 29), for comparison:",
-        picked_table(found.picked, found.as_recorded),
+        picked_table(file_modes.picked, file_modes.as_recorded),
     ]
 
 

@@ -17,40 +17,40 @@ NOT_FIT = "the tools do not fit one spindle: nothing is to be written into machi
 OPEN = "no measured mode feels the joints: nothing is to be written into machine.toml"
 
 
-def tools_json(found: ToolsCalibration) -> dict[str, Any]:
+def tools_json(calibration: ToolsCalibration) -> dict[str, Any]:
     """The fit, what it rests on, and other tools as it has them."""
-    return stiffness_fit_json(found.fit) | {
-        "taps": {tap.tool: tap.tap_id for tap in found.taps},
-        "tool": [found.taps[i].tool for i in found.fit.shaft],
-        "fits_one_spindle": not found.fit.misfits,
-        "not_counted_hz": found.left_out,
-        "machine_toml": _joint_lines(found.joints),
-        "predicted": {name: mode._asdict() for name, mode in found.predicted.items()},
-        "remarks": [*map(asdict, found.fit.remarks), *map(asdict, found.remarks)],
+    return stiffness_fit_json(calibration.fit) | {
+        "taps": {tap.tool: tap.tap_id for tap in calibration.taps},
+        "tool": [calibration.taps[i].tool for i in calibration.fit.shaft],
+        "fits_one_spindle": not calibration.fit.misfits,
+        "not_counted_hz": calibration.left_out,
+        "machine_toml": _joint_lines(calibration.joints),
+        "predicted": {name: mode._asdict() for name, mode in calibration.predicted.items()},
+        "remarks": [*map(asdict, calibration.fit.remarks), *map(asdict, calibration.remarks)],
     }
 
 
-def tools_texts(found: ToolsCalibration) -> list[str | Table]:
+def tools_texts(calibration: ToolsCalibration) -> list[str | Table]:
     """The same for people."""
-    label = [f"model: {found.label}"] if found.label else []
+    label = [f"model: {calibration.label}"] if calibration.label else []
     taps = [
         f"spindle {number}: tool {tap.tool}, {tap.tap_id}, mode {tap.number} is followed"
-        for number, tap in enumerate(found.taps, 1)
+        for number, tap in enumerate(calibration.taps, 1)
     ]
     left = [
-        f"not counted: {', '.join(f'{one:.1f}' for one in frequencies)} Hz of tool {tool}, nothing of the model is near"
-        for tool, frequencies in found.left_out.items()
+        f"not counted: {', '.join(f'{f:.1f}' for f in frequencies)} Hz of tool {tool}, nothing of the model is near"
+        for tool, frequencies in calibration.left_out.items()
     ]
-    warnings = [f"warning: {remark}" for remark in found.remarks]
-    return [*label, *taps, str(found.fit), *left, *warnings, *_to_enter(found), *_predicted(found)]
+    warnings = [f"warning: {remark}" for remark in calibration.remarks]
+    return [*label, *taps, str(calibration.fit), *left, *warnings, *_to_enter(calibration), *_predicted(calibration)]
 
 
-def _to_enter(found: ToolsCalibration) -> list[str]:
-    if found.joints:
-        unsure = ", ".join(sorted(found.fit.open_groups))
-        said = f" (open: {unsure}; good only together with the others)" if unsure else ""
-        return [f"for [spindle] of machine.toml{said}:", *_joint_lines(found.joints)]
-    return [NOT_FIT if found.fit.misfits else OPEN]
+def _to_enter(calibration: ToolsCalibration) -> list[str]:
+    if calibration.joints:
+        unsure = ", ".join(sorted(calibration.fit.open_groups))
+        caution = f" (open: {unsure}; good only together with the others)" if unsure else ""
+        return [f"for [spindle] of machine.toml{caution}:", *_joint_lines(calibration.joints)]
+    return [NOT_FIT if calibration.fit.misfits else OPEN]
 
 
 def _joint_lines(joints: tuple[Joint, ...]) -> list[str]:
@@ -65,11 +65,11 @@ def _joint_lines(joints: tuple[Joint, ...]) -> list[str]:
     return ["joints = [", *lines, "]"]
 
 
-def _predicted(found: ToolsCalibration) -> list[Table]:
-    if not found.predicted or found.fit.misfits:
+def _predicted(calibration: ToolsCalibration) -> list[Table]:
+    if not calibration.predicted or calibration.fit.misfits:
         return []
-    made = table("~tool, not tapped here", "softest mode (Hz)", "K at the tip (N/um)")
-    for name, mode in found.predicted.items():
+    rows = table("~tool, not tapped here", "softest mode (Hz)", "K at the tip (N/um)")
+    for name, mode in calibration.predicted.items():
         frequency = plus_minus(mode.frequency, mode.frequency_std)
-        made.add_row(name, frequency, plus_minus(mode.stiffness, mode.stiffness_std, 1e6))
-    return [made]
+        rows.add_row(name, frequency, plus_minus(mode.stiffness, mode.stiffness_std, 1e6))
+    return [rows]

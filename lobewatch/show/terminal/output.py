@@ -77,12 +77,12 @@ def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
 
 def table(*headings: str) -> Table:
     """An empty table; a heading that begins with "<" names a column of text, with "~" one that may be broken."""
-    made = Cells(box=None, pad_edge=False, header_style="bold")
+    rows = Cells(box=None, pad_edge=False, header_style="bold")
     for heading in headings:
         breaks = heading.startswith("~")
         justify: Literal["left", "right"] = "left" if breaks or heading.startswith("<") else "right"
-        made.add_column(heading.lstrip("<~"), justify=justify, no_wrap=not breaks, overflow="fold")
-    return made
+        rows.add_column(heading.lstrip("<~"), justify=justify, no_wrap=not breaks, overflow="fold")
+    return rows
 
 
 def _widest(cells: Iterable[RenderableType]) -> int:
@@ -92,19 +92,19 @@ def _widest(cells: Iterable[RenderableType]) -> int:
 
 def printable(text: str) -> str:
     """A text whose control characters are replaced, but for newline and tab."""
-    return CONTROL.sub(lambda found: found[0] if found[0] in "\n\t" else INSTEAD, text)
+    return CONTROL.sub(lambda match: match[0] if match[0] in "\n\t" else INSTEAD, text)
 
 
-def _escaped(found: re.Match[str]) -> str:
+def _escaped(match: re.Match[str]) -> str:
     """As JSON writes it inside of text; a newline stands between its lines only."""
-    return found[0] if found[0] == "\n" else f"\\u{ord(found[0]):04x}"
+    return match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}"
 
 
 def _finite(value: Any) -> Any:
     if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: _finite(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_finite(item) for item in value]
+        return [_finite(entry) for entry in value]
     if hasattr(value, "tolist"):
         return _finite(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value

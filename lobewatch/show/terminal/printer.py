@@ -71,8 +71,8 @@ class TapPrinter:
         if state.resumed != before.resumed:
             self._console.print(state.resumed)
         with_hit = state.word in (TapStep.GOOD, TapStep.REFUSED) and not state.trial
-        told = with_hit or state.word is TapStep.FAILED or state.reason == before.reason
-        if state.reason and not told:
+        is_listed = with_hit or state.word is TapStep.FAILED or state.reason == before.reason
+        if state.reason and not is_listed:
             self._console.print(escape(state.reason))
         self._print_hits(state)
 
@@ -80,7 +80,7 @@ class TapPrinter:
         for hit in state.hits[self._told :]:
             if hit.earlier:
                 continue
-            good = sum(not other.flags for other in state.hits[: hit.number])
+            good = sum(not earlier.flags for earlier in state.hits[: hit.number])
             self._console.print(f"{good:3d} / {state.wanted}  {verdict(hit)}  ({hit.peak_force:.0f} N)")
         self._told = len(state.hits)
 

@@ -104,10 +104,10 @@ class TerminalScreen:
     def ring(self, before: TapState, state: TapState) -> None:
         """The bells of a new word or hit; a verdict's word may come a picture ahead of its hit, and then rings once."""
         word, hit = state.word != before.word, len(state.hits) > len(before.hits)
-        told = word or (hit and not self._ahead_of_hit)
+        is_due = word or (hit and not self._ahead_of_hit)
         if word or hit:
             self._ahead_of_hit = not hit
-        for _ in range(BELLS.get(state.word, 0) if told and not self._muted else 0):
+        for _ in range(BELLS.get(state.word, 0) if is_due and not self._muted else 0):
             self._console.bell()
             self._ended.wait(BELL_PAUSE)
 
@@ -147,10 +147,10 @@ def _banner(state: TapState) -> RenderableType:
 
 def _numbers(state: TapState) -> str:
     """Levels, and how far the mean has come."""
-    said = []
+    texts = []
     if state.levels is not None:
-        said.append(f"force {state.levels[0]:.2g} N rms, response {state.levels[1]:.2g} m/s^2 rms")
+        texts.append(f"force {state.levels[0]:.2g} N rms, response {state.levels[1]:.2g} m/s^2 rms")
     if state.mean_change is not None:
         moves = f"the last good hit moved the mean by {100 * state.mean_change:.2g} %"
-        said.append(f"{moves}; it has settled" if state.settled else moves)
-    return "   ".join(said) or " "
+        texts.append(f"{moves}; it has settled" if state.settled else moves)
+    return "   ".join(texts) or " "

@@ -27,7 +27,7 @@ def chart_lines(trend: Trend) -> list[str]:
     canvas[_places(percent, high, low, HIGH), columns] = POINT
     labels = [f"{value:+8.2f} %" if row % 4 == 0 or row == HIGH - 1 else " " * 10 for row, value in _ticks(low, high)]
     drawn = [f"{label} |{''.join(cells)}".rstrip() for label, cells in zip(labels, canvas, strict=True)]
-    first, last = (f"{date(one):%Y-%m-%d}" for one in dates[[0, -1]])
+    first, last = (f"{date(days):%Y-%m-%d}" for days in dates[[0, -1]])
     return [*drawn, " " * 11 + "+" + "-" * WIDE, " " * 12 + first + last.rjust(WIDE - len(first))]
 
 

@@ -10,22 +10,22 @@ from lobewatch.decay.trend import date
 ASSUMED = "Dates hold if the machine is used as before; an acceleration that is not yet visible cannot be foreseen."
 
 
-def dates_text(found: DateRange | None, horizon: float, *, seen: bool = True) -> str:
-    """For people; horizon: days since 1970 up to which was looked; seen: whether what is past was tapped, too."""
-    if found is None:
+def dates_text(dates: DateRange | None, horizon: float, *, tapped: bool = True) -> str:
+    """For people; horizon: days since 1970 up to which was looked; tapped: whether what is past was tapped, too."""
+    if dates is None:
         return "history too short or too old"
-    if found.probable == -math.inf:
-        return "already" if seen else "by now, at this rate"
-    if found.earliest == math.inf:
+    if dates.probable == -math.inf:
+        return "already" if tapped else "by now, at this rate"
+    if dates.earliest == math.inf:
         return f"not before {date(horizon):%Y-%m}"
-    if found.latest == math.inf:
-        return f"not before {_day(found.earliest)}"
-    return f"between {_day(found.earliest)} and {_day(found.latest)} (80 %), probably {_day(found.probable)}"
+    if dates.latest == math.inf:
+        return f"not before {_day(dates.earliest)}"
+    return f"between {_day(dates.earliest)} and {_day(dates.latest)} (80 %), probably {_day(dates.probable)}"
 
 
-def dates_json(found: DateRange | None) -> dict[str, str | None]:
+def dates_json(dates: DateRange | None) -> dict[str, str | None]:
     """Dates as "2026-03-01", null where none is known, "already"."""
-    named = zip(("p10", "p50", "p90"), found or (math.inf,) * 3, strict=True)
+    named = zip(("p10", "p50", "p90"), dates or (math.inf,) * 3, strict=True)
     return {name: _or_word(days) for name, days in named}
 
 

@@ -13,7 +13,7 @@ from lobewatch.decay.trend import date
 from lobewatch.show.terminal.output import table
 from lobewatch.show.trends.dates import dates_json, dates_text
 from lobewatch.tap.stories.demo import DemoTap, SpindleState
-from lobewatch.tap.stories.truth import Foretold
+from lobewatch.tap.stories.level_forecast import LevelForecast
 
 KEYS = ("frequency_hz", "damping_ratio", "stiffness_n_per_m", "bearing_stiffness_n_per_m")
 """Names of the figures of a SpindleState in JSON ..."""
@@ -23,10 +23,12 @@ COLUMNS = (("f_1 Hz", 1.0, 2), ("zeta %", 0.01, 3), ("K N/um", 1e6, 3), ("k_b N/
 """Heading, size of the unit and decimals."""
 
 
-def demo_json(taps: Sequence[DemoTap], told: Sequence[Foretold], report: Path) -> dict[str, Any]:
+def demo_json(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], report: Path) -> dict[str, Any]:
     """All tap tests, and the forecast beside the truth."""
-    forecast = {one.what: {**dates_json(one.reached), "truth": _date(one.truth)} for one in told}
-    return {"taps": [_entry(tap) for tap in taps], "forecast": forecast, "report": str(report)}
+    levels = {
+        forecast.level: {**dates_json(forecast.reached), "truth": _date(forecast.truth)} for forecast in forecasts
+    }
+    return {"taps": [_entry(tap) for tap in taps], "forecast": levels, "report": str(report)}
 
 
 def _date(days: float | None) -> str | None:
@@ -35,48 +37,55 @@ def _date(days: float | None) -> str | None:
 
 def _entry(tap: DemoTap) -> dict[str, Any]:
     about = {"date": tap.plan.date.isoformat(), "direction": tap.plan.direction}
-    return about | {"truth": _json(tap.plan.truth), "found": _json(tap.found)}
+    return about | {"truth": _json(tap.plan.truth), "found": _json(tap.result)}
 
 
 def _json(state: SpindleState) -> dict[str, float]:
     return dict(zip(KEYS, astuple(state), strict=True))
 
 
-def demo_texts(taps: Sequence[DemoTap], told: Sequence[Foretold], scatter: float, report: Path) -> list[str | Table]:
+def demo_texts(
+    taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], scatter: float, report: Path
+) -> list[str | Table]:
     """Tap tests, worst errors, and the forecast beside the truth, for people; scatter: of f_1, as a share of it."""
     in_x = [tap for tap in taps if tap.plan.direction == "x"]
     first, last = in_x[0], in_x[-1]
-    found = last.found.relative_to(first.found).stiffness
+    measured = last.result.relative_to(first.result).stiffness
     true = last.plan.truth.relative_to(first.plan.truth).stiffness
     return [
         "Emulated, and found beside it (f_1 natural frequency, zeta damping ratio, K stiffness at the tool tip,",
         f"k_b stiffness of each bearing); before each test the tool is remounted: f_1 scatters by {100 * scatter:g} %.",
         _table(taps),
         "worst error: " + ", ".join(_worst(taps)),
-        f"K over the whole demo, in x: {100 * found:+.2f} % found, {100 * true:+.2f} % true",
-        *([] if not told else ["Foretold after the last test, and what the emulated spindle does if it goes on so:"]),
-        *(f"{one.what}: {dates_text(one.reached, one.horizon, seen=False)}; true {_truth(one)}" for one in told),
+        f"K over the whole demo, in x: {100 * measured:+.2f} % found, {100 * true:+.2f} % true",
+        *(
+            []
+            if not forecasts
+            else ["Foretold after the last test, and what the emulated spindle does if it goes on so:"]
+        ),
+        *map(_forecast_line, forecasts),
         f"report: {report}",
     ]
 
 
-def _truth(one: Foretold) -> str:
-    return _date(one.truth) or "never, or not for years"
+def _forecast_line(forecast: LevelForecast) -> str:
+    dates = dates_text(forecast.reached, forecast.horizon, tapped=False)
+    return f"{forecast.level}: {dates}; true {_date(forecast.truth) or 'never, or not for years'}"
 
 
 def _table(taps: Sequence[DemoTap]) -> Table:
-    made = table("<test", *(word for heading, _, _ in COLUMNS for word in (heading, "found")))
+    rows = table("<test", *(word for heading, _, _ in COLUMNS for word in (heading, "found")))
     for tap in taps:
-        pairs = zip(astuple(tap.plan.truth), astuple(tap.found), strict=True)
+        pairs = zip(astuple(tap.plan.truth), astuple(tap.result), strict=True)
         cells = [
             f"{value / scale:.{digits}f}"
             for pair, (_, scale, digits) in zip(pairs, COLUMNS, strict=True)
             for value in pair
         ]
-        made.add_row(f"{tap.plan.date:%Y-%m} {tap.plan.direction}", *cells)
-    return made
+        rows.add_row(f"{tap.plan.date:%Y-%m} {tap.plan.direction}", *cells)
+    return rows
 
 
 def _worst(taps: Sequence[DemoTap]) -> list[str]:
-    errors = zip(*(astuple(tap.found.relative_to(tap.plan.truth)) for tap in taps), strict=True)
+    errors = zip(*(astuple(tap.result.relative_to(tap.plan.truth)) for tap in taps), strict=True)
     return [f"{name} {100 * max(map(abs, values)):.2g} %" for name, values in zip(NAMES, errors, strict=True)]

@@ -19,7 +19,7 @@ from lobewatch.show.trends.chart import chart_lines
 from lobewatch.show.trends.dates import ASSUMED, dates_json, dates_text
 
 
-def trend_json(found: Outlook, series: SeriesStanding, preload: PreloadLeft | None) -> dict[str, Any]:
+def trend_json(outlook: Outlook, series: SeriesStanding, preload: PreloadLeft | None) -> dict[str, Any]:
     """Points, score, alarm, light, preload, forecast; percents are 100 ln of the frequency over that of the first."""
     trend = series.trend
     return {
@@ -28,14 +28,14 @@ def trend_json(found: Outlook, series: SeriesStanding, preload: PreloadLeft | No
         "points": [] if trend is None else _points_json(trend),
         "score": None if trend is None or not trend.watch.scores.size else float(trend.watch.scores[-1]),
         "alarm": None if trend is None else _alarm_json(trend),
-        "light": found.standing.light.value,
+        "light": outlook.standing.light.value,
         "fall_percent": series.fall.value,
         "fall_std_percent": series.fall.std,
         "preload_left": preload,
         "rate_percent_per_month": None if trend is None or trend.rate is None else trend.rate._asdict(),
         "forecast": {
-            **{name: _fate_json(fate) for name, fate in found.programs.items()},
-            **{f"{percent:g} %": {"reached": dates_json(when)} for percent, when in found.limits.items()},
+            **{name: _fate_json(fate) for name, fate in outlook.programs.items()},
+            **{f"{percent:g} %": {"reached": dates_json(when)} for percent, when in outlook.limits.items()},
         },
     }
 
@@ -55,17 +55,17 @@ def trend_csv(series: SeriesStanding) -> str:
     return written.getvalue()
 
 
-def trend_texts(found: Outlook, series: SeriesStanding, preload: PreloadLeft | None) -> list[str | Table]:
+def trend_texts(outlook: Outlook, series: SeriesStanding, preload: PreloadLeft | None) -> list[str | Table]:
     """Chart, sentence and table."""
     trend = series.trend
     if trend is None:
         return [f"{series.name}: no tap test that others can be compared with"]
     dates = table("~what", "~becomes doubtful", "~is not stable")
-    for line in dates_rows(found):
+    for line in dates_rows(outlook):
         dates.add_row(*line)
-    others = [f"{one.name}: {short_text(one)}" for one in found.standing.series if one is not series]
+    further = [f"{side.name}: {short_text(side)}" for side in outlook.standing.series if side is not series]
     left = [] if preload is None else [preload_text(preload)]
-    return [*chart_lines(trend), sentence(series), *left, dates, ASSUMED, *others]
+    return [*chart_lines(trend), sentence(series), *left, dates, ASSUMED, *further]
 
 
 def preload_text(preload: PreloadLeft) -> str:
@@ -73,18 +73,18 @@ def preload_text(preload: PreloadLeft) -> str:
     return f"preload left: {preload}"
 
 
-def dates_rows(found: Outlook) -> list[tuple[str, str, str]]:
+def dates_rows(outlook: Outlook) -> list[tuple[str, str, str]]:
     """What, when it becomes doubtful, when it is not stable: each program, and the fixed limits."""
-    end = found.horizon
-    rows = [(name, *_fate_texts(fate, end)) for name, fate in found.programs.items()]
-    for percent, when in found.limits.items():
+    end = outlook.horizon
+    rows = [(name, *_fate_texts(fate, end)) for name, fate in outlook.programs.items()]
+    for percent, when in outlook.limits.items():
         rows.append((f"-{percent:g} % (fixed limit, as in the paper)", "", dates_text(when, end)))
     return rows
 
 
 def _fate_texts(fate: Fate, end: float) -> tuple[str, str]:
-    seen = fate.critical.doubtful == 0, fate.critical.not_stable == 0
-    return dates_text(fate.doubtful, end, seen=seen[0]), dates_text(fate.not_stable, end, seen=seen[1])
+    tapped = fate.critical.doubtful == 0, fate.critical.not_stable == 0
+    return dates_text(fate.doubtful, end, tapped=tapped[0]), dates_text(fate.not_stable, end, tapped=tapped[1])
 
 
 def sentence(series: SeriesStanding) -> str:
@@ -93,11 +93,11 @@ def sentence(series: SeriesStanding) -> str:
     if trend is None:
         return f"{series.name}: unknown"
     n = len(trend.points)
-    said = f"{series.name}: {short_text(series)} after {n} point{'s' if n > 1 else ''}"
+    text = f"{series.name}: {short_text(series)} after {n} point{'s' if n > 1 else ''}"
     if trend.forecast is None:
-        return f"{said}; from 8 points on there is a forecast, from 9 on an alarm"
+        return f"{text}; from 8 points on there is a forecast, from 9 on an alarm"
     shape = _shape(trend.forecast.likeliest, falls=trend.forecast.fitted[-1] < trend.start)
-    return f"{said}; {shape}; scatter {trend.spread:.2f} %, score {_score(trend)}; {rate_text(trend)}"
+    return f"{text}; {shape}; scatter {trend.spread:.2f} %, score {_score(trend)}; {rate_text(trend)}"
 
 
 def rate_text(trend: Trend) -> str:
@@ -106,7 +106,7 @@ def rate_text(trend: Trend) -> str:
     if rate is None:
         return ""
     digits = max(2, -math.floor(math.log10(max(rate.high - rate.low, 1e-4))))
-    value, low, high = (f"{one:+.{digits}f}" for one in rate)
+    value, low, high = (f"{percent:+.{digits}f}" for percent in rate)
     return f"{value} % a month now ({low} to {high}, 95 %)"
 
 
@@ -134,7 +134,7 @@ def _scores(trend: Trend) -> list[float]:
 
 
 def _points_json(trend: Trend) -> list[dict[str, Any]]:
-    return [{"time": one.time.isoformat(), "percent": one.percent, "used": True} for one in trend.points]
+    return [{"time": point.time.isoformat(), "percent": point.percent, "used": True} for point in trend.points]
 
 
 def _alarm_json(trend: Trend) -> dict[str, Any] | None:

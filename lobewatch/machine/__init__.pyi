@@ -1,5 +1,6 @@
 """What is known of one machine: machine.toml, its folder, its journal, its devices."""
 
+from .archive.verify import verify
 from .folder import BusyError, MachineFolder
 from .journal.tap_entry import DamagedTapError, TapEntry
 from .known_devices import checked_rate, has_clock, known_rate, use_rate
@@ -31,4 +32,5 @@ __all__ = [
     "known_rate",
     "make_machine_folder",
     "use_rate",
+    "verify",
 ]

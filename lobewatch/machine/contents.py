@@ -117,7 +117,7 @@ def tap_files(folder: Path) -> Mapping[str, Path]:
 
 
 def fault_of(folder: Path, entry: TapEntry | RecordingFile) -> str:
-    """What is wrong with the file of a tap test or of a cut; empty where nothing is.
+    """Fault of the file of a tap test or of a cut; empty where it is as it was written.
 
     OSError where this program can open no more files.
     """

@@ -55,7 +55,7 @@ def read_rows(path: Path) -> Rows:
 
 def write_rows(path: Path, rows: Iterable[bytes]) -> int:
     """Write the whole file anew, complete under its name or the old one as it was; returns its size (bytes)."""
-    content = MAKE + _packed(rows)
+    content = MAKE + _pack(rows)
     atomic_write(path, content)
     return len(content)
 
@@ -65,7 +65,7 @@ def add_rows(path: Path, size: int, rows: Sequence[bytes]) -> int:
 
     To be called under a lock. Not made to outlast a power cut: what is worked out can be worked out again.
     """
-    content = _packed(rows)
+    content = _pack(rows)
     with path.open("r+b", buffering=0) as file:
         file.truncate(size)
         file.seek(size)
@@ -73,5 +73,5 @@ def add_rows(path: Path, size: int, rows: Sequence[bytes]) -> int:
     return size + len(content)
 
 
-def _packed(rows: Iterable[bytes]) -> bytes:
+def _pack(rows: Iterable[bytes]) -> bytes:
     return b"".join(part for row in rows for part in (_HEAD.pack(len(row), zlib.crc32(row)), row))

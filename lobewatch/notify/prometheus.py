@@ -35,11 +35,11 @@ def prometheus_text(standings: Sequence[MachineStanding]) -> str:
 
 
 def _line(name: str, sample: Sample) -> str:
-    labels = ",".join(f'{label}="{_escaped(value)}"' for label, value in sample.labels)
+    labels = ",".join(f'{label}="{_escape(value)}"' for label, value in sample.labels)
     return f"{name}{{{labels}}} {sample.value!r}\n"
 
 
-def _escaped(text: str) -> str:
+def _escape(text: str) -> str:
     return text.replace("\\", r"\\").replace('"', r"\"").replace("\n", r"\n")
 
 

@@ -172,10 +172,11 @@ def _row(standing: MachineStanding) -> dict[str, Any]:
     row = plant_row(standing)
     left = row["days_left"]
     row["days_left"] = left if left is None else math.floor(10 * left) / 10
-    return row | {"interrupted": _interrupted(standing.path)}
+    return row | {"interrupted": _interrupted_hits(standing.path)}
 
 
-def _interrupted(folder: Path) -> dict[str, int]:
+def _interrupted_hits(folder: Path) -> dict[str, int]:
+    """Hits of the interrupted tests of a machine, by direction."""
     try:
         spool = folder / "spool"
         is_empty = not spool.is_dir() or not any(path.is_dir() for path in spool.iterdir())

@@ -27,7 +27,7 @@ ENTER_AGAIN = (
     "events, exclusions, accepted questions and cuts heard by ear that stood there are lost: enter them again "
     "(lobewatch event, exclude, replay --accept, observe)"
 )
-"""What is to be done about corrections that no copy of the journal has."""
+"""Advice on corrections that no copy of the journal has."""
 
 
 def rebuild_files(path: Path) -> list[str]:

@@ -56,15 +56,15 @@ def broker_of(address: str) -> Broker:
     """Broker of mqtt://[user[:password]@]host[:port][/prefix]; ValueError for what is none."""
     hidden = address if "@" not in address else "...@" + address.rpartition("@")[2]
     allowed = "give mqtt://HOST, mqtt://USER@HOST:PORT/PREFIX, or mqtts:// where it is encrypted"
-    wrong = f"mqtt={hidden!r} is no address of a broker; {allowed}"
+    refusal = f"mqtt={hidden!r} is no address of a broker; {allowed}"
     url = urlsplit(address)
     try:
         port = url.port
     except ValueError:
-        raise ValueError(wrong) from None
+        raise ValueError(refusal) from None
     prefix = url.path.strip("/") or "lobewatch"
     if url.scheme not in PORTS or not url.hostname or set(address) & set("#?") or "+" in prefix:
-        raise ValueError(wrong)
+        raise ValueError(refusal)
     password = unquote(url.password or "") or (os.environ.get(PASSWORD, "") if url.username else "")
     user = unquote(url.username or "")
     return Broker(url.scheme, url.hostname, port or PORTS[url.scheme], user, password, prefix)

@@ -35,7 +35,7 @@ class TapSetup(Table, frozen=True):
         self.conditions(self.tool)
 
     def conditions(self, tool: str) -> Conditions:
-        """What is known of a tap test with a tool; the stick-out of `tool` alone."""
+        """Conditions of a tap test with a tool; the stick-out of `tool` alone."""
         stick_out = self.stick_out_mm if tool == self.tool else None
         return Conditions(stick_out_mm=stick_out, drawbar_kn=self.drawbar_kn, state=self.state)
 

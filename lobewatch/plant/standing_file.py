@@ -16,55 +16,62 @@ from lobewatch.plant.summary import Summary
 
 STANDING = "standing.json"
 MAKE = 1
-"""Of the file; another is made anew."""
-KEPT = timedelta(days=7)
-"""So long its forecast counts."""
+"""Number of this form of the file; a file of another is made anew."""
+LASTING = timedelta(days=7)
+"""Time that a summary and its forecast count; chosen."""
 HEAD = len('{"crc":"01234567",')
-"""Bytes of the file before the others; the checksum is that of these as an object of their own."""
+"""Bytes of the head of the file; the checksum in it is that of the others as an object of their own."""
 
 
-class _File(msgspec.Struct, frozen=True):
+class _StandingFile(msgspec.Struct, frozen=True):
+    """The content of the file behind its checksum."""
+
     make: int
+    """Number of its form."""
     software: str
+    """Version of the program that made it."""
     mark: tuple[int, ...]
+    """Mark of the files that it was made of."""
     made: str
+    """Time of its making (ISO 8601)."""
     summary: Summary
+    """Summary of the machine."""
 
 
-_encode, _decode = msgspec.json.Encoder().encode, msgspec.json.Decoder(_File).decode
+_encode, _decode = msgspec.json.Encoder().encode, msgspec.json.Decoder(_StandingFile).decode
 
 
 def read_standing(folder: Path, now: datetime) -> Summary | None:
-    """What stands beside a machine, where it fits its files; None for none, torn, altered, old, of another version,
+    """The summary beside a machine, where it fits its files; None for none, torn, altered, old, of another version,
     or of another folder."""
     try:
         content = (folder / STANDING).read_bytes()
         body = b"{" + content[HEAD:]
         if content[:HEAD] != _head(body):
             return None
-        found = _decode(body)
-        age = now - datetime.fromisoformat(found.made)
+        file = _decode(body)
+        age = now - datetime.fromisoformat(file.made)
     except (OSError, ValueError, TypeError):
         return None
-    if (found.make, found.software, found.mark) != (MAKE, software(), mark_of(folder, found.summary.newest_file)):
+    if (file.make, file.software, file.mark) != (MAKE, software(), mark_of(folder, file.summary.newest_file)):
         return None
-    named = found.summary.path
-    if not timedelta(0) <= age < KEPT or (named != str(folder) and found.summary.speaks_of(named)):
+    named = file.summary.path
+    if not timedelta(0) <= age < LASTING or (named != str(folder) and file.summary.speaks_of(named)):
         return None
-    return found.summary
+    return file.summary
 
 
 def write_standing(folder: Path, summary: Summary, mark: tuple[int, ...], now: datetime) -> None:
-    """Keep it beside the machine, whole or not at all; mark: of the files it was made of. To be called under the lock.
+    """Keep a summary beside the machine, whole or not at all; to be called under the lock.
 
-    OSError where it cannot be written.
+    mark: of the files it was made of. OSError where it cannot be written.
     """
-    body = _encode(_File(MAKE, software(), mark, now.isoformat(), summary))
+    body = _encode(_StandingFile(MAKE, software(), mark, now.isoformat(), summary))
     atomic_write(folder / STANDING, _head(body) + body[1:], lasting=False)
 
 
 def _head(body: bytes) -> bytes:
-    """The checksum as the first field."""
+    """Head of the file: the checksum as the first field."""
     return b'{"crc":"%08x",' % zlib.crc32(body)
 
 

@@ -1,16 +1,21 @@
-"""From the standing of a machine to its summary."""
+"""From the standing of a machine to its summary.
+
+It needs the logbook and numpy; who may do without them asks `lobewatch.plant`, which loads it when it is needed.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
 
 from lobewatch.decay.light import all_well
 from lobewatch.decay.standing import SeriesStanding, Standing
 from lobewatch.decay.trend import Trend, days_of
+from lobewatch.history.row_bytes import encode_row
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.outlook import of_limit
 from lobewatch.machine import BusyError, Limits
@@ -19,23 +24,35 @@ from lobewatch.plant.standing_file import write_standing
 from lobewatch.plant.summary import Ahead, SeriesSummary, Summary
 
 MOST = 60
-"""Points kept of a series."""
+"""Points kept of a series; chosen, more than its small picture can show."""
 OF_THE_DATE = ("overdue", "tap-in-future")
-"""Reasons that `Summary.at` adds."""
+"""Codes of the reasons that `Summary.at` adds."""
+
+
+def summarise_folder(path: Path, now: datetime) -> Summary:
+    """The summary of a machine folder as `summarise` makes it; DataError where it is none."""
+    return summarise(Logbook.open(path), now)
+
+
+def summarise_with_rows(path: Path, now: datetime) -> tuple[Summary, list[bytes]]:
+    """The summary of a machine folder, and each row of its history as history.rows holds it."""
+    logbook = Logbook.open(path)
+    summary, hashes = summarise(logbook, now), logbook.machine.program_hashes
+    return summary, [encode_row(number, row, hashes) for number, row in enumerate(logbook.history.rows)]
 
 
 def summarise(logbook: Logbook, now: datetime | None = None) -> Summary:
-    """Of a machine, kept beside it where its lock can be had; what `Logbook.standing` raises."""
+    """The summary of a machine, kept beside it where its lock can be had; what `Logbook.standing` raises."""
     now = now or datetime.now(UTC)
-    found = _summary(logbook, logbook.standing(now))
-    mark = mark_of(logbook.folder.path, found.newest_file)
+    summary = _summary(logbook, logbook.standing(now))
+    mark = mark_of(logbook.folder.path, summary.newest_file)
     if logbook.is_current:
         try:
             with logbook.folder.locked():
-                write_standing(logbook.folder.path, found, mark, now)
+                write_standing(logbook.folder.path, summary, mark, now)
         except (BusyError, OSError):
             pass  # it is made anew by the next who asks
-    return found
+    return summary
 
 
 def _summary(logbook: Logbook, standing: Standing) -> Summary:
@@ -51,42 +68,42 @@ def _summary(logbook: Logbook, standing: Standing) -> Summary:
         newest=rows[-1].tap_id if last is not None else "",
         last_tap="" if last is None else last.isoformat(),
         tap_tests=len(logbook.history.rows),
-        programs={name: one.word.value for name, one in (rows[-1].rulings or {}).items()} if rows else {},
-        series=tuple(_course(one, machine.limits) for one in standing.series),
+        programs={name: ruling.word.value for name, ruling in (rows[-1].rulings or {}).items()} if rows else {},
+        series=tuple(_series_summary(series, machine.limits) for series in standing.series),
     )
 
 
-def _course(one: SeriesStanding, limits: Limits) -> SeriesSummary:
-    trend, fall = one.trend, one.fall
+def _series_summary(series: SeriesStanding, limits: Limits) -> SeriesSummary:
+    trend, fall = series.trend, series.fall
     percents = limits.frequency_warn_percent, limits.frequency_alarm_percent
     return SeriesSummary(
-        name=one.name,
-        tool=one.tool,
-        direction=one.direction,
+        name=series.name,
+        tool=series.tool,
+        direction=series.direction,
         fall=fall.value if fall.is_known else None,
         fall_std=fall.std if fall.is_known and math.isfinite(fall.std) else None,
         frequency=None if trend is None else trend.first * math.exp(trend.points[-1].percent / 100),
         alarm=trend.watch.fall.kind if trend is not None and trend.watch.fall is not None else "",
-        points=() if trend is None else tuple(_thinned(trend)),
+        points=() if trend is None else tuple(_thin_out(trend)),
         limits=() if trend is None else tuple(_ahead(trend, percent) for percent in percents),
     )
 
 
-def _thinned(trend: Trend) -> Iterator[tuple[float, float]]:
-    """Means of neighbours where there are many; the newest as it is."""
+def _thin_out(trend: Trend) -> Iterator[tuple[float, float]]:
+    """Day and change (%) of the points, means of neighbours where there are many; the newest as it is."""
     percents = np.array([point.percent for point in trend.points])
-    found = np.column_stack([days_of(trend.points), percents - trend.start])
-    if len(found) > MOST:
-        least, more = divmod(len(found) - 1, MOST - 1)
+    points = np.column_stack([days_of(trend.points), percents - trend.start])
+    if len(points) > MOST:
+        least, more = divmod(len(points) - 1, MOST - 1)
         begins = np.cumsum([0, *[least + 1] * more, *[least] * (MOST - 1 - more)])
-        found = np.add.reduceat(found, begins) / np.diff(begins, append=len(found))[:, np.newaxis]
-    for at, percent in found.tolist():
+        points = np.add.reduceat(points, begins) / np.diff(begins, append=len(points))[:, np.newaxis]
+    for at, percent in points.tolist():
         yield round(at, 1), round(percent, 3)
 
 
 def _ahead(trend: Trend, percent: float) -> Ahead:
-    found = of_limit(trend, percent)
-    if found is None or trend.forecast is None:
+    dates = of_limit(trend, percent)
+    if dates is None or trend.forecast is None:
         return Ahead(percent)
-    first, middle, last = (None if one == math.inf else round(max(one, float(trend.today)), 1) for one in found)
+    first, middle, last = (None if date == math.inf else round(max(date, float(trend.today)), 1) for date in dates)
     return Ahead(percent, first, middle, last, round(float(trend.forecast.dates[-1]), 1))

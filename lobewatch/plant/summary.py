@@ -25,85 +25,85 @@ from lobewatch.decay.light import (
 
 
 class Ahead(msgspec.Struct, frozen=True):
-    """When a series has fallen by one of the fixed limits."""
+    """Dates at which a series has fallen by one of the fixed limits."""
 
     percent: float
-    """Fall from where the series started (%)."""
+    """Fall of the frequency from where the series started (%)."""
     earliest: float | None = None
     """Days since 1970, at 10 %; the day it was foretold on where that is past; None where it is not foretold."""
     probable: float | None = None
-    """At 50 %."""
+    """Days since 1970, at 50 %; None likewise."""
     latest: float | None = None
-    """At 90 %."""
+    """Days since 1970, at 90 %; None likewise."""
     foretold_to: float | None = None
     """Last day that was looked at; None where nothing can be foretold."""
 
 
 class SeriesSummary(msgspec.Struct, frozen=True):
-    """One tool in one direction."""
+    """The summary of one tool in one direction."""
 
     name: str
-    """Tool and direction."""
+    """Tool and direction, in words."""
     tool: str
-    """What is in the spindle."""
+    """Tool in the spindle."""
     direction: str
     """Direction at the tool tip, "x" or "y"."""
     fall: float | None
     """Fall of the frequency from the start of the series (%); None where it is not known."""
     fall_std: float | None
-    """Its standard error (%); None where it is not known."""
+    """Standard error of the fall (%); None where it is not known."""
     frequency: float | None
-    """Of the newest test that knows it (Hz)."""
+    """Natural frequency of the newest point (Hz); None where no test can be compared with."""
     alarm: str = ""
     """"step" or "slope" where the watch over the series is on alarm."""
     points: tuple[tuple[float, float], ...] = ()
     """Day since 1970 and change from the start (%), thinned out."""
     limits: tuple[Ahead, ...] = ()
-    """Those of machine.toml."""
+    """Dates at which it reaches the limits of machine.toml."""
 
 
 class DatedStanding(NamedTuple):
-    """How it stands at a time."""
+    """The standing of a machine at a time."""
 
     light: Light
-    """Of the worst reason."""
+    """Light of the worst reason."""
     remarks: tuple[Remark, ...]
-    """The reasons, in order of harm."""
+    """Reasons, in order of harm."""
     next_step: str
-    """What to do now, one sentence."""
+    """Next step, one sentence."""
     days_left: float | None
-    """Until the next test is due; negative where it is overdue; None before the first."""
+    """Days until the next test is due; negative where it is overdue; None before the first."""
 
 
 class Summary(msgspec.Struct, frozen=True, dict=True):
-    """How a machine stands, without what the date of today adds."""
+    """The standing of a machine, without what the date of today adds."""
 
     name: str
-    """In machine.toml."""
+    """Name of the machine in machine.toml."""
     remarks: tuple[Remark, ...]
-    """The reasons that hold at any time, in order of harm."""
+    """Reasons that hold at any time, in order of harm."""
     otherwise: str
-    """What to do where no reason says it."""
+    """Next step where no reason says one."""
     path: str = ""
-    """Of the folder as it was named, which commands in the reasons repeat."""
+    """Path of the folder as it was named, which commands in the reasons repeat."""
     interval_days: float = 0.0
-    """From tap test to tap test."""
+    """Time from tap test to tap test (days)."""
     has_port: bool = False
     """Whether machine.toml names a port, so that a test can be started."""
     newest: str = ""
     """Identity of the newest tap test; empty where there is none."""
     last_tap: str = ""
-    """When that was (ISO 8601)."""
+    """Time of the newest tap test (ISO 8601); empty where there is none."""
     tap_tests: int = 0
-    """Rows of the history."""
+    """Number of rows of the history."""
     programs: dict[str, str] = {}
-    """The word on each program."""
+    """Word on each program, by its name."""
     series: tuple[SeriesSummary, ...] = ()
-    """The one that fell most first."""
+    """Series, the one that fell most first."""
 
     @cached_property
     def time(self) -> datetime | None:
-        """When it was tapped last."""
+        """Time of the newest tap test; None where there is none."""
         return datetime.fromisoformat(self.last_tap) if self.last_tap else None
 
     @property
@@ -112,7 +112,7 @@ class Summary(msgspec.Struct, frozen=True, dict=True):
         return f"taps/{self.newest}.h5" if self.newest else ""
 
     def at(self, now: datetime, path: Path | str, damage: Sequence[Remark] = ()) -> DatedStanding:
-        """At a time, with what is known to be damaged besides; path: of the folder."""
+        """The standing at a time, with what is known to be damaged besides; path: of the folder."""
         left, remarks = None, self.remarks
         if self.time is not None:
             left = days_left(self.time, self.interval_days, now)
@@ -127,5 +127,5 @@ class Summary(msgspec.Struct, frozen=True, dict=True):
 
 
 def unreadable_summary(name: str, reason: str) -> Summary:
-    """Of a machine whose files cannot be read."""
+    """The summary of a machine whose files cannot be read."""
     return Summary(name, (about_unreadable(reason),), UNREADABLE)

@@ -15,6 +15,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+import lobewatch.plant as plant
 from lobewatch.machine.rows import read_rows
 from lobewatch.plant.standing_file import read_standing, software
 from lobewatch.plant.summary import Summary
@@ -32,16 +33,18 @@ NUMBERS = (
     "modal_tip_stiffness_n_per_m",
     "temperature_c",
 )
-"""Of the mode followed, where it was tapped, each with its standard error; mean of the recalibrated bearings, likewise;
-of the recalibrated model; of the spindle."""
+"""Columns of numbers: of the mode followed where it was tapped, each with its standard error; mean of the recalibrated
+bearings, likewise; of the recalibrated model; of the spindle."""
 
 
 class _Code(msgspec.Struct, gc=False):
+    """The code of a remark."""
+
     code: str
 
 
-class _Stored(msgspec.Struct, array_like=True, gc=False):
-    """The beginning of `columns.stored_row.Stored`, in its order; what is not needed is not looked into."""
+class _TableRow(msgspec.Struct, array_like=True, gc=False):
+    """The beginning of a `RowRecord` of the history, in its order; what is not needed is not looked into."""
 
     number: int
     tap_id: str
@@ -72,42 +75,43 @@ class TapTable(NamedTuple):
     machine: str
     """Name of the machine."""
     series: Sequence[tuple[str, str]]
-    """What is compared with one another: tool, and direction at its tip, "x" or "y"."""
+    """Series of tap tests that are compared with one another: tool, and direction at its tip, "x" or "y"."""
     of_series: Sequence[int]
-    """Of each tap test, from 1 on."""
+    """Number of the series of each tap test, from 1 on."""
     tap_id: Sequence[str]
-    """Of each tap test."""
+    """Identity of each tap test."""
     time: Sequence[float]
-    """Of each tap test (s since 1970)."""
+    """Time of each tap test (s since 1970)."""
     remarks: Sequence[str]
-    """Of each tap test: codes of what is in doubt, with blanks between."""
+    """Codes of what is in doubt of each tap test, with blanks between."""
     numbers: NDArray[np.float64]
-    """Of each tap test those of `NUMBERS`, NaN where not known, shape (n, 11)."""
+    """Numbers of each tap test as in `NUMBERS`, NaN where not known, shape (n, 11)."""
 
 
-_decode = msgspec.msgpack.Decoder(list[_Stored]).decode
+_decode = msgspec.msgpack.Decoder(list[_TableRow]).decode
 _series = attrgetter("tool", "direction", "series")
 _estimates = attrgetter("frequency", "damping_ratio", "stiffness", "bearing_stiffness")
 _modelled = attrgetter("static_tip_stiffness", "modal_tip_stiffness")
 
 
 def tap_table(key: str, path: Path, now: datetime | None = None) -> TapTable:
-    """That of one machine; ValueError or OSError where it cannot be read. key: name of its folder."""
+    """The table of one machine; ValueError or OSError where it cannot be read. key: name of its folder."""
     now = now or datetime.now(UTC)
     summary = read_standing(path, now)
-    rows = None if summary is None else _stored(path, summary)
+    rows = None if summary is None else _read_rows(path, summary)
     if summary is None or rows is None:
-        summary, rows = _worked_out(path, now)
-    found: dict[tuple[str, str, str], int] = {}
-    of_series = [found.setdefault(one, len(found) + 1) for one in map(_series, rows)]
+        summary, contents = plant.summarise_with_rows(path, now)
+        rows = _decode_rows(contents)
+    numbers: dict[tuple[str, str, str], int] = {}
+    of_series = [numbers.setdefault(series, len(numbers) + 1) for series in map(_series, rows)]
     return TapTable(
         key,
         summary.name,
-        [(tool, direction) for tool, direction, _ in found],
+        [(tool, direction) for tool, direction, _ in numbers],
         of_series,
-        [one.tap_id for one in rows],
-        [one.time.timestamp() for one in rows],
-        [_codes(one.remarks) for one in rows],
+        [row.tap_id for row in rows],
+        [row.time.timestamp() for row in rows],
+        [_codes(row.remarks) for row in rows],
         _numbers(rows),
     )
 
@@ -115,47 +119,37 @@ def tap_table(key: str, path: Path, now: datetime | None = None) -> TapTable:
 def _codes(remarks: Sequence[_Code]) -> str:
     if len(remarks) < 2:
         return remarks[0].code if remarks else ""
-    return " ".join(dict.fromkeys([one.code for one in remarks]))
+    return " ".join(dict.fromkeys([remark.code for remark in remarks]))
 
 
-def _numbers(rows: Sequence[_Stored]) -> NDArray[np.float64]:
+def _numbers(rows: Sequence[_TableRow]) -> NDArray[np.float64]:
     estimates = np.fromiter(chain.from_iterable(chain.from_iterable(map(_estimates, rows))), np.float64)
     modelled = np.fromiter(chain.from_iterable(map(_modelled, rows)), np.float64)
-    warmth = [one.conditions.get("temperature_c", math.nan) if one.conditions else math.nan for one in rows]
-    return np.column_stack([estimates.reshape(-1, 8), modelled.reshape(-1, 2), np.array(warmth)])
+    temperatures = [row.conditions.get("temperature_c", math.nan) if row.conditions else math.nan for row in rows]
+    return np.column_stack([estimates.reshape(-1, 8), modelled.reshape(-1, 2), np.array(temperatures)])
 
 
-def _stored(path: Path, summary: Summary) -> list[_Stored] | None:
-    """From history.rows; None where it is not that of the standing."""
+def _read_rows(path: Path, summary: Summary) -> list[_TableRow] | None:
+    """The rows of history.rows; None where it is not that of the standing."""
     if not summary.tap_tests:
         return []
     try:
         head, *contents = read_rows(path / "history.rows").rows
-        found = _decoded(contents)
+        rows = _decode_rows(contents)
     except (OSError, ValueError):
         return None
-    is_own = head.decode().endswith(f" lobewatch {software()}") and len(found) == summary.tap_tests
-    return found if is_own else None
+    is_ours = head.decode().endswith(f" lobewatch {software()}") and len(rows) == summary.tap_tests
+    return rows if is_ours else None
 
 
-def _decoded(contents: Sequence[bytes]) -> list[_Stored]:
-    """Those in a place, each as it was written last; all at once, an array of msgpack."""
+def _decode_rows(contents: Sequence[bytes]) -> list[_TableRow]:
+    """The rows in a place, each as it was written last; all at once, an array of msgpack."""
     rows = _decode(struct.pack(">BI", 0xDD, len(contents)) + b"".join(contents))
-    return list({one.number: one for one in rows if one.number >= 0}.values())
-
-
-def _worked_out(path: Path, now: datetime) -> tuple[Summary, list[_Stored]]:
-    from lobewatch.history.row_bytes import encode_row
-    from lobewatch.logbook.logbook import Logbook
-    from lobewatch.plant.summarise import summarise
-
-    logbook = Logbook.open(path)
-    summary, hashes = summarise(logbook, now), logbook.machine.program_hashes
-    return summary, _decoded([encode_row(number, row, hashes) for number, row in enumerate(logbook.history.rows)])
+    return list({row.number: row for row in rows if row.number >= 0}.values())
 
 
 def all_tables(machines: Mapping[str, Path], damaged: dict[str, str]) -> Iterator[TapTable]:
-    """Of all machines in order of their names; those that cannot be read are added to `damaged`, with the reason."""
+    """The tables of all machines in order of their names; `damaged` gets those that cannot be read, with the reason."""
     for key in sorted(machines):
         try:
             yield tap_table(key, machines[key])

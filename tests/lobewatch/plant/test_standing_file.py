@@ -17,7 +17,7 @@ from lobewatch.cli import app
 from lobewatch.logbook import Logbook
 from lobewatch.machine import MachineFolder
 from lobewatch.plant.plant import Plant
-from lobewatch.plant.standing_file import KEPT, read_standing
+from lobewatch.plant.standing_file import LASTING, read_standing
 from lobewatch.plant.summarise import summarise
 
 Shop = Any
@@ -109,7 +109,7 @@ def test_that_of_another_folder_or_another_week_does_not_count(tapped: Shop, tmp
     shutil.copytree(tapped.path, tmp_path / "other")
     assert read_standing(tmp_path / "other", now(tapped)) is None
     assert kept(tapped)
-    assert read_standing(tapped.path, now(tapped) + KEPT) is None
+    assert read_standing(tapped.path, now(tapped) + LASTING) is None
     newest = tapped.path / "taps" / f"{tapped.logbook.newest().id}.h5"
     newest.write_bytes(newest.read_bytes()[:-1])
     assert not kept(tapped)

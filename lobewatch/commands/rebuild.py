@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json
+from lobewatch.show.terminal.output import Json, emit
+
+if TYPE_CHECKING:
+    from lobewatch.measuring.workers.share_work import Workers
+    from lobewatch.show.replays.describe_rebuild import MachineRebuild
 
 
 def rebuild(
@@ -34,8 +38,53 @@ def rebuild(
       lobewatch rebuild mill-3
       lobewatch rebuild mills --scheduler tcp://10.0.0.5:8786
     """
+    from acquisition import DataError
     from lobewatch.measuring.workers.share_work import Workers
-    from lobewatch.notify.telling import tell
-    from lobewatch.show.replays.show_rebuild import show_rebuild
+    from lobewatch.show.replays.describe_rebuild import (
+        MachineRebuild,
+        folder_rebuild_json,
+        folder_rebuild_texts,
+        rebuild_json,
+        rebuild_texts,
+    )
 
-    show_rebuild(machine, Workers(jobs, scheduler), tell, as_json=as_json)
+    workers, folders = Workers(jobs, scheduler), _machines_in(machine)
+    if not folders:
+        outcome = _rebuild_machine(machine, workers)
+        emit(rebuild_json(outcome), as_json, *rebuild_texts(outcome))
+        return
+    outcomes, refused = dict[str, MachineRebuild](), list[str]()
+    for folder in folders:
+        try:
+            outcomes[folder.name] = _rebuild_machine(folder, workers)
+        except DataError as error:
+            refused.append(str(error))
+    emit(folder_rebuild_json(outcomes), as_json, *folder_rebuild_texts(outcomes, len(folders)))
+    if refused:
+        raise DataError("\n".join([f"{len(refused)} of {len(folders)} machines cannot be rebuilt", *refused]))
+
+
+def _machines_in(path: Path) -> list[Path]:
+    """The machine folders in a folder that is none itself."""
+    from lobewatch.machine.contents import tap_files
+
+    if (path / "machine.toml").is_file() or tap_files(path):
+        return []
+    return sorted(folder for folder in path.glob("*/") if (folder / "machine.toml").is_file() or tap_files(folder))
+
+
+def _rebuild_machine(path: Path, workers: Workers) -> MachineRebuild:
+    """Rebuild a machine, and tell whom it may concern."""
+    from lobewatch.logbook import Logbook
+    from lobewatch.logbook.rebuild_history import rebuild_history
+    from lobewatch.machine.archive.rebuild import rebuild_files
+    from lobewatch.notify.telling import tell
+    from lobewatch.show.replays.describe_rebuild import MachineRebuild
+    from lobewatch.show.replays.progress import rebuild_progress
+
+    repairs = rebuild_files(path)
+    logbook = Logbook.open(path)
+    n_taps = rebuild_history(logbook, workers, rebuild_progress(path.name))
+    is_saved = all(remark.code != "history-in-memory" for remark in logbook.remarks)
+    tell(logbook)
+    return MachineRebuild(repairs, n_taps, is_saved, logbook.remarks)

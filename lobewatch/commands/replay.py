@@ -67,12 +67,17 @@ def replay(
       lobewatch replay mill-3 h.mat --columns "frequency=Freq,frf=H:2" --unit m/N --date 2024-05-01
       lobewatch replay mill-3 mill-3/taps/ID.h5 --accept frequency-jump
     """
-    from acquisition import Conditions
+    from acquisition import Conditions, DataError
     from lobewatch.logbook import Logbook
+    from lobewatch.logbook.preview import preview_recordings
     from lobewatch.logbook.replaying.find_files import find_files
+    from lobewatch.logbook.replaying.store import refusal
+    from lobewatch.measuring.questions import check_codes, unasked_text
     from lobewatch.measuring.workers.share_work import Workers
     from lobewatch.notify.telling import telling
-    from lobewatch.show.replays.show_replay import show_preview, show_replay
+    from lobewatch.show.replays.describe_preview import show_preview
+    from lobewatch.show.replays.describe_replay import show_replay
+    from lobewatch.show.replays.progress import ReplayProgress
 
     description = file_options.description(
         date=date,
@@ -84,16 +89,24 @@ def replay(
     workers = Workers(jobs, scheduler)
     logbook, (recordings, passed) = Logbook.open(machine), find_files(files)
     if dry_run:
-        show_preview(logbook, recordings, passed, description, workers=workers, as_json=as_json)
+        with ReplayProgress() as progress:
+            previews = preview_recordings(logbook, recordings, description, progress, workers)
+        show_preview(previews, passed, as_json=as_json)
+        n_refused = sum(bool(preview.refused) for preview in previews)
+        if n_refused:
+            reasons = "cannot be used as they are; the reasons stand above"
+            raise DataError(f"{n_refused} of {len(recordings)} file(s) {reasons}")
         return
+    codes = check_codes(accept or ())
     with telling(logbook):
-        show_replay(
-            logbook,
-            recordings,
-            passed,
-            description,
-            accept or (),
-            workers=workers,
-            keep_going=keep_going,
-            as_json=as_json,
-        )
+        with ReplayProgress() as progress:
+            outcome = logbook.replay_all(
+                recordings, description, workers=workers, keep_going=keep_going, progress=progress
+            )
+        unasked = logbook.accept(outcome.tap_ids, codes)
+        accepted = [code for code in codes if code not in unasked]
+        show_replay(outcome, logbook, len(recordings), passed, accepted, as_json=as_json)
+        if outcome.refused:
+            raise DataError(refusal(outcome.refused, len(recordings), stored=True))
+        if unasked:
+            raise ValueError(unasked_text(unasked, outcome.tap_ids, logbook.questions))

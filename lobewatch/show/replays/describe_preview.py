@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.table import Table
@@ -12,11 +13,18 @@ from acquisition import Fact
 from lobewatch.logbook.preview import Preview
 from lobewatch.measuring.questions import open_questions
 from lobewatch.show.spindle.describe_modes import in_order, mode_json
-from lobewatch.show.terminal.output import table
+from lobewatch.show.terminal.output import emit, table
 
 ONE_BY_ONE = 6
 """So many files are told in full, more of them in a line each."""
 _ORIGINS = {"file": "from the file", "option": "by option", "default": "nobody says, taken"}
+
+
+def show_preview(previews: Sequence[Preview], passed: Sequence[Path], *, as_json: bool) -> None:
+    """Print what would become of files; passed: other files of the folders."""
+    files = [preview_json(preview) for preview in previews]
+    payload = {"dry_run": True, "files": files, "passed_over": list(map(str, passed))}
+    emit(payload, as_json, *preview_texts(previews), preview_summary(previews, len(passed)))
 
 
 def fact_lines(facts: Iterable[Fact]) -> list[str]:

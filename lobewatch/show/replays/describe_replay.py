@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.table import Table
@@ -13,10 +14,44 @@ from lobewatch.logbook import Logbook
 from lobewatch.logbook.replaying.store import ReplayOutcome
 from lobewatch.show.history.measurements import measurement_json, measurement_texts
 from lobewatch.show.programs.verdicts import program_texts, programs_json
-from lobewatch.show.terminal.output import table
+from lobewatch.show.terminal.output import emit, notes, table
 
 IN_FULL = 3
 """So many tap tests are told in full, more of them summed up."""
+MANY = 12
+"""So many files are told one by one where they were stored already, more of them by their number ..."""
+FEW = 3
+"""... unless no more than these were."""
+
+
+def show_replay(
+    outcome: ReplayOutcome,
+    logbook: Logbook,
+    n_files: int,
+    passed: Sequence[Path],
+    accepted: Sequence[str],
+    *,
+    as_json: bool,
+) -> None:
+    """Print what has become of files; passed: other files of the folders; accepted: codes of questions answered."""
+    _note_known(outcome.known, n_files)
+    if passed:
+        notes.print(f"passed over: {len(passed)} other files, such as {passed[0].name}", markup=False)
+    payload, texts = dict[str, Any](), list[str | Table]()
+    if as_json:
+        payload = replay_json(outcome, logbook) | {"accepted": list(accepted), "questions": logbook.questions}
+    else:
+        texts = [*replay_texts(outcome, logbook), *(f"accepted: {code}" for code in accepted)]
+    emit(payload, as_json, *texts, f"{len(outcome.fresh)} of {n_files} file(s) stored in {logbook.folder.path}")
+
+
+def _note_known(known: Mapping[Path, str], n_files: int) -> None:
+    """Files that were stored already: each where they are few."""
+    if n_files > MANY and len(known) > FEW:
+        notes.print(f"{len(known)} of {n_files} files are stored already", markup=False)
+        return
+    for file, tap_id in known.items():
+        notes.print(f"{file.name}: stored already as {tap_id}", markup=False)
 
 
 def replay_json(stored: ReplayOutcome, logbook: Logbook) -> dict[str, Any]:

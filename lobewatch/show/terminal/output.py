@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Annotated, Any, Literal
 
 import typer
@@ -19,6 +19,7 @@ from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
+from acquisition import Remark, joined
 from acquisition.names import CONTROL
 
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]
@@ -108,3 +109,13 @@ def _finite(value: Any) -> Any:
     if hasattr(value, "tolist"):
         return _finite(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def remark_json(remark: Remark) -> dict[str, str]:
+    """One remark."""
+    return {"code": remark.code, "about": remark.about, "text": remark.text, "cure": remark.cure}
+
+
+def remark_lines(remarks: Sequence[Remark]) -> list[str]:
+    """A line each; those that say the same of several things once."""
+    return [f"note: {remark}" for remark in joined(remarks)]

@@ -1,7 +1,8 @@
-"""How far a long piece of work is, on a terminal only."""
+"""How far a replay or a rebuild is, on standard error."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
@@ -9,12 +10,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from lobewatch.show.terminal.output import notes
 
-WORDS = {"read": "reading", "store": "storing", "measure": "working out"}
-"""What is told of the steps of a replay."""
+STEPS = {"read": "reading", "store": "storing", "measure": "working out"}
+"""Names of the steps of a replay for people."""
+EVERY = 10
+"""Tap tests between two lines of a rebuild."""
 
 
-class ProgressBar:
-    """A bar a step; called with the step, how many are done, and of how many."""
+class ReplayProgress:
+    """A bar a step, on a terminal only; called with the step, how many files are done, and of how many."""
 
     def __init__(self) -> None:
         """Nothing is shown yet."""
@@ -36,5 +39,15 @@ class ProgressBar:
     def __call__(self, step: str, done: int, of: int) -> None:
         """So many are done."""
         if step not in self._tasks:
-            self._tasks[step] = self._bars.add_task(WORDS[step], total=of)
+            self._tasks[step] = self._bars.add_task(STEPS[step], total=of)
         self._bars.update(self._tasks[step], completed=done, total=of)  # type: ignore[arg-type]
+
+
+def rebuild_progress(name: str) -> Callable[[int, int], None]:
+    """A line every few tap tests of the machine of this name; called with how many are done, and of how many."""
+
+    def show(done: int, of: int) -> None:
+        if done % EVERY == 0:
+            notes.print(f"{name}: {done} of {of} tap tests", markup=False)
+
+    return show

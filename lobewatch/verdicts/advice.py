@@ -37,7 +37,7 @@ def advise(found: Verdict, machine: Machine) -> Advice:
     remarks = (remark,) if found.stable else ()
     if found.word is Word.STABLE or not found.assembly.is_sure:
         return Advice(decay=decay, remarks=remarks)
-    search = SettingSearch.of(found.program, found.drawn, found.assembly, machine)
+    search = SettingSearch.of(found.program, found.drawn, found.assembly, machine, found.at_speed)
     best = search.elsewhere()
     if best is not None:
         return Advice(best, None, decay, remarks)

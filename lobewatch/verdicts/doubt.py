@@ -1,6 +1,7 @@
 """What is not known of a program on a spindle, as numbers: made here from tap tests and machine.toml, drawn from here.
 
-Half-widths of independent uniform distributions. Whatever is said of a program over its doubt comes from these draws.
+Half-widths of independent uniform distributions; where test cuts have taught, the draws that they have left. Whatever
+is said of a program over its doubt comes from these draws.
 """
 
 from __future__ import annotations
@@ -24,17 +25,54 @@ LEAST = 0.02
 """Nothing is drawn below this share of its middle value ..."""
 MOST_TURNED = np.radians(89)
 """... and no phase beyond this (rad)."""
+CUTS = "cuts"
+"""Cause of the doubt of modes that test cuts have taught: all that they have left open."""
 
 Floats = NDArray[np.float64]
 
 
 class Span(NamedTuple):
-    """Lowest and highest value over the middle one."""
+    """Lowest and highest value of a number, as factors on its middle or on that at rest."""
 
     low: float
-    """At most 1."""
+    """Lowest factor; at most 1 where it is on the middle."""
     high: float
-    """At least 1."""
+    """Highest factor; at least 1 where it is on the middle."""
+
+
+@dataclass(frozen=True, eq=False)
+class LearntDraws:
+    """Spindles at speed that explain the test cuts, r of equal weight, around their mean; n modes in x, then y."""
+
+    frequency: Floats
+    """Natural frequencies over their mean, shape (r, n)."""
+    damping_ratio: Floats
+    """Damping ratios over their mean, shape (r, n)."""
+    stiffness: Floats
+    """Modal stiffnesses over their mean, shape (r, n)."""
+    turned: Floats
+    """Phases less those of the middle (rad), shape (r, n)."""
+    force: Floats
+    """Kt over its mean, shape (r,)."""
+    direction: Floats
+    """Kr/Kt over its mean, shape (r,)."""
+
+    def rows(self, middle: MillingRows, count: int, without: str) -> MillingRows:
+        """So many of them around a middle (a row), at its speed; without: a cause that is taken as known."""
+        take = np.arange(count) % len(self.force)
+        rows, spindle = middle[np.zeros(count, dtype=np.intp)], float(without != CUTS)
+        force, direction = (
+            1 + (factor[take] - 1) * (without != "coefficients") for factor in (self.force, self.direction)
+        )
+        return replace(
+            rows,
+            frequency=rows.frequency * (1 + (self.frequency[take] - 1) * spindle),
+            damping_ratio=rows.damping_ratio * (1 + (self.damping_ratio[take] - 1) * spindle),
+            stiffness=rows.stiffness * (1 + (self.stiffness[take] - 1) * spindle),
+            phase=rows.phase + self.turned[take] * spindle,
+            tangential=rows.tangential * force,
+            radial=rows.radial * force * direction,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +82,7 @@ class Doubt:
     modes: Mapping[str, Floats]
     """Half-widths of frequency, damping ratio and stiffness (relative) and phase (rad) of the modes in x, then y, shape
     (n, 4), by cause: "tap" (the error of the tap test), "clamping" (from tap test to tap test), "prediction" (a tool
-    that was never tapped), "untapped" (a direction that was not)."""
+    that was never tapped), "untapped" (a direction that was not), "cuts" (what test cuts have left open)."""
     mixing: Floats
     """Roots of the correlations of the error of the tap test, lower triangular, shape (n, 4, 4); 1 where none count."""
     speed: float
@@ -53,6 +91,8 @@ class Doubt:
     """Of the cutting coefficient Kt."""
     ratio: Span
     """Of Kr/Kt, the direction of the force."""
+    learnt: LearntDraws | None = None
+    """Draws that test cuts have left, which stand for the half-widths; None where none has taught anything."""
 
     @property
     def causes(self) -> tuple[str, ...]:
@@ -64,6 +104,10 @@ class Doubt:
 
         without: a cause that is taken as known.
         """
+        if self.learnt is not None:
+            rows = self.learnt.rows(middle, count, without)
+            speed = 1 + self.speed * np.random.default_rng(seed).uniform(-1, 1, count) * (without != "speed")
+            return replace(rows, speed_rpm=rows.speed_rpm * np.maximum(speed, LEAST))
         random, phases = np.random.default_rng(seed), np.random.default_rng((seed, 1))
         factor = np.ones((count, middle.frequency.shape[1], 3))
         turned = np.zeros(factor.shape[:2])
@@ -99,9 +143,7 @@ class Doubt:
 
 
 def doubt_of(assembly: Assembly, table: CutTable, machine: Machine) -> Doubt:
-    """The doubt of a cut with a tool as it is known at some time; where test cuts have taught, what they left."""
-    if assembly.doubt is not None:
-        return assembly.doubt
+    """The doubt of a cut with a tool as it is known at some time, at rest."""
     tangential, ratio = _coefficients(table, machine)
     modes = [*(assembly.x or ()), *(assembly.y or ())]
     mixing = np.array([_mixing(mode) for mode in modes])

@@ -15,6 +15,7 @@ from lobewatch.tool.charts import cut_table
 from lobewatch.verdicts.doubt import doubt_of
 from lobewatch.verdicts.drawn import middle_row
 from lobewatch.verdicts.mean_force import MeanForce
+from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
 from lobewatch.verdicts.verdict import QUANTILES
 
 DRAWS = 64
@@ -39,16 +40,19 @@ class LimitBand:
     """99 % quantile, or the line (m), shape (n,); inf where there is no limit."""
 
 
-def limit_band(line: StabilityLobes, cut: str, assembly: Assembly, machine: Machine) -> LimitBand:
-    """The band around the line of a cut (its name), by draws from the doubt (`doubt_of`).
+def limit_band(
+    line: StabilityLobes, cut: str, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed = AT_REST
+) -> LimitBand:
+    """The band around the line of a cut (its name), by draws from the doubt.
 
     Each draw is worked out by zero order. Of a line by another method it is the same line at the speed that belongs to
     the frequency of the draw, times what zero order says of the rest: that holds to a per cent for a line by zero
     order, and for any method as to spindle speed, cutting coefficient, and changes that all modes share.
     """
     cuts = machine.cuts(assembly.tool)[cut]
-    rows = middle_row(Program(cuts[0], 1.0, 1.0), assembly)
-    drawn = doubt_of(assembly, cut_table(machine, cut), machine).draw(rows, DRAWS)
+    rows = middle_row(Program(cuts[0], 1.0, 1.0), at_speed.moved(assembly))
+    doubt = at_speed.doubt or doubt_of(assembly, cut_table(machine, cut), machine)
+    drawn = doubt.draw(rows, DRAWS)
     softest = int(np.argmin(rows.stiffness[0] * rows.damping_ratio[0]))
     moved = (drawn.speed_rpm / (drawn.frequency[:, softest] / rows.frequency[0, softest]))[:, np.newaxis]
     low, high = float(np.min(line.speed_rpm)), float(np.max(line.speed_rpm))

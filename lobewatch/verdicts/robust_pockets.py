@@ -13,13 +13,16 @@ from lobewatch.tool.assembly import Assembly, speed_grid
 from lobewatch.verdicts.doubt import doubt_of
 from lobewatch.verdicts.drawn import draw
 from lobewatch.verdicts.setting_search import MM, Setting, SettingSearch
+from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
 from lobewatch.verdicts.verdict import as_program
 
 SHARE = 0.5
 """Depth that the search begins with, over the lowest limit of the diagram."""
 
 
-def robust_pockets(table: CutTable, assembly: Assembly, machine: Machine, count: int = 3) -> list[Setting]:
+def robust_pockets(
+    table: CutTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed = AT_REST, count: int = 3
+) -> list[Setting]:
     """Speeds and depths that would be called stable with depth to spare, the largest removal rate first.
 
     The speed is the middle of those that are safe now and until it is tapped again. Empty where nothing is safe in the
@@ -27,11 +30,13 @@ def robust_pockets(table: CutTable, assembly: Assembly, machine: Machine, count:
     """
     if not assembly.is_sure:
         return []
-    table = _as_program(table, assembly, machine)
+    spindle = at_speed.moved(assembly)
+    table = _as_program(at_speed.taught(table), spindle, machine)
     program = as_program(table, machine)
-    found = program_limit(program, assembly.x, assembly.y, table.feed_angles)
-    drawn = draw(program, found, table.feed_angles, assembly, doubt_of(assembly, table, machine))
-    return SettingSearch.of(table, drawn, assembly, machine).pockets(count)
+    middle = program_limit(program, spindle.x, spindle.y, table.feed_angles)
+    doubt = at_speed.doubt or doubt_of(assembly, table, machine)
+    drawn = draw(program, middle, table.feed_angles, spindle, doubt)
+    return SettingSearch.of(table, drawn, assembly, machine, at_speed).pockets(count)
 
 
 def _as_program(table: CutTable, assembly: Assembly, machine: Machine) -> ProgramTable:

@@ -22,6 +22,7 @@ from lobewatch.verdicts.aging import StiffnessAt, aged, softening
 from lobewatch.verdicts.drawn import Drawn
 from lobewatch.verdicts.drawn_limits import ALIKE
 from lobewatch.verdicts.promise import Promise
+from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
 from lobewatch.verdicts.verdict import Word, weigh
 
 SPARE = 0.20
@@ -82,18 +83,21 @@ class SettingSearch:
     """Its draws, in the worst directions of feed."""
     assembly: Assembly
     machine: Machine
+    at_speed: SpindleAtSpeed
     stiffness_at: StiffnessAt
     fall: float
     promise: Promise
     """Where to look."""
 
     @classmethod
-    def of(cls, program: ProgramTable, drawn: Drawn, assembly: Assembly, machine: Machine) -> SettingSearch:
+    def of(
+        cls, program: ProgramTable, drawn: Drawn, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed
+    ) -> SettingSearch:
         """The search around a program that was drawn."""
         fall = needed_fall(assembly, machine)
-        promise = Promise.of(program, drawn, assembly, machine, fall, SPARE)
+        promise = Promise.of(program, drawn, at_speed.moved(assembly), machine, fall, SPARE)
         worst = drawn.fed(ALIKE * float(drawn.limits[0]), 2)
-        return cls(program, worst, assembly, machine, softening(assembly)[0], fall, promise)
+        return cls(program, worst, assembly, machine, at_speed, softening(assembly)[0], fall, promise)
 
     def elsewhere(self) -> Setting | None:
         """The nearest window of speeds at the program's depth."""
@@ -157,8 +161,8 @@ class SettingSearch:
         if not self._lasts(speed, depth_mm / 1e3):
             return None
         depth, deepest = depth_mm / 1e3, drive_limit(self.machine, table, np.array([speed]))[0]
-        found = weigh(table, self.assembly, self.machine)
-        margin = found.found.limit / depth - 1
+        found = weigh(table, self.assembly, self.machine, self.at_speed)
+        margin = found.middle.limit / depth - 1
         if found.word is not Word.STABLE or margin < SPARE or depth > deepest:
             return None
         near = found.drawn.fed(2 * depth)

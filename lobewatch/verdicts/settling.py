@@ -32,8 +32,11 @@ def decisive(drawn: Drawn, chatters: NDArray[np.bool_], middle: MillingRows, dep
     return max(mended, key=lambda cause: mended[cause])
 
 
-def settles(cause: str, table: ProgramTable, tangential: float, assembly: Assembly) -> Remark:
-    """What would settle it; tangential: Kt (Pa) above which the program chatters in the middle of all else."""
+def settles(cause: str, table: ProgramTable, tangential: float, assembly: Assembly, cuts: int) -> Remark:
+    """What would settle it; tangential: Kt (Pa) above which the program chatters in the middle of all else.
+
+    cuts: number of test cuts that have taught of it.
+    """
     known = "".join(assembly.directions)
     text, cure = {
         "coefficients": (
@@ -48,7 +51,7 @@ def settles(cause: str, table: ProgramTable, tangential: float, assembly: Assemb
         "tap": ("the error of the tap test decides", "tap again with more hits"),
         "prediction": ("the prediction decides", f"tap tool {table.tool!r}"),
         "cuts": (
-            f"the spindle at speed decides, as {assembly.cuts} test cuts have left it open",
+            f"the spindle at speed decides, as {cuts} test cuts have left it open",
             f"make the next test cut: lobewatch suggest names it for {table.name!r}",
         ),
         "question": (

@@ -19,6 +19,7 @@ from lobewatch.verdicts.doubt import doubt_of
 from lobewatch.verdicts.drawn import DRAWS, Drawn, draw, middle_row, turning
 from lobewatch.verdicts.drawn_limits import drawn_limits
 from lobewatch.verdicts.settling import decisive, settles
+from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
 
 QUANTILES = (0.01, 0.99)
 """Of the limit over the doubt."""
@@ -68,14 +69,16 @@ class Ruling(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """Whether a program is stable with a tool in the spindle as it is known at some time, at rest."""
+    """Whether a program is stable with a tool in the spindle as it is known at some time."""
 
     program: ProgramTable
-    """As it stands in machine.toml, with the cutting coefficients that test cuts have taught."""
+    """Program as it stands in machine.toml, with the cutting coefficients that test cuts have taught."""
     word: Word
     """See Word."""
     assembly: Assembly | None = None
-    """What it was checked with; None where there is nothing to check with."""
+    """Tool as tapped that it was checked with; None where there is nothing to check with."""
+    at_speed: SpindleAtSpeed = AT_REST
+    """What test cuts have taught beside it."""
     limit: float = math.nan
     """Deepest stable depth at its speed in the middle of the doubt, in the worst direction of feed (m); inf where there
     is none up to 20 times its own, NaN where unknown."""
@@ -116,6 +119,11 @@ class Verdict:
         return self.assembly is not None and not self.assembly.predicted
 
     @property
+    def cuts(self) -> int:
+        """Number of test cuts that it rests on; 0 where it holds for the spindle at rest."""
+        return self.at_speed.cuts
+
+    @property
     def depth_margin(self) -> float:
         """Limit in the middle over depth, less 1; negative where it is not stable."""
         return self.limit / (self.program.depth_mm / 1e3) - 1
@@ -136,66 +144,70 @@ class Judgement(NamedTuple):
 
     word: Word
     """See Word."""
-    found: ProgramLimit
-    """The middle of the doubt."""
+    middle: ProgramLimit
+    """Limit in the middle of the doubt."""
     low: float
     """1 % quantile of the limit over the doubt (m)."""
     high: float
     """99 % quantile (m)."""
     drawn: Drawn
-    """The spindles that it was judged on."""
+    """Spindles that it was judged on."""
     chatters: NDArray[np.bool_]
     """Which of the draws chatter, without the middle, shape (DRAWS,)."""
 
 
-def judge(table: ProgramTable, known: Assembly | DataError, machine: Machine) -> Verdict:
-    """The verdict on a program, or why its tool is not known."""
-    if isinstance(known, DataError):
-        return unknown(table, (Remark("no-tap", "", str(known)),))
-    return verdict(table, known, machine)
-
-
-def weigh(table: ProgramTable, assembly: Assembly, machine: Machine) -> Judgement:
-    """The word on a program by semi-discretisation over its doubt; charts by other methods decide nothing."""
-    program = as_program(table, machine)
-    found = program_limit(program, assembly.x, assembly.y, table.feed_angles)
-    drawn = draw(program, found, table.feed_angles, assembly, doubt_of(assembly, table, machine))
-    limits = drawn_limits(drawn, program.depth)[1:]
-    low, high = np.quantile(limits, QUANTILES, method="closest_observation")
-    near = drawn.fed(SURELY * program.depth * found.limit / low if np.isfinite(found.limit) else 0.0)
-    chatters = (near.growth(program.depth)[1:, 0] >= 0) | (limits <= program.depth)
-    return Judgement(_word(found.stable, chatters, assembly), found, float(low), float(high), drawn, chatters)
-
-
-def verdict(table: ProgramTable, assembly: Assembly, machine: Machine) -> Verdict:
-    """The word on a program, and what goes with it."""
-    if not assembly.directions:
-        return unknown(table, assembly.remarks, assembly)
-    word, found, low, high, drawn, chatters = weigh(table, assembly, machine)
-    program, cause, remarks = as_program(table, machine), "", [*_remarks(table, assembly, machine)]
+def judge(
+    table: ProgramTable, tool: Assembly | DataError, machine: Machine, at_speed: SpindleAtSpeed = AT_REST
+) -> Verdict:
+    """The verdict on a program as it stands in machine.toml, or why its tool is not known."""
+    if isinstance(tool, DataError):
+        return unknown(table, (Remark("no-tap", "", str(tool)),))
+    if not tool.directions:
+        return unknown(table, tool.remarks, tool)
+    table = at_speed.taught(table)
+    word, middle, low, high, drawn, chatters = weigh(table, tool, machine, at_speed)
+    program, cause, remarks = as_program(table, machine), "", [*_remarks(table, tool, at_speed, machine)]
     if word is Word.DOUBTFUL:
-        middle = middle_row(program, assembly)
-        cause = "question" if assembly.questions else decisive(drawn, chatters, middle, program.depth)
-        remarks.append(settles(cause, table, found.limit / program.depth * program.cut.tangential, assembly))
-    taught = assembly.doubt is not None
+        row = middle_row(program, at_speed.moved(tool))
+        cause = "question" if tool.questions else decisive(drawn, chatters, row, program.depth)
+        remarks.append(
+            settles(cause, table, middle.limit / program.depth * program.cut.tangential, tool, at_speed.cuts)
+        )
     return Verdict(
         program=table,
         word=word,
-        assembly=assembly,
-        limit=found.limit,
-        limit_low=min(low, found.limit),
-        limit_high=max(high, found.limit),
-        chance_turning=float(np.mean(chatters)) if taught else _chance_turning(drawn, program.depth),
+        assembly=tool,
+        at_speed=at_speed,
+        limit=middle.limit,
+        limit_low=min(low, middle.limit),
+        limit_high=max(high, middle.limit),
+        chance_turning=float(np.mean(chatters)) if at_speed.cuts else _chance_turning(drawn, program.depth),
         decided_by=cause,
-        chatter_frequency=found.chatter_frequency,
-        kind=found.kind,
-        feed_angle=found.feed_angle,
-        method=found.method,
-        detail=f"{found.detail}, {DRAWS} draws from the doubt",
+        chatter_frequency=middle.chatter_frequency,
+        kind=middle.kind,
+        feed_angle=middle.feed_angle,
+        method=middle.method,
+        detail=f"{middle.detail}, {DRAWS} draws from the doubt",
         drive_limit=float(drive_limit(machine, table, np.array([table.speed_rpm]))[0]),
         drawn=drawn,
         remarks=tuple(remarks),
     )
+
+
+def weigh(table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed = AT_REST) -> Judgement:
+    """The word on a program by semi-discretisation over its doubt; charts by other methods decide nothing.
+
+    table: with the coefficients that test cuts have taught.
+    """
+    program, spindle = as_program(table, machine), at_speed.moved(assembly)
+    middle = program_limit(program, spindle.x, spindle.y, table.feed_angles)
+    doubt = at_speed.doubt or doubt_of(assembly, table, machine)
+    drawn = draw(program, middle, table.feed_angles, spindle, doubt)
+    limits = drawn_limits(drawn, program.depth)[1:]
+    low, high = np.quantile(limits, QUANTILES, method="closest_observation")
+    near = drawn.fed(SURELY * program.depth * middle.limit / low if np.isfinite(middle.limit) else 0.0)
+    chatters = (near.growth(program.depth)[1:, 0] >= 0) | (limits <= program.depth)
+    return Judgement(_word(middle.stable, chatters, assembly), middle, float(low), float(high), drawn, chatters)
 
 
 def _chance_turning(drawn: Drawn, depth: float) -> float:
@@ -222,9 +234,9 @@ def as_program(table: ProgramTable, machine: Machine) -> Program:
     return Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
 
 
-def _remarks(table: ProgramTable, assembly: Assembly, machine: Machine) -> Iterator[Remark]:
-    about_modes = (*ABOUT_DIRECTIONS, "predicted", "cut-unexplained", "frequency-far-off")
-    yield from (remark for remark in assembly.remarks if remark.code in about_modes)
+def _remarks(table: ProgramTable, assembly: Assembly, at_speed: SpindleAtSpeed, machine: Machine) -> Iterator[Remark]:
+    yield from (remark for remark in assembly.remarks if remark.code in (*ABOUT_DIRECTIONS, "predicted"))
+    yield from at_speed.remarks
     yield from assembly.questions
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and table.feed_per_tooth_mm is None:
         yield Remark("drive-ignored", table.name, "[drive] does not count: feed_per_tooth_mm is missing")

@@ -10,9 +10,9 @@ from random_milling import random_case
 from verdict_study import MACHINE, assembly, chattering, limit_mm, program, study, upper_limit
 
 from lobes import growth, piece_numbers
-from lobewatch.analysis.programs.doubt import doubt_of
-from lobewatch.analysis.programs.drawn import middle_row
-from lobewatch.analysis.programs.verdict import Word, as_program, verdict
+from lobewatch.verdicts.doubt import doubt_of
+from lobewatch.verdicts.drawn import middle_row
+from lobewatch.verdicts.verdict import Word, as_program, judge
 
 
 def say(text: str) -> None:
@@ -52,7 +52,7 @@ def test_a_machine_tapped_in_one_direction_is_never_called_stable(count: int) ->
         milling = random_case(rng)
         limit = limit_mm(milling)
         depth = 0.1 * limit if np.isfinite(limit) else 1.0
-        words.append(verdict(program(milling, depth), assembly(milling, ("x",)), MACHINE).word)
+        words.append(judge(program(milling, depth), assembly(milling, ("x",)), MACHINE).word)
     assert Word.STABLE not in words
     assert Word.DOUBTFUL in words
 
@@ -73,7 +73,7 @@ def test_what_is_stable_in_all_of_the_doubt_with_5_percent_to_spare_is_called_st
         depths = np.full((2000, 1), 1.05 * cut.depth)
         turned = [drawn.fed_at(angle) for angle in table.feed_angles]
         if all(np.all(growth(rows, depths, piece_numbers(rows, 1.05 * cut.depth)) < 0) for rows in turned):
-            called.append(verdict(table, known, MACHINE).word is Word.STABLE)
+            called.append(judge(table, known, MACHINE).word is Word.STABLE)
     say(f"{share(sum(called), len(called))} called stable")
     assert len(called) >= 30
     assert np.mean(called) >= 0.95

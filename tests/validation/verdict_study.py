@@ -11,17 +11,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 
+import milling_simulation
 import numpy as np
-from milling_simulation import Case, Modes, judge
+from milling_simulation import Case, Modes
 from random_milling import RandomMilling, random_case
 from scipy.stats import beta
 
 from lobes import program_limit
-from lobewatch.analysis.assembly import Assembly
-from lobewatch.analysis.programs.advice import advise
-from lobewatch.analysis.programs.verdict import Word, as_program, verdict
 from lobewatch.machine import Machine, ProgramTable
-from lobewatch.machine.machine_file import parse_machine
+from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.advice import advise
+from lobewatch.verdicts.verdict import Word, as_program, judge
 from modal import Mode
 
 MACHINE: Machine = parse_machine('[machine]\nname = "random"\n[speed]\nlow_rpm = 1500\nhigh_rpm = 24000\n')
@@ -53,19 +54,19 @@ def study(count: int, seed: int, truths: int, most_modes: int = 12) -> Study:
         if not math.isfinite(limit):
             continue
         below, above = (program(milling, limit * rng.uniform(*share)) for share in ((0.3, 0.8), (1.05, 3.0)))
-        if verdict(below, assembly(milling), MACHINE).word is Word.STABLE:
+        if judge(below, assembly(milling), MACHINE).word is Word.STABLE:
             found.stable_programs += 1
             found.stable += drawn_truths(milling, below, truths, rng)
         for setting in settings(milling, above):
             found.settings += 1
-            found.refused += verdict(setting, assembly(milling), MACHINE).word is not Word.STABLE
+            found.refused += judge(setting, assembly(milling), MACHINE).word is not Word.STABLE
             found.recommended += drawn_truths(milling, setting, truths, rng)
     return found
 
 
 def settings(milling: RandomMilling, table: ProgramTable) -> Iterator[ProgramTable]:
     """The programs that are recommended in place of one."""
-    advice = advise(verdict(table, assembly(milling), MACHINE), MACHINE)
+    advice = advise(judge(table, assembly(milling), MACHINE), MACHINE)
     for one in dict.fromkeys(filter(None, (advice.best, advice.here))):
         yield program(milling, one.depth_mm, one.speed_rpm)
 
@@ -98,7 +99,7 @@ def _moved(modes: Modes, rng: np.random.Generator) -> Modes:
 
 def chattering(truths: list[Case]) -> int:
     """How many chatter; a case that is not settled counts."""
-    found = judge(truths)
+    found = milling_simulation.judge(truths)
     return int(np.sum(found.chatters | (found.doubt >= np.abs(found.growth))))
 
 

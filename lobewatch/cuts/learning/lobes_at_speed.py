@@ -27,11 +27,11 @@ class LobesAtSpeed(NamedTuple):
 
 def lobes_at_speed(verdicts: Sequence[Verdict], machine: Machine) -> LobesAtSpeed | None:
     """Of programs with the same cut, from their verdicts; None where no test cut has taught anything."""
-    for found in verdicts:
-        known, name = found.assembly, found.program.name
-        if known is None or not known.cuts:
+    for verdict in verdicts:
+        tool, name, at_speed = verdict.assembly, verdict.program.name, verdict.at_speed
+        if tool is None or not at_speed.cuts:
             continue
-        taught = msgspec.structs.replace(machine, program=(found.program,))
-        lobes = tip_lobes(known.tool, known.x, known.y, taught, [name])[name]
-        return LobesAtSpeed(known.cuts, lobes, limit_band(lobes, name, known, taught))
+        taught, spindle = msgspec.structs.replace(machine, program=(verdict.program,)), at_speed.moved(tool)
+        lobes = tip_lobes(spindle.tool, spindle.x, spindle.y, taught, [name])[name]
+        return LobesAtSpeed(at_speed.cuts, lobes, limit_band(lobes, name, tool, taught, at_speed))
     return None

@@ -17,8 +17,7 @@ from lobewatch.machine import REFERENCE_CUT, Machine
 from lobewatch.show.programs.doubts import at_speed_line
 from lobewatch.show.programs.settings import setting_json
 from lobewatch.show.programs.verdicts import programs_json, verdict_table
-from lobewatch.show.terminal.output import table
-from lobewatch.show.terminal.remarks import remark_json, remark_lines
+from lobewatch.show.terminal.output import remark_json, remark_lines, table
 from lobewatch.verdicts import Setting
 from lobewatch.verdicts.setting_search import LEFT
 
@@ -59,7 +58,7 @@ def comparison_texts(found: LobeComparison, remarks: Sequence[Remark]) -> list[s
 
 def _at_speed(found: LobeComparison) -> list[str]:
     """What holds at rest and what at speed, where test cuts have taught of a program."""
-    taught = [one for one in found.verdicts if one.assembly and one.assembly.cuts]
+    taught = [verdict for verdict in found.verdicts if verdict.cuts]
     if not taught:
         return []
     still = "the diagram and its pockets are" if found.now.name == REFERENCE_CUT else "the diagram is"

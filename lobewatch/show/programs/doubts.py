@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.cuts.learning.at_speed import LearntDoubt
 from lobewatch.machine import DoubtTable, Machine
 from lobewatch.show.programs.names import NAMES
 from lobewatch.tool import Assembly
 from lobewatch.tool.series import ENOUGH
 from lobewatch.verdicts import Verdict
 from lobewatch.verdicts.doubt import Doubt, Span
+from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
 
 PAGE = "docs/lobes.md"
 """Where the sizes come from."""
@@ -52,20 +52,19 @@ def reading_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
     """What stands below a table of verdicts: what the words mean, and the doubt; nothing where nothing was judged."""
     doubts = doubt_lines(verdicts, machine)
     judged = [found for found in verdicts if found.drawn is not None and found.assembly is not None]
-    taught = [found for found in judged if found.assembly and found.assembly.cuts]
+    taught = [found for found in judged if found.cuts]
     said = ([AT_REST] if len(taught) < len(judged) else []) + ([at_speed_line(taught)] if taught else [])
     return [*doubts, *said] if doubts else []
 
 
 def at_speed_line(taught: Sequence[Verdict]) -> str:
     """What the words mean where test cuts have taught."""
-    names = ", ".join(found.program.name for found in taught)
-    return f"{names}: the words hold for the spindle as it turns, from {_cuts(taught[0])}, and low..high for 98 % of it"
+    names, cuts = ", ".join(found.program.name for found in taught), _cuts(taught[0].at_speed)
+    return f"{names}: the words hold for the spindle as it turns, from {cuts}, and low..high for 98 % of it"
 
 
-def _cuts(found: Verdict) -> str:
-    number = found.assembly.cuts if found.assembly else 0
-    return f"{number} cut{'s' if number > 1 else ''}"
+def _cuts(at_speed: SpindleAtSpeed) -> str:
+    return f"{at_speed.cuts} cut{'s' if at_speed.cuts > 1 else ''}"
 
 
 def doubt_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
@@ -82,8 +81,8 @@ def doubt_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
 def _parts(found: Verdict, doubt: Doubt, assembly: Assembly, machine: Machine) -> Iterator[str]:
     given, standard = machine.doubt, DoubtTable()
     known = "".join(assembly.directions)
-    if isinstance(doubt, LearntDoubt):
-        yield from _learnt(doubt, _cuts(found))
+    if found.cuts:
+        yield from _learnt(found.at_speed, doubt.speed)
         return
     about = {"prediction": "by the prediction", "untapped": f"in {'y' if known == 'x' else 'x'}, not tapped"}
     for cause, widths in doubt.modes.items():
@@ -95,13 +94,14 @@ def _parts(found: Verdict, doubt: Doubt, assembly: Assembly, machine: Machine) -
     yield from _coefficients(found, doubt, machine)
 
 
-def _learnt(doubt: LearntDoubt, cuts: str) -> Iterator[str]:
-    """At speed, before and after the cuts."""
+def _learnt(at_speed: SpindleAtSpeed, speed: float) -> Iterator[str]:
+    """Intervals before and after the cuts; speed: half-width of the spindle speed, relative."""
+    cuts = _cuts(at_speed)
     for name in ("Kt", "Kr/Kt", "f_n in x", "f_n in y"):
         key = next(key for key, told in NAMES.items() if told == name)
-        before, after = (f"{one.low:.2f}..{one.high:.2f}" for one in (doubt.before[key], doubt.after[key]))
+        before, after = (f"{span.low:.2f}..{span.high:.2f}" for span in (at_speed.before[key], at_speed.after[key]))
         yield f"{name} x {after}, {before} before the {cuts}" if name == "Kt" else f"{name} x {after} ({before})"
-    yield f"speed {_half(doubt.speed)}"
+    yield f"speed {_half(speed)}"
 
 
 def _clamping(widths: Floats, assembly: Assembly, given: DoubtTable) -> Iterator[str]:

@@ -13,8 +13,7 @@ from rich.table import Table
 from lobes.program_limit import DEEPEST
 from lobewatch.logbook import Logbook
 from lobewatch.show.programs.doubts import doubt_json, reading_lines
-from lobewatch.show.terminal.output import table
-from lobewatch.show.terminal.remarks import remark_lines
+from lobewatch.show.terminal.output import remark_lines, table
 from lobewatch.verdicts import Verdict, Word
 from lobewatch.verdicts.drawn_limits import TRIED
 
@@ -57,7 +56,7 @@ def verdict_json(found: Verdict) -> dict[str, Any]:
         "depth_margin": found.depth_margin,
         "chance_turning": found.chance_turning,
         "decided_by": found.decided_by or None,
-        "cuts": found.assembly.cuts if found.assembly else 0,
+        "cuts": found.cuts,
         "chatter_frequency_hz": found.chatter_frequency,
         "kind": found.kind,
         "worst_feed_deg": math.degrees(found.feed_angle),

@@ -105,7 +105,7 @@ def analysed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def test_no_command_analyses_a_tap_twice(
     path: Path, analysed: list[str], monkeypatch: pytest.MonkeyPatch, command: str, most: int
 ) -> None:
-    monkeypatch.setattr("lobewatch.logbook.logbook.advise", lambda *_: Advice())
+    monkeypatch.setattr("lobewatch.logbook.analysis.advise", lambda *_: Advice())
     table = DISPUTED.partition('name = "disputed"')[2]
     add_programs(path, "".join(f'[[program]]\nname = "P{i}"{table}' for i in range(3)))
     for month in range(3):

@@ -88,7 +88,7 @@ def test_lobes_at_speed_are_those_of_modes_and_coefficients_that_were_learnt(sho
     assert found is not None
     assert found.cuts == 3
     assert taught.assembly is not None
-    softer = float(np.min(lobes_of(taught.assembly, logbook.machine)["A"].depth))
+    softer = float(np.min(lobes_of(taught.at_speed.moved(taught.assembly), logbook.machine)["A"].depth))
     push = (taught.program.tangential_n_per_mm2 or 0) / (rest.program.tangential_n_per_mm2 or 1)
     assert float(np.min(found.lobes.depth)) == pytest.approx(softer / push, rel=0.1)
     assert np.all(found.band.low <= found.lobes.depth)

@@ -1,0 +1,78 @@
+"""What test cuts have taught of the spindle as it turns, beside the tool as tapped: verdicts rest on both."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Remark
+from lobewatch.machine import CutTable
+from lobewatch.tool.assembly import Assembly, Modes
+from lobewatch.verdicts.doubt import Doubt, Span
+
+Table = TypeVar("Table", bound=CutTable)
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SpindleAtSpeed:
+    """What test cuts have taught of one program and its spindle; without any, the spindle is taken as tapped."""
+
+    cuts: int = 0
+    """Number of test cuts that it was learnt from."""
+    remarks: tuple[Remark, ...] = ()
+    """Cuts that contradict the others, and frequencies far from those at rest."""
+    doubt: Doubt | None = None
+    """What the cuts have left open; None where none has taught anything."""
+    factors: Floats = field(default_factory=lambda: np.ones((0, 3)))
+    """Frequency, damping ratio and stiffness in the middle over those tapped, modes in x, then y, shape (n, 3)."""
+    tangential: float = math.nan
+    """Cutting coefficient Kt in the middle of what was learnt (N/mm2)."""
+    radial: float = math.nan
+    """Cutting coefficient Kr in the middle of what was learnt (N/mm2)."""
+    before: Mapping[str, Span] = field(default_factory=dict)
+    """Intervals before the cuts, over the values at rest, by name ("frequency_x", "tangential" ...) ..."""
+    after: Mapping[str, Span] = field(default_factory=dict)
+    """... and intervals with them."""
+
+    def moved(self, assembly: Assembly) -> Assembly:
+        """A tool with its modes in the middle of what was learnt; as tapped where nothing was."""
+        if self.doubt is None:
+            return assembly
+        count = len(assembly.x or ())
+        x, y = _scaled(assembly.x, self.factors[:count]), _scaled(assembly.y, self.factors[count:])
+        return replace(assembly, x=x, y=y)
+
+    def taught(self, table: Table) -> Table:
+        """A cut with the coefficients that were learnt; as it stands in machine.toml where none were."""
+        if self.doubt is None:
+            return table
+        return msgspec.structs.replace(
+            table, material=None, tangential_n_per_mm2=self.tangential, radial_n_per_mm2=self.radial
+        )
+
+
+AT_REST = SpindleAtSpeed()
+"""Nothing learnt: the spindle is judged as it was tapped."""
+
+
+def _scaled(modes: Modes, factors: Floats) -> Modes:
+    """Modes with frequency, damping ratio and stiffness times factors (n, 3)."""
+    return modes and [
+        replace(
+            mode,
+            frequency=mode.frequency * f,
+            damping_ratio=mode.damping_ratio * zeta,
+            stiffness=mode.stiffness * k,
+            covariance=None,
+            jackknife=None,
+            n_hits=0,
+        )
+        for mode, (f, zeta, k) in zip(modes, factors.tolist(), strict=True)
+    ]

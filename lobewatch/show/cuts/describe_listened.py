@@ -33,14 +33,14 @@ NEXT: Mapping[str, str] = {
 """What to do, by the word."""
 
 
-def next_step(found: CutComparison) -> str:
+def next_step(comparison: CutComparison) -> str:
     """What to do now, in a line."""
-    return NEXT[found.heard.word]
+    return NEXT[comparison.heard.word]
 
 
-def why(found: CutComparison) -> str:
+def why(comparison: CutComparison) -> str:
     """What the word rests on, or why it cannot be told, in a line."""
-    heard = found.heard
+    heard = comparison.heard
     return WHY[heard.reason] if heard.word == "cannot tell" else _energy(heard.ratio)
 
 
@@ -49,9 +49,9 @@ def _energy(ratio: float) -> str:
     return f"beside the lines of the spindle: {percent} % of their energy"
 
 
-def listened_text(found: CutComparison) -> str:
+def listened_text(comparison: CutComparison) -> str:
     """The word, in a line."""
-    heard, chatter = found.heard, found.heard.chatter
+    heard, chatter = comparison.heard, comparison.heard.chatter
     if heard.word == "cannot tell":
         return f"cannot tell ({heard.reason}): {WHY[heard.reason]}"
     if chatter is None:
@@ -60,38 +60,41 @@ def listened_text(found: CutComparison) -> str:
     return f"{named} at {chatter.frequency:.1f} +- {max(2 * chatter.error, 0.1):.1f} Hz"
 
 
-def listened_texts(found: CutComparison) -> list[str]:
+def listened_texts(comparison: CutComparison) -> list[str]:
     """The word, and what it rests on."""
-    heard, chatter, told = found.heard, found.heard.chatter, [listened_text(found)]
+    heard, chatter, texts = comparison.heard, comparison.heard.chatter, [listened_text(comparison)]
     if heard.turning is not None:
-        off = 100 * (found.speed_rpm / found.setting.speed_rpm - 1)
-        told.append(
-            f"{found.speed_rpm:.1f} rpm ({off:+.2f} % of {found.setting.speed_rpm:g}), tooth passing "
-            f"{found.tooth_frequency:.1f} Hz; listened to {_seconds(found):.2f} s"
+        off = 100 * (comparison.speed_rpm / comparison.setting.speed_rpm - 1)
+        texts.append(
+            f"{comparison.speed_rpm:.1f} rpm ({off:+.2f} % of {comparison.setting.speed_rpm:g}), tooth passing "
+            f"{comparison.tooth_frequency:.1f} Hz; listened to {_seconds(comparison):.2f} s"
         )
     if math.isfinite(heard.ratio):
-        told.append(_energy(heard.ratio))
+        texts.append(_energy(heard.ratio))
     if chatter is not None:
-        told.append(f"lobe {found.lobe} ({found.lobe} whole waves between two teeth), {len(chatter.lines)} side bands")
-    return told + _expected(found)
+        lobe = comparison.lobe
+        texts.append(f"lobe {lobe} ({lobe} whole waves between two teeth), {len(chatter.lines)} side bands")
+    return texts + _expected(comparison)
 
 
-def _expected(found: CutComparison) -> list[str]:
-    if found.predicted is None:
+def _expected(comparison: CutComparison) -> list[str]:
+    if comparison.predicted is None:
         return []
-    word = "stable" if found.predicted.stable else "chatter"
-    told = f"by the tap tests, at rest: {word}, at this depth {found.predicted.frequency:.1f} Hz"
-    return [told if found.apart is None else f"{told}, {found.apart:.1f} Hz from what was heard modulo tooth passing"]
+    word = "stable" if comparison.predicted.stable else "chatter"
+    text = f"by the tap tests, at rest: {word}, at this depth {comparison.predicted.frequency:.1f} Hz"
+    if comparison.apart is not None:
+        text += f", {comparison.apart:.1f} Hz from what was heard modulo tooth passing"
+    return [text]
 
 
-def _seconds(found: CutComparison) -> float:
-    spectrum = found.heard.spectrum
+def _seconds(comparison: CutComparison) -> float:
+    spectrum = comparison.heard.spectrum
     return math.nan if spectrum is None else 1 / spectrum.bin
 
 
-def listened_json(found: CutComparison) -> dict[str, Any]:
+def listened_json(comparison: CutComparison) -> dict[str, Any]:
     """All of it."""
-    heard, chatter, expected = found.heard, found.heard.chatter, found.predicted
+    heard, chatter, expected = comparison.heard, comparison.heard.chatter, comparison.predicted
     return {
         "word": heard.word,
         "reason": heard.reason,
@@ -99,15 +102,15 @@ def listened_json(found: CutComparison) -> dict[str, Any]:
         "chatter_frequency_hz_std": None if chatter is None else chatter.error,
         "speed_rpm": heard.speed_rpm,
         "speed_rpm_std": None if heard.turning is None else 60 * heard.turning.error,
-        "commanded_rpm": found.setting.speed_rpm,
-        "depth_mm": 1e3 * found.setting.depth,
-        "tooth_frequency_hz": found.tooth_frequency,
+        "commanded_rpm": comparison.setting.speed_rpm,
+        "depth_mm": 1e3 * comparison.setting.depth,
+        "tooth_frequency_hz": comparison.tooth_frequency,
         "energy_ratio": heard.ratio,
-        "lobe": found.lobe,
+        "lobe": comparison.lobe,
         "side_bands_hz": [] if chatter is None else sorted(chatter.lines.frequency.tolist()),
         "predicted": None if expected is None else ("stable" if expected.stable else "chatter"),
         "predicted_frequency_hz": None if expected is None else expected.frequency,
-        "predicted_apart_hz": found.apart,
+        "predicted_apart_hz": comparison.apart,
         "begin_s": heard.parts.begin,
         "end_s": heard.parts.end,
     }

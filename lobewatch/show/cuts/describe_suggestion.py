@@ -1,4 +1,4 @@
-"""The next test cut, for people and as JSON."""
+"""What test cuts have taught of a program, and the next one, for people and as JSON."""
 
 from __future__ import annotations
 
@@ -8,23 +8,28 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from lobewatch.cuts.learning.of_program import NextCut
+from rich.table import Table
+
+from acquisition import Remark
+from lobewatch.cuts.learning.contradicting import contradiction_remarks
+from lobewatch.cuts.learning.of_program import Lesson, NextCut
+from lobewatch.cuts.learning.posterior import Interval
 from lobewatch.cuts.learning.suggest import Suggestion
-from lobewatch.show.cuts.describe_learnt import learnt_json
 from lobewatch.show.programs.names import NAMES
 from lobewatch.show.programs.settings import rpm
+from lobewatch.show.terminal.output import table
 
 
-def suggestion_json(found: NextCut) -> dict[str, Any]:
+def suggestion_json(next_cut: NextCut) -> dict[str, Any]:
     """The cut, and what it rests on."""
-    cut, best = found.suggested, _best(found)
+    cut, best = next_cut.suggested, _best(next_cut)
     return {
-        "program": found.lesson.program.name,
+        "program": next_cut.lesson.program.name,
         "suggested": None if cut is None else _cut_json(cut),
-        "cuts_made": len(found.lesson.own),
-        "cuts_left": found.left,
+        "cuts_made": len(next_cut.lesson.own),
+        "cuts_left": next_cut.left,
         "best_heard": None if best is None else {"speed_rpm": best[0], "depth_mm": 1e3 * best[1]},
-        "learnt": learnt_json(found.lesson),
+        "learnt": learnt_json(next_cut.lesson),
     }
 
 
@@ -38,33 +43,77 @@ def _cut_json(cut: Suggestion) -> dict[str, Any]:
     }
 
 
-def suggestion_lines(found: NextCut, folder: Path) -> Iterator[str]:
+def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
     """A line for each thing a person needs."""
-    name, cut, made = found.lesson.program.name, found.suggested, len(found.lesson.own)
+    name, cut, n_made = next_cut.lesson.program.name, next_cut.suggested, len(next_cut.lesson.own)
     if cut is None:
-        yield f"{name}: {_why_none(found)}"
+        yield f"{name}: {_why_none(next_cut)}"
     else:
         depth = f"{1e3 * cut.depth:.4g}"
         yield (
-            f"{name}: test cut {made + 1} of {made + found.left}: {rpm(cut.speed_rpm)} rpm, {depth} mm, "
+            f"{name}: test cut {n_made + 1} of {n_made + next_cut.left}: {rpm(cut.speed_rpm)} rpm, {depth} mm, "
             f"chance of chatter {round(100 * cut.chance)} %; it tells most of {NAMES[cut.settles]}"
         )
-        said = shlex.join(["lobewatch", "observe", str(folder), "--program", name])
-        yield f"then: {said} --speed {cut.speed_rpm:g} --depth {depth} --stable (or --chatter --frequency HZ)"
-    best = _best(found)
+        observe = shlex.join(["lobewatch", "observe", str(folder), "--program", name])
+        yield f"then: {observe} --speed {cut.speed_rpm:g} --depth {depth} --stable (or --chatter --frequency HZ)"
+    best = _best(next_cut)
     if best is not None:
         gain = f"; the next is expected to gain {100 * cut.gain:.0f} %" if cut and math.isfinite(cut.gain) else ""
         yield f"most chips heard stable: {1e3 * best[1]:.4g} mm at {rpm(best[0])} rpm{gain}"
     yield "a test cut is no advice: lobewatch check says what may be run"
 
 
-def _why_none(found: NextCut) -> str:
-    if not found.left:
-        return f"{len(found.lesson.own)} test cuts are made; a larger --cuts asks for more"
+def _why_none(next_cut: NextCut) -> str:
+    if not next_cut.left:
+        return f"{len(next_cut.lesson.own)} test cuts are made; a larger --cuts asks for more"
     return "no test cut is worth making: nothing more is to be gained"
 
 
-def _best(found: NextCut) -> tuple[float, float] | None:
+def _best(next_cut: NextCut) -> tuple[float, float] | None:
     """Speed (rpm) and depth (m) of most chips that were heard stable; None where none was."""
-    stable = [(cut.speed_rpm, cut.depth) for cut in found.lesson.own if not cut.chatters]
-    return max(stable, key=lambda one: one[0] * one[1], default=None)
+    stable = [(cut.speed_rpm, cut.depth) for cut in next_cut.lesson.own if not cut.chatters]
+    return max(stable, key=lambda setting: setting[0] * setting[1], default=None)
+
+
+def learnt_json(lesson: Lesson) -> dict[str, Any]:
+    """Factors on what was tapped at rest (Kt, Kr/Kt: on what machine.toml says), with and without the cuts."""
+    before, now = lesson.before.intervals, lesson.learnt.intervals
+    return {
+        "cuts": [cut.id for cut in lesson.learnt.cuts],
+        "chatter_frequencies": lesson.learnt.frequencies,
+        "frequency_learnt": lesson.learnt.frequencies > 0,
+        "effective_sample_size": lesson.learnt.size,
+        "factors": {name: _interval_json(now[name]) | {"before": _interval_json(before[name])} for name in NAMES},
+    }
+
+
+def _interval_json(interval: Interval) -> dict[str, float]:
+    return {"mean": interval.mean, "low": interval.low, "high": interval.high, "std": interval.std}
+
+
+def learnt_texts(lesson: Lesson) -> list[str | Table]:
+    """What the cuts have taught; nothing where there are none."""
+    count = len(lesson.learnt.cuts)
+    return [f"learnt from {count} cut{'s' if count > 1 else ''}:", learnt_table(lesson)] if count else []
+
+
+def learnt_table(lesson: Lesson) -> Table:
+    """Factors, a line each: before the cuts, and now."""
+    rows = table("~at speed, over at rest", "before (95 %)", "learnt (95 %)")
+    before, now = lesson.before.intervals, lesson.learnt.intervals
+    for name, term in NAMES.items():
+        is_open = name.startswith("frequency") and not lesson.learnt.frequencies
+        rows.add_row(term, _text(before[name]), "not learnt" if is_open else _text(now[name]))
+    return rows
+
+
+def _text(interval: Interval) -> str:
+    return f"{interval.mean:.3f} ({interval.low:.3f}..{interval.high:.3f})"
+
+
+def lesson_remarks(lesson: Lesson) -> Iterator[Remark]:
+    """What was left out, and what the cuts say nothing of."""
+    yield from contradiction_remarks(lesson.learnt, lesson.contradicting, lesson.program.name)
+    if lesson.learnt.cuts and not lesson.learnt.frequencies:
+        text = "f not learnt: no chatter frequency was heard yet"
+        yield Remark("frequency-not-learnt", lesson.program.name, text, "tell what the next chatter sounds at")

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from lobewatch.cuts.listening.listen_to import line_kinds
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.show.cuts.describe_listened import listened_text
-from lobewatch.show.figures.trend_figures import ALARM, EVENT, GOOD, NOW, THEN, new_axes, save_figure
+from lobewatch.show.figures.style import ALARM, EVENT, GOOD, NOW, THEN, new_axes, save_figure
 from lobewatch.tap.listening.cut_state import HIGHEST
 from lobewatch.tool.assembly import Assembly
 
@@ -26,29 +26,30 @@ SHOWN = 1e-4
 """Of the loudest amplitude, drawn downwards."""
 
 
-def save_listened(found: CutComparison, path: Path) -> None:
+def save_listened(comparison: CutComparison, path: Path) -> None:
     """The same figure as a file."""
-    save_figure(listened_figure(found), path)
+    save_figure(listened_figure(comparison), path)
 
 
-def listened_figure(found: CutComparison) -> Figure:
+def listened_figure(comparison: CutComparison) -> Figure:
     """Amplitude over frequency; without a spectrum, where it did not get so far, the word alone."""
     figure, axes = new_axes(1, (10.0, 4.5))
-    axis, spectrum = axes[0], found.heard.spectrum
-    setting = found.setting
-    named = f"{setting.program or 'reference cut'}, {found.speed_rpm:.0f} rpm, {1e3 * setting.depth:.3g} mm"
-    axis.set_title(f"{named}: {listened_text(found).partition(':')[0]}", loc="left", fontsize=11, fontweight="bold")
+    axis, spectrum = axes[0], comparison.heard.spectrum
+    setting = comparison.setting
+    named = f"{setting.program or 'reference cut'}, {comparison.speed_rpm:.0f} rpm, {1e3 * setting.depth:.3g} mm"
+    word = listened_text(comparison).partition(":")[0]
+    axis.set_title(f"{named}: {word}", loc="left", fontsize=11, fontweight="bold")
     axis.set(xlabel="frequency (Hz)", ylabel="amplitude (m/s²)")
     if spectrum is None:
         return figure
     inside = spectrum.frequency <= min(HIGHEST, spectrum.sample_rate / 2)
     amplitude = np.sqrt(spectrum.power[inside])
     axis.semilogy(spectrum.frequency[inside], amplitude, color="#bbbbbb", lw=0.6)
-    for name, lines in line_kinds(found.heard).items():
+    for name, lines in line_kinds(comparison.heard).items():
         label, colour, mark = MARKS[name]
         axis.plot(lines.frequency, lines.amplitude, mark, color=colour, ms=5, label=label, fillstyle="none")
-    if found.assembly is not None:
-        _modes(axis, found.assembly)
+    if comparison.assembly is not None:
+        _modes(axis, comparison.assembly)
     top = float(np.max(amplitude))
     axis.set(xlim=(0, spectrum.frequency[inside][-1]), ylim=(SHOWN * top, 3 * top))
     axis.legend(loc="upper right", ncols=3, fontsize=8)

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from lobes import Cut
 from lobewatch.machine.journal.heard_cut import HeardCut, geometry
 from lobewatch.show.figures.labels import PictureLabels
-from lobewatch.show.figures.trend_figures import ALARM, GOOD
+from lobewatch.show.figures.style import ALARM, GOOD
 
 MARKS = {False: ("heard stable", GOOD, "o"), True: ("heard to chatter", ALARM, "x")}
 """Name, colour and mark of cuts by whether they chatter; wide and hollow, so that a program's own shows through."""

@@ -27,10 +27,10 @@ class _Box(NamedTuple):
     right: float
     high: float
 
-    def overlap(self, other: _Box) -> float:
+    def overlap(self, box: _Box) -> float:
         """Area in common."""
-        wide = min(self.right, other.right) - max(self.left, other.left)
-        high = min(self.high, other.high) - max(self.low, other.low)
+        wide = min(self.right, box.right) - max(self.left, box.left)
+        high = min(self.high, box.high) - max(self.low, box.low)
         return wide * high if wide > 0 and high > 0 else 0.0
 
 
@@ -82,7 +82,7 @@ class PictureLabels:
         """Area of other words, and area outside of the axes."""
         inside = box.overlap(_Box(0, 0, *self._size))
         outside = (box.right - box.left) * (box.high - box.low) - inside
-        return outside + sum(box.overlap(other) for other in self._taken)
+        return outside + sum(box.overlap(taken) for taken in self._taken)
 
     def _points(self, place: tuple[float, float]) -> tuple[float, float]:
         shares = (

@@ -20,7 +20,7 @@ from lobewatch.cuts.learning.lobes_at_speed import LobesAtSpeed
 from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.show.figures.heard_cuts import draw_heard
 from lobewatch.show.figures.labels import PictureLabels
-from lobewatch.show.figures.trend_figures import ALARM, GOOD, NOW, THEN, UNKNOWN, new_axes
+from lobewatch.show.figures.style import ALARM, GOOD, NOW, THEN, UNKNOWN, new_axes
 from lobewatch.verdicts import Setting, Verdict, Word
 from lobewatch.verdicts.limit_band import LimitBand
 

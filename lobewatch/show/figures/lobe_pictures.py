@@ -13,13 +13,13 @@ from acquisition import DataError, Remark
 from lobes import Cut, StabilityLobes, radial_lobes
 from lobewatch.cuts.learning.lobes_at_speed import lobes_at_speed
 from lobewatch.history import Row
-from lobewatch.history.row_lobes import row_lobes
+from lobewatch.history.history_columns import row_lobes
 from lobewatch.logbook import LobeComparison, Logbook
 from lobewatch.machine import Machine
 from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.show.figures.heard_cuts import heard_of
 from lobewatch.show.figures.lobe_figures import lobes_figure, radial_figure, waterfall_figure
-from lobewatch.show.figures.trend_figures import save_figure
+from lobewatch.show.figures.style import save_figure
 from lobewatch.tool import Chart, Method, chart, speed_grid
 from lobewatch.verdicts.limit_band import limit_band
 

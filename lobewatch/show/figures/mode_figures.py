@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 from numpy.typing import NDArray
 
 from dsm import plus_minus
-from lobewatch.show.figures.trend_figures import ALARM, NOW, STYLE, THEN
+from lobewatch.show.figures.style import ALARM, NOW, STYLE, THEN
 from modal import Extraction, FittedBand, Mode, Trust, trust_of
 
 COLUMNS = 4
@@ -104,9 +104,9 @@ def _draw_chart(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
         chart, ends = band.data.chart, state.frf.frequency[band.lines][[0, -1]]
         axes.axvspan(*ends, color=THEN, alpha=0.10, lw=0)
         for stable, mark, colour, label in ((False, "x", THEN, "pole"), (True, "o", NOW, "stable pole")):
-            which = chart.stable == stable
+            at = chart.stable == stable
             style: dict[str, Any] = {"color": colour, "ms": 3, "ls": "", "label": label if i == 0 else None}
-            axes.plot(chart.frequency[which], chart.order[which], mark, **style)
+            axes.plot(chart.frequency[at], chart.order[at], mark, **style)
     for mode in modes:
         axes.axvline(mode.frequency, color=NOW, lw=0.6)
     axes.set(xlabel="frequency (Hz); grey: the bands fitted; ?: doubtful, -: rejected", ylabel="order")

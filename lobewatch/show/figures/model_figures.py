@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from acquisition import Frf
 from dsm import Modes, Segment, Spindle, WhirlMap
 from lobewatch.logbook.model_picture import ModelPicture
-from lobewatch.show.figures.trend_figures import ALARM, GOOD, NOW, STYLE, THEN
+from lobewatch.show.figures.style import ALARM, GOOD, NOW, STYLE, THEN
 
 _Float = NDArray[np.float64]
 STEEL = "#c9d3dc"

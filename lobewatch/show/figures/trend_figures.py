@@ -1,52 +1,34 @@
-"""Every picture: the same colours for the same thing, told apart in grey too (dashes and marks)."""
+"""Pictures of a series: values over time with what was done, and the frequency response now and then."""
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from datetime import datetime
-from pathlib import Path
 from textwrap import shorten
 from typing import Any, NamedTuple
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter, date2num
 from matplotlib.figure import Figure
-from matplotlib.text import Text
-from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
 
 from acquisition import Frf
+from lobewatch.decay.trend import Trend, days_of
 from lobewatch.machine.settings.setup_tables import Limits
-from lobewatch.show.figures.course import TrendCurve
-from lobewatch.show.terminal.output import printable
+from lobewatch.show.figures.style import ALARM, EVENT, NOW, THEN, new_axes
 
-NOW = "#0072B2"
-THEN = "#777777"
-ALARM = "#D55E00"
-GOOD = "#009E73"
-UNKNOWN = "#767676"
-EVENT = "#555555"
-STYLE: dict[Any, Any] = {
-    "font.size": 10,
-    "axes.grid": True,
-    "grid.color": "#dddddd",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "svg.hashsalt": "lobewatch",
-    "svg.fonttype": "none",
-    "text.parse_math": False,
-}
+Floats = NDArray[np.float64]
+
+AHEAD = 0.5
+"""Share of the length of the series that is drawn beyond it."""
 
 
 class Marks(NamedTuple):
     """What stands beside a trend."""
 
     events: Sequence[tuple[datetime, str]] = ()
-    """What was done, and when."""
+    """Times and texts of what was done."""
     hollow: Sequence[tuple[datetime, float]] = ()
     """Values that do not count."""
 
@@ -54,44 +36,40 @@ class Marks(NamedTuple):
 NOTHING_ELSE = Marks()
 
 
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a picture in the format that the ending names; ValueError for one that is not known."""
-    if path.suffix.lower() not in (".svg", ".png", ".pdf"):
-        raise ValueError(
-            f"{path}: a picture cannot end in {path.suffix!r}; name a file that ends in .svg, .png or .pdf"
-        )
-    _read_nothing_as_formula(figure)
-    with mpl.rc_context(STYLE):
-        figure.savefig(path, dpi=150)
+class TrendCurve(NamedTuple):
+    """The fitted line of a series and what it may become, in the unit of the series."""
+
+    days: Floats
+    """Days since 1970, from the first point on, shape (n,)."""
+    line: Floats
+    """Values of the mixture, shape (n,)."""
+    days_ahead: Floats
+    """Days since 1970, from today on, shape (m,)."""
+    low: Floats
+    """Values that are undercut with a chance of 10 %, shape (m,)."""
+    high: Floats
+    """Values that are exceeded with a chance of 10 %, shape (m,)."""
 
 
-def svg(figure: Figure) -> str:
-    """The picture as an <svg> element."""
-    text = io.StringIO()
-    _read_nothing_as_formula(figure)
-    with mpl.rc_context(STYLE):
-        figure.savefig(text, format="svg", metadata={"Date": None})
-    return text.getvalue()[text.getvalue().index("<svg") :]
+def course_of(trend: Trend) -> TrendCurve | None:
+    """The curve of a trend; None below 8 points."""
+    forecast = trend.forecast
+    if forecast is None:
+        return None
+    past = days_of(trend.points)
+    near = forecast.dates <= max(past[-1] + AHEAD * (past[-1] - past[0]), forecast.dates[1])
+    low, high = (trend.first * np.exp(forecast.fan(quantile)[near] / 100) for quantile in (0.1, 0.9))
+    line = np.append(forecast.fitted, forecast.line[near])
+    return TrendCurve(
+        np.append(past, forecast.dates[near]), trend.first * np.exp(line / 100), forecast.dates[near], low, high
+    )
 
 
-def _read_nothing_as_formula(figure: Figure) -> None:
-    """Texts stand as they are: a program may be called "cost $5 to $6". Logarithmic axes have plain numbers then.
-
-    Characters that no picture can hold are replaced.
-    """
-    for text in figure.findobj(Text):
-        text.set_parse_math(False)
-        text.set_text(printable(text.get_text()))
-    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis) if axis.get_scale() == "log"):
-        axis.set_major_formatter(LogFormatter())
-        axis.set_minor_formatter(LogFormatter(labelOnlyBase=False))
-
-
-def frf_figure(then: Frf | None, now: Frf, band: tuple[float, float]) -> Figure:
+def frf_figure(earliest: Frf | None, now: Frf, band: tuple[float, float]) -> Figure:
     """Real and imaginary part of receptance and coherence, the newest and the first test."""
     rows = 2 if now.coherence is None else 3
     figure, axes = new_axes(rows, (8.0, 2.1 * rows))
-    tests = [(now, "now", NOW, "-"), *([(then, "first", THEN, "--")] if then is not None else [])]
+    tests = [(now, "now", NOW, "-"), *([(earliest, "first", THEN, "--")] if earliest is not None else [])]
     for frf, label, colour, dashes in tests:
         inside = frf.in_band(band)
         style: dict[str, Any] = {"color": colour, "ls": dashes, "lw": 1.3, "label": label}
@@ -159,11 +137,3 @@ def _add_marks(axes: Axes, marks: Marks) -> None:
         axes.annotate(
             shorten(text, 26, placeholder="…"), (day, 0), xycoords=("data", "axes fraction"), va="bottom", **place
         )
-
-
-def new_axes(rows: int, size: tuple[float, float]) -> tuple[Figure, list[Axes]]:
-    """A figure of this size (inches) with rows of axes, one above the other."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=size, layout="constrained")
-        axes = figure.subplots(rows, 1, sharex=True, squeeze=False)
-    return figure, list(axes[:, 0])

@@ -18,13 +18,21 @@ from lobewatch.logbook import Logbook
 from lobewatch.machine import TapEntry
 from lobewatch.machine.journal.event import MaintenanceEvent
 from lobewatch.show.history.describe_cut import cut_json, cut_words
-from lobewatch.show.history.under import conditions_texts
 
 VALUES = {"frequency_hz": "frequency", "damping_ratio": "damping_ratio", "stiffness_n_per_m": "stiffness"}
 """Field of a row by its name in CSV and JSON."""
 HEADINGS = ["time", "what", "tool", "in", "f_n (Hz)", "zeta (%)", "K (N/um)", "identity, programs and remarks"]
 UNDER = tuple(field.name for field in fields(Conditions))
 COLUMNS = ("time", "kind", "id", "tool", "direction")
+CONDITION_WORDS = {
+    "temperature_c": "{:g} °C",
+    "stick_out_mm": "stick-out {:g} mm",
+    "drawbar_kn": "drawbar {:g} kN",
+    "state": "state {}",
+    "reclamped": "clamped anew",
+    "note": "note: {}",
+}
+"""How a condition of a tap test is told, by its name."""
 
 
 def event_text(event: MaintenanceEvent) -> str:
@@ -140,3 +148,8 @@ def _said(line: Mapping[str, Any]) -> str:
         return "; ".join([f"{line['id']}: {line['reason']}", *under])
     words = [f"{name}: {word}" for name, word in line["verdicts"].items()]
     return "; ".join([line["id"], *under, *(f"question {code}" for code in line["questions"]), *words])
+
+
+def conditions_texts(conditions: Conditions) -> list[str]:
+    """What a tap test was taken under, as far as that is known, a few words each."""
+    return [words.format(conditions.known[name]) for name, words in CONDITION_WORDS.items() if name in conditions.known]

@@ -11,11 +11,11 @@ from lobewatch.logbook import Logbook
 from lobewatch.machine import REFERENCE_CUT
 from lobewatch.measuring import Measurement, remarks_on_all
 from lobewatch.measuring.questions import QUESTIONS
-from lobewatch.show.history.under import conditions_texts
+from lobewatch.show.history.describe_history import conditions_texts
 from lobewatch.show.programs.describe_lobes import lobes_json
 from lobewatch.show.spindle.describe_model import calibration_json
 from lobewatch.show.spindle.describe_modes import in_order, mode_json, mode_table, short_remark_lines
-from lobewatch.show.terminal.remarks import remark_json, remark_lines
+from lobewatch.show.terminal.output import remark_json, remark_lines
 from lobewatch.tool import lobes_of
 
 

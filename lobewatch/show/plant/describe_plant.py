@@ -48,8 +48,8 @@ def limit_text(ahead: Mapping[str, Any] | None) -> str:
 
 
 def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
-    first, *others = row["reasons"] or [""]
-    why = f"{first} (and {len(others)} more)" if others else first
+    first, *further = row["reasons"] or [""]
+    why = f"{first} (and {len(further)} more)" if further else first
     ahead = limit_text(row["next_limit"])
     cells = row["key"], row["name"], row["light"].value, _fallen(row), _due(row), ahead, why, row["next_step"]
     return tuple(printable(cell).replace("\n", " ").replace("\t", " ") for cell in cells)
@@ -60,7 +60,7 @@ def _broken(cells: Sequence[str], widths: Sequence[int]) -> Iterator[str]:
     for i in range(max(len(why), len(step), 1)):
         parts = [
             *(cells[:-2] if i == 0 else [""] * (len(cells) - 2)),
-            *(one[i] if i < len(one) else "" for one in (why, step)),
+            *(lines[i] if i < len(lines) else "" for lines in (why, step)),
         ]
         yield "  ".join(part + " " * (wide - cell_len(part)) for part, wide in zip(parts, widths, strict=True)).rstrip()
 

@@ -15,19 +15,19 @@ SHOWN_APART = ("frequency-alarm", "frequency-warn", "overdue")
 EPOCH = date(1970, 1, 1)
 
 
-def plant_rows(found: Sequence[MachineStanding]) -> list[dict[str, Any]]:
+def plant_rows(machines: Sequence[MachineStanding]) -> list[dict[str, Any]]:
     """In the order of the standings; the series is the one that fell most."""
-    return [plant_row(one) for one in found]
+    return [plant_row(machine) for machine in machines]
 
 
-def plant_row(one: MachineStanding) -> dict[str, Any]:
+def plant_row(machine: MachineStanding) -> dict[str, Any]:
     """Of one machine."""
-    summary, dated = one.summary, one.dated
+    summary, dated = machine.summary, machine.dated
     worst = summary.series[0] if summary.series else None
-    told = joined(dated.remarks)
-    reasons = [one.finding for one in told if one.code not in SHOWN_APART]
+    remarks = joined(dated.remarks)
+    reasons = [remark.finding for remark in remarks if remark.code not in SHOWN_APART]
     return {
-        "key": one.key,
+        "key": machine.key,
         "name": summary.name,
         "light": dated.light,
         "fall": worst.fall if worst else None,
@@ -37,7 +37,7 @@ def plant_row(one: MachineStanding) -> dict[str, Any]:
         "days_left": dated.days_left,
         "reasons": reasons,
         "note": "; ".join(reasons),
-        "why": "; ".join(one.finding for one in told if one.code != "overdue"),
+        "why": "; ".join(remark.finding for remark in remarks if remark.code != "overdue"),
         "next_step": dated.next_step,
         "next_limit": next_limit(summary.series),
         "has_port": summary.has_port,
@@ -53,15 +53,22 @@ def next_limit(series: Sequence[SeriesSummary]) -> dict[str, Any] | None:
     A limit that the fall is past already is not ahead; where none is foretold, up to when there is none.
     """
     ahead = [
-        one for course in series for one in course.limits if one.foretold_to is not None and not _is_past(course, one)
+        limit
+        for course in series
+        for limit in course.limits
+        if limit.foretold_to is not None and not _is_past(course, limit)
     ]
     if not ahead:
         return None
-    first = min(ahead, key=lambda one: (one.probable is None, one.probable or 0.0, one.earliest or 1e9, one.percent))
+    first = min(ahead, key=_date_order)
     if first.earliest is None:
-        first = min(ahead, key=lambda one: (one.foretold_to or 0.0, one.percent))
+        first = min(ahead, key=lambda limit: (limit.foretold_to or 0.0, limit.percent))
     named = {"p10": first.earliest, "p50": first.probable, "p90": first.latest, "foretold_to": first.foretold_to}
     return {"percent": first.percent, **{name: _day(days) for name, days in named.items()}}
+
+
+def _date_order(limit: Ahead) -> tuple[bool, float, float, float]:
+    return limit.probable is None, limit.probable or 0.0, limit.earliest or 1e9, limit.percent
 
 
 def _is_past(course: SeriesSummary, limit: Ahead) -> bool:

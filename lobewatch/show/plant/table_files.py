@@ -45,7 +45,7 @@ def write_table(tables: Iterable[TapTable], path: Path) -> int:
 
     DataError for an ending that is not known, and for Parquet without DuckDB.
     """
-    write = next((one for ending, one in WRITERS.items() if path.name.endswith(ending)), None)
+    write = next((writer for ending, writer in WRITERS.items() if path.name.endswith(ending)), None)
     if write is None:
         raise DataError(f"{path}: {path.suffix or 'no ending'} is no kind of table; give {', '.join(WRITERS)}")
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
@@ -70,8 +70,8 @@ def _write_sqlite(tables: Iterable[TapTable], path: Path) -> int:
         base.execute("BEGIN")
         for machine, table in enumerate(tables, 1):
             base.execute("INSERT INTO machine VALUES (?, ?, ?)", (machine, table.folder, table.machine))
-            told = [(series + n, machine, n, *one) for n, one in enumerate(table.series, 1)]
-            base.executemany("INSERT INTO series VALUES (?, ?, ?, ?, ?)", told)
+            series_rows = [(series + n, machine, n, *place) for n, place in enumerate(table.series, 1)]
+            base.executemany("INSERT INTO series VALUES (?, ?, ?, ?, ?)", series_rows)
             of_series = [series + n for n in table.of_series]
             numbers = _short(table.numbers).T.tolist()
             base.executemany(insert, zip(of_series, table.tap_id, table.time, table.remarks, *numbers, strict=True))
@@ -108,8 +108,8 @@ def _lines(table: TapTable) -> Iterator[str]:
     begin = f"{_quoted(table.folder)},{_quoted(table.machine)},"
     series = [f"{_quoted(tool)},{direction},{n}" for n, (tool, direction) in enumerate(table.series, 1)]
     times = np.datetime_as_string(np.floor(table.time).astype("datetime64[s]")).tolist()
-    each = zip(table.tap_id, times, table.of_series, _cells(table.numbers), table.remarks, strict=True)
-    return (f"{begin}{tap_id},{time}Z,{series[n - 1]},{cells},{told}\n" for tap_id, time, n, cells, told in each)
+    taps = zip(table.tap_id, times, table.of_series, _cells(table.numbers), table.remarks, strict=True)
+    return (f"{begin}{tap_id},{time}Z,{series[n - 1]},{cells},{remarks}\n" for tap_id, time, n, cells, remarks in taps)
 
 
 def _cells(numbers: Floats) -> list[str]:
@@ -117,8 +117,8 @@ def _cells(numbers: Floats) -> list[str]:
     if not len(numbers):
         return []
     digits = np.array([DIGITS_OF_ERRORS if name.endswith("_std") else DIGITS for name in NUMBERS])
-    told = msgspec.json.encode(rounded(numbers, digits).tolist()).decode()
-    return told[2:-2].replace("null", "").replace(".0,", ",").split("],[")
+    cells = msgspec.json.encode(rounded(numbers, digits).tolist()).decode()
+    return cells[2:-2].replace("null", "").replace(".0,", ",").split("],[")
 
 
 def rounded(values: Floats, digits: NDArray[np.intp]) -> Floats:
@@ -154,7 +154,7 @@ def _write_parquet(tables: Iterable[TapTable], path: Path) -> int:
 def _columns(table: TapTable) -> dict[str, NDArray[Any]]:
     """As arrays, by name."""
     n, of_series = len(table.tap_id), np.array(table.of_series, np.int64)
-    tools, directions = (np.array([one[part] for one in table.series], object) for part in (0, 1))
+    tools, directions = (np.array([place[part] for place in table.series], object) for part in (0, 1))
     return {
         "folder": np.full(n, table.folder, object),
         "machine": np.full(n, table.machine, object),

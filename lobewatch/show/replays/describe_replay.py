@@ -45,12 +45,12 @@ def show_replay(
     emit(payload, as_json, *texts, f"{len(outcome.fresh)} of {n_files} file(s) stored in {logbook.folder.path}")
 
 
-def _note_known(known: Mapping[Path, str], n_files: int) -> None:
+def _note_known(stored: Mapping[Path, str], n_files: int) -> None:
     """Files that were stored already: each where they are few."""
-    if n_files > MANY and len(known) > FEW:
-        notes.print(f"{len(known)} of {n_files} files are stored already", markup=False)
+    if n_files > MANY and len(stored) > FEW:
+        notes.print(f"{len(stored)} of {n_files} files are stored already", markup=False)
         return
-    for file, tap_id in known.items():
+    for file, tap_id in stored.items():
         notes.print(f"{file.name}: stored already as {tap_id}", markup=False)
 
 
@@ -96,6 +96,6 @@ def _summed_up(shown: Sequence[Row]) -> list[str | Table]:
         ]
         days = f"{tests[0].time:%Y-%m-%d}", f"{tests[-1].time:%Y-%m-%d}"
         rows.add_row(tool, direction, str(len(tests)), *days, *values)
-    asked = Counter(one.code for row in shown for one in row.questions)
+    asked = Counter(question.code for row in shown for question in row.questions)
     lines = [f"asked of {count} tests: {code} (lobewatch history says which)" for code, count in asked.items()]
     return [rows, *lines]

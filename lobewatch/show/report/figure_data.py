@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from acquisition import Frf
 from lobewatch.decay.trend import date
 from lobewatch.measuring.estimate import Estimate
-from lobewatch.show.figures.course import TrendCurve
+from lobewatch.show.figures.trend_figures import TrendCurve
 
 Floats = NDArray[np.float64]
 

@@ -14,8 +14,7 @@ from lobewatch.machine import Machine
 from lobewatch.show.programs.advice import ProgramAdvice
 from lobewatch.show.programs.settings import rpm
 from lobewatch.show.programs.verdicts import WORDS
-from lobewatch.show.trends.dates import dates_text
-from lobewatch.show.trends.describe_trend import rate_text, short_text
+from lobewatch.show.trends.describe_trend import dates_text, rate_text, short_text
 from lobewatch.verdicts import Word
 
 LIGHTS = {Light.ALARM: "✗ ALARM", Light.UNKNOWN: "? UNKNOWN", Light.WARN: "! WARNING", Light.GOOD: "✓ GOOD"}

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from lobewatch.decay import SeriesStanding
 from lobewatch.decay.trend import MONTH, Trend, day
 from lobewatch.history import Row
-from lobewatch.history.row_lobes import row_lobes
+from lobewatch.history.history_columns import row_lobes
 from lobewatch.machine import Machine
 from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.show.figures.heard_cuts import heard_of

@@ -10,7 +10,7 @@ from lobewatch.cuts.learning.lobes_at_speed import lobes_at_speed
 from lobewatch.logbook import Logbook
 from lobewatch.show.figures.heard_cuts import heard_of
 from lobewatch.show.figures.lobe_figures import lobes_figure, waterfall_figure
-from lobewatch.show.figures.trend_figures import svg
+from lobewatch.show.figures.style import svg
 from lobewatch.show.programs.advice import ProgramAdvice
 from lobewatch.show.report.figure_data import lobe_numbers
 from lobewatch.show.report.lobe_course import LobeCourse

@@ -18,8 +18,9 @@ from lobewatch.history import Row
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.outlook import Outlook, outlook
 from lobewatch.machine import Machine
-from lobewatch.show.figures.trend_figures import frf_figure, svg
-from lobewatch.show.history.under import conditions_texts
+from lobewatch.show.figures.style import svg
+from lobewatch.show.figures.trend_figures import frf_figure
+from lobewatch.show.history.describe_history import conditions_texts
 from lobewatch.show.programs.advice import ProgramAdvice, advised, advised_lines, decay_text
 from lobewatch.show.programs.doubts import reading_lines
 from lobewatch.show.programs.verdicts import WORDS, band_text, limit_text, margin_text, turning_text, verdict_text
@@ -30,8 +31,7 @@ from lobewatch.show.report.lobe_course import lobe_course
 from lobewatch.show.report.lobe_figures import lobe_figures, pocket_figures
 from lobewatch.show.report.page import page, write_page
 from lobewatch.show.report.trend_pictures import Picture, trends
-from lobewatch.show.trends.dates import ASSUMED
-from lobewatch.show.trends.describe_trend import dates_rows, preload_text, sentence
+from lobewatch.show.trends.describe_trend import ASSUMED, dates_rows, preload_text, sentence
 from lobewatch.tool import ABOUT_DIRECTIONS, Assembly
 from lobewatch.verdicts import Word
 

@@ -13,8 +13,8 @@ from lobewatch.history import Row
 from lobewatch.history.left_out import left_out
 from lobewatch.logbook import Logbook
 from lobewatch.machine.journal.event import MaintenanceEvent
-from lobewatch.show.figures.course import course_of
-from lobewatch.show.figures.trend_figures import Marks, svg, trend_figure
+from lobewatch.show.figures.style import svg
+from lobewatch.show.figures.trend_figures import Marks, course_of, trend_figure
 from lobewatch.show.report.figure_data import Numbers, value_numbers
 
 NEAR = 0.15

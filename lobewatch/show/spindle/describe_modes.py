@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.table import Table
 
-from acquisition import Remark, joined
+from acquisition import Fact, Remark, joined
 from dsm import plus_minus
 from lobewatch.measuring import FileModes
 from lobewatch.show.terminal.output import table
@@ -20,7 +20,11 @@ ORDER = (Trust.TRUSTED, Trust.DOUBTFUL, Trust.REJECTED)
 LEAST_PHASE = 1.0
 """Phase of a modal constant worth a column (degrees)."""
 HIGH_CORRELATION = 0.5
-"""Of errors, that a person should know."""
+"""Correlation of errors that a person should know."""
+ORIGINS = {"file": "from the file", "option": "by option", "default": "nobody says, taken"}
+"""Words for where a fact on a file is from."""
+NOT_IN_FILE = "option", "default"
+"""Origins of facts that a file does not say itself."""
 
 
 def mode_json(mode: Mode) -> dict[str, Any]:
@@ -178,7 +182,7 @@ def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> list
     remarks = remark_lines if everything else short_remark_lines
     return [
         f"{file_modes.path.name}: {frf.n_averages} hit(s) averaged, {lines}{usable}",
-        *_not_in_file(file_modes),
+        *fact_lines(file_modes.facts, NOT_IN_FILE),
         mode_table(shown),
         summary(file_modes.fitted, everything=everything),
         *reasons(shown),
@@ -189,8 +193,7 @@ def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> list
     ]
 
 
-def _not_in_file(found: FileModes) -> list[str]:
-    """What is known of it by option, or was taken."""
-    words = {"option": "by option", "default": "nobody says, taken"}
-    told = {origin: [f"{one.name} {one.value}" for one in found.facts if one.origin == origin] for origin in words}
-    return [f"{words[origin]}: {'; '.join(texts)}" for origin, texts in told.items() if texts]
+def fact_lines(facts: Iterable[Fact], origins: Sequence[str] = tuple(ORIGINS)) -> list[str]:
+    """What is known of a file, a line for each place that it is from."""
+    texts = {origin: [f"{fact.name} {fact.value}" for fact in facts if fact.origin == origin] for origin in origins}
+    return [f"{ORIGINS[origin]}: {'; '.join(words)}" for origin, words in texts.items() if words]

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from lobewatch.decay.trend import date
 from lobewatch.show.terminal.output import table
-from lobewatch.show.trends.dates import dates_json, dates_text
+from lobewatch.show.trends.describe_trend import dates_json, dates_text
 from lobewatch.tap.stories.demo import DemoTap, SpindleState
 from lobewatch.tap.stories.level_forecast import LevelForecast
 

@@ -7,16 +7,22 @@ import io
 import math
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from rich.table import Table
 
 from dsm import PreloadLeft, plus_minus
 from lobewatch.decay import SeriesStanding
+from lobewatch.decay.forecast import DateRange
 from lobewatch.decay.shapes import Shape
-from lobewatch.decay.trend import Trend, date
+from lobewatch.decay.trend import Trend, date, days_of
 from lobewatch.logbook.outlook import Fate, Outlook
 from lobewatch.show.terminal.output import table
-from lobewatch.show.trends.chart import chart_lines
-from lobewatch.show.trends.dates import ASSUMED, dates_json, dates_text
+
+ASSUMED = "Dates hold if the machine is used as before; an acceleration that is not yet visible cannot be foreseen."
+WIDE, HIGH = 60, 12
+"""Characters of the plot itself."""
+POINT, LINE = "o", "."
 
 
 def trend_json(outlook: Outlook, series: SeriesStanding, preload: PreloadLeft | None) -> dict[str, Any]:
@@ -150,3 +156,61 @@ def _fate_json(fate: Fate) -> dict[str, Any]:
 
 def _cell(value: float) -> float | str:
     return value if math.isfinite(value) else ""
+
+
+def dates_text(dates: DateRange | None, horizon: float, *, tapped: bool = True) -> str:
+    """For people; horizon: days since 1970 up to which was looked; tapped: whether what is past was tapped, too."""
+    if dates is None:
+        return "history too short or too old"
+    if dates.probable == -math.inf:
+        return "already" if tapped else "by now, at this rate"
+    if dates.earliest == math.inf:
+        return f"not before {date(horizon):%Y-%m}"
+    if dates.latest == math.inf:
+        return f"not before {_day(dates.earliest)}"
+    return f"between {_day(dates.earliest)} and {_day(dates.latest)} (80 %), probably {_day(dates.probable)}"
+
+
+def dates_json(dates: DateRange | None) -> dict[str, str | None]:
+    """Dates as "2026-03-01", null where none is known, "already"."""
+    named = zip(("p10", "p50", "p90"), dates or (math.inf,) * 3, strict=True)
+    return {name: _or_word(days) for name, days in named}
+
+
+def _day(days: float) -> str:
+    return "now" if days == -math.inf else f"{date(days):%Y-%m-%d}"
+
+
+def _or_word(days: float) -> str | None:
+    if math.isfinite(days):
+        return f"{date(days):%Y-%m-%d}"
+    return "already" if days < 0 else None
+
+
+def chart_lines(trend: Trend) -> list[str]:
+    """Points and fitted line over the dates, fall downwards (%); the points alone below 8 of them."""
+    dates = days_of(trend.points)
+    percent = np.array([point.percent for point in trend.points]) - trend.start
+    low, high = float(percent.min()), float(percent.max())
+    low, high = (low, high) if high > low else (low - 0.5, high + 0.5)
+    columns = _places(dates, dates[0], dates[-1], WIDE)
+    canvas = np.full((HIGH, WIDE), " ")
+    if trend.forecast is not None:
+        at = np.linspace(dates[0], dates[-1], WIDE)
+        line = np.interp(at, dates, trend.forecast.fitted - trend.start)
+        canvas[_places(np.clip(line, low, high), high, low, HIGH), np.arange(WIDE)] = LINE
+    canvas[_places(percent, high, low, HIGH), columns] = POINT
+    labels = [f"{value:+8.2f} %" if row % 4 == 0 or row == HIGH - 1 else " " * 10 for row, value in _ticks(low, high)]
+    drawn = [f"{label} |{''.join(cells)}".rstrip() for label, cells in zip(labels, canvas, strict=True)]
+    first, last = (f"{date(days):%Y-%m-%d}" for days in dates[[0, -1]])
+    return [*drawn, " " * 11 + "+" + "-" * WIDE, " " * 12 + first + last.rjust(WIDE - len(first))]
+
+
+def _ticks(low: float, high: float) -> list[tuple[int, float]]:
+    return list(enumerate(np.linspace(high, low, HIGH).tolist()))
+
+
+def _places(values: NDArray[np.float64], start: float, end: float, count: int) -> NDArray[np.intp]:
+    span = end - start
+    share = (values - start) / span if span else np.zeros(values.size)
+    return np.round(share * (count - 1)).astype(np.intp)

@@ -12,7 +12,8 @@ from matplotlib.dates import date2num
 from acquisition import Frf
 from lobewatch.machine import Limits, ProgramTable
 from lobewatch.show.figures.lobe_figures import lobes_figure
-from lobewatch.show.figures.trend_figures import Marks, frf_figure, new_axes, svg, trend_figure
+from lobewatch.show.figures.style import new_axes, svg
+from lobewatch.show.figures.trend_figures import Marks, frf_figure, trend_figure
 from lobewatch.verdicts import Verdict, Word
 
 TIMES = [datetime(2026, month, 1, tzinfo=UTC) for month in (1, 2, 3)]

@@ -9,10 +9,10 @@ from datetime import UTC, datetime
 from acquisition import Channel, Device, DeviceError, DeviceIdentity, MeasuredRate, Remark, measure_rate
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import has_clock, use_rate
-from lobewatch.tap.sensor_doubts import WRONG, sensor_doubts
+from lobewatch.tap.self_check import WRONG, sensor_doubts
 
 RATE_SECONDS = 5.0
-"""How long the rate is measured (s)."""
+"""Time for which the rate is measured (s)."""
 
 
 @dataclass(frozen=True)
@@ -20,21 +20,21 @@ class SensorList:
     """A device, its channels, and what is wrong with them."""
 
     identity: DeviceIdentity
-    """The device."""
+    """Model and serial number of the device."""
     channels: tuple[Channel, ...]
-    """Its sensors."""
+    """Channels of the device, a sensor each."""
     nominal_rate: float
-    """The rate that it names (Hz)."""
+    """Sample rate that it names (Hz)."""
     measured_rate: MeasuredRate | None
-    """Against the clock; None where it follows none, or could not be measured."""
+    """Sample rate against the clock; None where it follows none, or could not be measured."""
     replaces_nominal: bool
     """Whether the measured rate is worked with."""
     remarks: tuple[Remark, ...]
-    """Sensitivities, ranges, dates and rates that are not believed."""
+    """Remarks on sensitivities, ranges, dates and rates that are not believed."""
 
     @property
     def errors(self) -> tuple[Remark, ...]:
-        """Those remarks on what is to be put right first."""
+        """Remarks on what is to be put right first."""
         return tuple(remark for remark in self.remarks if remark.code in WRONG)
 
 

@@ -14,7 +14,7 @@ from lobewatch.tap.self_check import quiet_stretch
 from lobewatch.tap.trial import Trial
 
 BASELINE_SECONDS = 0.5
-"""How long is listened before the first hit (s)."""
+"""Time that is listened before the first hit (s)."""
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class MassCheck:
     """What a hung mass says, and where to change what is wrong."""
 
     calibration: MassCalibration
-    """F/(m a)."""
+    """Force over mass times acceleration, and what follows from it."""
     place: SensorPlace | None
-    """Where the device keeps its sensitivities; None where machine.toml does."""
+    """Place where the device keeps its sensitivities; None where machine.toml does."""
 
 
 def check_mass(folder: MachineFolder, port: str, device: Device, mass: float, tell: Callable[[str], None]) -> MassCheck:
@@ -34,6 +34,7 @@ def check_mass(folder: MachineFolder, port: str, device: Device, mass: float, te
 
 
 def _good_hits(folder: MachineFolder, device: Device, tell: Callable[[str], None]) -> list[Hit]:
+    """As many hits without a fault as a tap test takes."""
     wanted = folder.machine.tap.hits
     checked_rate(folder, device)
     tell(f"HIT the hung mass opposite the accelerometer, {wanted} times; wait until it is still")
@@ -41,11 +42,11 @@ def _good_hits(folder: MachineFolder, device: Device, tell: Callable[[str], None
     device.start()
     baseline = quiet_stretch(LiveSignal(device).record(device.blocks(), BASELINE_SECONDS))
     for hit in capture_hits(device, Trial(folder.machine.tap, baseline).trigger):
-        found = judge_hit(hit)
-        if not found.flags:
+        verdict = judge_hit(hit)
+        if not verdict.flags:
             good.append(hit)
-        verdict = f"✗ {found.flags.words.upper()}  {found.text}" if found.flags else "✓ GOOD"
-        tell(f"{len(good):3d} / {wanted}  {verdict}")
+        text = f"✗ {verdict.flags.words.upper()}  {verdict.text}" if verdict.flags else "✓ GOOD"
+        tell(f"{len(good):3d} / {wanted}  {text}")
         if len(good) >= wanted:
             break
     device.stop()

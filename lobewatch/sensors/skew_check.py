@@ -13,21 +13,21 @@ from lobewatch.machine.known_devices import checked_rate
 from lobewatch.tap.plug import sensor_place
 
 SKEW_SECONDS = 2.0
-"""How long a common signal is recorded (s)."""
+"""Time for which a common signal is recorded (s)."""
 
 
 @dataclass(frozen=True)
 class SkewCheck:
     """The skew of a device, and where to enter it."""
 
-    found: MeasuredSkew
-    """Channel 1 against channel 0."""
+    measured: MeasuredSkew
+    """Skew of channel 1 against channel 0."""
     sample_rate: float
-    """At which it was measured (Hz)."""
+    """Sample rate at which it was measured (Hz)."""
     channel: Channel
     """Channel 1, with the skew that is entered."""
     place: SensorPlace | None
-    """Where the device keeps its skews; None where machine.toml does."""
+    """Place where the device keeps its skews; None where machine.toml does."""
 
 
 def check_skew(folder: MachineFolder, port: str, device: Device, tell: Callable[[str], None]) -> SkewCheck:

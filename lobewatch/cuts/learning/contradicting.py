@@ -1,4 +1,4 @@
-"""Cuts that contradict the model beyond chance: said with their likely cause, never averaged in."""
+"""Cuts that contradict the model beyond chance: left out with their likely cause, never averaged in."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ import numpy as np
 from acquisition import Remark
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.likelihood import FREQUENCY, MISJUDGED
-from lobewatch.cuts.learning.posterior import NewEvidence, Posterior
+from lobewatch.cuts.learning.posterior import USUAL, NewEvidence, Posterior
 
 CHANCE = MISJUDGED + 0.01
-"""What was heard is beyond chance where all else gives it less."""
+"""Chance below which what was heard is beyond chance: hardly more than that it was misheard; chosen."""
 AWAY = 4.0
-"""Standard deviations of a chatter frequency from all that were predicted."""
+"""Distance from all frequencies predicted (standard deviations) at which chatter is that of something else; chosen."""
 NONE = 0.005
-"""Share of the weight that counts as nothing."""
+"""Share of the weight that counts as nothing; chosen."""
 
 
 class Contradiction(StrEnum):
@@ -38,19 +38,20 @@ class ContradictingCut:
     """A cut that is left out."""
 
     cut: CutEvidence
+    """The cut."""
     why: Contradiction
+    """Contradiction for which it is left out."""
 
 
-def contradiction(expecting: NewEvidence) -> Contradiction | None:
+def contradiction(evidence: NewEvidence) -> Contradiction | None:
     """Whether a cut contradicts what was learnt from others; None where it may be chance."""
-    cut, guess, weights = expecting.cut, expecting.guess, expecting.learnt.weights
-    chatters = float(np.sum(weights * guess.chance))
+    cut, prediction, weights = evidence.cut, evidence.prediction, evidence.before.weights
+    chatters = float(np.sum(weights * prediction.chance))
     if (chatters if cut.chatters else 1 - chatters) < CHANCE:
         return Contradiction.CHATTERS if cut.chatters else Contradiction.STABLE
     if not np.isfinite(cut.frequency) or not cut.chatters:
         return None
-    teeth = cut.cut.teeth * cut.speed_rpm / 60
-    near = np.any(guess.off(cut, teeth) < AWAY * FREQUENCY * cut.frequency, axis=0)
+    near = np.any(prediction.distances(cut) < AWAY * FREQUENCY * cut.frequency, axis=0)
     return Contradiction.FREQUENCY if np.sum(weights * near) < NONE else None
 
 
@@ -61,33 +62,34 @@ def learn_from_consistent(
 
     A cut that contradicts those before it is asked again once all others are learnt.
     """
-    learnt, odd = start, list[CutEvidence]()
+    learnt, doubtful = start, list[CutEvidence]()
     for cut in cuts:
-        expecting = learnt.predict(cut)
-        if contradiction(expecting) is None:
-            learnt = expecting.learn()
+        evidence = learnt.predict(cut)
+        if contradiction(evidence) is None:
+            learnt = evidence.learn()
         else:
-            odd.append(cut)
-    still = list[ContradictingCut]()
-    for cut in odd:
-        expecting = learnt.predict(cut)
-        why = contradiction(expecting)
-        learnt = expecting.learn() if why is None else learnt
-        still += [] if why is None else [ContradictingCut(cut, why)]
-    return learnt, tuple(still)
+            doubtful.append(cut)
+    contradicting = list[ContradictingCut]()
+    for cut in doubtful:
+        evidence = learnt.predict(cut)
+        why = contradiction(evidence)
+        learnt = evidence.learn() if why is None else learnt
+        contradicting += [] if why is None else [ContradictingCut(cut, why)]
+    return learnt, tuple(contradicting)
 
 
-def contradiction_remarks(learnt: Posterior, odd: Sequence[ContradictingCut], about: str) -> Iterator[Remark]:
+def contradiction_remarks(learnt: Posterior, contradicting: Sequence[ContradictingCut], about: str) -> Iterator[Remark]:
     """What was left out, and where the spindle is not what it was tapped as; about: the program."""
-    yield from map(contradiction_remark, odd)
+    yield from map(_contradiction_remark, contradicting)
     if learnt.is_far_off:
-        text = "f_n at speed is further from that at rest than between 0.945 and 1.025 times it, as test cuts sound"
+        between = f"between {USUAL[0]:g} and {USUAL[1]:g} times it"
+        text = f"f_n at speed is further from that at rest than {between}, as test cuts sound"
         yield Remark("frequency-far-off", about, text, "tap again, warm, with this very tool and stick-out")
 
 
-def contradiction_remark(odd: ContradictingCut) -> Remark:
-    """A cut that no spindle explains which explains the others."""
-    cut = odd.cut
+def _contradiction_remark(contradicting: ContradictingCut) -> Remark:
+    """Remark on a cut that no spindle explains which explains the others."""
+    cut = contradicting.cut
     at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
     pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
     text, cure = {
@@ -103,5 +105,5 @@ def contradiction_remark(odd: ContradictingCut) -> Remark:
             f"stable {at}, which no spindle is that explains the others: another depth or speed than told?",
             "cut it again, or take it out with lobewatch exclude",
         ),
-    }[odd.why]
+    }[contradicting.why]
     return Remark("cut-unexplained", cut.id, f"{text}; left out", cure)

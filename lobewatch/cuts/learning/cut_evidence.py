@@ -1,4 +1,4 @@
-"""A cut that was heard, as the learning takes it."""
+"""One cut as the learning takes it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from lobes import Cut
 from lobewatch.machine.journal.heard_cut import CutWord
 
 AGED = 0.02
-"""Change of the natural frequency, relative, after which a cut says less of the spindle as it is now."""
+"""Change of the natural frequency, relative, after which a cut says 61 % of what it said; chosen."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class CutEvidence:
     depth: float
     """Axial depth (m)."""
     word: CutWord
-    """What it sounded like."""
+    """Word for what it sounded like."""
     frequency: float = math.nan
     """Chatter frequency (Hz); NaN where none was heard or told."""
     feed_angles: tuple[float, ...] = (0.0,)
@@ -35,12 +35,17 @@ class CutEvidence:
     moved: float = 1.0
     """Natural frequency at rest when it was made, over that of now."""
     id: str = ""
-    """In the journal."""
+    """Number of the cut in the journal."""
 
     @property
     def weight(self) -> float:
-        """Of what it says: less, the more the natural frequency has moved since."""
+        """Weight of what it says: less, the more the natural frequency has moved since."""
         return math.exp(-(((self.moved - 1) / AGED) ** 2) / 2)
+
+    @property
+    def tooth_frequency(self) -> float:
+        """Teeth a second (Hz)."""
+        return self.cut.teeth * self.speed_rpm / 60
 
     @property
     def chatters(self) -> bool:

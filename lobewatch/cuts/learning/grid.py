@@ -18,11 +18,13 @@ from modal import Mode
 STEP = 0.008
 """Relative step of the speeds that are looked at."""
 RPM, MM = 10.0, 0.05
-"""Steps that can be set at a machine."""
+"""Steps that can be set at a machine (rpm and mm)."""
+ROUNDING = 1e-6
+"""Share of a step of depth that rounding of numbers may miss."""
 SPEEDS = 80
-"""At which zero order is compared with semi-discretisation."""
+"""Number of speeds at which zero order is compared with semi-discretisation."""
 SHARES = (0.1, 3.0)
-"""Between which its errors are believed."""
+"""Least and largest ratio of true limit to zero order that is believed; chosen."""
 
 Tip = Sequence[Mode] | None
 Floats = NDArray[np.float64]
@@ -39,7 +41,7 @@ class Grid:
     speeds: Floats
     """Spindle speeds (rpm), rising, shape (s,)."""
     deepest: Floats
-    """What tool and drive allow at each (m), shape (s,)."""
+    """Depth that tool and drive allow at each (m), shape (s,)."""
     trust: Floats
     """True limit in the middle over that by zero order, at each speed, shape (s,)."""
 
@@ -56,7 +58,7 @@ def speeds_between(low: float, high: float) -> Floats:
 
 def floor_depth(depth: float) -> float:
     """The deepest depth (m) that can be set and is not deeper."""
-    return round(math.floor(depth * 1e3 / MM + 1e-6) * MM, 6) / 1e3
+    return round(math.floor(depth * 1e3 / MM + ROUNDING) * MM, 6) / 1e3
 
 
 def zero_order_trust(
@@ -69,8 +71,8 @@ def zero_order_trust(
     if is_constant(cut):
         return np.ones(speeds.shape)
     cuts = [replace(cut, feed_angle=angle) for angle in feed_angles]
-    some = np.unique(speeds[np.linspace(0, speeds.size - 1, min(SPEEDS, speeds.size)).astype(int)])
-    true = lowest_of([stability_boundary(x, y, one, some, deepest) for one in cuts]).depth
-    mean = lowest_of([zero_order(x, y, one, some) for one in cuts]).depth
+    compared = np.unique(speeds[np.linspace(0, speeds.size - 1, min(SPEEDS, speeds.size)).astype(int)])
+    true = lowest_of([stability_boundary(x, y, fed, compared, deepest) for fed in cuts]).depth
+    mean = lowest_of([zero_order(x, y, fed, compared) for fed in cuts]).depth
     share = np.minimum(true, deepest) / np.minimum(mean, deepest)
-    return np.asarray(np.interp(speeds, some, np.clip(share, *SHARES)))
+    return np.asarray(np.interp(speeds, compared, np.clip(share, *SHARES)))

@@ -17,19 +17,21 @@ from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.verdicts.mean_force import MeanForce, is_constant
 
 EDGE = 0.05
-"""Standard deviation of the depth, relative, within which a cut is stable or not."""
+"""Standard deviation of the depth, relative, within which a cut is stable or not; chosen."""
 MISJUDGED = 0.02
-"""Share of cuts that are heard as what they are not."""
+"""Share of cuts that are heard as what they are not; chosen, see docs/cuts.md, How often it is right."""
 FREQUENCY = 0.01
-"""Standard deviation of a chatter frequency against the one predicted, relative."""
+"""Standard deviation of a chatter frequency against the one predicted, relative; chosen, see docs/cuts.md."""
 STRANGE = 0.05
-"""Share of chatter frequencies that say nothing."""
+"""Share of chatter frequencies that say nothing; chosen, see docs/cuts.md, How good it is."""
 OTHER_KIND = 0.1
-"""Share of chatter that is heard as that of the other kind."""
+"""Share of chatter that is heard as that of the other kind; chosen."""
 ACCURACY = 1e-3
-"""Of a multiplier."""
+"""Accuracy of a multiplier, relative."""
 REAL = 1e-3
-"""A multiplier whose angle is this near to pi (rad) is that of period two."""
+"""Distance of the angle of a multiplier from pi (rad) up to which it is that of period two."""
+FARTHEST = 5.0
+"""Largest logarithm of depth over limit that counts, either way: a hundred times `EDGE`."""
 
 Floats = NDArray[np.float64]
 
@@ -42,95 +44,97 @@ class CutPrediction(NamedTuple):
     base: Floats
     """Frequency of what grows most, folded to between 0 and half the tooth frequency (Hz); NaN where not known."""
     at_limit: Floats
-    """The same at the limit at its speed, by zero order; may be NaN where the cut says nothing of frequencies."""
+    """Folded frequency at the limit of its speed, by zero order (Hz); may be NaN where the cut says nothing of any."""
     flip: NDArray[np.bool_]
     """Whether that is of period two."""
 
     @property
     def chance(self) -> Floats:
-        """That it is heard to chatter."""
+        """Chance that it is heard to chatter."""
         return np.asarray(MISJUDGED + (1 - 2 * MISJUDGED) * ndtr(self.excess / EDGE))
 
-    def off(self, seen: CutEvidence, tooth_frequency: float) -> Floats:
-        """How far what was heard is from both frequencies (Hz), shape (2, r).
+    def distances(self, cut: CutEvidence) -> Floats:
+        """Distances of the chatter of a cut from both frequencies (Hz), shape (2, r).
 
         Chatter that has grown leaves the cut, and sounds like what grows most or like what is at the limit: beyond the
         limit of a pocket these are two modes or lobes.
         """
-        heard = fold_frequency(_heard_base(seen, tooth_frequency), tooth_frequency)
-        return np.asarray(np.abs(heard - np.array([self.base, self.at_limit])))
+        return np.asarray(np.abs(_folded_chatter(cut) - np.array([self.base, self.at_limit])))
 
 
-def predict_cut(seen: CutEvidence, draws: Draws) -> CutPrediction:
-    """In the worst of its directions of feed, at its own depth."""
-    rows = draws.rows(seen.speed_rpm, seen.cut.tangential, seen.cut.radial, seen.material)
-    speed = rows.speed_rpm if seen.speed_found else rows.speed_rpm * draws.at_rest.speed_rpm
-    rows = replace(rows, cut=seen.cut, frequency=rows.frequency * seen.moved, speed_rpm=speed)
-    way = _by_mean_force if is_constant(seen.cut) else _by_multipliers
-    found = [way(rows.fed_at(angle), seen) for angle in seen.feed_angles]
-    worst = np.argmax([one.excess for one in found], axis=0)[np.newaxis]
-    return CutPrediction(*(np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*found, strict=True)))
+def predict_cut(cut: CutEvidence, draws: Draws) -> CutPrediction:
+    """What draws would do in the worst of the directions of feed of a cut, at its own depth."""
+    rows = draws.rows(cut.speed_rpm, cut.cut.tangential, cut.cut.radial, cut.material)
+    speed = rows.speed_rpm if cut.speed_found else rows.speed_rpm * draws.at_rest.speed_rpm
+    rows = replace(rows, cut=cut.cut, frequency=rows.frequency * cut.moved, speed_rpm=speed)
+    predict = _by_mean_force if is_constant(cut.cut) else _by_multipliers
+    fed = [predict(rows.fed_at(angle), cut) for angle in cut.feed_angles]
+    worst = np.argmax([prediction.excess for prediction in fed], axis=0)[np.newaxis]
+    return CutPrediction(*(np.take_along_axis(np.array(part), worst, axis=0)[0] for part in zip(*fed, strict=True)))
 
 
-def log_likelihood(seen: CutEvidence, guess: CutPrediction, tooth_frequency: float) -> Floats:
+def log_likelihood(cut: CutEvidence, prediction: CutPrediction) -> Floats:
     """Logarithm of the likelihood of what was heard, shape (r,)."""
-    if not seen.chatters:
-        return np.asarray(np.log(1 - guess.chance))
-    return np.asarray(np.log(guess.chance) + _log_of_sound(seen, guess, tooth_frequency))
+    if not cut.chatters:
+        return np.asarray(np.log(1 - prediction.chance))
+    return np.asarray(np.log(prediction.chance) + _log_of_sound(cut, prediction))
 
 
-def most_likely(seen: CutEvidence, tooth_frequency: float) -> float:
+def most_likely(cut: CutEvidence) -> float:
     """The largest that `log_likelihood` can be: of a spindle that would do what was heard."""
-    if not seen.has_frequency:
+    if not cut.has_frequency:
         return 0.0
-    base = np.atleast_1d(fold_frequency(_heard_base(seen, tooth_frequency), tooth_frequency))
-    same = CutPrediction(np.array([np.inf]), base, base, np.array([seen.word == "flip"]))
-    return float(log_likelihood(seen, same, tooth_frequency)[0])
+    base = np.atleast_1d(_folded_chatter(cut))
+    same = CutPrediction(np.array([np.inf]), base, base, np.array([cut.word == "flip"]))
+    return float(log_likelihood(cut, same)[0])
 
 
-def _log_of_sound(seen: CutEvidence, guess: CutPrediction, tooth_frequency: float) -> Floats:
-    """Of kind and frequency, where it chatters; 0 where neither was told."""
-    if not seen.has_frequency:
-        return np.zeros(guess.excess.shape)
-    alike = guess.flip == (seen.word == "flip")
+def _log_of_sound(cut: CutEvidence, prediction: CutPrediction) -> Floats:
+    """Logarithm of the likelihood of kind and frequency, where it chatters; 0 where neither was told."""
+    if not cut.has_frequency:
+        return np.zeros(prediction.excess.shape)
+    alike = prediction.flip == (cut.word == "flip")
     kind = np.where(alike, 1 - OTHER_KIND, OTHER_KIND)
-    wide = FREQUENCY * (seen.frequency if np.isfinite(seen.frequency) else tooth_frequency)
-    off = guess.off(seen, tooth_frequency)
-    near = np.exp(-((off / wide) ** 2) / 2) / (wide * np.sqrt(np.pi / 2))
-    anywhere = 2 / tooth_frequency
-    near = np.mean(np.where(np.isfinite(off), near, anywhere), axis=0)
+    wide = FREQUENCY * (cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency)
+    distances = prediction.distances(cut)
+    near = np.exp(-((distances / wide) ** 2) / 2) / (wide * np.sqrt(np.pi / 2))
+    anywhere = 2 / cut.tooth_frequency
+    near = np.mean(np.where(np.isfinite(distances), near, anywhere), axis=0)
     return np.asarray(np.log(kind * ((1 - STRANGE) * near + STRANGE * anywhere) / anywhere))
 
 
-def _heard_base(seen: CutEvidence, tooth_frequency: float) -> float:
-    """Chatter frequency that was heard (Hz), or that of period two where none was told."""
-    return seen.frequency if np.isfinite(seen.frequency) else tooth_frequency / 2
+def _folded_chatter(cut: CutEvidence) -> Floats:
+    """Chatter frequency that was heard, or that of period two where none was told, folded by the teeth (Hz)."""
+    chatter = cut.frequency if np.isfinite(cut.frequency) else cut.tooth_frequency / 2
+    return fold_frequency(chatter, cut.tooth_frequency)
 
 
-def _by_mean_force(rows: MillingRows, seen: CutEvidence) -> CutPrediction:
-    """Where that is all of the force."""
+def _by_mean_force(rows: MillingRows, cut: CutEvidence) -> CutPrediction:
+    """Prediction where the mean force is all of it."""
     mean = MeanForce.of(rows)
     limit, at_limit = (table[:, 0] for table in mean.limits(rows.speed_rpm[:, np.newaxis]))
-    excess = np.clip(np.log(seen.depth / limit), -5, 5)
+    excess = np.clip(np.log(cut.depth / limit), -FARTHEST, FARTHEST)
     frequency = at_limit.copy()
-    beyond = np.flatnonzero(excess > 0) if seen.has_frequency else np.empty(0, dtype=np.intp)
+    beyond = np.flatnonzero(excess > 0) if cut.has_frequency else np.empty(0, dtype=np.intp)
     if beyond.size:
-        _, own = MeanForce(mean.rows[beyond], mean.force[beyond]).loudest(rows.speed_rpm[beyond], seen.depth)
-        frequency[beyond] = np.where(np.isfinite(own), own, frequency[beyond])
+        _, loudest = MeanForce(mean.rows[beyond], mean.force[beyond]).loudest(rows.speed_rpm[beyond], cut.depth)
+        frequency[beyond] = np.where(np.isfinite(loudest), loudest, frequency[beyond])
     teeth = 1 / rows.tooth_period
-    return CutPrediction(
-        excess, fold_frequency(frequency, teeth), fold_frequency(at_limit, teeth), np.zeros(len(rows), dtype=bool)
-    )
+    base, at_limit = (fold_frequency(part, teeth) for part in (frequency, at_limit))
+    return CutPrediction(excess, base, at_limit, np.zeros(len(rows), dtype=bool))
 
 
-def _by_multipliers(rows: MillingRows, seen: CutEvidence) -> CutPrediction:
-    """By semi-discretisation at the depth of the cut; how far it is from the limit by its growth over that at rest."""
-    depth = np.full((len(rows), 1), seen.depth)
-    multiplier = largest_multipliers(rows, depth, piece_numbers(rows, seen.depth), ACCURACY)[:, 0]
+def _by_multipliers(rows: MillingRows, cut: CutEvidence) -> CutPrediction:
+    """Prediction by semi-discretisation at the depth of the cut; its distance from the limit is that of its growth.
+
+    Growth of the logarithm of the motion over the decay that the spindle has without a cut.
+    """
+    depth = np.full((len(rows), 1), cut.depth)
+    multiplier = largest_multipliers(rows, depth, piece_numbers(rows, cut.depth), ACCURACY)[:, 0]
     quiet = np.min(rows.damping_ratio * rows.frequency, axis=1) * rows.tooth_period
-    excess = np.clip(np.log(np.maximum(np.abs(multiplier), 1e-9)) / quiet, -5, 5)
+    excess = np.clip(np.log(np.maximum(np.abs(multiplier), 1e-9)) / quiet, -FARTHEST, FARTHEST)
     angle = np.abs(np.angle(multiplier))
     teeth, at_limit = 1 / rows.tooth_period, np.full(len(rows), np.nan)
-    if seen.has_frequency:
+    if cut.has_frequency:
         at_limit = MeanForce.of(rows).limits(rows.speed_rpm[:, np.newaxis])[1][:, 0]
     return CutPrediction(excess, angle / (2 * np.pi) * teeth, fold_frequency(at_limit, teeth), np.pi - angle < REAL)

@@ -1,10 +1,9 @@
-"""What was learnt of the turning spindle: draws from the prior, weighted by how well they explain the cuts heard."""
+"""What was learnt of the turning spindle: draws from the prior, weighted by how well they explain its cuts."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -17,21 +16,23 @@ from lobewatch.cuts.learning.priors import Draws, draw_prior
 from lobewatch.verdicts.doubt import Doubt
 
 COUNT = 2000
-"""Draws."""
+"""Number of draws."""
 REFRESHED = 500
-"""Draws that they are made anew with where few have any weight left ..."""
+"""Number of draws that are made anew where few have any weight left ..."""
 ENOUGH = 120
 """... which is when the effective sample size is less."""
 MOVES, REACH = 4, 0.5
-"""Times that each is then moved, and how far, as a share of their own spread."""
+"""Number of times that each is then moved, and how far, as a share of their own spread; chosen."""
+REGULAR = 1e-4
+"""Variance that is added to that of the draws before they are moved: a few alike have none of their own."""
 NEGLIGIBLE = 1e-6
-"""Draws with less than this share of the largest weight are not looked at any more."""
+"""Share of the largest weight below which a draw is not looked at any more."""
 SETTLED, OPEN = 2, (0.90, 1.05)
-"""Chatter frequencies without which nobody knows how far a spindle at speed may be off, and how far that is."""
+"""Chatter frequencies without which nobody knows how far a spindle at speed may be off, and how far that is; chosen."""
 USUAL = (0.945, 1.025)
-"""95 % of natural frequencies at speed lie between these, over those at rest."""
+"""Ends between which 95 % of natural frequencies at speed lie, over those at rest: `priors.FREQUENCY`."""
 LEVEL = 0.95
-"""Of intervals."""
+"""Share of the weight that an interval holds."""
 
 Floats = NDArray[np.float64]
 
@@ -40,14 +41,16 @@ class Interval(NamedTuple):
     """A number that is learnt, as a factor on that at rest (on that of the table, of coefficients)."""
 
     mean: float
+    """Weighted mean."""
     low: float
-    """2.5 % ..."""
+    """Lower end: 2.5 % of the weight lies below."""
     high: float
-    """... and 97.5 % lie beyond."""
+    """Upper end: 2.5 % of the weight lies above."""
     std: float
+    """Weighted standard deviation."""
 
     def no_narrower(self, low: float, high: float) -> Interval:
-        """It, with both of these inside."""
+        """An interval that has both of these inside."""
         return self._replace(low=min(self.low, low), high=max(self.high, high))
 
 
@@ -56,18 +59,20 @@ class Posterior:
     """Weighted draws of the turning spindle."""
 
     draws: Draws
-    log: Floats
+    """Spindles at speed."""
+    log_weight: Floats
     """Logarithm of the weight of each, up to a constant, shape (r,)."""
     cuts: tuple[CutEvidence, ...] = ()
-    """What they were learnt from."""
+    """Cuts that they were learnt from."""
     refreshed: int = 0
-    """How often the draws were made anew."""
+    """Number of times that the draws were made anew."""
     seed: int = 0
+    """Seed of all draws."""
 
     @property
     def weights(self) -> Floats:
-        """Of each draw, sum 1, shape (r,)."""
-        return _weights(self.log)
+        """Weight of each draw, sum 1, shape (r,)."""
+        return _weights(self.log_weight)
 
     @property
     def size(self) -> float:
@@ -76,11 +81,11 @@ class Posterior:
 
     @property
     def intervals(self) -> dict[str, Interval]:
-        """By name (`Draws.ratios`); those of natural frequencies stay open until two were heard in chatter."""
-        found = {name: _interval(values, self.weights) for name, values in self.draws.ratios().items()}
-        if self.frequencies >= SETTLED:
-            return found
-        return {name: one.no_narrower(*OPEN) if name.startswith("frequency") else one for name, one in found.items()}
+        """Intervals by name (`Draws.ratios`); of natural frequencies they stay open until chatter was heard twice."""
+        intervals = {name: _interval(values, self.weights) for name, values in self.draws.ratios().items()}
+        if self.frequencies < SETTLED:
+            intervals |= {name: intervals[name].no_narrower(*OPEN) for name in ("frequency_x", "frequency_y")}
+        return intervals
 
     @property
     def frequencies(self) -> int:
@@ -100,9 +105,10 @@ class Posterior:
 
     def predict(self, cut: CutEvidence) -> NewEvidence:
         """A cut, and what it would sound like on the spindles that are not ruled out."""
-        looked = np.flatnonzero(self.log > np.max(self.log) + np.log(NEGLIGIBLE))
-        draws = self.draws[looked].with_materials(cut.material + 1, self.seed)
-        return NewEvidence(replace(self, draws=draws, log=self.log[looked]), cut, predict_cut(cut, draws))
+        likely = np.flatnonzero(self.log_weight > np.max(self.log_weight) + np.log(NEGLIGIBLE))
+        draws = self.draws[likely].with_materials(cut.material + 1, self.seed)
+        before = replace(self, draws=draws, log_weight=self.log_weight[likely])
+        return NewEvidence(before, cut, predict_cut(cut, draws))
 
     def sample(self, count: int) -> Draws:
         """Draws of equal weight."""
@@ -113,20 +119,18 @@ class Posterior:
 class NewEvidence:
     """A cut before it teaches anything."""
 
-    learnt: Posterior
-    """Without it: draws that have any weight left, with coefficients of its material."""
+    before: Posterior
+    """Posterior without it: draws that have any weight left, with coefficients of its material."""
     cut: CutEvidence
-    guess: CutPrediction
-    """What each of these draws would do in it."""
+    """The cut."""
+    prediction: CutPrediction
+    """Sound that each of these draws would make in it."""
 
     def learn(self) -> Posterior:
         """What is known with it."""
-        known, cuts = self.learnt, (*self.learnt.cuts, self.cut)
-        draws, log, refreshed = known.draws, known.log + _log(self.cut, self.guess), known.refreshed
-        if 1 / np.sum(_weights(log) ** 2) < ENOUGH:
-            draws, log = _refresh(draws, log, cuts, np.random.default_rng((known.seed, 3, len(cuts))))
-            refreshed += 1
-        return replace(known, draws=draws, log=log, cuts=cuts, refreshed=refreshed)
+        log_weight = self.before.log_weight + _log_likelihood(self.cut, self.prediction)
+        learnt = replace(self.before, log_weight=log_weight, cuts=(*self.before.cuts, self.cut))
+        return _refresh(learnt) if learnt.size < ENOUGH else learnt
 
 
 def prior(middle: MillingRows, doubt: Doubt, count: int = COUNT, seed: int = 0) -> Posterior:
@@ -137,34 +141,21 @@ def prior(middle: MillingRows, doubt: Doubt, count: int = COUNT, seed: int = 0) 
     return Posterior(draw_prior(middle, doubt, count, seed=seed), np.zeros(count), seed=seed)
 
 
-def learn(
-    middle: MillingRows, doubt: Doubt, cuts: Sequence[CutEvidence], count: int = COUNT, seed: int = 0
-) -> Posterior:
-    """Learn from cuts in the order in which they were made; the same for a seed."""
-    return reduce(Posterior.learn_from, cuts, prior(middle, doubt, count, seed))
-
-
-def _log(cut: CutEvidence, guess: CutPrediction) -> Floats:
+def _log_likelihood(cut: CutEvidence, prediction: CutPrediction) -> Floats:
     """Logarithm of the likelihood of one cut; an old one counts less, the more the frequency has moved since."""
-    return cut.weight * log_likelihood(cut, guess, _teeth(cut))
+    return cut.weight * log_likelihood(cut, prediction)
 
 
-def _teeth(cut: CutEvidence) -> float:
-    """Tooth frequency (Hz)."""
-    return cut.cut.teeth * cut.speed_rpm / 60
-
-
-def _weights(log: Floats) -> Floats:
-    weights = np.exp(log - np.max(log))
+def _weights(log_weight: Floats) -> Floats:
+    weights = np.exp(log_weight - np.max(log_weight))
     return np.asarray(weights / np.sum(weights))
 
 
-def _refresh(
-    draws: Draws, log: Floats, cuts: Sequence[CutEvidence], random: np.random.Generator
-) -> tuple[Draws, Floats]:
+def _refresh(learnt: Posterior) -> Posterior:
     """Draws of equal weight, each moved a few times by Metropolis and Hastings."""
-    weights = _weights(log)
-    spread = np.cov(draws.normal.T, aweights=weights) + 1e-4 * np.eye(draws.normal.shape[1])
+    weights, draws, cuts = learnt.weights, learnt.draws, learnt.cuts
+    random = np.random.default_rng((learnt.seed, 3, len(cuts)))
+    spread = np.cov(draws.normal.T, aweights=weights) + REGULAR * np.eye(draws.normal.shape[1])
     root = np.linalg.cholesky(spread) * REACH
     chosen, copies = np.unique(_spread(weights, REFRESHED, random), return_inverse=True)
     value = _joint(draws[chosen], cuts, np.full(len(chosen), -np.inf))[copies]
@@ -173,11 +164,11 @@ def _refresh(
         step = random.standard_normal(draws.normal.shape) @ root.T
         moved = replace(draws, normal=draws.normal + step)
         least = value + np.log(random.uniform(size=len(draws)))
-        there = _joint(moved, cuts, least)
-        taken = there > least
+        moved_value = _joint(moved, cuts, least)
+        taken = moved_value > least
         normal = np.where(taken[:, np.newaxis], moved.normal, draws.normal)
-        draws, value = replace(draws, normal=normal), np.where(taken, there, value)
-    return draws, np.zeros(len(draws))
+        draws, value = replace(draws, normal=normal), np.where(taken, moved_value, value)
+    return replace(learnt, draws=draws, log_weight=np.zeros(len(draws)), refreshed=learnt.refreshed + 1)
 
 
 def _joint(draws: Draws, cuts: Sequence[CutEvidence], least: Floats) -> Floats:
@@ -186,12 +177,12 @@ def _joint(draws: Draws, cuts: Sequence[CutEvidence], least: Floats) -> Floats:
     A draw that cannot come to more any more is not asked about further cuts.
     """
     value: Floats = -np.sum(draws.normal**2, axis=1) / 2
-    hope = [cut.weight * most_likely(cut, _teeth(cut)) for cut in cuts]
+    hope = [cut.weight * most_likely(cut) for cut in cuts]
     for k, cut in enumerate(cuts):
         value[value + sum(hope[k:]) <= least] = -np.inf
         asked = np.flatnonzero(np.isfinite(value))
         if asked.size:
-            value[asked] += _log(cut, predict_cut(cut, draws[asked]))
+            value[asked] += _log_likelihood(cut, predict_cut(cut, draws[asked]))
     return value
 
 

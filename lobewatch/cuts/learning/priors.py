@@ -1,8 +1,8 @@
 """What may differ between a spindle at rest, as it was tapped, and one that turns and cuts: the prior of the learning.
 
 Standard deviations: f_n -1.5 +- 2 %, zeta x 1.1 +- 25 %, K +- 10 %, each for x and y apart; Kt x 1.1 +- 30 %, for each
-material. Plausible, not measured. They are joined with the doubt of the program. Each number is a function of one that
-is standard normal, so that draws can be moved without leaving the prior out of sight.
+material. Chosen: plausible, not measured. They are joined with the doubt of the program. Each number is a function of
+one that is standard normal, so that draws can be moved without leaving the prior out of sight.
 """
 
 from __future__ import annotations
@@ -19,11 +19,16 @@ from lobewatch.verdicts.doubt import Doubt
 FREQUENCY, DAMPING, STIFFNESS, FORCE = (0.985, 0.02), (1.1, 0.25), (1.0, 0.10), (1.1, 0.30)
 """Middle, and standard deviation (of the frequency absolute, else relative to the middle)."""
 SHARE, WIDE = 0.05, 3.0
-"""So many frequencies differ so many times as much: nobody has measured how often a spindle is far off."""
+"""Share of frequencies that differ more, and how many times as much; chosen: nobody has measured how often a spindle is
+far off."""
 LEAST = 0.1
-"""Nothing is below this share of its middle."""
+"""Least share of its middle that a factor has."""
+MOST_DAMPED = 0.95
+"""Largest damping ratio: a mode that is drawn still rings."""
 OF_MODES, OF_MATERIAL = 6, 3
 """Numbers of a draw: (f, zeta, K) in x, then in y; (Kt at speed, Kt and Kr/Kt as doubted) of each material."""
+REACH, POINTS = 18, 3601
+"""End (standard deviations) and number of points of the table that `_quantiles` makes of the mixture."""
 
 Floats = NDArray[np.float64]
 
@@ -33,19 +38,19 @@ class Draws:
     """Spindles at speed: what was drawn, and what follows for rows of a cut."""
 
     normal: Floats
-    """What differs from rest, each standard normal a priori, shape (r, 6 + 3 materials)."""
+    """Numbers for what differs from rest, each standard normal a priori, shape (r, 6 + 3 materials)."""
     at_rest: MillingRows
     """The spindles at rest, with the error of tap tests, r rows; their speeds are what a speed of 1 is truly."""
     doubt: Doubt
-    """What the coefficients were drawn from."""
+    """Doubt that the coefficients were drawn from."""
 
     def __len__(self) -> int:
         """Number of draws."""
         return len(self.normal)
 
-    def __getitem__(self, which: NDArray[np.intp] | slice) -> Draws:
+    def __getitem__(self, places: NDArray[np.intp] | slice) -> Draws:
         """Some of them."""
-        return replace(self, normal=self.normal[which], at_rest=self.at_rest[which])
+        return replace(self, normal=self.normal[places], at_rest=self.at_rest[places])
 
     def with_materials(self, count: int, seed: int) -> Draws:
         """The same with coefficients of so many materials at least, new ones as the prior has them."""
@@ -69,7 +74,7 @@ class Draws:
         return replace(
             self.at_rest,
             frequency=self.at_rest.frequency * factor[:, axis, 0],
-            damping_ratio=np.minimum(self.at_rest.damping_ratio * factor[:, axis, 1], 0.95),
+            damping_ratio=np.minimum(self.at_rest.damping_ratio * factor[:, axis, 1], MOST_DAMPED),
             stiffness=self.at_rest.stiffness * factor[:, axis, 2],
             speed_rpm=np.full(len(self), speed_rpm),
             tangential=tangential * push,
@@ -80,7 +85,7 @@ class Draws:
         """Factors of f, zeta and K in x and y, shape (r, 2, 3)."""
         normal = self.normal[:, :OF_MODES].reshape(-1, 2, 3)
         parts = (
-            FREQUENCY[0] + FREQUENCY[1] * _far(normal[..., 0]),
+            FREQUENCY[0] + FREQUENCY[1] * _heavy_tailed(normal[..., 0]),
             DAMPING[0] * np.maximum(1 + DAMPING[1] * normal[..., 1], LEAST),
             STIFFNESS[0] * np.maximum(1 + STIFFNESS[1] * normal[..., 2], LEAST),
         )
@@ -90,29 +95,28 @@ class Draws:
         """Factors of Kt and of Kr/Kt of a material, shape (r,) each."""
         first = OF_MODES + OF_MATERIAL * material
         at_speed, tangential, ratio = self.normal[:, first : first + OF_MATERIAL].T
-        known, turned = (
+        force, ratio = (
             span.low + (span.high - span.low) * ndtr(normal)
             for span, normal in ((self.doubt.tangential, tangential), (self.doubt.ratio, ratio))
         )
-        return FORCE[0] * np.maximum(1 + FORCE[1] * at_speed, LEAST) * known, np.maximum(turned, 0.0)
+        return FORCE[0] * np.maximum(1 + FORCE[1] * at_speed, LEAST) * force, np.maximum(ratio, 0.0)
 
 
 def draw_prior(middle: MillingRows, doubt: Doubt, count: int, seed: int = 0) -> Draws:
     """Draws from the prior around a spindle at rest (a row), the same for a seed."""
-    one = replace(middle, speed_rpm=np.ones(1))
-    rest = doubt.draw(one, count, seed, without="coefficients")
+    at_rest = doubt.draw(replace(middle, speed_rpm=np.ones(1)), count, seed, without="coefficients")
     normal = np.random.default_rng((seed, 2)).standard_normal((count, OF_MODES + OF_MATERIAL))
-    return Draws(normal, rest, doubt)
+    return Draws(normal, at_rest, doubt)
 
 
-def _far(normal: Floats) -> Floats:
+def _heavy_tailed(normal: Floats) -> Floats:
     """Standard normal numbers as those of a mixture of which a share is wider, of the same order."""
     return np.asarray(np.interp(normal, *_QUANTILES))
 
 
 def _quantiles() -> tuple[Floats, Floats]:
     """Standard normal numbers, and those of the mixture that as many lie below."""
-    value = np.linspace(-18, 18, 3601)
+    value = np.linspace(-REACH, REACH, POINTS)
     beyond = (1 - SHARE) * ndtr(-np.abs(value)) + SHARE * ndtr(-np.abs(value) / WIDE)
     return np.asarray(-np.sign(value) * ndtri(beyond)), value
 

@@ -17,9 +17,9 @@ PART = 1e-3
 ANCHORS = 12
 """Lines whose families are compared."""
 MULTIPLES = 3
-"""Of a frequency that are looked for."""
+"""Multiples of a frequency that are looked for."""
 SHARE = 0.3
-"""Weight of the displacement of a family beside the lines that it explains ..."""
+"""Weight of the displacement of a family beside the lines that it explains; chosen ..."""
 LEAST = 0.25
 """... which has this share of the energy of the largest at least."""
 
@@ -29,9 +29,9 @@ class ChatterLines:
     """One family."""
 
     frequency: float
-    """Of the line with the largest displacement (Hz)."""
+    """Frequency of the line with the largest displacement (Hz)."""
     error: float
-    """Standard error (Hz)."""
+    """Standard error of the frequency (Hz)."""
     lines: SpectralLines
     """All lines f_c + k tooth passing."""
 
@@ -54,14 +54,14 @@ def chatter_lines(left: SpectralLines, tooth_frequency: float, bin_: float) -> C
     score = np.where(large >= LEAST, explained / np.max(explained) + SHARE * large, 0.0)
     best = families[int(np.argmax(score))]
     top = int(np.argmax(np.where(best, named, 0.0)))
-    error = bin_ * np.hypot(0.3 / np.sqrt(left.clearness[top]), 0.03)
-    return ChatterLines(float(left.frequency[top]), float(error), left[best & part])
+    error = float(left.frequency_error(bin_)[top])
+    return ChatterLines(float(left.frequency[top]), error, left[best & part])
 
 
 def _explained(left: SpectralLines, frequency: float, tooth_frequency: float, bin_: float) -> Floats:
     """Which lines are multiples of a frequency or side bands of those, 0 or 1, shape (n,)."""
-    found = np.zeros(len(left))
+    explained = np.zeros(len(left))
     for order in range(1, MULTIPLES + 1):
         apart = family_distance(left.frequency, order * frequency, tooth_frequency)
-        found[apart < WIDE * bin_ * max(1.0, order / 2)] = 1.0
-    return found
+        explained[apart < WIDE * bin_ * max(1.0, order / 2)] = 1.0
+    return explained

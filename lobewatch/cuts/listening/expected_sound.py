@@ -16,16 +16,16 @@ from lobewatch.tool.assembly import Assembly
 
 
 class ExpectedSound(NamedTuple):
-    """In the direction of feed that is worst."""
+    """What a cut sounds like in the direction of feed that is worst."""
 
     stable: bool
     """Whether no multiplier reaches 1."""
     frequency: float
-    """Of the largest multiplier (Hz): what chatter would sound with at this depth."""
+    """Frequency of the largest multiplier (Hz): what chatter would sound with at this depth."""
 
 
 def expected_sound(setting: CutSetting, assembly: Assembly, speed_rpm: float) -> ExpectedSound:
-    """At a speed (rpm): that at the limit is more than 1 % off in many cuts far beyond it.
+    """What to expect at a speed (rpm): the sound at the limit is more than 1 % off in many cuts far beyond it.
 
     The multiplier is that of the cut's own depth. ValueError for an assembly without modes.
     """
@@ -33,11 +33,11 @@ def expected_sound(setting: CutSetting, assembly: Assembly, speed_rpm: float) ->
     axes = FEED_ANGLES.values() if setting.feed == "both" else (FEED_ANGLES[setting.feed],)
     cuts = [replace(setting.cut, feed_angle=angle) for angle in axes]
     depth, speed = np.array([[setting.depth]]), np.array([speed_rpm])
-    found = []
+    multipliers = []
     for cut in cuts:
         rows = rows_of(system, cut, speed)
-        found.append(largest_multipliers(rows, depth, piece_numbers(rows, setting.depth))[0])
-    worst = int(np.argmax([abs(one[0]) for one in found]))
+        multipliers.append(largest_multipliers(rows, depth, piece_numbers(rows, setting.depth))[0])
+    worst = int(np.argmax([abs(multiplier[0]) for multiplier in multipliers]))
     tooth = np.array([setting.cut.teeth * speed_rpm / 60])
-    frequency = chatter_frequency(system, cuts[worst], found[worst], depth[0], tooth)
-    return ExpectedSound(bool(abs(found[worst][0]) < 1), float(frequency[0]))
+    frequency = chatter_frequency(system, cuts[worst], multipliers[worst], depth[0], tooth)
+    return ExpectedSound(bool(abs(multipliers[worst][0]) < 1), float(frequency[0]))

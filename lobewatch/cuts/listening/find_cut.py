@@ -12,44 +12,52 @@ from scipy.ndimage import uniform_filter1d
 Floats = NDArray[np.float64]
 
 BLOCK = 0.04
-"""Length of the pieces that are compared (s), two turns at least; each begins in the middle of the one before."""
+"""Length of the pieces that are compared (s), two turns at least; each begins in the middle of the one before it."""
 LOUDER = 0.2
 """A cut is so much louder than air, in log10 of the power."""
 QUIETEST = 0.1
-"""Share of a recording that is air, at least; or it is the quietest part."""
+"""Share of a recording that is air, at least; or air is the quietest part."""
+QUIET_PIECES = 5
+"""Pieces in a row that the quietest part has; chosen."""
 LOUDEST = 1e3
-"""Times the power in air that counts at one frequency."""
+"""Largest power at one frequency, over that in air, that counts."""
+LOWEST = 100.0
+"""Frequency above which it is compared how loud pieces are (Hz): below it floors and pumps sound; chosen."""
+SMOOTHED = 3
+"""Pieces over which the power in air is smoothed; chosen."""
 JOINED = 0.1
 """Pauses up to this belong to a cut (s)."""
 KNOCK = 0.15
-"""What is louder for no longer than this is a knock, not a cut (s)."""
+"""Time up to which what is louder is a knock, not a cut (s)."""
 LEAST_AIR = 0.15
-"""Of air (s)."""
+"""Shortest air (s)."""
 SETTLED = 0.1
-"""After the beginning of a cut it is listened to (s)."""
+"""Time after the beginning of a cut from which it is listened to (s)."""
 LEAST_CUT = 0.3
-"""What is listened to, at least (s) ..."""
+"""Time that is listened to, at least (s) ..."""
 MOST_CUT = 2.0
 """... and at most, its end: no spindle is so steady that more is of use (s)."""
 SPIKE = 4.0
 """A piece of a cut with a peak so many times those around it is a knock."""
 AROUND = 6
-"""Pieces on each side that a piece is compared with."""
+"""Pieces on each side that a piece is compared with ..."""
+AMONG = 0.75
+"""... by this quantile of their peaks; chosen."""
 
 
 class CutParts(NamedTuple):
     """Where the cut is; or why it cannot be said, a code."""
 
     reason: str
-    """Empty where all is well."""
+    """Code of what is wrong; empty where all is well."""
     air: slice = slice(0, 0)
     """Samples of the spindle turning in air."""
     cut: slice = slice(0, 0)
     """Samples of the cut, its beginning and its end left out."""
     begin: float = np.nan
-    """When the cut begins (s)."""
+    """Time at which the cut begins (s)."""
     end: float = np.nan
-    """When it ends (s)."""
+    """Time at which it ends (s)."""
 
 
 def find_cut(signal: Floats, sample_rate: float, turn: float) -> CutParts:
@@ -62,9 +70,10 @@ def find_cut(signal: Floats, sample_rate: float, turn: float) -> CutParts:
     if signal.size < (LEAST_AIR + SETTLED + LEAST_CUT) * sample_rate or signal.size < 4 * size:
         return CutParts("too-short")
     level = _loudness(signal, size, step, sample_rate)
-    air = float(np.min(np.convolve(level, np.full(5, 0.2), "valid")))
+    air = float(np.min(np.convolve(level, np.full(QUIET_PIECES, 1 / QUIET_PIECES), "valid")))
     loud = _stretches(level > air + LOUDER)
-    cuts = [one for one in _joined(loud, JOINED * sample_rate / step) if _long(one, step) > KNOCK * sample_rate]
+    joined = _join(loud, JOINED * sample_rate / step)
+    cuts = [(first, last) for first, last in joined if (last - first) * step > KNOCK * sample_rate]
     if not cuts:
         return CutParts("no-cut")
     if len(cuts) > 1:
@@ -73,10 +82,11 @@ def find_cut(signal: Floats, sample_rate: float, turn: float) -> CutParts:
     first, last = begin + step + round(SETTLED * sample_rate), end - size
     settled = slice(max(first, last - round(MOST_CUT * sample_rate)), last)
     parts = CutParts("", _longest_air(loud, level.size, step), settled, begin / sample_rate, end / sample_rate)
-    return parts._replace(reason=_wrong(signal, parts, sample_rate, step))
+    return parts._replace(reason=_fault(signal, parts, sample_rate, step))
 
 
-def _wrong(signal: Floats, parts: CutParts, sample_rate: float, step: int) -> str:
+def _fault(signal: Floats, parts: CutParts, sample_rate: float, step: int) -> str:
+    """Why parts cannot be listened to, a code; empty where they can."""
     if parts.air.stop - parts.air.start < LEAST_AIR * sample_rate:
         return "no-air"
     if parts.cut.stop - parts.cut.start < LEAST_CUT * sample_rate:
@@ -85,17 +95,18 @@ def _wrong(signal: Floats, parts: CutParts, sample_rate: float, step: int) -> st
 
 
 def _loudness(signal: Floats, size: int, step: int, sample_rate: float) -> Floats:
-    """log10 of the power over that of the quietest part, in the mean over all frequencies above 100 Hz, of each piece.
+    """log10 of the power of each piece over that of the quietest part, in the mean over the frequencies above `LOWEST`.
 
     Mean over frequency, not of logarithms: a light cut is heard in few lines.
     """
     pieces = np.lib.stride_tricks.sliding_window_view(signal, size)[::step]
     pieces = (pieces - np.mean(pieces, axis=1, keepdims=True)) * np.hanning(size)
-    power = np.abs(np.fft.rfft(pieces, axis=1)[:, int(100 * size / sample_rate) + 1 :]) ** 2
+    power = np.abs(np.fft.rfft(pieces, axis=1)[:, int(LOWEST * size / sample_rate) + 1 :]) ** 2
     power += np.finfo(np.float64).tiny
-    smooth = uniform_filter1d(power, 3, axis=0)
-    quiet = int(np.argmin(uniform_filter1d(np.mean(np.log10(power), axis=1), 5)[2:-2])) if len(power) > 4 else 0
-    least = np.minimum(np.quantile(smooth, QUIETEST, axis=0), np.mean(power[quiet : quiet + 5], axis=0))
+    smooth = uniform_filter1d(power, SMOOTHED, axis=0)
+    beside = QUIET_PIECES // 2
+    quiet = int(np.argmin(uniform_filter1d(np.mean(np.log10(power), axis=1), QUIET_PIECES)[beside:-beside]))
+    least = np.minimum(np.quantile(smooth, QUIETEST, axis=0), np.mean(power[quiet : quiet + QUIET_PIECES], axis=0))
     return np.asarray(np.log10(np.mean(np.minimum(power / least, LOUDEST), axis=1)))
 
 
@@ -105,18 +116,15 @@ def _stretches(loud: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return list(zip(np.flatnonzero(edge == 1).tolist(), np.flatnonzero(edge == -1).tolist(), strict=True))
 
 
-def _joined(stretches: Sequence[tuple[int, int]], gap: float) -> list[tuple[int, int]]:
-    found: list[tuple[int, int]] = []
+def _join(stretches: Sequence[tuple[int, int]], gap: float) -> list[tuple[int, int]]:
+    """Stretches with short pauses between them as one; gap: longest pause (pieces)."""
+    joined: list[tuple[int, int]] = []
     for begin, end in stretches:
-        if found and begin - found[-1][1] <= gap:
-            found[-1] = found[-1][0], end
+        if joined and begin - joined[-1][1] <= gap:
+            joined[-1] = joined[-1][0], end
         else:
-            found.append((begin, end))
-    return found
-
-
-def _long(stretch: tuple[int, int], step: int) -> int:
-    return (stretch[1] - stretch[0]) * step
+            joined.append((begin, end))
+    return joined
 
 
 def _longest_air(loud: Sequence[tuple[int, int]], count: int, step: int) -> slice:
@@ -131,4 +139,4 @@ def _has_knock(signal: Floats, step: int) -> bool:
     count = signal.size // step
     peak = np.max(np.abs(signal[: count * step].reshape(count, step)), axis=1)
     wide = np.lib.stride_tricks.sliding_window_view(np.pad(peak, AROUND, mode="reflect"), 2 * AROUND + 1)
-    return bool(np.any(peak > SPIKE * np.quantile(wide, 0.75, axis=1)))
+    return bool(np.any(peak > SPIKE * np.quantile(wide, AMONG, axis=1)))

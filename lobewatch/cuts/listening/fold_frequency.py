@@ -10,12 +10,10 @@ Floats = NDArray[np.float64]
 
 def fold_frequency(frequency: Floats | float, rate: Floats | float) -> Floats:
     """Frequencies (Hz) as they are found again between 0 and half of a rate (Hz): of samples, or of teeth."""
-    rest = np.mod(frequency, rate)
-    return np.asarray(np.minimum(rest, rate - rest))
+    remainder = np.mod(frequency, rate)
+    return np.asarray(np.minimum(remainder, rate - remainder))
 
 
-def family_distance(frequency: Floats | float, other: float, tooth_frequency: float) -> Floats:
-    """Distance of frequencies from +-other + k tooth passing (Hz): those that chatter at one of them sounds with."""
-    return np.minimum(
-        fold_frequency(frequency - other, tooth_frequency), fold_frequency(frequency + other, tooth_frequency)
-    )
+def family_distance(frequency: Floats | float, chatter: float, teeth: float) -> Floats:
+    """Distance (Hz) of frequencies from +-chatter + k teeth, those that chatter at a frequency (Hz) sounds with."""
+    return np.minimum(fold_frequency(frequency - chatter, teeth), fold_frequency(frequency + chatter, teeth))

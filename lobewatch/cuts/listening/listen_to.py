@@ -1,4 +1,8 @@
-"""What a recording of a cut says: stable, chatter, period two, or why that cannot be told."""
+"""What a recording of a cut says: stable, chatter, period two, or why that cannot be told.
+
+The thresholds here and beside were chosen on simulated cuts, with other random numbers than those of the long tests
+(docs/cuts.md, How often it is right).
+"""
 
 from __future__ import annotations
 
@@ -24,39 +28,41 @@ ALONE = 1e-2
 QUIET = 2e-4
 """... and below this it is stable."""
 LEAST_COMB = 1e-9
-"""Of the energy of what is left, that the comb is taken to have at least."""
+"""Least energy that the comb is taken to have, over that of what is left."""
 SIDE_BANDS = 3
-"""Lines of a family that is chatter for sure."""
+"""Number of lines of a family that is chatter for sure."""
 FLIP = 0.003
-"""Nearer to half of tooth passing, relative to that, chatter has a period of two teeth."""
+"""Distance from half of tooth passing, relative to that, within which chatter has a period of two teeth."""
 OTHER_TEETH = 5.0
 """Energy of the orders that run-out hardly has (modulo the teeth neither 0 nor +-1) over those it has ..."""
 RUN_OUT = 8.0
 """... and of all orders that are no tooth passing over tooth passing, in less than a slot."""
 SLOT = 0.95
 """Immersion from which on tooth passing nearly vanishes."""
+NEAR = 1.0
+"""Distance of a line at the end of a cut up to which it is that of the whole cut (bins)."""
 
 
 @dataclass(frozen=True, eq=False)
 class CutSound:
-    """What was heard, and what it rests on; arrays are empty where it did not get so far."""
+    """What was heard in a recording, and what it rests on; None and NaN where it did not get so far."""
 
     word: CutWord
-    """See CutWord."""
+    """Word for what the cut sounded like."""
     reason: str
-    """Why it cannot be told, a code; empty where it can."""
+    """Code of why it cannot be told; empty where it can."""
     parts: CutParts
-    """Which part of the recording is the cut."""
+    """Parts of the recording that are the cut, and air."""
     turning: SpindleSpeed | None = None
-    """How fast the spindle turns."""
+    """True speed of the spindle."""
     ratio: float = np.nan
     """Energy of what is left, at the end of the cut, over that of the multiples of the spindle."""
     chatter: ChatterLines | None = None
-    """The lines of chatter."""
+    """Lines of chatter."""
     lines: SortedLines | None = None
-    """All lines."""
+    """All lines, by where they come from."""
     spectrum: Spectrum | None = None
-    """Of the cut."""
+    """Spectrum of the cut."""
 
     @property
     def speed_rpm(self) -> float:
@@ -68,100 +74,99 @@ class CutRecording(NamedTuple):
     """A recording that is to be listened to."""
 
     signal: Floats
-    """m/s^2, shape (n,)."""
+    """Acceleration of the housing (m/s^2), shape (n,)."""
     sample_rate: float
-    """Hz."""
+    """Sample rate (Hz)."""
     teeth: int
-    """Of the cutter."""
+    """Number of teeth of the cutter."""
     immersion: float
     """Radial depth over diameter (-)."""
     commanded_rpm: float
     """Spindle speed as it was set (rpm)."""
     clipped: NDArray[np.bool_] | None = None
-    """Where the sensor or its input was overloaded, shape (n,); None: nowhere."""
+    """Overload of the sensor or its input, shape (n,); None: nowhere."""
     lost_scans: int = 0
-    """How many are missing."""
+    """Number of scans that are missing."""
 
 
-def listen_to(what: CutRecording) -> CutSound:
+def listen_to(recording: CutRecording) -> CutSound:
     """Tell a recording of a cut, with some air before or after it.
 
     Reasons why it cannot be told: "too-short", "no-cut", "no-air", "two-cuts", "knock", "overload", "lost-scans",
     "speed-not-found", "on-spindle-lines" (period two of an even number of teeth, or chatter locked to the spindle),
     "faint".
     """
-    signal, rate = np.asarray(what.signal, dtype=np.float64), what.sample_rate
-    parts = find_cut(signal, rate, 60 / what.commanded_rpm)
-    reason = _fault(what, parts)
+    signal, rate = np.asarray(recording.signal, dtype=np.float64), recording.sample_rate
+    parts = find_cut(signal, rate, 60 / recording.commanded_rpm)
+    reason = _fault(recording, parts)
     if reason:
         return CutSound("cannot tell", reason, parts)
     spectrum, air = spectrum_of(signal[parts.cut], rate), spectrum_of(signal[parts.air], rate)
-    every = lines_of(spectrum)
-    turning = true_speed(every[~is_foreign(every, air)], every, spectrum, what.teeth, what.commanded_rpm / 60)
+    lines, teeth = lines_of(spectrum), recording.teeth
+    turning = true_speed(lines[~is_foreign(lines, air)], lines, spectrum, teeth, recording.commanded_rpm / 60)
     if turning is None:
         return CutSound("cannot tell", "speed-not-found", parts, spectrum=spectrum)
-    unsteady = unsteadiness(signal[parts.cut], rate, every, turning, spectrum.bin)
-    lines = sort_lines(every, spectrum, air, turning, what.teeth, unsteady)
-    found = CutSound("stable", "", parts, turning, 0.0, None, lines, spectrum)
-    return _judged(found, what)
+    unsteady = unsteadiness(signal[parts.cut], rate, lines, turning, spectrum.bin)
+    by_origin = sort_lines(lines, spectrum, air, turning, teeth, unsteady)
+    return _judge_lines(CutSound("stable", "", parts, turning, 0.0, None, by_origin, spectrum), recording)
 
 
-def _fault(what: CutRecording, parts: CutParts) -> str:
+def _fault(recording: CutRecording, parts: CutParts) -> str:
     """Why the signal cannot be trusted, a code; empty where it can."""
     if parts.reason == "too-short":
         return parts.reason
-    if what.clipped is not None and np.any(what.clipped if parts.reason else what.clipped[parts.cut]):
+    if recording.clipped is not None and np.any(recording.clipped if parts.reason else recording.clipped[parts.cut]):
         return "overload"
-    return "lost-scans" if what.lost_scans else parts.reason
+    return "lost-scans" if recording.lost_scans else parts.reason
 
 
-def _judged(found: CutSound, what: CutRecording) -> CutSound:
+def _judge_lines(sound: CutSound, recording: CutRecording) -> CutSound:
     """The word on a cut whose lines are known."""
-    lines, turning, spectrum = found.lines, found.turning, found.spectrum
+    lines, turning, spectrum = sound.lines, sound.turning, sound.spectrum
     if lines is None or turning is None or spectrum is None:
         raise ValueError("a cut whose lines are not known cannot be judged")
     if not len(lines.left):
-        return _without_chatter(found, what)
-    tooth = turning.frequency * what.teeth
+        return _judge_without_chatter(sound, recording)
+    tooth = turning.frequency * recording.teeth
     chatter = chatter_lines(lines.left, tooth, spectrum.bin)
-    part = what.signal[found.parts.cut]
-    end = spectrum_of(np.asarray(part[part.size // 2 :], dtype=np.float64), what.sample_rate)
-    still = min(float(end.loudest_near(np.array([chatter.frequency]), 1.0)[0]) / _power(chatter), 1.0)
+    part = recording.signal[sound.parts.cut]
+    end = spectrum_of(np.asarray(part[part.size // 2 :], dtype=np.float64), recording.sample_rate)
+    still = min(float(end.loudest_near(np.array([chatter.frequency]), NEAR)[0]) / _power(chatter), 1.0)
     ratio = still * lines.left.energy / max(lines.comb.energy, LEAST_COMB * lines.left.energy)
-    found = replace(found, ratio=ratio)
+    sound = replace(sound, ratio=ratio)
     if ratio < QUIET:
-        return _without_chatter(found, what)
+        return _judge_without_chatter(sound, recording)
     if ratio < (CHATTERS if len(chatter.lines) >= SIDE_BANDS else ALONE):
-        return replace(found, word="cannot tell", reason="faint")
+        return replace(sound, word="cannot tell", reason="faint")
     half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP
-    return replace(found, word="flip" if half else "chatter", chatter=chatter)
+    return replace(sound, word="flip" if half else "chatter", chatter=chatter)
 
 
 def _power(chatter: ChatterLines) -> float:
-    """Of the line that names it."""
+    """Power of the line that names it."""
     at = int(np.argmin(np.abs(chatter.lines.frequency - chatter.frequency)))
     return float(chatter.lines.amplitude[at] ** 2)
 
 
-def _without_chatter(found: CutSound, what: CutRecording) -> CutSound:
+def _judge_without_chatter(sound: CutSound, recording: CutRecording) -> CutSound:
     """Stable, unless multiples of the spindle are louder than run-out and teeth make them."""
-    if found.lines is None:
-        return found
-    power, order = found.lines.comb.amplitude**2, found.lines.tooth
-    tooth, run_out = order == 0, (order == 1) | (order == what.teeth - 1)
-    other = float(np.sum(power[~run_out & ~tooth]))
-    is_odd = other > OTHER_TEETH * float(np.sum(power[run_out & ~tooth])) and other > QUIET * float(np.sum(power))
-    is_loud = what.immersion < SLOT and float(np.sum(power[~tooth])) > RUN_OUT * float(np.sum(power[tooth]))
-    return replace(found, word="cannot tell", reason="on-spindle-lines") if is_odd or is_loud else found
+    if sound.lines is None:
+        return sound
+    power, order = sound.lines.comb.amplitude**2, sound.lines.tooth
+    tooth, run_out = order == 0, (order == 1) | (order == recording.teeth - 1)
+    uneven = float(np.sum(power[~run_out & ~tooth]))
+    is_odd = uneven > OTHER_TEETH * float(np.sum(power[run_out & ~tooth])) and uneven > QUIET * float(np.sum(power))
+    is_loud = recording.immersion < SLOT and float(np.sum(power[~tooth])) > RUN_OUT * float(np.sum(power[tooth]))
+    return replace(sound, word="cannot tell", reason="on-spindle-lines") if is_odd or is_loud else sound
 
 
-def line_kinds(heard: CutSound) -> dict[str, SpectralLines]:
+def line_kinds(sound: CutSound) -> dict[str, SpectralLines]:
     """Lines that are there, under "turns" of the spindle, "tooth" passing, "air" (there without a cut), "chatter"."""
-    lines, chatter = heard.lines, heard.chatter
+    lines, chatter = sound.lines, sound.chatter
     named: dict[str, SpectralLines] = {}
     if lines is not None:
         tooth = lines.tooth == 0
         named = {"turns": lines.comb[~tooth], "tooth": lines.comb[tooth], "air": lines.foreign}
     if chatter is not None:
         named["chatter"] = chatter.lines
-    return {name: one for name, one in named.items() if len(one)}
+    return {name: kind for name, kind in named.items() if len(kind)}

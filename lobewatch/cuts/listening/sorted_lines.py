@@ -14,14 +14,17 @@ from lobewatch.cuts.listening.spectrum import SpectralLines, Spectrum
 WIDE = 1.2
 """A line belongs to a frequency that is no further away than this (bins)."""
 FOREIGN = 9.0
-"""A line with less than so many times the power that it has in air comes from elsewhere."""
+"""Power of a line over that which it has in air, below which it comes from elsewhere."""
 AIR_WIDE = 2.0
-"""The same for lines of the air part, bins of its own."""
+"""Distance up to which a line of the air part is the same (bins of its own)."""
 HIGHEST = 2.0
 """Multiples are looked for up to this many sample rates: a device without a filter folds them back ..."""
 UPPER = 0.7
-"""... and is no louder there than 1.5 times the loudest multiple above this share of half the sample rate."""
+"""... and is hardly louder there (`LOUDER`) than the loudest multiple above this share of half the sample rate."""
 LOUDER = 1.5
+"""Amplitude of a folded multiple over that of the loudest multiple, at most."""
+SURE = 3.0
+"""Standard errors of the spindle frequency within which its multiples may lie; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +36,9 @@ class SortedLines:
     tooth: NDArray[np.int64]
     """Order of each of these, modulo the number of teeth; 0 is tooth passing."""
     foreign: SpectralLines
-    """Those that are there in air."""
+    """Lines that are there in air."""
     left: SpectralLines
-    """All others: chatter, where there is any."""
+    """Lines that are left: chatter, where there is any."""
 
 
 def is_foreign(lines: SpectralLines, air: Spectrum) -> NDArray[np.bool_]:
@@ -52,7 +55,7 @@ def sort_lines(
     """
     order = np.round(lines.frequency / turning.frequency)
     away = np.abs(lines.frequency - order * turning.frequency)
-    unsure = order * (3 * turning.error + unsteady * turning.frequency)
+    unsure = order * (SURE * turning.error + unsteady * turning.frequency)
     comb = (away < WIDE * spectrum.bin + unsure) & (order > 0)
     foreign = ~comb & is_foreign(lines, air)
     upper = comb & (lines.frequency > UPPER * spectrum.sample_rate / 2)
@@ -64,11 +67,12 @@ def sort_lines(
 
 
 def _near_folded(lines: SpectralLines, spectrum: Spectrum, turning: SpindleSpeed) -> NDArray[np.bool_]:
+    """Whether lines lie where multiples of the spindle above half the sample rate are folded to."""
     rate = spectrum.sample_rate
     orders = np.arange(int(rate / 2 / turning.frequency) + 1, int(HIGHEST * rate / turning.frequency) + 1)
     if not orders.size:
         return np.zeros(len(lines), dtype=np.bool_)
-    known = np.sort(fold_frequency(np.asarray(orders * turning.frequency), rate))
-    after = np.clip(np.searchsorted(known, lines.frequency), 1, max(known.size - 1, 1)) % known.size
-    nearest = np.minimum(np.abs(lines.frequency - known[after]), np.abs(lines.frequency - known[after - 1]))
+    folded = np.sort(fold_frequency(np.asarray(orders * turning.frequency), rate))
+    after = np.clip(np.searchsorted(folded, lines.frequency), 1, max(folded.size - 1, 1)) % folded.size
+    nearest = np.minimum(np.abs(lines.frequency - folded[after]), np.abs(lines.frequency - folded[after - 1]))
     return np.asarray(nearest < WIDE * spectrum.bin)

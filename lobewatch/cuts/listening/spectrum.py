@@ -22,23 +22,27 @@ QUIET = 0.25
 CLEAR = 25.0
 """A line has so many times the power of the noise: noise reaches it once in 1e11 bins."""
 APART = 1.5
-"""Bins between two lines that are told apart, at least."""
+"""Least distance of two lines that are told apart (bins)."""
+ERROR = 0.3
+"""Standard error of the frequency of a line, over the root of its clearness (bins) ..."""
+LEAST_ERROR = 0.03
+"""... and the part of it that stays however clear the line is (bins)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Of a part of a recording."""
+    """What a part of a recording sounds like."""
 
     frequency: Floats
-    """Hz, shape (n,)."""
+    """Frequencies (Hz), shape (n,)."""
     power: Floats
     """Square of the amplitude of a sine ((m/s^2)^2), shape (n,)."""
     noise: Floats
-    """What the noise alone has of it, shape (n,)."""
+    """Power that the noise alone has, shape (n,)."""
     bin: float
     """One over the length of the part (Hz)."""
     sample_rate: float
-    """Hz."""
+    """Sample rate of the recording (Hz)."""
 
     def loudest_near(self, frequency: Floats, bins: float) -> Floats:
         """Largest power within so many bins of frequencies (Hz)."""
@@ -51,32 +55,36 @@ class SpectralLines:
     """Single frequencies in a spectrum."""
 
     frequency: Floats
-    """Hz, shape (n,)."""
+    """Frequency of each (Hz), shape (n,)."""
     amplitude: Floats
-    """m/s^2, shape (n,)."""
+    """Amplitude of each (m/s^2), shape (n,)."""
     clearness: Floats
     """Power over that of the noise, shape (n,)."""
 
-    def __getitem__(self, which: NDArray[np.bool_] | NDArray[np.intp]) -> SpectralLines:
+    def __getitem__(self, places: NDArray[np.bool_] | NDArray[np.intp]) -> SpectralLines:
         """Some of them."""
-        return SpectralLines(self.frequency[which], self.amplitude[which], self.clearness[which])
+        return SpectralLines(self.frequency[places], self.amplitude[places], self.clearness[places])
 
     def __len__(self) -> int:
-        """How many."""
+        """Number of lines."""
         return self.frequency.size
 
     @property
     def energy(self) -> float:
-        """Of all of them ((m/s^2)^2)."""
+        """Energy of all of them ((m/s^2)^2)."""
         return float(np.sum(self.amplitude**2))
 
     def loudest(self, count: int) -> SpectralLines:
         """So many at most, the loudest first."""
         return self[np.argsort(-self.amplitude)[:count]]
 
+    def frequency_error(self, bin_: float) -> Floats:
+        """Standard error of each frequency (Hz), shape (n,); bin_: of the spectrum (Hz)."""
+        return np.asarray(bin_ * np.hypot(ERROR / np.sqrt(self.clearness), LEAST_ERROR))
+
 
 def spectrum_of(signal: Floats, sample_rate: float) -> Spectrum:
-    """Of a part of a recording; signal in m/s^2, shape (n,)."""
+    """The spectrum of a part of a recording; signal in m/s^2, shape (n,)."""
     phase = 2 * np.pi * (np.arange(signal.size) + 0.5) / signal.size
     window = sum(share * np.cos(k * phase) for k, share in enumerate(WINDOW))
     size = next_fast_len(PADDED * signal.size, real=True)

@@ -8,15 +8,15 @@ from lobewatch.cuts.listening.lattice import SpindleSpeed
 from lobewatch.cuts.listening.spectrum import Floats, SpectralLines, lines_of, spectrum_of
 
 PARTS = 4
-"""Of the cut."""
+"""Parts that a cut is divided into."""
 LOUDEST = 8
 """Multiples that are looked at."""
 MOST = 2e-3
-"""Change that is looked for, relative."""
+"""Largest change that is looked for, relative."""
 LEAST = 1e-4
-"""What every spindle varies by, relative."""
+"""Change that every spindle varies by, relative; chosen."""
 WIDER = 3.0
-"""Within a part it varies too."""
+"""Change of the speed over that of the means of the parts: within a part it varies too; chosen."""
 AGREEING = 3
 """Multiples that must have changed alike."""
 
@@ -31,8 +31,7 @@ def unsteadiness(signal: Floats, sample_rate: float, lines: SpectralLines, turni
     orders = np.round(loudest.frequency / turning.frequency)
     changes = []
     for part in np.array_split(signal, PARTS):
-        spectrum = spectrum_of(part, sample_rate)
-        heard = lines_of(spectrum).frequency
+        heard = lines_of(spectrum_of(part, sample_rate)).frequency
         if heard.size:
             nearest = heard[np.argmin(np.abs(heard[:, np.newaxis] - orders * turning.frequency), axis=0)]
             changes.append(_change(nearest / (orders * turning.frequency) - 1))
@@ -40,7 +39,7 @@ def unsteadiness(signal: Floats, sample_rate: float, lines: SpectralLines, turni
 
 
 def _change(off: Floats) -> float:
-    """Of the speed in one part: what most of its multiples agree on, else 0; off: of each, relative."""
+    """Change of the speed in one part: what most of its multiples agree on, else 0; off: of each, relative."""
     near = off[np.abs(off) < MOST]
     if near.size < max(AGREEING, off.size / 2):
         return 0.0

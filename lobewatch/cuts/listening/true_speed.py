@@ -17,6 +17,12 @@ HIGHEST = 60
 """Multiples of the frequency of the spindle by which two of them may differ."""
 SHARPNESS = 0.25
 """Standard deviation of a line in the count of votes (bins)."""
+STEP, FINEST = 0.25, 40
+"""Step of the grid of speeds, over the standard deviation of the vote of this multiple; chosen."""
+OWN_LINE = 0.5
+"""Distance up to which a line is that of the turning spindle (bins); chosen."""
+REACH = 2
+"""Standard deviations up to which a vote is spread."""
 UNBALANCE = 0.2
 """A speed whose own line is heard is taken where it has so much of the votes of the best one."""
 FITS = 4.0
@@ -26,39 +32,39 @@ PEAKS = 12
 BESIDE = 9
 """... of as many steps of the grid around each."""
 LEAST_SHARE = 0.5
-"""Of the lines that must belong to the lattice, and that must have a neighbour one or two turns or teeth away ..."""
+"""Share of the lines that must belong to the lattice, and must have a neighbour one or two turns or teeth away ..."""
 LEAST_AGREEING = 3
-"""... and so many of them must agree: a pump that is switched on has lines of its own."""
+"""... and number of them that must agree: a pump that is switched on has lines of its own."""
 
 
 def true_speed(
-    own: SpectralLines, all_lines: SpectralLines, spectrum: Spectrum, teeth: int, commanded: float
+    cut_lines: SpectralLines, all_lines: SpectralLines, spectrum: Spectrum, teeth: int, commanded: float
 ) -> SpindleSpeed | None:
     """Turns a second, near those that were set (Hz); None where too few lines agree.
 
-    own: lines that are not there in air; all_lines: with those that are. Each distance between two lines, each sum
-    and each line itself votes for the frequencies that it is a multiple of, for multiples of the teeth twice: chatter
-    f_c + k f counts as much as the multiples k f. The best is made exact by least squares.
+    cut_lines: those that are not there in air; all_lines: with those that are. Each distance between two lines, each
+    sum and each line itself votes for the frequencies that it is a multiple of, for multiples of the teeth twice:
+    chatter f_c + k f counts as much as the multiples k f. The best is made exact by least squares.
     """
-    loudest = own.loudest(LOUDEST)
+    loudest = cut_lines.loudest(LOUDEST)
     if len(loudest) < 2:
         return None
-    grid = commanded * (1 + np.arange(-AROUND, AROUND, 0.25 * SHARPNESS * spectrum.bin / (40 * commanded)))
+    grid = commanded * (1 + np.arange(-AROUND, AROUND, STEP * SHARPNESS * spectrum.bin / (FINEST * commanded)))
     votes = _votes(loudest, grid, teeth, SHARPNESS * spectrum.bin)
     if not np.any(votes):
         return None
     turning = all_lines.frequency[np.abs(all_lines.frequency / commanded - 1) < AROUND]
-    near = np.any(np.abs(grid[:, np.newaxis] - turning) < 0.5 * spectrum.bin, axis=1)
+    near = np.any(np.abs(grid[:, np.newaxis] - turning) < OWN_LINE * spectrum.bin, axis=1)
     best = int(np.argmax(votes))
     heard = int(np.argmax(np.where(near, votes, 0.0)))
     best = heard if near[heard] and votes[heard] > UNBALANCE * votes[best] else best
-    found = refine_speed(float(grid[best]), loudest, spectrum.bin)
-    if found.misfit > FITS:
-        others = grid[_peaks(votes)].tolist()
-        found = min((found, *(refine_speed(one, loudest, spectrum.bin) for one in others)), key=lambda one: one.misfit)
-    is_sure = min(found.share, _spaced(loudest, found.frequency, teeth, spectrum.bin)) >= LEAST_SHARE
-    is_sure &= found.agreeing >= LEAST_AGREEING
-    return found if is_sure else None
+    speed = refine_speed(float(grid[best]), loudest, spectrum.bin)
+    if speed.misfit > FITS:
+        rivals = [refine_speed(frequency, loudest, spectrum.bin) for frequency in grid[_peaks(votes)].tolist()]
+        speed = min((speed, *rivals), key=lambda rival: rival.misfit)
+    is_sure = min(speed.share, _spaced(loudest, speed.frequency, teeth, spectrum.bin)) >= LEAST_SHARE
+    is_sure &= speed.agreeing >= LEAST_AGREEING
+    return speed if is_sure else None
 
 
 def _spaced(lines: SpectralLines, frequency: float, teeth: int, bin_: float) -> float:
@@ -75,7 +81,7 @@ def _peaks(votes: Floats) -> NDArray[np.intp]:
 
 
 def _votes(lines: SpectralLines, grid: Floats, teeth: int, sharpness: float) -> Floats:
-    """For each frequency of a grid (Hz); sharpness: of one line (Hz)."""
+    """Votes for each frequency of a grid (Hz); sharpness: of one line (Hz)."""
     weight, step = np.log10(lines.clearness), grid[1] - grid[0]
     i, j = np.triu_indices(len(lines), 1)
     spaced = np.concatenate([np.abs(lines.frequency[i] - lines.frequency[j]), lines.frequency[i] + lines.frequency[j]])
@@ -95,6 +101,6 @@ def _votes(lines: SpectralLines, grid: Floats, teeth: int, sharpness: float) -> 
 
 def _smoothed(votes: Floats, width: float) -> Floats:
     """Each vote spread over its neighbours; width: standard deviation in steps of the grid."""
-    reach = min(int(np.ceil(2 * width)), (votes.size - 1) // 2)
+    reach = min(int(np.ceil(REACH * width)), (votes.size - 1) // 2)
     spread = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
     return np.convolve(votes, spread, "same")

@@ -109,16 +109,16 @@ def mass_texts(check: MassCheck) -> list[str]:
 def skew_json(check: SkewCheck) -> dict[str, Any]:
     """The skew and how sure it is."""
     return {
-        "skew_us": check.found.skew * 1e6,
-        "skew_us_std": check.found.std * 1e6,
-        "skew_samples": check.found.skew * check.sample_rate,
-        "coherent_share": check.found.coherent_share,
+        "skew_us": check.measured.skew * 1e6,
+        "skew_us_std": check.measured.std * 1e6,
+        "skew_samples": check.measured.skew * check.sample_rate,
+        "coherent_share": check.measured.coherent_share,
     }
 
 
 def skew_texts(check: SkewCheck) -> list[str]:
     """The skew, and where to enter it."""
-    skew, channel = check.found, check.channel
+    skew, channel = check.measured, check.channel
     if check.place is None:
         entry = f"skew_us = {skew.skew * 1e6:.3f} in its [[daq.channel]] of machine.toml"
     else:

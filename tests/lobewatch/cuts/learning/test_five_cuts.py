@@ -189,12 +189,12 @@ def test_chatter_beyond_a_pocket_that_sounds_as_at_its_limit_speaks_for_the_trut
     truth.normal[:] = 0.0
     one.turn({name: float(values[0]) for name, values in truth.ratios().items()})
     ((word, pitch),) = heard([one.milling(speed, depth)])
-    seen = CutEvidence(one.cut, speed, depth, word, pitch)
-    guess, teeth = predict_cut(seen, truth), one.cut.teeth * speed / 60
-    own, at_limit = guess.off(seen, teeth)[:, 0] / pitch
-    assert own > 0.1
+    cut = CutEvidence(one.cut, speed, depth, word, pitch)
+    prediction = predict_cut(cut, truth)
+    at_depth, at_limit = prediction.distances(cut)[:, 0] / pitch
+    assert at_depth > 0.1
     assert at_limit < 0.01
-    assert log_likelihood(seen, guess, teeth) > 1
+    assert log_likelihood(cut, prediction) > 1
 
 
 @pytest.mark.long

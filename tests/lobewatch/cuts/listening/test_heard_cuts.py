@@ -67,17 +67,17 @@ class Case:
         )
 
 
-class Moved(NamedTuple):
+class TipRecord(NamedTuple):
     """How the tip moves in a cut."""
 
     frequency: float
-    """Of the loudest displacement that does not turn with the spindle (Hz)."""
+    """Frequency of the loudest displacement that does not turn with the spindle (Hz)."""
     beside: float
-    """Its share of the energy, with all beside the turns."""
+    """Share of the energy of all displacement beside the turns of the spindle."""
     per_depth: float
     """Displacement over depth."""
 
-    def chatters(self, quiet: Moved) -> bool:
+    def chatters(self, quiet: TipRecord) -> bool:
         """Whether it chatters, beside one that does not."""
         return self.beside > CHATTERS or self.per_depth > LOCKED * quiet.per_depth
 
@@ -109,17 +109,17 @@ def cases(random: Random, count: int) -> Iterator[Case]:
         if not 3000 <= speed <= 24000:
             continue
         try:
-            found = stability_boundary(x, y, cut, [speed], 20e-3)
+            boundary = stability_boundary(x, y, cut, [speed], 20e-3)
         except ArithmeticError:
             continue
-        limit, island = float(found.crossings[0, 0]), [c for c in found.crossings[0, 1:2] if math.isfinite(c)]
+        limit, island = float(boundary.crossings[0, 0]), [c for c in boundary.crossings[0, 1:2] if math.isfinite(c)]
         if not (math.isfinite(limit) and limit > 1e-4) or any(share * limit > c / 1.1 for c in island):
             continue
         count -= 1
-        yield Case(cut, x, y, speed, share, limit, str(found.kind[0]), feed, tuple(runout) if teeth > 1 else (0.0,))
+        yield Case(cut, x, y, speed, share, limit, str(boundary.kind[0]), feed, tuple(runout) if teeth > 1 else (0.0,))
 
 
-def moved(motion: TipMotion, turn: float, depth: float) -> Moved:
+def tip_record(motion: TipMotion, turn: float, depth: float) -> TipRecord:
     """How the tip moves; turn in Hz."""
     rate = motion.sample_rate
     first = round((PASSAGE.before + PASSAGE.ramp + 0.3 * PASSAGE.steady) * rate)
@@ -131,16 +131,16 @@ def moved(motion: TipMotion, turn: float, depth: float) -> Moved:
     away = np.abs(frequency / turn - np.round(frequency / turn)) * turn
     beside = np.where(away > 4 * rate / (last - first), power, 0.0)
     total = float(np.sum(power))
-    return Moved(float(frequency[np.argmax(beside)]), float(np.sum(beside)) / total, math.sqrt(total) / depth)
+    return TipRecord(float(frequency[np.argmax(beside)]), float(np.sum(beside)) / total, math.sqrt(total) / depth)
 
 
-def told(signal: NDArray[Any], case: Case, rate: float, random: Random) -> CutSound:
+def listen(signal: NDArray[Any], case: Case, rate: float, random: Random) -> CutSound:
     commanded = case.speed_rpm * (1 + random.uniform(-0.015, 0.015))
     return listen_to(CutRecording(signal, rate, case.cut.teeth, case.cut.immersion, commanded))
 
 
 @dataclass
-class Judged:
+class Tally:
     """How often the words are right."""
 
     words: Counter[str] = field(default_factory=Counter)
@@ -152,20 +152,20 @@ class Judged:
     frequencies: list[float] = field(default_factory=list)
     """Relative errors of the chatter frequency modulo tooth passing."""
 
-    def add(self, case: Case, heard: CutSound, motions: list[Moved]) -> None:
+    def add(self, case: Case, heard: CutSound, motions: list[TipRecord]) -> None:
         """One more cut; motions: at each of its shares."""
-        own, *beside, quiet = motions
-        chatters = own.chatters(quiet)
-        is_near = any(one.chatters(quiet) != chatters for one in beside)
+        motion, *beside, quiet = motions
+        chatters = motion.chatters(quiet)
+        is_near = any(neighbour.chatters(quiet) != chatters for neighbour in beside)
         self.words["near" if is_near else _mark(heard, chatters)] += 1
         even = "even flip " if case.kind == "flip" and case.share > 1 and case.cut.teeth % 2 == 0 else ""
         self.by_limit[even + _mark(heard, case.share > 1)] += 1
         if heard.turning is not None:
             self.speeds.append(abs(heard.speed_rpm / case.speed_rpm - 1))
-        if heard.chatter is not None and own.beside > CHATTERS:
+        if heard.chatter is not None and motion.beside > CHATTERS:
             tooth = case.speed_rpm / 60 * case.cut.teeth
             self.frequencies.append(
-                float(family_distance(heard.chatter.frequency, own.frequency, tooth)) / own.frequency
+                float(family_distance(heard.chatter.frequency, motion.frequency, tooth)) / motion.frequency
             )
 
 
@@ -175,23 +175,23 @@ def _mark(heard: CutSound, chatters: bool) -> str:
     return "right" if (heard.word != "stable") == chatters else "wrong"
 
 
-def judge(seed: int, count: int, judged: Judged) -> None:
+def judge(seed: int, count: int, tally: Tally) -> None:
     """Simulate cuts, listen to them, and hold the words against the truth."""
     random = np.random.default_rng(seed)
     drawn = list(cases(random, count))
     places = [(case, share) for case in drawn for share in case.shares]
-    motions: dict[int, Moved] = {}
+    motions: dict[int, TipRecord] = {}
     heard: dict[int, CutSound] = {}
     for place, motion in simulate_cuts([case.milled(share) for case, share in places], PASSAGE):
         case, share = places[place]
-        motions[place] = moved(motion, case.speed_rpm / 60, share * case.limit)
+        motions[place] = tip_record(motion, case.speed_rpm / 60, share * case.limit)
         if place % SHARES == 0:
-            own = np.random.default_rng((seed, place))
-            rate = float(own.choice([25600.0, 51200.0]))
-            signal = hear(motion, random_housing(own, case.speed_rpm), case.speed_rpm, rate, own)
-            heard[place] = told(signal, case, rate, own)
+            noise = np.random.default_rng((seed, place))
+            rate = float(noise.choice([25600.0, 51200.0]))
+            signal = hear(motion, random_housing(noise, case.speed_rpm), case.speed_rpm, rate, noise)
+            heard[place] = listen(signal, case, rate, noise)
     for place, sound in heard.items():
-        judged.add(places[place][0], sound, [motions[place + number] for number in range(SHARES)])
+        tally.add(places[place][0], sound, [motions[place + number] for number in range(SHARES)])
 
 
 def share_right(words: Counter[str]) -> float:
@@ -202,16 +202,16 @@ def share_right(words: Counter[str]) -> float:
 @pytest.mark.long
 @pytest.mark.timeout(3600)
 def test_simulated_cuts_are_told_right() -> None:
-    judged = Judged()
+    tally = Tally()
     for seed in range(200, 205):
-        judge(seed, CUTS // 5, judged)
-    words, speeds, frequencies = judged.words, np.array(judged.speeds), np.array(judged.frequencies)
+        judge(seed, CUTS // 5, tally)
+    words, speeds, frequencies = tally.words, np.array(tally.speeds), np.array(tally.frequencies)
     quantiles = np.quantile(speeds, [0.5, 0.95, 1.0])
     shares = np.mean(speeds < 5e-4), np.mean(frequencies < 3e-3)
-    print(dict(words), dict(judged.by_limit), "speed", quantiles, shares[0], "frequency", frequencies.size, shares[1])  # noqa: T201  (for docs/long-tests.md)
+    print(dict(words), dict(tally.by_limit), "speed", quantiles, shares[0], "frequency", frequencies.size, shares[1])  # noqa: T201  (for docs/long-tests.md)
     assert share_right(words) >= RIGHT
     assert words["not told"] <= NOT_TOLD * (sum(words.values()) - words["near"])
-    assert share_right(judged.by_limit) >= RIGHT_BY_LIMIT
+    assert share_right(tally.by_limit) >= RIGHT_BY_LIMIT
     assert shares[0] >= 0.995
     assert shares[1] >= 0.97
 

@@ -25,20 +25,20 @@ AIR, CUT, AFTER = 0.5, 1.2, 0.3
 def sines(lines: Any, n: int, random: np.random.Generator) -> Floats:
     """Lines (Hz, m/s^2) sampled without a filter: what is above half the sample rate is folded."""
     time = np.arange(n) / RATE
-    found = np.zeros(n)
+    signal = np.zeros(n)
     for frequency, amplitude in lines:
-        found += amplitude * np.sin(2 * np.pi * frequency * time + random.uniform(0, 2 * np.pi))
-    return found
+        signal += amplitude * np.sin(2 * np.pi * frequency * time + random.uniform(0, 2 * np.pi))
+    return signal
 
 
 def comb(teeth: int, run_out: float = 0.2, highest: float = 40e3) -> list[tuple[float, float]]:
     """Tooth passing and its multiples, falling with frequency, with side bands of an eccentric tool."""
-    found = []
+    lines = []
     for k in range(1, int(highest / TURN)):
         beside = k % teeth in (1, teeth - 1)
         share = 1.0 if k % teeth == 0 else run_out if beside else 0.0
-        found.append((k * TURN, 30.0 * share / (1 + k * TURN / 4000.0)))
-    return found
+        lines.append((k * TURN, 30.0 * share / (1 + k * TURN / 4000.0)))
+    return lines
 
 
 def recorded(cut: Floats, seed: int = 0, foreign: Any = FOREIGN) -> Floats:
@@ -60,12 +60,12 @@ def a_cut(teeth: int = 4, chatter: float | None = None, loud: float = 20.0, **op
     return sines(lines, round(CUT * RATE), random)
 
 
-def told(signal: Floats, teeth: int = 4, **options: Any) -> CutSound:
+def listen(signal: Floats, teeth: int = 4, **options: Any) -> CutSound:
     return listen_to(CutRecording(signal, RATE, teeth, 0.5, SET, **options))
 
 
 def test_a_quiet_cut_is_stable_and_its_speed_is_found() -> None:
-    heard = told(recorded(a_cut()))
+    heard = listen(recorded(a_cut()))
     assert (heard.word, heard.reason, heard.chatter) == ("stable", "", None)
     assert heard.speed_rpm == pytest.approx(SPEED, rel=2e-5)
     assert heard.parts.begin == pytest.approx(AIR, abs=0.03)
@@ -81,53 +81,53 @@ def test_a_speed_two_percent_beside_the_one_that_was_set_is_found(off: float) ->
 
 
 def test_chatter_is_told_with_its_frequency_and_its_side_bands() -> None:
-    heard = told(recorded(a_cut(chatter=1712.3)))
+    heard = listen(recorded(a_cut(chatter=1712.3)))
     assert heard.word == "chatter"
     assert heard.chatter is not None
     assert heard.chatter.frequency == pytest.approx(1712.3, abs=0.1)
     tooth = 4 * TURN
-    found = heard.chatter.lines.frequency
+    frequency = heard.chatter.lines.frequency
     for k in (-1, 0, 1, 2):
-        assert np.min(np.abs(found - (1712.3 + k * tooth))) < 0.3
+        assert np.min(np.abs(frequency - (1712.3 + k * tooth))) < 0.3
     assert heard.ratio > 0.1
     assert heard.speed_rpm == pytest.approx(SPEED, rel=2e-5)
 
 
 def test_chatter_without_a_tooth_passing_that_is_heard_spaces_its_side_bands_by_the_spindle() -> None:
     lines = [(1712.3 + k * TURN, 20.0 * 0.6 ** abs(k)) for k in range(-8, 9)]
-    heard = told(recorded(sines(lines, round(CUT * RATE), np.random.default_rng(2))))
+    heard = listen(recorded(sines(lines, round(CUT * RATE), np.random.default_rng(2))))
     assert heard.word == "chatter"
     assert heard.speed_rpm == pytest.approx(SPEED, rel=1e-4)
 
 
 def test_period_two_is_told_where_teeth_are_odd_and_not_where_they_are_even() -> None:
-    odd = told(recorded(a_cut(3, chatter=1.5 * 3 * TURN)), 3)
+    odd = listen(recorded(a_cut(3, chatter=1.5 * 3 * TURN)), 3)
     assert odd.word == "flip"
     assert odd.chatter is not None
     assert odd.chatter.frequency / (3 * TURN) % 1 == pytest.approx(0.5, abs=1e-3)
-    even = told(recorded(a_cut(4, chatter=1.5 * 4 * TURN, loud=60.0)), 4)
+    even = listen(recorded(a_cut(4, chatter=1.5 * 4 * TURN, loud=60.0)), 4)
     assert (even.word, even.reason) == ("cannot tell", "on-spindle-lines")
 
 
 def test_what_was_there_before_is_no_chatter() -> None:
     foreign = [(f, 6.0) for f in (1711.0, 2305.5, 4444.4)]
-    assert told(recorded(a_cut(), foreign=foreign)).word == "stable"
+    assert listen(recorded(a_cut(), foreign=foreign)).word == "stable"
     only = sines(foreign, round(CUT * RATE), np.random.default_rng(3))
-    assert told(recorded(a_cut() + only, foreign=())).word != "stable"
+    assert listen(recorded(a_cut() + only, foreign=())).word != "stable"
 
 
 def test_multiples_above_half_the_sample_rate_are_no_chatter() -> None:
     far = [(k * TURN, 1.5) for k in range(132, 250, 4)]
     assert min(f for f, _ in far) > RATE
     random = np.random.default_rng(4)
-    heard = told(recorded(a_cut(highest=12e3) + sines(far, round(CUT * RATE), random)))
+    heard = listen(recorded(a_cut(highest=12e3) + sines(far, round(CUT * RATE), random)))
     assert heard.word == "stable"
 
 
 def test_a_mode_that_rings_down_is_no_chatter() -> None:
     time = np.arange(round(CUT * RATE)) / RATE
     ringing = 20.0 * np.exp(-time / 0.12) * np.sin(2 * np.pi * 1712.3 * time)
-    assert told(recorded(a_cut() + ringing)).word == "stable"
+    assert listen(recorded(a_cut() + ringing)).word == "stable"
 
 
 @pytest.mark.parametrize(("chatter", "word"), [(None, "stable"), (1712.3, "chatter")])
@@ -141,18 +141,18 @@ def test_a_spindle_whose_speed_wavers_is_no_chatter_and_hides_none(chatter: floa
     if chatter is not None:
         for k in range(4):
             cut += 10 * 0.3**k * np.sin(2 * np.pi * chatter * time + 4 * k * turned)
-    assert told(recorded(cut)).word == word
+    assert listen(recorded(cut)).word == word
 
 
 def test_the_spindle_in_air_is_no_cut() -> None:
-    assert told(recorded(np.zeros(round(CUT * RATE)))).reason == "no-cut"
+    assert listen(recorded(np.zeros(round(CUT * RATE)))).reason == "no-cut"
 
 
 @pytest.mark.parametrize("count", [1, 3, 5])
 def test_a_pump_that_is_switched_on_is_no_chatter(count: int) -> None:
     random = np.random.default_rng(count)
     pump = sines([(f, 3.0) for f in random.uniform(200, 6000, count)], round(CUT * RATE), random)
-    assert told(recorded(pump)).reason == "speed-not-found"
+    assert listen(recorded(pump)).reason == "speed-not-found"
 
 
 def test_a_speed_far_from_the_one_that_was_set_is_not_found() -> None:
@@ -161,17 +161,17 @@ def test_a_speed_far_from_the_one_that_was_set_is_not_found() -> None:
 
 
 def test_a_tenth_of_a_second_is_too_short() -> None:
-    assert told(recorded(a_cut())[: round(0.1 * RATE)]).reason == "too-short"
-    assert told(recorded(a_cut()[: round(0.35 * RATE)])).reason == "too-short"
+    assert listen(recorded(a_cut())[: round(0.1 * RATE)]).reason == "too-short"
+    assert listen(recorded(a_cut()[: round(0.35 * RATE)])).reason == "too-short"
 
 
 def test_two_cuts_in_one_recording_are_refused() -> None:
-    assert told(np.concatenate([recorded(a_cut()), recorded(a_cut())])).reason == "two-cuts"
+    assert listen(np.concatenate([recorded(a_cut()), recorded(a_cut())])).reason == "two-cuts"
 
 
 def test_a_cut_without_air_is_refused() -> None:
     cut = recorded(a_cut())[round((AIR - 0.04) * RATE) : round((AIR + CUT) * RATE)]
-    assert told(cut).reason in ("no-air", "no-cut")
+    assert listen(cut).reason in ("no-air", "no-cut")
 
 
 def test_a_hammer_in_the_cut_is_told_and_one_beside_it_does_no_harm() -> None:
@@ -180,12 +180,12 @@ def test_a_hammer_in_the_cut_is_told_and_one_beside_it_does_no_harm() -> None:
     for at, reason in ((AIR + 0.6, "knock"), (0.1, "")):
         signal = recorded(a_cut())
         signal[round(at * RATE) :][: hit.size] += hit
-        assert told(signal).reason == reason
+        assert listen(signal).reason == reason
 
 
 def test_an_overload_in_the_cut_and_lost_scans_are_told() -> None:
     signal = recorded(a_cut())
     clipped = np.abs(signal) > 0.9 * np.max(signal)
-    assert told(signal, clipped=clipped).reason == "overload"
-    assert told(signal, clipped=np.arange(signal.size) < 10).reason == ""
-    assert told(signal, lost_scans=7).reason == "lost-scans"
+    assert listen(signal, clipped=clipped).reason == "overload"
+    assert listen(signal, clipped=np.arange(signal.size) < 10).reason == ""
+    assert listen(signal, lost_scans=7).reason == "lost-scans"

@@ -28,7 +28,7 @@ def trend(
       lobewatch trend mill-3 --direction y --json
     """
     from lobewatch.decay import Light
-    from lobewatch.decay.preload import preload_of
+    from lobewatch.decay.series_history import preload_of
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.outlook import outlook
     from lobewatch.show.trends.describe_trend import trend_csv, trend_json, trend_texts
@@ -36,14 +36,14 @@ def trend(
     if as_csv and as_json:
         raise ValueError("--csv and --json: give one of them")
     logbook = Logbook.open(machine)
-    found = outlook(logbook)
-    series = found.series(tool, direction)
+    machine_outlook = outlook(logbook)
+    series = machine_outlook.series(tool, direction)
     if as_csv:
         results.out(trend_csv(series), end="", highlight=False)
     else:
-        preload = preload_of(logbook.history.series(series.tool, series.direction), logbook.machine)
-        texts = [] if as_json else trend_texts(found, series, preload)
-        emit(trend_json(found, series, preload), as_json, *texts)
-    for remark in [*found.standing.remarks, *logbook.remarks]:
+        preload = preload_of(series.history, logbook.machine)
+        texts = [] if as_json else trend_texts(machine_outlook, series, preload)
+        emit(trend_json(machine_outlook, series, preload), as_json, *texts)
+    for remark in [*machine_outlook.standing.remarks, *logbook.remarks]:
         notes.print(f"note: {remark}", markup=False)
-    raise typer.Exit(int(found.standing.light is Light.ALARM))
+    raise typer.Exit(int(machine_outlook.standing.light is Light.ALARM))

@@ -1,6 +1,5 @@
 """How a series of tap tests decays: points, alarm, forecast; arrays in, records out."""
 
-from .fallen import change_since_start
 from .light import Light
 from .standing import SeriesStanding, Standing, unreadable
 
@@ -8,6 +7,5 @@ __all__ = [
     "Light",
     "SeriesStanding",
     "Standing",
-    "change_since_start",
     "unreadable",
 ]

@@ -1,4 +1,4 @@
-"""How a machine stands: one light from all its series and all its programs, the reasons, one next step.
+"""The standing of a machine: one light from all its series and all its programs, the reasons, one next step.
 
 Pure: rows in, records out.
 """
@@ -12,7 +12,6 @@ from datetime import datetime
 from pathlib import Path
 
 from acquisition import Remark
-from lobewatch.decay.fallen import about_fall, about_others, about_trend, fall_of, known_rows, rows_with, trend_in
 from lobewatch.decay.light import (
     LIGHTS,
     UNREADABLE,
@@ -26,6 +25,8 @@ from lobewatch.decay.light import (
     next_step,
     of_files,
 )
+from lobewatch.decay.series_history import SeriesHistory, series_history
+from lobewatch.decay.series_remarks import about_fall, about_loss, about_others, about_trend
 from lobewatch.decay.trend import Trend
 from lobewatch.history.history import History, Row
 from lobewatch.machine import Machine
@@ -36,22 +37,24 @@ from lobewatch.verdicts.verdict import Word
 
 @dataclass(frozen=True)
 class SeriesStanding:
-    """One tool in one direction."""
+    """The standing of one tool in one direction."""
 
     tool: str
-    """What is in the spindle."""
+    """Tool in the spindle."""
     direction: str
     """Direction at the tool tip, "x" or "y"."""
     time: datetime
-    """Of its newest test."""
+    """Time of its newest test."""
     first: datetime
-    """Of the test that it is compared with."""
+    """Time of the test that it is compared with."""
     fall: Estimate
     """Fall of the followed frequency from the start of the series to the last test that shows it (%)."""
     trend: Trend | None = field(compare=False)
     """Points, alarm and forecast; None where no test of it can be compared with."""
     remarks: tuple[Remark, ...]
     """Reasons that it gives."""
+    history: SeriesHistory = field(compare=False, repr=False)
+    """Rows that all this follows from, and the history of their values."""
 
     @property
     def name(self) -> str:
@@ -66,32 +69,33 @@ class SeriesStanding:
 
 @dataclass(frozen=True)
 class Standing:
-    """How one machine stands."""
+    """The standing of one machine."""
 
     remarks: tuple[Remark, ...]
-    """The reasons, in order of harm."""
+    """Reasons, in order of harm."""
     next_step: str
-    """What to do now, one sentence."""
+    """Next step, one sentence."""
     series: tuple[SeriesStanding, ...] = ()
-    """The one that fell most first."""
+    """Series, the one that fell most first."""
     last_tap: datetime | None = None
-    """When it was tapped last; None where it never was."""
+    """Time of the newest tap test; None where there is none."""
     days_left: float | None = None
-    """Until the next test is due; negative where it is overdue; None before the first test."""
+    """Days until the next test is due; negative where it is overdue; None before the first."""
 
     @property
     def light(self) -> Light:
-        """That of the worst reason."""
+        """Light of the worst reason."""
         return light_of(self.remarks)
 
     def series_of(self, tool: str, direction: str) -> SeriesStanding | None:
         """How one series stands; None where there is none."""
-        return next((one for one in self.series if (one.tool, one.direction) == (tool, direction)), None)
+        fits = (series for series in self.series if (series.tool, series.direction) == (tool, direction))
+        return next(fits, None)
 
 
 def unreadable(reason: str) -> Standing:
     """The standing of a machine whose files cannot be read."""
-    return _of([about_unreadable(reason)], UNREADABLE)
+    return _standing([about_unreadable(reason)], UNREADABLE)
 
 
 def stand(
@@ -112,44 +116,49 @@ def stand(
     if not rows:
         cure = "Take the first tap test: all others are compared with it."
         since = "yet" if history.baseline is None else f"since the new baseline of {history.baseline:%Y-%m-%d}"
-        return _of([Remark("never-tapped", "", f"no tap test {since}", cure)])
+        return _standing([Remark("never-tapped", "", f"no tap test {since}", cure)])
     pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
-    series = [_series(history.series(*pair), machine, now, path, events) for pair in pairs]
+    series = [_stand_of(series_history(history.series(*pair)), machine, now, path, events) for pair in pairs]
     newest, interval = rows[-1], machine.machine.tap_interval_days
-    remarks = [remark for one in series for remark in one.remarks]
+    remarks = [remark for standing in series for remark in standing.remarks]
     remarks += [of_files(remark) for remark in files if remark.code in LIGHTS]
-    remarks += [asked for row in rows if row.questions for asked in about_questions(row.tap_id, row.questions, path)]
+    asked = [row for row in rows if row.questions]
+    remarks += [remark for row in asked for remark in about_questions(row.tap_id, row.questions, path)]
     remarks += [
         *_about_programs(rows, machine),
         *about_dates(newest.tap_id, newest.time, interval, now, path),
         *_about_directions(rows),
     ]
-    series.sort(key=lambda one: -one.fall.value if one.fall.is_known else math.inf)
+    series.sort(key=lambda standing: -standing.fall.value if standing.fall.is_known else math.inf)
     left = days_left(newest.time, interval, now)
-    return _of(remarks, all_well(newest.time, interval), tuple(series), newest.time, left)
+    return _standing(remarks, all_well(newest.time, interval), series, newest.time, left)
 
 
-def _of(remarks: Sequence[Remark], well: str = "", *others: object) -> Standing:
-    worst = in_order(remarks)
-    return Standing(worst, next_step(worst, well), *others)  # type: ignore[arg-type]
+def _standing(
+    remarks: Sequence[Remark],
+    well: str = "",
+    series: Sequence[SeriesStanding] = (),
+    last_tap: datetime | None = None,
+    left: float | None = None,
+) -> Standing:
+    """The standing with these reasons; well: the next step where none says another."""
+    ordered = in_order(remarks)
+    return Standing(ordered, next_step(ordered, well), tuple(series), last_tap, left)
 
 
-def _series(
-    rows: Sequence[Row], machine: Machine, now: datetime, path: Path | str, events: Sequence[datetime]
+def _stand_of(
+    series: SeriesHistory, machine: Machine, now: datetime, path: Path | str, events: Sequence[datetime]
 ) -> SeriesStanding:
-    known = known_rows(rows, "frequency") or rows_with(rows, "frequency") or rows
-    name, fall = f"{rows[-1].tool}, {rows[-1].direction}", fall_of(rows)
-    trend = trend_in(rows, "frequency", now, events)
-    remarks = [*_about_loss(name, rows[-1]), *about_fall(name, fall, machine.limits)]
+    newest, frequency, fall = series.rows[-1], series.frequency, series.fall
+    first = (frequency.sure or frequency.known or series.rows)[0]
+    trend = None if frequency.trend is None else frequency.trend.on(now, events)
+    name = f"{newest.tool}, {newest.direction}"
+    remarks = [*about_loss(name, newest), *about_fall(name, fall, machine.limits)]
     remarks += about_trend(name, trend, path) if trend else ()
-    remarks += about_others(name, rows, trend)
-    return SeriesStanding(rows[-1].tool, rows[-1].direction, rows[-1].time, known[0].time, fall, trend, tuple(remarks))
-
-
-def _about_loss(name: str, newest: Row) -> Iterator[Remark]:
-    if not newest.frequency.is_known:
-        cure = "Tap again: the mode that is followed was not found in the newest test."
-        yield Remark("mode-lost", name, "the newest test does not show the mode followed", cure)
+    remarks += about_others(name, series, trend)
+    return SeriesStanding(
+        newest.tool, newest.direction, newest.time, first.time, fall, trend, tuple(remarks), history=series
+    )
 
 
 def _about_programs(rows: Sequence[Row], machine: Machine) -> Iterator[Remark]:
@@ -171,12 +180,12 @@ def _about_programs(rows: Sequence[Row], machine: Machine) -> Iterator[Remark]:
 def _about_directions(rows: Sequence[Row]) -> Iterator[Remark]:
     pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
     for tool in dict.fromkeys(tool for tool, _ in pairs):
-        known = {direction for one, direction in pairs if one == tool and _is_known(rows, one, direction)}
-        if len(known) == 1:
-            seen = known.pop()
-            other = "y" if seen == "x" else "x"
-            cure = f"Tap direction {other} of the same tool too: no program is sure with one direction alone."
-            yield Remark("one-direction", tool, f"tapped in direction {seen} alone", cure)
+        tapped = {direction for name, direction in pairs if name == tool and _is_known(rows, name, direction)}
+        if len(tapped) == 1:
+            direction = tapped.pop()
+            missing = "y" if direction == "x" else "x"
+            cure = f"Tap direction {missing} of the same tool too: no program is sure with one direction alone."
+            yield Remark("one-direction", tool, f"tapped in direction {direction} alone", cure)
 
 
 def _is_known(rows: Sequence[Row], tool: str, direction: str) -> bool:

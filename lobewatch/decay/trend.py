@@ -1,4 +1,4 @@
-"""What the tap tests of one tool and direction say together: points, alarm, where they started and where they go."""
+"""The trend of one value of a series: its points, alarm, where they started and where they go."""
 
 from __future__ import annotations
 
@@ -13,45 +13,47 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobewatch.decay.change_point import Watch, watch_both
+from lobewatch.decay.day_points import PercentSeries, Span, divide_into_points
 from lobewatch.decay.forecast import ENOUGH, Forecast, Past, Rate, past
-from lobewatch.decay.together import Series, Span, together
 
 MOST = 1000
-"""The newest points, which alone are judged: the work grows with the square of their number."""
+"""Number of newest points that alone are judged; chosen, as the work grows with its square."""
 MONTH = 30.44
-"""Days."""
+"""Mean length of a month (days)."""
 HORIZON_DAYS = 36 * MONTH
-"""Nothing is foretold for later."""
+"""Time ahead (days) beyond which nothing is foretold; chosen."""
+STARTERS = 3
+"""Points that the start of a series is looked for in while it has no fitted line; chosen."""
 
 Floats = NDArray[np.float64]
 
 
 class TapValue(NamedTuple):
-    """One value of a series."""
+    """One value of a series, from one tap test."""
 
     time: datetime
-    """Of the tap test."""
+    """Time of the tap test."""
     value: float
-    """What was found, positive."""
+    """Value, positive."""
     error: float = math.nan
-    """Standard error of the tap test (%)."""
+    """Standard error of the value (%)."""
     temperature: float = math.nan
-    """Of the spindle (degC)."""
+    """Temperature of the spindle (degC)."""
 
 
 class DayPoint(NamedTuple):
-    """Tap tests of one day."""
+    """The tap tests of one day together."""
 
     time: datetime
-    """Of the first of them."""
+    """Time of the first of them."""
     percent: float
-    """100 ln of the value over that of the first tap test: mean, median from three on."""
+    """Change, 100 ln of the value over that of the first tap test of the series: mean, median from three on."""
     error: float
     """Standard error by the tap tests alone (%)."""
     temperature: float
-    """Mean of those recorded (degC)."""
+    """Mean of the temperatures recorded (degC)."""
     taps: tuple[int, ...]
-    """Which of the series."""
+    """Numbers of the tap tests in the series."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,15 +61,15 @@ class Trend:
     """One series, judged."""
 
     points: tuple[DayPoint, ...]
-    """Oldest first; one at least."""
+    """Points, oldest first; one at least."""
     first: float
-    """The value that the percents are of: that of the first tap test."""
+    """Value that the percents are of: that of the first tap test."""
     past: Past | None
-    """The shapes that it allows, over days since 1970; None below 8 points."""
+    """Shapes that it allows, over days since 1970; None below 8 points."""
     today: int
     """Day since 1970 that it is judged on."""
     events: tuple[datetime, ...] = ()
-    """An event after an alarm ends that alarm."""
+    """Times of events; one after an alarm ends that alarm."""
 
     @property
     def watched(self) -> int:
@@ -76,16 +78,16 @@ class Trend:
 
     @property
     def watch(self) -> Watch:
-        """Of the points from there on."""
+        """Watch over the points from there on, for a fall."""
         return self._judged[1]
 
     @property
     def rise(self) -> Watch:
-        """The same of the mirror image."""
+        """Watch over the points from there on, for a rise."""
         return self._judged[2]
 
     def on(self, now: datetime, events: Sequence[datetime]) -> Trend:
-        """The same series, judged on another day and with other events."""
+        """This trend as judged on another day and with other events."""
         return replace(self, today=int(day(now)), events=tuple(events))
 
     @cached_property
@@ -102,7 +104,7 @@ class Trend:
 
     @cached_property
     def forecast(self) -> Forecast | None:
-        """Over days since 1970; None below 8 points."""
+        """Forecast over days since 1970; None below 8 points."""
         return None if self.past is None else self.past.ahead(self.today + HORIZON_DAYS, self.today)
 
     @property
@@ -114,7 +116,7 @@ class Trend:
         """
         if self.past is not None:
             return float(self.past.fitted[:ENOUGH].max())
-        return max(point.percent for point in self.points[:3])
+        return max(point.percent for point in self.points[:STARTERS])
 
     @property
     def is_stale(self) -> bool:
@@ -129,7 +131,7 @@ class Trend:
     @property
     def rate(self) -> Rate | None:
         """Change in % a month now, with its 95 % interval; None below 8 points."""
-        return None if self.past is None else Rate(*(MONTH * one for one in self.past.rate))
+        return None if self.past is None else Rate(*(MONTH * rate for rate in self.past.rate))
 
     @property
     def fallen_since(self) -> datetime | None:
@@ -140,38 +142,39 @@ class Trend:
 def trend_of(series: Sequence[TapValue], now: datetime, events: Sequence[datetime] = ()) -> Trend:
     """Judge a series, oldest first, one value at least; an event after an alarm ends that alarm.
 
-    Foretold from the day of `now` on; the same for all of a day.
+    now: the forecast begins with its day, and is the same for all of it.
     """
     points = _newest_points(series)
     return Trend(points, series[0].value, _past(points), int(day(now)), tuple(events))
 
 
 def _newest_points(series: Sequence[TapValue]) -> tuple[DayPoint, ...]:
-    """Of a series, oldest first."""
+    """The newest points of a series, oldest first."""
     times, values, errors, temperatures = zip(*series, strict=True)
-    own = Series(times, _percents(values), temperatures)
-    return tuple(_point(own, errors, span) for span in together(own, MOST)[-MOST:])
+    percents = PercentSeries(times, _percents(values), temperatures)
+    return tuple(_point(percents, errors, span) for span in divide_into_points(percents, MOST)[-MOST:])
 
 
-def _point(own: Series, errors: Sequence[float], span: Span) -> DayPoint:
+def _point(series: PercentSeries, errors: Sequence[float], span: Span) -> DayPoint:
     first, end = span
+    time = series.times[first]
     if end - first == 1:
-        return DayPoint(own.times[first], own.percents[first], errors[first], own.temperatures[first], (first,))
+        return DayPoint(time, series.percents[first], errors[first], series.temperatures[first], (first,))
     error = math.sqrt(sum(error**2 for error in errors[first:end])) / (end - first)
-    return DayPoint(own.times[first], own.percent(span), error, own.temperature(span), tuple(range(first, end)))
+    return DayPoint(time, series.percent(span), error, series.temperature(span), tuple(range(first, end)))
 
 
 def newest_percents(times: Sequence[datetime], values: Sequence[float]) -> tuple[list[datetime], list[float]]:
     """Time and percent of the newest points of a series whose temperatures do not count, oldest first."""
-    own = Series(times, _percents(values), [math.nan] * len(times))
-    spans = together(own, MOST)[-MOST:] if times else []
-    return [times[first] for first, _ in spans], [own.percent(span) for span in spans]
+    series = PercentSeries(tuple(times), _percents(values), (math.nan,) * len(times))
+    spans = divide_into_points(series, MOST)[-MOST:] if times else ()
+    return [times[first] for first, _ in spans], [series.percent(span) for span in spans]
 
 
-def _percents(values: Sequence[float]) -> list[float]:
-    """100 ln of each over the first."""
+def _percents(values: Sequence[float]) -> tuple[float, ...]:
+    """Changes of values, 100 ln of each over the first."""
     log, first = math.log, values[0] if values else 1.0
-    return [100 * log(value / first) for value in values]
+    return tuple([100 * log(value / first) for value in values])
 
 
 def _past(points: Sequence[DayPoint]) -> Past | None:
@@ -192,5 +195,5 @@ def day(time: datetime) -> float:
 
 
 def date(days: float) -> datetime:
-    """Of so many days since 1970."""
+    """Date of so many days since 1970."""
     return datetime.fromtimestamp(86400 * days, UTC)

@@ -12,8 +12,8 @@ import numpy as np
 
 from acquisition import Frf, Remark, TapTest, joined
 from dsm import plus_minus
-from lobewatch.decay.fallen import change_since_start, start
-from lobewatch.decay.preload import preload_of
+from lobewatch.decay import SeriesStanding
+from lobewatch.decay.series_history import SeriesHistory, preload_of
 from lobewatch.history import Row
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.outlook import Outlook, outlook
@@ -21,7 +21,7 @@ from lobewatch.machine import Machine
 from lobewatch.show.figures.style import svg
 from lobewatch.show.figures.trend_figures import frf_figure
 from lobewatch.show.history.describe_history import conditions_texts
-from lobewatch.show.programs.advice import ProgramAdvice, advised, advised_lines, decay_text
+from lobewatch.show.programs.advice import ProgramAdvice, advice_lines, advise_program, decay_text
 from lobewatch.show.programs.doubts import reading_lines
 from lobewatch.show.programs.verdicts import WORDS, band_text, limit_text, margin_text, turning_text, verdict_text
 from lobewatch.show.report.figure_data import response_numbers
@@ -73,8 +73,9 @@ def _content(logbook: Logbook, rows: Sequence[Row], found: Outlook) -> dict[str,
     entries = {entry.id: entry for entry in logbook.taps}
     now = logbook.folder.read(entries[last.tap_id])
     assembly = logbook.assembly(last.tool)
+    series = found.series(last.tool, last.direction)
     course = trends(logbook, rows, found.standing)
-    programs = [advised(logbook, verdict) for verdict in logbook.verdicts()]
+    programs = [advise_program(logbook, verdict) for verdict in logbook.verdicts()]
     cut = next(iter(machine.cuts(assembly.tool)), None)
     lobes = None if cut is None else lobe_course(cut, rows, assembly, found.standing.series, machine, logbook.cuts)
     return {
@@ -87,13 +88,13 @@ def _content(logbook: Logbook, rows: Sequence[Row], found: Outlook) -> dict[str,
         "software": logbook.history.software,
         "label": machine.spindle.label if machine.spindle else "",
         "first_screen": first_screen(found, programs, machine),
-        "until": _until(found, last),
+        "until": _until(found, series),
         "series": series_lines(found.standing),
         "taps": tap_lines(logbook),
         "cuts": cut_lines(logbook),
         "tap_numbers": tap_numbers(logbook),
-        "changes": _changes(rows),
-        "preload": preload_text(left) if (left := preload_of(rows, machine)) else "",
+        "changes": _changes(series.history),
+        "preload": preload_text(left) if (left := preload_of(series.history, machine)) else "",
         **_programs(programs, machine),
         "remarks": [str(remark) for remark in _remarks(last, assembly)],
         **_newest(now, last),
@@ -114,7 +115,7 @@ def _programs(programs: Sequence[ProgramAdvice], machine: Machine) -> dict[str, 
     checked = [one.verdict for one in programs if one.verdict.word is not Word.UNKNOWN]
     return {
         "programs": [_program(one) for one in programs],
-        "program_lines": [_whole(line) for one in programs for line in advised_lines(one, machine.speed)],
+        "program_lines": [_whole(line) for one in programs for line in advice_lines(one, machine.speed)],
         "program_method": checked[0].method if checked else "",
         "program_doubt": [*map(_whole, reading_lines(checked, machine))],
     }
@@ -131,9 +132,8 @@ def _newest(tap: TapTest, row: Row) -> dict[str, Any]:
     }
 
 
-def _until(found: Outlook, last: Row) -> dict[str, Any] | None:
+def _until(found: Outlook, series: SeriesStanding) -> dict[str, Any] | None:
     """When programs stop holding; None where no test can be compared with."""
-    series = found.series(last.tool, last.direction)
     if series.trend is None:
         return None
     return {"course": sentence(series), "dates": dates_rows(found), "assumed": ASSUMED}
@@ -156,18 +156,19 @@ def _shown_band(frf: Frf, machine: Machine) -> tuple[float, float]:
     return max(0.6 * low, float(frf.frequency[0])), min(1.4 * high, float(frf.frequency[-1]))
 
 
-def _changes(rows: Sequence[Row]) -> list[dict[str, str]]:
+def _changes(series: SeriesHistory) -> list[dict[str, str]]:
     """What was measured first and last, and the change by the formula of the light."""
     table = []
     for name, label, scale in CHANGES:
-        known = [getattr(row, name) for row in rows if getattr(row, name).is_known]
-        change = change_since_start(rows, name)
+        history = series.values[name]
+        change = history.change
         if change.is_known:
-            now, then = (plus_minus(one.value, one.std, scale) for one in (known[-1], start(rows, name)))
+            newest = getattr(history.known[-1], name)
+            now, then = (plus_minus(estimate.value, estimate.std, scale) for estimate in (newest, history.start))
             table.append({"label": label, "then": then, "now": now, "change": f"{change.value:+.2f} %"})
     for name, label in (("static_tip_stiffness", "static"), ("modal_tip_stiffness", "modal")):
-        values = [float(getattr(row, name)) for row in rows if np.isfinite(getattr(row, name))]
-        if values and np.isfinite(getattr(rows[-1], name)):
+        values = [float(getattr(row, name)) for row in series.rows if np.isfinite(getattr(row, name))]
+        if values and np.isfinite(getattr(series.rows[-1], name)):
             then, now = (f"{value / 1e6:.6g}" for value in (values[0], values[-1]))
             change_text = f"{100 * (values[-1] / values[0] - 1):+.2f} %"
             heading = f"{label} tip stiffness, model (N/µm)"
@@ -199,7 +200,7 @@ def _program(one: ProgramAdvice) -> dict[str, Any]:
         "margin": margin_text(found),
         "turning": turning_text(found),
         "left": decay_text(one.advice),
-        "then": None if one.then is None else _looks(one.then.word, one.then.word.value),
+        "then": None if one.at_first is None else _looks(one.at_first.word, one.at_first.word.value),
         "now": _looks(found.word, verdict_text(found)),
     }
 

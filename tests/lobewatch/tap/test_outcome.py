@@ -25,13 +25,13 @@ from acquisition import (
     from_accelerance,
     new_tap_id,
 )
-from lobewatch.decay.fallen import change_since_start
+from lobewatch.decay.series_history import series_history
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.measuring import Estimate
-from lobewatch.tap.outcome import outcome_of
 from lobewatch.tap.plots import plots_of
+from lobewatch.tap.session import outcome_of
 from lobewatch.tap.state import Outcome
 from modal import Mode, synthesize
 
@@ -85,7 +85,7 @@ def test_the_fall_has_the_standard_error_of_both_frequencies(folder: MachineFold
     first, last = Logbook(folder).history.rows
     first = replace(first, frequency=Estimate(first.frequency.value, 1.72))
     last = replace(last, frequency=Estimate(last.frequency.value, 0.96 * 1.72))
-    change = change_since_start([first, last], "frequency")
+    change = series_history([first, last]).frequency.change
     assert change.value == pytest.approx(-4.0, abs=0.01)
     assert change.std == pytest.approx(0.136, abs=0.001)
 

@@ -1,0 +1,78 @@
+"""What the limits of machine.toml and the watch over a series call for."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+
+from acquisition import Remark
+from lobewatch.decay.series_history import SeriesHistory
+from lobewatch.decay.trend import Trend
+from lobewatch.history.history import Row
+from lobewatch.machine import Limits
+from lobewatch.measuring.estimate import Estimate
+
+BESIDE = {"damping_ratio": "damping ratio", "stiffness": "stiffness K", "bearing_stiffness": "bearing stiffness"}
+"""Values that are watched beside the frequency, and what they are called."""
+
+
+def about_loss(name: str, newest: Row) -> Iterator[Remark]:
+    """Remark on a newest test that does not show the mode followed."""
+    if not newest.frequency.is_known:
+        cure = "Tap again: the mode that is followed was not found in the newest test."
+        yield Remark("mode-lost", name, "the newest test does not show the mode followed", cure)
+
+
+def about_fall(name: str, fall: Estimate, limits: Limits) -> Iterator[Remark]:
+    """Remark on a fall that has reached a limit of machine.toml."""
+    text = f"frequency fallen by {fall.value:.1f} % since the first tests"
+    if fall.value >= limits.frequency_alarm_percent:
+        cure = "Do not cut on: have the bearings, the tool and its clamping looked at, then tap again."
+        yield Remark("frequency-alarm", name, f"{text} (alarm at {limits.frequency_alarm_percent:g} %)", cure)
+    elif fall.value >= limits.frequency_warn_percent:
+        cure = "Tap again to be sure; if it stays, have the bearings and the tool's clamping looked at soon."
+        yield Remark("frequency-warn", name, f"{text} (warning at {limits.frequency_warn_percent:g} %)", cure)
+
+
+def about_trend(name: str, trend: Trend, path: Path | str = "MACHINE") -> Iterator[Remark]:
+    """Remarks on what the watch over the frequency sees: a fall, a doubt, a rise. path: of the folder, for commands."""
+    event = f'lobewatch event {shlex.quote(str(path))} "what was done"'
+    if trend.watch.fall is not None and trend.fallen_since is not None:
+        fall = trend.watch.fall
+        how = "fell at once before" if fall.kind == "step" else "has been falling since"
+        text = f"frequency {how} {trend.fallen_since:%Y-%m-%d}, by {_relative(fall.size, fall.half_width)}"
+        cure = "Have the bearings, the tool and its clamping looked at"
+        yield Remark("decay", name, text, f"{cure}; {event} ends this alarm, --new-baseline with it after a repair.")
+    elif trend.watch.asks_again:
+        text = "the newest test is lower than those before it"
+        yield Remark("decay-doubtful", name, text, "Clamp the tool anew and tap again: that shows whether it fell.")
+    if trend.rise.fall is not None:
+        rise = trend.rise.fall
+        text = f"frequency rose by {_relative(-rise.size, rise.half_width)}: assembly changed?"
+        yield Remark("frequency-rose", name, text, f"If so: {event} --new-baseline")
+
+
+def about_others(name: str, series: SeriesHistory, trend: Trend | None) -> Iterator[Remark]:
+    """Remarks on changes of damping ratio, stiffness and bearing stiffness.
+
+    trend: of the frequency; where that has changed, the bearing stiffness that follows from it says nothing more.
+    """
+    has_changed = trend is not None and (trend.watch.fall or trend.rise.fall)
+    for field, word in BESIDE.items():
+        if has_changed and field == "bearing_stiffness":
+            continue
+        newest = series.values[field].newest_change()
+        if newest is not None:
+            time, change = newest
+            verbs = ("fell", "falling") if change.size > 0 else ("rose", "rising")
+            how = f"{verbs[0]} at once before" if change.kind == "step" else f"has been {verbs[1]} since"
+            text = f"{word} {how} {time:%Y-%m-%d}, by {_relative(change.size, change.half_width)}"
+            yield Remark("value-changed", name, text)
+
+
+def _relative(fall: float, half_width: float) -> str:
+    """Size of a change (%), from that of its logarithm (%) with the half-width of its 95 % interval."""
+    share = math.exp(-fall / 100)
+    return f"{100 * abs(1 - share):.2f} ±{half_width * share:.2f} %"

@@ -15,8 +15,8 @@ from lobewatch.cuts.learning.contradicting import contradiction_remarks
 from lobewatch.cuts.learning.of_program import Lesson, NextCut
 from lobewatch.cuts.learning.posterior import Interval
 from lobewatch.cuts.learning.suggest import Suggestion
-from lobewatch.show.programs.names import NAMES
-from lobewatch.show.programs.settings import rpm
+from lobewatch.show.programs.advice import rpm
+from lobewatch.show.programs.doubts import NAMES
 from lobewatch.show.terminal.output import table
 
 

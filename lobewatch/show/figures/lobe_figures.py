@@ -15,10 +15,9 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from lobes import RadialLobes
+from lobes import Cut, RadialLobes
 from lobewatch.cuts.learning.lobes_at_speed import LobesAtSpeed
-from lobewatch.machine.journal.heard_cut import HeardCut
-from lobewatch.show.figures.heard_cuts import draw_heard
+from lobewatch.machine.journal.heard_cut import HeardCut, geometry
 from lobewatch.show.figures.labels import PictureLabels
 from lobewatch.show.figures.style import ALARM, GOOD, NOW, THEN, UNKNOWN, new_axes
 from lobewatch.verdicts import Setting, Verdict, Word
@@ -45,6 +44,10 @@ LEVELS = 12
 BAR = "limiting depth (mm); brightest: this or more"
 SHORT = 10.0
 """Days below which dates are told with their time."""
+HEARD_MARKS = {False: ("heard stable", GOOD, "o"), True: ("heard to chatter", ALARM, "x")}
+"""Name, colour and mark of cuts by whether they chatter; wide and hollow, so that a program's own shows through."""
+HEARD_SIZE = 11.0
+"""Size of these marks (points)."""
 
 
 def lobes_figure(
@@ -65,8 +68,8 @@ def lobes_figure(
     figure, (axes,) = new_axes(1, (8.0, 4.6))
     *earlier, now = depths.items()
     finite = now[1][np.isfinite(now[1])] * 1e3
-    wanted = [one.program.depth_mm for one in programs] + [one.depth_mm for one in pockets]
-    wanted += [1e3 * one.depth for one in heard]
+    wanted = [verdict.program.depth_mm for verdict in programs] + [pocket.depth_mm for pocket in pockets]
+    wanted += [1e3 * cut.depth for cut in heard]
     top = max([5 * float(finite.min()) if finite.size else 1.0, *(1.3 * depth for depth in wanted)])
     low, high = (now[1], now[1]) if band is None else (band.low, band.high)
     low, high = (np.minimum(edge * 1e3, 2 * top) for edge in (low, high))
@@ -143,11 +146,11 @@ def _top(depth: Floats) -> float:
 
 def _draw_learnt(axes: Axes, learnt: LobesAtSpeed, deepest: float) -> None:
     """Line and band of the spindle at speed; depths (mm) end at the deepest."""
-    told = f"at speed, learnt from {learnt.cuts} test cut{'s' if learnt.cuts > 1 else ''}"
+    label = f"at speed, learnt from {learnt.cuts} test cut{'s' if learnt.cuts > 1 else ''}"
     left = "98 % of what test cuts have left open"
     low, high = (np.minimum(edge * 1e3, deepest) for edge in (learnt.band.low, learnt.band.high))
     axes.fill_between(learnt.band.speed_rpm, low, high, color=LEARNT, alpha=0.25, lw=0, label=left)
-    axes.plot(learnt.lobes.speed_rpm, learnt.lobes.depth * 1e3, color=LEARNT, ls="-.", lw=1.6, label=told)
+    axes.plot(learnt.lobes.speed_rpm, learnt.lobes.depth * 1e3, color=LEARNT, ls="-.", lw=1.6, label=label)
 
 
 def _draw_pocket(axes: Axes, pocket: Setting, labels: PictureLabels, label: str) -> None:
@@ -165,3 +168,24 @@ def _draw_program(axes: Axes, verdict: Verdict, labels: PictureLabels) -> None:
     place = (verdict.program.speed_rpm, verdict.program.depth_mm)
     axes.plot(*place, mark, color=colour, ms=9, mec="white")
     labels.add(f"{verdict.program.name}\n{verdict.word}", place)
+
+
+def heard_of(cuts: Sequence[HeardCut], name: str, tool: str, cut: Cut) -> list[HeardCut]:
+    """Those with this tool, cutter and immersion that count: of the cut of this name, or of the same coefficients."""
+    alike = [heard for heard in cuts if heard.counts and heard.tool == tool and geometry(heard.cut) == geometry(cut)]
+    force = cut.tangential, cut.radial
+    return [heard for heard in alike if heard.program == name or (heard.cut.tangential, heard.cut.radial) == force]
+
+
+def draw_heard(axes: Axes, cuts: Sequence[HeardCut], labels: PictureLabels) -> None:
+    """A mark for each cut, with the frequency that it chattered at; before other words look for a place."""
+    for chatters, (name, colour, mark) in HEARD_MARKS.items():
+        marked = [cut for cut in cuts if cut.chatters == chatters]
+        if marked:
+            places = [cut.speed_rpm for cut in marked], [1e3 * cut.depth for cut in marked]
+            axes.plot(*places, mark, color=colour, mfc="none", ms=HEARD_SIZE, mew=2.2, zorder=4, label=name)
+    for cut in cuts:
+        labels.keep_clear((cut.speed_rpm, 1e3 * cut.depth), HEARD_SIZE)
+    for cut in cuts:
+        if cut.chatter_frequency_hz is not None:
+            labels.add(f"{cut.chatter_frequency_hz:.0f} Hz", (cut.speed_rpm, 1e3 * cut.depth), ALARM)

@@ -14,10 +14,10 @@ from rich.table import Table
 from acquisition import Remark
 from lobewatch.logbook import Logbook
 from lobewatch.machine import SpeedRange
-from lobewatch.show.programs.settings import rpm, setting_json, spare
 from lobewatch.show.programs.verdicts import verdict_json, verdict_table
 from lobewatch.tool import Assembly
 from lobewatch.verdicts import Advice, Setting, Verdict, Word
+from lobewatch.verdicts.setting_search import LEFT
 from lobewatch.verdicts.verdict import Ruling
 
 IN_LINES = ("doubt-decides", "not-checked")
@@ -33,13 +33,13 @@ class ProgramAdvice:
     verdict: Verdict
     """The word and the limit."""
     advice: Advice
-    """Where to go, and how much decay is left."""
-    then: Ruling | None
-    """At the first tap tests of the same tool and directions; None without earlier ones."""
+    """Settings to go to, and how much decay is left."""
+    at_first: Ruling | None
+    """Ruling at the first tap tests of the same tool and directions; None without earlier ones."""
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """Of both."""
+        """Remarks of verdict and advice."""
         return (*self.verdict.remarks, *self.advice.remarks)
 
     @property
@@ -50,29 +50,30 @@ class ProgramAdvice:
     @property
     def is_no_longer_stable(self) -> bool:
         """Whether it chatters now, and did not at first."""
-        return self.verdict.stable is False and self.then is not None and bool(self.then.stable)
+        return self.verdict.stable is False and self.at_first is not None and bool(self.at_first.stable)
 
 
-def advised(logbook: Logbook, verdict: Verdict) -> ProgramAdvice:
+def advise_program(logbook: Logbook, verdict: Verdict) -> ProgramAdvice:
     """All that is said of one program."""
     return ProgramAdvice(verdict, logbook.advice(verdict), logbook.ruling_then(verdict))
 
 
-def advised_json(one: ProgramAdvice) -> dict[str, Any]:
+def advice_json(program: ProgramAdvice) -> dict[str, Any]:
     """One program."""
-    return verdict_json(one.verdict) | {
-        "was_stable_at_first": None if one.then is None else one.then.stable,
-        "verdict_at_first": None if one.then is None else one.then.word,
-        "advice": setting_json(one.advice.best),
-        "advice_here": setting_json(one.advice.here),
-        "tolerable_decay": one.advice.decay,
-        "remarks": [asdict(remark) for remark in one.remarks],
+    return verdict_json(program.verdict) | {
+        "was_stable_at_first": None if program.at_first is None else program.at_first.stable,
+        "verdict_at_first": None if program.at_first is None else program.at_first.word,
+        "advice": setting_json(program.advice.best),
+        "advice_here": setting_json(program.advice.here),
+        "tolerable_decay": program.advice.decay,
+        "remarks": [asdict(remark) for remark in program.remarks],
     }
 
 
-def advised_table(programs: Sequence[ProgramAdvice]) -> Table:
+def advice_table(programs: Sequence[ProgramAdvice]) -> Table:
     """Programs, a line each."""
-    return verdict_table([one.verdict for one in programs], [decay_text(one.advice) for one in programs])
+    decays = [decay_text(program.advice) for program in programs]
+    return verdict_table([program.verdict for program in programs], decays)
 
 
 def decay_text(advice: Advice) -> str:
@@ -86,94 +87,126 @@ def decay_text(advice: Advice) -> str:
 
 def counts(programs: Sequence[ProgramAdvice]) -> dict[str, int]:
     """How many there are of each that may not be run."""
-    words = Counter(one.verdict.word for one in programs)
+    words = Counter(program.verdict.word for program in programs)
     return {
         "unstable": words[Word.NOT_STABLE],
         "doubtful": words[Word.DOUBTFUL],
         "not_checked": words[Word.UNKNOWN],
-        "beyond_drive": sum(one.verdict.is_beyond_drive for one in programs),
+        "beyond_drive": sum(program.verdict.is_beyond_drive for program in programs),
     }
 
 
 def summary(programs: Sequence[ProgramAdvice]) -> str:
     """How many there are of each word."""
-    words = Counter(one.verdict.word for one in programs)
-    said = [f"{words[word]} {word}" for word in Word if words[word]]
+    words = Counter(program.verdict.word for program in programs)
+    texts = [f"{words[word]} {word}" for word in Word if words[word]]
     beyond = counts(programs)["beyond_drive"]
-    said += [f"{beyond} beyond the drive"] if beyond else []
-    return f"{len(programs)} program{'s' if len(programs) > 1 else ''}: {', '.join(said)}"
+    texts += [f"{beyond} beyond the drive"] if beyond else []
+    return f"{len(programs)} program{'s' if len(programs) > 1 else ''}: {', '.join(texts)}"
 
 
-def advised_lines(one: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:
+def advice_lines(program: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:
     """What is wrong and what to do, a line for each thing that is called for."""
-    found = one.verdict
-    name = found.program.name
-    if found.word is Word.UNKNOWN:
-        yield from (str(remark) for remark in found.remarks if remark.code == "not-checked")
-    elif found.word is Word.NOT_STABLE:
-        yield f"{name}: {_chatter(one)}; {_elsewhere(one, speeds)}"
-    elif found.word is Word.DOUBTFUL:
-        settles = [remark for remark in found.remarks if remark.code == "doubt-decides"]
-        said = [f"{remark.text}; to settle it: {remark.cure}" for remark in settles]
-        yield f"{name}: {'; '.join([*said, *_or_elsewhere(one, speeds)])}"
-    if found.is_beyond_drive:
-        yield f"{name}: [drive] allows no more than {_floored(found.drive_limit)} mm at this speed"
+    verdict = program.verdict
+    name = verdict.program.name
+    if verdict.word is Word.UNKNOWN:
+        yield from (str(remark) for remark in verdict.remarks if remark.code == "not-checked")
+    elif verdict.word is Word.NOT_STABLE:
+        yield f"{name}: {_chatter(program)}; {_elsewhere(program, speeds)}"
+    elif verdict.word is Word.DOUBTFUL:
+        settles = [remark for remark in verdict.remarks if remark.code == "doubt-decides"]
+        texts = [f"{remark.text}; to settle it: {remark.cure}" for remark in settles]
+        yield f"{name}: {'; '.join([*texts, *_or_elsewhere(program, speeds)])}"
+    if verdict.is_beyond_drive:
+        yield f"{name}: [drive] allows no more than {_floored(verdict.drive_limit)} mm at this speed"
 
 
-def _chatter(one: ProgramAdvice) -> str:
-    found = one.verdict
-    word = "period-two chatter" if found.kind == "flip" else "chatter"
-    where = f" near {found.chatter_frequency:.0f} Hz" if math.isfinite(found.chatter_frequency) else ""
-    said = f"{word}{where}{_worst_feed(found)}"
-    return f"stable at first, no longer: {said}" if one.is_no_longer_stable else said
+def _chatter(program: ProgramAdvice) -> str:
+    verdict = program.verdict
+    word = "period-two chatter" if verdict.kind == "flip" else "chatter"
+    where = f" near {verdict.chatter_frequency:.0f} Hz" if math.isfinite(verdict.chatter_frequency) else ""
+    text = f"{word}{where}{_worst_feed(verdict)}"
+    return f"stable at first, no longer: {text}" if program.is_no_longer_stable else text
 
 
-def _worst_feed(found: Verdict) -> str:
+def _worst_feed(verdict: Verdict) -> str:
     """The direction of feed that is worst, where it matters."""
-    limits = np.ones(1) if found.drawn is None else found.drawn.limits
+    limits = np.ones(1) if verdict.drawn is None else verdict.drawn.limits
     if np.max(limits) <= ALIKE * np.min(limits):
         return ""
-    degrees = round(math.degrees(found.feed_angle))
+    degrees = round(math.degrees(verdict.feed_angle))
     return f", worst fed along {({0: 'x', 90: 'y'}).get(degrees, f'{degrees} degrees from x')}"
 
 
-def _or_elsewhere(one: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:
+def _or_elsewhere(program: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:
     """What to do until it is settled; tapping what was not tapped comes first."""
-    if one.verdict.assembly is not None and one.verdict.assembly.is_sure:
-        yield f"until then {_elsewhere(one, speeds)}"
+    if program.verdict.assembly is not None and program.verdict.assembly.is_sure:
+        yield f"until then {_elsewhere(program, speeds)}"
 
 
-def _elsewhere(one: ProgramAdvice, speeds: SpeedRange) -> str:
+def _elsewhere(advice: ProgramAdvice, speeds: SpeedRange) -> str:
     """Where to go."""
-    program, best, here = one.verdict.program, one.advice.best, one.advice.here
-    known = one.verdict.assembly
-    if known is not None and len(known.directions) == 1:
-        return f"tap direction {_missing(known)} too: only then can a safe speed be named"
-    if known is not None and known.questions:
+    verdict, best, shallower = advice.verdict, advice.advice.best, advice.advice.here
+    assembly = verdict.assembly
+    if assembly is not None and len(assembly.directions) == 1:
+        return f"tap direction {_missing(assembly)} too: only then can a safe speed be named"
+    if assembly is not None and assembly.questions:
         cure = "answer what is asked of its tap tests"
-        cure = "tap again" if any(one.code == "newest-damaged" for one in known.questions) else cure
+        cure = "tap again" if any(question.code == "newest-damaged" for question in assembly.questions) else cure
         return f"{cure}: only then can a safe speed be named"
     reach = f"in {rpm(speeds.low_rpm)} to {rpm(speeds.high_rpm)} rpm"
     if best is None:
         return f"no safe speed {reach}; choose another tool"
-    if best.depth_mm == program.depth_mm:
-        return f"run this depth at {rpm(best.speed_rpm)} rpm {spare(best)}"
-    said = [f"no safe speed for this depth {reach}"]
-    said += (
-        [] if _same(best, here) else [f"most chips: {best.depth_mm:g} mm at {rpm(best.speed_rpm)} rpm {spare(best)}"]
-    )
-    said += [] if here is None else [f"at {rpm(here.speed_rpm)} rpm no deeper than {here.depth_mm:g} mm {spare(here)}"]
-    return "; ".join(said)
+    if best.depth_mm == verdict.program.depth_mm:
+        return f"run this depth at {rpm(best.speed_rpm)} rpm {spare_text(best)}"
+    texts = [f"no safe speed for this depth {reach}"]
+    if not _is_same(best, shallower):
+        texts.append(f"most chips: {best.depth_mm:g} mm at {rpm(best.speed_rpm)} rpm {spare_text(best)}")
+    if shallower is not None:
+        depth, speed = f"{shallower.depth_mm:g}", rpm(shallower.speed_rpm)
+        texts.append(f"at {speed} rpm no deeper than {depth} mm {spare_text(shallower)}")
+    return "; ".join(texts)
 
 
-def _same(best: Setting, here: Setting | None) -> bool:
-    return here is not None and (best.speed_rpm, best.depth_mm) == (here.speed_rpm, here.depth_mm)
+def _is_same(best: Setting, shallower: Setting | None) -> bool:
+    return shallower is not None and (best.speed_rpm, best.depth_mm) == (shallower.speed_rpm, shallower.depth_mm)
 
 
-def _missing(known: Assembly) -> str:
-    return "y" if known.directions[0] == "x" else "x"
+def _missing(assembly: Assembly) -> str:
+    return "y" if assembly.directions[0] == "x" else "x"
 
 
 def _floored(depth: float) -> str:
     """The deepest cut (mm) of two decimals that is not deeper (m)."""
     return f"{math.floor(depth * 1e5) / 100:.2f}"
+
+
+def setting_json(setting: Setting | None) -> dict[str, Any] | None:
+    """One setting."""
+    if setting is None:
+        return None
+    return {
+        "speed_rpm": setting.speed_rpm,
+        "depth_mm": setting.depth_mm,
+        "window_rpm": list(setting.window_rpm),
+        "depth_margin": setting.depth_margin,
+        "frequency_left": setting.frequency_left,
+    }
+
+
+def rpm(speed: float) -> str:
+    """A speed in groups of three digits."""
+    return f"{speed:,.10g}".replace(",", " ")
+
+
+def spare_text(setting: Setting) -> str:
+    """How far a setting is from what is not safe; all of it rounded towards it."""
+    low, high = setting.window_rpm
+    margin = f"{math.floor(100 * setting.depth_margin + 1e-6)} % of depth to spare"
+    return f"({rpm(low)} to {rpm(high)} rpm is safe; {margin}; {_left(setting.frequency_left)})"
+
+
+def _left(fall: float) -> str:
+    if fall <= 0:
+        return f"f_n may fall by less than {100 * LEFT[1]:g} %"
+    return f"f_n may fall by {100 * fall:.3g} %" + (" or more" if fall >= LEFT[-1] else "")

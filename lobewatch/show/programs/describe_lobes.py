@@ -14,59 +14,65 @@ from lobes import Pocket, PocketShift, StabilityLobes, cutting_coefficients
 from lobewatch.logbook import LobeComparison
 from lobewatch.logbook.lobe_comparison import NO_POCKET
 from lobewatch.machine import REFERENCE_CUT, Machine
+from lobewatch.show.programs.advice import setting_json
 from lobewatch.show.programs.doubts import at_speed_line
-from lobewatch.show.programs.settings import setting_json
 from lobewatch.show.programs.verdicts import programs_json, verdict_table
 from lobewatch.show.terminal.output import remark_json, remark_lines, table
 from lobewatch.verdicts import Setting
 from lobewatch.verdicts.setting_search import LEFT
 
 
-def comparison_json(found: LobeComparison, remarks: Sequence[Remark]) -> dict[str, Any]:
+def comparison_json(comparison: LobeComparison, remarks: Sequence[Remark]) -> dict[str, Any]:
     """The diagram now, its pockets, and the verdicts on the programs with this cut."""
-    lobes = found.now.lobes
-    return lobes_json(found.now.name, lobes) | {
-        "tap_id": found.now.assembly.tap_id,
-        "source": str(found.now.source),
+    lobes = comparison.now.lobes
+    return lobes_json(comparison.now.name, lobes) | {
+        "tap_id": comparison.now.assembly.tap_id,
+        "source": str(comparison.now.source),
         "speed_rpm": lobes.speed_rpm,
         "depth_mm": lobes.depth * 1e3,
         "chatter_frequencies_hz": lobes.chatter_frequency,
         "kind": lobes.kind,
-        "pockets": [setting_json(pocket) for pocket in found.pockets],
-        "pocket_shifts": [shift_json(shift) for shift in found.shifts],
-        "programs": programs_json(found.verdicts),
+        "pockets": [setting_json(pocket) for pocket in comparison.pockets],
+        "pocket_shifts": [shift_json(shift) for shift in comparison.shifts],
+        "programs": programs_json(comparison.verdicts),
         "remarks": [remark_json(remark) for remark in joined(remarks)],
     }
 
 
-def comparison_texts(found: LobeComparison, remarks: Sequence[Remark]) -> list[str | Table]:
+def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> list[str | Table]:
     """The same for people."""
-    now = found.now
+    now = comparison.now
     texts: list[str | Table] = [
         f"{now.name}: {now.lobes.stated_method}, from the {now.source} of {now.assembly.tap_id}",
-        _limit_line(found),
-        *shift_lines(found.shifts),
+        _limit_line(comparison),
+        *shift_lines(comparison.shifts),
     ]
-    if found.pockets:
-        texts += ["safe now and until the next tap tests, the largest removal rate first:", pocket_table(found.pockets)]
+    if comparison.pockets:
+        texts += [
+            "safe now and until the next tap tests, the largest removal rate first:",
+            pocket_table(comparison.pockets),
+        ]
     texts += [str(remark) for remark in remarks if remark.code == NO_POCKET]
-    if found.verdicts:
-        texts += [verdict_table(found.verdicts), f"verdicts by {found.verdicts[0].method}, as lobewatch check"]
-        texts += _at_speed(found)
+    if comparison.verdicts:
+        texts += [
+            verdict_table(comparison.verdicts),
+            f"verdicts by {comparison.verdicts[0].method}, as lobewatch check",
+        ]
+        texts += _at_speed(comparison)
     return [*texts, *remark_lines([remark for remark in remarks if remark.code != NO_POCKET])]
 
 
-def _at_speed(found: LobeComparison) -> list[str]:
+def _at_speed(comparison: LobeComparison) -> list[str]:
     """What holds at rest and what at speed, where test cuts have taught of a program."""
-    taught = [verdict for verdict in found.verdicts if verdict.cuts]
+    taught = [verdict for verdict in comparison.verdicts if verdict.cuts]
     if not taught:
         return []
-    still = "the diagram and its pockets are" if found.now.name == REFERENCE_CUT else "the diagram is"
+    still = "the diagram and its pockets are" if comparison.now.name == REFERENCE_CUT else "the diagram is"
     return [f"{at_speed_line(taught)}; {still} of the spindle at rest"]
 
 
-def _limit_line(found: LobeComparison) -> str:
-    lobes, low = found.now.lobes, found.now.lobes.minimum
+def _limit_line(comparison: LobeComparison) -> str:
+    lobes, low = comparison.now.lobes, comparison.now.lobes.minimum
     if not np.isfinite(low.depth):
         return f"no limit in this speed range ({lobes.stated_method})"
     return (
@@ -76,13 +82,13 @@ def _limit_line(found: LobeComparison) -> str:
 
 def pocket_table(pockets: Sequence[Setting]) -> Table:
     """Settings that can be recommended, a line each."""
-    made = table("pocket: speed (rpm)", "window (rpm)", "depth (mm)", "depth to spare", "f_n may fall by")
-    for one in pockets:
-        low, high = one.window_rpm
-        left = f"{100 * one.frequency_left:.0f} %{' or more' if one.frequency_left >= LEFT[-1] else ''}"
-        spare = f"{math.floor(100 * one.depth_margin + 1e-6)} %"
-        made.add_row(f"{one.speed_rpm:.0f}", f"{low:.0f}..{high:.0f}", f"{one.depth_mm:.2f}", spare, left)
-    return made
+    rows = table("pocket: speed (rpm)", "window (rpm)", "depth (mm)", "depth to spare", "f_n may fall by")
+    for pocket in pockets:
+        low, high = pocket.window_rpm
+        left = f"{100 * pocket.frequency_left:.0f} %{' or more' if pocket.frequency_left >= LEFT[-1] else ''}"
+        spare = f"{math.floor(100 * pocket.depth_margin + 1e-6)} %"
+        rows.add_row(f"{pocket.speed_rpm:.0f}", f"{low:.0f}..{high:.0f}", f"{pocket.depth_mm:.2f}", spare, left)
+    return rows
 
 
 def shift_json(shift: PocketShift) -> dict[str, Any]:
@@ -101,7 +107,7 @@ def _tip_json(tip: Pocket) -> dict[str, float]:
 
 def shift_lines(shifts: Sequence[PocketShift]) -> Iterator[str]:
     """The three fastest pockets that moved, a line each."""
-    for shift in sorted(shifts, key=lambda one: one.then.speed_rpm, reverse=True)[:3]:
+    for shift in sorted(shifts, key=lambda shift: shift.then.speed_rpm, reverse=True)[:3]:
         yield (
             f"pocket of the diagram moved from {shift.then.speed_rpm:.0f} to {shift.now.speed_rpm:.0f} rpm "
             f"({100 * shift.speed_change:+.1f} %), its tip from {shift.then.depth * 1e3:.2f} to "
@@ -113,22 +119,22 @@ def materials_json(machine: Machine) -> list[dict[str, Any]]:
     """Cutting coefficients of one's own, then the published ones."""
     return [
         {
-            "material": one.material,
-            "tangential_n_per_mm2": one.tangential / 1e6,
-            "radial_n_per_mm2": one.radial / 1e6,
-            "note": one.note,
-            "source": one.source,
+            "material": coefficients.material,
+            "tangential_n_per_mm2": coefficients.tangential / 1e6,
+            "radial_n_per_mm2": coefficients.radial / 1e6,
+            "note": coefficients.note,
+            "source": coefficients.source,
         }
-        for one in (*(own.build() for own in machine.material), *cutting_coefficients())
+        for coefficients in (*(material.build() for material in machine.material), *cutting_coefficients())
     ]
 
 
 def material_lines(machine: Machine) -> Iterator[str]:
     """The same, a line each."""
-    for one in materials_json(machine):
-        kt, kr = one["tangential_n_per_mm2"], one["radial_n_per_mm2"]
-        about = "; ".join(filter(None, (one["note"], one["source"])))
-        yield f"{one['material']:<42} Kt {kt:5.0f}  Kr {kr:4.0f} N/mm²  {about}"
+    for material in materials_json(machine):
+        kt, kr = material["tangential_n_per_mm2"], material["radial_n_per_mm2"]
+        about = "; ".join(filter(None, (material["note"], material["source"])))
+        yield f"{material['material']:<42} Kt {kt:5.0f}  Kr {kr:4.0f} N/mm²  {about}"
 
 
 def lobes_json(name: str, lobes: StabilityLobes) -> dict[str, Any]:

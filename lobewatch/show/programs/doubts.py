@@ -1,4 +1,4 @@
-"""The doubt that programs were judged over: its sizes, and where each comes from."""
+"""The doubt that programs were judged over: its sizes, where each comes from, and what test cuts have taught of it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobewatch.machine import DoubtTable, Machine
-from lobewatch.show.programs.names import NAMES
 from lobewatch.tool import Assembly
 from lobewatch.tool.series import ENOUGH
 from lobewatch.verdicts import Verdict
@@ -28,15 +27,26 @@ SIZES = "frequency", "damping_ratio", "stiffness", "phase_deg"
 DEGREE = 180 / np.pi
 NOTHING = 5e-5
 """A smaller half-width is not told."""
+NAMES = {
+    "tangential": "Kt",
+    "ratio": "Kr/Kt",
+    "frequency_x": "f_n in x",
+    "frequency_y": "f_n in y",
+    "damping_x": "zeta in x",
+    "damping_y": "zeta in y",
+    "stiffness_x": "K in x",
+    "stiffness_y": "K in y",
+}
+"""What test cuts teach, as people call it, by the name of the factor."""
 
 Floats = NDArray[np.float64]
 
 
-def doubt_json(found: Verdict) -> dict[str, Any] | None:
+def doubt_json(verdict: Verdict) -> dict[str, Any] | None:
     """Relative half-widths by cause (degrees of phases), those of modes in x, then y; None where nothing was judged."""
-    if found.drawn is None:
+    if verdict.drawn is None:
         return None
-    doubt = found.drawn.doubt
+    doubt = verdict.drawn.doubt
     modes = {
         cause: dict(zip(SIZES, (widths * [1, 1, 1, DEGREE]).T.tolist(), strict=True))
         for cause, widths in doubt.modes.items()
@@ -51,15 +61,15 @@ def doubt_json(found: Verdict) -> dict[str, Any] | None:
 def reading_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
     """What stands below a table of verdicts: what the words mean, and the doubt; nothing where nothing was judged."""
     doubts = doubt_lines(verdicts, machine)
-    judged = [found for found in verdicts if found.drawn is not None and found.assembly is not None]
-    taught = [found for found in judged if found.cuts]
-    said = ([AT_REST] if len(taught) < len(judged) else []) + ([at_speed_line(taught)] if taught else [])
-    return [*doubts, *said] if doubts else []
+    judged = [verdict for verdict in verdicts if verdict.drawn is not None and verdict.assembly is not None]
+    taught = [verdict for verdict in judged if verdict.cuts]
+    texts = ([AT_REST] if len(taught) < len(judged) else []) + ([at_speed_line(taught)] if taught else [])
+    return [*doubts, *texts] if doubts else []
 
 
 def at_speed_line(taught: Sequence[Verdict]) -> str:
     """What the words mean where test cuts have taught."""
-    names, cuts = ", ".join(found.program.name for found in taught), _cuts(taught[0].at_speed)
+    names, cuts = ", ".join(verdict.program.name for verdict in taught), _cuts(taught[0].at_speed)
     return f"{names}: the words hold for the spindle as it turns, from {cuts}, and low..high for 98 % of it"
 
 
@@ -70,35 +80,35 @@ def _cuts(at_speed: SpindleAtSpeed) -> str:
 def doubt_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
     """One for all programs that have it alike."""
     named: dict[str, list[str]] = {}
-    for found in verdicts:
-        if found.drawn is not None and found.assembly is not None:
-            parts = _parts(found, found.drawn.doubt, found.assembly, machine)
-            named.setdefault("; ".join(parts), []).append(found.program.name)
+    for verdict in verdicts:
+        if verdict.drawn is not None and verdict.assembly is not None:
+            parts = _parts(verdict, verdict.drawn.doubt, verdict.assembly, machine)
+            named.setdefault("; ".join(parts), []).append(verdict.program.name)
     about = {text: f"doubt of {', '.join(names)}" if len(named) > 1 else "doubt" for text, names in named.items()}
     return [f"{about[text]}: {text} ({PAGE})" for text in named]
 
 
-def _parts(found: Verdict, doubt: Doubt, assembly: Assembly, machine: Machine) -> Iterator[str]:
+def _parts(verdict: Verdict, doubt: Doubt, assembly: Assembly, machine: Machine) -> Iterator[str]:
     given, standard = machine.doubt, DoubtTable()
-    known = "".join(assembly.directions)
-    if found.cuts:
-        yield from _learnt(found.at_speed, doubt.speed)
+    tapped = "".join(assembly.directions)
+    if verdict.cuts:
+        yield from _learnt(verdict.at_speed, doubt.speed)
         return
-    about = {"prediction": "by the prediction", "untapped": f"in {'y' if known == 'x' else 'x'}, not tapped"}
+    about = {"prediction": "by the prediction", "untapped": f"in {'y' if tapped == 'x' else 'x'}, not tapped"}
     for cause, widths in doubt.modes.items():
         if cause == "clamping":
             yield from _clamping(widths, assembly, given)
         elif np.any(widths > NOTHING):
             yield f"{_sizes(np.max(widths, axis=0))} {about.get(cause, 'by the tap test')}"
     yield f"speed {_half(doubt.speed)}" + (f" ({GIVEN})" if given.speed_percent != standard.speed_percent else "")
-    yield from _coefficients(found, doubt, machine)
+    yield from _coefficients(verdict, doubt, machine)
 
 
 def _learnt(at_speed: SpindleAtSpeed, speed: float) -> Iterator[str]:
     """Intervals before and after the cuts; speed: half-width of the spindle speed, relative."""
     cuts = _cuts(at_speed)
     for name in ("Kt", "Kr/Kt", "f_n in x", "f_n in y"):
-        key = next(key for key, told in NAMES.items() if told == name)
+        key = next(key for key, term in NAMES.items() if term == name)
         before, after = (f"{span.low:.2f}..{span.high:.2f}" for span in (at_speed.before[key], at_speed.after[key]))
         yield f"{name} x {after}, {before} before the {cuts}" if name == "Kt" else f"{name} x {after} ({before})"
     yield f"speed {_half(speed)}"
@@ -107,25 +117,25 @@ def _learnt(at_speed: SpindleAtSpeed, speed: float) -> Iterator[str]:
 def _clamping(widths: Floats, assembly: Assembly, given: DoubtTable) -> Iterator[str]:
     """From tap test to tap test, once where both directions have it alike."""
     places = {"x": 0, "y": len(assembly.x or ())}
-    said = {}
+    texts = {}
     for side in assembly.directions:
-        said[side] = f"{_sizes(widths[places[side]])} from tap to tap ({_source(assembly, side, given)})"
-    alike = len(set(said.values())) == 1
-    yield from list(said.values())[:1] if alike else (f"in {side} {text}" for side, text in said.items())
+        texts[side] = f"{_sizes(widths[places[side]])} from tap to tap ({_source(assembly, side, given)})"
+    alike = len(set(texts.values())) == 1
+    yield from list(texts.values())[:1] if alike else (f"in {side} {text}" for side, text in texts.items())
 
 
 def _source(assembly: Assembly, side: str, given: DoubtTable) -> str:
     asked = (given.frequency_percent, given.damping_percent, given.stiffness_percent)
-    own = f"scatter of {len(assembly.series.get(side, ()))} tests"
-    found = own if assembly.scatter(side) is not None else f"default until {ENOUGH} tests"
+    scatter = f"scatter of {len(assembly.series.get(side, ()))} tests"
+    source = scatter if assembly.scatter(side) is not None else f"default until {ENOUGH} tests"
     if all(wish is not None for wish in asked):
         return GIVEN
-    return found if all(wish is None for wish in asked) else f"{found}, {GIVEN}"
+    return source if all(wish is None for wish in asked) else f"{source}, {GIVEN}"
 
 
-def _coefficients(found: Verdict, doubt: Doubt, machine: Machine) -> Iterator[str]:
+def _coefficients(verdict: Verdict, doubt: Doubt, machine: Machine) -> Iterator[str]:
     standard = DoubtTable().coefficients_percent
-    alloy = machine.coefficients(found.program).alloy
+    alloy = machine.coefficients(verdict.program).alloy
     share = machine.doubt.coefficients_percent / 100
     by_default = doubt.tangential == Span(1 - share, 1 + share)
     source = "" if machine.doubt.coefficients_percent == standard else f" ({GIVEN})"
@@ -139,9 +149,9 @@ def _coefficients(found: Verdict, doubt: Doubt, machine: Machine) -> Iterator[st
 def _sizes(widths: Floats) -> str:
     """Half-widths of frequency, damping ratio, stiffness and phase; those that are next to nothing are left out."""
     named = zip(("f_n", "zeta", "K"), widths[:3].tolist(), strict=True)
-    said = [f"{name} {_half(width)}" for name, width in named if width > NOTHING]
-    said += [f"phase ±{DEGREE * widths[3]:.2g} deg"] if widths[3] > NOTHING else []
-    return ", ".join(said) or "nothing"
+    texts = [f"{name} {_half(width)}" for name, width in named if width > NOTHING]
+    texts += [f"phase ±{DEGREE * widths[3]:.2g} deg"] if widths[3] > NOTHING else []
+    return ", ".join(texts) or "nothing"
 
 
 def _half(width: float) -> str:

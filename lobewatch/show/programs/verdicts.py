@@ -22,11 +22,11 @@ class Look(NamedTuple):
     """How a word looks."""
 
     symbol: str
-    """Beside it, for those who do not see its colour."""
+    """Character beside it, for those who do not see its colour."""
     kind: str
-    """Its class in the report."""
+    """Class in the report."""
     style: str
-    """Its style in a terminal."""
+    """Style in a terminal."""
 
 
 WORDS: Mapping[Word, Look] = {
@@ -39,105 +39,105 @@ WORDS: Mapping[Word, Look] = {
 HEADINGS = ("~program", "speed\n(rpm)", "depth\n(mm)", "limit (mm)\nlow..high", "turning", "f_n\nleft", "~verdict")
 
 
-def verdict_json(found: Verdict) -> dict[str, Any]:
+def verdict_json(verdict: Verdict) -> dict[str, Any]:
     """One program; numbers that are not known are null."""
     return {
-        "name": found.program.name,
-        "speed_rpm": found.program.speed_rpm,
-        "depth_mm": found.program.depth_mm,
-        "feed": found.program.feed,
-        "tap_id": found.assembly.tap_id if found.assembly else "",
-        "stable": found.stable,
-        "verdict": found.word,
-        "measured": found.measured,
-        "limit_mm": found.limit * 1e3,
-        "limit_low_mm": found.limit_low * 1e3,
-        "limit_high_mm": found.limit_high * 1e3,
-        "depth_margin": found.depth_margin,
-        "chance_turning": found.chance_turning,
-        "decided_by": found.decided_by or None,
-        "cuts": found.cuts,
-        "chatter_frequency_hz": found.chatter_frequency,
-        "kind": found.kind,
-        "worst_feed_deg": math.degrees(found.feed_angle),
-        "drive_limit_mm": found.drive_limit * 1e3,
-        "doubt": doubt_json(found),
-        "method": found.method,
-        "method_detail": found.detail,
+        "name": verdict.program.name,
+        "speed_rpm": verdict.program.speed_rpm,
+        "depth_mm": verdict.program.depth_mm,
+        "feed": verdict.program.feed,
+        "tap_id": verdict.assembly.tap_id if verdict.assembly else "",
+        "stable": verdict.stable,
+        "verdict": verdict.word,
+        "measured": verdict.measured,
+        "limit_mm": verdict.limit * 1e3,
+        "limit_low_mm": verdict.limit_low * 1e3,
+        "limit_high_mm": verdict.limit_high * 1e3,
+        "depth_margin": verdict.depth_margin,
+        "chance_turning": verdict.chance_turning,
+        "decided_by": verdict.decided_by or None,
+        "cuts": verdict.cuts,
+        "chatter_frequency_hz": verdict.chatter_frequency,
+        "kind": verdict.kind,
+        "worst_feed_deg": math.degrees(verdict.feed_angle),
+        "drive_limit_mm": verdict.drive_limit * 1e3,
+        "doubt": doubt_json(verdict),
+        "method": verdict.method,
+        "method_detail": verdict.detail,
     }
 
 
 def verdict_table(verdicts: Sequence[Verdict], left: Sequence[str] = ()) -> Table:
     """Programs, a line each; left: how far the frequency of each may fall, a column where it is given."""
-    made = table(*(heading for heading in HEADINGS if left or heading != "f_n\nleft"))
-    for i, found in enumerate(verdicts):
-        program = found.program
-        numbers = (f"{program.speed_rpm:g}", f"{program.depth_mm:g}", limits_text(found), turning_text(found))
-        made.add_row(escape(program.name), *numbers, *left[i : i + 1], _styled(found))
-    return made
+    rows = table(*(heading for heading in HEADINGS if left or heading != "f_n\nleft"))
+    for i, verdict in enumerate(verdicts):
+        program = verdict.program
+        numbers = (f"{program.speed_rpm:g}", f"{program.depth_mm:g}", limits_text(verdict), turning_text(verdict))
+        rows.add_row(escape(program.name), *numbers, *left[i : i + 1], _styled(verdict))
+    return rows
 
 
-def limits_text(found: Verdict) -> str:
+def limits_text(verdict: Verdict) -> str:
     """The limit in the middle of the doubt (mm), and how low and high it may be."""
-    band = band_text(found)
-    return limit_text(found) + (f" ({band})" if band else "")
+    band = band_text(verdict)
+    return limit_text(verdict) + (f" ({band})" if band else "")
 
 
-def limit_text(found: Verdict) -> str:
+def limit_text(verdict: Verdict) -> str:
     """The limit in the middle of the doubt (mm)."""
-    return "-" if math.isnan(found.limit) else _depth(found.limit, found)
+    return "-" if math.isnan(verdict.limit) else _depth(verdict.limit, verdict)
 
 
-def band_text(found: Verdict) -> str:
+def band_text(verdict: Verdict) -> str:
     """How low and high the limit may be (mm); empty where that is not known, or more than is looked at."""
-    if math.isnan(found.limit_low) or math.isinf(found.limit_low):
+    if math.isnan(verdict.limit_low) or math.isinf(verdict.limit_low):
         return ""
-    return f"{_depth(found.limit_low, found)}..{_depth(found.limit_high, found)}"
+    return f"{_depth(verdict.limit_low, verdict)}..{_depth(verdict.limit_high, verdict)}"
 
 
-def turning_text(found: Verdict) -> str:
+def turning_text(verdict: Verdict) -> str:
     """Chance of chatter once the spindle turns."""
-    if math.isnan(found.chance_turning):
+    if math.isnan(verdict.chance_turning):
         return "-"
-    percent = round(100 * found.chance_turning)
+    percent = round(100 * verdict.chance_turning)
     return {0: "< 1 %", 100: "> 99 %"}.get(percent, f"{percent} %")
 
 
-def margin_text(found: Verdict) -> str:
+def margin_text(verdict: Verdict) -> str:
     """The margin of a program in depth."""
-    return f"{100 * found.depth_margin:+.0f} %" if math.isfinite(found.depth_margin) else "-"
+    return f"{100 * verdict.depth_margin:+.0f} %" if math.isfinite(verdict.depth_margin) else "-"
 
 
-def verdict_text(found: Verdict) -> str:
+def verdict_text(verdict: Verdict) -> str:
     """The word, with what must be said in the same breath."""
-    predicted = found.word is not Word.UNKNOWN and not found.measured
-    words = [found.word.value, *(["beyond the drive"] if found.is_beyond_drive else [])]
+    predicted = verdict.word is not Word.UNKNOWN and not verdict.measured
+    words = [verdict.word.value, *(["beyond the drive"] if verdict.is_beyond_drive else [])]
     return ", ".join(words) + (" (predicted)" if predicted else "")
 
 
-def is_safe(found: Verdict) -> bool:
+def is_safe(verdict: Verdict) -> bool:
     """Whether it may be run: stable, and not beyond the drive."""
-    return found.word is Word.STABLE and not found.is_beyond_drive
+    return verdict.word is Word.STABLE and not verdict.is_beyond_drive
 
 
-def _styled(found: Verdict) -> str:
-    style = WORDS[found.word].style if is_safe(found) or found.word is not Word.STABLE else "bold"
-    return f"[{style}]{verdict_text(found)}[/]"
+def _styled(verdict: Verdict) -> str:
+    style = WORDS[verdict.word].style if is_safe(verdict) or verdict.word is not Word.STABLE else "bold"
+    return f"[{style}]{verdict_text(verdict)}[/]"
 
 
-def _depth(depth: float, found: Verdict) -> str:
+def _depth(depth: float, verdict: Verdict) -> str:
     """A depth in mm; how deep was looked where there is none."""
     if math.isinf(depth):
-        return f"> {_millimetres(_looked_at(found))}"
+        return f"> {_millimetres(_looked_at(verdict))}"
     return _millimetres(depth)
 
 
-def _looked_at(found: Verdict) -> float:
+def _looked_at(verdict: Verdict) -> float:
     """Depth (m) up to which every draw was looked at."""
-    if math.isinf(found.limit) or found.drawn is None:
-        return DEEPEST * found.program.depth_mm / 1e3
-    force = found.drawn.rows.tangential
-    return float(np.min(force[0] / force)) * float(TRIED[-1]) * found.limit
+    if math.isinf(verdict.limit) or verdict.drawn is None:
+        return DEEPEST * verdict.program.depth_mm / 1e3
+    force = verdict.drawn.rows.tangential
+    return float(np.min(force[0] / force)) * float(TRIED[-1]) * verdict.limit
 
 
 def _millimetres(depth: float) -> str:
@@ -147,7 +147,7 @@ def _millimetres(depth: float) -> str:
 
 def programs_json(verdicts: Sequence[Verdict]) -> list[dict[str, Any]]:
     """The verdict on every program."""
-    return [verdict_json(found) for found in verdicts]
+    return [verdict_json(verdict) for verdict in verdicts]
 
 
 def program_texts(logbook: Logbook) -> list[str | Table]:

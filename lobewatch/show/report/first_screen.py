@@ -11,8 +11,7 @@ from acquisition import joined
 from lobewatch.decay import Light, SeriesStanding, Standing
 from lobewatch.logbook.outlook import Fate, Outlook
 from lobewatch.machine import Machine
-from lobewatch.show.programs.advice import ProgramAdvice
-from lobewatch.show.programs.settings import rpm
+from lobewatch.show.programs.advice import ProgramAdvice, rpm
 from lobewatch.show.programs.verdicts import WORDS
 from lobewatch.show.trends.describe_trend import dates_text, rate_text, short_text
 from lobewatch.verdicts import Word

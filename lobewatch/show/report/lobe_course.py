@@ -17,7 +17,7 @@ from lobewatch.history import Row
 from lobewatch.history.history_columns import row_lobes
 from lobewatch.machine import Machine
 from lobewatch.machine.journal.heard_cut import HeardCut
-from lobewatch.show.figures.heard_cuts import heard_of
+from lobewatch.show.figures.lobe_figures import heard_of
 from lobewatch.show.report.figure_data import Numbers, lobe_numbers
 from lobewatch.tool import Assembly, speed_grid
 from lobewatch.tool.assembly import tip_lobes

@@ -8,8 +8,7 @@ import numpy as np
 
 from lobewatch.cuts.learning.lobes_at_speed import lobes_at_speed
 from lobewatch.logbook import Logbook
-from lobewatch.show.figures.heard_cuts import heard_of
-from lobewatch.show.figures.lobe_figures import lobes_figure, waterfall_figure
+from lobewatch.show.figures.lobe_figures import heard_of, lobes_figure, waterfall_figure
 from lobewatch.show.figures.style import svg
 from lobewatch.show.programs.advice import ProgramAdvice
 from lobewatch.show.report.figure_data import lobe_numbers

@@ -37,7 +37,8 @@ from acquisition.taps.stream import ScanStream
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen import ScreenServer
-from lobewatch.tap.session import TapSession, TapStopped
+from lobewatch.tap.hit_loop import TapStopped
+from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapStep
 
 RATE = 102_400.0

@@ -26,14 +26,14 @@ class _Commands(Mapping[str, Any]):
     def __getitem__(self, name: str) -> Any:
         if name not in COMMANDS:
             raise KeyError(name)
-        found = getattr(import_module(f"lobewatch.commands.{name}"), name)
+        command = getattr(import_module(f"lobewatch.commands.{name}"), name)
         holder = typer.Typer(rich_markup_mode=None)
-        if isinstance(found, typer.Typer):
-            for command in found.registered_commands:
-                command.cls = HelpCommand
-            holder.add_typer(found, name=name, cls=HelpGroup)
+        if isinstance(command, typer.Typer):
+            for registered in command.registered_commands:
+                registered.cls = HelpCommand
+            holder.add_typer(command, name=name, cls=HelpGroup)
         else:
-            holder.command(name, cls=HelpCommand)(found)
+            holder.command(name, cls=HelpCommand)(command)
         return typer.main.get_group(holder).commands[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -51,7 +51,7 @@ class _Root(HelpGroup):
         self.commands = cast(MutableMapping[str, Any], _Commands())
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Where a command comes first, none of these options is given: what reads them takes a while to import."""
+        """Read these options where no command comes first: what reads them takes a while to import."""
         if args and not args[0].startswith("-"):
             self.resolve_command(ctx, args)
             self.params = []

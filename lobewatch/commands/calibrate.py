@@ -61,10 +61,10 @@ def calibrate(
     from lobewatch.show.spindle.describe_model import model_calibration_json, model_calibration_texts
 
     _check_counts(len(frequency), frequency_std or [], mode or [])
-    found = calibrate_model(
+    calibration = calibrate_model(
         MachineFolder(machine).machine, frequency, frequency_std or [], mode or [], group or [], damping_ratio
     )
-    emit(model_calibration_json(found), as_json, *model_calibration_texts(found))
+    emit(model_calibration_json(calibration), as_json, *model_calibration_texts(calibration))
 
 
 def _refuse_beside_tools(given: Mapping[str, object]) -> None:
@@ -78,9 +78,9 @@ def _from_tools(machine: Path, tools: Sequence[str], direction: str | None, mode
     from lobewatch.logbook.joints.tools_calibration import calibrate_tools
     from lobewatch.show.spindle.describe_tools import tools_json, tools_texts
 
-    found = calibrate_tools(Logbook.open(machine), tools, direction, mode)
-    emit(tools_json(found), as_json, *tools_texts(found))
-    raise typer.Exit(int(found.fit.misfits))
+    calibration = calibrate_tools(Logbook.open(machine), tools, direction, mode)
+    emit(tools_json(calibration), as_json, *tools_texts(calibration))
+    raise typer.Exit(int(calibration.fit.misfits))
 
 
 def _check_counts(frequencies: int, stds: Sequence[float], modes: Sequence[int]) -> None:

@@ -35,40 +35,40 @@ def check(
     from lobewatch.logbook import Logbook
     from lobewatch.show.programs.advice import (
         ProgramAdvice,
-        advised,
-        advised_json,
-        advised_lines,
-        advised_table,
+        advice_json,
+        advice_lines,
+        advice_table,
+        advise_program,
         counts,
         summary,
     )
     from lobewatch.show.programs.doubts import reading_lines
     from lobewatch.show.programs.verdicts import is_safe
-    from lobewatch.show.terminal.remarks import remark_json, remark_lines
+    from lobewatch.show.terminal.output import remark_json, remark_lines
 
     logbook = Logbook.open(machine)
     if not logbook.machine.program:
         raise DataError(f"{logbook.folder.toml}: no [[program]] to check; add one for each cut that the shop runs")
     logbook.newest()
-    begin, told, programs = monotonic(), False, list[ProgramAdvice]()
+    begin, slow, programs = monotonic(), False, list[ProgramAdvice]()
     for verdict in logbook.verdicts():
-        if not told and monotonic() - begin > PATIENCE:
+        if not slow and monotonic() - begin > PATIENCE:
             count = len(logbook.machine.program)
             notes.print(f"{len(programs)} of {count} programs are checked; the others take a while too")
-            told = True
-        programs.append(advised(logbook, verdict))
+            slow = True
+        programs.append(advise_program(logbook, verdict))
     emit(
         {
-            "programs": [advised_json(one) for one in programs],
+            "programs": [advice_json(advice) for advice in programs],
             **counts(programs),
             "remarks": [remark_json(remark) for remark in logbook.remarks],
         },
         as_json,
-        advised_table(programs),
-        *(line for one in programs for line in advised_lines(one, logbook.machine.speed)),
-        *reading_lines([one.verdict for one in programs], logbook.machine),
-        *remark_lines([*logbook.remarks, *(remark for one in programs for remark in one.notes)]),
+        advice_table(programs),
+        *(line for advice in programs for line in advice_lines(advice, logbook.machine.speed)),
+        *reading_lines([advice.verdict for advice in programs], logbook.machine),
+        *remark_lines([*logbook.remarks, *(remark for advice in programs for remark in advice.notes)]),
         summary(programs),
     )
-    if not all(is_safe(one.verdict) for one in programs):
+    if not all(is_safe(advice.verdict) for advice in programs):
         raise typer.Exit(1)

@@ -48,9 +48,9 @@ def demo(
     from lobewatch.show.report.report import write_report
     from lobewatch.show.trends.describe_demo import demo_json, demo_texts
     from lobewatch.tap.stories.demo import age_spindle, compare_with_truth
+    from lobewatch.tap.stories.level_forecast import forecast_levels
     from lobewatch.tap.stories.mounting import Mounting
     from lobewatch.tap.stories.story import Story, Wear
-    from lobewatch.tap.stories.truth import foretold
 
     if story == "replaced" and taps > MOST_REPLACED:
         raise ValueError(
@@ -66,11 +66,11 @@ def demo(
         taken = list(progress.track(tests, total=2 * taps, description="tap tests"))
         progress.add_task("history", total=None)
         logbook = Logbook(folder)
-        found = compare_with_truth(logbook, taken)
-        told = foretold(logbook, Wear.of(folder, taps, Story(story)))
+        compared = compare_with_truth(logbook, taken)
+        forecasts = forecast_levels(logbook, Wear.of(folder, taps, Story(story)))
         with telling(logbook):
             report = write_report(logbook)
-    emit(demo_json(found, told, report), as_json, *demo_texts(found, told, mounting.scatter, report))
+    emit(demo_json(compared, forecasts, report), as_json, *demo_texts(compared, forecasts, mounting.scatter, report))
 
 
 def _free_name() -> Path:

@@ -7,40 +7,77 @@ import json
 import math
 import shlex
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import typer
 
+import acquisition
 from lobewatch.machine.folder_path import named_folder
 from lobewatch.show.terminal.output import Json, notes, results
-
-if TYPE_CHECKING:
-    from acquisition import EmulatorThread
-    from dsm import Spindle
-    from lobewatch.machine import MachineFolder
 
 StoryName = Literal["steady", "step", "accelerating", "replaced", "none"]
 emulate = typer.Typer(help="A data acquisition device made of software, on a pseudo-terminal.", no_args_is_help=True)
 
-Machine = Annotated[
-    Path, typer.Argument(parser=named_folder, help="Machine folder with a spindle in its machine.toml: what is hit.")
-]
-Tcp = Annotated[bool, typer.Option("--tcp", help="On a TCP port of this computer instead.")]
-Fast = Annotated[bool, typer.Option("--fast", help="As fast as the host reads, not in real time.")]
-Seed = Annotated[int, typer.Option(help="Of the random numbers.")]
-Told = Annotated[StoryName, typer.Option("--story", help="What befalls the bearings over 24 months.")]
-Month = Annotated[int, typer.Option("--month", min=0, max=60, help="Of the story, in which it is tapped.")]
-Scatter = Annotated[float, typer.Option(help="Scatter of f_1 by remounting: standard deviation, 0 to 5 %.")]
-Bad = Annotated[float, typer.Option("--bad-clampings", help="Chance that it is clamped badly: f_1 2 % low, 0 to 50 %.")]
-Warm = Annotated[float | None, typer.Option("--temperature", help="Swing over the year, 0 to 30 K; f_1 moves with it.")]
-Cutting = Annotated[
-    str | None, typer.Option("--cut", metavar="PROGRAM", help="It cuts this, and is heard on its housing.")
-]
-Speed = Annotated[float | None, typer.Option("--speed", help="Of the cut, as it is told (rpm).")]
-Depth = Annotated[float | None, typer.Option("--depth", help="Of the cut (mm).")]
 MONTHS = 24
-"""Of a story."""
+"""Length of a story (months)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class EmulateOptions:
+    """Options of an emulator; the fields are the options, in the order of the help pages."""
+
+    machine: Annotated[
+        Path,
+        typer.Argument(parser=named_folder, help="Machine folder with a spindle in its machine.toml: what is hit."),
+    ]
+    """Machine folder."""
+    tcp: Annotated[bool, typer.Option("--tcp", help="On a TCP port of this computer instead.")] = False
+    """Whether a TCP port takes the place of the pseudo-terminal."""
+    fast: Annotated[bool, typer.Option("--fast", help="As fast as the host reads, not in real time.")] = False
+    """Whether it runs ahead of real time; not every driver can."""
+    seed: Annotated[int, typer.Option(help="Of the random numbers.")] = 1
+    """Seed of the random numbers."""
+    story: Annotated[StoryName, typer.Option("--story", help="What befalls the bearings over 24 months.")] = "none"
+    """Story of the bearings."""
+    month: Annotated[int, typer.Option("--month", min=0, max=60, help="Of the story, in which it is tapped.")] = 0
+    """Month of the story."""
+    scatter: Annotated[float, typer.Option(help="Scatter of f_1 by remounting: standard deviation, 0 to 5 %.")] = 0.0
+    """Standard deviation of f_1 by remounting (%)."""
+    bad: Annotated[
+        float, typer.Option("--bad-clampings", help="Chance that it is clamped badly: f_1 2 % low, 0 to 50 %.")
+    ] = 0.0
+    """Chance of a bad clamping (%)."""
+    warm: Annotated[
+        float | None, typer.Option("--temperature", help="Swing over the year, 0 to 30 K; f_1 moves with it.")
+    ] = None
+    """Swing of the temperature over the year (K)."""
+    cut: Annotated[
+        str | None, typer.Option("--cut", metavar="PROGRAM", help="It cuts this, and is heard on its housing.")
+    ] = None
+    """Name of the program that is cut; None where the spindle is tapped."""
+    speed: Annotated[float | None, typer.Option("--speed", help="Of the cut, as it is told (rpm).")] = None
+    """Spindle speed of the cut (rpm); None for that of the program."""
+    depth: Annotated[float | None, typer.Option("--depth", help="Of the cut (mm).")] = None
+    """Axial depth of the cut (mm); None for that of the program."""
+    as_json: Json = False
+    """Whether the result is printed as JSON."""
+
+
+class Emulation(NamedTuple):
+    """A device made of software, with what stands behind it."""
+
+    device: acquisition.EmulatorThread
+    """Emulator that serves while its context lasts."""
+    truth: Mapping[str, float | None]
+    """Figures of what is emulated, by the names that JSON has for them."""
+    truth_text: str
+    """The same figures for people."""
+    command: str
+    """Command that a person gives next."""
+    words: str = ""
+    """Options of that command beside its port."""
 
 
 def _add_commands() -> None:
@@ -58,30 +95,15 @@ def _add_commands() -> None:
 
 
 def _command(name: str, takes_fast: bool) -> Callable[..., None]:
-    """What a driver is emulated with; takes_fast: whether --fast is among it."""
+    """The command that emulates a driver; takes_fast: whether --fast is among its options."""
 
-    def run(
-        machine: Machine,
-        tcp: Tcp = False,
-        fast: Fast = False,
-        seed: Seed = 1,
-        story: Told = "none",
-        month: Month = 0,
-        scatter: Scatter = 0.0,
-        bad: Bad = 0.0,
-        warm: Warm = None,
-        cut: Cutting = None,
-        speed: Speed = None,
-        depth: Depth = None,
-        as_json: Json = False,
-    ) -> None:
-        _serve(
-            _Served(name, machine, tcp, fast, seed, as_json), (story, month, scatter, bad, warm), (cut, speed, depth)
-        )
+    def run(**values: Any) -> None:
+        _serve(name, EmulateOptions(**values))
 
-    taken = inspect.signature(run, eval_str=True).parameters
-    kept = [one for one in taken.values() if takes_fast or one.name != "fast"]
-    run.__signature__ = inspect.Signature(kept)  # type: ignore[attr-defined]
+    options = inspect.signature(EmulateOptions, eval_str=True).parameters.values()
+    run.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+        [option for option in options if takes_fast or option.name != "fast"]
+    )
     return run
 
 
@@ -93,93 +115,68 @@ def _help(name: str, title: str) -> str:
     )
 
 
-Asked = tuple[StoryName, int, float, float, float | None]
-"""Story, month, scatter (%), chance of a bad clamping (%), swing of the temperature (K)."""
-
-
-Chosen = tuple[str | None, float | None, float | None]
-"""Program, speed (rpm) and depth (mm) of a cut."""
-
-
-class _Served(NamedTuple):
-    name: str
-    machine: Path
-    tcp: bool
-    fast: bool
-    seed: int
-    as_json: bool
-
-
-def _serve(served: _Served, asked: Asked, chosen: Chosen) -> None:
+def _serve(name: str, options: EmulateOptions) -> None:
     """Somebody taps, or cuts where a program was chosen; until Ctrl-C."""
     from lobewatch.machine.folder import MachineFolder
+    from lobewatch.tap.stories.mounting import Mounting, mounted_spindle
+    from lobewatch.tap.stories.story import Story
 
-    folder = MachineFolder(served.machine)
-    spindle = _spindle(folder, asked, served.seed)
-    program, speed, depth = chosen
-    if program is not None:
-        _serve_cut(served, folder, spindle, (program, speed, depth))
-        return
-    if (speed, depth) != (None, None):
+    folder = MachineFolder(options.machine)
+    mounting = Mounting(options.scatter / 100, options.bad / 100, options.warm)
+    mounting.check()
+    story = Story(options.story)
+    as_built = story is Story.NONE and not any(mounting)
+    shared = {
+        "folder": folder,
+        "seed": options.seed,
+        "realtime": not options.fast,
+        "tcp": options.tcp,
+        "spindle": None if as_built else mounted_spindle(folder, story, MONTHS, options.month, mounting, options.seed),
+    }
+    emulation = _tapped(name, options, shared) if options.cut is None else _cut(name, options, options.cut, shared)
+    _until_interrupted(emulation, options)
+
+
+def _tapped(name: str, options: EmulateOptions, shared: Mapping[str, Any]) -> Emulation:
+    """The spindle tapped; shared: arguments that a cut takes too."""
+    if (options.speed, options.depth) != (None, None):
         raise ValueError("--speed and --depth are those of a cut: give --cut PROGRAM with them")
     from acquisition.devices import find_driver
     from lobewatch.tap.emulated_spindle import emulate_machine
 
-    driver = find_driver(served.name)
-    emulated = emulate_machine(folder, driver, served.seed, realtime=not served.fast, tcp=served.tcp, spindle=spindle)
+    emulated = emulate_machine(driver=find_driver(name), **shared)
     truth = {"frequency_hz": emulated.frequency, "stiffness_n_per_m": emulated.stiffness}
-    said = f"f_1 {emulated.frequency:.2f} Hz, K {emulated.stiffness / 1e6:.3f} N/um"
-    _until_interrupted(served, emulated.device, truth, said, "tap with: lobewatch tap {machine} --port {port}")
+    text = f"f_1 {emulated.frequency:.2f} Hz, K {emulated.stiffness / 1e6:.3f} N/um"
+    return Emulation(emulated.device, truth, text, "tap")
 
 
-def _serve_cut(
-    served: _Served, folder: MachineFolder, spindle: Spindle | None, chosen: tuple[str, float | None, float | None]
-) -> None:
+def _cut(name: str, options: EmulateOptions, program: str, shared: Mapping[str, Any]) -> Emulation:
+    """The spindle cutting a program; shared: arguments that a tapped one takes too."""
     from acquisition.devices import find_driver
     from lobewatch.machine.settings.cut_setting import cut_setting
-    from lobewatch.tap.milling.emulated_cut import emulate_cut
+    from lobewatch.tap.emulated_cut import emulate_cut
 
-    setting = cut_setting(folder.machine, *chosen)
-    driver = find_driver(served.name)
-    emulated = emulate_cut(
-        folder, driver, setting, served.seed, realtime=not served.fast, tcp=served.tcp, spindle=spindle
-    )
+    setting = cut_setting(shared["folder"].machine, program, options.speed, options.depth)
+    emulated = emulate_cut(driver=find_driver(name), setting=setting, **shared)
     limit = 1e3 * emulated.limit if math.isfinite(emulated.limit) else None
-    truth = {"speed_rpm": emulated.speed_rpm, "limit_mm": limit} | emulated.truth.told
+    truth = {"speed_rpm": emulated.speed_rpm, "limit_mm": limit} | emulated.truth.factors
     stable = "any depth" if limit is None else f"{limit:.3g} mm"
-    said = f"{emulated.speed_rpm:.1f} rpm, stable up to {stable} there ({1e3 * setting.depth:g} mm is cut)"
-    how = f"--program {shlex.quote(chosen[0])} --speed {setting.speed_rpm:g} --depth {1e3 * setting.depth:g}"
-    _until_interrupted(
-        served, emulated.device, truth, said, f"listen with: lobewatch listen {{machine}} --port {{port}} {how}"
-    )
+    text = f"{emulated.speed_rpm:.1f} rpm, stable up to {stable} there ({1e3 * setting.depth:g} mm is cut)"
+    words = f" --program {shlex.quote(program)} --speed {setting.speed_rpm:g} --depth {1e3 * setting.depth:g}"
+    return Emulation(emulated.device, truth, text, "listen", words)
 
 
-def _until_interrupted(
-    served: _Served, emulated: EmulatorThread, truth: Mapping[str, float | None], said: str, next_step: str
-) -> None:
+def _until_interrupted(emulation: Emulation, options: EmulateOptions) -> None:
     """Say where the device is and what is behind it, and serve until Ctrl-C."""
-    with emulated as device:
-        line = json.dumps({"port": device.port, **truth}) if served.as_json else f"port {device.port}"
+    with emulation.device as device:
+        line = json.dumps({"port": device.port, **emulation.truth}) if options.as_json else f"port {device.port}"
         results.print(line, markup=False)
         results.file.flush()
-        notes.print(f"the truth: {said}", markup=False)
-        step = next_step.format(machine=shlex.quote(str(served.machine)), port=device.port)
-        notes.print(f"{step}   (Ctrl-C ends the emulator)", markup=False)
+        notes.print(f"the truth: {emulation.truth_text}", markup=False)
+        command = f"lobewatch {emulation.command} {shlex.quote(str(options.machine))} --port {device.port}"
+        next_step = f"{emulation.command} with: {command}{emulation.words}"
+        notes.print(f"{next_step}   (Ctrl-C ends the emulator)", markup=False)
         device.wait()
-
-
-def _spindle(folder: MachineFolder, asked: Asked, seed: int) -> Spindle | None:
-    """As it is mounted in that month; None for that of machine.toml as it stands there."""
-    from lobewatch.tap.stories.mounted import mounted_at
-    from lobewatch.tap.stories.mounting import Mounting
-    from lobewatch.tap.stories.story import Story
-
-    story, month, scatter, bad, warm = asked
-    mounting = Mounting(scatter / 100, bad / 100, warm)
-    mounting.check()
-    if story == "none" and not any(mounting):
-        return None
-    return mounted_at(folder, Story(story), MONTHS, month, mounting, seed)
 
 
 _add_commands()

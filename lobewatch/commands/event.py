@@ -46,6 +46,6 @@ def event(
             gone = withdraw_event(folder, withdraw)
             emit({"withdrawn": event_json(gone)}, as_json, f"withdrawn {event_text(gone)}")
             return
-        found = add_event(folder, text, date, new_baseline)
+        done = add_event(folder, text, date, new_baseline)
         next_step = ["tap next: all tests after it are compared with the first of them"] if new_baseline else []
-        emit({"event": event_json(found)}, as_json, f"saved {event_text(found)}", *next_step)
+        emit({"event": event_json(done)}, as_json, f"saved {event_text(done)}", *next_step)

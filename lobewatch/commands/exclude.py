@@ -34,6 +34,6 @@ def exclude(
 
     logbook = Logbook.open(machine)
     with telling(logbook):
-        found = take_out(logbook.folder, tap, reason)
-        payload = {"excluded": found.id, "reason": reason}
-        emit(payload, as_json, f"excluded {found.id}", f"back with: lobewatch include {machine} {found.id}")
+        entry = take_out(logbook.folder, tap, reason)
+        payload = {"excluded": entry.id, "reason": reason}
+        emit(payload, as_json, f"excluded {entry.id}", f"back with: lobewatch include {machine} {entry.id}")

@@ -1,39 +1,80 @@
-"""The options that say what a recorded file does not say itself."""
+"""Options that say what a recorded file does not say itself, declared once for all commands that read one."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any
+import functools
+import inspect
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import typer
 
-if TYPE_CHECKING:
-    from acquisition import Description
+import acquisition
 
-Columns = Annotated[
-    str,
-    typer.Option(
-        help='Of its columns: "frequency,real,imag", "time [s],force [N],acceleration [g]", "frequency=F,frf=H:2".'
-    ),
-]
-Quantity = Annotated[str, typer.Option(help="Of the response: displacement, velocity or acceleration.")]
-Unit = Annotated[str, typer.Option(help="Of the response (m/s^2, g), or of an FRF (m/N, um/N, g/N).")]
-ForceUnit = Annotated[str, typer.Option(help="Of the force (N, lbf).")]
-Rate = Annotated[float | None, typer.Option(help="Samples a second (Hz).")]
-Averages = Annotated[int | None, typer.Option(help="Hits that an FRF was averaged from; 1 where nobody says.")]
-Response = Annotated[int | None, typer.Option(help="Which of several responses, from 1.")]
-FullScale = Annotated[str, typer.Option(help='Of each channel of a WAV file, in its unit: "500,50".')]
-Sensitivity = Annotated[str, typer.Option(help='Of each channel in volts: "2.25 mV/N,10.2 mV/g".')]
+Command = Callable[..., None]
 
 
-def described(columns: str, full_scale: str, sensitivity: str = "", **said: Any) -> Description:
-    """What these options say, with other fields of Description; ValueError for a full scale that is no number."""
-    from acquisition import Description  # `--help` does not wait for it
+@dataclass(frozen=True, kw_only=True)
+class FileOptions:
+    """Options on a recorded file; the fields are the options, in the order of the help pages."""
 
-    try:
-        scales = tuple(float(word) for word in full_scale.split(",")) if full_scale else ()
-    except ValueError as error:
-        raise ValueError(f'--full-scale {full_scale}: give a number for each channel, as in "500,50"') from error
-    return Description(_words(columns), full_scale=scales, sensitivity=_words(sensitivity), **said)
+    columns: Annotated[
+        str,
+        typer.Option(
+            help='Of its columns: "frequency,real,imag", "time [s],force [N],acceleration [g]", "frequency=F,frf=H:2".'
+        ),
+    ] = ""
+    """Headings of the columns, separated by commas."""
+    quantity: Annotated[str, typer.Option(help="Of the response: displacement, velocity or acceleration.")] = ""
+    """Quantity of the response."""
+    unit: Annotated[str, typer.Option(help="Of the response (m/s^2, g), or of an FRF (m/N, um/N, g/N).")] = ""
+    """Unit of the response or of the FRF."""
+    force_unit: Annotated[str, typer.Option(help="Of the force (N, lbf).")] = ""
+    """Unit of the force."""
+    rate: Annotated[float | None, typer.Option(help="Samples a second (Hz).")] = None
+    """Sample rate (Hz)."""
+    averages: Annotated[
+        int | None,
+        typer.Option(help="Hits that an FRF was averaged from; 1 where nobody says."),
+    ] = None
+    """Number of hits that an FRF was averaged from."""
+    response: Annotated[int | None, typer.Option(help="Which of several responses, from 1.")] = None
+    """Number of the response, from 1."""
+    full_scale: Annotated[str, typer.Option(help='Of each channel of a WAV file, in its unit: "500,50".')] = ""
+    """Full scales of the channels, separated by commas."""
+    sensitivity: Annotated[str, typer.Option(help='Of each channel in volts: "2.25 mV/N,10.2 mV/g".')] = ""
+    """Sensitivities of the channels, separated by commas."""
+
+    def description(self, **fields: Any) -> acquisition.Description:
+        """The description that these options make, with other fields; ValueError for a full scale that is no number."""
+        try:
+            scales = tuple(float(word) for word in self.full_scale.split(",")) if self.full_scale else ()
+        except ValueError as error:
+            text = f'--full-scale {self.full_scale}: give a number for each channel, as in "500,50"'
+            raise ValueError(text) from error
+        lists = {"columns": _words(self.columns), "full_scale": scales, "sensitivity": _words(self.sensitivity)}
+        return acquisition.Description(**vars(self) | lists | fields)
+
+
+def takes_file_options(*, without: Iterable[str] = ()) -> Callable[[Command], Command]:
+    """Give a command these options in place of its keyword parameter `file_options: FileOptions`, but for some."""
+    options = inspect.signature(FileOptions, eval_str=True).parameters
+    shared = {name: option for name, option in options.items() if name not in without}
+
+    def decorate(command: Command) -> Command:
+        @functools.wraps(command)
+        def run(**values: Any) -> None:
+            command(file_options=FileOptions(**{name: values.pop(name) for name in shared}), **values)
+
+        parameters: list[inspect.Parameter] = []
+        for name, parameter in inspect.signature(command, eval_str=True).parameters.items():
+            keyword = parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+            parameters += shared.values() if name == "file_options" else [keyword]
+        run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        return run
+
+    return decorate
 
 
 def _words(text: str) -> tuple[str, ...]:

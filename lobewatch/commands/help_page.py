@@ -31,7 +31,7 @@ class HelpGroup(TyperGroup):
         formatter.write(_page(self, ctx, formatter.width, self.summaries(ctx)))
 
     def summaries(self, ctx: Any) -> Mapping[str, str]:
-        """What each of its commands does: the first paragraph of its help."""
+        """Summaries of its commands: the first paragraph of the help of each."""
         commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
         return {name: (command.help or "").partition("\n\n")[0] for name, command in commands.items() if command}
 

@@ -30,7 +30,7 @@ def history(
       lobewatch history mill-3 --hdf5 history.h5
     """
     from lobes import write_history
-    from lobewatch.history.columns.history_columns import to_columns
+    from lobewatch.history.history_columns import to_columns
     from lobewatch.logbook import Logbook
     from lobewatch.show.history.describe_history import history_csv, history_json, history_lines
 

@@ -31,5 +31,5 @@ def include(
 
     logbook = Logbook.open(machine)
     with telling(logbook):
-        found = take_back(logbook.folder, tap)
-        emit({"included": found.id}, as_json, f"included {found.id}: it counts again")
+        entry = take_back(logbook.folder, tap)
+        emit({"included": entry.id}, as_json, f"included {entry.id}: it counts again")

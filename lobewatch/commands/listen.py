@@ -9,12 +9,13 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.commands.file_options import Columns, FullScale, Rate, Response, Sensitivity, Unit, described
+from lobewatch.commands.file_options import FileOptions, takes_file_options
 from lobewatch.machine.folder_path import named_folder
 from lobewatch.show.terminal.output import Json, emit, notes
 from lobewatch.show.terminal.show_address import Listen, Token, WatchToken, serving
 
 
+@takes_file_options(without=["quantity", "force_unit", "averages"])
 def listen(
     machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
     program: Annotated[str, typer.Option(help="Cutting program that is cut.")] = "",
@@ -33,12 +34,8 @@ def listen(
     listen: Listen = "127.0.0.1",
     token: Token = None,
     watch_token: WatchToken = None,
-    columns: Columns = "",
-    unit: Unit = "",
-    rate: Rate = None,
-    response: Response = None,
-    full_scale: FullScale = "",
-    sensitivity: Sensitivity = "",
+    *,
+    file_options: FileOptions,
     as_json: Json = False,
 ) -> None:
     """Hear a cut with the accelerometer on the housing: stable, chatter and its frequency, or why it cannot be told.
@@ -61,8 +58,7 @@ def listen(
     from lobewatch.notify.telling import telling
     from lobewatch.show.cuts.describe_listened import listened_json, listened_texts
     from lobewatch.show.history.describe_cut import about_tool, otherwise
-    from lobewatch.tap.listening.hear_cut import hear_cut
-    from lobewatch.tap.listening.live_cut import cut_pictures, judge_live
+    from lobewatch.tap.listening.hear_cut import cut_pictures, hear_cut, judge_live
 
     logbook = Logbook.open(machine)
     setting = choose_cut(logbook.machine, program, cut, speed, depth)
@@ -70,27 +66,28 @@ def listen(
         logbook.folder.refuse_damage()
     if screen and file is not None:
         raise ValueError("--screen follows a device; what a --file says stands here")
-    said = described(columns, full_scale, sensitivity, unit=unit, rate=rate, response=response)
+    description = file_options.description()
     with contextlib.ExitStack() as screens, cut_pictures(logbook, setting) as pictures:
         if screen:
             from lobewatch.screen import CutScreenServer  # brings aiohttp, which nobody needs without a screen
 
             server = CutScreenServer(pictures, listen=listen, token=token, watch_token=watch_token)
             screens.enter_context(serving(server))
-        signal = hear_cut(logbook.folder, setting, file, port, seconds, said, notes.print, pictures.show)
-        found = judge_live(logbook, setting, signal, pictures)
+        signal = hear_cut(logbook.folder, setting, file, port, seconds, description, notes.print, pictures.show)
+        comparison = judge_live(logbook, setting, signal, pictures)
         if out is not None:
             from lobewatch.show.cuts.figure_listened import save_listened  # brings matplotlib
 
-            save_listened(found, out)
-        payload = listened_json(found)
+            save_listened(comparison, out)
+        payload = listened_json(comparison)
         if dry_run:
-            emit(payload, as_json, *listened_texts(found))
+            emit(payload, as_json, *listened_texts(comparison))
             return
         with telling(logbook):
-            known, kept = logbook.cuts, keep_listened(logbook.folder, found, signal, date)
-            pictures.show(saved=kept.id)
-            remarks = [*about_tool(logbook, kept), *map(otherwise, contradicting_cuts(kept, known) if kept.counts else ())]
-            told = {"id": kept.id, "remarks": [remark.code for remark in remarks]}
-            emit(payload | told, as_json, *listened_texts(found), f"saved {kept.id}")
+            earlier, stored = logbook.cuts, keep_listened(logbook.folder, comparison, signal, date)
+            pictures.show(saved=stored.id)
+            contrary = contradicting_cuts(stored, earlier) if stored.counts else ()
+            remarks = [*about_tool(logbook, stored), *map(otherwise, contrary)]
+            payload |= {"id": stored.id, "remarks": [remark.code for remark in remarks]}
+            emit(payload, as_json, *listened_texts(comparison), f"saved {stored.id}")
     notes.print(*(f"note: {remark}" for remark in remarks), sep="\n", end="\n" if remarks else "", markup=False)

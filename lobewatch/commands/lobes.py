@@ -49,10 +49,10 @@ def lobes(
         return
     if notes.is_terminal:
         notes.print("looking for speeds and depths that are safe; this takes some seconds")
-    found = compare_lobes(logbook, tool, cut, Dynamics(source), Method(method))
+    comparison = compare_lobes(logbook, tool, cut, Dynamics(source), Method(method))
     remarks = [
         *logbook.remarks,
-        *found.remarks,
-        *save_pictures(logbook, found, Method(method), figure, radial, waterfall),
+        *comparison.remarks,
+        *save_pictures(logbook, comparison, Method(method), figure, radial, waterfall),
     ]
-    emit(comparison_json(found, remarks), as_json, *comparison_texts(found, remarks))
+    emit(comparison_json(comparison, remarks), as_json, *comparison_texts(comparison, remarks))

@@ -32,14 +32,14 @@ def model(
     from lobewatch.logbook import Logbook, model_picture
     from lobewatch.measuring import model_state, model_summary
     from lobewatch.show.spindle.describe_model import model_json, model_texts
-    from lobewatch.show.terminal.remarks import remark_lines
+    from lobewatch.show.terminal.output import remark_lines
 
     logbook = Logbook.open(machine)
     state = model_state(logbook.machine, logbook.calibrated, tool)
     if figure is not None:
         from lobewatch.show.figures.model_figures import model_figure
-        from lobewatch.show.figures.trend_figures import save_figure
+        from lobewatch.show.figures.style import save_figure
 
         save_figure(model_figure(model_picture(logbook, state, modes)), figure)
-    found = model_summary(state, modes)
-    emit(model_json(found), as_json, *model_texts(found), *remark_lines(logbook.remarks))
+    summary = model_summary(state, modes)
+    emit(model_json(summary), as_json, *model_texts(summary), *remark_lines(logbook.remarks))

@@ -66,10 +66,12 @@ def modes(
     of_window = window is not None or hit_at is not None or window_start != 0
     taken_off = Window(float("nan") if window is None else window, window_start, hit_at) if of_window else None
     description = file_options.description(averages=averages)
-    file_modes = modes_of_file(file, band, window=taken_off, conjugate=conjugate, accept=accept or (), description=description)
+    file_modes = modes_of_file(
+        file, band, window=taken_off, conjugate=conjugate, accept=accept or (), description=description
+    )
     if figure is not None:
         from lobewatch.show.figures.mode_figures import modes_figure
-        from lobewatch.show.figures.trend_figures import save_figure
+        from lobewatch.show.figures.style import save_figure
 
         save_figure(modes_figure(file_modes.extraction, file_modes.as_recorded, file.name), figure)
     emit(file_modes_json(file_modes), as_json, *file_modes_texts(file_modes, everything=everything))

@@ -46,9 +46,10 @@ def observe(
     logbook = Logbook.open(machine)
     setting = cut_setting(logbook.machine, program, speed, depth)
     heard = observe_cut(setting, "stable" if stable else "chatter", frequency, date)
-    said = [*about_tool(logbook, heard), *map(otherwise, contradicting_cuts(heard, logbook.cuts))]
+    remarks = [*about_tool(logbook, heard), *map(otherwise, contradicting_cuts(heard, logbook.cuts))]
     with telling(logbook):
-        kept = keep_cut(logbook.folder, heard)
-        emit({"cut": cut_json(kept), "remarks": [remark.code for remark in said]}, as_json, f"saved {cut_text(kept)}")
-    for remark in said:
+        stored = keep_cut(logbook.folder, heard)
+        payload = {"cut": cut_json(stored), "remarks": [remark.code for remark in remarks]}
+        emit(payload, as_json, f"saved {cut_text(stored)}")
+    for remark in remarks:
         notes.print(f"note: {remark}", markup=False)

@@ -49,9 +49,9 @@ def sensors(
             skew_check = check_skew(folder, port, device, _tell)
             emit(show.skew_json(skew_check), as_json, *show.skew_texts(skew_check))
         else:
-            found = list_sensors(folder, device, _tell)
-            emit(show.list_json(found), as_json, *show.list_texts(found))
-            if found.errors:
+            sensor_list = list_sensors(folder, device, _tell)
+            emit(show.list_json(sensor_list), as_json, *show.list_texts(sensor_list))
+            if sensor_list.errors:
                 raise typer.Exit(2)
 
 

@@ -45,8 +45,8 @@ def status(
 
     if as_csv and as_json:
         raise ValueError("--csv and --json: give one of them")
-    found = Plant(find_machines(folder)).standings()
-    rows = plant_rows(found)
+    standings = Plant(find_machines(folder)).standings()
+    rows = plant_rows(standings)
     shown = [row for row in rows if not due or row["days_left"] is None or row["days_left"] < 0]
     if as_csv:
         results.out(plant_csv(shown), end="", highlight=False)
@@ -54,15 +54,15 @@ def status(
         lights = [row["light"] for row in rows]
         counted = ", ".join(f"{lights.count(light)} {light.value}" for light in Light if light in lights)
         count = f"{len(rows)} machine{'s' if len(rows) > 1 else ''}: {counted}"
-        told = [{name: value for name, value in row.items() if name not in FOR_THE_PAGE} for row in shown]
-        emit({"machines": told}, as_json, "" if as_json else plant_text(shown, results.width), count)
+        without_points = [{name: value for name, value in row.items() if name not in FOR_THE_PAGE} for row in shown]
+        emit({"machines": without_points}, as_json, "" if as_json else plant_text(shown, results.width), count)
     if prometheus is not None:
         from acquisition.atomic import atomic_write
         from lobewatch.notify.prometheus import prometheus_text
 
-        atomic_write(prometheus, prometheus_text(found).encode())
+        atomic_write(prometheus, prometheus_text(standings).encode())
     if to_notify:
         from lobewatch.notify.telling import notify
 
-        notify(found)
+        notify(standings)
     raise typer.Exit(int(any(row["light"] is Light.ALARM for row in rows)))

@@ -29,19 +29,18 @@ def suggest(
     """
     from lobewatch.cuts.learning.of_program import next_cut, program_named
     from lobewatch.logbook import Logbook
-    from lobewatch.show.cuts.describe_learnt import learnt_texts, lesson_remarks
-    from lobewatch.show.cuts.describe_suggestion import suggestion_json, suggestion_lines
-    from lobewatch.show.terminal.remarks import remark_json, remark_lines
+    from lobewatch.show.cuts.describe_suggestion import learnt_texts, lesson_remarks, suggestion_json, suggestion_lines
+    from lobewatch.show.terminal.output import remark_json, remark_lines
 
     logbook = Logbook.open(machine)
     table = program_named(logbook.machine, program)
     assembly = logbook.assembly(table.tool)
-    found = next_cut(table, assembly, logbook.machine, logbook.cuts, cuts)
-    remarks = [*logbook.remarks, *assembly.remarks, *lesson_remarks(found.lesson)]
+    suggestion = next_cut(table, assembly, logbook.machine, logbook.cuts, cuts)
+    remarks = [*logbook.remarks, *assembly.remarks, *lesson_remarks(suggestion.lesson)]
     emit(
-        suggestion_json(found) | {"remarks": [remark_json(remark) for remark in remarks]},
+        suggestion_json(suggestion) | {"remarks": [remark_json(remark) for remark in remarks]},
         as_json,
-        *suggestion_lines(found, logbook.folder.path),
-        *learnt_texts(found.lesson),
+        *suggestion_lines(suggestion, logbook.folder.path),
+        *learnt_texts(suggestion.lesson),
         *remark_lines(remarks),
     )

@@ -25,20 +25,20 @@ def verify(
 
       lobewatch verify mill-3
     """
-    from lobewatch.machine.archive.verify import verify as verified
-    from lobewatch.show.terminal.remarks import remark_json
+    from lobewatch.machine.archive.verify import verify as verify_folder
+    from lobewatch.show.terminal.output import remark_json
 
-    found = verified(machine)
-    others = [remark for remark in found.remarks if remark not in found.damage]
+    verification = verify_folder(machine)
+    notes = [remark for remark in verification.remarks if remark not in verification.damage]
     payload = {
-        "damage": [remark_json(remark) for remark in found.damage],
-        "remarks": [remark_json(remark) for remark in others],
-        "adopted": found.adopted,
-        "sound_taps": found.n_taps,
+        "damage": [remark_json(remark) for remark in verification.damage],
+        "remarks": [remark_json(remark) for remark in notes],
+        "adopted": verification.adopted,
+        "sound_taps": verification.n_taps,
     }
-    texts = [*(f"damaged: {one}" for one in found.damage), *(f"note: {one}" for one in others)]
-    texts += [f"entered in the journal: {name}" for name in found.adopted]
-    last = f"{len(found.damage)} damaged" if found.damage else "nothing is damaged"
-    emit(payload, as_json, *texts, f"{found.n_taps} tap test(s) as they were committed, {last}")
-    if found.damage:
+    texts = [*(f"damaged: {remark}" for remark in verification.damage), *(f"note: {remark}" for remark in notes)]
+    texts += [f"entered in the journal: {name}" for name in verification.adopted]
+    last = f"{len(verification.damage)} damaged" if verification.damage else "nothing is damaged"
+    emit(payload, as_json, *texts, f"{verification.n_taps} tap test(s) as they were committed, {last}")
+    if verification.damage:
         raise typer.Exit(1)

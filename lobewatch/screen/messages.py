@@ -55,11 +55,11 @@ def cut_message(state: CutState) -> str:
             "title": state.title,
             "device": state.device,
             "saved": state.saved,
-            "reason": state.reason if state.found is None else why(state.found),
+            "reason": state.reason if state.comparison is None else why(state.comparison),
             "level": _finite(state.level),
             "left": _finite(state.left),
             "cut_seconds": _finite(state.cut_seconds),
-            "heard": None if state.found is None else _heard(state.found),
+            "heard": None if state.comparison is None else _heard(state.comparison),
         },
         allow_nan=False,
     )

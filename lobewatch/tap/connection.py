@@ -14,9 +14,9 @@ from lobewatch.tap.publisher import Publisher
 from lobewatch.tap.state import TapStep
 
 RETRY_TIME = 0.5
-"""Pause between two tries to find the device again (s)."""
+"""Time between two tries to find the device again (s)."""
 BOUNCE_TIME = 0.3
-"""A press so soon after the button has moved is its bouncing (s)."""
+"""Time after a move of the button in which a press is its bouncing (s)."""
 
 
 class Button:
@@ -31,7 +31,7 @@ class Button:
         self._moved: int | None = None
 
     def presses(self, events: deque[Event]) -> int:
-        """Take all events that wait; how often the button was pressed in them."""
+        """Take all events that wait, and count the presses in them."""
         count = 0
         while events:
             event = events.popleft()
@@ -59,7 +59,7 @@ class Connection:
 
     @property
     def sample_rate(self) -> float:
-        """Hz."""
+        """Sample rate (Hz)."""
         return self._device.sample_rate
 
     def start(self) -> None:
@@ -68,17 +68,17 @@ class Connection:
         self._device.events.clear()
 
     def blocks(self) -> Iterator[Block]:
-        """What the device sends from now on."""
+        """Blocks that the device sends from now on."""
         for block in self._device.blocks():
             self.signal.add(block)
             yield block
 
     def presses(self) -> int:
-        """How often its button was pressed since this was last asked for."""
+        """Number of presses of its button since this was last asked for."""
         return self._button.presses(self._device.events)
 
     def news(self) -> str:
-        """That a sensor cable was pulled or a supply is missing, or that it is mended, where it tells that; once."""
+        """Sentence on a pulled sensor cable or a missing supply, or that it is mended, where the device tells; once."""
         before, self._fault = self._fault, self._device.fault
         if self._fault == before:
             return ""

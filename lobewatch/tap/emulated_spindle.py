@@ -28,9 +28,9 @@ from dsm import Spindle, modes_at, static_stiffness
 from lobewatch.machine.folder import MachineFolder
 
 MODES = 8
-"""Modes integrated; the rest is their static flexibility."""
+"""Number of modes integrated; all higher ones are their static flexibility."""
 SAMPLE_RATE = 25600.0
-"""Hz."""
+"""Sample rate of the device (Hz)."""
 CHANNELS = (
     Channel("force", sensitivity=2.25e-3, full_scale=5.0, calibration_date="2026-01-15"),
     Channel("acceleration", sensitivity=1.02e-3, full_scale=5.0, calibration_date="2026-01-15"),
@@ -39,7 +39,7 @@ CHANNELS = (
 AHEAD = 25
 """Blocks (0.5 s) that a device in step with its host may send before they are asked for."""
 PATIENCE = 0.2
-"""How long it waits for a host that asks for no more (s); then it sends a block all the same."""
+"""Time that it waits for a host that asks for no more (s); then it sends a block all the same."""
 
 
 @dataclass(frozen=True)
@@ -47,15 +47,15 @@ class EmulatedMachine:
     """A device made of software on a spindle made of numbers."""
 
     device: EmulatorThread
-    """Serves while its context lasts."""
+    """Emulator that serves while its context lasts."""
     frequency: float
-    """The truth: natural frequency of the first mode (Hz) ..."""
+    """Natural frequency of the first mode (Hz), the truth."""
     stiffness: float
-    """... and its stiffness at the tapped point (N/m)."""
+    """Stiffness of the first mode at the tapped point (N/m), the truth."""
 
 
 def emulated_structure(spindle: Spindle, damping_ratio: float, position: float = 0.0) -> Structure:
-    """What a hammer meets at a position (m from the tool tip): modes and static residual of the model."""
+    """Structure that a hammer meets at a position (m from the tool tip): modes and static residual of the model."""
     frequency, stiffness = modes_at(spindle, MODES, position)
     return Structure(
         frequency=frequency,
@@ -138,11 +138,13 @@ def emulate_machine(
     return EmulatedMachine(driver.emulate(bench), float(structure.frequency[0]), float(structure.stiffness[0]))
 
 
-def _structure(folder: MachineFolder, other: Spindle | None) -> Structure:
+def _structure(folder: MachineFolder, replacement: Spindle | None) -> Structure:
     spindle = folder.machine.spindle
     if spindle is None:
         raise DataError(f"{folder.toml}: no model to emulate: add a [spindle] table (or use lobewatch init --example)")
-    return emulated_structure(other or spindle.build(), spindle.damping_ratio, folder.machine.tap.position_mm / 1e3)
+    return emulated_structure(
+        replacement or spindle.build(), spindle.damping_ratio, folder.machine.tap.position_mm / 1e3
+    )
 
 
 def emulated_inputs(folder: MachineFolder, driver: Driver) -> tuple[SensorInput, ...]:

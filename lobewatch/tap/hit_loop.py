@@ -14,7 +14,7 @@ from lobewatch.tap.publisher import Publisher
 from lobewatch.tap.state import TapStep
 
 VERDICT_TIME = 0.8
-"""How long a verdict is shown at least (s); the trigger may be armed before."""
+"""Time for which a verdict is shown at least (s); the trigger may be armed before."""
 UNDO_TIME = 2.0
 """Time in which the last hit needed can be taken back (s)."""
 
@@ -59,7 +59,7 @@ class HitLoop:
         self._verdict_at: int | None = None
 
     def blocks(self, connection: Connection) -> Iterator[Block]:
-        """What the device sends; wishes are served and levels shown in between."""
+        """Blocks that the device sends; wishes are served and levels shown in between."""
         for block in connection.blocks():
             self._heard += block.codes.shape[1]
             for _ in range(connection.presses()):
@@ -74,7 +74,7 @@ class HitLoop:
             raise DataError(f"the samples have ended with {self._hits.progress}; record more of them")
 
     def serve(self) -> None:
-        """What other threads have asked for; TapStopped where that is the end."""
+        """Do what other threads have asked for; TapStopped where that is the end."""
         if self._wishes.stopping:
             raise TapStopped(f"stopped with {self._hits.tap.good} good hits; the same command goes on with them")
         while self._wishes.take_undo():
@@ -114,7 +114,7 @@ class HitLoop:
             self._publisher.show(plots=plots_of(hit, self._hits.mean))
 
     def _verdict_age(self, sample_rate: float) -> float:
-        """For how long the verdict has been shown (s); inf where none is."""
+        """Time for which the verdict has been shown (s); inf where none is."""
         return float("inf") if self._verdict_at is None else (self._heard - self._verdict_at) / sample_rate
 
     def _follow(self, search: HitSearch, sample_rate: float) -> None:
@@ -139,10 +139,10 @@ class HitLoop:
             reason = f"Hit {number + 1} does not fit the others and counts no more. {why.text}"
             self._show_taken_out(why.flags, reason)
 
-    def _undo(self, how: str = "") -> None:
+    def _undo(self, means: str = "") -> None:
         number = self._hits.undo()
         if number is not None:
-            self._show_taken_out(HitFlags.UNDONE, f"Hit {number + 1} was taken back{how}.")
+            self._show_taken_out(HitFlags.UNDONE, f"Hit {number + 1} was taken back{means}.")
 
     def _show_taken_out(self, flags: HitFlags, reason: str) -> None:
         """A hit that was good counts no more: the word GOOD must not stand there any longer."""

@@ -36,23 +36,23 @@ class TapInProgress:
     id: str
     """Identity of the tap test to be."""
     circumstances: Circumstances
-    """Who, what, when."""
+    """Circumstances of the test: who, what, when."""
     folder: Path
-    """Where its hits are spooled."""
+    """Folder in which its hits are spooled."""
     hits: list[Hit] = field(default_factory=list)
     """All hits so far."""
     flags: list[HitFlags] = field(default_factory=list)
-    """The verdict on each; UNDONE where the operator took a good one back."""
+    """Verdict on each; UNDONE where the operator took a good one back."""
     reasons: list[str] = field(default_factory=list)
-    """What was wrong with each, in a sentence; empty where it is averaged."""
+    """Sentence on what was wrong with each; empty where it is averaged."""
     numbers: list[int] = field(default_factory=list)
-    """In the name of the file of each."""
+    """Number of each, in the name of its file."""
     earlier: int = 0
-    """How many of them were there when it was gone on with."""
+    """Number of hits that were there when it was gone on with."""
     trigger: Trigger | None = None
-    """How its hits are recorded; None until that is chosen."""
+    """Trigger by which its hits are recorded; None until that is chosen."""
     baseline: Hit | None = None
-    """A record at rest; None until the self-check has run."""
+    """Record at rest; None until the self-check has run."""
     damaged: list[Path] = field(default_factory=list)
     """Files of an interrupted test that could not be read, where they were set aside."""
     left: list[str] = field(default_factory=list)
@@ -62,22 +62,22 @@ class TapInProgress:
 
     @property
     def good(self) -> int:
-        """How many hits may be averaged."""
+        """Number of hits that may be averaged."""
         return self.flags.count(HitFlags.OK)
 
     @property
     def taken(self) -> tuple[TakenHit, ...]:
-        """The hits as a screen lists them."""
-        told = enumerate(zip(self.hits, self.flags, self.reasons, strict=True), 1)
+        """Hits as a screen lists them."""
+        hits = enumerate(zip(self.hits, self.flags, self.reasons, strict=True), 1)
         return tuple(
             TakenHit(i, flags, float(hit.force.max()), bool(flags & HitFlags.UNDONE), reason, i <= self.earlier)
-            for i, (hit, flags, reason) in told
+            for i, (hit, flags, reason) in hits
         )
 
     def accept_device(self, sample_rate: float, channels: tuple[Channel, Channel], description: str) -> None:
         """Note what the hits to come are recorded with; ValueError where those before them had another set-up."""
-        known = self.hits[-1] if self.hits else self.baseline
-        if known is not None and (known.sample_rate, known.channels) != (sample_rate, channels):
+        earlier = self.hits[-1] if self.hits else self.baseline
+        if earlier is not None and (earlier.sample_rate, earlier.channels) != (sample_rate, channels):
             raise self.other_setup()
         if not self.hits:
             self.circumstances = replace(self.circumstances, device=description)
@@ -97,8 +97,8 @@ class TapInProgress:
 
     def add_spooled(self, spooled: SpooledHit) -> None:
         """Go on with a hit that is on the disk already."""
-        found = judge_hit(spooled.hit)
-        self._append(spooled.number, spooled.hit, spooled.flags | found.flags, found.text or spooled.flags.cure)
+        verdict = judge_hit(spooled.hit)
+        self._append(spooled.number, spooled.hit, spooled.flags | verdict.flags, verdict.text or spooled.flags.cure)
         self.circumstances = spooled.circumstances
         self.earlier = len(self.hits)
 
@@ -119,7 +119,7 @@ class TapInProgress:
         self.reasons.append(reason)
 
     def _store(self, number: int, hit: Hit, flags: HitFlags) -> None:
-        """On the disk when this returns; where that is full, in the room that was held."""
+        """Write a hit, which is on the disk when this returns; where that is full, in the room that was held."""
         try:
             self._write(number, hit, flags)
         except OSError as error:
@@ -140,9 +140,9 @@ def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool 
     tidy(folder)
     _remove_committed(folder)
     damaged, left = list[Path](), list[str]()
-    found = _interrupted(folder, circumstances, resume, damaged, left)
+    interrupted = _interrupted(folder, circumstances, resume, damaged, left)
     tap_id = new_tap_id(circumstances)
-    tap = found or TapInProgress(tap_id, circumstances, folder.spool / tap_id)
+    tap = interrupted or TapInProgress(tap_id, circumstances, folder.spool / tap_id)
     tap.damaged, tap.left = damaged, left
     return tap
 
@@ -161,7 +161,7 @@ def _interrupted(
     folder: MachineFolder, circumstances: Circumstances, resume: bool, damaged: list[Path], left: list[str]
 ) -> TapInProgress | None:
     """The newest test of the same tool and direction to go on with, if that is wished; `left`: all others."""
-    committed, found = folder.committed, None
+    committed, newest = folder.committed, None
     for path in sorted(folder.spool.iterdir(), reverse=True) if folder.spool.is_dir() else []:
         if not path.is_dir() or path.name in committed:
             continue
@@ -171,13 +171,13 @@ def _interrupted(
             continue
         about = first.circumstances
         same = (about.tool, about.direction) == (circumstances.tool, circumstances.direction)
-        if resume and found is None and same and circumstances.created - about.created < RESUMABLE:
-            found = TapInProgress(path.name, about, path, trigger=spooled_trigger(path, damaged))
+        if resume and newest is None and same and circumstances.created - about.created < RESUMABLE:
+            newest = TapInProgress(path.name, about, path, trigger=spooled_trigger(path, damaged))
             for hit in (first, *hits):
-                found.add_spooled(hit)
-            said = circumstances.conditions.over(found.circumstances.conditions)
-            found.circumstances = replace(found.circumstances, conditions=said)
+                newest.add_spooled(hit)
+            conditions = circumstances.conditions.over(newest.circumstances.conditions)
+            newest.circumstances = replace(newest.circumstances, conditions=conditions)
         else:
             when = f"{about.created:%Y-%m-%d %H:%M} UTC, tool {about.tool}, direction {about.direction}"
             left.append(f"an interrupted test of {when} is still in {path}; delete that folder if it is not needed")
-    return found
+    return newest

@@ -18,9 +18,9 @@ class JudgedHits:
         self.tap = tap
         """The hits on the disk."""
         self.wanted = machine.tap.hits
-        """How many good ones are needed."""
+        """Number of good hits needed."""
         self.mean = RunningMean()
-        """Of the good hits."""
+        """Mean of the good hits."""
         self._band = machine.mode.band_hz
         for hit, flags in zip(tap.hits, tap.flags, strict=True):
             if not flags:
@@ -28,16 +28,16 @@ class JudgedHits:
 
     @property
     def missing(self) -> int:
-        """How many good hits are still to come."""
+        """Number of good hits still to come."""
         return max(self.wanted - self.tap.good, 0)
 
     @property
     def progress(self) -> str:
-        """How far the test is."""
+        """Progress of the test in words."""
         return f"{self.tap.good} of {self.wanted} good hits"
 
     def judge(self, hit: Hit) -> Verdict:
-        """Against the mean, too, where that has enough hits to tell how far they scatter."""
+        """Verdict on a hit, against the mean too where that has enough hits to tell how far they scatter."""
         mean = self.mean.frf if len(self.mean.hits) >= FEWEST_FOR_MEAN else None
         return judge_hit(hit, mean, self._band)
 
@@ -65,7 +65,7 @@ class JudgedHits:
         for hit in self.mean.hits[:FEWEST_FOR_MEAN]:
             verdict = judge_hit(hit, self.mean.without(hit))
             if verdict.flags:
-                number = next(i for i, other in enumerate(self.tap.hits) if other is hit)
+                number = next(i for i, tap_hit in enumerate(self.tap.hits) if tap_hit is hit)
                 self._take_out(number, verdict)
                 return number, verdict
         return None

@@ -18,8 +18,8 @@ LEVEL_TIME = 0.05
 def description(device: Device) -> str:
     """Model, serial number, firmware, and how it finds lost scans, as far as it says."""
     who = device.identity
-    told = {"serial number ": who.serial, "firmware ": who.firmware, "loss detection: ": device.loss_detection}
-    return ", ".join([who.model, *(name + value for name, value in told.items() if value)])
+    details = {"serial number ": who.serial, "firmware ": who.firmware, "loss detection: ": device.loss_detection}
+    return ", ".join([who.model, *(name + value for name, value in details.items() if value)])
 
 
 class LiveSignal:

@@ -18,7 +18,7 @@ from lobewatch.tap.state import Check, TapStep
 from lobewatch.tap.trial import Trial, trigger_of
 
 BASELINE_TIME = 1.0
-"""How long the self-check listens (s)."""
+"""Time for which the self-check listens (s)."""
 
 
 class Phases:
@@ -70,8 +70,8 @@ class Phases:
         self._trial = self._trial or Trial(setup, tap.baseline)
         self._take_trial_hits(connection, self._trial)
         tap.trigger = self._trial.trigger
-        found = Check("trial hits", not self._trial.remarks, self._trial.text.removesuffix("."))
-        self._publisher.show(checks=(*self._publisher.state.checks, found))
+        check = Check("trial hits", not self._trial.remarks, self._trial.text.removesuffix("."))
+        self._publisher.show(checks=(*self._publisher.state.checks, check))
 
     def _take_trial_hits(self, connection: Connection, trial: Trial) -> None:
         asked = False
@@ -92,7 +92,7 @@ class Phases:
         self._loop.take_hits(connection, self._at_rest(trigger))
 
     def _at_rest(self, trigger: Trigger) -> Trigger:
-        """Armed only while the structure is at rest, where somebody taps by hand."""
+        """Trigger that is armed only while the structure is at rest, where somebody taps by hand."""
         if not self._guided or self._tap.baseline is None:
             return trigger
         return replace(trigger, rest_rms=resting_rms(self._tap.baseline, trigger.pre_trigger))

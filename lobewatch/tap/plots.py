@@ -14,7 +14,7 @@ from acquisition.hits.pulse import find_pulse
 from lobewatch.tap.state import Plots
 
 BINS = 400
-"""Of a curve; the highest and the lowest sample of every bin are shown."""
+"""Number of bins of a curve; the highest and the lowest sample of every bin are shown."""
 BEYOND_BAND = 1.25
 """Spectra are shown up to this many times the upper end of the usable band."""
 LEAST_COHERENT = 3
@@ -22,7 +22,7 @@ LEAST_COHERENT = 3
 
 
 def plots_of(hit: Hit, mean: RunningMean) -> Plots:
-    """What the screen shows after a hit, good or not."""
+    """Curves that the screen shows after a hit, good or not."""
     shown = _samples(hit)
     spectra = None if find_pulse(hit) is None else cross_spectra([hit])
     last = None if spectra is None else frf_of_spectra(spectra, [hit])
@@ -75,8 +75,8 @@ def extremes(curves: Sequence[NDArray[Any]], end: int) -> NDArray[np.int64]:
     if width == 1 or not curves:
         return np.arange(0, end, width)
     starts = np.arange(0, end, width)
-    found = [starts]
+    indices = [starts]
     for curve in curves:
         bins = np.pad(curve[:end], (0, -end % width), mode="edge").reshape(-1, width)
-        found += [starts + np.argmax(bins, axis=1), starts + np.argmin(bins, axis=1)]
-    return np.unique(np.minimum(np.concatenate(found), end - 1))
+        indices += [starts + np.argmax(bins, axis=1), starts + np.argmin(bins, axis=1)]
+    return np.unique(np.minimum(np.concatenate(indices), end - 1))

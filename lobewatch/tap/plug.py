@@ -6,7 +6,7 @@ from acquisition import Device, DeviceError, FileSource, SensorPlace, find_drive
 from lobewatch.machine.settings.daq_tables import Daq
 
 REPLAY = "file:"
-"""What a port begins with that is no port but a recording, whatever the driver."""
+"""Beginning of a port that is no port but a recording, whatever the driver."""
 
 
 class Plug:
@@ -16,18 +16,18 @@ class Plug:
     """
 
     def __init__(self, daq: Daq, port: str) -> None:
-        """As [daq] sets it up; port: where it is the first time."""
+        """A device as [daq] sets it up; port: where it is the first time."""
         self._daq, self._port = daq, port
         self._identity: tuple[int, str] | None = None
 
     def open(self) -> Device:
-        """See open_source; DeviceError, too, while the USB device is nowhere: no other one at its port is touched."""
+        """Open as open_source does; DeviceError while the USB device is nowhere: no other at its port is touched."""
         if self._identity is not None and usb_identity(self._port) != self._identity:
-            found = find_port(*self._identity)
-            if found is None:
+            port = find_port(*self._identity)
+            if port is None:
                 number = self._identity[1]
                 raise DeviceError(f"the DAQ with the USB serial number {number} is not plugged in", "plug it in")
-            self._port = found
+            self._port = port
         source = open_source(self._daq, self._port)
         self._identity = self._identity or usb_identity(self._port)
         return source
@@ -44,5 +44,5 @@ def open_source(daq: Daq, port: str) -> Device:
 
 
 def sensor_place(daq: Daq, port: str) -> SensorPlace | None:
-    """Where the device on a port keeps the data of its sensors; None where machine.toml does."""
+    """Place where the device on a port keeps the data of its sensors; None where machine.toml does."""
     return None if port.startswith(REPLAY) else find_driver(daq.driver).sensors

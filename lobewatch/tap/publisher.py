@@ -10,8 +10,8 @@ from lobewatch.tap.judged_hits import JudgedHits
 from lobewatch.tap.state import TapState
 
 
-class Picture(Protocol):
-    """What is shown of a test: a frozen dataclass."""
+class LivePicture(Protocol):
+    """Picture of a live test: a frozen dataclass."""
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
@@ -20,7 +20,7 @@ class Picture(Protocol):
         """Number that rises with every change."""
 
 
-State = TypeVar("State", bound=Picture)
+State = TypeVar("State", bound=LivePicture)
 
 
 class Pictures(Generic[State]):
@@ -38,7 +38,7 @@ class Pictures(Generic[State]):
 
     @property
     def age(self) -> float:
-        """How long it has stood (s)."""
+        """Time for which it has stood (s)."""
         return self._clock() - self._shown_at
 
     def show(self, **changes: Any) -> None:

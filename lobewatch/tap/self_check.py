@@ -1,16 +1,15 @@
-"""What is looked at before the first hit, on about a second in which nobody taps."""
+"""The self-check before the first hit: sensors and their calibration, and about a second in which nobody taps."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Channel, Hit
+from acquisition import Channel, Hit, Remark, calibration_doubt, channel_doubts
 from lobewatch.machine.reserve import RESERVE_BYTES
-from lobewatch.tap.sensor_doubts import sensor_doubts
 from lobewatch.tap.state import Check
 
 PIECE = 0.01
@@ -28,11 +27,15 @@ MAINS = (50.0, 60.0)
 HARMONICS = 6
 """Lines of the mains looked at."""
 HUM_SHARE = 0.5
-"""Share of the power at rest in the lines of the mains that is called hum ..."""
+"""Share of the power at rest in the lines of the mains that is called hum; chosen."""
 TURNING_SHARE = 0.5
-"""... and in any other single line that is called a turning spindle ..."""
+"""Share of the power at rest in another single line that is called a turning spindle; chosen."""
 FEWEST_CODES = 3.0
-"""... where that line's rms is at least so many steps of the converter."""
+"""Steps of the converter below which the rms of such lines is nothing; chosen."""
+DISK_ROOM = 4
+"""Free bytes of the disk over those that a test reserves, at least; chosen."""
+WRONG = frozenset({"calibration-no-date", "calibration-in-future", "sample-rate-wrong"})
+"""Codes of what cannot be, and is to be put right before a sensor or a DAQ is worked with."""
 
 
 def quiet_stretch(record: Hit) -> Hit:
@@ -72,6 +75,17 @@ def calibration_check(channels: Sequence[Channel], interval_months: float) -> Ch
     """Sensitivities and calibration dates."""
     doubts = sensor_doubts(channels, datetime.now(UTC).date(), interval_months)
     return Check("calibration", not doubts, "; ".join(map(str, doubts)) or "dates known and not too old")
+
+
+def sensor_doubts(channels: Sequence[Channel], today: date, interval_months: float) -> list[Remark]:
+    """Sensitivities and ranges that are not believed, calibrations that are old, not known or of an impossible day."""
+    doubts: list[Remark] = []
+    for channel in channels:
+        doubts += channel_doubts(channel)
+        calibration = calibration_doubt(channel, today, interval_months)
+        if calibration is not None:
+            doubts.append(calibration)
+    return doubts
 
 
 def _samples(baseline: Hit) -> Check:
@@ -128,10 +142,10 @@ def _hum(baseline: Hit) -> Check:
     texts = []
     for channel, signal, unit in _signals(baseline):
         frequency, power = _spectrum(signal, baseline.sample_rate)
-        found = max(MAINS, key=lambda mains: float(np.sum(power[_mains(frequency, mains)])))
-        hum = float(np.sum(power[_mains(frequency, found)]))
+        worst = max(MAINS, key=lambda mains: float(np.sum(power[_mains(frequency, mains)])))
+        hum = float(np.sum(power[_mains(frequency, worst)]))
         if hum > HUM_SHARE * np.sum(power) and np.sqrt(hum) > FEWEST_CODES * abs(channel.scale):
-            texts.append(f"{np.sqrt(hum):.2g} {unit} rms at {found:g} Hz and its multiples in the {channel.quantity}")
+            texts.append(f"{np.sqrt(hum):.2g} {unit} rms at {worst:g} Hz and its multiples in the {channel.quantity}")
     if texts:
         return Check("hum", False, f"{', '.join(texts)}: check cable shields and the ground")
     return Check("hum", True, "no mains hum")
@@ -141,12 +155,12 @@ def _spindle(baseline: Hit) -> Check:
     """One strong line in the response that is not of the mains."""
     channel, signal, unit = _signals(baseline)[1]
     frequency, power = _spectrum(signal, baseline.sample_rate)
-    other = np.where(np.any([_mains(frequency, mains) for mains in MAINS], axis=0), 0.0, power)
-    line = float(frequency[int(np.argmax(other))])
-    rms = float(np.sqrt(np.sum(other[_near(frequency, line)])))
+    off_mains = np.where(np.any([_mains(frequency, mains) for mains in MAINS], axis=0), 0.0, power)
+    line = float(frequency[int(np.argmax(off_mains))])
+    rms = float(np.sqrt(np.sum(off_mains[_near(frequency, line)])))
     if rms**2 > TURNING_SHARE * np.sum(power) and rms > FEWEST_CODES * abs(channel.scale):
-        found = f"{rms:.2g} {unit} rms at {line:.0f} Hz ({60 * line:.0f} rpm)"
-        return Check("spindle", False, f"a steady vibration of {found}: stop the spindle and what runs beside it")
+        vibration = f"{rms:.2g} {unit} rms at {line:.0f} Hz ({60 * line:.0f} rpm)"
+        return Check("spindle", False, f"a steady vibration of {vibration}: stop the spindle and what runs beside it")
     return Check("spindle", True, "no steady vibration")
 
 
@@ -157,7 +171,7 @@ def _signals(baseline: Hit) -> list[tuple[Channel, NDArray[np.float64], str]]:
 
 
 def _disk(free: int) -> Check:
-    enough = free >= 4 * RESERVE_BYTES
+    enough = free >= DISK_ROOM * RESERVE_BYTES
     return Check("disk", enough, f"{free / 1e9:.1f} GB free{'' if enough else ': make room soon'}")
 
 

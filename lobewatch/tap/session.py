@@ -63,7 +63,7 @@ class TapSession:
         self._connector = Connector(folder, open_device, self._publisher, sleep)
         self._measurement: Measurement | None = None
         self.unasked: Sequence[str] = ()
-        """Of `accept`, what the finished test does not ask."""
+        """Codes of `accept` that the finished test does not ask."""
 
     @property
     def state(self) -> TapState:
@@ -72,7 +72,7 @@ class TapSession:
 
     @property
     def measurement(self) -> Measurement:
-        """What the finished test says of the spindle; ValueError before the end."""
+        """Measurement that the finished test gives of the spindle; ValueError before the end."""
         if self._measurement is None:
             raise ValueError("the tap test is not finished; there is no measurement before run() has returned")
         return self._measurement
@@ -142,7 +142,7 @@ class TapSession:
 
 
 def _why(error: Exception, remarks: Sequence[Remark]) -> str:
-    """Why a saved tap test has no result; remarks: about its file."""
+    """Reason why a saved tap test has no result; remarks: about its file."""
     if isinstance(error, OSError) and error.errno:
         return system_failure(error)
     return "; ".join(map(str, remarks)) or str(error)

@@ -20,7 +20,7 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.journal.doubtful import has_whole_hits
 
 RESUMABLE = timedelta(hours=12)
-"""An interrupted test older than this is not gone on with."""
+"""Age from which an interrupted test is not gone on with."""
 HALF_WRITTEN = (".journal*.tmp", ".history.*.tmp", "taps/.*.tmp", "spool/**/.*.tmp")
 """Temporary names of what is written under the lock."""
 SETUP = "setup.json"
@@ -32,13 +32,13 @@ class SpooledHit:
     """One hit from its file."""
 
     number: int
-    """In the name of its file."""
+    """Number in the name of its file."""
     hit: Hit
-    """As it was recorded."""
+    """Hit as it was recorded."""
     flags: HitFlags
-    """The verdict of then."""
+    """Verdict of then."""
     circumstances: Circumstances
-    """Of the test."""
+    """Circumstances of the test."""
 
 
 def spooled_hits(folder: Path, damaged: list[Path]) -> Iterator[SpooledHit]:
@@ -47,41 +47,41 @@ def spooled_hits(folder: Path, damaged: list[Path]) -> Iterator[SpooledHit]:
     A file under the name of another one is damaged too: no hit counts twice.
     """
     for path in sorted(folder.glob("[0-9]*.h5")):
-        found = _read(path)
-        if found is None:
+        hit = _read(path)
+        if hit is None:
             damaged.append(_set_aside(path))
         else:
-            yield found
+            yield hit
 
 
 def interrupted_tests(folder: MachineFolder) -> dict[str, int]:
     """Hits on the disk of interrupted tests of the tool of machine.toml that START would go on with, by direction."""
-    found: dict[str, int] = {}
+    counts: dict[str, int] = {}
     for path in sorted(folder.spool.iterdir()) if folder.spool.is_dir() else []:
         files = sorted(path.glob("[0-9]*.h5"))
         first = next(filter(None, map(_read, files)), None)
         if first is None or first.circumstances.tool != folder.machine.tap.tool:
             continue
         if datetime.now(UTC) - first.circumstances.created < RESUMABLE and path.name not in folder.committed:
-            found[first.circumstances.direction] = len(files)
-    return found
+            counts[first.circumstances.direction] = len(files)
+    return counts
 
 
 def write_set_up(folder: Path, trigger: Trigger) -> None:
     """Keep how the hits are recorded; on the disk when this returns."""
-    told = asdict(trigger)
-    atomic_write(folder / SETUP, json.dumps(told | {"crc": _crc(told)}).encode())
+    fields = asdict(trigger)
+    atomic_write(folder / SETUP, json.dumps(fields | {"crc": _crc(fields)}).encode())
 
 
 def spooled_trigger(folder: Path, damaged: list[Path]) -> Trigger | None:
-    """How the hits were recorded; None where that was not kept, or is damaged and set aside as hits are."""
+    """Trigger by which the hits were recorded; None where it was not kept, or is damaged and set aside."""
     path = folder / SETUP
     try:
-        told = json.loads(path.read_text("utf-8"))
-        crc = told.pop("crc", None)  # not in the first files
-        if crc not in (None, _crc(told)):
+        fields = json.loads(path.read_text("utf-8"))
+        crc = fields.pop("crc", None)  # not in the first files
+        if crc not in (None, _crc(fields)):
             raise ValueError("altered")
-        return Trigger(**told)
+        return Trigger(**fields)
     except FileNotFoundError:
         return None
     except (ValueError, TypeError, AttributeError):
@@ -99,14 +99,14 @@ def tidy(folder: MachineFolder) -> None:
     spool = folder.spool
     for path in sorted(spool.iterdir()) if spool.is_dir() else []:
         if path.is_dir():
-            if [one.name for one in path.iterdir()] == [SETUP]:
+            if [file.name for file in path.iterdir()] == [SETUP]:
                 (path / SETUP).unlink()
             with contextlib.suppress(OSError):  # it is not empty
                 path.rmdir()
 
 
-def _crc(told: object) -> int:
-    return zlib.crc32(json.dumps(told, sort_keys=True).encode())
+def _crc(fields: object) -> int:
+    return zlib.crc32(json.dumps(fields, sort_keys=True).encode())
 
 
 def _read(path: Path) -> SpooledHit | None:

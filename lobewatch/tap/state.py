@@ -38,11 +38,11 @@ class Check:
     """One line of the self-check before hit 1."""
 
     name: str
-    """What was looked at, e.g. "noise floor"."""
+    """Name of the check, e.g. "noise floor"."""
     passed: bool
     """Whether all is well; a failed check warns and does not stop the test."""
     text: str
-    """What was found, with its unit, and the cure where it failed."""
+    """Finding with its unit, and the cure where it failed."""
 
 
 @dataclass(frozen=True)
@@ -50,17 +50,17 @@ class TakenHit:
     """One hit in the list of the screen."""
 
     number: int
-    """From 1."""
+    """Number of the hit, from 1."""
     flags: HitFlags
-    """Falsy where it is averaged."""
+    """Verdict on the hit; falsy where it is averaged."""
     peak_force: float
-    """N."""
+    """Largest force (N)."""
     undone: bool = False
-    """Taken back by the operator."""
+    """Whether the operator took it back."""
     reason: str = ""
-    """One sentence with figures: what was wrong with it; empty where it is averaged."""
+    """Sentence with figures: what was wrong with it; empty where it is averaged."""
     earlier: bool = False
-    """Taken before the test was interrupted."""
+    """Whether it was taken before the test was interrupted."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,35 +68,35 @@ class Plots:
     """The curves of the screen, thinned to what a screen can show."""
 
     time: NDArray[np.float64]
-    """From the trigger of the last hit (s), shape (n,)."""
+    """Time from the trigger of the last hit (s), shape (n,)."""
     force: NDArray[np.float64]
-    """Of the last hit (N), shape (n,)."""
+    """Force of the last hit (N), shape (n,)."""
     acceleration: NDArray[np.float64]
-    """Of the last hit (m/s^2), shape (n,)."""
+    """Acceleration of the last hit (m/s^2), shape (n,)."""
     frequency: NDArray[np.float64]
-    """Hz, shape (m,)."""
+    """Frequencies (Hz), shape (m,)."""
     mean: NDArray[np.float64] | None
-    """|receptance| of the mean of the good hits (m/N), shape (m,); None before the first good one."""
+    """Magnitude of the receptance of the mean of the good hits (m/N), shape (m,); None before the first good one."""
     last: NDArray[np.float64] | None
-    """|receptance| of the last hit (m/N), shape (m,); None where it had no pulse."""
+    """Magnitude of the receptance of the last hit (m/N), shape (m,); None where it had no pulse."""
     coherence: NDArray[np.float64] | None
-    """Of the good hits, shape (m,); None under 3 of them."""
+    """Coherence of the good hits (-), shape (m,); None under 3 of them."""
     force_spectrum: NDArray[np.float64] | None
-    """Of the last hit, dB below its largest value, shape (m,)."""
+    """Spectrum of the force of the last hit (dB below its largest value), shape (m,)."""
     usable_band: tuple[float, float] | None
     """Band in which the force reaches (Hz)."""
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What stands at the end."""
+    """The result as it stands at the end."""
 
     light: str
-    """"good", "warn" or "alarm", against the baseline and the limits of machine.toml."""
+    """Light of the machine: "good", "warn" or "alarm", against the baseline and the limits of machine.toml."""
     texts: Sequence[str]
-    """The result in sentences."""
+    """Result in sentences."""
     next_step: str
-    """What to do now, one sentence."""
+    """Sentence on what to do now."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,22 +104,22 @@ class TapState:
     """One picture of a tap test."""
 
     revision: int
-    """Rises with every change."""
+    """Number that rises with every change."""
     word: TapStep
-    """See Word."""
+    """Word that can be read from 3 m."""
     title: str
     """Machine, tool and direction."""
     resumed: str = ""
-    """Where an interrupted test is gone on with: which one, how many good hits it had, and damaged files that were set
-    aside; empty for a new one."""
+    """Interrupted test that is gone on with, how many good hits it had, and damaged files that were set aside; empty
+    for a new one."""
     device: str = ""
     """DAQ, port and rate."""
     verdict: str = ""
-    """Of the last hit, e.g. "good" or "double hit, too soft"."""
+    """Verdict on the last hit, e.g. "good" or "double hit, too soft"."""
     trial: bool = False
     """Whether the last hit was a trial hit, which does not count."""
     reason: str = ""
-    """One sentence with figures: what was wrong with the last hit, or why the test stands still."""
+    """Sentence with figures: what was wrong with the last hit, or why the test stands still."""
     good: int = 0
     """Hits averaged so far."""
     wanted: int = 10
@@ -127,21 +127,21 @@ class TapState:
     hits: tuple[TakenHit, ...] = ()
     """All hits, oldest first."""
     mean_change: float | None = None
-    """By which share the last good hit moved the mean; None under 2 of them."""
+    """Share by which the last good hit moved the mean (-); None under 2 of them."""
     settled: bool = False
     """Whether the mean has settled (a hint: the wanted number stays the rule)."""
     levels: tuple[float, float] | None = None
-    """rms of force (N) and acceleration (m/s^2) over the last 50 ms, live."""
+    """Root mean squares of force (N) and acceleration (m/s^2) over the last 50 ms, live."""
     checks: tuple[Check, ...] = ()
-    """Self-check."""
+    """Lines of the self-check."""
     plots: Plots | None = None
-    """Of the last hit and the mean."""
+    """Curves of the last hit and the mean."""
     outcome: Outcome | None = None
-    """At the end."""
+    """Result; None before the end."""
 
     @property
     def shown_word(self) -> str:
-        """The word as a screen shows it: the verdict in place of REFUSED."""
+        """Word as a screen shows it: the verdict in place of REFUSED."""
         if self.word is not TapStep.REFUSED or not self.verdict:
             return self.word.value
         return f"{self.verdict}{', trial hit' if self.trial else ''}".upper()

@@ -15,22 +15,26 @@ RECORD = 0.25
 LONGEST_RECORD = 4.0
 """Longest record chosen (s)."""
 TIME_CONSTANTS = 6
-"""Of the slowest mode, that a record holds (ISO 7626-5: then the cut-off part is < 0.5 %)."""
+"""Time constants of the slowest mode that a record holds (ISO 7626-5: then the cut-off part is < 0.5 %)."""
 RECORD_STEP = 0.05
 """A longer record is a multiple of this (s)."""
 LEVEL_SHARE = 0.1
-"""Trigger level against the median peak of the trial hits ..."""
+"""Trigger level over the median peak of the trial hits; chosen."""
 LEVEL_NOISE_RATIO = 10.0
-"""... and against the rms of the force at rest: the larger of both ..."""
+"""Trigger level over the rms of the force at rest, where that is the larger one; chosen."""
 LEVEL_CAP = 0.5
-"""... but at most this share of the softest trial hit."""
+"""Trigger level over the softest trial hit, at most; chosen."""
+FIRST_LEVEL_SHARE = 0.005
+"""Trigger level of the first trial hit over the range of the force, at least; chosen."""
 RANGE_LOW, RANGE_HIGH = 0.02, 0.9
-"""Share of its range that a channel should stay between."""
+"""Shares of its range that a channel should stay between; chosen."""
+HEADROOM = 2
+"""Range to choose over the peaks of the hits; chosen."""
 MOST = 3
 """Trial hits at most."""
 _RANGES = HitFlags.TOO_SOFT | HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
 _USABLE = HitFlags.NOT_DECAYED | _RANGES
-"""What a trial hit may be: that is what trial hits are for."""
+"""Flags that a trial hit may have: to find them out is what trial hits are for."""
 
 
 def trigger_of(setup: TapSetup, sample_rate: float) -> Trigger | None:
@@ -63,7 +67,7 @@ class Trial:
 
     @property
     def text(self) -> str:
-        """What to do; when done, what was chosen, and which range to choose."""
+        """Sentence on what to do; when done, on what was chosen, and which range to choose."""
         if not self.done:
             return f"Trial hit {len(self._hits) + 1}: it chooses trigger level and record length and does not count."
         slowest = max(ring_down(hit) for hit in self._hits)
@@ -73,8 +77,8 @@ class Trial:
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """One for each channel whose range the trial hits do not fit into."""
-        found = (_range_remark(self._hits, i) for i in (0, 1) if self._hits)
-        return tuple(remark for remark in found if remark is not None)
+        remarks = (_range_remark(self._hits, i) for i in (0, 1) if self._hits)
+        return tuple(remark for remark in remarks if remark is not None)
 
     def add(self, hit: Hit) -> HitFlags:
         """Take a trial hit; returns why it is no use, falsy where it is."""
@@ -91,7 +95,7 @@ class Trial:
             return self._setup.trigger_n
         noise = LEVEL_NOISE_RATIO * float(np.std(self._baseline.force))
         if not self._hits:
-            return max(noise, 0.005 * _range(self._baseline, 0))
+            return max(noise, FIRST_LEVEL_SHARE * _range(self._baseline, 0))
         peaks = [float(np.max(hit.force)) for hit in self._hits]
         level = min(max(LEVEL_SHARE * float(np.median(peaks)), noise), LEVEL_CAP * min(peaks))
         return float(f"{level:.2g}")
@@ -126,7 +130,7 @@ def _range_remark(hits: Sequence[Hit], channel: int) -> Remark | None:
     if RANGE_LOW <= share <= RANGE_HIGH:
         return None
     too_large = share < RANGE_LOW
-    wanted = 2 * float(np.median(peaks)) if too_large else 2 * max(peaks)
+    wanted = HEADROOM * (float(np.median(peaks)) if too_large else max(peaks))
     return Remark(
         "range-too-large" if too_large else "range-too-small",
         name,

@@ -60,7 +60,7 @@ class CutState:
     """Time for which a cut is still waited for (s)."""
     cut_seconds: float | None = None
     """Length of the cut heard so far (s)."""
-    found: CutComparison | None = None
+    comparison: CutComparison | None = None
     """Cut as it was heard, beside what was expected of it; None before the end."""
     saved: str = ""
     """Name under which it is kept; empty where it is not, or not yet."""

@@ -1,17 +1,23 @@
-"""The sound of a cut: from a file, or from the device that machine.toml names."""
+"""A cut heard, from a file or from the device that machine.toml names, judged, and shown meanwhile."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import contextlib
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from acquisition import Description
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_sound import read_sound
+from lobewatch.logbook import Logbook
+from lobewatch.logbook.cut_comparison import CutComparison, compare_cut
 from lobewatch.machine import MachineFolder, checked_rate
 from lobewatch.machine.settings.cut_setting import CutSetting
+from lobewatch.tap.listening.cut_state import CutState, CutStep, cut_curves, word_of
 from lobewatch.tap.listening.record_cut import record_cut
 from lobewatch.tap.plug import REPLAY, open_source
+from lobewatch.tap.publisher import Pictures
 
 
 def hear_cut(
@@ -20,18 +26,18 @@ def hear_cut(
     file: Path | None,
     port: str,
     patience: float,
-    said: Description,
+    description: Description,
     show: Callable[[str], None],
     picture: Callable[..., None],
 ) -> CutSignal:
-    """What the accelerometer hears; file: in place of the device, said: what it does not say itself.
+    """The sound at the accelerometer; file: in place of the device, description: what the file does not say itself.
 
     patience: how long a cut is waited for (s); show: told what to do; picture: as in record_cut. ValueError without a
     port, DataError for a file that holds no such recording and where no cut is heard, DeviceError where no device
     answers.
     """
     if file is not None:
-        return read_sound(file, said)
+        return read_sound(file, description)
     port = port or folder.machine.daq.port
     if not port:
         raise ValueError(f"no port: give --port, --file, or port in [daq] of {folder.toml}")
@@ -45,3 +51,27 @@ def hear_cut(
         picture(device=f"{device.identity.model}, {device.sample_rate:g} Hz")
         device.start()
         return record_cut(device, 60 / setting.speed_rpm, patience, show, picture)
+
+
+@contextlib.contextmanager
+def cut_pictures(logbook: Logbook, setting: CutSetting) -> Iterator[Pictures[CutState]]:
+    """Begin with where the sensor belongs; what is raised within is the last of them."""
+    cut = f"{setting.program or 'reference cut'}, {setting.speed_rpm:g} rpm, {1e3 * setting.depth:g} mm"
+    title, reason = f"{logbook.machine.machine.name}: {cut}", "From the tool to the housing; spindle turning in air."
+    pictures = Pictures(CutState(0, CutStep.SENSOR, title, reason=reason), time.monotonic)
+    try:
+        yield pictures
+    except KeyboardInterrupt:
+        pictures.show(word=CutStep.FAILED, reason="Stopped at the terminal.", level=None, left=None)
+        raise
+    except (OSError, RuntimeError, ValueError) as error:
+        pictures.show(word=CutStep.FAILED, reason=str(error), level=None, left=None)
+        raise
+
+
+def judge_live(logbook: Logbook, setting: CutSetting, signal: CutSignal, pictures: Pictures[CutState]) -> CutComparison:
+    """Listen to a recording, and show the word."""
+    pictures.show(word=CutStep.JUDGING, reason="The cut is over.", level=None, left=None, cut_seconds=None)
+    comparison = compare_cut(logbook, setting, signal)
+    pictures.show(word=word_of(comparison), reason="", comparison=comparison, plots=cut_curves(comparison))
+    return comparison

@@ -16,17 +16,17 @@ from lobewatch.tap.listening.cut_state import CutStep
 from lobewatch.tap.live_signal import LEVEL_TIME
 
 LOOK = 0.5
-"""A look at what has been heard every so often (s)."""
+"""Time between two looks at what has been heard (s)."""
 KEPT = 20.0
-"""Of the newest is kept (s)."""
+"""Length of the newest sound that is kept (s)."""
 LONGEST = 8.0
-"""A cut is listened to for so long, whether it ends or not (s)."""
+"""Length after which a cut is judged, whether it ends or not (s)."""
 AFTER = 0.3
-"""Of air that shows that it has ended (s)."""
+"""Length of air that shows that a cut has ended (s)."""
 BEFORE = 1.0
-"""Of air that is kept before it (s)."""
+"""Length of air that is kept before a cut (s)."""
 ALIVE = 1.0
-"""After so long it is looked at whether anything is heard at all (s)."""
+"""Time after which it is looked at whether anything is heard at all (s)."""
 
 BEGIN = "hearing the spindle turn in air; begin the cut"
 ON_HOUSING = "The sensor on the housing, the spindle turning in air: now begin the cut."
@@ -36,7 +36,7 @@ GO_ON = "A second or longer, then out of the cut: it is judged by itself."
 
 @dataclass
 class _Ear:
-    """What has been heard so far of one channel."""
+    """Sound heard so far on one channel."""
 
     channel: Channel
     row: int
@@ -61,17 +61,17 @@ class _Ear:
 
     @property
     def signal(self) -> CutSignal:
-        """All that is kept."""
+        """Sound that is kept."""
         codes, first = np.concatenate(self.codes), self.heard - self.count
-        marks = [what for place, what in self.marks if place > first]
-        lost = sum(what for what in marks if what > 0)
+        marks = [mark for place, mark in self.marks if place > first]
+        lost = sum(mark for mark in marks if mark > 0)
         return CutSignal(
             np.asarray(codes * self.channel.scale, np.float64), self.rate, codes, self.channel, lost, -1 in marks
         )
 
     @property
     def level(self) -> float:
-        """rms about the mean over the newest LEVEL_TIME (m/s^2)."""
+        """Root mean square about the mean over the newest LEVEL_TIME (m/s^2)."""
         wanted, newest = round(LEVEL_TIME * self.rate), list[NDArray[np.int32]]()
         for codes in reversed(self.codes):
             newest.insert(0, codes)
@@ -80,7 +80,7 @@ class _Ear:
         return float(np.std(np.concatenate(newest)[-wanted:]) * abs(self.channel.scale))
 
     def forget(self) -> None:
-        """What was heard is no use."""
+        """Drop the sound heard so far, which is no use."""
         self.codes, self.count, self.marks = [self.codes[-1]], self.codes[-1].size, []
 
 
@@ -129,7 +129,7 @@ def _ear(device: Device) -> _Ear:
 
 
 def _looks(device: Device, ear: _Ear, patience: float, picture: Callable[..., None]) -> Iterator[CutSignal]:
-    """What has been heard, again and again."""
+    """Sound heard so far, again and again."""
     next_look, next_level, checked = LOOK, LEVEL_TIME, False
     for block in device.blocks():
         ear.add(block)

@@ -1,4 +1,4 @@
-"""A spindle that ages, tapped every month: what was emulated beside what was found."""
+"""A spindle that ages, tapped every month: the truth beside the result."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from lobewatch.tap.stories.story import Story, Wear
 SCATTERS = Mounting()
 """Tests that differ by their scatter alone."""
 DIRECTIONS: dict[TapDirection, int] = {"x": 0, "y": 30}
-"""Of the tests of a month, and the minute of the hour at which each is taken."""
+"""Directions of the tests of a month, with the minute of the hour at which each is taken."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +40,15 @@ class SpindleState:
     frequency: float
     """First natural frequency (Hz)."""
     damping_ratio: float
-    """Its damping ratio (-)."""
+    """Damping ratio of that mode (-)."""
     stiffness: float
-    """Its stiffness at the tool tip (N/m)."""
+    """Stiffness of that mode at the tool tip (N/m)."""
     bearing_stiffness: float
-    """Of each bearing (N/m)."""
+    """Stiffness of each bearing (N/m)."""
 
-    def relative_to(self, other: SpindleState) -> SpindleState:
+    def relative_to(self, reference: SpindleState) -> SpindleState:
         """Relative differences (-)."""
-        return SpindleState(*(mine / its - 1 for mine, its in zip(astuple(self), astuple(other), strict=True)))
+        return SpindleState(*(value / base - 1 for value, base in zip(astuple(self), astuple(reference), strict=True)))
 
 
 @dataclass(frozen=True)
@@ -56,15 +56,15 @@ class PlannedTap:
     """One tap test of the demo before it is taken."""
 
     date: datetime
-    """Of the simulated calendar; the two of a month differ."""
+    """Date in the simulated calendar; those of the two tests of a month differ."""
     direction: TapDirection
-    """In which is tapped."""
+    """Direction in which is tapped."""
     structure: Structure
-    """What the hammer meets."""
+    """Structure that the hammer meets."""
     truth: SpindleState
-    """The same in four figures."""
+    """Truth: the spindle as emulated."""
     conditions: Conditions = UNSAID
-    """What is said of the test."""
+    """Conditions of the test."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +72,9 @@ class TakenTap:
     """One tap test of the demo, committed."""
 
     plan: PlannedTap
-    """What was emulated."""
+    """Test as it was planned, with its truth."""
     id: str
-    """In the journal."""
+    """Identity in the journal."""
 
 
 @dataclass(frozen=True)
@@ -82,9 +82,9 @@ class DemoTap:
     """One tap test of the demo."""
 
     plan: PlannedTap
-    """What was emulated."""
-    found: SpindleState
-    """What the pipeline made of the hits."""
+    """Test as it was planned, with its truth."""
+    result: SpindleState
+    """Spindle as the pipeline measured it."""
 
 
 def plan_taps(
@@ -131,11 +131,11 @@ def age_spindle(
 
 
 def compare_with_truth(logbook: Logbook, taken: Iterable[TakenTap]) -> list[DemoTap]:
-    """What all these tests say, beside what was emulated; DataError where one does not show the mode followed.
+    """The results of these tests beside what was emulated; DataError where one does not show the mode followed.
 
     The history is worked out once, after the last test, and not anew after every one with a word on every program.
     """
-    return [DemoTap(tap.plan, _found(logbook.measurement(tap.id))) for tap in taken]
+    return [DemoTap(tap.plan, _result(logbook.measurement(tap.id))) for tap in taken]
 
 
 def _plan(
@@ -161,7 +161,7 @@ def _take(folder: MachineFolder, plan: PlannedTap, random: np.random.Generator) 
     return hits.tap.id
 
 
-def _found(measurement: Measurement) -> SpindleState:
+def _result(measurement: Measurement) -> SpindleState:
     mode, calibration = measurement.followed, measurement.calibration
     if mode is None or calibration is None:
         why = "; ".join(map(str, measurement.remarks))

@@ -14,23 +14,23 @@ from lobewatch.machine import MachineFolder
 from lobewatch.tap.emulated_spindle import with_bearing_stiffness
 
 FALL = 0.10
-"""Fall of the first natural frequency over a story that wears the spindle out."""
+"""Fall of the first natural frequency over a story that wears the spindle out, as a share; chosen."""
 STEP = 0.02
-"""Fall at once, halfway."""
+"""Fall at once, halfway, as a share; chosen."""
 POWER = 3
-"""Of the time, that an accelerating fall goes with."""
+"""Power of the time that an accelerating fall goes with; chosen."""
 NEW_AT = 0.6
-"""Share of the months after which the bearings are replaced."""
+"""Share of the months after which the bearings are replaced; chosen."""
 DEEPEST = 0.3
-"""Fall beyond which nothing is worked out."""
+"""Largest fall that is worked out, as a share."""
 MOST = 60
 """Months that the truth is looked up in beyond the end of a story."""
 HALVINGS = 20
-"""Of a month, in which the date of a fall is looked for."""
+"""Number of halvings of a month, in which the date of a fall is looked for."""
 
 
 class Story(StrEnum):
-    """What befalls the bearings."""
+    """Stories of the bearings."""
 
     STEADY = "steady"
     """The first natural frequency falls by the same share every month."""
@@ -49,17 +49,17 @@ class Wear:
     """One spindle in one story; months count from 0, the last test is at `months` - 1."""
 
     new: Spindle
-    """As it was built."""
+    """Spindle as it was built."""
     fresh: float
     """Stiffness of each bearing when new (N/m)."""
     months: int
-    """Of the story."""
+    """Length of the story (months)."""
     story: Story
-    """Which."""
+    """Story of the bearings."""
 
     @classmethod
     def of(cls, folder: MachineFolder, months: int, story: Story) -> Self:
-        """Of the spindle of a machine; DataError where machine.toml has none."""
+        """The wear of the spindle of a machine; DataError where machine.toml has none."""
         table = folder.machine.spindle
         if table is None:
             raise DataError(f"{folder.toml}: no model to age: add a [spindle] table (or use lobewatch init --example)")
@@ -71,7 +71,7 @@ class Wear:
         return math.ceil(NEW_AT * self.months) if self.story is Story.REPLACED and self.months > 1 else None
 
     def spindle(self, month: float) -> Spindle:
-        """As it is then."""
+        """The spindle as it is then."""
         return with_bearing_stiffness(self.new, self.bearing_stiffness(month))
 
     def frequency(self, month: float) -> float:
@@ -79,12 +79,12 @@ class Wear:
         return float(natural_frequencies(self.spindle(month), 1)[0])
 
     def bearing_stiffness(self, month: float) -> float:
-        """Of each bearing then (N/m)."""
+        """Stiffness of each bearing then (N/m)."""
         fall = self.fall(month)
         return float(calibrate(self.new, (1 - fall) * self._first).bearing_stiffness) if fall else self.fresh
 
     def fall(self, month: float) -> float:
-        """Of the first natural frequency since it was new, as a share of it."""
+        """Fall of the first natural frequency since it was new, as a share of it."""
         if self.replaced_at is not None and month >= self.replaced_at:
             month -= self.replaced_at
         share = month / max(self.months - 1, 1)

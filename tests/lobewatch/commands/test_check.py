@@ -68,11 +68,11 @@ def check(shop: Shop, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFix
 @pytest.fixture
 def no_search(monkeypatch: pytest.MonkeyPatch) -> None:
     """Takes the search for settings out of tests that are not about it."""
-    monkeypatch.setattr("lobewatch.logbook.logbook.advise", lambda *_: Advice())
+    monkeypatch.setattr("lobewatch.logbook.analysis.advise", lambda *_: Advice())
 
 
 def advised_to(monkeypatch: pytest.MonkeyPatch, best: Setting | None, here: Setting | None) -> None:
-    monkeypatch.setattr("lobewatch.logbook.logbook.advise", lambda *_: Advice(best, here))
+    monkeypatch.setattr("lobewatch.logbook.analysis.advise", lambda *_: Advice(best, here))
 
 
 def test_a_new_spindle_passes_and_an_aged_one_does_not(shop: Shop, check: Check) -> None:

@@ -17,7 +17,7 @@ from matplotlib.patches import Rectangle
 from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
 from lobes import Cut, radial_lobes, stability_boundary, zero_order
 from lobewatch.cli import main
-from lobewatch.history.columns.row_lobes import row_lobes
+from lobewatch.history.history_columns import row_lobes
 from lobewatch.logbook import Logbook, compare_lobes
 from lobewatch.machine import ProgramTable, drive_limit
 from lobewatch.machine.folder import MachineFolder
@@ -26,7 +26,7 @@ from lobewatch.machine.settings.machine_file import parse_machine
 from lobewatch.show.figures.labels import PictureLabels
 from lobewatch.show.figures.lobe_figures import BAND, lobes_figure, radial_figure, waterfall_figure
 from lobewatch.show.figures.lobe_pictures import lobes_picture
-from lobewatch.show.figures.trend_figures import new_axes, svg
+from lobewatch.show.figures.style import new_axes, svg
 from lobewatch.show.programs.describe_lobes import comparison_json, comparison_texts
 from lobewatch.tool import Dynamics, Method, chart, lobes_of, speed_grid
 from lobewatch.verdicts import Setting, Verdict, Word

@@ -16,7 +16,7 @@ from lobewatch.cli import app
 from lobewatch.decay import Standing
 from lobewatch.logbook import Logbook
 from lobewatch.show.report.report import render_report
-from lobewatch.tap.outcome import outcome_of
+from lobewatch.tap.session import outcome_of
 from lobewatch.verdicts.verdict import Word
 
 SPINDLE = "# The spindle of the example"

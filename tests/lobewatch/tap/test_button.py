@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from acquisition import Channel, Event, EventKind, HammeredStructure, HitFlags, TapsEmulator, TapsSource, TapTest
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.connection import Button
-from lobewatch.tap.session import TapSession, TapStopped
+from lobewatch.tap.hit_loop import TapStopped
+from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState
 
 RATE = 25600.0

@@ -15,7 +15,8 @@ import pytest
 
 from acquisition import Channel, Circumstances, DataError, HammeredStructure, TapTest, new_tap_id, write_hit
 from lobewatch.machine.folder import MachineFolder
-from lobewatch.tap.session import TapSession, TapStopped
+from lobewatch.tap.hit_loop import TapStopped
+from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState, TapStep
 from modal import Mode, synthesize
 

@@ -13,8 +13,9 @@ import pytest
 
 from acquisition import Channel, Circumstances, HammeredStructure, HitFlags, read_tap, read_tap_hits
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.in_progress import TapInProgress, begin_tap
-from lobewatch.tap.session import TapSession, TapStopped
+from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState
 
 Tapper = Callable[..., HammeredStructure]

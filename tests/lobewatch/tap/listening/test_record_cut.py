@@ -18,8 +18,8 @@ from lobewatch.logbook import Logbook
 from lobewatch.logbook.cut_comparison import compare_cut
 from lobewatch.machine import MachineFolder, make_machine_folder
 from lobewatch.machine.settings.cut_setting import cut_setting
+from lobewatch.tap.emulated_cut import emulate_cut
 from lobewatch.tap.listening.record_cut import record_cut
-from lobewatch.tap.milling.emulated_cut import emulate_cut
 
 RATE = 12800.0
 CHANNELS = (Channel("force", 2e-3, 5.0), Channel("acceleration", 1e-2, 5.0))

@@ -15,8 +15,7 @@ from lobewatch.cli import app
 from lobewatch.decay.trend import MONTH, TapValue, Trend, day, trend_of
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.stories.demo import PlannedTap, plan_taps
-from lobewatch.tap.stories.mounted import mounted_at
-from lobewatch.tap.stories.mounting import Mounting
+from lobewatch.tap.stories.mounting import Mounting, mounted_spindle
 from lobewatch.tap.stories.story import Story, Wear
 
 MONTHS = 24
@@ -114,7 +113,7 @@ def test_bad_clampings_are_lower_and_as_many_as_asked(folder: MachineFolder) -> 
 
 def test_an_emulated_month_is_seeded_and_falls_with_the_story(folder: MachineFolder) -> None:
     def frequency(month: int, seed: int = 1) -> float:
-        spindle = mounted_at(folder, Story.STEADY, MONTHS, month, Mounting(0.001), seed)
+        spindle = mounted_spindle(folder, Story.STEADY, MONTHS, month, Mounting(0.001), seed)
         return float(natural_frequencies(spindle, 1)[0])
 
     assert frequency(5) == frequency(5) != frequency(5, seed=2)

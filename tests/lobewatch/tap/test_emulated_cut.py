@@ -18,8 +18,7 @@ from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.machine.settings.cut_setting import cut_setting
-from lobewatch.tap.milling.emulated_cut import EmulatedCut, emulate_cut
-from lobewatch.tap.milling.hidden_truth import hidden_truth, runout_of
+from lobewatch.tap.emulated_cut import EmulatedCut, emulate_cut, hidden_truth, runout_of
 
 RATE = 25600.0
 PASSAGE = Passage(before=0.2, ramp=0.05, steady=0.5, after=0.1)
@@ -97,7 +96,7 @@ def test_the_truth_is_that_of_the_seed_whatever_is_cut(folder: MachineFolder) ->
 
 
 def test_truths_scatter_as_spindles_at_speed_may() -> None:
-    truths = [hidden_truth(seed).told for seed in range(400)]
+    truths = [hidden_truth(seed).factors for seed in range(400)]
     middle = {name: float(np.mean([truth[name] for truth in truths])) for name in truths[0]}
     spread = {name: float(np.std([truth[name] for truth in truths])) / middle[name] for name in middle}
     for side in "xy":

@@ -1,8 +1,12 @@
-"""A cut on an emulated machine, heard by the accelerometer on its housing, again and again."""
+"""A cut on an emulated machine, heard by the accelerometer on its housing, again and again.
+
+The spindle at speed, and the cut, differ from what was tapped and what stands in machine.toml by a hidden truth.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,24 +14,69 @@ from acquisition import Bench, DataError, Driver, EmulatorThread, Structure
 from acquisition.emulation import CutSound, Housing, MillingCut, Passage, random_housing, simulate_cut
 from dsm import Spindle
 from lobes import Program, program_limit
+from lobewatch.cuts.learning.priors import DAMPING, FORCE, FREQUENCY, STIFFNESS
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.cut_setting import CutSetting
 from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.tap.emulated_spindle import SAMPLE_RATE, emulated_inputs, emulated_structure
-from lobewatch.tap.milling.hidden_truth import HiddenTruth, hidden_truth, runout_of
 from modal import Mode
 
 PASSAGE = Passage(before=2.0, ramp=0.1, steady=2.8, after=2.0)
-"""What is repeated: air, cut, air."""
+"""Air, cut, air (s), again and again."""
 STIFFEST, HIGHEST = 100.0, 6000.0
 """Modes so many times as stiff as the softest, or so high (Hz), are left out: a cut hardly moves them, but steps for
-them take long."""
+them take long; chosen."""
 HEARD = np.arange(100.0, 8000.0, 2.0)
 """Frequencies of cuts and chatter (Hz)."""
 FEED_SHARE = 5e-3
-"""Feed per tooth over diameter, where machine.toml does not say."""
+"""Feed per tooth over diameter, where machine.toml does not say; chosen."""
 EDGES = (25e3, 35e3)
 """Tangential and radial edge coefficients (N/m), where they are not known: about those of aluminium."""
+LEAST = 0.3
+"""Least share of its middle that a drawn factor falls to; chosen."""
+OFF_COMMAND = 0.015
+"""Share by which the spindle turns slower or faster than it is told, at most; chosen."""
+RUNOUT = 20e-6
+"""Largest eccentricity of a tool in its holder (m); chosen."""
+
+
+class ModeFactors(NamedTuple):
+    """Factors on the modes of one direction."""
+
+    frequency: float
+    """Factor on the natural frequencies (-)."""
+    damping_ratio: float
+    """Factor on the damping ratios (-)."""
+    stiffness: float
+    """Factor on the stiffnesses (-)."""
+
+    def of(self, at_rest: Structure) -> Structure:
+        """Structure at speed, from that at rest."""
+        return Structure(
+            at_rest.frequency * self.frequency,
+            at_rest.damping_ratio * self.damping_ratio,
+            at_rest.stiffness * self.stiffness,
+        )
+
+
+class HiddenTruth(NamedTuple):
+    """Factors that nobody has measured."""
+
+    x: ModeFactors
+    """Factors on the modes in x."""
+    y: ModeFactors
+    """Factors on the modes in y."""
+    tangential: float
+    """Factor on both cutting coefficients (-)."""
+    speed: float
+    """Factor on the spindle speed that is told (-)."""
+
+    @property
+    def factors(self) -> dict[str, float]:
+        """All factors by name."""
+        sides = {"x": self.x, "y": self.y}
+        modes = {f"{name}_{side}": value for side, mode in sides.items() for name, value in mode._asdict().items()}
+        return modes | {"tangential": self.tangential, "speed": self.speed}
 
 
 @dataclass(frozen=True)
@@ -35,9 +84,9 @@ class EmulatedCut:
     """A device made of software on a housing made of numbers."""
 
     device: EmulatorThread
-    """Serves while its context lasts."""
+    """Emulator that serves while its context lasts."""
     truth: HiddenTruth
-    """What nobody has measured."""
+    """Hidden truth of the seed."""
     speed_rpm: float
     """True spindle speed (rpm)."""
     limit: float
@@ -85,22 +134,22 @@ def _at_rest(folder: MachineFolder, setting: CutSetting, spindle: Spindle | None
         raise DataError(f"{folder.toml}: no model to emulate: add a [spindle] table (or use lobewatch init --example)")
     whole = emulated_structure(spindle or folder.machine.model(setting.tool), table.damping_ratio)
     softest = int(np.argmin(whole.stiffness))
-    some = (whole.stiffness < STIFFEST * whole.stiffness[softest]) & (whole.frequency < HIGHEST)
-    some[softest] = True
-    return Structure(whole.frequency[some], whole.damping_ratio[some], whole.stiffness[some])
+    moved = (whole.stiffness < STIFFEST * whole.stiffness[softest]) & (whole.frequency < HIGHEST)
+    moved[softest] = True
+    return Structure(whole.frequency[moved], whole.damping_ratio[moved], whole.stiffness[moved])
 
 
 def _levelled(housing: Housing) -> Housing:
-    """With a gain that its own modes do not exceed: a sensor that is chosen so that chatter does not overload it."""
+    """Housing with a gain that its own modes do not exceed: with a sensor that chatter does not overload."""
     loudest = float(np.max(np.abs(housing.transfer(HEARD))))
     return replace(housing, gain=(housing.gain[0] / loudest, housing.gain[1] / loudest))
 
 
 def _turning_cut(
-    folder: MachineFolder, setting: CutSetting, rest: Structure, truth: HiddenTruth, runout: tuple[float, ...]
+    folder: MachineFolder, setting: CutSetting, at_rest: Structure, truth: HiddenTruth, runout: tuple[float, ...]
 ) -> MillingCut:
-    known = folder.machine.coefficients(setting.table)
-    edges = np.array([known.tangential_edge, known.radial_edge])
+    coefficients = folder.machine.coefficients(setting.table)
+    edges = np.array([coefficients.tangential_edge, coefficients.radial_edge])
     edges = np.where(np.isfinite(edges), edges, EDGES)
     feed = setting.table.feed_per_tooth_mm or FEED_SHARE * setting.table.tool_diameter_mm
     return MillingCut(
@@ -114,8 +163,8 @@ def _turning_cut(
         depth=setting.depth,
         feed_per_tooth=feed / 1e3,
         speed_rpm=setting.speed_rpm * truth.speed,
-        x=truth.x.of(rest),
-        y=truth.y.of(rest),
+        x=truth.x.of(at_rest),
+        y=truth.y.of(at_rest),
         runout=runout,
         helix_lag=setting.cut.helix_lag,
         feed_angle=FEED_ANGLES.get(setting.feed, 0.0),
@@ -125,9 +174,26 @@ def _turning_cut(
 def _limit(cut: MillingCut, setting: CutSetting) -> float:
     """Deepest stable depth, by semi-discretisation (m)."""
     x, y = (
-        [Mode(*one) for one in zip(side.frequency, side.damping_ratio, side.stiffness, strict=True)]
+        [Mode(*figures) for figures in zip(side.frequency, side.damping_ratio, side.stiffness, strict=True)]
         for side in (cut.x, cut.y)
         if side is not None
     )
     pushed = replace(setting.cut, tangential=cut.tangential, radial=cut.radial, feed_angle=cut.feed_angle)
     return program_limit(Program(pushed, cut.speed_rpm, cut.depth), x, y).limit
+
+
+def hidden_truth(seed: int) -> HiddenTruth:
+    """Truth of a seed, the same whatever is cut; modes in x and y differ apart."""
+    random = np.random.default_rng([seed, 1])
+    x, y = (ModeFactors(*(_drawn(random, *prior) for prior in (FREQUENCY, DAMPING, STIFFNESS))) for _ in range(2))
+    return HiddenTruth(x, y, _drawn(random, *FORCE), 1 + random.uniform(-OFF_COMMAND, OFF_COMMAND))
+
+
+def runout_of(teeth: int, random: np.random.Generator) -> tuple[float, ...]:
+    """Run-out of each tooth of an eccentric tool: how far it stands out (m)."""
+    angle = 2 * np.pi * np.arange(teeth) / teeth + random.uniform(0, 2 * np.pi)
+    return tuple((random.uniform(0, RUNOUT) * np.cos(angle)).tolist())
+
+
+def _drawn(random: np.random.Generator, middle: float, spread: float) -> float:
+    return float(middle * max(1 + spread * random.standard_normal(), LEAST))

@@ -49,8 +49,8 @@ class Import:
     """Module that defines it."""
     name: str
     """The name itself; empty for a whole module."""
-    inside: bool
-    """Whether the import stands in a function."""
+    is_hidden: bool
+    """Whether the import stands in a function or is made for type checking alone."""
 
 
 class House:
@@ -126,19 +126,19 @@ class House:
         return where
 
     def _taken(self, module: str) -> Iterator[Import]:
-        functions = [node for node in ast.walk(self.trees[module]) if isinstance(node, ast.FunctionDef)]
-        inner = {id(node) for function in functions for node in ast.walk(function)}
+        holders = [node for node in ast.walk(self.trees[module]) if _hides(node)]
+        hidden = {id(node) for holder in holders for node in ast.walk(holder)}
         for node in ast.walk(self.trees[module]):
             if isinstance(node, ast.ImportFrom):
                 base = _absolute(node, module, self.paths[module])
                 for alias in node.names:
                     target = self._definer(base, alias.name)
                     if target is not None:
-                        yield Import(module, target, alias.name, id(node) in inner)
+                        yield Import(module, target, alias.name, id(node) in hidden)
             elif isinstance(node, ast.Import):
                 for alias in node.names:
                     if alias.name in self.paths:
-                        yield Import(module, alias.name, "", id(node) in inner)
+                        yield Import(module, alias.name, "", id(node) in hidden)
 
     def _definer(self, base: str, name: str) -> str | None:
         if f"{base}.{name}" in self.paths:
@@ -147,6 +147,12 @@ class House:
             return None
         further = self._facades[base].get(name)
         return base if further is None else self._definer(*further)
+
+
+def _hides(node: ast.AST) -> bool:
+    """Whether what is imported below a node is not imported with its module."""
+    is_check = isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+    return is_check or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
 
 
 def _module(path: Path, root: Path) -> str:
@@ -171,6 +177,7 @@ def _handed_on(module: str, path: Path, tree: ast.Module) -> dict[str, tuple[str
         for node in top
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
+        if _absolute(node, module, path) != module
     }
 
 

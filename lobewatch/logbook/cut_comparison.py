@@ -11,7 +11,7 @@ from acquisition import DataError
 from acquisition.files.cut_file import CutSignal
 from lobewatch.cuts.listening.expected_sound import ExpectedSound, expected_sound
 from lobewatch.cuts.listening.fold_frequency import family_distance
-from lobewatch.cuts.listening.listen_to import CutRecording, CutSound, listen_to
+from lobewatch.cuts.listening.listen_to import CutRecording, HeardSound, listen_to
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine.additions.keep_cut import keep_cut, software
@@ -28,7 +28,7 @@ class CutComparison:
 
     setting: CutSetting
     """What was cut."""
-    heard: CutSound
+    heard: HeardSound
     """What it sounds like."""
     assembly: Assembly | None
     """The tool as it was tapped; None where it was not and cannot be predicted."""

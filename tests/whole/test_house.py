@@ -1,27 +1,22 @@
-"""The house stays tidy: small rooms, short files, short bodies, commands that only parse and show."""
+"""The house stays in order: layers without circles, short bodies, names that say what they hold."""
 
 from __future__ import annotations
 
 import ast
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from statistics import mean
 
 import pytest
+from rooms import PACKAGES, House
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("acquisition", "modal", "dsm", "lobes", "lobewatch")
-FLAT = {"modal": 26, "lobes": 31, "lobewatch/commands": 29}
-"""Folders that may hold more than twenty files, and how many."""
-WHOLE = (*PACKAGES, "tests")
-
-
-def sources(package: str) -> list[Path]:
-    return [path for path in (ROOT / package).rglob("*.py") if "plugins" not in path.parts]
-
-
-def lines(path: Path) -> int:
-    return len(path.read_text("utf-8").splitlines())
+HOUSE = House(ROOT)
+CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]["contracts"]
+DOOR = ("lobewatch.cli", "lobewatch.commands")
+"""What a person starts: it imports when it knows what is wanted."""
+DOMAIN = ("machine", "measuring", "tool", "verdicts", "cuts", "history", "decay", "logbook", "plant")
 
 
 def bodies(path: Path) -> Iterator[tuple[str, int]]:
@@ -33,33 +28,70 @@ def bodies(path: Path) -> Iterator[tuple[str, int]]:
             yield f"{path.relative_to(ROOT)}:{node.name}", (node.end_lineno or 0) - start + 1
 
 
-@pytest.mark.parametrize("package", WHOLE)
-def test_no_folder_holds_more_than_twenty_files(package: str) -> None:
-    count: dict[str, int] = {}
-    for path in sources(package):
-        name = path.parent.relative_to(ROOT).as_posix()
-        count[name] = count.get(name, 0) + 1
-    assert {name: n for name, n in count.items() if n > FLAT.get(name, 20)} == {}
+@pytest.mark.parametrize("package", PACKAGES)
+def test_no_rooms_and_no_files_reach_each_other_in_a_circle(package: str) -> None:
+    assert (HOUSE.circles(package), HOUSE.file_circles(package)) == ([], [])
 
 
-def test_no_file_of_the_application_is_longer_than_250_lines() -> None:
-    assert {str(path.relative_to(ROOT)): lines(path) for path in sources("lobewatch") if lines(path) > 250} == {}
+@pytest.mark.parametrize("contract", [one for one in CONTRACTS if one["type"] == "layers"], ids=lambda one: one["name"])
+def test_names_are_taken_from_layers_below_also_through_facades(contract: dict[str, list[str]]) -> None:
+    container = f"{contract['containers'][0]}." if "containers" in contract else ""
+    rank = {
+        f"{container}{name}": number
+        for number, layer in enumerate(reversed(contract["layers"]))
+        for name in layer.split(" | ")
+    }
+
+    def layer_of(module: str) -> int | None:
+        parts = module.split(".")
+        return next((rank[name] for n in range(len(parts)) if (name := ".".join(parts[: n + 1])) in rank), None)
+
+    upwards = [
+        f"{one.file} takes {one.name} of {one.target}"
+        for one in HOUSE.imports
+        if (mine := layer_of(one.file)) is not None and (other := layer_of(one.target)) is not None and mine < other
+    ]
+    assert upwards == []
+
+
+def test_the_application_imports_nothing_from_its_own_facade_and_hides_no_import() -> None:
+    mine = [one for one in HOUSE.imports if one.file.startswith("lobewatch.")]
+    assert [one.file for one in mine if one.target == "lobewatch"] == []
+    facade = [
+        module
+        for module, tree in HOUSE.trees.items()
+        for node in ast.walk(tree)
+        if module.startswith("lobewatch.") and isinstance(node, ast.ImportFrom) and node.module == "lobewatch"
+    ]
+    assert facade == []
+    assert [f"{one.file}: {one.name}" for one in mine if one.is_hidden and not one.file.startswith(DOOR)] == []
 
 
 @pytest.mark.parametrize("package", PACKAGES)
 def test_no_body_is_longer_than_40_lines(package: str) -> None:
-    assert {name: n for path in sources(package) for name, n in bodies(path) if n > 40} == {}
+    paths = (ROOT / package).rglob("*.py")
+    assert {name: count for path in paths for name, count in bodies(path) if count > 40} == {}
+
+
+def test_no_class_name_has_two_meanings() -> None:
+    assert {name: modules for name, modules in HOUSE.classes.items() if len(modules) > 1} == {}
+
+
+def test_names_and_docstrings_of_the_application_say_what_is_held() -> None:
+    lines = sum(HOUSE.lines("lobewatch").values())
+    assert 1000 * len(HOUSE.generic_names("lobewatch")) / lines <= 15
+    assert HOUSE.share_without_noun("lobewatch") <= 0.04
 
 
 def test_commands_only_parse_and_show() -> None:
-    commands = [path for path in sources("lobewatch/commands") if path.name not in ("__init__.py", "help_page.py")]
-    assert mean(map(lines, commands)) <= 65
+    lines = HOUSE.lines("lobewatch")
+    others = ("lobewatch.commands", "lobewatch.commands.help_page", "lobewatch.commands.file_options")
+    commands = [count for name, count in lines.items() if name.startswith("lobewatch.commands") and name not in others]
+    assert mean(commands) <= 65
 
 
-@pytest.mark.parametrize(
-    "room", ["machine", "measuring", "tool", "verdicts", "cuts", "history", "decay", "logbook", "plant"]
-)
+@pytest.mark.parametrize("room", DOMAIN)
 def test_the_domain_never_prints(room: str) -> None:
-    for path in sources(f"lobewatch/{room}"):
+    for path in (ROOT / "lobewatch" / room).rglob("*.py"):
         names = {node.id for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Name)}
         assert not names & {"print", "Console"}, path

@@ -44,7 +44,7 @@ NEAR = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class CutSound:
+class HeardSound:
     """What was heard in a recording, and what it rests on; None and NaN where it did not get so far."""
 
     word: CutWord
@@ -89,7 +89,7 @@ class CutRecording(NamedTuple):
     """Number of scans that are missing."""
 
 
-def listen_to(recording: CutRecording) -> CutSound:
+def listen_to(recording: CutRecording) -> HeardSound:
     """Tell a recording of a cut, with some air before or after it.
 
     Reasons why it cannot be told: "too-short", "no-cut", "no-air", "two-cuts", "knock", "overload", "lost-scans",
@@ -100,15 +100,15 @@ def listen_to(recording: CutRecording) -> CutSound:
     parts = find_cut(signal, rate, 60 / recording.commanded_rpm)
     reason = _fault(recording, parts)
     if reason:
-        return CutSound("cannot tell", reason, parts)
+        return HeardSound("cannot tell", reason, parts)
     spectrum, air = spectrum_of(signal[parts.cut], rate), spectrum_of(signal[parts.air], rate)
     lines, teeth = lines_of(spectrum), recording.teeth
     turning = true_speed(lines[~is_foreign(lines, air)], lines, spectrum, teeth, recording.commanded_rpm / 60)
     if turning is None:
-        return CutSound("cannot tell", "speed-not-found", parts, spectrum=spectrum)
+        return HeardSound("cannot tell", "speed-not-found", parts, spectrum=spectrum)
     unsteady = unsteadiness(signal[parts.cut], rate, lines, turning, spectrum.bin)
     by_origin = sort_lines(lines, spectrum, air, turning, teeth, unsteady)
-    return _judge_lines(CutSound("stable", "", parts, turning, 0.0, None, by_origin, spectrum), recording)
+    return _judge_lines(HeardSound("stable", "", parts, turning, 0.0, None, by_origin, spectrum), recording)
 
 
 def _fault(recording: CutRecording, parts: CutParts) -> str:
@@ -120,7 +120,7 @@ def _fault(recording: CutRecording, parts: CutParts) -> str:
     return "lost-scans" if recording.lost_scans else parts.reason
 
 
-def _judge_lines(sound: CutSound, recording: CutRecording) -> CutSound:
+def _judge_lines(sound: HeardSound, recording: CutRecording) -> HeardSound:
     """The word on a cut whose lines are known."""
     lines, turning, spectrum = sound.lines, sound.turning, sound.spectrum
     if lines is None or turning is None or spectrum is None:
@@ -148,7 +148,7 @@ def _power(chatter: ChatterLines) -> float:
     return float(chatter.lines.amplitude[at] ** 2)
 
 
-def _judge_without_chatter(sound: CutSound, recording: CutRecording) -> CutSound:
+def _judge_without_chatter(sound: HeardSound, recording: CutRecording) -> HeardSound:
     """Stable, unless multiples of the spindle are louder than run-out and teeth make them."""
     if sound.lines is None:
         return sound
@@ -160,7 +160,7 @@ def _judge_without_chatter(sound: CutSound, recording: CutRecording) -> CutSound
     return replace(sound, word="cannot tell", reason="on-spindle-lines") if is_odd or is_loud else sound
 
 
-def line_kinds(sound: CutSound) -> dict[str, SpectralLines]:
+def line_kinds(sound: HeardSound) -> dict[str, SpectralLines]:
     """Lines that are there, under "turns" of the spindle, "tooth" passing, "air" (there without a cut), "chatter"."""
     lines, chatter = sound.lines, sound.chatter
     named: dict[str, SpectralLines] = {}

@@ -75,7 +75,7 @@ class SpectralLines:
         return float(np.sum(self.amplitude**2))
 
     def loudest(self, count: int) -> SpectralLines:
-        """So many at most, the loudest first."""
+        """The loudest lines, the loudest first, so many at most."""
         return self[np.argsort(-self.amplitude)[:count]]
 
     def frequency_error(self, bin_: float) -> Floats:

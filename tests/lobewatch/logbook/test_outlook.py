@@ -80,7 +80,7 @@ def test_critical_falls_are_worked_out_once_and_kept(worn: Shop, monkeypatch: py
     def again(*_: object) -> None:
         raise AssertionError("judged again")
 
-    monkeypatch.setattr("lobewatch.logbook.logbook.judge_at_speed", again)
+    monkeypatch.setattr("lobewatch.logbook.analysis.judge_at_speed", again)
     assert outlook(worn.logbook).programs["A"] == first
     worn.edit("depth_mm = 1.5", "depth_mm = 1.4")
     with pytest.raises(AssertionError, match="judged again"):

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from acquisition.emulation import MillingCut, Passage, Structure, TipMotion, hear, random_housing, simulate_cuts
 from lobes import Cut, stability_boundary
 from lobewatch.cuts.listening.fold_frequency import family_distance
-from lobewatch.cuts.listening.listen_to import CutRecording, CutSound, listen_to
+from lobewatch.cuts.listening.listen_to import CutRecording, HeardSound, listen_to
 from modal import Mode
 
 PASSAGE = Passage(before=0.4, ramp=0.05, steady=1.05, after=0.2)
@@ -134,7 +134,7 @@ def tip_record(motion: TipMotion, turn: float, depth: float) -> TipRecord:
     return TipRecord(float(frequency[np.argmax(beside)]), float(np.sum(beside)) / total, math.sqrt(total) / depth)
 
 
-def listen(signal: NDArray[Any], case: Case, rate: float, random: Random) -> CutSound:
+def listen(signal: NDArray[Any], case: Case, rate: float, random: Random) -> HeardSound:
     commanded = case.speed_rpm * (1 + random.uniform(-0.015, 0.015))
     return listen_to(CutRecording(signal, rate, case.cut.teeth, case.cut.immersion, commanded))
 
@@ -152,7 +152,7 @@ class Tally:
     frequencies: list[float] = field(default_factory=list)
     """Relative errors of the chatter frequency modulo tooth passing."""
 
-    def add(self, case: Case, heard: CutSound, motions: list[TipRecord]) -> None:
+    def add(self, case: Case, heard: HeardSound, motions: list[TipRecord]) -> None:
         """One more cut; motions: at each of its shares."""
         motion, *beside, quiet = motions
         chatters = motion.chatters(quiet)
@@ -169,7 +169,7 @@ class Tally:
             )
 
 
-def _mark(heard: CutSound, chatters: bool) -> str:
+def _mark(heard: HeardSound, chatters: bool) -> str:
     if heard.word == "cannot tell":
         return "not told"
     return "right" if (heard.word != "stable") == chatters else "wrong"
@@ -181,7 +181,7 @@ def judge(seed: int, count: int, tally: Tally) -> None:
     drawn = list(cases(random, count))
     places = [(case, share) for case in drawn for share in case.shares]
     motions: dict[int, TipRecord] = {}
-    heard: dict[int, CutSound] = {}
+    heard: dict[int, HeardSound] = {}
     for place, motion in simulate_cuts([case.milled(share) for case, share in places], PASSAGE):
         case, share = places[place]
         motions[place] = tip_record(motion, case.speed_rpm / 60, share * case.limit)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lobewatch.cuts.listening.listen_to import CutRecording, CutSound, listen_to
+from lobewatch.cuts.listening.listen_to import CutRecording, HeardSound, listen_to
 
 Floats = NDArray[np.float64]
 RATE = 25600.0
@@ -60,7 +60,7 @@ def a_cut(teeth: int = 4, chatter: float | None = None, loud: float = 20.0, **op
     return sines(lines, round(CUT * RATE), random)
 
 
-def listen(signal: Floats, teeth: int = 4, **options: Any) -> CutSound:
+def listen(signal: Floats, teeth: int = 4, **options: Any) -> HeardSound:
     return listen_to(CutRecording(signal, RATE, teeth, 0.5, SET, **options))
 
 

@@ -1,0 +1,160 @@
+"""The likelihood of what was heard, in closed form where what each spindle would do is given."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import ndtr
+
+from lobes import Cut, stability_boundary, zero_order
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
+from lobewatch.cuts.learning.likelihood import CutPrediction, log_likelihood, most_likely, predict_cut
+from lobewatch.cuts.learning.posterior import prior
+from lobewatch.cuts.learning.priors import Draws
+from tests.lobewatch.cuts.learning.conftest import SLOT, Mill, doubt
+
+TEETH = 800.0
+"""Tooth frequency of a slot at 12 000 rpm (Hz)."""
+CHATTER = CutEvidence(SLOT, 12000, 3e-3, "chatter", 1750.0)
+"""Chatter that is folded to 150 Hz."""
+
+
+def predicted(base: float, at_limit: float, excess: float = 5.0, flip: bool = False) -> CutPrediction:
+    """What one spindle would do."""
+    return CutPrediction(np.array([excess]), np.array([base]), np.array([at_limit]), np.array([flip]))
+
+
+def log_of(cut: CutEvidence, prediction: CutPrediction) -> float:
+    """Logarithm of the likelihood on one spindle."""
+    return float(log_likelihood(cut, prediction)[0])
+
+
+def middle(mill: Mill) -> Draws:
+    """One spindle in the middle of the prior."""
+    draws = mill.prior.draws[:1]
+    draws.normal[:] = 0.0
+    return draws
+
+
+@pytest.mark.parametrize("depth", [0.9, 0.95, 1.0, 1.03, 1.1])
+def test_a_cut_is_heard_to_chatter_by_a_normal_edge_of_5_percent_but_for_2_percent(depth: float) -> None:
+    chance = predicted(0.0, 0.0, math.log(depth)).chance[0]
+    assert chance == pytest.approx(0.02 + 0.96 * ndtr(math.log(depth) / 0.05))
+    stable = replace(CHATTER, word="stable", frequency=math.nan)
+    assert log_of(stable, predicted(0.0, 0.0, math.log(depth))) == pytest.approx(math.log(1 - chance))
+    untold = replace(CHATTER, frequency=math.nan)
+    assert log_of(untold, predicted(0.0, 0.0, math.log(depth))) == pytest.approx(math.log(chance))
+
+
+def test_a_frequency_far_from_both_says_nothing_in_5_percent_and_one_that_is_met_speaks_for_the_spindle() -> None:
+    """Against a frequency that may be anywhere between 0 and half of tooth passing, a width of 1 % of 1750 Hz."""
+    nowhere, wide = math.log(0.98) + math.log(0.9), 17.5
+    assert log_of(CHATTER, predicted(390.0, 10.0)) == pytest.approx(nowhere + math.log(0.05), abs=1e-6)
+    for off in (0.0, -10.0, 17.5, 30.0):
+        peak = TEETH / 2 * math.sqrt(2 / math.pi) / wide * math.exp(-((off / wide) ** 2) / 2)
+        both, growing, limit = (
+            log_of(CHATTER, prediction)
+            for prediction in (
+                predicted(150 + off, 150 + off),
+                predicted(150 + off, 390.0),
+                predicted(390.0, 150 + off),
+            )
+        )
+        assert both == pytest.approx(nowhere + math.log(0.95 * peak + 0.05), abs=1e-6)
+        assert growing == limit == pytest.approx(nowhere + math.log(0.95 * peak / 2 + 0.05), abs=1e-6)
+
+
+def test_a_frequency_that_is_not_predicted_speaks_neither_for_nor_against_a_spindle() -> None:
+    unknown = log_of(CHATTER, predicted(math.nan, math.nan))
+    assert unknown == pytest.approx(math.log(0.98) + math.log(0.9))
+    assert log_of(CHATTER, predicted(390.0, 10.0)) < unknown < log_of(CHATTER, predicted(150.0, 150.0))
+
+
+def test_period_two_is_told_from_other_chatter_in_nine_of_ten() -> None:
+    flip = replace(CHATTER, word="flip", frequency=math.nan)
+    for cut, base in ((CHATTER, 150.0), (flip, TEETH / 2)):
+        is_flip = cut.word == "flip"
+        alike, unlike = (log_of(cut, predicted(base, base, flip=kind)) for kind in (is_flip, not is_flip))
+        assert alike - unlike == pytest.approx(math.log(0.9 / 0.1))
+        assert most_likely(cut) == pytest.approx(alike)
+    wide = 0.01 * TEETH
+    far = predicted(TEETH / 2 - 2 * wide, math.nan, flip=True)
+    peak = TEETH / 2 * math.sqrt(2 / math.pi) / wide * math.exp(-2)
+    assert log_of(flip, far) == pytest.approx(math.log(0.98 * 0.9 * (0.95 * (peak + 1) / 2 + 0.05)), abs=1e-6)
+
+
+def test_what_was_not_told_is_as_likely_as_can_be_where_a_cut_chatters() -> None:
+    assert most_likely(replace(CHATTER, frequency=math.nan)) == 0.0
+    assert most_likely(replace(CHATTER, word="stable", frequency=math.nan)) == 0.0
+
+
+def test_of_two_directions_of_feed_the_worse_counts(mill: Mill) -> None:
+    limits = {
+        angle: zero_order([mill.x], [mill.y], replace(mill.cut, feed_angle=angle), [9000.0]).depth[0]
+        for angle in (0.0, 0.7, np.pi / 2)
+    }
+    cut = CutEvidence(mill.cut, 9000, 1e-3, "stable")
+    excess = {angle: predict_cut(replace(cut, feed_angles=(angle,)), middle(mill)).excess[0] for angle in limits}
+    assert len(set(excess.values())) > 1
+    both = predict_cut(replace(cut, feed_angles=tuple(limits)), middle(mill))
+    assert both.excess[0] == max(excess.values())
+
+
+def test_a_speed_that_was_not_found_is_as_far_off_as_the_doubt_of_the_machine_says(mill: Mill) -> None:
+    draws = mill.prior.draws[:5]
+    draws.normal[:] = 0.0
+    cut = CutEvidence(mill.cut, 12000, 2e-3, "stable")
+    found, commanded = (predict_cut(replace(cut, speed_found=sure), draws).excess for sure in (True, False))
+    assert np.ptp(found) == 0
+    off = draws.at_rest.speed_rpm
+    assert 0.002 < np.ptp(off) < 0.02
+    at_true = [predict_cut(replace(cut, speed_rpm=12000 * factor), draws).excess[0] for factor in off]
+    assert commanded == pytest.approx(at_true)
+
+
+def test_an_old_cut_was_made_with_a_frequency_that_was_higher(mill: Mill) -> None:
+    """As of a spindle whose modes are 3 % higher."""
+    stiff = Mill(x=mill.x.scaled(1.03, 1.0, ""), y=mill.y.scaled(1.03, 1.0, ""))
+    cut = CutEvidence(mill.cut, 12000, 2e-3, "stable")
+    old = predict_cut(replace(cut, moved=1.03), middle(mill)).excess[0]
+    assert old == pytest.approx(predict_cut(cut, middle(stiff)).excess[0], abs=1e-9)
+    assert old != pytest.approx(predict_cut(cut, middle(mill)).excess[0], abs=1e-3)
+
+
+def test_the_excess_is_the_logarithm_of_depth_over_limit_and_clipped_far_from_it(mill: Mill) -> None:
+    draws = middle(mill)
+    shallow, deep = (predict_cut(CutEvidence(mill.cut, 12000, depth, "stable"), draws) for depth in (1e-3, 1.1e-3))
+    assert deep.excess[0] - shallow.excess[0] == pytest.approx(math.log(1.1))
+    assert predict_cut(CutEvidence(mill.cut, 12000, 1e3, "stable"), draws).excess[0] == 5
+    assert predict_cut(CutEvidence(mill.cut, 12000, 1e-9, "stable"), draws).excess[0] == -5
+
+
+def test_by_semi_discretisation_kind_and_frequency_are_those_of_the_boundary() -> None:
+    """A slender cut in a flip lobe and in a Hopf lobe, at its limit."""
+    cut = Cut(2, 0.1, "down", 1.4e9 / 1.1, 5e8 / 1.1)
+    mill = Mill(cut=cut, y=Mill().x)
+    draws = prior(mill.middle, doubt(), 2).draws[:1]
+    draws.normal[:] = 0.0
+    ratios = {name: float(values[0]) for name, values in draws.ratios().items()}
+    mode = mill.x.scaled(ratios["frequency_x"], ratios["stiffness_x"], "")
+    mode = replace(mode, damping_ratio=mill.x.damping_ratio * ratios["damping_x"])
+    speeds = np.arange(9000.0, 24000.0, 500.0)
+    pushed = replace(cut, tangential=1.4e9, radial=5e8)
+    boundary = stability_boundary([mode], [mode], pushed, speeds, 0.05)
+    kinds = set()
+    for speed, depth, chatter, kind in zip(
+        speeds, boundary.depth, boundary.chatter_frequency, boundary.kind, strict=True
+    ):
+        if not math.isfinite(depth) or depth > 0.04:
+            continue
+        teeth = 2 * speed / 60
+        prediction = predict_cut(CutEvidence(cut, speed, 1.001 * depth, "chatter", chatter), draws)
+        kinds.add(bool(prediction.flip[0]))
+        assert prediction.flip[0] == (str(kind) == "flip")
+        assert prediction.excess[0] == pytest.approx(0.0, abs=0.05)
+        folded = min(chatter % teeth, teeth - chatter % teeth)
+        assert prediction.base[0] == pytest.approx(folded, abs=0.01 * teeth)
+    assert kinds == {True, False}

@@ -1,0 +1,98 @@
+"""The prior in closed form: what a draw of one standard deviation is, and what its rows cut with."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import ndtr
+
+from lobewatch.cuts.learning.priors import Draws
+from lobewatch.verdicts.doubt import Span
+from tests.lobewatch.cuts.learning.conftest import Mill
+
+KR_OVER_KT = Span(0.5, 1.1)
+
+
+def draws(*rows: dict[int, float], ratio: Span = KR_OVER_KT) -> Draws:
+    """Draws in the middle of the prior, but for some standard deviations of some numbers; ratio: doubt of Kr/Kt."""
+    middle = Mill().prior.draws[: len(rows)]
+    middle.normal[:] = 0.0
+    for number, row in enumerate(rows):
+        for place, deviations in row.items():
+            middle.normal[number, place] = deviations
+    return replace(middle, doubt=replace(middle.doubt, ratio=ratio))
+
+
+def test_the_middle_of_the_prior_is_a_slower_softer_damped_spindle_and_a_harder_cut() -> None:
+    middle = {name: values[0] for name, values in draws({}).ratios().items()}
+    assert middle == pytest.approx(
+        {
+            "frequency_x": 0.985, "damping_x": 1.1, "stiffness_x": 1.0,
+            "frequency_y": 0.985, "damping_y": 1.1, "stiffness_y": 1.0,
+            "tangential": 1.1, "ratio": 0.8,
+        }
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("side", "first"), [("x", 0), ("y", 3)])
+def test_a_standard_deviation_is_25_percent_of_damping_and_10_of_stiffness(side: str, first: int) -> None:
+    ratios = draws({first + 1: 1.0}, {first + 2: -1.0}, {first + 1: -9.0}, {first + 2: -99.0}).ratios()
+    assert ratios[f"damping_{side}"] == pytest.approx([1.1 * 1.25, 1.1, 1.1 * 0.1, 1.1])
+    assert ratios[f"stiffness_{side}"] == pytest.approx([1.0, 0.9, 1.0, 0.1])
+    unmoved = [name for name, values in ratios.items() if np.ptp(values) == 0]
+    assert len(unmoved) == 6
+
+
+@pytest.mark.parametrize(("side", "first"), [("x", 0), ("y", 3)])
+@pytest.mark.parametrize("deviations", [-2.0, -0.5, 1.0, 3.5])
+def test_one_frequency_in_twenty_is_three_times_as_far_off(side: str, first: int, deviations: float) -> None:
+    """As many lie below as of the mixture of 95 % with a standard deviation of 2 % and 5 % with 6 %."""
+    factor = draws({first: deviations}).ratios()[f"frequency_{side}"][0]
+    off = (factor - 0.985) / 0.02
+    assert 0.95 * ndtr(off) + 0.05 * ndtr(off / 3) == pytest.approx(ndtr(deviations), rel=1e-3, abs=1e-6)
+
+
+def test_kt_is_drawn_at_speed_and_as_doubted_and_kr_over_kt_as_doubted() -> None:
+    ratios = draws({6: 1.0}, {7: 1.0}, {8: 1.0}, {6: -9.0}).ratios()
+    doubted = 0.8 + 0.4 * ndtr(1.0)
+    assert ratios["tangential"] == pytest.approx([1.1 * 1.3, 1.1 * doubted, 1.1, 1.1 * 0.1])
+    assert ratios["ratio"] == pytest.approx([0.8, 0.8, 0.5 + 0.6 * ndtr(1.0), 0.8])
+    negative = draws({8: -1.0}, ratio=Span(-1.0, 0.5)).ratios()["ratio"]
+    assert negative.tolist() == [0.0]
+
+
+def test_rows_cut_with_the_coefficients_of_their_material_and_turn_at_the_speed_asked_for() -> None:
+    both = draws({0: 1.0, 4: 1.0}, {5: 1.0}).with_materials(2, 0)
+    both.normal[:, 9:] = [[1.0, 0.0, 1.0], [0.0, 0.0, 0.0]]
+    ratios, rows = both.ratios(), both.rows(9000.0, 1.4e9, 5e8)
+    sides = ["xy"[axis] for axis in rows.axes[rows.direction]]
+    assert sorted(sides) == ["x", "y"]
+    for column, side in enumerate(sides):
+        mode = getattr(Mill(), side)
+        frequency = 2 * np.pi * mode.frequency * ratios[f"frequency_{side}"]
+        assert rows.frequency[:, column] == pytest.approx(frequency)
+        assert rows.damping_ratio[:, column] == pytest.approx(mode.damping_ratio * ratios[f"damping_{side}"])
+        assert rows.stiffness[:, column] == pytest.approx(mode.stiffness * ratios[f"stiffness_{side}"])
+    assert rows.speed_rpm.tolist() == [9000.0, 9000.0]
+    assert rows.tangential == pytest.approx([1.4e9 * 1.1] * 2)
+    assert rows.radial == pytest.approx([5e8 * 1.1 * 0.8] * 2)
+    steel = both.rows(9000.0, 1.4e9, 5e8, 1)
+    assert steel.tangential == pytest.approx([1.4e9 * 1.1 * 1.3, 1.4e9 * 1.1])
+    assert steel.radial == pytest.approx([5e8 * 1.1 * 1.3 * (0.5 + 0.6 * ndtr(1.0)), 5e8 * 1.1 * 0.8])
+
+
+def test_a_mode_that_is_drawn_still_rings() -> None:
+    both = draws({1: 200.0}, {})
+    assert both.rows(9000.0, 1.4e9, 5e8).damping_ratio[0].tolist()[:1] == [0.95]
+
+
+def test_a_new_material_leaves_what_was_drawn_as_it_is() -> None:
+    known = Mill().prior.draws[:40]
+    more = known.with_materials(3, 0)
+    assert more.normal.shape == (40, 6 + 3 * 3)
+    assert np.array_equal(more.normal[:, :9], known.normal)
+    assert abs(np.std(more.normal[:, 9:]) - 1) < 0.15
+    assert more.with_materials(2, 0) is more
+    assert np.array_equal(known.with_materials(3, 0).normal, more.normal)

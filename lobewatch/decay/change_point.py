@@ -1,4 +1,4 @@
-"""Whether a series has begun to fall: the change-point model, judged anew at each point.
+"""The watch over a series for a fall: the change-point model, judged anew at each point.
 
 Hawkins, Qiu & Kang (2003), "The changepoint model for statistical process control", Journal of Quality
 Technology 35(4), with hinges beside the steps, one-sided.
@@ -13,27 +13,27 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri, stdtr, stdtrit
 
-from lobewatch.decay.temperature import Base, base_of
+from lobewatch.decay.temperature import SeriesBase, base_of
 
 FIRST_JUDGED = 9
-"""Points before which nothing is judged."""
+"""Number of points before which nothing is judged; chosen."""
 SURE = 3.3
 """Score from which a change is taken for real: a chance of 1 in 2000 where only the last point is looked at."""
 ROWS = 64
-"""Points that are judged at once, to bound the memory."""
+"""Number of points that are judged at once, to bound the memory."""
 
 Floats = NDArray[np.float64]
 Kind = Literal["step", "slope"]
 KINDS: tuple[Kind, ...] = ("step", "slope")
 LEFT = ((2, 2), (1, 3))
-"""Points at least before a change of each kind, and from it on."""
+"""Least number of points before a change of each kind, and from it on."""
 
 
 class Fall(NamedTuple):
     """A change of a series, as it is fitted to a number of its points."""
 
     kind: Kind
-    """Whether it fell at once, or has been falling since."""
+    """Kind: fallen at once, or falling since."""
     point: int
     """Index of the first point after the step, or of the last one before the slope."""
     size: float
@@ -44,10 +44,11 @@ class Fall(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Watch:
-    """What the points of a series have called for, one after the other."""
+    """Judgement on the points of a series, one after the other."""
 
     scores: Floats
-    """How ill a steady series fits, as a quantile of the normal distribution, shape (n,); NaN before the 9th."""
+    """Score of each point: how ill a steady series fits up to it, as a quantile of the normal distribution, shape (n,);
+    NaN before the 9th."""
     alarm_at: int | None
     """Index of the point that raised the alarm, the second one running that is sure; None where there is none."""
     fall: Fall | None
@@ -63,11 +64,11 @@ class LikeliestChange(NamedTuple):
     """The likeliest change in the points up to each of some of them."""
 
     score: Floats
-    """How ill a steady series fits, as a quantile of the normal distribution, shape (r,)."""
+    """Score: how ill a steady series fits, as a quantile of the normal distribution, shape (r,)."""
     fell: NDArray[np.bool_]
-    """Whether it is a step, shape (r,)."""
+    """Whether the change is a step, shape (r,)."""
     point: NDArray[np.intp]
-    """See Fall, shape (r,)."""
+    """Index of its point as in Fall, shape (r,)."""
 
 
 def calls_for_another(y: Floats, temperature: Floats) -> bool:
@@ -75,7 +76,7 @@ def calls_for_another(y: Floats, temperature: Floats) -> bool:
     if y.size < FIRST_JUDGED:
         return False
     last = np.arange(max(y.size - 2, FIRST_JUDGED - 1), y.size)
-    sure = _best(base_of(y, temperature), last)[0].score >= SURE
+    sure = _likeliest_changes(base_of(y, temperature), last)[0].score >= SURE
     return bool(sure[-1] and not (sure.size > 1 and sure[0]))
 
 
@@ -84,9 +85,9 @@ def newest_change(y: Floats) -> Fall | None:
     if y.size <= FIRST_JUDGED:
         return None
     base = base_of(y)
-    for sign, found in zip((1, -1), _best(base, np.arange(y.size - 2, y.size)), strict=True):
-        if (found.score >= SURE).all():
-            fall = _fall(base, found, -1, sign)
+    for sign, change in zip((1, -1), _likeliest_changes(base, np.arange(y.size - 2, y.size)), strict=True):
+        if (change.score >= SURE).all():
+            fall = _fall(base, change, -1, sign)
             return fall._replace(size=sign * fall.size)
     return None
 
@@ -100,29 +101,29 @@ def watch(y: Floats, temperature: Floats | None = None) -> Watch:
 
 
 def watch_both(y: Floats, temperature: Floats | None = None) -> tuple[Watch, Watch]:
-    """The same, and of the mirror image: whether it rises."""
+    """Judge a series likewise, and its mirror image: whether it rises."""
     base = base_of(y, temperature)
     if y.size < FIRST_JUDGED:
         unknown = Watch(np.full(y.size, np.nan), None, None)
         return unknown, unknown
-    falls, rises = _best(base, np.arange(FIRST_JUDGED - 1, y.size))
+    falls, rises = _likeliest_changes(base, np.arange(FIRST_JUDGED - 1, y.size))
     return _watch(base, falls, 1), _watch(base, rises, -1)
 
 
-def _watch(base: Base, best: LikeliestChange, sign: int) -> Watch:
-    """best: of all points that are judged; sign: 1 for falls, -1 for rises."""
+def _watch(base: SeriesBase, change: LikeliestChange, sign: int) -> Watch:
+    """The watch from the likeliest change up to each point that is judged; sign: 1 for falls, -1 for rises."""
     scores = np.full(base.y.size, np.nan)
-    scores[FIRST_JUDGED - 1 :] = best.score
+    scores[FIRST_JUDGED - 1 :] = change.score
     with np.errstate(invalid="ignore"):
         sure = scores >= SURE
     twice = np.flatnonzero(sure[1:] & sure[:-1]) + 1
     if not twice.size:
         return Watch(scores, None, None)
     at = int(twice[0])
-    return Watch(scores, at, _fall(base, best, at - FIRST_JUDGED + 1, sign))
+    return Watch(scores, at, _fall(base, change, at - FIRST_JUDGED + 1, sign))
 
 
-def _best(base: Base, last: NDArray[np.intp]) -> tuple[LikeliestChange, LikeliestChange]:
+def _likeliest_changes(base: SeriesBase, last: NDArray[np.intp]) -> tuple[LikeliestChange, LikeliestChange]:
     """The likeliest fall, and the likeliest rise, in the points up to each of these, which follow one another."""
     blocks = [_farthest(base, last[begin : begin + ROWS] + 1) for begin in range(0, last.size, ROWS)]
     points, leans = (np.concatenate(parts, axis=2) for parts in zip(*blocks, strict=True))
@@ -130,7 +131,7 @@ def _best(base: Base, last: NDArray[np.intp]) -> tuple[LikeliestChange, Likelies
     return fall, rise
 
 
-def _farthest(base: Base, n: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
+def _farthest(base: SeriesBase, n: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats]:
     """Where a change of each kind explains most in the first n (r,), and how much; shape (2, 2, r): falls, rises."""
     k, rows = np.arange(n[-1]), np.arange(n.size)
     points, leans = np.empty((2, len(KINDS), n.size), np.intp), np.empty((2, len(KINDS), n.size))
@@ -145,7 +146,7 @@ def _farthest(base: Base, n: NDArray[np.intp]) -> tuple[NDArray[np.intp], Floats
     return points, leans
 
 
-def _likeliest(base: Base, n: NDArray[np.intp], points: NDArray[np.intp], leans: Floats) -> LikeliestChange:
+def _likeliest(base: SeriesBase, n: NDArray[np.intp], points: NDArray[np.intp], leans: Floats) -> LikeliestChange:
     """The likelier of two changes in the first n (r,), one of each kind at a point (2, r), that explain so much."""
     t = [base.t_of(lean, n) for lean in leans]
     scores = -ndtri(stdtr(n - 2, -np.maximum(*t)))
@@ -153,10 +154,10 @@ def _likeliest(base: Base, n: NDArray[np.intp], points: NDArray[np.intp], leans:
     return LikeliestChange(scores, fell, np.where(fell, points[0], points[1]))
 
 
-def _fall(base: Base, found: LikeliestChange, at: int, sign: int) -> Fall:
-    """at: which of those found."""
-    kind: Kind = "step" if found.fell[at] else "slope"
-    n, point = base.y.size, int(found.point[at])
+def _fall(base: SeriesBase, change: LikeliestChange, at: int, sign: int) -> Fall:
+    """The change up to one of the points, fitted to the whole series; at: index of that point."""
+    kind: Kind = "step" if change.fell[at] else "slope"
+    n, point = base.y.size, int(change.point[at])
     beta, error = base.fit_change(kind, n, point)
     length = n - 1 - point if kind == "slope" else 1
     return Fall(kind, point, -sign * beta * length, error * length * float(stdtrit(n - 2, 0.975)))

@@ -16,42 +16,44 @@ from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
 from lobewatch.decay.shapes import KINDS, Shape, courses, shapes_of
-from lobewatch.decay.temperature import Fits, base_of
+from lobewatch.decay.temperature import ColumnFits, base_of
 
 ENOUGH = 8
-"""Points from which on anything is foretold."""
+"""Number of points from which on anything is foretold; chosen."""
 QUANTILES = (0.1, 0.5, 0.9)
-"""Probabilities at which a level counts as reached: earliest, probable and latest date."""
+"""Probabilities at which a level counts as reached: earliest, probable and latest date; chosen."""
 LOOKS = 241
-"""Dates looked at up to the horizon; between them the probability is interpolated."""
+"""Number of dates looked at up to the horizon; between them the probability is interpolated."""
 
 LIGHTEST = 1e-7
 """Weight beside the heaviest below which a shape is left out."""
 SURELY_NOT = 1e-12
 """Probability that is as good as none."""
 STEP = 1e-6
-"""Of the span, over which a rate is taken."""
+"""Part of the span over which a rate is taken."""
 SURELY = (0.025, 0.975)
 """Probabilities of the interval of a rate."""
 HALVINGS = 40
-"""Of the range in which a quantile is looked for."""
+"""Halvings of the range in which a quantile is looked for."""
+REACH = 50
+"""Standard errors around the means within which any level of a fan lies."""
 
 Floats = NDArray[np.float64]
 
 
 class DateRange(NamedTuple):
-    """When a level is reached, as dates of the series."""
+    """Dates of the series between which a level is reached."""
 
     earliest: float
-    """At a probability of 10 %; -inf where it is reached already, inf where not before the horizon."""
+    """Date at a probability of 10 %; -inf where it is reached already, inf where not before the horizon."""
     probable: float
-    """At 50 %."""
+    """Date at a probability of 50 %."""
     latest: float
-    """At 90 %."""
+    """Date at a probability of 90 %."""
 
 
 class Rate(NamedTuple):
-    """How fast a series changes at its last point, in its unit for one of its dates."""
+    """Rate of change of a series at its last point, in its unit for one of its dates."""
 
     value: float
     """Mean of the mixture; negative where it falls."""
@@ -63,20 +65,20 @@ class Rate(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """What a series may become."""
+    """The mixture of all courses that a series may take."""
 
     shapes: tuple[Shape, ...]
-    """All that were fitted, j of them."""
+    """Shapes that were fitted, j of them."""
     weight: Floats
-    """Of each, shape (j,), their sum 1."""
+    """Weight of each shape, shape (j,), their sum 1."""
     spread: float
     """Standard deviation of the points around the shapes, in the unit of the series."""
     fitted: Floats
     """Mean of the mixture at the points themselves, shape (n,)."""
     dates: Floats
-    """From now to the horizon, shape (d,); where that has passed, all are the horizon."""
+    """Dates from now to the horizon, shape (d,); where that has passed, all are the horizon."""
     mean: Floats
-    """Of each shape at these dates, shape (j, d)."""
+    """Mean of each shape at these dates, shape (j, d)."""
     error: Floats
     """Standard error of these means, shape (j, d)."""
     freedom: int
@@ -95,13 +97,14 @@ class Forecast:
         return self.shapes[int(np.argmax(np.where(kinds == heaviest, self.weight, -1.0)))]
 
     def probability(self, level: float | Floats, error: float = 0.0) -> Floats:
-        """That the series is below a level (one, or one a date; with its standard error) at the dates, shape (d,)."""
+        """Probability that the series is below a level (one, or one a date; with its standard error) at the dates,
+        shape (d,)."""
         away = level - self.mean
         away /= np.hypot(self.error, error) if error else self.error
         return np.asarray(self.weight @ _below(self.freedom, away))
 
     def reached(self, level: float, error: float = 0.0) -> DateRange:
-        """When a level (with its standard error) is reached."""
+        """Dates at which a level (with its standard error) is reached."""
         chance = np.maximum.accumulate(self.probability(level, error))
         return DateRange(*(self._first(chance, quantile) for quantile in QUANTILES))
 
@@ -113,7 +116,7 @@ class Forecast:
 
     def fan(self, quantile: float) -> Floats:
         """Level below which the series is with a probability at the dates, shape (d,)."""
-        low, high = (self.mean - 50 * self.error).min(axis=0), (self.mean + 50 * self.error).max(axis=0)
+        low, high = (self.mean - REACH * self.error).min(axis=0), (self.mean + REACH * self.error).max(axis=0)
         for _ in range(HALVINGS):
             middle = (low + high) / 2
             below = self.probability(middle) < quantile
@@ -129,41 +132,41 @@ def forecast(
     temperature: at each point (K or degC), NaN where it was not recorded; now: if that is later than the last point.
     ValueError below 8 points and without a span.
     """
-    return past(dates, y, temperature).ahead(horizon, now)
+    return fit_past(dates, y, temperature).ahead(horizon, now)
 
 
 @dataclass(frozen=True, eq=False)
-class Past:
+class PastFit:
     """A series with all shapes that it allows fitted to it: what of a forecast does not hang on the day it is made."""
 
     shapes: tuple[Shape, ...]
-    """As in Forecast, the dates counted from the first point on."""
+    """Shapes that were fitted, j of them, their dates counted from the first point on."""
     weight: Floats
-    """As in Forecast."""
+    """Weight of each shape, shape (j,), their sum 1."""
     spread: float
-    """As in Forecast."""
+    """Standard deviation of the points around the shapes, in the unit of the series."""
     fitted: Floats
-    """As in Forecast."""
-    fits: Fits
-    """Of the shapes."""
+    """Mean of the mixture at the points, shape (n,)."""
+    fits: ColumnFits
+    """Fits of the shapes."""
     dates: Floats
-    """Of the points, shape (n,)."""
+    """Dates of the points, shape (n,)."""
     first: float
     """Value of the first point."""
 
     def ahead(self, horizon: float, now: float = -np.inf) -> Forecast:
-        """What may become of it until a date; now: if that is later than the last point."""
+        """Forecast until a date; now: if that is later than the last point."""
         begin, span = float(self.dates[0]), float(self.dates[-1] - self.dates[0])
         start = min(max(span, now - begin), 3 * span)
         at = np.linspace(start, max(min(horizon - begin, 3 * span), start), LOOKS)
         mean, error = self.fits.at(courses(self.shapes, at, span))
-        moved = tuple(Shape(one.kind, one.start + begin, *one[2:]) for one in self.shapes)
+        moved = tuple(Shape(shape.kind, shape.start + begin, *shape[2:]) for shape in self.shapes)
         mean = mean + self.first
         return Forecast(moved, self.weight, self.spread, self.fitted, begin + at, mean, error, self.fits.freedom)
 
     @property
     def rate(self) -> Rate:
-        """How fast it changes at its last point."""
+        """Rate of change at its last point."""
         span = float(self.dates[-1] - self.dates[0])
         near = courses(self.shapes, np.array([span - STEP * span, span]), span)
         rate, error = self.fits.rate(np.diff(near)[:, 0] / (STEP * span))
@@ -171,7 +174,7 @@ class Past:
         return Rate(float(self.weight @ rate), low, high)
 
 
-def past(dates: Floats, y: Floats, temperature: Floats | None = None) -> Past:
+def fit_past(dates: Floats, y: Floats, temperature: Floats | None = None) -> PastFit:
     """Fit all shapes to a series; arguments and errors as those of `forecast`."""
     at = dates - dates[:1].sum()
     if y.size < ENOUGH or at[-1] <= 0:
@@ -184,21 +187,21 @@ def past(dates: Floats, y: Floats, temperature: Floats | None = None) -> Past:
     log = -fits.freedom / 2 * np.log(fits.rss) - np.repeat(share, [*counts.values()])
     weight = np.exp(log - log.max())
     kept = np.flatnonzero(weight > LIGHTEST)
-    weight, fits = weight[kept] / weight[kept].sum(), fits.some(kept)
+    weight, fits = weight[kept] / weight[kept].sum(), fits.select(kept)
     spread = float(np.sqrt(weight @ fits.rss / fits.freedom))
     fitted = fits.mixed(weight, columns[kept]) + y[0]
-    return Past(tuple(shapes[j] for j in kept), weight, spread, fitted, fits, dates, float(y[0]))
+    return PastFit(tuple(shapes[j] for j in kept), weight, spread, fitted, fits, dates, float(y[0]))
 
 
 def _below(freedom: int, t: Floats) -> Floats:
     """Distribution of Student's t: 0 and 1 where it is nearer to them than anybody asks."""
-    found, near = (t > 0).astype(np.float64), ~(np.abs(t) > stdtrit(freedom, 1 - SURELY_NOT))
-    found[near] = stdtr(freedom, t[near])
-    return np.asarray(found)
+    share, near = (t > 0).astype(np.float64), ~(np.abs(t) > stdtrit(freedom, 1 - SURELY_NOT))
+    share[near] = stdtr(freedom, t[near])
+    return np.asarray(share)
 
 
 def _quantile(weight: Floats, middle: Floats, error: Floats, freedom: int, p: float) -> float:
-    """Of a mixture of Student's t, where an error of 0 is a value that is certain."""
+    """Quantile of a mixture of Student's t, where an error of 0 is a value that is certain."""
     reach = stdtrit(freedom, 1 - LIGHTEST) * error
     low, high = float((middle - reach).min()), float((middle + reach).max())
     for _ in range(HALVINGS):

@@ -1,4 +1,7 @@
-"""The light of a machine: what each reason means, in order of harm, and the reasons that the date alone gives."""
+"""The light of a machine: what each reason means, in order of harm, and the reasons that the date alone gives.
+
+Imported with every look at a plant, so without numpy.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ from lobewatch.measuring.clock import CLOCK_QUESTIONS, about_future
 
 
 class Light(StrEnum):
-    """Worst first."""
+    """The light of a machine, worst first."""
 
     ALARM = "alarm"
     UNKNOWN = "unknown"
@@ -51,14 +54,14 @@ LIGHTS = {
     "value-changed": Light.GOOD,
     "one-direction": Light.GOOD,
 }
-"""What each reason means, in order of harm."""
+"""Light of each reason by its code, in order of harm."""
 
 UNREADABLE = "Put its files right: the sentence above says which."
 """What to do about a machine that cannot be read."""
 
 
 def about_unreadable(reason: str) -> Remark:
-    """That the files of a machine cannot be read."""
+    """Remark on a machine whose files cannot be read."""
     return Remark("unreadable", "", reason)
 
 
@@ -69,7 +72,7 @@ def in_order(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
 
 
 def light_of(ordered: Sequence[Remark]) -> Light:
-    """That of the worst reason."""
+    """Light of the worst reason."""
     return LIGHTS[ordered[0].code] if ordered else Light.GOOD
 
 
@@ -84,14 +87,14 @@ def all_well(newest: datetime, interval_days: float) -> str:
 
 
 def days_left(newest: datetime, interval_days: float, now: datetime) -> float:
-    """Until the next tap test is due; newest: when the last one was."""
+    """Days until the next tap test is due; newest: when the last one was."""
     return interval_days - (now - newest) / timedelta(days=1)
 
 
 def about_dates(
     tap_id: str, newest: datetime, interval_days: float, now: datetime, path: Path | str
 ) -> Iterator[Remark]:
-    """What the date alone gives: a test that is overdue, one of the future. path: of the folder, for commands."""
+    """Remarks that the date alone gives: a test is overdue, or one of the future. path: of the folder, for commands."""
     left = days_left(newest, interval_days, now)
     if left < 0:
         days = math.ceil(-left)
@@ -107,6 +110,6 @@ def of_files(remark: Remark) -> Remark:
 
 def with_files(ordered: tuple[Remark, ...], damage: Sequence[Remark]) -> tuple[Remark, ...]:
     """The reasons with what else was found damaged in the folder."""
-    known = {(remark.code, remark.about) for remark in ordered}
-    new = [of_files(remark) for remark in damage if (remark.code, remark.about) not in known]
+    named = {(remark.code, remark.about) for remark in ordered}
+    new = [of_files(remark) for remark in damage if (remark.code, remark.about) not in named]
     return in_order([*ordered, *new])

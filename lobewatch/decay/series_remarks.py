@@ -41,8 +41,8 @@ def about_trend(name: str, trend: Trend, path: Path | str = "MACHINE") -> Iterat
     event = f'lobewatch event {shlex.quote(str(path))} "what was done"'
     if trend.watch.fall is not None and trend.fallen_since is not None:
         fall = trend.watch.fall
-        how = "fell at once before" if fall.kind == "step" else "has been falling since"
-        text = f"frequency {how} {trend.fallen_since:%Y-%m-%d}, by {_relative(fall.size, fall.half_width)}"
+        course = "fell at once before" if fall.kind == "step" else "has been falling since"
+        text = f"frequency {course} {trend.fallen_since:%Y-%m-%d}, by {_relative(fall.size, fall.half_width)}"
         cure = "Have the bearings, the tool and its clamping looked at"
         yield Remark("decay", name, text, f"{cure}; {event} ends this alarm, --new-baseline with it after a repair.")
     elif trend.watch.asks_again:
@@ -67,8 +67,8 @@ def about_others(name: str, series: SeriesHistory, trend: Trend | None) -> Itera
         if newest is not None:
             time, change = newest
             verbs = ("fell", "falling") if change.size > 0 else ("rose", "rising")
-            how = f"{verbs[0]} at once before" if change.kind == "step" else f"has been {verbs[1]} since"
-            text = f"{word} {how} {time:%Y-%m-%d}, by {_relative(change.size, change.half_width)}"
+            course = f"{verbs[0]} at once before" if change.kind == "step" else f"has been {verbs[1]} since"
+            text = f"{word} {course} {time:%Y-%m-%d}, by {_relative(change.size, change.half_width)}"
             yield Remark("value-changed", name, text)
 
 

@@ -1,4 +1,4 @@
-"""The shapes that a series may have come about by, as columns over its dates."""
+"""The shapes that the course of a series may have, as columns over its dates."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 RATES = (-4.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 6.0)
-"""Of the exponential curves, over the span of the series."""
+"""Rates of the exponential curves, over the span of the series; chosen."""
 POWERS = (1.5, 2.0, 3.0)
-"""Of the power curves."""
+"""Exponents of the power curves; chosen."""
 
 Floats = NDArray[np.float64]
 Kind = Literal["none", "line", "slope", "step", "curve"]
@@ -20,22 +20,22 @@ KINDS: tuple[Kind, ...] = ("none", "line", "slope", "step", "curve")
 
 
 class Shape(NamedTuple):
-    """One way in which a series may have come about."""
+    """One shape that the course of a series may have."""
 
     kind: Kind
-    """"none": steady; "slope": a line from a point on; "step": fallen once; "curve": accelerating or slowing down."""
+    """Kind: "none", steady; "slope", a line from a point on; "step", fallen once; "curve", accelerating or slowing."""
     start: float
     """Date from which on it falls, or on which it fell."""
     accelerates: bool = False
-    """Of a curve; else it slows down."""
+    """Whether a curve accelerates; else it slows down."""
     rate: float = 0.0
-    """Of an exponential curve, over the span of the series; 0 of others."""
+    """Rate of an exponential curve, over the span of the series; 0 of others."""
     power: float = 0.0
-    """Of a power curve; 0 of others."""
+    """Exponent of a power curve; 0 of others."""
 
 
 def shapes_of(at: Floats) -> Iterator[Shape]:
-    """All that are tried; dates count from the first point on."""
+    """All shapes that are tried; dates count from the first point on."""
     yield Shape("none", 0.0)
     yield Shape("line", 0.0)
     for kind, starts in (("slope", at[1:-3]), ("step", at[2:-1])):
@@ -45,17 +45,17 @@ def shapes_of(at: Floats) -> Iterator[Shape]:
 
 
 def courses(shapes: Sequence[Shape], at: Floats, span: float) -> Floats:
-    """How shapes run over dates that count from the first point on, shape (j, d); span: of the series."""
+    """Courses of shapes over dates that count from the first point on, shape (j, d); span: of the series."""
     starts = np.array([np.inf if shape.kind == "none" else shape.start for shape in shapes])[:, np.newaxis]
-    found, end = np.empty((len(shapes), at.size)), 0
+    columns, end = np.empty((len(shapes), at.size)), 0
     for kind, alike in groupby(shape.kind for shape in shapes):
         begin, end = end, end + len([*alike])
-        own, of_own = found[begin:end], starts[begin:end]
+        block, block_starts = columns[begin:end], starts[begin:end]
         if kind == "step":
-            own[:] = at >= of_own
+            block[:] = at >= block_starts
         elif kind == "curve":
-            curved = [(one.rate, one.power) for one in shapes[begin:end]]
-            own[:] = [np.expm1(rate * at / span) if rate else (at / span) ** power for rate, power in curved]
+            curves = [(shape.rate, shape.power) for shape in shapes[begin:end]]
+            block[:] = [np.expm1(rate * at / span) if rate else (at / span) ** power for rate, power in curves]
         else:
-            np.maximum(np.subtract(at, of_own, out=own), 0.0, out=own)
-    return found
+            np.maximum(np.subtract(at, block_starts, out=block), 0.0, out=block)
+    return columns

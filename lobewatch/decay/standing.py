@@ -93,11 +93,6 @@ class Standing:
         return next(fits, None)
 
 
-def unreadable(reason: str) -> Standing:
-    """The standing of a machine whose files cannot be read."""
-    return _standing([about_unreadable(reason)], UNREADABLE)
-
-
 def stand(
     machine: Machine,
     history: History,
@@ -112,7 +107,7 @@ def stand(
     """
     rows = history.current
     if not rows and files:
-        return unreadable("; ".join(map(str, files)))
+        return _standing([about_unreadable("; ".join(map(str, files)))], UNREADABLE)
     if not rows:
         cure = "Take the first tap test: all others are compared with it."
         since = "yet" if history.baseline is None else f"since the new baseline of {history.baseline:%Y-%m-%d}"

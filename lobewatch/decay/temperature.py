@@ -1,46 +1,46 @@
-"""What every fit of a series has in common: its level, and the influence of the temperature where that is known."""
+"""The base of every fit of a series: its level, and the influence of the temperature where that is known."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 ENOUGH = 12
-"""Points with a temperature from which on its influence is fitted ..."""
+"""Number of points with a temperature from which on its influence is fitted; chosen."""
 SPAN = 5.0
-"""... where they span so much (K)."""
+"""Least span of these temperatures (K); chosen."""
 STEEL = -0.015
 """Change of the natural frequency that Young's modulus of steel leads to (%/K), and how far it may be from that."""
 
 TINY = 1e-12
-"""Variance of a point at least (%^2)."""
+"""Least variance of a point (%^2): below it is rounding."""
 LEAST = 1e-20
-"""Share of the sum of squares that is taken as left at least: less is rounding."""
+"""Least share of the sum of squares that is taken as left: less is rounding."""
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Base:
+class SeriesBase:
     """A series and the columns that are in every fit of it."""
 
     y: Floats
-    """Without the expected influence of the temperature, from its first point on, shape (n,)."""
+    """Values without the expected influence of the temperature, from the first point on, shape (n,)."""
     columns: Floats
-    """1, and the temperature where it counts, shape (n, p)."""
+    """Columns: 1, and the temperature where it counts, shape (n, p)."""
 
     def precision(self, n: NDArray[np.intp]) -> Floats:
-        """Of what is known of the coefficients beforehand, times the variance of n (r,) points, shape (r, p, p)."""
+        """Precision of the coefficients as known beforehand, times the variance of n (r,) points, shape (r, p, p)."""
         p = self.columns.shape[1]
-        known = np.zeros((n.size, p, p))
+        precision = np.zeros((n.size, p, p))
         if p > 1:
             squares = np.concatenate([[0.0, 0.0], np.cumsum(np.diff(self.y) ** 2)])
-            known[:, 1, 1] = np.maximum(squares[n] / (2 * (n - 1)), TINY) / STEEL**2
-        return known
+            precision[:, 1, 1] = np.maximum(squares[n] / (2 * (n - 1)), TINY) / STEEL**2
+        return precision
 
     def lean(self, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> Floats:
         """Root of the sum of squares that a "step" or "slope" from each point k (m,) on explains in the first n (r, 1).
@@ -52,9 +52,9 @@ class Base:
             product, square = self._change(kind, n, k)
             with np.errstate(invalid="ignore", divide="ignore"):
                 return np.asarray(product / np.sqrt(square))
-        ones, root = _flat(kind, int(n[0, 0]), n.size, k.size)
+        sums, root = _flat(kind, n, k)
         product = self._tail(0, kind, n, k)
-        product -= ones * self._levels[1][n[:, 0]]
+        product -= sums * self._levels[1][n[:, 0]]
         with np.errstate(invalid="ignore", divide="ignore"):
             product /= root
         return product
@@ -68,15 +68,17 @@ class Base:
     def fit_change(self, kind: str, n: int, k: int) -> tuple[float, float]:
         """Size and standard error of a "step" or "slope" (a point) from a point k on in the first n."""
         until = np.array([n])
-        product, square = (float(one[0, 0]) for one in self._change(kind, until[:, np.newaxis], np.array([k])))
+        product, square = (
+            float(products[0, 0]) for products in self._change(kind, until[:, np.newaxis], np.array([k]))
+        )
         size, total = product / square, float(self._total[n])
         left = max(total - size * product, LEAST * total + np.finfo(float).tiny)
         return size, float(np.sqrt(left / (n - 2) / square))
 
     def _change(self, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> tuple[Floats, Floats]:
-        """Of the column of a change with the series and with itself, what the base leaves of both."""
+        """Products of the column of a change with the series and with itself, what the base leaves of both."""
         tail, square = [self._tail(i, kind, n, k) for i in range(1 + self.columns.shape[1])], _square(kind, n - k)
-        inverse, level = (one[n[:, 0]] for one in self._levels)
+        inverse, level = (coefficients[n[:, 0]] for coefficients in self._levels)
         p = self.columns.shape[1]
         product = tail[0]
         for i in range(p):
@@ -86,7 +88,7 @@ class Base:
         return product, square
 
     def _tail(self, i: int, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> Floats:
-        """Of the column of a change with the series (0) or one of the columns (from 1 on)."""
+        """Product of the column of a change with the series (0) or one of the columns (from 1 on)."""
         sums, moments = self._sums[i], self._moments[i]
         tail: Floats = sums[n] - sums[k]
         if kind == "slope":
@@ -96,8 +98,8 @@ class Base:
 
     @cached_property
     def _levels(self) -> tuple[Floats, Floats]:
-        """By the number of the first points: inverse (n + 1, p, p) of the normal matrix of the base, and its
-        coefficients (n + 1, p); those of less than two are nothing."""
+        """Inverse (n + 1, p, p) of the normal matrix of the base, and its coefficients (n + 1, p), by the number of the
+        first points; those of less than two are nothing."""
         n, p = np.arange(2, self.y.size + 1), self.columns.shape[1]
         inverse, level = np.zeros((self.y.size + 1, p, p)), np.zeros((self.y.size + 1, p))
         normal = self._outer[n, 1:, 1:] + self.precision(n)
@@ -131,7 +133,7 @@ class Base:
         """Degrees of freedom once a shape is fitted: the temperature costs none, its influence is known beforehand."""
         return self.y.size - 2
 
-    def fit_columns(self, columns: Floats) -> Fits:
+    def fit_columns(self, columns: Floats) -> ColumnFits:
         """Each of some columns (j, n) fitted beside the base, one at a time."""
         gram = np.linalg.inv(self.columns.T @ self.columns + self.precision(np.array([self.y.size]))[0])
         level = gram @ self.columns.T @ self.y
@@ -143,31 +145,31 @@ class Base:
         total = self.y @ (self.y - self.columns @ level)
         size = product / square
         rss = np.maximum(total - size * product, LEAST * total + np.finfo(float).tiny)
-        return Fits(rss, size, square, leaning[:, 0], float(level[0]), float(gram[0, 0]), self.freedom)
+        return ColumnFits(rss, size, square, leaning[:, 0], float(level[0]), float(gram[0, 0]), self.freedom)
 
 
-class Fits(NamedTuple):
+class ColumnFits(NamedTuple):
     """Columns fitted one at a time."""
 
     rss: Floats
     """Sum of squares that each leaves, shape (j,)."""
     size: Floats
-    """Of each, shape (j,)."""
+    """Size of each column, shape (j,)."""
     square: Floats
-    """Of each, what the base leaves of it, shape (j,)."""
+    """Square of each column, what the base leaves of it, shape (j,)."""
     leaning: Floats
-    """Of each on the level of the base, shape (j,)."""
+    """Leaning of each column on the level of the base, shape (j,)."""
     level: float
-    """Of the base, at the mean temperature."""
+    """Level of the base, at the mean temperature."""
     flat: float
     """Variance of the level, that of a point being 1."""
     freedom: int
     """Degrees of freedom."""
 
-    def some(self, which: NDArray[np.intp]) -> Fits:
-        """Some of the columns."""
-        rss, size, square, leaning = (one[which] for one in self[:4])
-        return Fits(rss, size, square, leaning, self.level, self.flat, self.freedom)
+    def select(self, numbers: NDArray[np.intp]) -> ColumnFits:
+        """The fits of some of the columns."""
+        rss, size, square, leaning = (values[numbers] for values in self[:4])
+        return ColumnFits(rss, size, square, leaning, self.level, self.flat, self.freedom)
 
     def at(self, columns: Floats) -> tuple[Floats, Floats]:
         """Mean and standard error of the series where the columns have other values (j, d), shape (j, d) each."""
@@ -187,25 +189,23 @@ class Fits(NamedTuple):
         return np.asarray(self.level * weight.sum() - sizes @ self.leaning + sizes @ columns)
 
     def rate(self, slopes: Floats) -> tuple[Floats, Floats]:
-        """How fast the series changes, and the standard error of that, where the columns do so (j,)."""
+        """Rate of change of the series, and its standard error, where the columns change so (j,)."""
         return self.size * slopes, np.abs(slopes) * np.sqrt(self.rss / self.freedom / self.square)
 
 
 def _square(kind: str, length: NDArray[np.intp]) -> Floats:
-    """Of the column of a change over so many points with itself."""
+    """Product of the column of a change over so many points with itself."""
     points = length.astype(np.float64)
     return points if kind == "step" else (points - 1) * points * (2 * points - 1) / 6
 
 
-@lru_cache(maxsize=64)
-def _flat(kind: str, first: int, count: int, m: int) -> tuple[Floats, Floats]:
-    """Of changes from each of m points on in the first n, a count of them from `first` on, shape (count, m) each: of
-    their columns with one of ones, and the root of the square of what that leaves of them."""
-    n, k = np.arange(first, first + count)[:, np.newaxis], np.arange(m)
+def _flat(kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """Sums of the columns of changes from each point k (m,) on in the first n (r, 1), and the root of the square of
+    what a column of ones leaves of them, shape (r, m) each."""
     length = (n - k).astype(np.float64)
-    ones = length if kind == "step" else length * (length - 1) / 2
+    sums = length if kind == "step" else length * (length - 1) / 2
     with np.errstate(invalid="ignore"):
-        return ones, np.asarray(np.sqrt(_square(kind, n - k) - 1 / n * ones * ones))
+        return sums, np.asarray(np.sqrt(_square(kind, n - k) - 1 / n * sums * sums))
 
 
 def _summed(values: Floats) -> Floats:
@@ -213,17 +213,17 @@ def _summed(values: Floats) -> Floats:
 
 
 def may_count(temperature: Floats) -> bool:
-    """Whether it counts in any part of a series."""
-    known = temperature[np.isfinite(temperature)]
-    return known.size >= ENOUGH and bool(np.ptp(known) >= SPAN)
+    """Whether the temperature counts in any part of a series."""
+    recorded = temperature[np.isfinite(temperature)]
+    return recorded.size >= ENOUGH and bool(np.ptp(recorded) >= SPAN)
 
 
-def base_of(y: Floats, temperature: Floats | None = None) -> Base:
+def base_of(y: Floats, temperature: Floats | None = None) -> SeriesBase:
     """The base of a series (n,), the temperature in it only where enough of it is known over a wide enough span."""
     columns = np.ones((y.size, 1))
     start = y[:1].sum()
-    known = np.isfinite(temperature) if temperature is not None else np.zeros(y.size, dtype=bool)
-    if temperature is None or known.sum() < ENOUGH or np.ptp(temperature[known]) < SPAN:
-        return Base(y - start, columns)
-    warmer = np.where(known, temperature - temperature[known].mean(), 0.0)
-    return Base(y - start - STEEL * warmer, np.column_stack([columns, warmer]))
+    recorded = np.isfinite(temperature) if temperature is not None else np.zeros(y.size, dtype=bool)
+    if temperature is None or recorded.sum() < ENOUGH or np.ptp(temperature[recorded]) < SPAN:
+        return SeriesBase(y - start, columns)
+    warmer = np.where(recorded, temperature - temperature[recorded].mean(), 0.0)
+    return SeriesBase(y - start - STEEL * warmer, np.column_stack([columns, warmer]))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from lobewatch.decay.change_point import Watch, watch_both
 from lobewatch.decay.day_points import PercentSeries, Span, divide_into_points
-from lobewatch.decay.forecast import ENOUGH, Forecast, Past, Rate, past
+from lobewatch.decay.forecast import ENOUGH, Forecast, PastFit, Rate, fit_past
 
 MOST = 1000
 """Number of newest points that alone are judged; chosen, as the work grows with its square."""
@@ -64,7 +64,7 @@ class Trend:
     """Points, oldest first; one at least."""
     first: float
     """Value that the percents are of: that of the first tap test."""
-    past: Past | None
+    past: PastFit | None
     """Shapes that it allows, over days since 1970; None below 8 points."""
     today: int
     """Day since 1970 that it is judged on."""
@@ -177,11 +177,11 @@ def _percents(values: Sequence[float]) -> tuple[float, ...]:
     return tuple([100 * log(value / first) for value in values])
 
 
-def _past(points: Sequence[DayPoint]) -> Past | None:
+def _past(points: Sequence[DayPoint]) -> PastFit | None:
     if len(points) < ENOUGH:
         return None
     y, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
-    return past(days_of(points), y, warmth)
+    return fit_past(days_of(points), y, warmth)
 
 
 def days_of(points: Sequence[DayPoint]) -> Floats:

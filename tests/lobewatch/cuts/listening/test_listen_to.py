@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lobewatch.cuts.listening.listen_to import CutRecording, HeardSound, listen_to
+from lobewatch.cuts.listening.listen_to import CutRecording, HeardSound, line_kinds, listen_to
 
 Floats = NDArray[np.float64]
 RATE = 25600.0
@@ -189,3 +189,91 @@ def test_an_overload_in_the_cut_and_lost_scans_are_told() -> None:
     assert listen(signal, clipped=clipped).reason == "overload"
     assert listen(signal, clipped=np.arange(signal.size) < 10).reason == ""
     assert listen(signal, lost_scans=7).reason == "lost-scans"
+
+
+COMB = ((4 * TURN, 30.0), (8 * TURN, 20.0), (12 * TURN, 10.0), (5 * TURN, 3.0), (9 * TURN, 2.0))
+"""Multiples of a cutter of four teeth with a little run-out."""
+ENERGY = sum(loud**2 for _, loud in COMB)
+
+
+def heard_beside(*shares: float, frequency: float = 1712.3, teeth: int = 4) -> HeardSound:
+    """Comb and f_c + k tooth passing, with these shares of the energy of the comb."""
+    beside = [(frequency + k * teeth * TURN, np.sqrt(share * ENERGY)) for k, share in enumerate(shares)]
+    return listen(recorded(sines((*COMB, *beside), round(CUT * RATE), np.random.default_rng(8))), teeth)
+
+
+@pytest.mark.parametrize(("share", "word"), [(1.5e-4, "stable"), (2.5e-4, "cannot tell"), (0.009, "cannot tell")])
+def test_a_line_alone_is_faint_between_2e_4_and_1e_2_of_the_comb(share: float, word: str) -> None:
+    heard = heard_beside(share)
+    assert (heard.word, heard.reason) == (word, "faint" if word == "cannot tell" else "")
+    assert heard.ratio == pytest.approx(share, rel=0.05)
+
+
+@pytest.mark.parametrize(("shares", "word"), [
+    ((0.011,), "chatter"), ((0.0045, 0.0045), "cannot tell"), ((0.0015, 0.0015, 0.0015), "chatter"),
+    ((2e-4, 1.2e-4, 1.2e-4), "cannot tell"), ((2.5e-4, 1.5e-4, 1.5e-4), "chatter"),
+])  # fmt: skip
+def test_chatter_is_a_hundredth_of_the_comb_or_with_side_bands_a_twentieth_of_that(
+    shares: tuple[float, ...], word: str
+) -> None:
+    heard = heard_beside(*shares)
+    assert heard.word == word
+    assert heard.ratio == pytest.approx(sum(shares), rel=0.05)
+
+
+def test_chatter_that_falls_counts_as_at_the_end_of_the_cut() -> None:
+    """A tenth of its amplitude in the second half; the half of the whole line that the first half leaves."""
+    time = np.arange(round(CUT * RATE)) / RATE
+    falling = np.where(time < 0.6 * CUT, 1.0, 0.1) * 8.0 * np.sin(2 * np.pi * 1712.3 * time)
+    heard = listen(recorded(sines(COMB, time.size, np.random.default_rng(8)) + falling))
+    constant = heard_beside(64.0 / ENERGY)
+    assert heard.ratio < 0.1 * constant.ratio
+
+
+@pytest.mark.parametrize(("off", "word"), [(0.002, "flip"), (-0.002, "flip"), (0.004, "chatter"), (-0.004, "chatter")])
+def test_period_two_is_within_3_thousandths_of_half_of_tooth_passing(off: float, word: str) -> None:
+    lines = [*comb(3), *(((k + 0.5 + off) * 3 * TURN, 20.0 * 0.5**k) for k in range(4))]
+    assert listen(recorded(sines(lines, round(CUT * RATE), np.random.default_rng(1))), 3).word == word
+
+
+def without_chatter(teeth: int, immersion: float, *pairs: tuple[int, float]) -> tuple[str, str]:
+    """Word on orders of the spindle with these energies."""
+    lines = [(order * TURN, 10 * np.sqrt(energy)) for order, energy in pairs]
+    signal = recorded(sines(lines, round(CUT * RATE), np.random.default_rng(9)))
+    heard = listen_to(CutRecording(signal, RATE, teeth, immersion, SET))
+    return heard.word, heard.reason
+
+
+ON_LINES = "cannot tell", "on-spindle-lines"
+
+
+@pytest.mark.parametrize(("energy", "words"), [(4.6, ("stable", "")), (5.4, ON_LINES)])
+@pytest.mark.parametrize("order", [7, 8])
+def test_orders_that_run_out_hardly_has_are_chatter_on_the_lines_of_the_spindle(
+    energy: float, words: tuple[str, str], order: int
+) -> None:
+    """Orders 2 and 3 modulo five teeth, over 1 and 4."""
+    assert without_chatter(5, 0.5, (5, 9.0), (10, 9.0), (15, 9.0), (6, 0.4), (9, 0.6), (order, energy)) == words
+
+
+@pytest.mark.parametrize(("energy", "immersion", "words"), [
+    (7.4, 0.5, ("stable", "")), (8.6, 0.5, ON_LINES), (8.6, 0.94, ON_LINES), (8.6, 0.96, ("stable", "")),
+])  # fmt: skip
+def test_run_out_is_no_louder_than_eight_times_tooth_passing_but_in_a_slot(
+    energy: float, immersion: float, words: tuple[str, str]
+) -> None:
+    share = energy / 2
+    assert without_chatter(5, immersion, (5, 0.4), (10, 0.4), (15, 0.2), (6, share), (9, share)) == words
+
+
+def test_lines_are_drawn_by_what_they_are() -> None:
+    kinds = line_kinds(listen(recorded(a_cut(chatter=1712.3))))
+    assert set(kinds) == {"turns", "tooth", "air", "chatter"}
+    tooth = kinds["tooth"].frequency / (4 * TURN)
+    assert tooth == pytest.approx(np.round(tooth), abs=1e-3)
+    turns = kinds["turns"].frequency / TURN
+    assert turns == pytest.approx(np.round(turns), abs=1e-2)
+    assert not np.any(np.round(turns) % 4 == 0)
+    assert np.min(np.abs(kinds["air"].frequency - 3333.3)) < 0.1
+    assert set(line_kinds(listen(recorded(a_cut())))) == {"turns", "tooth", "air"}
+    assert line_kinds(listen(recorded(np.zeros(round(CUT * RATE))))) == {}

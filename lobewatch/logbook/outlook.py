@@ -67,10 +67,11 @@ class Outlook:
 def outlook(logbook: Logbook, now: datetime | None = None) -> Outlook:
     """The outlook of a machine; DataError where it was never tapped."""
     logbook.newest()
-    return logbook.ask(_outlook, now or datetime.now(UTC))
+    return logbook.ask(outlook_of, now or datetime.now(UTC))
 
 
-def _outlook(analysis: Analysis, now: datetime) -> Outlook:
+def outlook_of(analysis: Analysis, now: datetime) -> Outlook:
+    """The outlook of a machine that was tapped."""
     standing, machine = analysis.standing(now), analysis.machine
     fixed = machine.limits
     percents = (fixed.frequency_warn_percent, fixed.frequency_alarm_percent)

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from acquisition import Remark
 from lobewatch.cuts.learning.contradicting import contradiction_remarks
-from lobewatch.cuts.learning.of_program import Lesson, NextCut
+from lobewatch.cuts.learning.lesson import Lesson, NextCut
 from lobewatch.cuts.learning.posterior import Interval
 from lobewatch.cuts.learning.suggest import Suggestion
 from lobewatch.show.programs.advice import rpm
@@ -26,7 +26,7 @@ def suggestion_json(next_cut: NextCut) -> dict[str, Any]:
     return {
         "program": next_cut.lesson.program.name,
         "suggested": None if cut is None else _cut_json(cut),
-        "cuts_made": len(next_cut.lesson.own),
+        "cuts_made": len(next_cut.lesson.own_cuts),
         "cuts_left": next_cut.left,
         "best_heard": None if best is None else {"speed_rpm": best[0], "depth_mm": 1e3 * best[1]},
         "learnt": learnt_json(next_cut.lesson),
@@ -45,7 +45,7 @@ def _cut_json(cut: Suggestion) -> dict[str, Any]:
 
 def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
     """A line for each thing a person needs."""
-    name, cut, n_made = next_cut.lesson.program.name, next_cut.suggested, len(next_cut.lesson.own)
+    name, cut, n_made = next_cut.lesson.program.name, next_cut.suggested, len(next_cut.lesson.own_cuts)
     if cut is None:
         yield f"{name}: {_why_none(next_cut)}"
     else:
@@ -65,13 +65,13 @@ def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
 
 def _why_none(next_cut: NextCut) -> str:
     if not next_cut.left:
-        return f"{len(next_cut.lesson.own)} test cuts are made; a larger --cuts asks for more"
+        return f"{len(next_cut.lesson.own_cuts)} test cuts are made; a larger --cuts asks for more"
     return "no test cut is worth making: nothing more is to be gained"
 
 
 def _best(next_cut: NextCut) -> tuple[float, float] | None:
     """Speed (rpm) and depth (m) of most chips that were heard stable; None where none was."""
-    stable = [(cut.speed_rpm, cut.depth) for cut in next_cut.lesson.own if not cut.chatters]
+    stable = [(cut.speed_rpm, cut.depth) for cut in next_cut.lesson.own_cuts if not cut.chatters]
     return max(stable, key=lambda setting: setting[0] * setting[1], default=None)
 
 

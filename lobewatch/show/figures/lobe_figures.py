@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from lobes import Cut, RadialLobes
-from lobewatch.cuts.learning.lobes_at_speed import LobesAtSpeed
+from lobewatch.cuts.learning.at_speed import LobesAtSpeed
 from lobewatch.machine.journal.heard_cut import HeardCut, geometry
 from lobewatch.show.figures.labels import PictureLabels
 from lobewatch.show.figures.style import ALARM, GOOD, NOW, THEN, UNKNOWN, new_axes

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from acquisition import DataError, Remark
 from lobes import Cut, StabilityLobes, radial_lobes
-from lobewatch.cuts.learning.lobes_at_speed import lobes_at_speed
+from lobewatch.cuts.learning.at_speed import lobes_at_speed
 from lobewatch.history import Row
 from lobewatch.history.history_columns import row_lobes
 from lobewatch.logbook import LobeComparison, Logbook

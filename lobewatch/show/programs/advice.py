@@ -13,6 +13,7 @@ from rich.table import Table
 
 from acquisition import Remark
 from lobewatch.logbook import Logbook
+from lobewatch.logbook.analysis import Analysis
 from lobewatch.machine import SpeedRange
 from lobewatch.show.programs.verdicts import verdict_json, verdict_table
 from lobewatch.tool import Assembly
@@ -53,7 +54,7 @@ class ProgramAdvice:
         return self.verdict.stable is False and self.at_first is not None and bool(self.at_first.stable)
 
 
-def advise_program(logbook: Logbook, verdict: Verdict) -> ProgramAdvice:
+def advise_program(logbook: Logbook | Analysis, verdict: Verdict) -> ProgramAdvice:
     """All that is said of one program."""
     return ProgramAdvice(verdict, logbook.advice(verdict), logbook.ruling_then(verdict))
 
@@ -131,7 +132,7 @@ def _chatter(program: ProgramAdvice) -> str:
 
 def _worst_feed(verdict: Verdict) -> str:
     """The direction of feed that is worst, where it matters."""
-    limits = np.ones(1) if verdict.drawn is None else verdict.drawn.limits
+    limits = np.ones(1) if verdict.draws is None else verdict.draws.limits
     if np.max(limits) <= ALIKE * np.min(limits):
         return ""
     degrees = round(math.degrees(verdict.feed_angle))

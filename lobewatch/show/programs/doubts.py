@@ -44,9 +44,9 @@ Floats = NDArray[np.float64]
 
 def doubt_json(verdict: Verdict) -> dict[str, Any] | None:
     """Relative half-widths by cause (degrees of phases), those of modes in x, then y; None where nothing was judged."""
-    if verdict.drawn is None:
+    if verdict.draws is None:
         return None
-    doubt = verdict.drawn.doubt
+    doubt = verdict.draws.doubt
     modes = {
         cause: dict(zip(SIZES, (widths * [1, 1, 1, DEGREE]).T.tolist(), strict=True))
         for cause, widths in doubt.modes.items()
@@ -61,7 +61,7 @@ def doubt_json(verdict: Verdict) -> dict[str, Any] | None:
 def reading_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
     """What stands below a table of verdicts: what the words mean, and the doubt; nothing where nothing was judged."""
     doubts = doubt_lines(verdicts, machine)
-    judged = [verdict for verdict in verdicts if verdict.drawn is not None and verdict.assembly is not None]
+    judged = [verdict for verdict in verdicts if verdict.draws is not None and verdict.assembly is not None]
     taught = [verdict for verdict in judged if verdict.cuts]
     texts = ([AT_REST] if len(taught) < len(judged) else []) + ([at_speed_line(taught)] if taught else [])
     return [*doubts, *texts] if doubts else []
@@ -81,8 +81,8 @@ def doubt_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
     """One for all programs that have it alike."""
     named: dict[str, list[str]] = {}
     for verdict in verdicts:
-        if verdict.drawn is not None and verdict.assembly is not None:
-            parts = _parts(verdict, verdict.drawn.doubt, verdict.assembly, machine)
+        if verdict.draws is not None and verdict.assembly is not None:
+            parts = _parts(verdict, verdict.draws.doubt, verdict.assembly, machine)
             named.setdefault("; ".join(parts), []).append(verdict.program.name)
     about = {text: f"doubt of {', '.join(names)}" if len(named) > 1 else "doubt" for text, names in named.items()}
     return [f"{about[text]}: {text} ({PAGE})" for text in named]

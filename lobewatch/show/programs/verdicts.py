@@ -134,9 +134,9 @@ def _depth(depth: float, verdict: Verdict) -> str:
 
 def _looked_at(verdict: Verdict) -> float:
     """Depth (m) up to which every draw was looked at."""
-    if math.isinf(verdict.limit) or verdict.drawn is None:
+    if math.isinf(verdict.limit) or verdict.draws is None:
         return DEEPEST * verdict.program.depth_mm / 1e3
-    force = verdict.drawn.rows.tangential
+    force = verdict.draws.rows.tangential
     return float(np.min(force[0] / force)) * float(TRIED[-1]) * verdict.limit
 
 

@@ -26,9 +26,9 @@ class Numbers(NamedTuple):
     """A table."""
 
     heads: Sequence[str]
-    """Of the columns, with units."""
+    """Headings of the columns, with units."""
     lines: Sequence[Sequence[Any]]
-    """Texts and numbers."""
+    """Texts and numbers of each row."""
 
     @property
     def text(self) -> str:
@@ -41,15 +41,17 @@ class Numbers(NamedTuple):
 def value_numbers(
     unit: str,
     scale: float,
-    known: Iterable[tuple[datetime, Estimate]],
+    estimates: Iterable[tuple[datetime, Estimate]],
     aside: Iterable[tuple[datetime, float]],
     course: TrendCurve | None,
 ) -> Numbers:
-    """Of a value over time: tests, those that do not count, fitted line, and the band of 80 % ahead.
+    """A value over time: tests, those that do not count, fitted line, and the band of 80 % ahead.
 
-    scale: of the unit; the values of `known` alone are in SI.
+    scale: of the unit; the values of `estimates` alone are in SI.
     """
-    lines: list[list[Any]] = [["test", _day(time), one.value / scale, one.std / scale, "", ""] for time, one in known]
+    lines: list[list[Any]] = [
+        ["test", _day(time), estimate.value / scale, estimate.std / scale, "", ""] for time, estimate in estimates
+    ]
     lines += [["does not count", _day(time), value, "", "", ""] for time, value in aside]
     if course is not None:
         past = course.days.size - course.days_ahead.size
@@ -63,18 +65,18 @@ def value_numbers(
 
 
 def lobe_numbers(speed_rpm: Floats, depths: Mapping[str, Floats]) -> Numbers:
-    """Of lines over speed (n,), depths in m by what each is called."""
+    """Lines over speed (n,), depths in m by what each is called."""
     heads = ["speed (rpm)", *(f"{name}: limiting depth (mm)" for name in depths)]
-    every = math.ceil(speed_rpm.size / MOST)
-    return Numbers(heads, np.column_stack([speed_rpm, *(1e3 * one for one in depths.values())])[::every].tolist())
+    step = math.ceil(speed_rpm.size / MOST)
+    return Numbers(heads, np.column_stack([speed_rpm, *(1e3 * depth for depth in depths.values())])[::step].tolist())
 
 
 def response_numbers(frf: Frf) -> Numbers:
-    """Of a frequency response in its band; no more lines than one can see."""
-    every = math.ceil(frf.frequency.size / MOST)
+    """A frequency response in its band; no more lines than one can see."""
+    step = math.ceil(frf.frequency.size / MOST)
     coherence = np.full(frf.frequency.size, np.nan) if frf.coherence is None else frf.coherence
     columns = (frf.frequency, frf.receptance.real * 1e9, frf.receptance.imag * 1e9, coherence)
-    lines = np.column_stack([one[::every] for one in columns])
+    lines = np.column_stack([column[::step] for column in columns])
     return Numbers(["frequency (Hz)", "Re (nm/N)", "Im (nm/N)", "coherence"], lines.tolist())
 
 

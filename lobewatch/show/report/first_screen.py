@@ -23,13 +23,13 @@ FEW = 3
 """Reasons on the first screen; the others stand below it."""
 
 
-def first_screen(found: Outlook, programs: Sequence[ProgramAdvice], machine: Machine) -> dict[str, Any]:
+def first_screen(outlook: Outlook, programs: Sequence[ProgramAdvice], machine: Machine) -> dict[str, Any]:
     """What the first screen shows, as the template takes it."""
     return {
-        **light_of(found.standing),
-        "changed": [_changed(one) for one in found.standing.series],
-        "programs": [_program(one, found) for one in programs],
-        "tap": _tap(found.standing, machine),
+        **light_of(outlook.standing),
+        "changed": [_changed(series) for series in outlook.standing.series],
+        "programs": [_program(program, outlook) for program in programs],
+        "tap": _tap(outlook.standing, machine),
     }
 
 
@@ -47,24 +47,24 @@ def light_of(standing: Standing) -> dict[str, Any]:
 
 
 def _changed(series: SeriesStanding) -> str:
-    said = f"{series.name}: {short_text(series)}, {series.first:%Y-%m-%d}"
+    text = f"{series.name}: {short_text(series)}, {series.first:%Y-%m-%d}"
     if series.trend is None or series.trend.rate is None:
-        return said
+        return text
     since, fall = series.trend.fallen_since, series.trend.watch.fall
     if since is None or fall is None:
-        return f"{said}; {rate_text(series.trend)}"
-    how = "fell at once before" if fall.kind == "step" else "falling since"
-    return f"{said}; {how} {since:%Y-%m-%d}; {rate_text(series.trend)}"
+        return f"{text}; {rate_text(series.trend)}"
+    course = "fell at once before" if fall.kind == "step" else "falling since"
+    return f"{text}; {course} {since:%Y-%m-%d}; {rate_text(series.trend)}"
 
 
-def _program(one: ProgramAdvice, found: Outlook) -> dict[str, str]:
-    name, word = one.verdict.program.name, one.verdict.word
+def _program(program: ProgramAdvice, outlook: Outlook) -> dict[str, str]:
+    name, word = program.verdict.program.name, program.verdict.word
     return {
         "name": name,
         "kind": WORDS[word].kind,
         "word": f"{WORDS[word].symbol} {word}",
-        "until": _until(word, found.programs[name], found.horizon),
-        "instead": instead_text(one),
+        "until": _until(word, outlook.programs[name], outlook.horizon),
+        "instead": instead_text(program),
     }
 
 
@@ -76,15 +76,15 @@ def _until(word: Word, fate: Fate, end: float) -> str:
     return "not stable already" if word is Word.NOT_STABLE else "not known"
 
 
-def instead_text(one: ProgramAdvice) -> str:
+def instead_text(program: ProgramAdvice) -> str:
     """Speed and depth to go to, in a few words."""
-    known, settings = one.verdict.assembly, (one.advice.best, one.advice.here)
-    if one.verdict.word is Word.STABLE:
+    assembly, settings = program.verdict.assembly, (program.advice.best, program.advice.here)
+    if program.verdict.word is Word.STABLE:
         return "as it is"
-    if one.verdict.word is Word.UNKNOWN or known is None or not known.is_sure:
+    if program.verdict.word is Word.UNKNOWN or assembly is None or not assembly.is_sure:
         return "not known: see below"
-    told = [f"{rpm(setting.speed_rpm)} rpm, {setting.depth_mm:g} mm" for setting in settings if setting is not None]
-    return " or ".join(dict.fromkeys(told)) or "no safe speed: another tool"
+    texts = [f"{rpm(setting.speed_rpm)} rpm, {setting.depth_mm:g} mm" for setting in settings if setting is not None]
+    return " or ".join(dict.fromkeys(texts)) or "no safe speed: another tool"
 
 
 def _tap(standing: Standing, machine: Machine) -> str:

@@ -1,23 +1,24 @@
-"""Lists of the report: tools and directions, tap tests."""
+"""Lists of the report: tools and directions, test cuts, tap tests."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from lobewatch.decay import Light, SeriesStanding, Standing
+from lobewatch.decay import Light, SeriesStanding
 from lobewatch.decay.light import LIGHTS as HARM
 from lobewatch.history import Row
-from lobewatch.logbook import Logbook
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT
 from lobewatch.measuring.estimate import Estimate
 from lobewatch.show.history.describe_cut import heard_text
 from lobewatch.show.programs.verdicts import WORDS
 from lobewatch.show.report.figure_data import Numbers
 from lobewatch.show.report.first_screen import KINDS, LIGHTS
+from lobewatch.show.report.material import ReportMaterial
+from lobewatch.show.report.section import DataTable, Download, Paragraph, Section, TableCell
 from lobewatch.show.trends.describe_trend import rate_text, short_text
 
-HEADS = (
+NUMBER_HEADS = (
     "time",
     "tool",
     "direction",
@@ -27,36 +28,37 @@ HEADS = (
     "bearing stiffness (N/um)",
     "temperature (degC)",
 )
+"""Headings of the tap tests as numbers."""
+VALUE_FORMATS = (("{:.2f}", 1.0), ("{:.3f}", 0.01), ("{:.3f}", 1e6), ("{:.1f}", 1e6))
+"""Format and size of the unit of f_n, zeta, K and the stiffness of a bearing."""
+COUNTING = "Those that count, the newest first"
+"""Which of them a list holds."""
 
 
-def series_lines(standing: Standing) -> list[dict[str, Any]]:
-    """Tools and directions, a line each, the one that fell most first."""
-    return [_series_line(one) for one in standing.series]
+def tools_and_directions(material: ReportMaterial) -> list[Section]:
+    """A line for each, the one that fell most first."""
+    heads = ["tool", "direction", "light", "points", "newest", "change", "rate"]
+    rows = [_series_row(series) for series in material.outlook.standing.series]
+    return [Section("Tools and directions", [DataTable(heads, rows, "words")], is_framed=False)]
 
 
-def _series_line(series: SeriesStanding) -> dict[str, Any]:
-    worst = min((HARM[one.code] for one in series.remarks), key=list(Light).index, default=Light.GOOD)
+def _series_row(series: SeriesStanding) -> list[str | TableCell]:
+    worst = min((HARM[remark.code] for remark in series.remarks), key=list(Light).index, default=Light.GOOD)
     trend = series.trend
-    return {
-        "tool": series.tool,
-        "direction": series.direction,
-        "light": LIGHTS[worst],
-        "kind": KINDS.get(worst, "doubt"),
-        "points": 0 if trend is None else len(trend.points),
-        "newest": f"{series.time:%Y-%m-%d}",
-        "change": short_text(series),
-        "rate": "-" if trend is None else rate_text(trend) or "from 8 points on",
-    }
-
-
-def tap_lines(logbook: Logbook) -> list[list[str]]:
-    """Tap tests that count, the newest first: date, tool, direction, values, words of then."""
-    return [_tap_line(row) for row in reversed(logbook.history.current)]
-
-
-def cut_lines(logbook: Logbook) -> list[list[str]]:
-    """Test cuts that count, the newest first: date, what was cut, speed, depth, what it sounded like, who heard it."""
     return [
+        series.tool,
+        series.direction,
+        TableCell(LIGHTS[worst], KINDS.get(worst, "doubt")),
+        "0" if trend is None else str(len(trend.points)),
+        f"{series.time:%Y-%m-%d}",
+        short_text(series),
+        "-" if trend is None else rate_text(trend) or "from 8 points on",
+    ]
+
+
+def test_cuts(material: ReportMaterial) -> list[Section]:
+    """Date, what was cut, speed, depth, what it sounded like, who heard it."""
+    rows = [
         [
             f"{cut.at.astimezone():%Y-%m-%d %H:%M}",
             cut.program or REFERENCE_CUT,
@@ -66,22 +68,29 @@ def cut_lines(logbook: Logbook) -> list[list[str]]:
             heard_text(cut),
             cut.by,
         ]
-        for cut in reversed(logbook.cuts)
+        for cut in reversed(material.analysis.cuts)
     ]
+    if not rows:
+        return []
+    table = DataTable(["when", "cut", "tool", "rpm", "mm", "heard", "by"], rows, "words")
+    return [Section("Test cuts", [Paragraph(f"{COUNTING}, as they were heard.", is_small=True), table])]
 
 
-def tap_numbers(logbook: Logbook) -> Numbers:
-    """The same as numbers, oldest first."""
-    return Numbers(HEADS, [_tap_numbers(row) for row in logbook.history.current])
+def tap_tests(material: ReportMaterial) -> list[Section]:
+    """Date, tool, direction, values, words of then; the same as numbers, oldest first."""
+    history = material.analysis.history.current
+    heads = ["when", "tool", "in", "f_n (Hz)", "ζ (%)", "K (N/µm)", "bearings (N/µm)", "said of it"]
+    table = DataTable(heads, [_tap_row(row) for row in reversed(history)], "words taps")
+    numbers = Download(Numbers(NUMBER_HEADS, [_tap_numbers(row) for row in history]), "taps")
+    return [Section("Tap tests", [Paragraph(f"{COUNTING}.", is_small=True), table, numbers], is_framed=False)]
 
 
-def _tap_line(row: Row) -> list[str]:
+def _tap_row(row: Row) -> list[str]:
     values = (row.frequency, row.damping_ratio, row.stiffness, row.bearing_stiffness)
-    formats = (("{:.2f}", 1.0), ("{:.3f}", 0.01), ("{:.3f}", 1e6), ("{:.1f}", 1e6))
-    told = [_number(value, form, scale) for value, (form, scale) in zip(values, formats, strict=True)]
-    words = [f"{name} {WORDS[one.word].symbol}" for name, one in (row.rulings or {}).items()]
-    asked = [f"question {one.code}" for one in row.questions]
-    return [f"{row.time.astimezone():%Y-%m-%d %H:%M}", row.tool, row.direction, *told, "; ".join([*asked, *words])]
+    cells = [_number(value, form, scale) for value, (form, scale) in zip(values, VALUE_FORMATS, strict=True)]
+    words = [f"{name} {WORDS[ruling.word].symbol}" for name, ruling in (row.rulings or {}).items()]
+    asked = [f"question {question.code}" for question in row.questions]
+    return [f"{row.time.astimezone():%Y-%m-%d %H:%M}", row.tool, row.direction, *cells, "; ".join([*asked, *words])]
 
 
 def _number(value: Estimate, form: str, scale: float) -> str:

@@ -27,7 +27,7 @@ from modal import Mode
 MOST = 24
 """Tap tests shown, at most."""
 SPEEDS = 600
-"""Given of each diagram, at most."""
+"""Speeds given of each diagram, at most."""
 AHEAD = (6, 12)
 """Months after the newest test that are foretold."""
 
@@ -38,15 +38,15 @@ class LobeCourse(NamedTuple):
     """Diagrams of one cut, oldest first; at least two."""
 
     cut: str
-    """Its name."""
+    """Name of the cut."""
     speed_rpm: Floats
-    """Common to all, shape (n,)."""
+    """Speeds common to all (rpm), shape (n,)."""
     times: Sequence[datetime]
-    """Of the tap tests, m of them."""
+    """Times of the tap tests, m of them."""
     depth: Floats
-    """Of the tap tests (m), shape (m, n)."""
+    """Limiting depths after each tap test (m), shape (m, n)."""
     ahead: Mapping[str, Floats]
-    """By what it is called: the same where it is foretold (m), shape (n,)."""
+    """Limiting depths that are foretold (m), shape (n,), by what each diagram is called."""
     heard: Sequence[HeardCut] = ()
     """Test cuts of the same cut, as they were heard."""
 
@@ -58,10 +58,10 @@ class LobeCourse(NamedTuple):
     @property
     def numbers(self) -> Numbers:
         """Speed, and depth in mm for each."""
-        every = max(math.ceil(self.speed_rpm.size / SPEEDS), 1)
+        step = max(math.ceil(self.speed_rpm.size / SPEEDS), 1)
         depths = [*self.depth, *self.ahead.values()]
         return lobe_numbers(
-            self.speed_rpm[::every], {name: one[::every] for name, one in zip(self.labels, depths, strict=True)}
+            self.speed_rpm[::step], {name: depth[::step] for name, depth in zip(self.labels, depths, strict=True)}
         )
 
     @property
@@ -70,10 +70,10 @@ class LobeCourse(NamedTuple):
 
         A cut that is younger than the newest tap test belongs to that.
         """
-        known = [min(bisect_left(self.times, cut.at), len(self.times) - 1) + 1 for cut in self.heard]
+        diagrams = [min(bisect_left(self.times, cut.at), len(self.times) - 1) + 1 for cut in self.heard]
         lines = [
             [at, cut.word, f"{cut.at:%Y-%m-%d}", cut.speed_rpm, 1e3 * cut.depth, cut.chatter_frequency_hz]
-            for at, cut in zip(known, self.heard, strict=True)
+            for at, cut in zip(diagrams, self.heard, strict=True)
         ]
         heads = ["from diagram", "heard", "date", "speed (rpm)", "depth (mm)", "chatter (Hz)"]
         return Numbers(heads, lines) if lines else None
@@ -94,40 +94,40 @@ def lobe_course(
     """
     shown = [row for row in rows if row.x or row.y]
     picked = np.unique(np.linspace(0, len(shown) - 1, min(len(shown), MOST)).round().astype(int)).tolist()
-    found = [(shown[i].time, row_lobes(shown[i], machine, [cut]).get(cut)) for i in picked]
-    known = [(time, lobes.depth) for time, lobes in found if lobes is not None]
-    if len(known) < 2:
+    diagrams = [(shown[i].time, row_lobes(shown[i], machine, [cut]).get(cut)) for i in picked]
+    limits = [(time, lobes.depth) for time, lobes in diagrams if lobes is not None]
+    if len(limits) < 2:
         return None
-    trends = {one.direction: one.trend for one in series if one.tool == assembly.tool and one.trend is not None}
-    times, depths = zip(*known, strict=True)
-    ahead = _foretold(cut, assembly, trends, machine)
+    trends = {side.direction: side.trend for side in series if side.tool == assembly.tool and side.trend is not None}
+    times, depths = zip(*limits, strict=True)
+    ahead = _foretold_depths(cut, assembly, trends, machine)
     heard = heard_of(cuts, cut, assembly.tool, machine.cuts(assembly.tool)[cut][0])
     return LobeCourse(cut, speed_grid(machine), times, np.stack(depths), ahead, heard)
 
 
-def _foretold(cut: str, assembly: Assembly, trends: Mapping[str, Trend], machine: Machine) -> dict[str, Floats]:
-    told: dict[str, Floats] = {}
+def _foretold_depths(cut: str, assembly: Assembly, trends: Mapping[str, Trend], machine: Machine) -> dict[str, Floats]:
+    depths: dict[str, Floats] = {}
     for months in AHEAD:
-        falls = {name: _fall(trend, months) for name, trend in trends.items()}
-        known = {name: fall for name, fall in falls.items() if fall is not None}
-        if not known:
+        shares = {name: _fall(trend, months) for name, trend in trends.items()}
+        falls = {name: fall for name, fall in shares.items() if fall is not None}
+        if not falls:
             break
-        worst = max(known.values())
-        x, y = (_aged(assembly, name, known.get(name, worst)) for name in ("x", "y"))
+        worst = max(falls.values())
+        x, y = (_aged(assembly, name, falls.get(name, worst)) for name in ("x", "y"))
         lobes = tip_lobes(assembly.tool, x, y, machine, [cut]).get(cut)
         if lobes is not None:
             at = assembly.time + timedelta(days=months * MONTH)
-            told[f"{at:%Y-%m} (forecast)"] = lobes.depth
-    return told
+            depths[f"{at:%Y-%m} (forecast)"] = lobes.depth
+    return depths
 
 
 def _fall(trend: Trend, months: int) -> float | None:
     """Share by which the line falls from the last point on; None where nothing is foretold for that long."""
-    found, last = trend.forecast, day(trend.points[-1].time)
+    forecast, last = trend.forecast, day(trend.points[-1].time)
     at = last + months * MONTH
-    if found is None or trend.is_stale or not found.dates[0] <= at <= found.dates[-1]:
+    if forecast is None or trend.is_stale or not forecast.dates[0] <= at <= forecast.dates[-1]:
         return None
-    change = float(np.interp(at, found.dates, found.line)) - float(found.fitted[-1])
+    change = float(np.interp(at, forecast.dates, forecast.line)) - float(forecast.fitted[-1])
     return -math.expm1(min(change, 0.0) / 100)
 
 

@@ -22,10 +22,10 @@ NOTICE = "/* uPlot 1.6.32, (c) 2022 Leon Sorokin, MIT licence */"
 
 def page(template: str, **content: Any) -> str:
     """HTML of a template beside `report.html`; it is handed styles, script and plots."""
-    own = resources.files("lobewatch.show.report")
-    loader = jinja2.FunctionLoader(lambda name: own.joinpath(name).read_text(encoding="utf-8"))
+    room = resources.files("lobewatch.show.report")
+    loader = jinja2.FunctionLoader(lambda name: room.joinpath(name).read_text(encoding="utf-8"))
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
-    environment.filters |= {"in_css": _in_css, "named": _named}
+    environment.filters |= {"in_css": _in_css, "named": _named, "macro_name": _macro_name}
     return environment.get_template(template).render(_static() | content)
 
 
@@ -47,11 +47,11 @@ def write_page(path: Path, html: str) -> None:
 
 @cache
 def _static() -> dict[str, str]:
-    own, plots = (resources.files(f"lobewatch.{room}").joinpath("static") for room in ("show.report", "screen"))
+    pages, plots = (resources.files(f"lobewatch.{room}").joinpath("static") for room in ("show.report", "screen"))
     plot_script = plots.joinpath("uPlot.iife.min.js").read_text(encoding="utf-8")
     return {
-        "style": own.joinpath("report.css").read_text(encoding="utf-8"),
-        "script": own.joinpath("report.js").read_text(encoding="utf-8"),
+        "style": pages.joinpath("report.css").read_text(encoding="utf-8"),
+        "script": pages.joinpath("report.js").read_text(encoding="utf-8"),
         "plot_style": plots.joinpath("uPlot.min.css").read_text(encoding="utf-8"),
         "plot_script": NOTICE + plot_script.partition("*/")[2],
     }
@@ -59,7 +59,12 @@ def _static() -> dict[str, str]:
 
 def _in_css(text: str) -> str:
     """A name as part of a string of a style sheet."""
-    return re.sub(r"[^\w .,:;()+-]", lambda one: f"\\{ord(one[0]):x} ", text)
+    return re.sub(r"[^\w .,:;()+-]", lambda match: f"\\{ord(match[0]):x} ", text)
+
+
+def _macro_name(part: object) -> str:
+    """The macro of parts.html that shows a part of a section: the name of its class in small letters."""
+    return type(part).__name__.lower()
 
 
 def _named(picture: str, name: str) -> Markup:

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 
 from lobes import Cut, StabilityLobes
-from lobewatch.cuts.learning.lobes_at_speed import LobesAtSpeed, lobes_at_speed
+from lobewatch.cuts.learning.at_speed import LobesAtSpeed, lobes_at_speed
 from lobewatch.machine.additions.keep_cut import keep_cut
 from lobewatch.machine.journal.heard_cut import CutWord, HeardCut
-from lobewatch.show.figures.heard_cuts import heard_of
-from lobewatch.show.figures.lobe_figures import lobes_figure
+from lobewatch.show.figures.lobe_figures import heard_of, lobes_figure
 from lobewatch.show.report.report import render_report
 from lobewatch.tool import lobes_of
 from lobewatch.verdicts.limit_band import LimitBand

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lobewatch.machine import ProgramTable
-from lobewatch.show.programs.settings import rpm
+from lobewatch.show.programs.advice import rpm
 from lobewatch.show.programs.verdicts import (
     WORDS,
     is_safe,

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from lobewatch.cuts.listening.lattice import SpindleSpeed
 from lobewatch.cuts.listening.sorted_lines import SortedLines, is_foreign, sort_lines
 from lobewatch.cuts.listening.spectrum import SpectralLines, Spectrum
 
+Floats = NDArray[np.float64]
 RATE, BIN, TURN, TEETH = 25600.0, 1.0, 200.0, 4
 TURNING = SpindleSpeed(TURN, 1e-4, 1.0, 9, 0.0)
 
 
 def quiet(power: float = 1e-6) -> Spectrum:
     """A part without a line, of one second."""
-    frequency = np.arange(round(RATE / 2) * 2 + 1) * 0.5
+    frequency: Floats = np.linspace(0.0, RATE / 2, round(RATE) + 1)
     noise = np.full(frequency.size, power)
     return Spectrum(frequency, noise.copy(), noise, BIN, RATE)
 

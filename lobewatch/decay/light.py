@@ -57,7 +57,7 @@ LIGHTS = {
 """Light of each reason by its code, in order of harm."""
 
 UNREADABLE = "Put its files right: the sentence above says which."
-"""What to do about a machine that cannot be read."""
+"""Next step of a machine that cannot be read."""
 
 
 def about_unreadable(reason: str) -> Remark:
@@ -77,12 +77,12 @@ def light_of(ordered: Sequence[Remark]) -> Light:
 
 
 def next_step(ordered: Sequence[Remark], well: str) -> str:
-    """What to do now, one sentence; well: where no reason says another."""
+    """Next step, one sentence; well: that where no reason says another."""
     return ordered[0].cure if ordered and ordered[0].cure else well
 
 
 def all_well(newest: datetime, interval_days: float) -> str:
-    """What to do where nothing is wrong; newest: when it was tapped last."""
+    """Next step where nothing is wrong; newest: when it was tapped last."""
     return f"All is well: tap again by {newest + timedelta(days=math.floor(interval_days)):%Y-%m-%d}."
 
 
@@ -104,7 +104,7 @@ def about_dates(
 
 
 def of_files(remark: Remark) -> Remark:
-    """What is wrong with a file, with a cure that can be the next step."""
+    """A remark on a file, with a cure that can be the next step."""
     return replace(remark, cure=f"{remark.about}: {remark.cure or remark.text}.")
 
 

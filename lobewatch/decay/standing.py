@@ -88,7 +88,7 @@ class Standing:
         return light_of(self.remarks)
 
     def series_of(self, tool: str, direction: str) -> SeriesStanding | None:
-        """How one series stands; None where there is none."""
+        """The standing of one series; None where there is none."""
         fits = (series for series in self.series if (series.tool, series.direction) == (tool, direction))
         return next(fits, None)
 

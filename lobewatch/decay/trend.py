@@ -109,7 +109,7 @@ class Trend:
 
     @property
     def start(self) -> float:
-        """Where it started (%): the highest of the fitted line at the first 8 points, else of the first three points.
+        """Its start (%): the highest of the fitted line at the first 8 points, else of the first three points.
 
         A first test clamped badly must not hide a fall for ever, and a mean of the first ones would hide that of a
         spindle that falls from the beginning.
@@ -135,7 +135,7 @@ class Trend:
 
     @property
     def fallen_since(self) -> datetime | None:
-        """When the fall began or happened that the alarm is about; None without alarm."""
+        """Time at which the fall began or happened that the alarm is about; None without alarm."""
         return None if self.watch.fall is None else self.points[self.watched + self.watch.fall.point].time
 
 

@@ -10,13 +10,13 @@ import numpy as np
 from acquisition import DataError, Frf, Remark
 from lobes import PocketShift, pocket_shifts
 from lobes.tip_response import Tip
-from lobewatch.cuts.learning.at_speed import at_speed
+from lobewatch.cuts.learning.at_speed import spindle_at_speed
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import Machine
-from lobewatch.measuring.model_state import model_frf, model_state
+from lobewatch.measuring.model import model_frf, model_state
 from lobewatch.tool.assembly import Assembly, speed_grid
 from lobewatch.tool.charts import DEEPEST, Chart, Dynamics, Method, chart, cut_table
-from lobewatch.verdicts.robust_pockets import robust_pockets
+from lobewatch.verdicts.advice import robust_pockets
 from lobewatch.verdicts.setting_search import Setting
 from lobewatch.verdicts.verdict import Verdict
 
@@ -54,7 +54,7 @@ def compare_lobes(logbook: Logbook, tool: str | None, cut: str, source: Dynamics
     then = None if first is None else _charted(logbook, first, cut, source, method)
     cuts = logbook.machine.cuts(assembly.tool)
     same = logbook.verdicts(names=[name for name, program_cuts in cuts.items() if program_cuts == now.cuts])
-    learnt = at_speed(now.table, assembly, logbook.machine, logbook.cuts)
+    learnt = spindle_at_speed(now.table, assembly, logbook.machine, logbook.cuts)
     pockets = robust_pockets(now.table, assembly, logbook.machine, learnt)
     remarks = [*assembly.remarks, *(replace(remark, about=cut) for remark in now.lobes.remarks)]
     remarks += [] if pockets else [_no_pocket(now, logbook.machine)]

@@ -11,7 +11,7 @@ from acquisition import Frf
 from dsm import Modes, Spindle, WhirlMap, mode_shapes, natural_frequencies, stiffness_curve, whirl_map
 from lobewatch.history.usable_taps import NotTappedError
 from lobewatch.logbook.logbook import Logbook
-from lobewatch.measuring.model_state import POINTS, ModelState, first_critical_speed, model_frf, tap_position
+from lobewatch.measuring.model import POINTS, ModelState, first_critical_speed, model_frf, tap_position
 
 _Float = NDArray[np.float64]
 

@@ -2,9 +2,16 @@
 
 from .estimate import Estimate
 from .measurement import Measurement, measure
+from .model import (
+    ModelMode,
+    ModelState,
+    ModelSummary,
+    first_critical_speed,
+    model_frf,
+    model_state,
+    model_summary,
+)
 from .model_calibration import ModelCalibration, calibrate_model
-from .model_state import ModelState, first_critical_speed, model_frf, model_state
-from .model_summary import ModelMode, ModelSummary, model_summary
 from .one_file.file_modes import FileModes, modes_of_file, remarks_on_all
 from .one_file.windows import Window
 

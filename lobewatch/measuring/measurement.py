@@ -27,7 +27,7 @@ Wear of 10 % in frequency takes a third off K, tests scatter by a tenth, the sma
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """What one tap test says of the spindle."""
+    """One tap test as it is understood: modes, the mode followed, the model recalibrated to it."""
 
     tap_id: str
     """Identity of the tap test."""
@@ -51,7 +51,7 @@ class Measurement:
 
 @dataclass(frozen=True, eq=False)
 class TapFit:
-    """What one tap test says by itself, whatever others said."""
+    """The modes of one tap test, fitted by itself, whatever other tests say."""
 
     tap_id: str
     """Identity of the tap test."""

@@ -1,4 +1,4 @@
-"""What a recording makes one ask: whether it is of this machine at all, and what was answered."""
+"""Questions about a recording that a person answers: is it of this machine at all, is its time right; the answers."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def unasked_text(codes: Sequence[str], tap_ids: Sequence[str], asked: Mapping[st
 
 
 def about_questions(tap_id: str, questions: Sequence[Remark], path: Path | str) -> Iterator[Remark]:
-    """What is asked of a tap test, with the command that answers; path: of the folder."""
+    """Remarks on what is asked of a tap test, with the command that answers; path: of the folder."""
     file = Path(path) / "taps" / f"{tap_id}.h5"
     for question in questions:
         answer = shlex.join(["lobewatch", "replay", str(path), str(file), "--accept", question.code])
@@ -142,7 +142,7 @@ def about_questions(tap_id: str, questions: Sequence[Remark], path: Path | str) 
 
 
 def clock_questions(created: datetime, now: datetime | None, taps: Iterable[TapEntry]) -> tuple[str, ...]:
-    """What is asked of a test of this time, by code; now: when a live one is committed, None for any other."""
+    """Codes of what is asked of a test of this time; now: when a live one is committed, None for any other."""
     if now is None:
         return ()
     newest = max((datetime.fromisoformat(tap.time) for tap in taps if not tap.excluded), default=None)

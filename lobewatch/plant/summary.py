@@ -1,4 +1,4 @@
-"""How a machine stands, in short, for many at once: what follows from its files, and what the date adds."""
+"""The standing of a machine in short, for many at once: what follows from its files, and what the date adds."""
 
 from __future__ import annotations
 

@@ -10,8 +10,8 @@ from acquisition import DataError, Remark
 from dsm import Calibration, calibrate, modes_at
 from lobewatch.machine import Machine
 from lobewatch.measuring.measurement import Measurement
-from lobewatch.measuring.model_state import model_state
-from lobewatch.tool.assembly import Assembly, Modes, untapped
+from lobewatch.measuring.model import model_state
+from lobewatch.tool.assembly import Assembly, Modes, untapped_remark
 from modal import Mode
 
 MODES = 8
@@ -45,7 +45,7 @@ def predict(machine: Machine, newest: Sequence[Measurement], tool: str) -> Assem
         calibration=found[newest[0].direction][1],
         taps={},
         predicted=True,
-        remarks=(remark, *([untapped(tool, known[0])] if len(known) == 1 else [])),
+        remarks=(remark, *([untapped_remark(tool, known[0])] if len(known) == 1 else [])),
     )
 
 

@@ -125,7 +125,7 @@ def _beyond(frf: Frf) -> Iterator[Remark]:
 
 
 def remarks_on_all(modes: Sequence[Mode]) -> list[Remark]:
-    """What speaks against all modes of an FRF together."""
+    """Remarks on all modes of an FRF together."""
     return [*_wrong_sign(modes), *_delayed(modes)]
 
 

@@ -1,1 +1,1 @@
-"""Who does a piece of work: this process, several of this computer, or the workers of a Dask cluster."""
+"""Work shared among processes: this one, several of this computer, or the workers of a Dask cluster."""

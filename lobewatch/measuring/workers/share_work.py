@@ -54,7 +54,7 @@ class Team(NamedTuple):
 
 
 def share_work(work: Callable[[Task], Result], tasks: Iterable[Task], workers: Workers) -> Iterator[Result]:
-    """What `work`, a function of a module that depends on its argument alone, gives for each task, in order.
+    """Results of `work`, a function of a module that depends on its argument alone, for each task, in order.
 
     DataError where a process is ended from outside, the cluster does not answer or has no workers, or runs another
     version. A worker of a cluster that dies is made up for by the others.

@@ -1,4 +1,4 @@
-"""The model as the newest tap test left it, with one tool or another in it."""
+"""The model as the newest tap test left it, with one tool or another in it: its FRF, and its figures."""
 
 from __future__ import annotations
 
@@ -12,9 +12,12 @@ from dsm import (
     Spindle,
     couple_tool,
     critical_speed,
+    energy_shares,
+    modes_at,
     natural_frequencies,
     receptance,
     spindle_side,
+    static_stiffness,
 )
 from lobewatch.machine import Machine
 from lobewatch.measuring.measurement import Measurement
@@ -108,3 +111,58 @@ def tap_position(state: ModelState) -> float:
     """Distance from the tool tip (m); another tool than the one that is always tapped is looked at where it cuts."""
     tap = state.machine.tap
     return tap.position_mm / 1e3 if state.tool == tap.tool else 0.0
+
+
+@dataclass(frozen=True)
+class ModelMode:
+    """One mode of the model."""
+
+    frequency: float
+    """Natural frequency (Hz)."""
+    tip_stiffness: float
+    """Modal stiffness at the tool tip (N/m)."""
+    bearing_share: float
+    """Share of its strain energy in bearings and housings (-)."""
+    segment_share: float
+    """Share of its strain energy in the shaft (-)."""
+    joint_share: float
+    """Share of its strain energy in the joints (-)."""
+
+
+@dataclass(frozen=True)
+class ModelSummary:
+    """The model in figures."""
+
+    state: ModelState
+    """Model with its tool."""
+    modes: tuple[ModelMode, ...]
+    """First modes, the lowest first."""
+    static_stiffness: float
+    """Static stiffness at the tool tip (N/m)."""
+    critical_speed: float | None
+    """Lowest critical speed (rpm); None where gyroscopic moments leave none."""
+    rigid_frequency: float
+    """Natural frequency of the first mode with rigid bearings (Hz): no bearing lifts it beyond."""
+
+
+def model_summary(state: ModelState, count: int) -> ModelSummary:
+    """The figures of a model: its first modes, stiffness and critical speed."""
+    frequency, stiffness = modes_at(state.spindle, count)
+    shares = energy_shares(state.spindle, count)
+    modes = tuple(
+        ModelMode(
+            frequency=float(frequency[n]),
+            tip_stiffness=float(stiffness[n]),
+            bearing_share=float(np.sum(shares.bearings[n] + shares.housings[n])),
+            segment_share=float(np.sum(shares.segments[n])),
+            joint_share=float(np.sum(shares.joints[n])),
+        )
+        for n in range(count)
+    )
+    return ModelSummary(
+        state,
+        modes,
+        static_stiffness(state.spindle),
+        first_critical_speed(state.spindle),
+        float(natural_frequencies(state.spindle, 1, rigid_bearings=True)[0]),
+    )

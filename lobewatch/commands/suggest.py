@@ -27,13 +27,13 @@ def suggest(
       lobewatch suggest mill-3 --program A
       lobewatch suggest mill-3 --program A --cuts 8 --json
     """
-    from lobewatch.cuts.learning.of_program import next_cut, program_named
+    from lobewatch.cuts.learning.lesson import find_program, next_cut
     from lobewatch.logbook import Logbook
     from lobewatch.show.cuts.describe_suggestion import learnt_texts, lesson_remarks, suggestion_json, suggestion_lines
     from lobewatch.show.terminal.output import remark_json, remark_lines
 
     logbook = Logbook.open(machine)
-    table = program_named(logbook.machine, program)
+    table = find_program(logbook.machine, program)
     assembly = logbook.assembly(table.tool)
     suggestion = next_cut(table, assembly, logbook.machine, logbook.cuts, cuts)
     remarks = [*logbook.remarks, *assembly.remarks, *lesson_remarks(suggestion.lesson)]

@@ -14,11 +14,12 @@ from acquisition import Bench, DataError, Driver, EmulatorThread, Structure
 from acquisition.emulation import CutSound, Housing, MillingCut, Passage, random_housing, simulate_cut
 from dsm import Spindle
 from lobes import Program, program_limit
-from lobewatch.cuts.learning.priors import DAMPING, FORCE, FREQUENCY, STIFFNESS
+from lobewatch.cuts.learning.priors import FORCE
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.cut_setting import CutSetting
 from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.tap.emulated_spindle import SAMPLE_RATE, emulated_inputs, emulated_structure
+from lobewatch.verdicts.draws import DAMPING, FREQUENCY, STIFFNESS
 from modal import Mode
 
 PASSAGE = Passage(before=2.0, ramp=0.1, steady=2.8, after=2.0)

@@ -99,7 +99,7 @@ def assemble(newest: Measurement, other: Measurement | None, series: Mapping[str
     )
 
 
-def untapped(tool: str, known: str) -> Remark:
+def untapped_remark(tool: str, known: str) -> Remark:
     """That one direction alone is known."""
     missing = "y" if known == "x" else "x"
     text = f"modes in the {known} direction alone, {missing} taken like {known}"
@@ -116,7 +116,7 @@ def _about_directions(
     newest: Measurement, other: Measurement | None, directions: Sequence[str], moved: float | None
 ) -> tuple[Remark, ...]:
     if len(directions) == 1:
-        return (untapped(newest.tool, directions[0]),)
+        return (untapped_remark(newest.tool, directions[0]),)
     if other is None or newest.time - other.time <= TOGETHER:
         return ()
     days = round((newest.time - other.time) / timedelta(days=1))

@@ -70,7 +70,7 @@ def _before(tap: TapEntry, baselines: Sequence[datetime]) -> datetime | None:
     return next((one for one in reversed(baselines) if one <= time), None)
 
 
-def earlier(place: Place, among: Sequence[Place]) -> Iterator[int]:
+def earlier_numbers(place: Place, among: Sequence[Place]) -> Iterator[int]:
     """Numbers of the tap tests of the same series and direction before it, the newest first."""
     while place.before is not None:
         place = among[place.before]

@@ -1,8 +1,7 @@
 """What a tool allows: doubt, word and limit of each program, why, and settings that would be safe."""
 
-from .advice import Advice, advise
+from .advice import Advice, advise, robust_pockets
 from .doubt import Doubt, doubt_of
-from .robust_pockets import robust_pockets
 from .setting_search import Setting
 from .verdict import Ruling, Verdict, Word
 

@@ -12,14 +12,14 @@ from acquisition import Remark
 from dsm import Calibration, calibrate
 from lobes.program import SHARES
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.drawn import Drawn
+from lobewatch.verdicts.draws import ProgramDraws
 
 FALLS = np.array([0.0, 0.05, 0.10, 0.15, 0.20])
 """Falls of the frequency for which the model is recalibrated; between them its stiffness is interpolated."""
 STEPS = 101
-"""Looks between no fall and the largest of them ..."""
+"""Number of looks between no fall and the largest of them ..."""
 PARTS = 8
-"""... of which only those parts are taken that come before the first chatter."""
+"""... in so many parts, up to the one with the first chatter."""
 
 StiffnessAt = Callable[[float], float]
 
@@ -31,11 +31,11 @@ def softening(assembly: Assembly) -> tuple[StiffnessAt, Remark]:
     it stays.
     """
     ratios = np.ones(1) if assembly.calibration is None else _stiffness_ratios(assembly.calibration)
-    said = "K does not (no model)"
+    clause = "K does not (no model)"
     if ratios.size > 1:
         fall, change = 100 * FALLS[ratios.size - 1], 100 * (ratios[-1] - 1)
-        said = f"K changes as in the model ({change:+.1f} % when f_n has fallen by {fall:.0f} %)"
-    text = f"decay left: all modes fall alike, zeta does not change, {said}"
+        clause = f"K changes as in the model ({change:+.1f} % when f_n has fallen by {fall:.0f} %)"
+    text = f"decay left: all modes fall alike, zeta does not change, {clause}"
 
     def stiffness_at(fall: float) -> float:
         return float(np.interp(fall, FALLS[: ratios.size], ratios))
@@ -55,19 +55,19 @@ def _stiffness_ratios(calibration: Calibration) -> NDArray[np.float64]:
     return np.array(stiffness or [1.0]) / (stiffness or [1.0])[0]
 
 
-def aged(drawn: Drawn, falls: NDArray[np.float64], stiffness_at: StiffnessAt) -> Drawn:
+def age(draws: ProgramDraws, falls: NDArray[np.float64], stiffness_at: StiffnessAt) -> ProgramDraws:
     """All draws with all frequencies fallen by each of these shares (k,), one after the other."""
-    return drawn.swept(np.ones(falls.size), 1 - falls, np.array([stiffness_at(fall) for fall in falls.tolist()]))
+    return draws.swept(np.ones(falls.size), 1 - falls, np.array([stiffness_at(fall) for fall in falls.tolist()]))
 
 
-def tolerable_decay(drawn: Drawn, depth: float, stiffness_at: StiffnessAt) -> float:
+def tolerable_decay(draws: ProgramDraws, depth: float, stiffness_at: StiffnessAt) -> float:
     """Largest fall of the frequency, relative, up to which a depth (m) stays stable in the middle of the doubt.
 
     0.0 where it is unstable now, inf where nothing happens down to 80 %. Looks every 0.2 % of fall.
     """
     falls, worst = np.linspace(0, FALLS[-1], STEPS), np.empty(0)
     for part in np.array_split(falls, PARTS):
-        middle = aged(drawn.some(np.array([0])), part, stiffness_at)
+        middle = age(draws[np.array([0])], part, stiffness_at)
         worst = np.append(worst, np.max(middle.growth(depth * np.array(SHARES)), axis=1))
         if np.any(worst >= 0):
             break

@@ -20,11 +20,13 @@ from lobewatch.tool.series import Scatter
 from modal import Mode
 
 SCATTER = Scatter(0.003, 0.10, 0.03)
-"""From tap test to tap test, until a series tells its own."""
+"""Scatter from tap test to tap test, until a series tells its own; chosen."""
 LEAST = 0.02
-"""Nothing is drawn below this share of its middle value ..."""
+"""Least share of its middle value that anything is drawn with ..."""
 MOST_TURNED = np.radians(89)
-"""... and no phase beyond this (rad)."""
+"""... and largest phase (rad)."""
+ALIKE = 2
+"""Number of tests of an alloy from which on their range counts."""
 CUTS = "cuts"
 """Cause of the doubt of modes that test cuts have taught: all that they have left open."""
 
@@ -88,15 +90,15 @@ class Doubt:
     speed: float
     """Relative half-width of the spindle speed."""
     tangential: Span
-    """Of the cutting coefficient Kt."""
+    """Range of the cutting coefficient Kt over the middle."""
     ratio: Span
-    """Of Kr/Kt, the direction of the force."""
+    """Range of Kr/Kt, the direction of the force, over the middle."""
     learnt: LearntDraws | None = None
     """Draws that test cuts have left, which stand for the half-widths; None where none has taught anything."""
 
     @property
     def causes(self) -> tuple[str, ...]:
-        """All that it comes from."""
+        """Names of all that it comes from."""
         return (*self.modes, "speed", "coefficients")
 
     def draw(self, middle: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
@@ -121,16 +123,16 @@ class Doubt:
         tangential, ratio = (span.low + (span.high - span.low) * random.uniform(0, 1, count) for span in self._spans)
         if without == "coefficients":
             tangential, ratio = np.ones((2, count))
-        all_of_them = middle[np.zeros(count, dtype=np.intp)]
+        rows = middle[np.zeros(count, dtype=np.intp)]
         return replace(
-            all_of_them,
-            frequency=all_of_them.frequency * factor[..., 0],
-            damping_ratio=all_of_them.damping_ratio * factor[..., 1],
-            stiffness=all_of_them.stiffness * factor[..., 2],
-            phase=np.clip(all_of_them.phase + turned, -MOST_TURNED, MOST_TURNED),
-            speed_rpm=all_of_them.speed_rpm * np.maximum(speed, LEAST),
-            tangential=all_of_them.tangential * np.maximum(tangential, LEAST),
-            radial=all_of_them.radial * np.maximum(tangential, LEAST) * np.maximum(ratio, 0.0),
+            rows,
+            frequency=rows.frequency * factor[..., 0],
+            damping_ratio=rows.damping_ratio * factor[..., 1],
+            stiffness=rows.stiffness * factor[..., 2],
+            phase=np.clip(rows.phase + turned, -MOST_TURNED, MOST_TURNED),
+            speed_rpm=rows.speed_rpm * np.maximum(speed, LEAST),
+            tangential=rows.tangential * np.maximum(tangential, LEAST),
+            radial=rows.radial * np.maximum(tangential, LEAST) * np.maximum(ratio, 0.0),
         )
 
     def _mixed(self, cause: str, uniform: Floats) -> Floats:
@@ -151,33 +153,33 @@ def doubt_of(assembly: Assembly, table: CutTable, machine: Machine) -> Doubt:
 
 
 def _modes(assembly: Assembly, given: DoubtTable) -> dict[str, Floats]:
+    """Half-widths of the modes by cause, shape (n, 4) each."""
     x, y = assembly.x or (), assembly.y or ()
     absent = np.zeros((len(x) + len(y), 4))
     if assembly.predicted:
-        made = {"prediction": np.array([_of_prediction(mode, given) for mode in (*x, *y)])}
+        widths = {"prediction": np.array([_of_prediction(mode, given) for mode in (*x, *y)])}
     else:
         sides = (("x", len(x)), ("y", len(y)))
         clamping = [np.tile(scatter_in(assembly, side, given), (count, 1)) for side, count in sides]
-        clamping = [widths * [1, 1, 1, np.pi / 180] for widths in clamping]
-        made = {"tap": np.array([_error(mode) for mode in (*x, *y)]), "clamping": np.vstack(clamping)}
+        clamping = [scatter * [1, 1, 1, np.pi / 180] for scatter in clamping]
+        widths = {"tap": np.array([_error(mode) for mode in (*x, *y)]), "clamping": np.vstack(clamping)}
     if len(assembly.directions) == 1:
         unknown = slice(len(x), None) if assembly.directions[0] == "x" else slice(0, len(x))
-        made["untapped"] = absent
+        widths["untapped"] = absent
         absent[unknown] = given.untapped_frequency_percent / 100, 0.0, given.untapped_stiffness_percent / 100, 0.0
-    return made
+    return widths
 
 
 def scatter_in(assembly: Assembly, side: str, given: DoubtTable) -> Scatter:
     """Scatter of the tap tests of a tool in a direction: what machine.toml says, else the series, else the default."""
-    known = side if side in assembly.directions else assembly.directions[0]
-    found = assembly.scatter(known) or SCATTER
-    asked = (given.frequency_percent, given.damping_percent, given.stiffness_percent)
-    sizes = [own if wish is None else wish / 100 for own, wish in zip(found[:3], asked, strict=True)]
-    return Scatter(sizes[0], sizes[1], sizes[2], found.phase_deg)
+    scatter = assembly.scatter(side if side in assembly.directions else assembly.directions[0]) or SCATTER
+    percents = (given.frequency_percent, given.damping_percent, given.stiffness_percent)
+    sizes = [width if wish is None else wish / 100 for width, wish in zip(scatter[:3], percents, strict=True)]
+    return Scatter(sizes[0], sizes[1], sizes[2], scatter.phase_deg)
 
 
 def _of_prediction(mode: Mode, given: DoubtTable) -> tuple[float, float, float, float]:
-    """The phase may be none at all, or twice what it is taken for."""
+    """Half-widths of a mode that is predicted; its phase may be none at all, or twice what it is taken for."""
     frequency, damping = given.predicted_frequency_percent / 100, given.predicted_damping_percent / 100
     return frequency, damping, given.predicted_stiffness_percent / 100, abs(np.radians(mode.phase_deg))
 
@@ -201,11 +203,11 @@ def _mixing(mode: Mode) -> Floats:
 
 def _coefficients(table: CutTable, machine: Machine) -> tuple[Span, Span]:
     """Kt and Kr/Kt over the middle: the published range of an alloy with several tests, else that of [doubt]."""
-    own = machine.coefficients(table)
-    alike = [one for one in cutting_coefficients() if own.alloy and one.alloy == own.alloy]
-    if len(alike) < 2 or own.radial == 0:
+    middle = machine.coefficients(table)
+    alike = [test for test in cutting_coefficients() if middle.alloy and test.alloy == middle.alloy]
+    if len(alike) < ALIKE or middle.radial == 0:
         share = machine.doubt.coefficients_percent / 100
         return Span(1 - share, 1 + share), Span(1 - share, 1 + share)
-    tangential = [one.tangential / own.tangential for one in alike]
-    ratio = [one.radial / one.tangential * own.tangential / own.radial for one in alike]
+    tangential = [test.tangential / middle.tangential for test in alike]
+    ratio = [test.radial / test.tangential * middle.tangential / middle.radial for test in alike]
     return Span(min(tangential), max(tangential)), Span(min(ratio), max(ratio))

@@ -6,18 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes.program_limit import DEEPEST
-from lobewatch.verdicts.drawn import Drawn
+from lobewatch.verdicts.draws import ProgramDraws
 
 TRIED = np.array([0.75, 1.0, 1.4])
-"""Shares of the limit in the middle, for its own cutting coefficient, at which each draw is looked at ..."""
+"""Shares of the limit in the middle, as its own cutting coefficient moves it, at which each draw is looked at ..."""
 BEYOND = np.array([2.0, 3.0])
-"""... and those that are stable at all of them too."""
+"""... and shares at which those are looked at that are stable at all of these."""
 FREE = np.array([0.05, 0.2, 0.5, 1.0])
 """Shares of the deepest of interest where there is no limit in the middle."""
 EXTREMES = 9
-"""So many of the lowest and highest limits are then refined, in all directions of feed that count."""
+"""Number of the lowest and of the highest limits that are then refined, in all directions of feed that count."""
 STEPS = 3
-"""Of that refinement."""
+"""Steps of that refinement."""
 ALIKE = 1.15
 """Directions of feed whose limit is at most so many times the lowest one count ..."""
 MOST = 3
@@ -26,33 +26,33 @@ MOST = 3
 Floats = NDArray[np.float64]
 
 
-def drawn_limits(drawn: Drawn, depth: float) -> Floats:
+def drawn_limits(draws: ProgramDraws, depth: float) -> Floats:
     """Deepest stable depth of each draw (m), shape (draws,); inf beyond what is looked at.
 
     Of the other draws than the lowest and highest it is the first change between the depths that are looked at,
     linearly interpolated. depth: that of the program (m).
     """
-    limit, worst = float(drawn.limits[0]), drawn.fed(0.0)
-    near = drawn.fed(ALIKE * limit, MOST)
-    own = (drawn.rows.tangential[0] / drawn.rows.tangential)[:, np.newaxis]
-    tried = own * limit * TRIED if np.isfinite(limit) else np.tile(DEEPEST * depth * FREE, (len(own), 1))
+    limit, worst = float(draws.limits[0]), draws.fed(0.0)
+    near = draws.fed(ALIKE * limit, MOST)
+    softness = (draws.rows.tangential[0] / draws.rows.tangential)[:, np.newaxis]
+    tried = softness * limit * TRIED if np.isfinite(limit) else np.tile(DEEPEST * depth * FREE, (len(softness), 1))
     low, high, at_low, at_high = _brackets(tried, worst.growth(tried))
     open_ones = np.flatnonzero(np.isinf(high)) if np.isfinite(limit) else np.empty(0, dtype=np.intp)
     if open_ones.size:
-        further = np.hstack((low[open_ones, np.newaxis], own[open_ones] * limit * BEYOND))
-        known = _brackets(further, worst.some(open_ones).growth(further))
-        low[open_ones], high[open_ones], at_low[open_ones], at_high[open_ones] = known
-    found = _between(low, high, at_low, at_high)
-    order = np.argsort(found)
+        further = np.hstack((low[open_ones, np.newaxis], softness[open_ones] * limit * BEYOND))
+        brackets = _brackets(further, worst[open_ones].growth(further))
+        low[open_ones], high[open_ones], at_low[open_ones], at_high[open_ones] = brackets
+    limits = _between(low, high, at_low, at_high)
+    order = np.argsort(limits)
     ends = np.unique(np.concatenate((order[:EXTREMES], order[-EXTREMES:])))
-    ends = ends[np.isfinite(found[ends])]
+    ends = ends[np.isfinite(limits[ends])]
     for _ in range(STEPS if ends.size else 0):
-        value = near.some(ends).growth(found[ends, np.newaxis])[:, 0]
+        value = near[ends].growth(limits[ends, np.newaxis])[:, 0]
         above = value >= 0
-        low[ends], at_low[ends] = np.where(above, low[ends], found[ends]), np.where(above, at_low[ends], value)
-        high[ends], at_high[ends] = np.where(above, found[ends], high[ends]), np.where(above, value, at_high[ends])
-        found[ends] = _between(low[ends], high[ends], at_low[ends], at_high[ends])
-    return found
+        low[ends], at_low[ends] = np.where(above, low[ends], limits[ends]), np.where(above, at_low[ends], value)
+        high[ends], at_high[ends] = np.where(above, limits[ends], high[ends]), np.where(above, value, at_high[ends])
+        limits[ends] = _between(low[ends], high[ends], at_low[ends], at_high[ends])
+    return limits
 
 
 def _brackets(tried: Floats, grown: Floats) -> tuple[Floats, Floats, Floats, Floats]:

@@ -13,24 +13,24 @@ from lobewatch.machine import Machine
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.charts import cut_table
 from lobewatch.verdicts.doubt import doubt_of
-from lobewatch.verdicts.drawn import middle_row
+from lobewatch.verdicts.draws import middle_row
+from lobewatch.verdicts.judgement import QUANTILES
 from lobewatch.verdicts.mean_force import MeanForce
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
-from lobewatch.verdicts.verdict import QUANTILES
 
 DRAWS = 64
-"""From the doubt."""
+"""Number of draws from the doubt."""
 SPEEDS = 81
-"""Of the diagrams of the draws."""
+"""Number of speeds of their diagrams."""
 DEEP = 1e3
-"""Stands for no limit (m)."""
+"""Depth that stands for no limit (m)."""
 
 Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class LimitBand:
-    """Between 1 and 99 % of the limits over the doubt, at the speeds of a diagram."""
+    """Band between 1 and 99 % of the limits over the doubt, at the speeds of a diagram."""
 
     speed_rpm: Floats
     """Spindle speeds (rpm), shape (n,)."""
@@ -52,17 +52,17 @@ def limit_band(
     cuts = machine.cuts(assembly.tool)[cut]
     rows = middle_row(Program(cuts[0], 1.0, 1.0), at_speed.moved(assembly))
     doubt = at_speed.doubt or doubt_of(assembly, cut_table(machine, cut), machine)
-    drawn = doubt.draw(rows, DRAWS)
+    draws = doubt.draw(rows, DRAWS)
     softest = int(np.argmin(rows.stiffness[0] * rows.damping_ratio[0]))
-    moved = (drawn.speed_rpm / (drawn.frequency[:, softest] / rows.frequency[0, softest]))[:, np.newaxis]
+    moved = (draws.speed_rpm / (draws.frequency[:, softest] / rows.frequency[0, softest]))[:, np.newaxis]
     low, high = float(np.min(line.speed_rpm)), float(np.max(line.speed_rpm))
     speeds, middle = np.geomspace(low, high, SPEEDS), rows[np.zeros(DRAWS, np.intp)]
-    own = _depths(drawn, cuts, drawn.speed_rpm[:, np.newaxis] * speeds)
-    rest = own / _depths(middle, cuts, np.clip(moved * speeds, low, high))
+    depths = _depths(draws, cuts, draws.speed_rpm[:, np.newaxis] * speeds)
+    ratios = depths / _depths(middle, cuts, np.clip(moved * speeds, low, high))
     order = np.argsort(line.speed_rpm)
-    known = line.speed_rpm[order], np.minimum(line.depth[order], DEEP)
-    limits = np.interp(np.clip(moved * line.speed_rpm, low, high), *known)
-    limits *= [np.interp(line.speed_rpm, speeds, ratio) for ratio in rest]
+    rising = line.speed_rpm[order], np.minimum(line.depth[order], DEEP)
+    limits = np.interp(np.clip(moved * line.speed_rpm, low, high), *rising)
+    limits *= [np.interp(line.speed_rpm, speeds, ratio) for ratio in ratios]
     lowest, highest = np.quantile(limits, QUANTILES, axis=0)
     return LimitBand(
         line.speed_rpm,
@@ -73,5 +73,5 @@ def limit_band(
 
 def _depths(rows: MillingRows, cuts: Sequence[Cut], speed_rpm: Floats) -> Floats:
     """Limit of each row in the worst of some cuts at speeds (rpm) of its own (r, s), DEEP where there is none."""
-    found = [MeanForce.of(replace(rows, cut=cut).fed_at(cut.feed_angle)).limits(speed_rpm)[0] for cut in cuts]
-    return np.asarray(np.minimum(np.min(found, axis=0), DEEP))
+    depths = [MeanForce.of(replace(rows, cut=cut).fed_at(cut.feed_angle)).limits(speed_rpm)[0] for cut in cuts]
+    return np.asarray(np.minimum(np.min(depths, axis=0), DEEP))

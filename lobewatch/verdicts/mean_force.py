@@ -21,9 +21,9 @@ from lobes import Cut, MillingRows
 from lobes.tooth_force import interval_forces, mean_force, turned
 
 REACH = 0.7
-"""Frequencies are looked at so far around each natural frequency, relatively ..."""
+"""Distance from each natural frequency up to which frequencies are looked at, relative ..."""
 POINTS = 49
-"""... at so many places, dense near it."""
+"""... and number of them, dense near it."""
 AT_ONCE = 300_000
 """Numbers that are worked on at once."""
 NEWTON = 14
@@ -39,13 +39,15 @@ class ModeColumns(NamedTuple):
     """One mode of each spindle, shape (r, 1) each."""
 
     frequency: Floats
-    """rad/s."""
+    """Natural frequency (rad/s)."""
     damping_ratio: Floats
+    """Damping ratio (-)."""
     stiffness: Floats
-    """N/m."""
+    """Modal stiffness (N/m)."""
     place: Floats
-    """Of the tip in it, and of the velocity of the tip."""
+    """Share of its coordinate that the tip shows (-)."""
     velocity: Floats
+    """Share of its velocity over the natural frequency that the tip shows (-)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +55,13 @@ class MeanForce:
     """r spindles with a cut, by its mean force."""
 
     rows: MillingRows
+    """Spindles, each with its cut and feed."""
     force: Floats
     """Mean force matrix of each (Pa), in the directions x and y of the machine, shape (r, 2, 2)."""
 
     @classmethod
     def of(cls, rows: MillingRows) -> MeanForce:
-        """Of rows fed each in its own direction."""
+        """Spindles fed each in its own direction, by the mean force of their cut."""
         tangential, radial = _unit_forces(rows.cut)
         force = np.multiply.outer(rows.tangential, tangential) + np.multiply.outer(rows.radial, radial)
         return cls(rows, turned(force, rows.feed_angle))
@@ -73,8 +76,8 @@ class MeanForce:
         size = max(1, AT_ONCE // (speeds.shape[1] * POINTS * self.rows.direction.size))
         for first in range(0, len(self.rows), size):
             part = slice(first, first + size)
-            some = MeanForce(self.rows[part], self.force[part])
-            depth[part], chatter[part] = some._limits(speeds[part] * self.rows.cut.teeth / 60, deepest)
+            spindles = MeanForce(self.rows[part], self.force[part])
+            depth[part], chatter[part] = spindles._limits(speeds[part] * self.rows.cut.teeth / 60, deepest)
         return depth, chatter
 
     def _limits(self, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
@@ -82,9 +85,9 @@ class MeanForce:
         grid = self._grid()
         depth, chatter = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
         for loop in self._eigenvalues(grid):
-            own, frequency = _lowest(grid, loop, teeth, deepest)
-            chatter = np.where(own < depth, frequency, chatter)
-            depth = np.minimum(own, depth)
+            limit, frequency = _lowest(grid, loop, teeth, deepest)
+            chatter = np.where(limit < depth, frequency, chatter)
+            depth = np.minimum(limit, depth)
         return depth, chatter
 
     def loudest(self, speed_rpm: Floats, depth: float) -> tuple[Floats, Floats]:
@@ -103,9 +106,8 @@ class MeanForce:
         value, slope = self._closed(root, tau[:, np.newaxis], depth)
         good = (np.abs(value / slope) * tau[:, np.newaxis] < 1e-3) & (root.imag > 0)
         best = np.argmax(np.where(good, root.real, -np.inf), axis=1)
-        found = root[np.arange(len(root)), best]
-        found = np.where(np.any(good, axis=1), found, np.nan)
-        return np.asarray(found.real), np.asarray(found.imag / (2 * np.pi))
+        fastest = np.where(np.any(good, axis=1), root[np.arange(len(root)), best], np.nan)
+        return np.asarray(fastest.real), np.asarray(fastest.imag / (2 * np.pi))
 
     def _closed(self, s: Complexes, tau: Floats, depth: float) -> tuple[Complexes, Complexes]:
         """det(I + b (1 - exp(-s tau)) H0 G) and its derivative by s."""
@@ -115,14 +117,14 @@ class MeanForce:
         gain, dgain = depth * (1 - wave), depth * tau * wave
         trace, dtrace = h[:, 0, 0] * gx + h[:, 1, 1] * gy, h[:, 0, 0] * dx + h[:, 1, 1] * dy
         product = h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] * h[:, 1, 0]
-        both, dboth = product * gx * gy, product * (dx * gy + gx * dy)
+        minor, dminor = product * gx * gy, product * (dx * gy + gx * dy)
         return (
-            1 + gain * trace + gain**2 * both,
-            dgain * trace + gain * dtrace + 2 * gain * dgain * both + gain**2 * dboth,
+            1 + gain * trace + gain**2 * minor,
+            dgain * trace + gain * dtrace + 2 * gain * dgain * minor + gain**2 * dminor,
         )
 
     def _receptance(self, frequency: Floats, axis: int) -> Complexes:
-        """Of one direction at frequencies (rad/s) (r, k)."""
+        """Receptance in one direction at frequencies (rad/s) (r, k)."""
         total = np.zeros(frequency.shape, np.complex128)
         for mode in self._modes(axis):
             r = frequency / mode.frequency
@@ -133,7 +135,7 @@ class MeanForce:
         return total
 
     def _with_slope(self, s: Complexes, axis: int) -> tuple[Complexes, Complexes]:
-        """Of one direction at s (r, k) (1/s), and its derivative."""
+        """Receptance in one direction at s (r, k) (1/s), and its derivative."""
         total, slope = np.zeros(s.shape, np.complex128), np.zeros(s.shape, np.complex128)
         for mode in self._modes(axis):
             r = s / mode.frequency
@@ -145,7 +147,7 @@ class MeanForce:
         return total, slope
 
     def _modes(self, axis: int) -> Iterator[ModeColumns]:
-        """Of one direction."""
+        """Modes of one direction."""
         place, velocity = self.rows.seen
         parts = self.rows.frequency, self.rows.damping_ratio, self.rows.stiffness, place, velocity
         for k in np.flatnonzero(self.rows.axes[self.rows.direction] == axis):
@@ -159,7 +161,7 @@ class MeanForce:
         return np.sort(grid.reshape(len(self.rows), -1), axis=1)
 
     def _eigenvalues(self, grid: Floats) -> list[Complexes]:
-        """Both of H0 G at frequencies (r, k), each followed over them."""
+        """Both eigenvalues of H0 G at frequencies (r, k), each followed over them."""
         gx, gy = (self._receptance(2 * np.pi * grid, axis) for axis in (0, 1))
         h = self.force[..., np.newaxis]
         half = (h[:, 0, 0] * gx + h[:, 1, 1] * gy) / 2
@@ -190,8 +192,8 @@ def _lowest(grid: Floats, loop: Complexes, teeth: Floats, deepest: float) -> tup
     row, speed, step = np.unravel_index(np.flatnonzero(crosses), crosses.shape)
     before, after = place[row, speed, step], place[row, speed, step + 1]
     share = (np.maximum(whole[row, speed, step], whole[row, speed, step + 1]) - before) / (after - before)
-    there = real[row, step] + share * (real[row, step + 1] - real[row, step])
-    limit = np.where(there < 0, -1 / (2 * np.minimum(there, -1e-300)), np.inf)
+    crossing = real[row, step] + share * (real[row, step + 1] - real[row, step])
+    limit = np.where(crossing < 0, -1 / (2 * np.minimum(crossing, -1e-300)), np.inf)
     begins = np.flatnonzero(np.diff(row * teeth.shape[1] + speed, prepend=-1))
     depth[row[begins], speed[begins]] = np.minimum.reduceat(limit, begins)
     lowest = np.flatnonzero(limit == depth[row, speed])

@@ -13,7 +13,7 @@ from scipy.ndimage import minimum_filter1d
 from lobes import lowest_of, zero_order
 from lobewatch.machine import Machine, ProgramTable, drive_limit
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.drawn import Drawn
+from lobewatch.verdicts.draws import ProgramDraws
 
 GRID = 0.002
 """Relative step of the speeds."""
@@ -22,7 +22,7 @@ BESIDE = 0.003
 APART = 0.02
 """Relative distance of two speeds that are worth looking at both."""
 VALLEY = 0.8
-"""Between two pockets less than this share of the shallower one is promised."""
+"""Share of the shallower of two pockets, less than which is promised between them."""
 ENOUGH = 0.95
 """Share of a depth that is promised at all speeds of its window ..."""
 NEAR = 0.05
@@ -42,7 +42,7 @@ class Promise:
 
     @classmethod
     def of(
-        cls, program: ProgramTable, drawn: Drawn, assembly: Assembly, machine: Machine, fall: float, spare: float
+        cls, program: ProgramTable, draws: ProgramDraws, assembly: Assembly, machine: Machine, fall: float, spare: float
     ) -> Promise:
         """What holds around each speed as far as speed and frequency may be off, now and after a fall of the frequency.
 
@@ -50,12 +50,12 @@ class Promise:
         """
         low, high = machine.speed.low_rpm, machine.speed.high_rpm
         speeds = np.geomspace(low, high, max(int(math.log(high / low) / GRID), 2))
-        cuts = [replace(machine.build_cut(program), feed_angle=angle) for angle in drawn.angles.tolist()]
+        cuts = [replace(machine.build_cut(program), feed_angle=angle) for angle in draws.angles.tolist()]
         limit = lowest_of([zero_order(assembly.x, assembly.y, cut, speeds) for cut in cuts]).depth * 1e3
-        steps, ahead = math.ceil((drawn.doubt.speed + BESIDE + fall / 2) / GRID), round(fall / 2 / GRID)
+        steps, ahead = math.ceil((draws.doubt.speed + BESIDE + fall / 2) / GRID), round(fall / 2 / GRID)
         around = minimum_filter1d(np.minimum(limit, 1e6), 2 * steps + 1, origin=-ahead, mode="nearest")
         deepest = np.minimum(program.deepest_mm, 1e3 * drive_limit(machine, program, speeds))
-        return cls(speeds, np.minimum(around / max(drawn.doubt.tangential.high, 1 + spare), deepest))
+        return cls(speeds, np.minimum(around / max(draws.doubt.tangential.high, 1 + spare), deepest))
 
     def middles(self, depth_mm: float) -> list[float]:
         """The middle (rpm) of each window of speeds at which a depth (mm) is promised."""
@@ -65,7 +65,7 @@ class Promise:
         """Places with more chips than beside them, the most first, none right beside another."""
         taken: list[int] = []
         for place in self._all_tops():
-            if all(abs(place - other) * GRID > APART for other in taken):
+            if all(abs(place - top) * GRID > APART for top in taken):
                 taken.append(place)
         return taken
 
@@ -73,7 +73,7 @@ class Promise:
         """The place with the most chips of each pocket, the most first."""
         taken: list[int] = []
         for place in self._all_tops():
-            if not any(self._joined(place, other) for other in taken):
+            if not any(self._joined(place, top) for top in taken):
                 taken.append(place)
         return taken
 
@@ -89,14 +89,14 @@ class Promise:
         tops = np.flatnonzero((chips[1:-1] >= chips[:-2]) & (chips[1:-1] >= chips[2:]))
         return sorted(tops.tolist(), key=lambda place: -chips[place + 1])
 
-    def _joined(self, one: int, other: int) -> bool:
+    def _joined(self, first: int, second: int) -> bool:
         """Whether nearly as much is promised all the way between two places."""
-        between = self.depths[min(one, other) : max(one, other) + 1]
+        between = self.depths[min(first, second) : max(first, second) + 1]
         return bool(np.min(between) >= VALLEY * min(between[0], between[-1]))
 
 
 def _runs(wanted: NDArray[np.bool_]) -> list[NDArray[np.intp]]:
     """Places without a gap between them."""
     places: NDArray[np.intp] = np.flatnonzero(wanted)
-    found: Sequence[NDArray[np.intp]] = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
-    return [run for run in found if run.size]
+    runs: Sequence[NDArray[np.intp]] = np.split(places, np.flatnonzero(np.diff(places) > 1) + 1)
+    return [run for run in runs if run.size]

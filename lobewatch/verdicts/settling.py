@@ -5,39 +5,39 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Remark
-from lobes import MillingRows
 from lobewatch.machine import ProgramTable
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.drawn import DRAWS, Drawn
+from lobewatch.verdicts.draws import DRAWS
+from lobewatch.verdicts.judgement import Judgement
 
-LOOKED_AT = 60
-"""Draws that chatter, of which it is seen what each lacks to be stable."""
+MENDED = 60
+"""Number of draws that chatter, of which it is seen what each lacks to be stable."""
 
 
-def decisive(drawn: Drawn, chatters: NDArray[np.bool_], middle: MillingRows, depth: float) -> str:
-    """The cause without which most of the draws that chatter (DRAWS,) at a depth (m) would not.
+def decisive_cause(judgement: Judgement, depth: float) -> str:
+    """The cause without which most of the draws that chatter at a depth (m) would not.
 
     Where none of them chatters a direction that was not tapped is all that is left open.
     """
-    if "untapped" in drawn.doubt.modes or not np.any(chatters):
+    draws, doubt = judgement.draws, judgement.draws.doubt
+    if "untapped" in doubt.modes or not np.any(judgement.chatters):
         return "untapped"
-    which = np.flatnonzero(chatters)[:LOOKED_AT]
-    mended = {}
-    for cause in drawn.doubt.causes:
-        rows = drawn.doubt.draw(middle, DRAWS, without=cause)[which]
-        mended[cause] = float(np.mean(replace(drawn, rows=rows).growth(depth) < 0))
-    return max(mended, key=lambda cause: mended[cause])
+    places, middle = np.flatnonzero(judgement.chatters)[:MENDED], draws.rows[np.array([0])]
+    shares = {}
+    for cause in doubt.causes:
+        rows = doubt.draw(middle, DRAWS, without=cause)[places]
+        shares[cause] = float(np.mean(replace(draws, rows=rows).growth(depth) < 0))
+    return max(shares, key=lambda cause: shares[cause])
 
 
-def settles(cause: str, table: ProgramTable, tangential: float, assembly: Assembly, cuts: int) -> Remark:
+def settling_remark(cause: str, table: ProgramTable, tangential: float, assembly: Assembly, cuts: int) -> Remark:
     """What would settle it; tangential: Kt (Pa) above which the program chatters in the middle of all else.
 
     cuts: number of test cuts that have taught of it.
     """
-    known = "".join(assembly.directions)
+    missing = "y" if assembly.directions == ("x",) else "x"
     text, cure = {
         "coefficients": (
             f"the cutting coefficients decide: chatters above Kt {tangential / 1e6:.0f} N/mm2",
@@ -55,9 +55,9 @@ def settles(cause: str, table: ProgramTable, tangential: float, assembly: Assemb
             f"make the next test cut: lobewatch suggest names it for {table.name!r}",
         ),
         "question": (
-            f"it rests on a tap test in question ({', '.join(dict.fromkeys(one.code for one in assembly.questions))})",
+            f"it rests on a tap test in question ({', '.join(dict.fromkeys(q.code for q in assembly.questions))})",
             "answer the question, or tap again",
         ),
-        "untapped": (f"direction {'y' if known == 'x' else 'x'} was not tapped", f"tap {'y' if known == 'x' else 'x'}"),
+        "untapped": (f"direction {missing} was not tapped", f"tap {missing}"),
     }[cause]
     return Remark("doubt-decides", table.name, text, cure)

@@ -9,22 +9,14 @@ from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import DataError, Remark
-from lobes import Program, ProgramLimit, program_limit
 from lobewatch.machine import Machine, ProgramTable, drive_limit
 from lobewatch.tool.assembly import ABOUT_DIRECTIONS, Assembly
-from lobewatch.verdicts.doubt import doubt_of
-from lobewatch.verdicts.drawn import DRAWS, Drawn, draw, middle_row, turning
-from lobewatch.verdicts.drawn_limits import drawn_limits
-from lobewatch.verdicts.settling import decisive, settles
+from lobewatch.verdicts.draws import DRAWS, ProgramDraws, turning_draws
+from lobewatch.verdicts.judgement import Judgement, weigh
+from lobewatch.verdicts.settling import decisive_cause, settling_remark
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
-
-QUANTILES = (0.01, 0.99)
-"""Of the limit over the doubt."""
-SURELY = 1.15
-"""A direction of feed is looked at unless its limit, were it as doubtful as the lowest, left this much to spare."""
 
 
 class Word(StrEnum):
@@ -44,22 +36,22 @@ class CriticalFall(NamedTuple):
     """Falls of the frequency of today, relative; 0 where the word has changed already, inf where none changes it."""
 
     doubtful: float
-    """Up to which it stays stable; NaN where it could not be checked."""
+    """Fall up to which it stays stable; NaN where it could not be checked."""
     not_stable: float
-    """Up to which it stays stable in the middle of the doubt; NaN where it could not be checked."""
+    """Fall up to which it stays stable in the middle of the doubt; NaN where it could not be checked."""
     error: float
-    """Standard error of the latter, by damping and stiffness as they scatter from tap test to tap test."""
+    """Standard error of `not_stable`, by damping and stiffness as they scatter from tap test to tap test."""
 
 
 class Ruling(NamedTuple):
     """What the history keeps of a verdict."""
 
     word: Word
-    """See Word."""
+    """Word on the program."""
     limit: float
     """Deepest stable depth at the program's speed in the middle of the doubt (m); NaN where it is not known."""
     critical: CriticalFall | None = None
-    """How far the frequency may fall; None where nobody has asked yet."""
+    """Falls of the frequency that change the word; None where nobody has asked yet."""
 
     @property
     def stable(self) -> bool | None:
@@ -74,11 +66,11 @@ class Verdict:
     program: ProgramTable
     """Program as it stands in machine.toml, with the cutting coefficients that test cuts have taught."""
     word: Word
-    """See Word."""
+    """Word on the program."""
     assembly: Assembly | None = None
     """Tool as tapped that it was checked with; None where there is nothing to check with."""
     at_speed: SpindleAtSpeed = AT_REST
-    """What test cuts have taught beside it."""
+    """Spindle as test cuts have taught it beside that."""
     limit: float = math.nan
     """Deepest stable depth at its speed in the middle of the doubt, in the worst direction of feed (m); inf where there
     is none up to 20 times its own, NaN where unknown."""
@@ -94,19 +86,19 @@ class Verdict:
     chatter_frequency: float = math.nan
     """Frequency that is heard at the limit (Hz); NaN where there is none."""
     kind: str = ""
-    """"hopf", "flip" or ""."""
+    """Kind of the limit: "hopf", "flip" or ""."""
     feed_angle: float = math.nan
     """Direction of feed that is worst, as an angle from x (rad)."""
     method: str = ""
-    """How the limit was found."""
+    """Method that the limit was found by."""
     detail: str = ""
-    """How finely."""
+    """Fineness of the method, and number of draws."""
     drive_limit: float = math.inf
     """Deepest cut that power and torque allow at its speed (m); inf where no limit is known."""
-    drawn: Drawn | None = None
-    """The spindles that it was judged on; None where it is unknown."""
+    draws: ProgramDraws | None = None
+    """Spindles that it was judged on; None where it is unknown."""
     remarks: tuple[Remark, ...] = ()
-    """What it rests on, what would settle it, and why it is unknown."""
+    """Remarks on what it rests on, what would settle it, and why it is unknown."""
 
     @property
     def stable(self) -> bool | None:
@@ -139,49 +131,31 @@ class Verdict:
         return Ruling(self.word, self.limit)
 
 
-class Judgement(NamedTuple):
-    """The word on a program and what it rests on."""
-
-    word: Word
-    """See Word."""
-    middle: ProgramLimit
-    """Limit in the middle of the doubt."""
-    low: float
-    """1 % quantile of the limit over the doubt (m)."""
-    high: float
-    """99 % quantile (m)."""
-    drawn: Drawn
-    """Spindles that it was judged on."""
-    chatters: NDArray[np.bool_]
-    """Which of the draws chatter, without the middle, shape (DRAWS,)."""
-
-
 def judge(
     table: ProgramTable, tool: Assembly | DataError, machine: Machine, at_speed: SpindleAtSpeed = AT_REST
 ) -> Verdict:
     """The verdict on a program as it stands in machine.toml, or why its tool is not known."""
     if isinstance(tool, DataError):
-        return unknown(table, (Remark("no-tap", "", str(tool)),))
+        return _unknown(table, (Remark("no-tap", "", str(tool)),))
     if not tool.directions:
-        return unknown(table, tool.remarks, tool)
+        return _unknown(table, tool.remarks, tool)
     table = at_speed.taught(table)
-    word, middle, low, high, drawn, chatters = weigh(table, tool, machine, at_speed)
-    program, cause, remarks = as_program(table, machine), "", [*_remarks(table, tool, at_speed, machine)]
+    judgement, depth = weigh(table, tool, machine, at_speed), table.depth_mm / 1e3
+    middle, word, cause = judgement.middle, _word(judgement, tool), ""
+    remarks = [*_remarks(table, tool, at_speed, machine)]
     if word is Word.DOUBTFUL:
-        row = middle_row(program, at_speed.moved(tool))
-        cause = "question" if tool.questions else decisive(drawn, chatters, row, program.depth)
-        remarks.append(
-            settles(cause, table, middle.limit / program.depth * program.cut.tangential, tool, at_speed.cuts)
-        )
+        cause = "question" if tool.questions else decisive_cause(judgement, depth)
+        tangential = middle.limit / depth * machine.build_cut(table).tangential
+        remarks.append(settling_remark(cause, table, tangential, tool, at_speed.cuts))
     return Verdict(
         program=table,
         word=word,
         assembly=tool,
         at_speed=at_speed,
         limit=middle.limit,
-        limit_low=min(low, middle.limit),
-        limit_high=max(high, middle.limit),
-        chance_turning=float(np.mean(chatters)) if at_speed.cuts else _chance_turning(drawn, program.depth),
+        limit_low=min(judgement.low, middle.limit),
+        limit_high=max(judgement.high, middle.limit),
+        chance_turning=_chance_turning(judgement, depth, at_speed),
         decided_by=cause,
         chatter_frequency=middle.chatter_frequency,
         kind=middle.kind,
@@ -189,49 +163,29 @@ def judge(
         method=middle.method,
         detail=f"{middle.detail}, {DRAWS} draws from the doubt",
         drive_limit=float(drive_limit(machine, table, np.array([table.speed_rpm]))[0]),
-        drawn=drawn,
+        draws=judgement.draws,
         remarks=tuple(remarks),
     )
 
 
-def weigh(table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed = AT_REST) -> Judgement:
-    """The word on a program by semi-discretisation over its doubt; charts by other methods decide nothing.
-
-    table: with the coefficients that test cuts have taught.
-    """
-    program, spindle = as_program(table, machine), at_speed.moved(assembly)
-    middle = program_limit(program, spindle.x, spindle.y, table.feed_angles)
-    doubt = at_speed.doubt or doubt_of(assembly, table, machine)
-    drawn = draw(program, middle, table.feed_angles, spindle, doubt)
-    limits = drawn_limits(drawn, program.depth)[1:]
-    low, high = np.quantile(limits, QUANTILES, method="closest_observation")
-    near = drawn.fed(SURELY * program.depth * middle.limit / low if np.isfinite(middle.limit) else 0.0)
-    chatters = (near.growth(program.depth)[1:, 0] >= 0) | (limits <= program.depth)
-    return Judgement(_word(middle.stable, chatters, assembly), middle, float(low), float(high), drawn, chatters)
-
-
-def _chance_turning(drawn: Drawn, depth: float) -> float:
-    """Chance of chatter at a depth (m) with the spindle turning, where nothing was learnt of that."""
-    return float(np.mean(turning(drawn.fed(0.0)).growth(depth)[1:] >= 0))
-
-
-def _word(stable: bool, chatters: NDArray[np.bool_], assembly: Assembly) -> Word:
-    if not stable:
-        return Word.NOT_STABLE
-    sure = not np.any(chatters) and assembly.is_sure
-    return Word.STABLE if sure else Word.DOUBTFUL
-
-
-def unknown(table: ProgramTable, why: tuple[Remark, ...], assembly: Assembly | None = None) -> Verdict:
+def _unknown(table: ProgramTable, reasons: tuple[Remark, ...], assembly: Assembly | None = None) -> Verdict:
     """The verdict on a program that cannot be checked."""
-    reasons = "; ".join(map(str, why)) or "no modes at the tool tip"
-    remark = Remark("not-checked", table.name, f"not checked: {reasons}")
+    text = "; ".join(map(str, reasons)) or "no modes at the tool tip"
+    remark = Remark("not-checked", table.name, f"not checked: {text}")
     return Verdict(table, Word.UNKNOWN, assembly, remarks=(remark,))
 
 
-def as_program(table: ProgramTable, machine: Machine) -> Program:
-    """A program in SI units."""
-    return Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
+def _word(judgement: Judgement, assembly: Assembly) -> Word:
+    if not judgement.middle.stable:
+        return Word.NOT_STABLE
+    return Word.STABLE if judgement.is_stable_throughout and assembly.is_sure else Word.DOUBTFUL
+
+
+def _chance_turning(judgement: Judgement, depth: float, at_speed: SpindleAtSpeed) -> float:
+    """Chance of chatter at a depth (m) with the spindle turning: as learnt, or under plausible differences."""
+    if at_speed.cuts:
+        return float(np.mean(judgement.chatters))
+    return float(np.mean(turning_draws(judgement.draws.fed(0.0)).growth(depth)[1:] >= 0))
 
 
 def _remarks(table: ProgramTable, assembly: Assembly, at_speed: SpindleAtSpeed, machine: Machine) -> Iterator[Remark]:

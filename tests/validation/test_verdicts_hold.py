@@ -11,8 +11,8 @@ from verdict_study import MACHINE, assembly, chattering, limit_mm, program, stud
 
 from lobes import growth, piece_numbers
 from lobewatch.verdicts.doubt import doubt_of
-from lobewatch.verdicts.drawn import middle_row
-from lobewatch.verdicts.verdict import Word, as_program, judge
+from lobewatch.verdicts.draws import as_program, middle_row
+from lobewatch.verdicts.verdict import Word, judge
 
 
 def say(text: str) -> None:

@@ -22,7 +22,8 @@ from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.settings.machine_file import parse_machine
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.advice import advise
-from lobewatch.verdicts.verdict import Word, as_program, judge
+from lobewatch.verdicts.draws import as_program
+from lobewatch.verdicts.verdict import Word, judge
 from modal import Mode
 
 MACHINE: Machine = parse_machine('[machine]\nname = "random"\n[speed]\nlow_rpm = 1500\nhigh_rpm = 24000\n')

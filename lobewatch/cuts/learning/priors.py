@@ -15,9 +15,11 @@ from scipy.special import ndtr, ndtri
 
 from lobes import MillingRows
 from lobewatch.verdicts.doubt import Doubt
+from lobewatch.verdicts.draws import DAMPING, FORCE_SPREAD, FREQUENCY, STIFFNESS
 
-FREQUENCY, DAMPING, STIFFNESS, FORCE = (0.985, 0.02), (1.1, 0.25), (1.0, 0.10), (1.1, 0.30)
-"""Middle, and standard deviation (of the frequency absolute, else relative to the middle)."""
+FORCE = (1.1, FORCE_SPREAD)
+"""Middle of Kt at speed over that of the table, chosen, and its standard deviation relative to that; as FREQUENCY,
+DAMPING and STIFFNESS, which are those of the chance of chatter beside a verdict (the deviation of f_n absolute)."""
 SHARE, WIDE = 0.05, 3.0
 """Share of frequencies that differ more, and how many times as much; chosen: nobody has measured how often a spindle is
 far off."""

@@ -30,8 +30,8 @@ from lobewatch.show.figures.style import new_axes, svg
 from lobewatch.show.programs.describe_lobes import comparison_json, comparison_texts
 from lobewatch.tool import Dynamics, Method, chart, lobes_of, speed_grid
 from lobewatch.verdicts import Setting, Verdict, Word
+from lobewatch.verdicts.advice import robust_pockets
 from lobewatch.verdicts.limit_band import LimitBand, limit_band
-from lobewatch.verdicts.robust_pockets import robust_pockets
 from modal import Mode, synthesize
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)

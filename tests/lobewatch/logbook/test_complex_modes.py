@@ -20,9 +20,10 @@ from lobewatch.tool import Assembly
 from lobewatch.tool.prediction import predict
 from lobewatch.tool.series import FollowedMode, scatter_of
 from lobewatch.verdicts.doubt import doubt_of
-from lobewatch.verdicts.draws import middle_row
+from lobewatch.verdicts.draws import as_program, middle_row
+from lobewatch.verdicts.judgement import QUANTILES
 from lobewatch.verdicts.limit_band import DRAWS, limit_band
-from lobewatch.verdicts.verdict import QUANTILES, as_program, judge
+from lobewatch.verdicts.verdict import judge
 from modal import Mode
 
 Shop = Any

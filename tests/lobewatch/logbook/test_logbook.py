@@ -38,7 +38,8 @@ from lobewatch.show.report.report import render_report
 from lobewatch.tap.session import outcome_of
 from lobewatch.tool.charts import Dynamics, Method
 from lobewatch.verdicts import Advice, Verdict, Word
-from lobewatch.verdicts.verdict import as_program, judge
+from lobewatch.verdicts.draws import as_program
+from lobewatch.verdicts.verdict import judge
 from modal import Mode, synthesize
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
@@ -263,7 +264,7 @@ def test_only_the_newest_row_pays_for_its_verdicts(path: Path, monkeypatch: pyte
         asked.append(program)
         return program_limit(program, x, y, feed_angles)
 
-    monkeypatch.setattr("lobewatch.verdicts.verdict.program_limit", counting)
+    monkeypatch.setattr("lobewatch.verdicts.judgement.program_limit", counting)
     for day in range(5):
         tap(path, day, 1713.0 - day)
     tap(path, 4.1, 1690.0, "y")

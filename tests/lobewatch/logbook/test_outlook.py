@@ -226,7 +226,7 @@ def test_the_error_of_the_critical_fall_is_its_scatter_over_damping_and_stiffnes
     shop.run(("A", 12900, 1.5))
     shop.tap_both()
     (found,) = shop.logbook.verdicts()
-    drawn, (stiffness_at, _) = found.drawn, softening(found.assembly)
+    drawn, (stiffness_at, _) = found.draws, softening(found.assembly)
     middle, falls = drawn.rows[np.array([0])], []
     for i in range(1, 13):
         one = drawn.rows[np.array([i])]

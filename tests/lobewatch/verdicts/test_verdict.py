@@ -11,7 +11,7 @@ from dsm import calibrate
 from lobes import Program, program_limit
 from lobewatch.verdicts import Word
 from lobewatch.verdicts.aging import softening, tolerable_decay
-from lobewatch.verdicts.verdict import as_program
+from lobewatch.verdicts.draws import as_program
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -49,7 +49,7 @@ def test_a_twin_that_was_never_tapped_has_the_limit_of_the_tool_tapped(
     assert (tapped.measured, twin.measured) == (True, False)
     assert twin.limit == pytest.approx(tapped.limit, rel=0.01)
     assert twin.limit_low < tapped.limit_low < tapped.limit_high < twin.limit_high
-    assert "prediction" in twin.drawn.doubt.modes
+    assert "prediction" in twin.draws.doubt.modes
     assert "predicted" in [remark.code for remark in twin.remarks]
 
 
@@ -84,7 +84,7 @@ def test_decay_left_ends_where_the_limit_crosses_the_depth(shop: Shop) -> None:
     for found in shop.logbook.verdicts():
         stiffness_at, remark = softening(found.assembly)
         assert remark.code == "decay-assumption"
-        fall = tolerable_decay(found.drawn, found.program.depth_mm / 1e3, stiffness_at)
+        fall = tolerable_decay(found.draws, found.program.depth_mm / 1e3, stiffness_at)
         program = as_program(found.program, shop.folder.machine)
         if np.isinf(fall):
             assert limit_after(found, program, 0.2, stiffness_at(0.2)) > program.depth
@@ -121,4 +121,4 @@ def test_a_chattering_program_has_no_decay_left(shop: Shop) -> None:
     shop.run(("A", 12900, 6))
     shop.tap_both()
     (found,) = shop.logbook.verdicts()
-    assert tolerable_decay(found.drawn, 6e-3, softening(found.assembly)[0]) == 0.0
+    assert tolerable_decay(found.draws, 6e-3, softening(found.assembly)[0]) == 0.0

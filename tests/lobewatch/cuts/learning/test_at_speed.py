@@ -43,13 +43,13 @@ def test_verdicts_are_at_speed_from_the_first_cut_on_and_narrower_with_more(shop
     hear(shop, 8700, 3.0, "chatter", 1710.0)
     four = judged(shop)
     assert (one.cuts, four.cuts) == (1, 4)
-    assert (rest.drawn.doubt.learnt is None, four.drawn.doubt.learnt is None) == (True, False)
+    assert (rest.draws.doubt.learnt is None, four.draws.doubt.learnt is None) == (True, False)
     assert four.limit_high / four.limit_low < one.limit_high / one.limit_low
     assert four.limit_low > one.limit_low
     assert four.word is Word.STABLE
     assert four.chance_turning < rest.chance_turning
     assert four.program.tangential_n_per_mm2 < rest.program.tangential_n_per_mm2
-    assert [two.rows.tangential[0] for two in (rest.drawn, four.drawn)] == pytest.approx(
+    assert [two.rows.tangential[0] for two in (rest.draws, four.draws)] == pytest.approx(
         [1.4e9, four.program.tangential_n_per_mm2 * 1e6]
     )
 
@@ -79,7 +79,7 @@ def test_the_history_keeps_the_word_that_the_cuts_have_made_and_forgets_it_with_
     assert words(shop.logbook) == {one.program.name: one.word for one in before}
     for then, now in zip(before, again, strict=True):
         assert (now.limit, now.limit_low, now.limit_high) == (then.limit, then.limit_low, then.limit_high)
-        assert np.array_equal(now.drawn.rows.frequency, then.drawn.rows.frequency)
+        assert np.array_equal(now.draws.rows.frequency, then.draws.rows.frequency)
 
 
 def words(logbook: Logbook) -> dict[str, Word]:

@@ -11,7 +11,7 @@ from lobewatch.cuts.learning.contradicting import ContradictingCut, learn_from_c
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.grid import Grid, speeds_between, zero_order_trust
 from lobewatch.cuts.learning.posterior import Posterior, prior
-from lobewatch.cuts.learning.suggest import Suggestion, best_removal_rate, suggest
+from lobewatch.cuts.learning.suggest import Suggestion, suggest
 from lobewatch.machine import Machine, ProgramTable, drive_limit
 from lobewatch.machine.journal.heard_cut import HeardCut, geometry
 from lobewatch.machine.settings.cut_setting import find_named
@@ -19,8 +19,7 @@ from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.series import frequency_at
 from lobewatch.verdicts.doubt import doubt_of
-from lobewatch.verdicts.drawn import middle_row
-from lobewatch.verdicts.verdict import as_program
+from lobewatch.verdicts.draws import as_program, middle_row
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,14 +27,15 @@ class Lesson:
     """What was learnt for one program."""
 
     program: ProgramTable
+    """Program as it stands in machine.toml."""
     before: Posterior
-    """What is known without any cut."""
+    """Spindle and coefficients as known without any cut."""
     learnt: Posterior
-    """What is known with them."""
+    """Spindle and coefficients as known with the cuts."""
     contradicting: tuple[ContradictingCut, ...]
     """Cuts that were left out."""
-    own: tuple[CutEvidence, ...]
-    """Those that were cuts of this very program, at whatever speed and depth."""
+    own_cuts: tuple[CutEvidence, ...]
+    """Cuts of this very program, in its material and of its geometry, at whatever speed and depth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,39 +43,36 @@ class NextCut:
     """What to cut next, and what it rests on."""
 
     lesson: Lesson
+    """Lesson of the cuts that were made."""
     suggested: Suggestion | None
-    """None where nothing more is to be gained, or all cuts are made."""
+    """Cut to make; None where nothing more is to be gained, or all cuts are made."""
     left: int
-    """Test cuts that are still to be made."""
-
-    @property
-    def best(self) -> float:
-        """Largest speed times depth that was heard stable (rpm m); 0 where none was."""
-        return best_removal_rate(self.lesson.own)
+    """Number of test cuts that are still to be made."""
 
 
-def program_named(machine: Machine, name: str) -> ProgramTable:
+def find_program(machine: Machine, name: str) -> ProgramTable:
     """A program of machine.toml, by its name or how that begins; ValueError for one that is not there."""
     return find_named({table.name: table for table in machine.program}, name)
 
 
-def lesson(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[HeardCut]) -> Lesson:
+def learn_program(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[HeardCut]) -> Lesson:
     """Learn from the cuts of a machine; those of other tools say nothing of this one."""
-    seen = observed(cuts, table, assembly, machine)
+    evidence = _tool_evidence(cuts, table, assembly, machine)
     start = prior(middle_row(as_program(table, machine), assembly), doubt_of(assembly, table, machine))
-    learnt, odd = learn_from_consistent(start, seen)
-    cut = geometry(machine.build_cut(table))
-    own = tuple(one for one in seen if one.material == 0 and geometry(one.cut) == cut)
-    return Lesson(table, start, learnt, odd, own)
+    learnt, contradicting = learn_from_consistent(start, evidence)
+    shape = geometry(machine.build_cut(table))
+    own_cuts = tuple(cut for cut in evidence if cut.material == 0 and geometry(cut.cut) == shape)
+    return Lesson(table, start, learnt, contradicting, own_cuts)
 
 
 def next_cut(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[HeardCut], most: int) -> NextCut:
     """The next test cut of a program of which so many shall be made at most."""
-    found = lesson(table, assembly, machine, cuts)
-    left = max(most - len(found.own), 0)
-    sound = [one for one in found.own if one not in {odd.cut for odd in found.contradicting}]
-    suggested = suggest(found.learnt, grid_of(table, assembly, machine), sound, left) if left else None
-    return NextCut(found, suggested, left)
+    lesson = learn_program(table, assembly, machine, cuts)
+    left = max(most - len(lesson.own_cuts), 0)
+    left_out = {contradiction.cut for contradiction in lesson.contradicting}
+    heard = [cut for cut in lesson.own_cuts if cut not in left_out]
+    suggested = suggest(lesson.learnt, grid_of(table, assembly, machine), heard, left) if left else None
+    return NextCut(lesson, suggested, left)
 
 
 def grid_of(table: ProgramTable, assembly: Assembly, machine: Machine) -> Grid:
@@ -87,24 +84,24 @@ def grid_of(table: ProgramTable, assembly: Assembly, machine: Machine) -> Grid:
     return Grid(cut, angles, speeds, deepest, trust)
 
 
-def observed(
+def _tool_evidence(
     cuts: Sequence[HeardCut], table: ProgramTable, assembly: Assembly, machine: Machine
 ) -> tuple[CutEvidence, ...]:
     """The cuts of the same tool that count, oldest first."""
-    own = table.material or "", machine.build_cut(table).tangential, machine.build_cut(table).radial
-    materials = [own]
-    found = []
-    for cut in cuts:
-        if cut.tool != table.tool or not cut.counts:
+    cut = machine.build_cut(table)
+    materials = [(table.material or "", cut.tangential, cut.radial)]
+    evidence = []
+    for heard in cuts:
+        if heard.tool != table.tool or not heard.counts:
             continue
-        made_of = cut.coefficients, cut.cut.tangential, cut.cut.radial
-        if made_of not in materials:
-            materials.append(made_of)
-        found.append(_observed(cut, materials.index(made_of), assembly))
-    return tuple(found)
+        material = heard.coefficients, heard.cut.tangential, heard.cut.radial
+        if material not in materials:
+            materials.append(material)
+        evidence.append(_evidence(heard, materials.index(material), assembly))
+    return tuple(evidence)
 
 
-def _observed(cut: HeardCut, material: int, assembly: Assembly) -> CutEvidence:
+def _evidence(cut: HeardCut, material: int, assembly: Assembly) -> CutEvidence:
     feeds = FEED_ANGLES if cut.feed == "both" else (cut.feed,)
     return CutEvidence(
         cut=cut.cut,
@@ -122,6 +119,6 @@ def _observed(cut: HeardCut, material: int, assembly: Assembly) -> CutEvidence:
 
 def _moved(cut: HeardCut, assembly: Assembly) -> float:
     """Natural frequency when a cut was made over that of now, in the mean of the directions; 1 where not known."""
-    then = [(frequency_at(series, cut.at), series[-1].frequency) for series in assembly.series.values() if series]
-    ratios = [before / now for before, now in then if before is not None]
+    pairs = [(frequency_at(series, cut.at), series[-1].frequency) for series in assembly.series.values() if series]
+    ratios = [before / now for before, now in pairs if before is not None]
     return float(np.mean(ratios)) if ratios else 1.0

@@ -1,0 +1,123 @@
+"""A program on all the spindles that it may be run on: draws from its doubt, and which of them chatter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobes import MillingRows, Program, ProgramLimit, growth, joined_rows, milling_system, piece_numbers, rows_of
+from lobes.program_limit import DEEPEST
+from lobewatch.machine import Machine, ProgramTable
+from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.doubt import Doubt
+
+DRAWS = 300
+"""Number of draws: as many stable ones say, with 95 % confidence, that no more than 1 % of the doubt chatters."""
+TURNING_SEED = 1
+"""Seed of the draws for the turning spindle."""
+FREQUENCY, DAMPING, STIFFNESS = (0.985, 0.02), (1.1, 0.25), (1.0, 0.10)
+"""Middle and standard deviation of f_n, zeta and K in the cut over those at rest; chosen: plausible, not measured."""
+FORCE_MIDDLE, FORCE_SPREAD = 1.0, 0.30
+"""Middle and standard deviation of Kt in the cut over that of the table; chosen, as those. The prior of the learning
+begins 10 % higher (`priors.FORCE`), since cuts then correct it; nothing corrects the chance made here."""
+LEAST_FACTOR = 0.1
+"""Least share of its middle that a factor has."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ProgramDraws:
+    """Draws of one program; row 0 is the middle, without any doubt."""
+
+    rows: MillingRows
+    """All draws, the feed along x."""
+    angles: Floats
+    """Directions of feed (rad), the worst first."""
+    limits: Floats
+    """Deepest stable depth in the middle in each of them (m)."""
+    finer: int
+    """Number of pieces of a turn over those that modes alone ask for."""
+    doubt: Doubt
+    """Doubt that they were drawn from."""
+
+    def growth(self, depth: float | Floats) -> Floats:
+        """Growth from tooth to tooth in the worst direction of feed; negative where stable.
+
+        depth in m: one, several (d,) or those of each draw (draws, d). Returns shape (draws, d).
+        """
+        rows, wanted = self.rows, np.atleast_2d(depth)
+        depths = np.broadcast_to(wanted, (len(rows), wanted.shape[1]))
+        number = self.finer * piece_numbers(rows, float(np.max(depths)))
+        return np.asarray(np.max([growth(rows.fed_at(angle), depths, number) for angle in self.angles], axis=0))
+
+    def __getitem__(self, places: NDArray[np.intp]) -> ProgramDraws:
+        """The draws at some places."""
+        return replace(self, rows=self.rows[places])
+
+    def fed(self, below: float, most: int | None = None) -> ProgramDraws:
+        """The directions of feed with a limit up to a depth (m) alone, at most so many; the worst stays."""
+        wanted = (self.limits <= below) & np.isfinite(self.limits) & (np.arange(self.limits.size) < (most or np.inf))
+        wanted[0] = True
+        return replace(self, angles=self.angles[wanted], limits=self.limits[wanted])
+
+    def at(self, speed: float = 1.0, frequency: float = 1.0, stiffness: float = 1.0) -> ProgramDraws:
+        """The same draws with speed, frequencies and stiffnesses times these factors."""
+        return self.swept(np.array([speed]), np.array([frequency]), np.array([stiffness]))
+
+    def swept(self, speed: Floats, frequency: Floats | float = 1.0, stiffness: Floats | float = 1.0) -> ProgramDraws:
+        """All draws at each of several factors (k,) after the other, k times as many."""
+        factors = np.broadcast_arrays(speed, frequency, stiffness)
+        rows = self.rows[np.tile(np.arange(len(self.rows)), factors[0].size)]
+        speeds, frequencies, stiffnesses = (np.repeat(factor, len(self.rows)) for factor in factors)
+        changed = replace(
+            rows,
+            speed_rpm=rows.speed_rpm * speeds,
+            frequency=rows.frequency * frequencies[:, np.newaxis],
+            stiffness=rows.stiffness * stiffnesses[:, np.newaxis],
+        )
+        return replace(self, rows=changed)
+
+
+def as_program(table: ProgramTable, machine: Machine) -> Program:
+    """A program in SI units."""
+    return Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
+
+
+def middle_row(program: Program, assembly: Assembly) -> MillingRows:
+    """The program without any doubt, the feed along x."""
+    return rows_of(milling_system(assembly.x, assembly.y), program.cut, np.array([program.speed_rpm]))
+
+
+def draw(
+    program: Program, limit: ProgramLimit, feed_angles: tuple[float, ...], assembly: Assembly, doubt: Doubt
+) -> ProgramDraws:
+    """The draws of a program; limit: that in the middle of the doubt."""
+    middle = middle_row(program, assembly)
+    limits = np.array(limit.limits)
+    order = np.argsort(limits)
+    finer = max(limit.pieces // int(piece_numbers(middle, DEEPEST * program.depth)[0]), 1)
+    rows = joined_rows(middle, doubt.draw(middle, DRAWS))
+    return ProgramDraws(rows, np.array(feed_angles)[order], limits[order], finer, doubt)
+
+
+def turning_draws(draws: ProgramDraws, seed: int = TURNING_SEED) -> ProgramDraws:
+    """The draws with what may differ between a spindle at rest and one in the cut, alike in all modes of a draw."""
+    rows, random = draws.rows, np.random.default_rng(seed)
+    frequency, damping, stiffness, force = random.standard_normal((4, len(rows)))
+
+    def factor(middle: float, spread: float, normal: Floats) -> Floats:
+        return np.asarray(np.maximum(middle * (1 + spread * normal), LEAST_FACTOR * middle)[:, np.newaxis])
+
+    push = factor(FORCE_MIDDLE, FORCE_SPREAD, force)[:, 0]
+    changed = replace(
+        rows,
+        frequency=rows.frequency * factor(*FREQUENCY, frequency),
+        damping_ratio=rows.damping_ratio * factor(*DAMPING, damping),
+        stiffness=rows.stiffness * factor(*STIFFNESS, stiffness),
+        tangential=rows.tangential * push,
+        radial=rows.radial * push,
+    )
+    return replace(draws, rows=changed)

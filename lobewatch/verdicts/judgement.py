@@ -1,0 +1,55 @@
+"""A program over its doubt by semi-discretisation: limit in the middle, band of limits, draws that chatter."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobes import ProgramLimit, program_limit
+from lobewatch.machine import Machine, ProgramTable
+from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.doubt import doubt_of
+from lobewatch.verdicts.drawn_limits import drawn_limits
+from lobewatch.verdicts.draws import ProgramDraws, as_program, draw
+from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
+
+QUANTILES = (0.01, 0.99)
+"""Quantiles of the limit over the doubt that a band reaches between."""
+SURELY = 1.15
+"""Factor that the limit of a direction of feed, were it as doubtful as the lowest, has to spare where it is passed
+over."""
+
+
+class Judgement(NamedTuple):
+    """What the word on a program rests on."""
+
+    middle: ProgramLimit
+    """Limit in the middle of the doubt."""
+    low: float
+    """1 % quantile of the limit over the doubt (m)."""
+    high: float
+    """99 % quantile of the limit over the doubt (m)."""
+    draws: ProgramDraws
+    """Spindles that it was judged on."""
+    chatters: NDArray[np.bool_]
+    """Whether each draw chatters, without the middle, shape (DRAWS,)."""
+
+    @property
+    def is_stable_throughout(self) -> bool:
+        """Whether it is stable in the middle and on every draw."""
+        return self.middle.stable and not np.any(self.chatters)
+
+
+def weigh(table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed) -> Judgement:
+    """A program with the coefficients that were learnt, over its doubt; charts by other methods decide nothing."""
+    program, spindle = as_program(table, machine), at_speed.moved(assembly)
+    middle = program_limit(program, spindle.x, spindle.y, table.feed_angles)
+    doubt = at_speed.doubt or doubt_of(assembly, table, machine)
+    draws = draw(program, middle, table.feed_angles, spindle, doubt)
+    limits = drawn_limits(draws, program.depth)[1:]
+    low, high = np.quantile(limits, QUANTILES, method="closest_observation")
+    near = draws.fed(SURELY * program.depth * middle.limit / low if np.isfinite(middle.limit) else 0.0)
+    chatters = (near.growth(program.depth)[1:, 0] >= 0) | (limits <= program.depth)
+    return Judgement(middle, float(low), float(high), draws, chatters)

@@ -31,10 +31,10 @@ def atomic_write(path: Path, content: bytes, *, lasting: bool = True) -> None:
 
 def make_folder(folder: Path) -> None:
     """Make a folder, and those above it that are missing; they outlast a power cut when this returns."""
-    missing = [one for one in (folder, *folder.parents) if not one.is_dir()]
-    for one in reversed(missing):
-        one.mkdir(exist_ok=True)
-        sync_folder(one.parent)
+    missing = [parent for parent in (folder, *folder.parents) if not parent.is_dir()]
+    for parent in reversed(missing):
+        parent.mkdir(exist_ok=True)
+        sync_folder(parent.parent)
 
 
 def sync_folder(folder: Path) -> None:

@@ -17,11 +17,11 @@ TapDirection = Literal["x", "y"]
 
 def tap_direction(text: str) -> TapDirection:
     """A direction from its text; ValueError for what is none."""
-    known: tuple[TapDirection, ...] = get_args(TapDirection)
-    for one in known:
-        if text == one:
-            return one
-    raise ValueError(f"direction={text!r} is none of {', '.join(known)}; give one of them")
+    directions: tuple[TapDirection, ...] = get_args(TapDirection)
+    for direction in directions:
+        if text == direction:
+            return direction
+    raise ValueError(f"direction={text!r} is none of {', '.join(directions)}; give one of them")
 
 
 @dataclass(frozen=True)

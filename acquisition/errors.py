@@ -42,6 +42,6 @@ class DataError(ValueError):
 
 def system_failure(error: OSError) -> str:
     """An error of the operating system in a sentence: where, what, and what to do where that is known."""
-    told = f"{error.filename or 'the disk'}: {error.strerror or error}"
+    failure = f"{error.filename or 'the disk'}: {error.strerror or error}"
     cure = CURES.get(error.errno or 0, "")
-    return f"{told}; {cure}" if cure else told
+    return f"{failure}; {cure}" if cure else failure

@@ -34,4 +34,4 @@ def joined(remarks: Iterable[Remark]) -> list[Remark]:
     about: dict[Remark, list[str]] = {}
     for remark in remarks:
         about.setdefault(replace(remark, about=""), []).append(remark.about)
-    return [replace(one, about=", ".join(dict.fromkeys(filter(None, names)))) for one, names in about.items()]
+    return [replace(first, about=", ".join(dict.fromkeys(filter(None, names)))) for first, names in about.items()]

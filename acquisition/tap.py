@@ -46,15 +46,15 @@ class Conditions:
             check_name(getattr(self, name), name)
 
     @classmethod
-    def of(cls, told: Mapping[str, Any]) -> Self:
+    def of(cls, mapping: Mapping[str, Any]) -> Self:
         """From what `known` has told, among other things."""
-        return cls(**{field.name: told[field.name] for field in fields(cls) if field.name in told})
+        return cls(**{field.name: mapping[field.name] for field in fields(cls) if field.name in mapping})
 
     @property
     def known(self) -> dict[str, Any]:
         """What somebody said, by name."""
-        told = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {name: value for name, value in told.items() if value not in (None, "", False)}
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: value for name, value in values.items() if value not in (None, "", False)}
 
     def over(self, other: Self) -> Self:
         """The same, with what the other one knows where this one does not."""
@@ -144,8 +144,8 @@ def new_tap_id(circumstances: Circumstances) -> str:
     Raises ValueError for a machine, tool or operator with control characters in its name: what is kept for good must
     be fit to be shown.
     """
-    for what in ("machine", "tool", "operator"):
-        check_name(getattr(circumstances, what), what)
+    for label in ("machine", "tool", "operator"):
+        check_name(getattr(circumstances, label), label)
     stamp = circumstances.created.astimezone(UTC).strftime("%Y%m%dT%H%M%S.%fZ")
     names = (circumstances.machine, circumstances.tool, circumstances.direction)
     return "_".join([stamp, *filter(None, map(named_in_id, names)), secrets.token_hex(2)])

@@ -29,5 +29,5 @@ def aged_mode(baseline: Mode, ratio: float, rule: Rule, stiffness_ratio: float |
     if rule == "paper" and stiffness_ratio is not None:
         raise ValueError(f'rule="paper" sets K itself; leave stiffness_ratio={stiffness_ratio} out')
     softer = ratio if rule == "paper" else 1.0 if stiffness_ratio is None else stiffness_ratio
-    said = "K constant, no model" if rule == "model" and stiffness_ratio is None else f"K by rule {rule}"
-    return baseline.scaled(ratio, softer, f"aged, {said}")
+    rule_text = "K constant, no model" if rule == "model" and stiffness_ratio is None else f"K by rule {rule}"
+    return baseline.scaled(ratio, softer, f"aged, {rule_text}")

@@ -38,8 +38,8 @@ def find_crossings(growth: Growth, n_rows: int, deepest: float) -> Floats:
     rows = np.arange(n_rows)
     depth = np.broadcast_to(deepest * (np.arange(1, SCAN + 1) / SCAN) ** SPREAD, (n_rows, SCAN))
     value = growth(rows, depth, SURE)
-    found = _brackets(growth, _steps(depth, value))
-    return _table(found.row, _refine(growth, found), n_rows)
+    brackets = _brackets(growth, _steps(depth, value))
+    return _table(brackets.row, _refine(growth, brackets), n_rows)
 
 
 def _table(row: Rows, crossing: Floats, n_rows: int) -> Floats:
@@ -116,10 +116,10 @@ def _brackets(growth: Growth, steps: _Steps) -> _Steps:
     return _joined(*done, steps[steps.crosses])
 
 
-def _refine(growth: Growth, found: _Steps) -> Floats:
+def _refine(growth: Growth, brackets: _Steps) -> Floats:
     """The zero in each step by the false position, with the weight of an end that stays put twice halved (Illinois)."""
-    row, low, high = found.row, found.low.copy(), found.high.copy()
-    at_low, at_high = found.at_low.copy(), found.at_high.copy()
+    row, low, high = brackets.row, brackets.low.copy(), brackets.high.copy()
+    at_low, at_high = brackets.at_low.copy(), brackets.at_high.copy()
     zero, was_lower = (low + high) / 2, np.full(row.size, -1)
     busy = np.arange(row.size)
     for _ in range(MOST_STEPS):

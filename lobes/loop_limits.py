@@ -49,14 +49,14 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
         frequency, limit = _limits(branch, responses[i], tooth_frequency)
         lower = limit < depth
         depth[lower], chatter[lower], setting[lower] = limit[lower], frequency[lower], i
-    found = np.isfinite(depth)
-    waves = np.where(found, np.floor(np.where(found, chatter, 0) / tooth_frequency), -1).astype(np.int64)
-    loops = [(branch.grid, responses[i], waves[found & (setting == i)]) for i, branch in enumerate(branches)]
+    limited = np.isfinite(depth)
+    waves = np.where(limited, np.floor(np.where(limited, chatter, 0) / tooth_frequency), -1).astype(np.int64)
+    loops = [(branch.grid, responses[i], waves[limited & (setting == i)]) for i, branch in enumerate(branches)]
     return StabilityLobes(
         speed_rpm=speed_rpm,
         depth=depth,
         chatter_frequency=chatter,
-        kind=np.where(found, "hopf", ""),
+        kind=np.where(limited, "hopf", ""),
         crossings=depth[:, np.newaxis],
         method=method,
         curves=partial(_lobes_of, loops, cut, speed_rpm),
@@ -81,36 +81,36 @@ def _out_of_band(branches: Sequence[TipResponse], responses: Sequence[Complexes]
     weakest = int(np.argmin(response.real))
     if branch.grid[0] == 0 or (response.real[weakest] < 0 and 0 < weakest < branch.grid.size - 1):
         return ()
-    said = (
+    text = (
         f"the FRF does not reach the chatter band: between {branch.grid[0]:g} and {branch.grid[-1]:g} Hz the real part "
         "has no lowest point"
     )
-    return (Remark("chatter-band-missing", "", said, "use a wider band, or record one"),)
+    return (Remark("chatter-band-missing", "", text, "use a wider band, or record one"),)
 
 
 def _out_of_range(method: MethodName, cut: Cut, chatter: float, speed_rpm: Floats) -> tuple[Remark, ...]:
     """Whether the cut is too slender, or the teeth too fast, for a mean force."""
     if cut.immersion < LOW_IMMERSION:
-        said = f"at immersion {cut.immersion:g} (below {LOW_IMMERSION}) the true limit can be lower"
-        return (Remark("low-immersion", "", f"{method} knows no flip lobes: {said}", INSTEAD),)
+        text = f"at immersion {cut.immersion:g} (below {LOW_IMMERSION}) the true limit can be lower"
+        return (Remark("low-immersion", "", f"{method} knows no flip lobes: {text}", INSTEAD),)
     fast = FAST * 60 * chatter / cut.teeth
     if cut.immersion >= NEAR_SLOT or np.max(speed_rpm) < fast:
         return ()
-    said = (
+    text = (
         f"{method} knows no flip lobes: above {fast:.0f} rpm, where the tooth frequency is half the chatter frequency, "
         f"the true limit at immersion {cut.immersion:g} can be far lower"
     )
-    return (Remark("fast-teeth", "", said, INSTEAD),)
+    return (Remark("fast-teeth", "", text, INSTEAD),)
 
 
 def _limits(branch: TipResponse, response: Complexes, tooth_frequency: Floats) -> tuple[Floats, Floats]:
     """Frequency of the lowest crossing at each tooth frequency (Hz) and its depth (m); nan and inf where none."""
     chatter = _chatter_frequency(branch, response, tooth_frequency)
-    found = np.flatnonzero(np.isfinite(chatter))
-    real = branch.receptance(chatter[found]).real
-    chatter[found[real >= 0]] = np.nan
+    limited = np.flatnonzero(np.isfinite(chatter))
+    real = branch.receptance(chatter[limited]).real
+    chatter[limited[real >= 0]] = np.nan
     depth = np.full(chatter.shape, np.inf)
-    depth[found[real < 0]] = -1 / (2 * real[real < 0])
+    depth[limited[real < 0]] = -1 / (2 * real[real < 0])
     return chatter, depth
 
 
@@ -136,9 +136,9 @@ def _chatter_frequency(branch: TipResponse, response: Complexes, tooth_frequency
         best[rows[lower]], step[rows[lower]], whole[rows[lower]] = real[lower], where[lower], number[lower]
         begin, size = begin + block.size, 2 * size
     chatter = np.full(tooth_frequency.shape, np.nan)
-    found = np.flatnonzero(best < 0)
-    missing = whole[found] - branch.grid[step[found]] / tooth_frequency[found] - turn[step[found]]
-    chatter[found] = _refine(branch, step[found], missing, tooth_frequency[found])
+    negative = np.flatnonzero(best < 0)
+    missing = whole[negative] - branch.grid[step[negative]] / tooth_frequency[negative] - turn[step[negative]]
+    chatter[negative] = _refine(branch, step[negative], missing, tooth_frequency[negative])
     return chatter
 
 

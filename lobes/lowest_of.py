@@ -17,21 +17,22 @@ def lowest_of(diagrams: Sequence[StabilityLobes]) -> StabilityLobes:
     All by one method at the same speeds. The lobes and remarks of all are kept, each remark once.
     """
     first = diagrams[0]
-    lowest, speed = np.argmin([one.depth for one in diagrams], axis=0), np.arange(first.speed_rpm.size)
-    width = max(one.crossings.shape[1] for one in diagrams)
+    lowest, speed = np.argmin([diagram.depth for diagram in diagrams], axis=0), np.arange(first.speed_rpm.size)
+    width = max(diagram.crossings.shape[1] for diagram in diagrams)
     crossings = [
-        np.pad(one.crossings, ((0, 0), (0, width - one.crossings.shape[1])), constant_values=np.inf) for one in diagrams
+        np.pad(diagram.crossings, ((0, 0), (0, width - diagram.crossings.shape[1])), constant_values=np.inf)
+        for diagram in diagrams
     ]
     return replace(
         first,
-        depth=np.stack([one.depth for one in diagrams])[lowest, speed],
-        chatter_frequency=np.stack([one.chatter_frequency for one in diagrams])[lowest, speed],
-        kind=np.stack([one.kind for one in diagrams])[lowest, speed],
+        depth=np.stack([diagram.depth for diagram in diagrams])[lowest, speed],
+        chatter_frequency=np.stack([diagram.chatter_frequency for diagram in diagrams])[lowest, speed],
+        kind=np.stack([diagram.kind for diagram in diagrams])[lowest, speed],
         crossings=np.stack(crossings)[lowest, speed],
         curves=partial(_lobes_of, diagrams),
-        remarks=tuple(dict.fromkeys(remark for one in diagrams for remark in one.remarks)),
+        remarks=tuple(dict.fromkeys(remark for diagram in diagrams for remark in diagram.remarks)),
     )
 
 
 def _lobes_of(diagrams: Sequence[StabilityLobes]) -> list[Lobe]:
-    return [lobe for one in diagrams for lobe in one.lobes]
+    return [lobe for diagram in diagrams for lobe in diagram.lobes]

@@ -40,9 +40,9 @@ class MillingSystem:
         """Receptance of each direction (m/N) at frequencies (Hz) of any shape, shape (..., p)."""
         omega = 2 * np.pi * frequency
         total = np.zeros((*omega.shape, self.axes.size), dtype=np.complex128)
-        seen = seen_at_tip(self.damping_ratio, self.phase)
-        each = zip(self.frequency, self.damping_ratio, self.shape, *seen, self.direction, strict=True)
-        for w, zeta, shape, place, velocity, row in each:
+        shares = seen_at_tip(self.damping_ratio, self.phase)
+        modes = zip(self.frequency, self.damping_ratio, self.shape, *shares, self.direction, strict=True)
+        for w, zeta, shape, place, velocity, row in modes:
             shown = shape**2 * (place + 1j * velocity * omega / w if velocity else place)
             total[..., row] += shown / (w**2 - omega**2 + 2j * zeta * w * omega)
         return total

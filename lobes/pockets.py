@@ -117,5 +117,5 @@ def _inside(lobes: StabilityLobes, deepest: float) -> list[Pocket]:
 
 
 def _median_chatter(lobes: StabilityLobes) -> float:
-    known = lobes.chatter_frequency[np.isfinite(lobes.chatter_frequency)]
-    return float(np.median(known)) if known.size else 1.0
+    frequency = lobes.chatter_frequency[np.isfinite(lobes.chatter_frequency)]
+    return float(np.median(frequency)) if frequency.size else 1.0

@@ -57,9 +57,9 @@ def program_limit(program: Program, x: Modes, y: Modes, feed_angles: Sequence[fl
     worst = int(np.argmin(limit))
     chatter, kind = np.array([np.nan]), np.array([""])
     if np.isfinite(crossings[worst, 0]):
-        one = slice(worst, worst + 1)
+        row = slice(worst, worst + 1)
         cut = replace(program.cut, feed_angle=float(angles[worst]))
-        chatter, kind = chatter_at(system, replace(rows[one], cut=cut), crossings[one, 0], number[one])
+        chatter, kind = chatter_at(system, replace(rows[row], cut=cut), crossings[row, 0], number[row])
     return ProgramLimit(
         stable=program.depth < limit[worst],
         limit=float(limit[worst]),

@@ -46,13 +46,13 @@ def settled_crossings(rows: MillingRows, max_depth: float) -> tuple[Floats, Numb
 def _holds(rows: MillingRows, depth: Floats, number: Numbers) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Whether twice as many pieces leave the limit where it is, and its kind, each of shape (r,)."""
     limit, kind = np.ones((2, depth.size), dtype=bool)
-    found = np.flatnonzero(np.isfinite(depth))
-    if found.size:
-        around = depth[found, np.newaxis] * (1 + SETTLED * np.array([-1.0, 1.0]))
-        fine = largest_multipliers(rows[found], around, 2 * number[found], SETTLED * 1e-2)
-        coarse = largest_multipliers(rows[found], around[:, 1:], number[found], SETTLED * 1e-2)
-        limit[found] = (np.abs(fine[:, 0]) < 1) & (np.abs(fine[:, 1]) > 1)
-        kind[found] = is_flip(fine[:, 1]) == is_flip(coarse[:, 0])
+    limited = np.flatnonzero(np.isfinite(depth))
+    if limited.size:
+        around = depth[limited, np.newaxis] * (1 + SETTLED * np.array([-1.0, 1.0]))
+        fine = largest_multipliers(rows[limited], around, 2 * number[limited], SETTLED * 1e-2)
+        coarse = largest_multipliers(rows[limited], around[:, 1:], number[limited], SETTLED * 1e-2)
+        limit[limited] = (np.abs(fine[:, 0]) < 1) & (np.abs(fine[:, 1]) > 1)
+        kind[limited] = is_flip(fine[:, 1]) == is_flip(coarse[:, 0])
     return limit, kind
 
 

@@ -41,9 +41,9 @@ def stability_boundary(
     crossings, number = settled_crossings(rows, float(max_depth))
     depth = crossings[:, 0]
     chatter, kind = np.full(speed.shape, np.nan), np.full(speed.shape, "", dtype="<U4")
-    found = np.flatnonzero(np.isfinite(depth))
-    if found.size:
-        chatter[found], kind[found] = chatter_at(system, rows[found], depth[found], number[found])
+    limited = np.flatnonzero(np.isfinite(depth))
+    if limited.size:
+        chatter[limited], kind[limited] = chatter_at(system, rows[limited], depth[limited], number[limited])
     low, high = int(np.min(number)), int(np.max(number))
     return StabilityLobes(
         speed_rpm=speed,

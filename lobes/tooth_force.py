@@ -71,8 +71,8 @@ def _teeth(cut: Cut) -> Floats:
 
 def _once(cut: Cut, angle: Floats) -> Floats:
     """Integral of H of one tooth from angle 0 for both coefficients, shape (..., 2, 2, 2)."""
-    turns, rest = np.divmod(angle, 2 * np.pi)
-    inside = np.clip(rest, cut.entry_angle, cut.exit_angle)
+    turns, remainder = np.divmod(angle, 2 * np.pi)
+    inside = np.clip(remainder, cut.entry_angle, cut.exit_angle)
     start, end = _integral(np.array(cut.entry_angle)), _integral(np.array(cut.exit_angle))
     return _integral(inside) - start + _expanded(turns) * (end - start)
 

@@ -55,11 +55,11 @@ def _cancelling(cut: Cut, axis: int) -> tuple[Remark, ...]:
     share = abs(np.mean(forces)) / np.mean(np.abs(forces))
     if share >= CANCELS:
         return ()
-    said = (
+    text = (
         f"zero order knows the mean force alone, and {100 * (1 - share):.0f} % of the force in {'xy'[axis]}, the one "
         "direction known, cancels over a turn: the true limit can be far lower"
     )
-    return (Remark("force-cancels", "", said, INSTEAD),)
+    return (Remark("force-cancels", "", text, INSTEAD),)
 
 
 def _eigenvalues(force: NDArray[np.float64], tips: Sequence[TipResponse]) -> list[TipResponse]:
@@ -78,9 +78,9 @@ def _eigenvalues(force: NDArray[np.float64], tips: Sequence[TipResponse]) -> lis
 
     def branch(side: float) -> TipResponse:
         def value(frequency: NDArray[np.float64]) -> NDArray[np.complex128]:
-            half, found = half_trace_and_root(frequency)
+            half, root_here = half_trace_and_root(frequency)
             near = root[np.clip(np.searchsorted(grid, frequency), 0, grid.size - 1)]
-            return np.asarray(half + side * np.where(np.real(found * np.conj(near)) < 0, -found, found))
+            return np.asarray(half + side * np.where(np.real(root_here * np.conj(near)) < 0, -root_here, root_here))
 
         return TipResponse(grid, value, half_trace + side * root)
 

@@ -51,9 +51,9 @@ def modes_of(state: Extraction, hits: Sequence[Sequence[Hit]] = ()) -> list[Mode
     """Modes of an extraction, by rising frequency; hits: for each of its FRFs those that it was averaged from."""
     if hits and len(hits) != len(state.frfs):
         raise ValueError(f"hits of {len(hits)} FRFs for {len(state.frfs)}; give a list of hits for each, maybe empty")
-    without = [left_out(own, frf) for own, frf in zip(hits, state.frfs, strict=False)]
-    found = [mode for band in state.bands for mode in _modes(state, band, hits, without)]
-    return with_phase_remarks(sorted(found, key=lambda mode: mode.frequency))
+    without = [left_out(hits_of_frf, frf) for hits_of_frf, frf in zip(hits, state.frfs, strict=False)]
+    modes = [mode for band in state.bands for mode in _modes(state, band, hits, without)]
+    return with_phase_remarks(sorted(modes, key=lambda mode: mode.frequency))
 
 
 def _modes(
@@ -61,10 +61,10 @@ def _modes(
 ) -> list[Mode]:
     fit = band.fit
     beyond = systematic(band)
-    by_hammer = sum(hammer_covariance(state, band, i, own) for i, own in enumerate(hits))
+    by_hammer = sum(hammer_covariance(state, band, i, hits_of_frf) for i, hits_of_frf in enumerate(hits))
     covariance = fit.covariance * beyond.factor + by_hammer + beyond.covariance
     n_hits = min(map(len, without), default=0)
-    over_hits = np.sum([jackknife(state, band, *one) for one in enumerate(without)], axis=0) if n_hits else None
+    over_hits = np.sum([jackknife(state, band, *pair) for pair in enumerate(without)], axis=0) if n_hits else None
     scatter = None if over_hits is None else over_hits + beyond.covariance
     modes = [_mode(fit, i, covariance, beyond.freedom, scatter, n_hits) for i in range(fit.frequency.size)]
     return [assess(state, band, i, replace(mode, method=_method(state, band))) for i, mode in enumerate(modes)]
@@ -111,8 +111,8 @@ def _shape(constants: NDArray[np.complex128]) -> Array | None:
 def _of_one(covariance: Array, fit: BandFit, i: int) -> Array:
     """Covariance of frequency, damping ratio, stiffness and phase (degrees) of mode i from that of its band, (4, 4)."""
     p, m = fit.constant.shape
-    mine = np.ix_(*2 * [[i, m + i, 2 * m + i, (2 + p) * m + i]])
+    block = np.ix_(*2 * [[i, m + i, 2 * m + i, (2 + p) * m + i]])
     constant = fit.constant[0, i]
     by_size = -np.sign(constant.real) / abs(constant) ** 2
     scale = np.array([1.0, 1.0, by_size, np.degrees(1 / abs(constant))])
-    return np.asarray(covariance[mine] * np.outer(scale, scale))
+    return np.asarray(covariance[block] * np.outer(scale, scale))

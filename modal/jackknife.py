@@ -26,10 +26,10 @@ def left_out(hits: Sequence[Hit], frf: Frf) -> list[Frf]:
     if len(hits) < FEWEST_HITS:
         return []
     lines = parts[0]
-    own = [(s_ff[1:][lines], s_fx[1:][lines]) for s_ff, _, s_fx in (cross_spectra([hit]) for hit in hits)]
-    s_ff, s_fx = (np.sum(one, axis=0) for one in zip(*own, strict=True))
+    spectra = [(s_ff[1:][lines], s_fx[1:][lines]) for s_ff, _, s_fx in (cross_spectra([hit]) for hit in hits)]
+    s_ff, s_fx = (np.sum(column, axis=0) for column in zip(*spectra, strict=True))
     per_line = -1 / (2 * np.pi * frf.frequency) ** 2
-    return [Frf(frf.frequency, (s_fx - fx) / (s_ff - ff) * per_line) for ff, fx in own]
+    return [Frf(frf.frequency, (s_fx - fx) / (s_ff - ff) * per_line) for ff, fx in spectra]
 
 
 def _lines(hit: Hit, frf: Frf) -> slice:
@@ -50,7 +50,7 @@ def jackknife(state: Extraction, band: FittedBand, i: int, without: Sequence[Frf
     Statistics 9, 586.
     """
     part = band.lines
-    change = np.array([one.receptance[part] for one in without]) * state.weight[i, part]
+    change = np.array([frf.receptance[part] for frf in without]) * state.weight[i, part]
     change -= change.mean(axis=0)
     steps = np.concatenate([change.real, change.imag], axis=1) @ band.fit.influence_of(i).T
     n = len(without)

@@ -88,19 +88,21 @@ class DataqDialogue:
 
     def ask(self, command: str) -> str:
         """Send, and wait for the echo; what the device adds to it."""
-        said = ""
+        last_line = ""
         for _ in range(self._tries):
             self._link.write(encode_command(command))
-            rest = b""
+            unfinished = b""
             deadline = time.monotonic() + ANSWER_TIME
             while (left := deadline - time.monotonic()) > 0:
-                lines, rest = split_lines(rest + self._link.read(left))
+                lines, unfinished = split_lines(unfinished + self._link.read(left))
                 for line in lines:
                     answer = answer_in(command, line)
                     if answer is not None and not any(refusal in answer for refusal in REFUSALS):
                         return answer
-                    said = line or said
+                    last_line = line or last_line
         tries = f"{self._tries} tries"
-        if not said:
+        if not last_line:
             raise DeviceError(f"no DATAQ device answers on {self._link.port} ({command}, {tries})", CDC_HINT)
-        raise DeviceError(f"the device on {self._link.port} does not take {command!r} ({tries}); it says {said[:60]!r}")
+        raise DeviceError(
+            f"the device on {self._link.port} does not take {command!r} ({tries}); it says {last_line[:60]!r}"
+        )

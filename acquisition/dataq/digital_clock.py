@@ -63,7 +63,7 @@ class DigitalClock:
         self._learning.append(scans)
         if len(self._learning) < LEARNT:
             return
-        even = [one for one in self._learning if abs(one - np.median(self._learning)) <= UNEVEN]
+        even = [length for length in self._learning if abs(length - np.median(self._learning)) <= UNEVEN]
         self._period = float(np.mean(even))
         if len(even) < LEARNT - 2 or not PERIODS[0] <= self._period <= PERIODS[1]:
             raise no_clock()

@@ -98,7 +98,7 @@ class DataqEmulator(EmulatorThread):
         realtime=False sends as fast as the host reads; tcp listens on loopback instead of a pseudo-terminal.
         """
         super().__init__(tcp)
-        self._signal_at, self._inputs = signal_at, {one.number: (i, one) for i, one in enumerate(inputs)}
+        self._signal_at, self._inputs = signal_at, {sensor.number: (i, sensor) for i, sensor in enumerate(inputs)}
         self._realtime, self._clock = realtime, clock
         self._traits, self._faults = traits or DataqTraits(), faults or DataqFaults()
         self._info = {0: "DATAQ", 1: self._traits.model, 2: self._traits.firmware, 6: "5E0ABC12", 9: "60000000"}
@@ -232,9 +232,9 @@ class DataqEmulator(EmulatorThread):
             if number == DIGITAL_INPUTS:
                 words[:, position] = self._digital_words(count)
             elif number in self._inputs:
-                row, one = self._inputs[number]
+                row, sensor = self._inputs[number]
                 bits = self._traits.bits
-                channel = replace(one.channel, full_scale=self._ranges[gain], adc_bits=bits)
+                channel = replace(sensor.channel, full_scale=self._ranges[gain], adc_bits=bits)
                 words[:, position] = channel.encode(values[row, position % step :: step]) << 16 - bits
         self._scan += count
         return words

@@ -55,7 +55,7 @@ class RateSetting:
 
 def check_inputs(inputs: Sequence[SensorInput]) -> None:
     """ValueError for inputs that the device does not have, the same one twice, or none."""
-    numbers = [one.number for one in inputs]
+    numbers = [sensor.number for sensor in inputs]
     for number in numbers:
         if not 0 <= number < DIGITAL_INPUTS:
             raise ValueError(f"input={number} is none of 0 to {DIGITAL_INPUTS - 1}")
@@ -93,21 +93,21 @@ def encode_command(command: str) -> bytes:
 
 def split_lines(received: bytes) -> tuple[list[str], bytes]:
     """Whole lines in what was received, and what is left of the last; NUL and LF count for nothing."""
-    *lines, rest = received.replace(b"\0", b"").replace(b"\n", b"").split(b"\r")
-    return [line.decode("ascii", "replace").strip() for line in lines], rest
+    *lines, unfinished = received.replace(b"\0", b"").replace(b"\n", b"").split(b"\r")
+    return [line.decode("ascii", "replace").strip() for line in lines], unfinished
 
 
 def answer_in(command: str, line: str) -> str | None:
     """What a device adds to the echo of a command ("" where nothing); None where the line is no echo of it."""
-    sent, said = command.split(), line.split()
-    return " ".join(said[len(sent) :]) if said[: len(sent)] == sent else None
+    sent, words = command.split(), line.split()
+    return " ".join(words[len(sent) :]) if words[: len(sent)] == sent else None
 
 
 def model_of(answer: str) -> str:
     """Key of RANGES for an answer to `info 1`, e.g. "2108P" for "DI-2108-P"; ValueError for other devices."""
     model = answer.upper().removeprefix("DI").replace("-", "").replace(" ", "")
     if model not in RANGES:
-        raise ValueError(f"model {answer!r} is none of {', '.join(f'DI-{known}' for known in RANGES)}")
+        raise ValueError(f"model {answer!r} is none of {', '.join(f'DI-{number}' for number in RANGES)}")
     return model
 
 

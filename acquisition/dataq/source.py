@@ -66,7 +66,7 @@ class DataqSource:
         device, ValueError for inputs, ranges and rates it does not have.
         """
         check_inputs(inputs)
-        self.channels = tuple(one.channel for one in inputs)
+        self.channels = tuple(sensor.channel for sensor in inputs)
         self.loss_detection = "digital word" + " and clock" * digital_clock if digital_word else "none"
         self.events: deque[Event] = deque()
         """It tells of no events."""
@@ -182,7 +182,7 @@ class DataqSource:
 
     def _configure(self, device: DataqIdentity, inputs: Sequence[SensorInput], wanted: float) -> float:
         """Send the set-up; the rate that results (Hz)."""
-        codes = [scan_code(one.number, range_code(device.model, one.channel.full_scale)) for one in inputs]
+        codes = [scan_code(sensor.number, range_code(device.model, sensor.channel.full_scale)) for sensor in inputs]
         if self.loss_detection != "none":
             codes.append(DIGITAL_INPUTS)
         setting = choose_rate(wanted, device.dividend)

@@ -113,12 +113,12 @@ class ScanDecoder:
 
     def _shift(self) -> int | None:
         """Bytes to the next scan: the known word counts first, then a new one in the old place, then anywhere."""
-        found = {shift: self._steady_word(shift) for shift in range(self._scan_bytes)}
-        steady = [shift for shift, word in found.items() if word is not None]
-        known = [shift for shift in steady if found[shift] == self._word]
-        if self._word is not None and not known:
+        words = {shift: self._steady_word(shift) for shift in range(self._scan_bytes)}
+        steady = [shift for shift, word in words.items() if word is not None]
+        same = [shift for shift in steady if words[shift] == self._word]
+        if self._word is not None and not same:
             return 0 if 0 in steady else None
-        return next(iter(known or steady), None)
+        return next(iter(same or steady), None)
 
     def _steady_word(self, shift: int) -> int | None:
         words = self._digital_words(shift, WINDOW) & self._steady

@@ -37,7 +37,7 @@ def _check_taps(settings: DeviceSettings) -> None:
 def _emulate_taps(bench: Bench) -> EmulatorThread:
     from acquisition.taps import TapsEmulator
 
-    channels = tuple(one.channel for one in bench.inputs)
+    channels = tuple(sensor.channel for sensor in bench.inputs)
     signal = bench.signal_at(bench.sample_rate)
     return TapsEmulator(signal, channels, bench.sample_rate, realtime=bench.realtime, tcp=bench.tcp)
 
@@ -68,7 +68,7 @@ def _emulate_dataq(bench: Bench) -> EmulatorThread:
     """Where a skew is given for an input, the device converts its inputs one after the other."""
     from acquisition.dataq import DataqEmulator, DataqTraits
 
-    skewed = any(one.channel.skew for one in bench.inputs)
+    skewed = any(sensor.channel.skew for sensor in bench.inputs)
     traits = DataqTraits(scanned=skewed, clock_hz=CLOCK if bench.digital_clock else None)
     return DataqEmulator(bench.signal_at, bench.inputs, realtime=bench.realtime, tcp=bench.tcp, traits=traits)
 

@@ -18,7 +18,7 @@ def check_settings(driver: Driver, settings: DeviceSettings) -> None:
 
 
 def _check_sensors(driver: Driver, settings: DeviceSettings) -> None:
-    quantities = sorted(one.channel.quantity for one in settings.inputs)
+    quantities = sorted(sensor.channel.quantity for sensor in settings.inputs)
     if quantities != ["acceleration", "force"]:
         listed = ", ".join(quantities) or "nothing"
         raise ValueError(

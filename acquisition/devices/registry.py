@@ -22,17 +22,17 @@ def driver_names() -> tuple[str, ...]:
 
 def find_driver(name: str) -> Driver:
     """The driver of this name; DataError where there is none, or where its package cannot be loaded."""
-    found = _find(name)
-    if isinstance(found, Remark):
-        raise DataError(str(found))
-    return found
+    driver = _find(name)
+    if isinstance(driver, Remark):
+        raise DataError(str(driver))
+    return driver
 
 
 def load_drivers() -> tuple[tuple[Driver, ...], tuple[Remark, ...]]:
     """All drivers, and a remark on each that cannot be loaded."""
-    found = [_find(name) for name in driver_names()]
-    drivers = tuple(one for one in found if isinstance(one, Driver))
-    return drivers, tuple(one for one in found if isinstance(one, Remark))
+    loaded = [_find(name) for name in driver_names()]
+    drivers = tuple(entry for entry in loaded if isinstance(entry, Driver))
+    return drivers, tuple(entry for entry in loaded if isinstance(entry, Remark))
 
 
 def _find(name: str) -> Driver | Remark:

@@ -40,10 +40,10 @@ class PortSurvey:
 def survey_ports(only: str = "") -> PortSurvey:
     """Ask on every USB port, or only on this one, whatever it is, also where it is not listed."""
     drivers, remarks = load_drivers()
-    known = list_ports()
+    ports = list_ports()
     if only:
-        known = [one for one in known if one.device == only] or [PortInfo(only)]
-    return PortSurvey(tuple(_ask(one, drivers, named=bool(only)) for one in known), remarks)
+        ports = [port for port in ports if port.device == only] or [PortInfo(only)]
+    return PortSurvey(tuple(_ask(port, drivers, named=bool(only)) for port in ports), remarks)
 
 
 def _ask(port: PortInfo, drivers: Sequence[Driver], named: bool) -> SeenPort:

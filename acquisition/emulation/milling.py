@@ -139,8 +139,10 @@ def _period(
 def _acceleration(swings: NDArray[np.complex128], gains: Floats, modes: ModeTables) -> Floats:
     """q'' = w^2 F / K - 2 zeta w q' - w^2 q along x and y (s, c, 2), in the middle of the impulse of each step."""
     free = np.imag(modes.pole**2 * (swings - gains / 2))
-    seen: Floats = np.einsum("cam,scm->sca", modes.axis, free + gains * modes.pole.imag / modes.step[:, np.newaxis])
-    return seen
+    acceleration: Floats = np.einsum(
+        "cam,scm->sca", modes.axis, free + gains * modes.pole.imag / modes.step[:, np.newaxis]
+    )
+    return acceleration
 
 
 def _motion(
@@ -156,9 +158,9 @@ def _motion(
     n = round((passage.cutting + passage.after) / step)
     left = step * np.arange(1, n - len(cutting) + 1)
     ringing = axis @ np.imag((pole**2 * swing)[:, np.newaxis] * np.exp(np.outer(pole, left)))
-    rest = np.zeros((2, round(passage.before / step)))
+    still = np.zeros((2, round(passage.before / step)))
     full = cutting[: round((passage.ramp + passage.steady) / step)]
-    return TipMotion(1 / step, np.hstack([rest, cutting[:n].T, ringing]), _wander(full, turn))
+    return TipMotion(1 / step, np.hstack([still, cutting[:n].T, ringing]), _wander(full, turn))
 
 
 def _wander(acceleration: NDArray[np.float32], turn: int) -> float:

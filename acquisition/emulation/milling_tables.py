@@ -81,12 +81,12 @@ def tables(cuts: Sequence[MillingCut], steps: int) -> tuple[ModeTables, ToothTab
     return modes, ToothTables(root, thick, place, reach, push, edges[..., 0])
 
 
-def _side_by_side(each: Sequence[tuple[NDArray[Any], ...]], axis: int) -> list[Any]:
+def _side_by_side(of_cuts: Sequence[tuple[NDArray[Any], ...]], axis: int) -> list[Any]:
     """Arrays of each cut side by side along a new axis, zeros where others have more along the last one."""
-    most = max(one[0].shape[-1] for one in each)
+    most = max(arrays[0].shape[-1] for arrays in of_cuts)
     return [
         np.stack([np.pad(a, [(0, 0)] * (a.ndim - 1) + [(0, most - a.shape[-1])]) for a in same], axis=axis)
-        for same in zip(*each, strict=True)
+        for same in zip(*of_cuts, strict=True)
     ]
 
 

@@ -38,5 +38,5 @@ def force_noise_through(
     spectra = [waves[:, : part.force.size] @ part.force for part in parts]
     power = np.sum(np.abs(spectra) ** 2, axis=0)
     for part, spectrum in zip(parts, spectra, strict=True):
-        seen = (rows * (np.conj(spectrum) / power)) @ waves[:, : part.window.size]
-        yield np.column_stack((seen * (-part.noise * part.window), seen @ (part.mean_noise * part.window)))
+        response = (rows * (np.conj(spectrum) / power)) @ waves[:, : part.window.size]
+        yield np.column_stack((response * (-part.noise * part.window), response @ (part.mean_noise * part.window)))

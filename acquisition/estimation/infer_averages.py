@@ -30,8 +30,8 @@ def infer_averages(frf: Frf) -> int | None:
     g2 = np.clip(frf.coherence, 1e-6, 1.0)[1:-2]
     of_hits = np.abs(frf.receptance[1:-2]) ** 2 * (1 - g2) / g2
     of_mean = np.abs(np.diff(frf.receptance, 3)) ** 2 / 20
-    seen = _blocks(1 - g2) > LEAST_INCOHERENCE
-    ratios = (_blocks(of_hits) / np.maximum(_blocks(of_mean), 1e-300))[seen]
+    incoherent = _blocks(1 - g2) > LEAST_INCOHERENCE
+    ratios = (_blocks(of_hits) / np.maximum(_blocks(of_mean), 1e-300))[incoherent]
     if ratios.size < LEAST_BLOCKS:
         return None
     low, middle, high = np.quantile(ratios, [0.25, 0.5, 0.75])

@@ -64,9 +64,9 @@ class RunningMean:
                 f"a hit of {hit.force.size} samples at {hit.sample_rate:g} Hz cannot join a mean of hits of "
                 f"{self.hits[0].force.size} samples at {self.hits[0].sample_rate:g} Hz; begin a new test"
             )
-        own = cross_spectra([hit])
+        spectra = cross_spectra([hit])
         sums = self._sums
-        self._sums = own if sums is None else (sums[0] + own[0], sums[1] + own[1], sums[2] + own[2])
+        self._sums = spectra if sums is None else (sums[0] + spectra[0], sums[1] + spectra[1], sums[2] + spectra[2])
         self.hits += (hit,)
         self._before, self.frf = self.frf, frf_of_spectra(self._sums, self.hits)
 
@@ -81,11 +81,11 @@ class RunningMean:
         """Take a hit back; ValueError where it is not in the mean."""
         kept = self._others(hit)
         self.hits, self.frf, self._sums = (), None, None
-        for one in kept:  # anew: subtraction would leave its rounding errors
-            self.add(one)
+        for remaining in kept:  # anew: subtraction would leave its rounding errors
+            self.add(remaining)
 
     def _others(self, hit: Hit) -> list[Hit]:
-        kept = [one for one in self.hits if one is not hit]
+        kept = [counted for counted in self.hits if counted is not hit]
         if len(kept) == len(self.hits):
             raise ValueError("this hit is not in the mean; only hits that were added can be taken back")
         return kept

@@ -84,13 +84,13 @@ def convert(path: Path | str, out: Path | str, said: Description, *, hits: bool 
     )
     if writer.of_frf is not None and not hits:
         frf = recording.frf or read_frf(path, said)
-        content, what = writer.of_frf(frf, labels), f"FRF of {frf.frequency.size} lines"
+        content, amount = writer.of_frf(frf, labels), f"FRF of {frf.frequency.size} lines"
     elif recording.hits:
-        content, what = writer.of_hits(recording.hits, labels), f"{len(recording.hits)} hit(s)"
+        content, amount = writer.of_hits(recording.hits, labels), f"{len(recording.hits)} hit(s)"
     else:
         raise DataError(f"{path}: holds an FRF, not the hits it was made from; write it as {', '.join(_OF_FRF)}")
     atomic_write(out, content)
-    return Converted(out, writer.title, what, writer.precision, recording)
+    return Converted(out, writer.title, amount, writer.precision, recording)
 
 
 _OF_FRF = [extension for extension, writer in WRITERS.items() if writer.of_frf]

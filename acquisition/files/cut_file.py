@@ -100,8 +100,8 @@ def write_cut_signal(path: Path, signal: CutSignal, about: Mapping[str, Any]) ->
         if signal.codes is not None and signal.channel is not None:
             word = np.int16 if signal.channel.adc_bits <= 16 else np.int32
             _dataset(file, "codes", signal.codes.astype(word), "ADC code")
-            told = {field.name: getattr(signal.channel, field.name) for field in fields(Channel)}
-            file["codes"].attrs.update(told)
+            settings = {field.name: getattr(signal.channel, field.name) for field in fields(Channel)}
+            file["codes"].attrs.update(settings)
         else:
             _dataset(file, "acceleration", signal.acceleration, "m/s^2")
     content = sealed(memory.getvalue())
@@ -130,8 +130,10 @@ def _read(file: h5py.File) -> CutSignal:
     if "acceleration" in file:
         return CutSignal(file["acceleration"][()], rate, lost_scans=lost, overload=overload)
     codes = file["codes"]
-    own = {name: codes.attrs[name] for name in (field.name for field in fields(Channel))}
-    channel = Channel(**{name: one.item() if isinstance(one, np.generic) else one for name, one in own.items()})
+    settings = {name: codes.attrs[name] for name in (field.name for field in fields(Channel))}
+    channel = Channel(
+        **{name: value.item() if isinstance(value, np.generic) else value for name, value in settings.items()}
+    )
     values = codes[()].astype(np.int32)
     return CutSignal(values * channel.scale, rate, values, channel, lost, overload)
 

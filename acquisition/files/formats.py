@@ -41,11 +41,11 @@ def format_of(path: Path) -> Format:
         head = file.read(HEAD)
     if not head:
         raise DataError(f"{path}: the file is empty")
-    for one in known_formats():
-        if _is_it(one, head, path):
-            return one
-    known = ", ".join(f"{one.title} ({', '.join(one.extensions)})" for one in known_formats())
-    raise DataError(f"{path}: of no format that is known here; export it as one of these: {known}{broken_formats()}")
+    for file_format in known_formats():
+        if _is_it(file_format, head, path):
+            return file_format
+    titles = ", ".join(f"{file_format.title} ({', '.join(file_format.extensions)})" for file_format in known_formats())
+    raise DataError(f"{path}: of no format that is known here; export it as one of these: {titles}{broken_formats()}")
 
 
 def broken_formats() -> str:
@@ -53,26 +53,26 @@ def broken_formats() -> str:
     return "".join(f"; {fault}" for fault in _of_others()[1])
 
 
-def _is_it(one: Format, head: bytes, path: Path) -> bool:
+def _is_it(file_format: Format, head: bytes, path: Path) -> bool:
     try:
-        return one.is_it(head, path)
+        return file_format.is_it(head, path)
     except Exception as error:  # noqa: BLE001 - code of others may raise anything; the other formats are asked still
-        _log.warning("%r: format %r could not be asked (%r)", str(path), one.name, error)
+        _log.warning("%r: format %r could not be asked (%r)", str(path), file_format.name, error)
         return False
 
 
 @functools.cache
 def _of_others() -> tuple[tuple[Format, ...], tuple[Remark, ...]]:
     """Formats of other packages, and a remark on each that cannot be used."""
-    found: dict[str, Format] = {}
+    formats: dict[str, Format] = {}
     remarks: list[Remark] = []
-    taken = {one.name for one in BUILT_IN}
-    for point in sorted(entry_points(group=GROUP), key=lambda one: one.name):
-        one = load_plugin(point, Format)
-        if isinstance(one, Format) and one.name not in taken | found.keys():
-            found[one.name] = one
-        elif isinstance(one, Format):
+    taken = {built_in.name for built_in in BUILT_IN}
+    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+        plugin = load_plugin(point, Format)
+        if isinstance(plugin, Format) and plugin.name not in taken | formats.keys():
+            formats[plugin.name] = plugin
+        elif isinstance(plugin, Format):
             remarks.append(not_loaded(Format, point, f"{package_of(point)} is not the only one to bring it"))
         else:
-            remarks.append(one)
-    return tuple(found.values()), tuple(remarks)
+            remarks.append(plugin)
+    return tuple(formats.values()), tuple(remarks)

@@ -30,16 +30,16 @@ def look(path: Path | str, said: Description = NOTHING) -> Recording:
     DataError for a file that is damaged or of no format that is known.
     """
     path = Path(path)
-    found = format_of(path)
-    held = _guarded(found, path, lambda: found.read(path))
+    file_format = format_of(path)
+    held = _guarded(file_format, path, lambda: file_format.read(path))
     if isinstance(held, Contents):
         contents = held
-        return _guarded(found, path, lambda: understood(path, found.title, contents, said))
-    about = found.recorded_as(path)
+        return _guarded(file_format, path, lambda: understood(path, file_format.title, contents, said))
+    about = file_format.recorded_as(path)
     hits, frf = ((), held) if isinstance(held, Frf) else (tuple(held), None)
     options = said.of_signals()
-    complaint = f"a {found.title} says itself what it holds; leave out {', '.join(options)}" if options else ""
-    recording = Recording(path, found.title, hits, frf, tuple(_facts(hits, frf)), complaint)
+    complaint = f"a {file_format.title} says itself what it holds; leave out {', '.join(options)}" if options else ""
+    recording = Recording(path, file_format.title, hits, frf, tuple(_facts(hits, frf)), complaint)
     return recording if about is None else _labelled(recording, about)
 
 
@@ -54,9 +54,9 @@ def read_hits(path: Path | str, said: Description = NOTHING) -> list[Hit]:
 def read_frf(path: Path | str, said: Description = NOTHING) -> Frf:
     """The FRF that a recorded file holds, or that estimated (H1) from its good hits."""
     path = Path(path)
-    found = format_of(path)
-    if found.read_frf is not None:
-        return found.read_frf(path)
+    file_format = format_of(path)
+    if file_format.read_frf is not None:
+        return file_format.read_frf(path)
     recording = read_recording(path, said)
     if isinstance(recording, Frf):
         return recording
@@ -72,7 +72,7 @@ def read_recording(path: Path | str, said: Description = NOTHING) -> list[Hit] |
     return list(recording.hits) if recording.frf is None else recording.frf
 
 
-def _guarded(found: Format, path: Path, work: Callable[[], Result]) -> Result:
+def _guarded(file_format: Format, path: Path, work: Callable[[], Result]) -> Result:
     """What some work on a file gives; DataError for whatever goes wrong in it."""
     try:
         return work()
@@ -82,7 +82,9 @@ def _guarded(found: Format, path: Path, work: Callable[[], Result]) -> Result:
         raise
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
-        raise DataError(f"{path}: cannot be read as {found.title} ({reason}); export it in another format") from error
+        raise DataError(
+            f"{path}: cannot be read as {file_format.title} ({reason}); export it in another format"
+        ) from error
 
 
 def _facts(hits: Sequence[Hit], frf: Frf | None) -> list[Fact]:

@@ -23,10 +23,10 @@ def read_sound(path: Path | str, said: Description = NOTHING) -> CutSignal:
         raise DataError(f"{path}: no such file")
     if is_cut_file(path):
         return read_cut_signal(path)[0]
-    found = format_of(path)
-    contents = found.read(path)
+    file_format = format_of(path)
+    contents = file_format.read(path)
     if not isinstance(contents, Contents):
-        raise DataError(f"{path}: a {found.title}, not the recording of a cut")
+        raise DataError(f"{path}: a {file_format.title}, not the recording of a cut")
     ledger = Ledger()
     sound = settle_sound(contents, said, ledger)
     if sound is None or not ledger.is_clean:

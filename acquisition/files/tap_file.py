@@ -117,8 +117,8 @@ def _open(path: Path) -> h5py.File:
             raise DataError(f"{path}: an HDF5 file, but no tap test of lobewatch (attribute format is not {FORMAT!r})")
         newest = int(file.attrs.get("version", VERSION))
         if newest > VERSION:
-            told = f"a tap file of version {newest}, this lobewatch reads up to {VERSION}"
-            raise DataError(f"{path}: {told}; update lobewatch")
+            versions = f"a tap file of version {newest}, this lobewatch reads up to {VERSION}"
+            raise DataError(f"{path}: {versions}; update lobewatch")
         check_unpacked(file, len(content), path)
     except BaseException:
         file.close()

@@ -149,15 +149,17 @@ class HitSearch:
         self._join()
         before = self._trigger.pre_trigger
         while self._settled or self._settle():
-            found = self._find_crossing()
-            if found is None:
+            crossing = self._find_crossing()
+            if crossing is None:
                 return False
-            quiet = self._codes[1, found - before : found - before // 5]  # the pulse may begin before its crossing
+            quiet = self._codes[
+                1, crossing - before : crossing - before // 5
+            ]  # the pulse may begin before its crossing
             if self._rest is None or self._rest.holds(quiet):
-                self._crossing = found
+                self._crossing = crossing
                 return True
             self.too_early += 1
-            self._from, self._quiet, self._settled = found + 1, 0, False
+            self._from, self._quiet, self._settled = crossing + 1, 0, False
         return False
 
     def _settle(self) -> bool:

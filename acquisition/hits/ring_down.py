@@ -31,11 +31,11 @@ def ring_down(hit: Hit) -> float:
     if not loud.size:
         return 0.0
     visible = ringing[: (int(loud[-1]) + 1) * width]
-    found = _time_constant(visible, width)
+    constant = _time_constant(visible, width)
     wide = visible.size // COARSE
-    if found > 2 * wide:  # a slow mode: pieces shorter than its period would ripple
-        found = _time_constant(visible, wide)
-    return found / hit.sample_rate
+    if constant > 2 * wide:  # a slow mode: pieces shorter than its period would ripple
+        constant = _time_constant(visible, wide)
+    return constant / hit.sample_rate
 
 
 def _envelope(signal: NDArray[np.float64], width: int) -> NDArray[np.float64]:

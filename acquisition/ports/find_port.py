@@ -11,15 +11,15 @@ def find_port(vid: int, serial_number: str) -> str | None:
     A look at the list of ports, for a caller that waits for a device to come back.
     """
     wanted = (vid, serial_number.casefold())
-    found = (
+    ports = (
         port.device for port in list_ports.comports() if (port.vid, (port.serial_number or "").casefold()) == wanted
     )
-    return next(found, None)
+    return next(ports, None)
 
 
 def usb_identity(port: str) -> tuple[int, str] | None:
     """Vendor id and serial number of what is plugged in at a port; None where it is no USB device or has no number."""
-    for known in list_ports.comports(include_links=True):
-        if known.device == port and known.vid is not None and known.serial_number:
-            return known.vid, known.serial_number
+    for listed in list_ports.comports(include_links=True):
+        if listed.device == port and listed.vid is not None and listed.serial_number:
+            return listed.vid, listed.serial_number
     return None

@@ -75,8 +75,8 @@ class MassCalibration:
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """What is wrong; nothing where the mass is rigid and both sensitivities agree."""
-        found = (self._phase_remark, self._sign_remark, self._size_remark)
-        return tuple(remark for remark in (*found, *self._mistakes) if remark is not None)
+        doubts = (self._phase_remark, self._sign_remark, self._size_remark)
+        return tuple(remark for remark in (*doubts, *self._mistakes) if remark is not None)
 
     @property
     def _phase_remark(self) -> Remark | None:
@@ -117,21 +117,21 @@ class MassCalibration:
     def __str__(self) -> str:
         """All of it, a sentence a line."""
         low, high = self.band
-        said = [
+        lines = [
             f"F/(m a) = {self.ratio:.4f} ± {self.ratio_std:.4f} over {self.n_hits} hits on {self.mass:g} kg, "
             f"{low:.0f} to {high:.0f} Hz, flat within {abs(self.flatness):.1%}, phase {self.phase:+.1f} deg",
             *map(str, self.remarks),
         ]
         if self.sizes_agree:
-            said.append(f"Both sensitivities agree within {AGREES:.0%}.")
+            lines.append(f"Both sensitivities agree within {AGREES:.0%}.")
         elif self.channels is not None:
             old = [channel.sensitivity * 1e3 for channel in self.channels]
-            said.append(
+            lines.append(
                 f"If the accelerometer is trusted, the hammer has {old[0] * self.ratio:.4g} mV/N instead of "
                 f"{old[0]:.4g}; if the hammer is trusted, the accelerometer has {old[1] / self.ratio:.4g} mV per m/s^2 "
                 f"instead of {old[1]:.4g}."
             )
-        return "\n".join(said)
+        return "\n".join(lines)
 
 
 def calibrate_by_mass(hits: Sequence[Hit], mass: float) -> MassCalibration:

@@ -46,11 +46,11 @@ def measure_skew(first: ArrayLike, second: ArrayLike, sample_rate: float) -> Mea
     if not (np.isfinite(sample_rate) and sample_rate > 0):
         raise ValueError(f"sample_rate={sample_rate} Hz is not > 0")
     records = _records(first, second)
-    found = _phase_slope(records, records[1])
+    fit = _phase_slope(records, records[1])
     for _ in range(2):
-        rest = _phase_slope(records, _shifted_back(records[1], found.skew))
-        found = replace(rest, skew=found.skew + rest.skew)
-    return replace(found, skew=found.skew / sample_rate, std=found.std / sample_rate)
+        correction = _phase_slope(records, _shifted_back(records[1], fit.skew))
+        fit = replace(correction, skew=fit.skew + correction.skew)
+    return replace(fit, skew=fit.skew / sample_rate, std=fit.std / sample_rate)
 
 
 def _phase_slope(records: NDArray[np.float64], second: NDArray[np.float64]) -> MeasuredSkew:

@@ -51,19 +51,19 @@ def unit_mistake(ratio: float) -> Remark | None:
 
 def channel_doubts(channel: Channel) -> tuple[Remark, ...]:
     """What speaks against a channel's sensitivity and range; nothing where both are of this world."""
-    low, high, unit, known = SENSITIVITIES[channel.quantity]
+    low, high, unit, usual = SENSITIVITIES[channel.quantity]
     per = "N" if channel.quantity == "force" else "m/s^2"
     doubts = []
     sensitivity = abs(channel.sensitivity) * unit
     if not low / SPREAD <= sensitivity <= high * SPREAD:
-        said = f"a sensitivity of {channel.sensitivity:g} V per {per} is not believed ({known})"
+        text = f"a sensitivity of {channel.sensitivity:g} V per {per} is not believed ({usual})"
         doubts.append(
-            Remark("sensitivity-not-believed", channel.quantity, said, _slip(sensitivity, low / SPREAD, high * SPREAD))
+            Remark("sensitivity-not-believed", channel.quantity, text, _slip(sensitivity, low / SPREAD, high * SPREAD))
         )
     if not FULL_SCALES[0] <= channel.full_scale <= FULL_SCALES[1]:
-        said = f"a range of ±{channel.full_scale:g} V is not believed (converters have 0.01 to 100 V)"
+        text = f"a range of ±{channel.full_scale:g} V is not believed (converters have 0.01 to 100 V)"
         doubts.append(
-            Remark("input-range-not-believed", channel.quantity, said, _slip(channel.full_scale, *FULL_SCALES))
+            Remark("input-range-not-believed", channel.quantity, text, _slip(channel.full_scale, *FULL_SCALES))
         )
     return tuple(doubts)
 
@@ -71,7 +71,7 @@ def channel_doubts(channel: Channel) -> tuple[Remark, ...]:
 def _slip(value: float, low: float, high: float) -> str:
     """The slip by 1000 that explains a value outside its bounds, as a question; empty where it does not."""
     slips = {value / 1e3: "did you mean mV?", value * 1e3: "was it divided by 1000 twice?"}
-    return next((words for other, words in slips.items() if low <= other <= high), "")
+    return next((words for corrected, words in slips.items() if low <= corrected <= high), "")
 
 
 def stiffness_doubt(stiffness: float) -> Remark | None:
@@ -96,13 +96,13 @@ def calibration_doubt(channel: Channel, today: date, interval_months: float = 12
     try:
         calibrated = date.fromisoformat(channel.calibration_date[:10])
     except ValueError:
-        said = f"calibration date {channel.calibration_date!r} is no date"
-        return Remark("calibration-no-date", channel.quantity, said, "give YYYY-MM-DD")
+        text = f"calibration date {channel.calibration_date!r} is no date"
+        return Remark("calibration-no-date", channel.quantity, text, "give YYYY-MM-DD")
     if calibrated > today:
-        said = f"calibration date {calibrated} lies in the future (today is {today})"
-        return Remark("calibration-in-future", channel.quantity, said, "correct it, or the clock of this computer")
+        text = f"calibration date {calibrated} lies in the future (today is {today})"
+        return Remark("calibration-in-future", channel.quantity, text, "correct it, or the clock of this computer")
     months = (today - calibrated).days / DAYS_PER_MONTH
     if months <= interval_months:
         return None
-    said = f"calibrated {calibrated}, {months:.0f} months ago (interval {interval_months:g})"
-    return Remark("calibration-old", channel.quantity, said, "check it with a known mass or have it calibrated")
+    text = f"calibrated {calibrated}, {months:.0f} months ago (interval {interval_months:g})"
+    return Remark("calibration-old", channel.quantity, text, "check it with a known mass or have it calibrated")

@@ -53,8 +53,8 @@ class EventLog:
         except struct.error:
             return
         self.new.append(event)
-        others = (fault for fault in self._standing if (fault.kind, fault.channel) != (event.kind, event.channel))
-        self._standing = (*others, event) if event.begins and event.kind in _FAULTS else tuple(others)
+        remaining = (fault for fault in self._standing if (fault.kind, fault.channel) != (event.kind, event.channel))
+        self._standing = (*remaining, event) if event.begins and event.kind in _FAULTS else tuple(remaining)
 
     def fault(self, channels: Mapping[int, Channel]) -> str:
         """One sentence on the faults that stand; empty where all is well. channels: by their i in INFO."""

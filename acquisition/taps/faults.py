@@ -50,5 +50,5 @@ class Faults:
         return NOISE + encoded if _is_due(self.noise_every, count) else encoded
 
 
-def _is_due(every: int | None, count: int) -> bool:
-    return every is not None and count % every == 0
+def _is_due(period: int | None, count: int) -> bool:
+    return period is not None and count % period == 0

@@ -123,8 +123,8 @@ class FrameDecoder:
 
     def feed(self, data: bytes) -> list[Frame]:
         """The frames that are complete with these bytes."""
-        *pieces, rest = (self._rest + data).split(b"\x00")
-        self._rest = rest[: MAX_ENCODED + 1]  # what is too long stays too long until its delimiter comes
+        *pieces, unfinished = (self._rest + data).split(b"\x00")
+        self._rest = unfinished[: MAX_ENCODED + 1]  # what is too long stays too long until its delimiter comes
         frames = [decode_frame(piece) for piece in pieces if piece]
         good = [frame for frame in frames if frame is not None]
         self.dropped += len(frames) - len(good)

@@ -27,10 +27,10 @@ def distance_from_mean(frf: Frf, mean: Frf) -> tuple[float, float]:
             f"the hit has {frf.frequency.size} lines up to {frf.frequency[-1]:g} Hz, the mean "
             f"{mean.frequency.size} up to {mean.frequency[-1]:g} Hz; compare hits of one set-up only"
         )
-    reach = min(one.usable_band[1] if one.usable_band else np.inf for one in (frf, mean))
+    reach = min(response.usable_band[1] if response.usable_band else np.inf for response in (frf, mean))
     used = mean.frequency <= reach
-    hit, other = frf.receptance[used], mean.receptance[used]
+    hit, expected = frf.receptance[used], mean.receptance[used]
     scatter = np.minimum((1 + 1 / n) * n / (n - 1) * 2 * n * error[used] ** 2, 4.0)
     weight = 1 / (FLOOR**2 + scatter)
-    apart = 2 * np.abs(hit - other) / np.maximum(np.abs(hit) + np.abs(other), np.finfo(float).tiny)
+    apart = 2 * np.abs(hit - expected) / np.maximum(np.abs(hit) + np.abs(expected), np.finfo(float).tiny)
     return float(np.sqrt(np.average(apart**2, weights=weight))), float(np.sqrt(np.average(scatter, weights=weight)))

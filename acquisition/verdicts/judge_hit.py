@@ -54,16 +54,16 @@ def judge_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | Non
 
 def _overloads(hit: Hit) -> dict[HitFlags, str]:
     flags = (HitFlags.OVERLOAD_FORCE, HitFlags.OVERLOAD_RESPONSE)
-    found = {flag: find_overload(hit, i) for i, flag in enumerate(flags)}
-    texts = {flag: _overload_text(flag, overload) for flag, overload in found.items() if overload is not None}
+    overloads = {flag: find_overload(hit, i) for i, flag in enumerate(flags)}
+    texts = {flag: _overload_text(flag, overload) for flag, overload in overloads.items() if overload is not None}
     reported = {flag: "The device reports an overload" for i, flag in enumerate(flags) if hit.overload >> i & 1}
     return reported | texts
 
 
 def _overload_text(flag: HitFlags, overload: Overload) -> str:
     name, unit = ("Force", "N") if flag is HitFlags.OVERLOAD_FORCE else ("Response", "m/s^2")
-    how = " (inferred from its flat top)" if overload.inferred else ""
-    return f"{name} cut off at {overload.level:.4g} {unit} for {overload.samples} samples{how}"
+    note = " (inferred from its flat top)" if overload.inferred else ""
+    return f"{name} cut off at {overload.level:.4g} {unit} for {overload.samples} samples{note}"
 
 
 def _is_swapped(hit: Hit) -> bool:

@@ -74,7 +74,7 @@ def _without_main_pulse(pulse: Pulse, width: int) -> NDArray[np.float64]:
     force = pulse.force
     before, after = force[max(low - width // 2, 0) : low], force[high : high + max(width // 2, 1)]
     ends = [float(np.mean(side)) if side.size else None for side in (before, after)]
-    left, right = (end if end is not None else other or 0.0 for end, other in (ends, ends[::-1]))
+    left, right = (end if end is not None else opposite or 0.0 for end, opposite in (ends, ends[::-1]))
     force[low:high] = np.linspace(left, right, high - low)
     return force
 

@@ -140,19 +140,19 @@ def calibrate_damping(
     shaft = DampedShaft.of(spindle, mode)
     dampers = _Dampers(shaft, mode, Damping(fixed, loss_factor), _ratio(spindle, chosen))
     start = dampers.point(0.0, shaft.follow(mode, shaft.start(mode), shaft.none, dampers.fixed))
-    found = _reach(dampers, start, damping_ratio)
-    viscous = dampers.at(found.amount).viscous
+    damped = _reach(dampers, start, damping_ratio)
+    viscous = dampers.at(damped.amount).viscous
     mean, per_amount = float(np.mean(viscous[chosen])), float(np.mean(dampers.ratio[chosen]))
     return DampingCalibration(
         damping_ratio=damping_ratio,
         damping_ratio_std=damping_ratio_std,
         mode=mode,
-        frequency=abs(found.mode.w) / (2 * math.pi),
+        frequency=abs(damped.mode.w) / (2 * math.pi),
         other_damping_ratio=start.mode.damping_ratio,
         loss_factor=loss_factor,
         bearing_damping=mean,
-        bearing_damping_std=None if damping_ratio_std is None else per_amount * damping_ratio_std / found.slope,
-        sensitivity=found.slope * found.amount,
+        bearing_damping_std=None if damping_ratio_std is None else per_amount * damping_ratio_std / damped.slope,
+        sensitivity=damped.slope * damped.amount,
         given=spindle,
         spindle=replace(
             spindle, bearings=[replace(b, damping=float(c)) for b, c in zip(spindle.bearings, viscous, strict=True)]
@@ -186,12 +186,12 @@ def _ratio(spindle: Spindle, chosen: list[int]) -> _Float:
 
 def _reach(dampers: _Dampers, start: _Point, target: float) -> _Point:
     """The weakest dampers with the damping ratio `target`."""
-    own = start.mode.damping_ratio
-    if own >= target:
+    without_dampers = start.mode.damping_ratio
+    if without_dampers >= target:
         raise UnreachableDampingError(
             f"damping_ratio={target:g} of mode {dampers.number} leaves nothing for these dampers: the loss factor and "
-            f"other bearings alone give {own:.6g}; lower them, or check the measurement",
-            own,
+            f"other bearings alone give {without_dampers:.6g}; lower them, or check the measurement",
+            without_dampers,
         )
     low, high = _bracket(dampers, start, target)
     amount = _zero(

@@ -67,8 +67,8 @@ def fit_stiffness(
     minimum is found.
     """
     spindles = (spindle,) if isinstance(spindle, Spindle) else tuple(spindle)
-    for one in spindles:
-        require_support(one)
+    for model in spindles:
+        require_support(model)
     names = chosen_groups(spindles, groups)
     measured = check_measured(len(spindles), frequency, frequency_std, mode, shaft)
     if measured.frequency.size < len(names):
@@ -196,7 +196,7 @@ def _close_modes(problem: Problem, state: Iterate) -> list[FitRemark]:
     measured = problem.measured
     remarks = []
     for number, frequency in enumerate(state.frequency):
-        gap, seen = np.diff(frequency) / frequency[1:], measured.mode[measured.shaft == number]
+        gap, numbers = np.diff(frequency) / frequency[1:], measured.mode[measured.shaft == number]
         where = f" of spindle {number + 1}" if len(state.frequency) > 1 else ""
         remarks += [
             FitRemark(
@@ -207,7 +207,7 @@ def _close_modes(problem: Problem, state: Iterate) -> list[FitRemark]:
                 "check which of them was measured",
             )
             for low in range(1, frequency.size)
-            if gap[low - 1] < NEAR and np.any((seen == low) | (seen == low + 1))
+            if gap[low - 1] < NEAR and np.any((numbers == low) | (numbers == low + 1))
         ]
     return remarks
 

@@ -74,20 +74,20 @@ def identifiability(
     compare with, and the energy shares decide alone.
     """
     felt = _felt(problem, best)
-    found = []
+    remarks = []
     for index, name in enumerate(problem.names):
         share = float(np.max(best.share[:, index]))
         if share < LEAST_SHARE:
             text = f"at most {100 * share:.2g} % of the strain energy of the measured modes is in it"
-            found.append(FitRemark("group-not-felt", name, text, CURE))
+            remarks.append(FitRemark("group-not-felt", name, text, CURE))
         elif log_covariance is not None:
             text = _open(problem, best, log_covariance, index, felt[index] < LITTLE_SHARE)
-            found += [FitRemark("stiffness-ambiguous", name, text, CURE)] if text else []
-    if not found and rival is not None:
+            remarks += [FitRemark("stiffness-ambiguous", name, text, CURE)] if text else []
+    if not remarks and rival is not None:
         factors = ", ".join(f"{math.exp(value):.3g}" for value in rival.log_factor)
         text = f"another solution fits as well: factors {factors}"
-        found = [FitRemark("stiffness-ambiguous", ", ".join(problem.names), text, CURE)]
-    return found
+        remarks = [FitRemark("stiffness-ambiguous", ", ".join(problem.names), text, CURE)]
+    return remarks
 
 
 def rival_solution(problem: Problem, best: Iterate, log_covariance: _Float | None) -> Iterate | None:
@@ -104,9 +104,9 @@ def rival_solution(problem: Problem, best: Iterate, log_covariance: _Float | Non
     rivals = []
     for step in (-1.2, -0.5, 0.5, 1.2):
         with suppress(ArithmeticError):
-            other, _ = minimize(problem, best.log_factor + step * direction, (), _tolerance(problem, best))
-            if other.cost < worst and np.max(np.abs(other.log_factor - best.log_factor)) > far:
-                rivals.append(other)
+            trial, _ = minimize(problem, best.log_factor + step * direction, (), _tolerance(problem, best))
+            if trial.cost < worst and np.max(np.abs(trial.log_factor - best.log_factor)) > far:
+                rivals.append(trial)
     return min(rivals, key=lambda state: state.cost, default=None)
 
 

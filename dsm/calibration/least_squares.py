@@ -75,15 +75,15 @@ class Problem(NamedTuple):
         measured, factors = self.measured, dict(zip(self.names, np.exp(log_factor).tolist(), strict=True))
         scaled = tuple(scale_groups(spindle, factors) for spindle in self.spindles)
         fitted, share = np.empty(measured.mode.size), np.empty((measured.mode.size, len(self.names)))
-        known = []
+        frequencies = []
         for number, spindle in enumerate(scaled):
-            here = measured.shaft == number
-            wanted = measured.mode[here] - 1
+            on_shaft = measured.shaft == number
+            wanted = measured.mode[on_shaft] - 1
             modes = find_modes(spindle, int(np.max(wanted)) + 2)
-            known.append(modes.frequency)
-            fitted[here], share[here] = modes.frequency[wanted], group_shares(modes, self.names)[wanted]
+            frequencies.append(modes.frequency)
+            fitted[on_shaft], share[on_shaft] = modes.frequency[wanted], group_shares(modes, self.names)[wanted]
         residual, slope = (fitted - measured.frequency) / measured.scale, fitted / measured.scale / 2
-        return Iterate(log_factor, scaled, tuple(known), fitted, share, residual, slope[:, np.newaxis] * share)
+        return Iterate(log_factor, scaled, tuple(frequencies), fitted, share, residual, slope[:, np.newaxis] * share)
 
     def fits(self, state: Iterate) -> bool:
         """Whether the residuals are of the size that is to be expected."""
@@ -135,7 +135,7 @@ def _step(state: Iterate, free: NDArray[np.int_], damping: float) -> _Float:
     slope = state.slope[:, free]
     weight = math.sqrt(damping) * np.linalg.norm(slope, 2)
     matrix = np.vstack([slope, weight * np.eye(free.size)])
-    found = np.zeros(state.log_factor.size)
-    found[free] = np.linalg.lstsq(matrix, -np.append(state.residual, np.zeros(free.size)), rcond=None)[0]
-    longest = float(np.max(np.abs(found)))
-    return np.asarray(found * (LONGEST_STEP / longest if damping > 0 and longest > LONGEST_STEP else 1.0))
+    step = np.zeros(state.log_factor.size)
+    step[free] = np.linalg.lstsq(matrix, -np.append(state.residual, np.zeros(free.size)), rcond=None)[0]
+    longest = float(np.max(np.abs(step)))
+    return np.asarray(step * (LONGEST_STEP / longest if damping > 0 and longest > LONGEST_STEP else 1.0))

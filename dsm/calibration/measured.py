@@ -55,8 +55,8 @@ def check_measured(
         )
     numbers = np.arange(1, f.size + 1) if mode is None else np.atleast_1d(np.asarray(mode))
     whole = numbers.shape == f.shape and numbers.dtype.kind in "iu"
-    for one in range(spindles):
-        _check_modes(f[where == one], numbers[where == one] if whole else numbers, mode)
+    for number in range(spindles):
+        _check_modes(f[where == number], numbers[where == number] if whole else numbers, mode)
     return Measured(numbers, f, std, where)
 
 

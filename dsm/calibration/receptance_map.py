@@ -52,16 +52,16 @@ def receptance_map(
     bearings = [
         replace(spindle.bearings[index], stiffness=middle * spindle.bearings[index].stiffness) for index in chosen
     ]
-    others = [bearing for index, bearing in enumerate(spindle.bearings) if index not in chosen]
+    kept = [bearing for index, bearing in enumerate(spindle.bearings) if index not in chosen]
     w = np.asarray(2 * np.pi * f, dtype=np.complex128)
     places = [position, *(bearing.position for bearing in bearings)]
-    compliance = _compliance(replace(spindle, bearings=[*bearings, *others]), w, places, loss_factor)
+    compliance = _compliance(replace(spindle, bearings=[*bearings, *kept]), w, places, loss_factor)
     values, products = _across_springs(bearings, compliance, w, loss_factor)
     change = (1 + 1j * loss_factor) * (factors[:, np.newaxis] / middle - 1)
-    found = np.tile(compliance[:, 0, 0], (factors.size, 1))
+    receptances = np.tile(compliance[:, 0, 0], (factors.size, 1))
     for value, product in zip(values.T, products.T, strict=True):
-        found -= product * change / (1 + change * value)
-    return found
+        receptances -= product * change / (1 + change * value)
+    return receptances
 
 
 def _checked(factor: ArrayLike) -> _Float:
@@ -81,12 +81,12 @@ def _compliance(spindle: Spindle, w: _Complex, places: Sequence[float], loss_fac
     dofs = [2 * model.node(place) for place in places]
     forces = np.zeros((model.held.size, len(dofs)), dtype=np.complex128)
     forces[dofs, np.arange(len(dofs))] = ~model.held.ravel()[dofs]
-    found = np.empty((w.size, len(dofs), len(dofs)), dtype=np.complex128)
+    compliance = np.empty((w.size, len(dofs), len(dofs)), dtype=np.complex128)
     for start in range(0, w.size, CHUNK):
         chunk = slice(start, start + CHUNK)
         matrices = full_matrices(*damped_blocks(model, spindle, w[chunk], damping))
-        found[chunk] = model.solve(matrices, forces)[:, dofs]
-    return found
+        compliance[chunk] = model.solve(matrices, forces)[:, dofs]
+    return compliance
 
 
 def _across_springs(

@@ -68,7 +68,7 @@ class StiffnessFit:
     def open_groups(self) -> frozenset[str]:
         """Groups whose stiffness the measured modes leave open, as the remarks say."""
         about = [remark.about for remark in self.remarks if remark.code in OPEN]
-        return frozenset(name for one in about for name in ([one] if one in self.groups else self.groups))
+        return frozenset(name for entry in about for name in ([entry] if entry in self.groups else self.groups))
 
     @property
     def misfits(self) -> bool:
@@ -138,9 +138,9 @@ class StiffnessFit:
             scale, unit = (1.0, "N m/rad") if is_tilting(self.spindles, group) else (1e6, "N/um")
             std = None if self.stiffness_std is None else float(self.stiffness_std[index])
             start = f"start {stiffness / factor / scale:.5g} {unit}"
-            found = f"{plus_minus(stiffness, std, scale, unit, percent=True)} each on average"
-            said = f"open, {start}" if group in self.open_groups else f"{found}, {start}: factor {factor:.5f}"
-            lines.append(f"stiffness {group:{width}}  {said}")
+            estimate = f"{plus_minus(stiffness, std, scale, unit, percent=True)} each on average"
+            text = f"open, {start}" if group in self.open_groups else f"{estimate}, {start}: factor {factor:.5f}"
+            lines.append(f"stiffness {group:{width}}  {text}")
         return lines
 
     def _correlation_lines(self) -> list[str]:

@@ -40,9 +40,9 @@ def calibrated_bearings(spindle: Spindle, group: str | None = None) -> list[int]
         if (bearing.group if group is None else bearing.group == group)
     ]
     if not chosen:
-        known = ", ".join(sorted({repr(part.group) for part in _parts(spindle) if part.group})) or "none"
+        groups = ", ".join(sorted({repr(part.group) for part in _parts(spindle) if part.group})) or "none"
         wanted = "with a group" if group is None else f"of group {group!r}"
-        raise ValueError(f"there is no bearing {wanted} to calibrate; groups of this spindle: {known}")
+        raise ValueError(f"there is no bearing {wanted} to calibrate; groups of this spindle: {groups}")
     for index in chosen:
         _require_spring(spindle, index, "or the group '' to leave it rigid")
     return chosen
@@ -65,13 +65,13 @@ def chosen_groups(spindles: Sequence[Spindle], groups: Sequence[str] | None) -> 
 
     Raises ValueError for a group that is not there or named twice, for none, and for one with a rigid bearing.
     """
-    known = tuple(dict.fromkeys(name for spindle in spindles for name in _names(spindle) if name))
-    names = known if groups is None else tuple(groups)
-    listed = ", ".join(map(repr, known)) or "none"
+    known_names = tuple(dict.fromkeys(name for spindle in spindles for name in _names(spindle) if name))
+    names = known_names if groups is None else tuple(groups)
+    listed = ", ".join(map(repr, known_names)) or "none"
     if not names:
         raise ValueError(f"no group of bearings or joints was named; groups of this spindle: {listed}")
     for name in names:
-        if name not in known:
+        if name not in known_names:
             raise ValueError(f"group {name!r} is none of this spindle; its groups: {listed}")
         if names.count(name) > 1:
             raise ValueError(f"group {name!r} is named {names.count(name)} times; name it once")
@@ -115,13 +115,13 @@ def is_tilting(spindles: Sequence[Spindle], group: str) -> bool:
 def group_shares(modes: Modes, groups: Sequence[str]) -> _Float:
     """Share of each group in the strain energy of each mode (-), shape (n_modes, n_groups); d ln w^2 / d ln factor."""
     energy = spring_energy(modes)
-    found = np.zeros((modes.frequency.size, len(groups)))
+    shares = np.zeros((modes.frequency.size, len(groups)))
     springs = np.hstack([energy.radial, energy.shifts, energy.kinks]).T
     names = [*(part.group for part in _parts(modes.spindle)), *map(_tilting, modes.spindle.joints)]
-    for name, each in zip(names, springs, strict=True):
+    for name, of_spring in zip(names, springs, strict=True):
         if name in groups:
-            found[:, groups.index(name)] += each
-    return np.asarray(found / (2 * np.pi * modes.frequency[:, np.newaxis]) ** 2)
+            shares[:, groups.index(name)] += of_spring
+    return np.asarray(shares / (2 * np.pi * modes.frequency[:, np.newaxis]) ** 2)
 
 
 def _tilting(joint: Joint) -> str:

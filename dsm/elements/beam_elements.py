@@ -24,19 +24,19 @@ def stiffness_elements(
     With u, t of both ends the rows are k(u1,u1), k(u1,t1), k(t1,t1); k(u2,u2), k(u2,t2), k(t2,t2); k(u1,u2), k(u1,t2),
     k(t1,u2), k(t1,t2).
     """
-    found = np.zeros((10, segment.size, number_of_terms(apart)))
+    stiffness = np.zeros((10, segment.size, number_of_terms(apart)))
     plain = ~shaft.is_cone[segment] & (theory == "euler-bernoulli")
     if np.any(plain):
         section = shaft.at(segment[plain], start[plain])
         series = element_series(section.rigidity, section.mass, (end - start)[plain])
         mirror = np.array([1, -1, 1])[:, np.newaxis, np.newaxis]
         rows = np.concatenate([series[:3], mirror * series[:3], series[3:5], -series[4:5], series[5:]])
-        found[:, plain, :: TERMS if apart else 1] = rows
+        stiffness[:, plain, :: TERMS if apart else 1] = rows
     if not np.all(plain):
         rest = ~plain
         transfer = transfer_series(shaft, theory, segment[rest], start[rest], end[rest], apart)
-        found[:, rest] = _by_stiffness(transfer)
-    return found
+        stiffness[:, rest] = _by_stiffness(transfer)
+    return stiffness
 
 
 def link_elements(

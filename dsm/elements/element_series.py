@@ -69,6 +69,6 @@ def _times(a: _Series, b: _Series) -> _Series:
 def _divide(a: _Series, b: _Series) -> _Series:
     quotient: _Series = []
     for n in range(TERMS):
-        known = sum((quotient[i] * b[n - i] for i in range(n)), Fraction(0))
-        quotient.append((a[n] - known) / b[0])
+        earlier = sum((quotient[i] * b[n - i] for i in range(n)), Fraction(0))
+        quotient.append((a[n] - earlier) / b[0])
     return quotient

@@ -11,10 +11,10 @@ _Float = NDArray[np.float64]
 def product(a: _Float, b: _Float) -> _Float:
     """A B."""
     near, far = _terms_outside(a), _terms_outside(b)
-    found = np.zeros_like(far)
+    series = np.zeros_like(far)
     for power in _present(near):
-        found[:, :, power:] += _times(near[:, :, power, np.newaxis], far[:, :, : far.shape[2] - power])
-    return _terms_last(found)
+        series[:, :, power:] += _times(near[:, :, power, np.newaxis], far[:, :, : far.shape[2] - power])
+    return _terms_last(series)
 
 
 def inverse(a: _Float) -> _Float:
@@ -22,15 +22,15 @@ def inverse(a: _Float) -> _Float:
     given = _terms_outside(a)
     (p, q), (r, s) = given[:, :, :1]
     inverted = np.array([[s, -q], [-r, p]]) / (p * s - q * r)
-    found, rest = np.zeros_like(given), np.zeros_like(given)
-    rest[0, 0, 0] = rest[1, 1, 0] = 1.0
+    series, remainder = np.zeros_like(given), np.zeros_like(given)
+    remainder[0, 0, 0] = remainder[1, 1, 0] = 1.0
     for power in range(given.shape[2]):
-        if not np.any(rest[:, :, power]):
+        if not np.any(remainder[:, :, power]):
             continue
-        found[:, :, power, np.newaxis] = _times(inverted, rest[:, :, power, np.newaxis])
-        known = _times(given[:, :, 1 : given.shape[2] - power], found[:, :, power, np.newaxis])
-        rest[:, :, power + 1 :] -= known
-    return _terms_last(found)
+        series[:, :, power, np.newaxis] = _times(inverted, remainder[:, :, power, np.newaxis])
+        earlier = _times(given[:, :, 1 : given.shape[2] - power], series[:, :, power, np.newaxis])
+        remainder[:, :, power + 1 :] -= earlier
+    return _terms_last(series)
 
 
 def _times(a: _Float, b: _Float) -> _Float:

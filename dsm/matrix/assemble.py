@@ -146,11 +146,11 @@ def _elements(
     apart: bool,
 ) -> _Float:
     """Series of all elements, (10, n_elements, n_terms): rows of link_elements where short, else of the others."""
-    found = []
+    blocks = []
     for kind, chosen in ((stiffness_elements, ~short), (link_elements, short)):
-        found.append(kind(shaft, theory, segment[chosen], position[:-1][chosen], position[1:][chosen], apart))
-    series = np.empty((10, segment.size, found[0].shape[2]))
-    series[:, ~short], series[:, short] = found
+        blocks.append(kind(shaft, theory, segment[chosen], position[:-1][chosen], position[1:][chosen], apart))
+    series = np.empty((10, segment.size, blocks[0].shape[2]))
+    series[:, ~short], series[:, short] = blocks
     return series
 
 

@@ -31,12 +31,12 @@ def condense_damped(
     """
     damping = given_damping(spindle.bearings, loss_factor)
     w = np.asarray(2 * np.pi * frequency, dtype=np.complex128)
-    found = np.empty((5, w.size), dtype=np.complex128)
+    condensed = np.empty((5, w.size), dtype=np.complex128)
     for first in range(0, w.size, CHUNK):
         chunk = slice(first, first + CHUNK)
         diagonal, coupling = damped_blocks(model, spindle, w[chunk], damping)
         if extra is not None:
             diagonal[:, -1] += extra[:, chunk]
-        for row, value in zip(found, condense(diagonal, coupling, model.is_link, node, start), strict=True):
+        for row, value in zip(condensed, condense(diagonal, coupling, model.is_link, node, start), strict=True):
             row[chunk] = value
-    return Condensed(*found)
+    return Condensed(*condensed)

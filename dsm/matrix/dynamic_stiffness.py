@@ -96,9 +96,9 @@ class DynamicStiffness:
     def scaled(self, eigenvalue: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         """K at each eigenvalue, rows and columns times `scale`, in Fortran's order; the lower half, 0 above it."""
         place, coefficients = self._lower
-        found = np.zeros((eigenvalue.size, self.scale.size**2))
-        found[:, place] = (coefficients @ self._powers(eigenvalue)).T
-        return [matrix.reshape(self.scale.size, -1).T for matrix in found]
+        matrices = np.zeros((eigenvalue.size, self.scale.size**2))
+        matrices[:, place] = (coefficients @ self._powers(eigenvalue)).T
+        return [matrix.reshape(self.scale.size, -1).T for matrix in matrices]
 
     def slope_of(self, eigenvalue: NDArray[np.float64], shape: NDArray[np.float64]) -> NDArray[np.float64]:
         """phi^T K' phi at each eigenvalue (n,), K' its derivative, of a motion phi = `scale` times shape."""
@@ -129,8 +129,8 @@ class DynamicStiffness:
     def solve(self, matrices: NDArray[Number], right: NDArray[Number]) -> NDArray[Number]:
         """Solutions of full matrices times y = right, shape (n, 2 n_nodes, m), rows and columns made of one size."""
         scale = self.scale[:, np.newaxis]
-        found = np.linalg.solve(matrices * (scale * self.scale), scale * right)
-        return np.asarray(scale * found, dtype=matrices.dtype)
+        solution = np.linalg.solve(matrices * (scale * self.scale), scale * right)
+        return np.asarray(scale * solution, dtype=matrices.dtype)
 
     def solve_nearly(self, matrices: NDArray[Number], right: NDArray[Number]) -> NDArray[Number]:
         """The same for inverse iteration: of matrices that are singular, of those that are equal but for rounding.

@@ -170,8 +170,8 @@ def _iterate(model: DynamicStiffness, eigenvalue: _Float, shape: _Float, width: 
     """One step from beside each eigenvalue; shapes phi with -phi^T K' phi = 1, for w^2 the modal mass."""
     trial = eigenvalue + width
     stiffness, slope = model.dense(trial), model.dense(trial, derivative=True)
-    found, moved, energy = newton_step(trial, stiffness, slope, shape, model.solve_nearly)
-    return found, moved / np.sqrt(-energy)[:, np.newaxis]
+    improved, moved, energy = newton_step(trial, stiffness, slope, shape, model.solve_nearly)
+    return improved, moved / np.sqrt(-energy)[:, np.newaxis]
 
 
 def _require_sharp(wanted: _Wanted, eigenvalue: _Float, width: _Float, widest: float) -> None:

@@ -49,9 +49,9 @@ def whirling_modes(model: DynamicStiffness, w2: _Float, shape: _Float, count: in
     scaled[:n, n:] = scaled[n:, :n] = np.diag(1 / still)
     inverse, vectors = np.linalg.eigh(scaled)
     last = slice(-1, -count - 1, -1)
-    w, found = 1 / inverse[last], (vectors[:n, last] / still[:, np.newaxis]).T @ shape
-    size = -quadratic(model.dense(w, derivative=True), found)
-    return w, found / np.sqrt(size)[:, np.newaxis]
+    w, shapes = 1 / inverse[last], (vectors[:n, last] / still[:, np.newaxis]).T @ shape
+    size = -quadratic(model.dense(w, derivative=True), shapes)
+    return w, shapes / np.sqrt(size)[:, np.newaxis]
 
 
 def _across_links(model: DynamicStiffness) -> tuple[_Float, _Float]:

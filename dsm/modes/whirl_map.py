@@ -53,8 +53,8 @@ def whirl_map(spindle: Spindle, speed_rpm: ArrayLike, count: int) -> WhirlMap:
     speed = _speeds(speed_rpm)
     spins = speed * np.pi / 30
     # Both senses of a speed one after the other: they share a matrix.
-    found = [[find_modes(spindle, count, spin=sense * spin).frequency for sense in (1.0, -1.0)] for spin in spins]
-    forward, backward = np.moveaxis(np.reshape(found, (-1, 2, count)), 0, 2)
+    frequencies = [[find_modes(spindle, count, spin=sense * spin).frequency for sense in (1.0, -1.0)] for spin in spins]
+    forward, backward = np.moveaxis(np.reshape(frequencies, (-1, 2, count)), 0, 2)
     return WhirlMap(speed, forward, backward, _critical(spindle, speed, forward))
 
 

@@ -57,10 +57,10 @@ class Supports(NamedTuple):
         A pair of forces across a spring moves the shaft with the share a of it, and the housing by a times its
         compliance.
         """
-        found = self.share[:, :, np.newaxis] * compliance * self.share[:, np.newaxis]
-        each = np.arange(self.softness.size)
-        found[:, each, each] += self.share * self.softness
-        return found
+        matrices = self.share[:, :, np.newaxis] * compliance * self.share[:, np.newaxis]
+        diagonal = np.arange(self.softness.size)
+        matrices[:, diagonal, diagonal] += self.share * self.softness
+        return matrices
 
 
 def supports(bearings: Sequence[Bearing], w: _Complex, damping: Damping) -> Supports:

@@ -43,7 +43,7 @@ def spinning_modes(beam: SpinningBeam, count: int, spin: float) -> tuple[_Float,
 
     Raises ArithmeticError at a critical speed and where the steps do not prove the modes.
     """
-    found = None
+    modes = None
     for fineness in FINENESS:
         try:
             chain, w, shape = _start(beam, count, spin, fineness)
@@ -52,15 +52,15 @@ def spinning_modes(beam: SpinningBeam, count: int, spin: float) -> tuple[_Float,
         except np.linalg.LinAlgError:
             continue
         if _steps(chain, w, sign, width, spin, sum(planes)):
-            found = w[:count], abs(planes[0] - planes[1]), sum(planes) - 2 * int(np.sum(sign < 0))
-            if found[1] == found[2]:
+            modes = w[:count], abs(planes[0] - planes[1]), sum(planes) - 2 * int(np.sum(sign < 0))
+            if modes[1] == modes[2]:
                 break
-    if found is None:
+    if modes is None:
         raise ArithmeticError(
             f"the modes at speed_rpm={spin * 30 / np.pi:g} cannot be proved: two meet, or rounding spoils them; try a "
             "speed beside, and look for springs or segment ends far too close together"
         )
-    return found
+    return modes
 
 
 def _start(beam: SpinningBeam, count: int, spin: float, fineness: float) -> tuple[SpinningChain, _Float, _Float]:

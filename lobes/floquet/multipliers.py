@@ -36,10 +36,10 @@ def largest_multipliers(
     if rows.cut.helix_lag > 0 and depth.shape[1] > 1:
         flat = np.repeat(np.arange(len(rows)), depth.shape[1])
         return largest_multipliers(rows[flat], depth.reshape(-1, 1), numbers[flat], tolerance).reshape(depth.shape)
-    found = np.empty(depth.shape, dtype=np.complex128)
+    multipliers = np.empty(depth.shape, dtype=np.complex128)
     for which, pieces in _alike(rows, depth, numbers):
-        found[which] = _multipliers(rows[which], depth[which], pieces, tolerance)
-    return found
+        multipliers[which] = _multipliers(rows[which], depth[which], pieces, tolerance)
+    return multipliers
 
 
 def _alike(
@@ -93,17 +93,17 @@ def _hessenberg(over_period: PeriodMap, start: Floats, vectors: int) -> Floats:
     """Hessenberg matrices (..., k + 1, k) of k Arnoldi steps; zeros from where the space is exhausted."""
     basis = np.zeros((*start.shape[:-1], vectors + 1, start.shape[-1]))
     basis[..., 0, :] = start / np.linalg.norm(start, axis=-1, keepdims=True)
-    made = np.zeros((*start.shape[:-1], vectors + 1, vectors))
+    matrix = np.zeros((*start.shape[:-1], vectors + 1, vectors))
     for k in range(vectors):
-        new, known = over_period(basis[..., k, :]), basis[..., : k + 1, :]
+        new, earlier = over_period(basis[..., k, :]), basis[..., : k + 1, :]
         for _ in range(2):
-            overlap = (known @ new[..., np.newaxis])[..., 0]
-            made[..., : k + 1, k] += overlap
-            new = new - (overlap[..., np.newaxis, :] @ known)[..., 0, :]
+            overlap = (earlier @ new[..., np.newaxis])[..., 0]
+            matrix[..., : k + 1, k] += overlap
+            new = new - (overlap[..., np.newaxis, :] @ earlier)[..., 0, :]
         length = np.linalg.norm(new, axis=-1)
-        made[..., k + 1, k] = length
+        matrix[..., k + 1, k] = length
         basis[..., k + 1, :] = new / np.where(length > 0, length, 1.0)[..., np.newaxis]
-    return made
+    return matrix
 
 
 def _largest(matrices: Floats) -> tuple[Complexes, Floats]:
@@ -124,5 +124,5 @@ def _largest(matrices: Floats) -> tuple[Complexes, Floats]:
         vector[..., j - 1] = -row / np.maximum(square[..., j, j - 1], tiny)
         vector /= np.max(np.abs(vector), axis=-1, keepdims=True)
     residual = matrices[..., -1, -1] * np.abs(vector[..., -1]) / np.linalg.norm(vector, axis=-1)
-    found = np.where(finite, largest[..., 0], np.inf)
-    return found, residual / np.maximum(np.abs(largest[..., 0]), tiny)
+    multiplier = np.where(finite, largest[..., 0], np.inf)
+    return multiplier, residual / np.maximum(np.abs(largest[..., 0]), tiny)

@@ -109,9 +109,9 @@ def _ringing(rows: MillingRows, time: Floats) -> Floats:
 def _blocks(qq: Floats, qv: Floats, vq: Floats, vv: Floats) -> Floats:
     """A matrix (r, 2n, 2n) of four diagonals (r, n)."""
     n = qq.shape[1]
-    made, i = np.zeros((len(qq), 2 * n, 2 * n)), np.arange(n)
-    made[:, i, i], made[:, i, n + i], made[:, n + i, i], made[:, n + i, n + i] = qq, qv, vq, vv
-    return made
+    matrix, i = np.zeros((len(qq), 2 * n, 2 * n)), np.arange(n)
+    matrix[:, i, i], matrix[:, i, n + i], matrix[:, n + i, i], matrix[:, n + i, n + i] = qq, qv, vq, vv
+    return matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,23 +159,23 @@ class _Response:
         """The maps (r, d, k, m, m) of k pieces with forces -force (d - w) at their nodes, force (r, d, k, s, p, p)."""
         *cases, s, p, _ = force.shape
         size, states = p * s, self.ends.shape[-1]
-        each = np.ascontiguousarray(np.moveaxis(force, -3, -1))
+        forces = np.ascontiguousarray(np.moveaxis(force, -3, -1))
         loop, push = np.empty((*cases, size, size)), np.zeros((*cases, states, size))
         gives = self.gives[:, np.newaxis, np.newaxis, :, :, np.newaxis]
-        np.multiply(gives, each[..., np.newaxis, :, :], out=loop.reshape(*cases, p, s, p, s))
+        np.multiply(gives, forces[..., np.newaxis, :, :], out=loop.reshape(*cases, p, s, p, s))
         i = np.arange(size)
         loop[..., i, i] += 1
-        for one in range(p):
-            pushes = self.pushes[:, np.newaxis, np.newaxis, :, one, np.newaxis]
-            push.reshape(*cases, states, p, s)[...] += pushes * each[..., np.newaxis, one, :, :]
+        for direction in range(p):
+            pushes = self.pushes[:, np.newaxis, np.newaxis, :, direction, np.newaxis]
+            push.reshape(*cases, states, p, s)[...] += pushes * forces[..., np.newaxis, direction, :, :]
         inverse = np.linalg.inv(loop)
-        made = np.empty((*cases, states + size, states + size))
-        np.matmul(inverse, self.shows.reshape(-1, 1, 1, size, states), out=made[..., states:, :states])
-        np.negative(inverse, out=made[..., states:, states:])
-        made[..., :states, :] = np.negative(push, out=push) @ made[..., states:, :]
-        made[..., :states, :states] += self.ends[:, np.newaxis, np.newaxis]
-        made[..., states + i, states + i] += 1
-        return made
+        maps = np.empty((*cases, states + size, states + size))
+        np.matmul(inverse, self.shows.reshape(-1, 1, 1, size, states), out=maps[..., states:, :states])
+        np.negative(inverse, out=maps[..., states:, states:])
+        maps[..., :states, :] = np.negative(push, out=push) @ maps[..., states:, :]
+        maps[..., :states, :states] += self.ends[:, np.newaxis, np.newaxis]
+        maps[..., states + i, states + i] += 1
+        return maps
 
 
 def _moves(rows: MillingRows) -> Floats:

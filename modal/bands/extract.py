@@ -125,7 +125,7 @@ def _stray_lines(state: Extraction) -> NDArray[np.bool_]:
     stray = np.zeros(state.weight.shape, bool)
     for band in state.bands:
         size = np.abs(band.data.own) * band.data.weight
-        for one, left, own in zip(stray, np.abs(band.fit.complex_residual), size, strict=True):
+        for mask, left, own in zip(stray, np.abs(band.fit.complex_residual), size, strict=True):
             far = left > STRAY * np.maximum(median_filter(left, size=11), np.median(left))
-            one[band.lines] |= far & (left > ROUNDING * np.max(own))
+            mask[band.lines] |= far & (left > ROUNDING * np.max(own))
     return stray

@@ -137,19 +137,19 @@ def _peaks_at_all_scales(frf: Frf, least: float = 0.0) -> list[_Peak]:
     least: height of the mobility below which none is looked at (m/s/N).
     """
     noise, mobility = mobility_noise(frf), frf.mobility
-    found: list[_Peak] = []
+    peaks: list[_Peak] = []
     longest = max(1, frf.frequency.size // 16)
     for length in SCALES[longest >= SCALES]:
         mean = _running_mean(mobility, length)
         gain = (2 * length**2 + 1) / (3 * length**3)
         rms = np.sqrt(gain * np.maximum(_running_mean(noise**2, length), 0.0))
         for new in _peaks(frf, mean, rms, least):
-            same = [i for i, old in enumerate(found) if _is_same(new, old)]
+            same = [i for i, old in enumerate(peaks) if _is_same(new, old)]
             if not same:
-                found.append(new)
-            elif len(same) == 1 and _is_as_high(new, found[same[0]]):
-                found[same[0]] = new
-    return found
+                peaks.append(new)
+            elif len(same) == 1 and _is_as_high(new, peaks[same[0]]):
+                peaks[same[0]] = new
+    return peaks
 
 
 def _running_mean(values: NDArray[Any], length: int) -> NDArray[Any]:

@@ -80,8 +80,8 @@ def _left(fit: BandFit, data: BandLines) -> float:
 def _better(a: tuple[BandFit, Array] | None, b: tuple[BandFit, Array] | None) -> tuple[BandFit, Array] | None:
     """The one with more modes, of two with as many that which leaves less."""
     return max(
-        (one for one in (a, b) if one is not None),
-        key=lambda one: (one[1].size, -one[0].sum_of_squares),
+        (fit for fit in (a, b) if fit is not None),
+        key=lambda fit: (fit[1].size, -fit[0].sum_of_squares),
         default=None,
     )
 

@@ -41,9 +41,9 @@ def look_closer(band: FittedBand) -> FittedBand:
         if fit is None or not _is_better(fit, band.fit, TERM_F) or not _is_likelier(fit, bent.fit):
             continue
         if _is_better(fit, band.fit, HIDDEN_F) and np.all(are_modes(fit, band.data.frequency, height, HIDDEN_ERROR)):
-            found = _with_terms(replace(band, fit=fit, height=height))
-            if _is_sure(found):
-                return found
+            refitted = _with_terms(replace(band, fit=fit, height=height))
+            if _is_sure(refitted):
+                return refitted
         if np.all(are_modes(fit, band.data.frequency, height, np.inf)):
             bent = replace(bent, suspects=tuple(sorted(fit.frequency.tolist())))
     return bent
@@ -70,19 +70,19 @@ def _is_sure(band: FittedBand) -> bool:
 def _more_modes(band: FittedBand, split: bool) -> Iterator[Array]:
     """Starts (2, m) for more modes than are fitted, from all high LSCF poles down; then two for the highest mode."""
     fit, poles = band.fit, physical_poles(band.data.chart)
-    known = fit.poles
+    fitted = fit.poles
     size = np.pi * poles.frequency * poles.largest / poles.damping_ratio
     high = size > LEAST_SHARE * np.max(band.height)
     starts = np.stack([poles.frequency, poles.damping_ratio])[:, high]
-    alone = [k for k in range(band.height.size) if not np.any(np.abs(starts[0] - known[0, k]) < np.prod(known[:, k]))]
-    starts, size = np.hstack([starts, known[:, alone]]), np.concatenate([size[high], fit.mobility_peak[alone]])
+    alone = [k for k in range(band.height.size) if not np.any(np.abs(starts[0] - fitted[0, k]) < np.prod(fitted[:, k]))]
+    starts, size = np.hstack([starts, fitted[:, alone]]), np.concatenate([size[high], fit.mobility_peak[alone]])
     for n in range(size.size, band.height.size, -1):
         yield starts[:, np.argsort(-size)[:n]]
     if split:
         i = int(np.argmax(fit.mobility_peak))
-        apart = SPLIT * known[1, i] * known[0, i]
-        halves = [[known[0, i] - apart, known[0, i] + apart], 2 * [known[1, i]]]
-        yield np.hstack([np.delete(known, i, axis=1), halves])
+        apart = SPLIT * fitted[1, i] * fitted[0, i]
+        halves = [[fitted[0, i] - apart, fitted[0, i] + apart], 2 * [fitted[1, i]]]
+        yield np.hstack([np.delete(fitted, i, axis=1), halves])
 
 
 def _with_terms(band: FittedBand) -> FittedBand:
@@ -111,5 +111,5 @@ def _is_better(more: BandFit, fewer: BandFit, least: float) -> bool:
 
 def _is_likelier(fit: BandFit, other: BandFit) -> bool:
     """By the information criterion of Akaike (sum of squares and number of unknowns)."""
-    variance = min(one.sum_of_squares / one.freedom for one in (fit, other))
+    variance = min(candidate.sum_of_squares / candidate.freedom for candidate in (fit, other))
     return fit.sum_of_squares - 2 * variance * fit.freedom < other.sum_of_squares - 2 * variance * other.freedom

@@ -25,8 +25,8 @@ def without_drift(frf: Frf) -> Frf:
     A constant error of an accelerance is such a drift of the receptance, of any phase; against the phase of a mode it
     turns the peak into a dip. Behind a high-pass filter it begins above the lowest lines.
     """
-    found = [_drift(frf, lines) for lines in _ranges(frf)]
-    scatter, drift = min(found, key=lambda one: one[0], default=(np.inf, 0.0))
+    drifts = [_drift(frf, lines) for lines in _ranges(frf)]
+    scatter, drift = min(drifts, key=lambda candidate: candidate[0], default=(np.inf, 0.0))
     if scatter > MOST_SCATTER:
         return frf
     left = frf.receptance - drift / frf.frequency**2
@@ -35,9 +35,9 @@ def without_drift(frf: Frf) -> Frf:
 
 def _drift(frf: Frf, lines: slice) -> tuple[float, complex]:
     """What A is on these lines, after the share of it that half of them differ by."""
-    each = frf.receptance[lines] * frf.frequency[lines] ** 2
-    middle = complex(np.median(each.real), np.median(each.imag))
-    return (float(np.median(np.abs(each - middle)) / abs(middle)) if middle else np.inf), middle
+    constants = frf.receptance[lines] * frf.frequency[lines] ** 2
+    middle = complex(np.median(constants.real), np.median(constants.imag))
+    return (float(np.median(np.abs(constants - middle)) / abs(middle)) if middle else np.inf), middle
 
 
 def _ranges(frf: Frf) -> Iterator[slice]:

@@ -42,6 +42,6 @@ def gain_of_a_term(fit: BandFit, frequency: Array, weight: Array, terms: int) ->
 def _block_diagonal(blocks: Sequence[Array]) -> Array:
     """Blocks of one shape, each a FRF's, on the diagonal of a matrix that is 0 elsewhere."""
     p, (rows, columns) = len(blocks), blocks[0].shape
-    made = np.zeros((p, rows, p, columns))
-    made[np.arange(p), :, np.arange(p)] = blocks
-    return made.reshape(p * rows, p * columns)
+    matrix = np.zeros((p, rows, p, columns))
+    matrix[np.arange(p), :, np.arange(p)] = blocks
+    return matrix.reshape(p * rows, p * columns)

@@ -47,7 +47,7 @@ def common_delay(modes: Sequence[Mode]) -> CommonDelay | None:
     error = np.hypot([mode.phase_deg_std for mode in modes], REAL_WITHIN)
     turn, phase = 360 * frequency / error, np.array([mode.phase_deg for mode in modes]) / error
     skew, std = float(turn @ phase / (turn @ turn)), float(1 / np.linalg.norm(turn))
-    rest = float(np.sum((phase - turn * skew) ** 2))
-    explains = rest < REST * (len(modes) - 1) and rest < SHARE * float(phase @ phase)
+    left = float(np.sum((phase - turn * skew) ** 2))
+    explains = left < REST * (len(modes) - 1) and left < SHARE * float(phase @ phase)
     is_clear = abs(360 * skew) * frequency.max() > CLEAR and abs(skew) > 3 * std
     return CommonDelay(skew, std) if explains and is_clear else None

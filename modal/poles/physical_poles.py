@@ -39,17 +39,17 @@ def physical_poles(chart: StabilisationChart) -> PhysicalPoles:
     the upper half of its chain, part by part.
     """
     taken = np.zeros(chart.order.size, bool)
-    found = []
+    rows = []
     lengths = _lengths(chart)
     for end in np.argsort(-lengths, kind="stable"):
         if lengths[end] < LEAST_ORDERS:
             break
         chain = _chain(chart, int(end))
         if not taken[chain].any():
-            found.append(_median(chart, chain))
+            rows.append(_median(chart, chain))
         taken[chain] = True
-    found.sort(key=lambda row: float(row[0].real))
-    table = np.array(found).reshape(len(found), 3 + chart.flexibility.shape[1])
+    rows.sort(key=lambda row: float(row[0].real))
+    table = np.array(rows).reshape(len(rows), 3 + chart.flexibility.shape[1])
     return PhysicalPoles(table[:, 0].real, table[:, 1].real, table[:, 3:], table[:, 2].real.astype(np.int64))
 
 

@@ -60,8 +60,8 @@ def stabilise(frequency: Array, receptance: ComplexArray, weight: Array, orders:
     Formenti (1982), Parameter estimation from FRF measurements using rational fraction polynomials, IMAC 1.
     """
     orders = min(orders, (2 * frequency.size - 2 * EXTRA) // 6)
-    every = slice(None, None, -(-frequency.size // MOST_LINES))
-    model = _Model(frequency[every], receptance[:, every], weight[:, every])
+    thinned = slice(None, None, -(-frequency.size // MOST_LINES))
+    model = _Model(frequency[thinned], receptance[:, thinned], weight[:, thinned])
     return _chart(list(_orders(model, orders)), receptance.shape[0])
 
 
@@ -136,18 +136,18 @@ def _same(below: _Order, here: _Order) -> NDArray[np.int64]:
     return np.where(same, nearest, -1)
 
 
-def _chart(found: list[_Order], p: int) -> StabilisationChart:
-    sizes = np.array([poles.size for poles, _ in found], dtype=np.int64)
+def _chart(orders: list[_Order], p: int) -> StabilisationChart:
+    sizes = np.array([poles.size for poles, _ in orders], dtype=np.int64)
     starts = np.cumsum(sizes) - sizes
     previous = [np.full(size, -1) for size in sizes[:1]]
-    for (below, here), start in zip(pairwise(found), starts, strict=False):
+    for (below, here), start in zip(pairwise(orders), starts, strict=False):
         same = _same(below, here)
         previous.append(np.where(same < 0, -1, same + start))
-    poles = np.concatenate([poles for poles, _ in found] or [np.empty(0, complex)])
+    poles = np.concatenate([poles for poles, _ in orders] or [np.empty(0, complex)])
     return StabilisationChart(
         np.repeat(np.arange(1, sizes.size + 1), sizes),
         np.abs(poles),
         poles.imag / np.abs(poles),
-        np.concatenate([a for _, a in found] or [np.empty((0, p), complex)]),
+        np.concatenate([a for _, a in orders] or [np.empty((0, p), complex)]),
         np.concatenate([*previous, np.empty(0, np.int64)]),
     )

@@ -43,8 +43,10 @@ def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
         left_ringing=_left_at_the_end(state.frf.frequency, mode.damping_ratio * mode.frequency),
         half_power_damping=_half_power_damping(band, mode),
     )
-    found = chain(_on_its_place(state, band, i, judged), _on_its_values(band, i, judged, share), _on_its_errors(judged))
-    return replace(judged, remarks=tuple(found))
+    remarks = chain(
+        _on_its_place(state, band, i, judged), _on_its_values(band, i, judged, share), _on_its_errors(judged)
+    )
+    return replace(judged, remarks=tuple(remarks))
 
 
 def _coherence(state: Extraction, mode: Mode) -> float | None:

@@ -40,8 +40,8 @@ class Trust(enum.StrEnum):
 
 def trust_of(mode: Mode) -> Trust:
     """The worst verdict of all rules, from figures and codes alone; the table of docs/modal.md says why each."""
-    found = {verdict for _, verdict in trust_rules(mode)}
-    return next((one for one in (Trust.REJECTED, Trust.DOUBTFUL) if one in found), Trust.TRUSTED)
+    verdicts = {verdict for _, verdict in trust_rules(mode)}
+    return next((trust for trust in (Trust.REJECTED, Trust.DOUBTFUL) if trust in verdicts), Trust.TRUSTED)
 
 
 def trust_rules(mode: Mode) -> Iterator[tuple[str, Trust]]:

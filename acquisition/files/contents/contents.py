@@ -63,7 +63,7 @@ class Contents:
 
 def distinct(names: Iterable[str]) -> tuple[str, ...]:
     """Names that differ in more than a number, each once: "hit 1" and "hit 2" are one; empty ones are none."""
-    found: dict[str, str] = {}
+    spellings: dict[str, str] = {}
     for name in names:
-        found.setdefault(re.sub(r"[\d\s_.#-]+", "", name).lower(), name)
-    return tuple(name for plain, name in found.items() if plain)
+        spellings.setdefault(re.sub(r"[\d\s_.#-]+", "", name).lower(), name)
+    return tuple(name for plain, name in spellings.items() if plain)

@@ -48,5 +48,5 @@ class Description:
 
     def of_signals(self) -> list[str]:
         """The options that were given and that say something of the signals in the file."""
-        names = [one.name for one in fields(self) if one.name not in _LABELS]
+        names = [option.name for option in fields(self) if option.name not in _LABELS]
         return [f"--{name.replace('_', '-')}" for name in names if getattr(self, name) not in ("", (), None)]

@@ -13,10 +13,10 @@ def time_constant_of(window: str) -> float | None:
     """Of "exponential 0.05 s" (s); None where there is no window, NaN where it is not told how it falls."""
     if _NONE.fullmatch(window):
         return None
-    said = _CONSTANT.search(window)
-    if said is None or "exp" not in window.lower():
+    constant = _CONSTANT.search(window)
+    if constant is None or "exp" not in window.lower():
         return math.nan
-    return float(said[1]) * (1e-3 if said[2] else 1.0)
+    return float(constant[1]) * (1e-3 if constant[2] else 1.0)
 
 
 def window_text(time_constant: float | None) -> str:

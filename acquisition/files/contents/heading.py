@@ -51,10 +51,10 @@ def name_and_unit(heading: str) -> tuple[str, str]:
     bracketed = _BRACKETS.fullmatch(heading)
     if bracketed:
         return bracketed[1], bracketed[2]
-    for at in (found.start() for found in re.finditer("_", heading)):
-        name, rest = heading[:at], heading[at + 1 :]
-        if name and (is_unit(rest)):
-            return name, rest
+    for at in (underscore.start() for underscore in re.finditer("_", heading)):
+        name, unit = heading[:at], heading[at + 1 :]
+        if name and (is_unit(unit)):
+            return name, unit
     return heading, ""
 
 
@@ -71,8 +71,8 @@ def is_level(unit: str) -> bool:
 def role_of(name: str, unit: str) -> Role:
     """What a column is by its name and its unit, the unit first; empty where neither tells."""
     by_name = next((role for pattern, role in _BY_NAME if re.match(pattern, name.strip().lower())), "")
-    known = unit_of(unit)
-    quantity = known.quantity if known else ""
+    parsed = unit_of(unit)
+    quantity = parsed.quantity if parsed else ""
     of_frf = by_name in ("real", "imag", "magnitude", "phase", "coherence", "frf")
     if quantity in ("time", "frequency", "force") and not (len(name) > 1 and by_name in ("time", "frequency")):
         return quantity

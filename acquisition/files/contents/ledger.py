@@ -35,13 +35,13 @@ class Ledger:
         """A fact."""
         self.facts.append(Fact(name, value, origin))
 
-    def ask(self, what: str, option: str) -> None:
+    def ask(self, fact: str, option: str) -> None:
         """Something is missing."""
-        self.missing.append(f"{what} ({option})")
+        self.missing.append(f"{fact} ({option})")
 
-    def contradict(self, option: str, said: object, in_file: object) -> None:
+    def contradict(self, option: str, given: object, in_file: object) -> None:
         """An option says other than the file."""
-        self.faults.append(f"{option} {said}: the file says {in_file}; leave the option out")
+        self.faults.append(f"{option} {given}: the file says {in_file}; leave the option out")
 
     @property
     def is_clean(self) -> bool:
@@ -50,6 +50,6 @@ class Ledger:
 
     def complaint(self) -> str:
         """All that is missing and wrong; empty where nothing is."""
-        said = ["; ".join(self.faults)] if self.faults else []
-        said += [f"it does not say: {', '.join(self.missing)}"] if self.missing else []
-        return "; ".join(said)
+        sentences = ["; ".join(self.faults)] if self.faults else []
+        sentences += [f"it does not say: {', '.join(self.missing)}"] if self.missing else []
+        return "; ".join(sentences)

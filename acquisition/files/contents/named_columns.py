@@ -16,7 +16,7 @@ def named_columns(signals: Sequence[Signal], columns: Sequence[str], ledger: Led
 
     "time [s]" names the next column, "frf [m/N]=H1" a signal of this name, "frf=H:2" the second column of H.
     """
-    found = list[Signal]()
+    named = list[Signal]()
     for number, text in enumerate(columns):
         heading, _, name = text.partition("=")
         signal = _signal(signals, name.strip(), number, ledger)
@@ -26,8 +26,8 @@ def named_columns(signals: Sequence[Signal], columns: Sequence[str], ledger: Led
             ledger.faults.append(f"--columns {text!r}: {word!r} is none of {', '.join(ROLES)}")
         elif signal is not None and role[0] != "ignored":
             unit = unit or ("dB" if word.lower() == "db" else "") or signal.unit
-            found.append(replace(signal, role=role[0], quantity=role[1] or signal.quantity, unit=unit, record=0))
-    return tuple(found)
+            named.append(replace(signal, role=role[0], quantity=role[1] or signal.quantity, unit=unit, record=0))
+    return tuple(named)
 
 
 def _signal(signals: Sequence[Signal], name: str, number: int, ledger: Ledger) -> Signal | None:
@@ -36,14 +36,17 @@ def _signal(signals: Sequence[Signal], name: str, number: int, ledger: Ledger) -
     same = [signal for signal in signals if signal.name == name or (name and signal.name == f"{name}:1")]
     if same:
         return same[0]
-    there = names_of(signals)
+    names = names_of(signals)
     wanted = f"nothing called {name!r}" if name else f"no column {number + 1}"
-    ledger.faults.append(f"--columns: {wanted} in the file, which holds {there}")
+    ledger.faults.append(f"--columns: {wanted} in the file, which holds {names}")
     return None
 
 
 def names_of(signals: Sequence[Signal], most: int = 12) -> str:
     """What a file holds, for a sentence: names with units, or with how long they are."""
-    plain = [f"{one.name} [{one.unit}]" if one.unit else f"{one.name} ({one.values.size})" for one in signals]
+    plain = [
+        f"{signal.name} [{signal.unit}]" if signal.unit else f"{signal.name} ({signal.values.size})"
+        for signal in signals
+    ]
     whole = [re.sub(r"\s+", " ", text) for text in plain]
     return ", ".join(whole[:most]) + (f" and {len(whole) - most} more" if len(whole) > most else "")

@@ -59,23 +59,23 @@ class Recording:
         return self
 
 
-def understood(path: Path, title: str, contents: Contents, said: Description) -> Recording:
+def understood(path: Path, title: str, contents: Contents, description: Description) -> Recording:
     """Hits where signals over time are all there is, else the FRF."""
     ledger = Ledger()
-    signals = named_columns(contents.signals, said.columns, ledger) if said.columns else contents.signals
+    signals = named_columns(contents.signals, description.columns, ledger) if description.columns else contents.signals
     contents = replace(contents, signals=signals)
     frf, hits = None, list[Hit]()
     if not ledger.faults:
         if candidates(signals) and any(signal.role == "frequency" for signal in signals):
-            frf = settle_frf(contents, said, ledger)
-            _useless(said, ("rate", "full_scale", "sensitivity"), "an FRF", ledger)
+            frf = settle_frf(contents, description, ledger)
+            _useless(description, ("rate", "full_scale", "sensitivity"), "an FRF", ledger)
         elif not signals or any(signal.role == "frequency" for signal in signals):
             ledger.ask(f"what its columns are ({names_of(signals)})", COLUMNS_FRF)
         elif not _is_over_time(signals):
             ledger.ask(f"what its columns are ({names_of(signals)})", f"{COLUMNS_HIT}; or {COLUMNS_FRF}")
         else:
-            hits = settle_hits(contents, said, ledger)
-            _useless(said, ("averages",), "hits, and they are counted", ledger)
+            hits = settle_hits(contents, description, ledger)
+            _useless(description, ("averages",), "hits, and they are counted", ledger)
     if len(contents.machines) > 1:
         ledger.faults.append(f"it holds {', '.join(contents.machines)}, not one machine; export each by itself")
     if contents.window:
@@ -101,8 +101,8 @@ def _is_over_time(signals: Sequence[Signal]) -> bool:
     return over_time or any(signal.per_full_scale for signal in signals)
 
 
-def _useless(said: Description, names: Sequence[str], what: str, ledger: Ledger) -> None:
+def _useless(description: Description, names: Sequence[str], content: str, ledger: Ledger) -> None:
     """Options that say nothing of what the file holds."""
     for name in names:
-        if getattr(said, name) not in ((), None):
-            ledger.faults.append(f"--{name.replace('_', '-')}: the file holds {what}; leave the option out")
+        if getattr(description, name) not in ((), None):
+            ledger.faults.append(f"--{name.replace('_', '-')}: the file holds {content}; leave the option out")

@@ -16,23 +16,23 @@ _SENSITIVITY = re.compile(r"\s*([+-]?\d+\.?\d*(?:[eE][+-]?\d+)?)\s*([a-zA-Zµ]+)
 _EXAMPLE = '--sensitivity "2.25 mV/N,10.2 mV/g"'
 
 
-def in_sensor_units(signals: Sequence[Signal], said: Description, ledger: Ledger) -> list[Signal] | None:
+def in_sensor_units(signals: Sequence[Signal], description: Description, ledger: Ledger) -> list[Signal] | None:
     """Signals over time, those in volts in the units of their sensors; None where one of these is missing or wrong."""
     volts = {id(signal): VOLTS[signal.unit.lower()] for signal in signals if signal.unit.lower() in VOLTS}
     wired = [signal for signal in signals if id(signal) in volts]
-    if not wired and said.sensitivity:
+    if not wired and description.sensitivity:
         ledger.faults.append("--sensitivity: it has no channel in volts; leave it out")
     if not wired:
         return list(signals)
-    if len(said.sensitivity) != len(wired):
+    if len(description.sensitivity) != len(wired):
         ledger.ask(f"the sensitivity of each of {names_of(wired)}, in their order", _EXAMPLE)
         return None
-    sensors = [_parsed(text, ledger) for text in said.sensitivity]
-    ledger.know("sensitivity", ", ".join(said.sensitivity), "option")
-    known = {id(signal): sensor for signal, sensor in zip(wired, sensors, strict=True) if sensor is not None}
-    if len(known) < len(wired):
+    sensors = [_parsed(text, ledger) for text in description.sensitivity]
+    ledger.know("sensitivity", ", ".join(description.sensitivity), "option")
+    sensor_of = {id(signal): sensor for signal, sensor in zip(wired, sensors, strict=True) if sensor is not None}
+    if len(sensor_of) < len(wired):
         return None
-    measured = {id(one): _measured(one, volts[id(one)], known[id(one)]) for one in wired}
+    measured = {id(channel): _measured(channel, volts[id(channel)], sensor_of[id(channel)]) for channel in wired}
     return [measured.get(id(signal), signal) for signal in signals]
 
 

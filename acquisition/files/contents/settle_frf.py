@@ -33,29 +33,29 @@ class Candidate:
 
 def candidates(signals: Sequence[Signal]) -> list[Candidate]:
     """The FRFs among signals: complex ones, and pairs in their order."""
-    found = [Candidate(signal) for signal in signals if signal.role == "frf"]
+    listed = [Candidate(signal) for signal in signals if signal.role == "frf"]
     for first, second in (("real", "imag"), ("magnitude", "phase")):
-        seconds: Iterator[Signal | None] = iter([one for one in signals if one.role == second])
-        found += [Candidate(one, next(seconds, None)) for one in signals if one.role == first]
-    return found
+        seconds: Iterator[Signal | None] = iter([part for part in signals if part.role == second])
+        listed += [Candidate(part, next(seconds, None)) for part in signals if part.role == first]
+    return listed
 
 
-def settle_frf(contents: Contents, said: Description, ledger: Ledger) -> Frf | None:
+def settle_frf(contents: Contents, description: Description, ledger: Ledger) -> Frf | None:
     """The FRF; None where something is missing or wrong, which the ledger then says."""
-    known = candidates(contents.signals)
-    if not known:
+    listed = candidates(contents.signals)
+    if not listed:
         ledger.ask("what its columns are", COLUMNS_FRF)
         return None
-    one = chosen([candidate.signal for candidate in known], said.response, "FRFs", ledger)
-    n_averages = _averages(contents, said, ledger)
-    if one is None:
-        frf_unit(known[0].signal, said, ledger)
+    signal = chosen([candidate.signal for candidate in listed], description.response, "FRFs", ledger)
+    n_averages = _averages(contents, description, ledger)
+    if signal is None:
+        frf_unit(listed[0].signal, description, ledger)
         return None
-    candidate = next(candidate for candidate in known if candidate.signal is one)
+    candidate = next(candidate for candidate in listed if candidate.signal is signal)
     values = _values(candidate, ledger)
-    unit = frf_unit(one, said, ledger)
-    frequency = _frequency(contents, one, ledger)
-    coherence = _coherence(contents, known.index(candidate), candidate.signal, ledger)
+    unit = frf_unit(signal, description, ledger)
+    frequency = _frequency(contents, signal, ledger)
+    coherence = _coherence(contents, listed.index(candidate), candidate.signal, ledger)
     if frequency is None or values is None or unit is None or not ledger.is_clean:
         return None
     try:
@@ -76,8 +76,8 @@ def _frf(
     if form == "receptance":
         return Frf(frequency, values, coherence, n_averages)
     if form == "mobility":
-        found = from_accelerance(frequency, values * (2j * np.pi * frequency), coherence, n_averages)
-        return replace(found, measured_as="mobility")
+        receptance = from_accelerance(frequency, values * (2j * np.pi * frequency), coherence, n_averages)
+        return replace(receptance, measured_as="mobility")
     return from_accelerance(frequency, values, coherence, n_averages)
 
 
@@ -108,12 +108,12 @@ def _values(candidate: Candidate, ledger: Ledger) -> NDArray[np.complex128] | No
     return np.asarray(size * np.exp(1j * phase))
 
 
-def _frequency(contents: Contents, one: Signal, ledger: Ledger) -> NDArray[np.float64] | None:
+def _frequency(contents: Contents, frf: Signal, ledger: Ledger) -> NDArray[np.float64] | None:
     """Of an FRF (Hz)."""
-    axes = [signal for signal in contents.signals if signal.role == "frequency" and signal.record == one.record]
-    axis = next((signal for signal in axes if signal.values.size == one.values.size), None)
+    axes = [signal for signal in contents.signals if signal.role == "frequency" and signal.record == frf.record]
+    axis = next((signal for signal in axes if signal.values.size == frf.values.size), None)
     if axis is None:
-        ledger.ask(f"the frequency of each of the {one.values.size} lines of {one.name}", '--columns "frequency,..."')
+        ledger.ask(f"the frequency of each of the {frf.values.size} lines of {frf.name}", '--columns "frequency,..."')
         return None
     unit = unit_of(axis.unit) if axis.unit else None
     if axis.unit and (unit is None or unit.quantity != "frequency"):
@@ -129,14 +129,14 @@ def _ends(axis: Signal, factor: float) -> str:
     return f"{axis.values[0] * factor:.4g} to {axis.values[-1] * factor:.6g} Hz"
 
 
-def _coherence(contents: Contents, number: int, one: Signal, ledger: Ledger) -> NDArray[np.float64] | None:
+def _coherence(contents: Contents, number: int, frf: Signal, ledger: Ledger) -> NDArray[np.float64] | None:
     """That of the FRF of this number; a line where it lies beyond 0 to 1 is trusted with nothing."""
-    found = [signal for signal in contents.signals if signal.role == "coherence"]
-    same = [signal for signal in found if signal.record == one.record and signal.values.shape == one.values.shape]
-    if not same or (len(found) > 1 and number >= len(found)):
+    coherences = [signal for signal in contents.signals if signal.role == "coherence"]
+    same = [signal for signal in coherences if signal.record == frf.record and signal.values.shape == frf.values.shape]
+    if not same or (len(coherences) > 1 and number >= len(coherences)):
         ledger.know("coherence", "none", "file")
         return None
-    signal = found[number] if len(found) > 1 and found[number] in same else same[0]
+    signal = coherences[number] if len(coherences) > 1 and coherences[number] in same else same[0]
     values = np.asarray(signal.values.real, dtype=np.float64)
     beyond = ~((values >= 0) & (values <= 1 + 1e-9))
     if np.mean(beyond) > MOST_BEYOND:
@@ -151,17 +151,17 @@ MOST_BEYOND = 0.02
 """Share of the lines that may have a coherence that is none, as the first lines of some analysers have."""
 
 
-def _averages(contents: Contents, said: Description, ledger: Ledger) -> int:
-    if said.averages is not None and said.averages < 1:
-        ledger.faults.append(f"--averages {said.averages}: give the number of hits averaged, 1 or more")
-    elif None not in (said.averages, contents.averages) and said.averages != contents.averages:
-        ledger.contradict("--averages", said.averages, contents.averages)
+def _averages(contents: Contents, description: Description, ledger: Ledger) -> int:
+    if description.averages is not None and description.averages < 1:
+        ledger.faults.append(f"--averages {description.averages}: give the number of hits averaged, 1 or more")
+    elif None not in (description.averages, contents.averages) and description.averages != contents.averages:
+        ledger.contradict("--averages", description.averages, contents.averages)
     elif contents.averages is not None:
         ledger.know("averages", str(contents.averages))
         return contents.averages
-    elif said.averages is not None:
-        ledger.know("averages", str(said.averages), "option")
-        return said.averages
+    elif description.averages is not None:
+        ledger.know("averages", str(description.averages), "option")
+        return description.averages
     else:
         ledger.know("averages", "1 (--averages)", "default")
     return 1

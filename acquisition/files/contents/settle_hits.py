@@ -25,36 +25,36 @@ SAME_RATE = 1e-4
 """Relative difference of two sample rates that are taken for one: that of a rate with five digits."""
 
 
-def settle_hits(contents: Contents, said: Description, ledger: Ledger) -> list[Hit]:
+def settle_hits(contents: Contents, description: Description, ledger: Ledger) -> list[Hit]:
     """Those of each record; empty where something is missing or wrong, which the ledger then says."""
     hits = list[Hit]()
     for record in dict.fromkeys(signal.record for signal in contents.signals):
         of_one = Ledger()
-        hit = _hit([signal for signal in contents.signals if signal.record == record], said, of_one)
+        hit = _hit([signal for signal in contents.signals if signal.record == record], description, of_one)
         if not of_one.is_clean or hit is None:
             ledger.missing += of_one.missing
             ledger.faults += of_one.faults
             return []
         ledger.facts += of_one.facts if not hits else []
-        found = hits_in_record(hit)
-        if len(found) > 1:
-            ledger.know("hits", f"{len(found)} in one record, each of {found[0].force.size} samples")
-        hits += found
+        parts = hits_in_record(hit)
+        if len(parts) > 1:
+            ledger.know("hits", f"{len(parts)} in one record, each of {parts[0].force.size} samples")
+        hits += parts
     return hits
 
 
-def _hit(signals: Sequence[Signal], said: Description, ledger: Ledger) -> Hit | None:
-    scaled = in_sensor_units(in_their_unit(signals, said, ledger), said, ledger)
+def _hit(signals: Sequence[Signal], description: Description, ledger: Ledger) -> Hit | None:
+    scaled = in_sensor_units(in_their_unit(signals, description, ledger), description, ledger)
     if scaled is None:
-        rate_of(signals, (), said, ledger)
+        rate_of(signals, (), description, ledger)
         return None
     signals = scaled
     forces, responses = _by_kind(signals, ledger)
-    rate = rate_of(signals, [*forces, *responses], said, ledger)
+    rate = rate_of(signals, [*forces, *responses], description, ledger)
     force = forces[0] if len(forces) == 1 else None
-    response = chosen(responses, said.response, "responses", ledger) if responses else None
-    to_newton = force_unit(forces[0], said, ledger) if forces else None
-    unit = response_unit(response or responses[0], said, ledger) if responses else None
+    response = chosen(responses, description.response, "responses", ledger) if responses else None
+    to_newton = force_unit(forces[0], description, ledger) if forces else None
+    unit = response_unit(response or responses[0], description, ledger) if responses else None
     _doubt_gravity(responses, ledger)
     if force is None or response is None or unit is None or to_newton is None or not ledger.is_clean:
         return None
@@ -72,20 +72,20 @@ def _by_kind(signals: Sequence[Signal], ledger: Ledger) -> tuple[list[Signal], l
     """Forces and responses; what neither unit nor name tells is asked about."""
     forces = [signal for signal in signals if kind_of(signal) == "force"]
     responses = [signal for signal in signals if kind_of(signal) == "response"]
-    unclear = [one for one in signals if not kind_of(one) and one.role in ("", "real", "magnitude")]
-    channels = [one for one in signals if one.role != "time"]
-    there = names_of(channels)
+    unclear = [channel for channel in signals if not kind_of(channel) and channel.role in ("", "real", "magnitude")]
+    channels = [channel for channel in signals if channel.role != "time"]
+    names = names_of(channels)
     if len(channels) < 2:
-        ledger.faults.append(f"it holds {there or 'nothing'} over time; a hit needs a force and a response")
+        ledger.faults.append(f"it holds {names or 'nothing'} over time; a hit needs a force and a response")
         return [], []
     if unclear and (not forces or not responses):
-        ledger.ask(f"what its columns are ({there})", COLUMNS_HIT)
+        ledger.ask(f"what its columns are ({names})", COLUMNS_HIT)
         return forces, responses
     if len(forces) != 1:
         count = "no force channel" if not forces else f"{len(forces)} force channels"
-        ledger.faults.append(f"{count} among {there}; one is needed")
+        ledger.faults.append(f"{count} among {names}; one is needed")
     if not responses:
-        ledger.faults.append(f"no channel of a response among {there}")
+        ledger.faults.append(f"no channel of a response among {names}")
     return forces, responses
 
 
@@ -97,7 +97,7 @@ def kind_of(signal: Signal) -> str:
     return by_quantity or (signal.role if signal.role in ("force", "response") else "")
 
 
-def rate_of(signals: Sequence[Signal], used: Sequence[Signal], said: Description, ledger: Ledger) -> float:
+def rate_of(signals: Sequence[Signal], used: Sequence[Signal], description: Description, ledger: Ledger) -> float:
     """Samples a second (Hz); 0 where it is missing or wrong."""
     if not used:
         used = signals
@@ -109,12 +109,12 @@ def rate_of(signals: Sequence[Signal], used: Sequence[Signal], said: Description
         ledger.faults.append(f"its channels differ in sample rate: {min(rates):g} and {max(rates):g} Hz")
         return 0.0
     by_axis = _rate_of_axis(signals, used[0].values.size, ledger)
-    return _agreed(rates[0] if rates else by_axis, said.rate, ledger)
+    return _agreed(rates[0] if rates else by_axis, description.rate, ledger)
 
 
 def _rate_of_axis(signals: Sequence[Signal], size: int, ledger: Ledger) -> float | None:
     """That of the time column; None where there is none whose unit is known."""
-    time = next((one for one in signals if one.role == "time" and one.values.size == size), None)
+    time = next((signal for signal in signals if signal.role == "time" and signal.values.size == size), None)
     if time is None:
         return None
     if size < 8:
@@ -130,19 +130,19 @@ def _rate_of_axis(signals: Sequence[Signal], size: int, ledger: Ledger) -> float
     return 1 / (step * unit.factor)
 
 
-def _agreed(in_file: float | None, said: float | None, ledger: Ledger) -> float:
-    if said is not None and not (np.isfinite(said) and said > 0):
-        ledger.faults.append(f"--rate {said:g}: give the samples a second, > 0 Hz")
+def _agreed(in_file: float | None, given: float | None, ledger: Ledger) -> float:
+    if given is not None and not (np.isfinite(given) and given > 0):
+        ledger.faults.append(f"--rate {given:g}: give the samples a second, > 0 Hz")
         return 0.0
-    if in_file is not None and said is not None and abs(said / in_file - 1) > 0.01:
-        ledger.contradict("--rate", f"{said:g}", f"{in_file:g} Hz")
+    if in_file is not None and given is not None and abs(given / in_file - 1) > 0.01:
+        ledger.contradict("--rate", f"{given:g}", f"{in_file:g} Hz")
         return 0.0
     if in_file is not None:
         ledger.know("sample rate", f"{in_file:.8g} Hz")
         return in_file
-    if said is not None:
-        ledger.know("sample rate", f"{said:.8g} Hz", "option")
-        return said
+    if given is not None:
+        ledger.know("sample rate", f"{given:.8g} Hz", "option")
+        return given
     if not ledger.faults:
         ledger.ask("its sample rate, or the unit of its time", "--rate 51200")
     return 0.0
@@ -151,23 +151,23 @@ def _agreed(in_file: float | None, said: float | None, ledger: Ledger) -> float:
 def _doubt_gravity(responses: Sequence[Signal], ledger: Ledger) -> None:
     """A resting sensor that shows 9.8 in a column called g holds m/s^2."""
     for signal in responses:
-        rest = abs(float(np.median(signal.values))) if signal.values.size else 0.0
-        if signal.unit.lower() == "g" and abs(rest - STANDARD_GRAVITY) < 0.5:
+        offset = abs(float(np.median(signal.values))) if signal.values.size else 0.0
+        if signal.unit.lower() == "g" and abs(offset - STANDARD_GRAVITY) < 0.5:
             ledger.faults.append(
-                f"unit of {signal.name} in doubt (called g, rests at {rest:.2f}, which is gravity in m/s^2)"
+                f"unit of {signal.name} in doubt (called g, rests at {offset:.2f}, which is gravity in m/s^2)"
             )
 
 
-def in_their_unit(signals: Sequence[Signal], said: Description, ledger: Ledger) -> list[Signal]:
+def in_their_unit(signals: Sequence[Signal], description: Description, ledger: Ledger) -> list[Signal]:
     """Values that are shares of a full scale, in their unit."""
     shares = [signal for signal in signals if signal.per_full_scale]
     if not shares:
-        if said.full_scale:
+        if description.full_scale:
             ledger.faults.append("--full-scale: its values are no shares of a full scale; leave it out")
         return list(signals)
-    if len(said.full_scale) != len(shares):
+    if len(description.full_scale) != len(shares):
         ledger.ask(f"the full scale of its {len(shares)} channels, in their order and units", "--full-scale 500,50")
         return list(signals)
-    ledger.know("full scale", ", ".join(f"{one:g}" for one in said.full_scale), "option")
-    scale = dict(zip((id(signal) for signal in shares), said.full_scale, strict=True))
-    return [replace(one, values=one.values * scale.get(id(one), 1.0)) for one in signals]
+    ledger.know("full scale", ", ".join(f"{factor:g}" for factor in description.full_scale), "option")
+    scale = dict(zip((id(signal) for signal in shares), description.full_scale, strict=True))
+    return [replace(signal, values=signal.values * scale.get(id(signal), 1.0)) for signal in signals]

@@ -17,24 +17,26 @@ COLUMNS_SOUND = '--columns "time [s],acceleration [m/s^2]", in their order, or e
 """How an acceleration is named."""
 
 
-def settle_sound(contents: Contents, said: Description, ledger: Ledger) -> tuple[NDArray[np.float64], float] | None:
+def settle_sound(
+    contents: Contents, description: Description, ledger: Ledger
+) -> tuple[NDArray[np.float64], float] | None:
     """Acceleration (m/s^2), shape (n,), and sample rate (Hz); None where the ledger says what is missing or wrong."""
-    signals = named_columns(contents.signals, said.columns, ledger) if said.columns else contents.signals
-    scaled = in_sensor_units(in_their_unit(signals, said, ledger), said, ledger)
+    signals = named_columns(contents.signals, description.columns, ledger) if description.columns else contents.signals
+    scaled = in_sensor_units(in_their_unit(signals, description, ledger), description, ledger)
     if scaled is None or not ledger.is_clean:
         return None
-    over_time = [one for one in scaled if one.role not in ("time", "frequency", "ignored", "frf", "coherence")]
-    heard = [one for one in over_time if kind_of(one) == "response"]
-    heard = heard or [one for one in over_time if not kind_of(one)]
+    over_time = [signal for signal in scaled if signal.role not in ("time", "frequency", "ignored", "frf", "coherence")]
+    heard = [signal for signal in over_time if kind_of(signal) == "response"]
+    heard = heard or [signal for signal in over_time if not kind_of(signal)]
     if not heard:
         ledger.ask(f"which of its columns is the acceleration ({names_of(signals)})", COLUMNS_SOUND)
         return None
-    one = chosen(heard, said.response, "responses", ledger)
-    unit = response_unit(one, said, ledger) if one is not None else None
-    rate = rate_of(scaled, [one] if one is not None else (), said, ledger)
-    if one is None or unit is None or not ledger.is_clean:
+    signal = chosen(heard, description.response, "responses", ledger)
+    unit = response_unit(signal, description, ledger) if signal is not None else None
+    rate = rate_of(scaled, [signal] if signal is not None else (), description, ledger)
+    if signal is None or unit is None or not ledger.is_clean:
         return None
     if unit[0] != "acceleration":
-        ledger.faults.append(f"{one.name} is a {unit[0]}; a cut is heard by an accelerometer")
+        ledger.faults.append(f"{signal.name} is a {unit[0]}; a cut is heard by an accelerometer")
         return None
-    return np.asarray(one.values * unit[1], dtype=np.float64), rate
+    return np.asarray(signal.values * unit[1], dtype=np.float64), rate

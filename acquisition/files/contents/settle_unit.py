@@ -15,66 +15,66 @@ MOTIONS = ("displacement", "velocity", "acceleration")
 """What a response can be."""
 
 
-def chosen(signals: Sequence[Signal], response: int | None, what: str, ledger: Ledger) -> Signal | None:
-    """The one that is meant; what: of which there are several, for people."""
+def chosen(signals: Sequence[Signal], response: int | None, noun: str, ledger: Ledger) -> Signal | None:
+    """The one that is meant; noun: word for what there are several of, for people."""
     if response is not None and not 1 <= response <= len(signals):
-        ledger.faults.append(f"--response {response}: it holds {len(signals)} of the {what} asked for")
+        ledger.faults.append(f"--response {response}: it holds {len(signals)} of the {noun} asked for")
         return None
     if response is None and len(signals) > 1:
         names = ", ".join(f"{i} {signal.name}" for i, signal in enumerate(signals[:12], 1))
         more = f" and {len(signals) - 12} more" if len(signals) > 12 else ""
-        ledger.ask(f"which of its {len(signals)} {what} is meant: {names}{more}", "--response 1")
+        ledger.ask(f"which of its {len(signals)} {noun} is meant: {names}{more}", "--response 1")
         return None
     signal = signals[(response or 1) - 1]
     ledger.know("response", signal.name, "file" if response is None else "option")
     return signal
 
 
-def frf_unit(signal: Signal, said: Description, ledger: Ledger) -> tuple[str, float] | None:
+def frf_unit(signal: Signal, description: Description, ledger: Ledger) -> tuple[str, float] | None:
     """Quantity of the response, and the factor to SI, of an FRF."""
     in_file = "" if is_level(signal.unit) else signal.unit
     wanted = ("receptance", "mobility", "accelerance", *MOTIONS)
-    found = _either(in_file, said.unit, wanted, ("--unit", "m/N, um/N, g/N", signal.name), ledger)
-    if found is None:
+    agreed = _either(in_file, description.unit, wanted, ("--unit", "m/N, um/N, g/N", signal.name), ledger)
+    if agreed is None:
         return None
-    (unit, origin), force = found, _force_of_frf(said, found[0], ledger)
-    quantity = _quantity(motion_of(unit.quantity), signal, said, ledger)
+    (unit, origin), force = agreed, _force_of_frf(description, agreed[0], ledger)
+    quantity = _quantity(motion_of(unit.quantity), signal, description, ledger)
     if force is None or not quantity:
         return None
-    ledger.know("unit", f"{in_file or said.unit} ({quantity})", origin)
+    ledger.know("unit", f"{in_file or description.unit} ({quantity})", origin)
     return quantity, unit.factor / force
 
 
-def response_unit(signal: Signal, said: Description, ledger: Ledger) -> tuple[str, float] | None:
+def response_unit(signal: Signal, description: Description, ledger: Ledger) -> tuple[str, float] | None:
     """Quantity and factor to SI of a response over time."""
-    found = _either(signal.unit, said.unit, MOTIONS, ("--unit", "m/s^2, g", signal.name), ledger)
-    if found is None:
+    agreed = _either(signal.unit, description.unit, MOTIONS, ("--unit", "m/s^2, g", signal.name), ledger)
+    if agreed is None:
         return None
-    unit, origin = found
-    quantity = _quantity(unit.quantity, signal, said, ledger)
+    unit, origin = agreed
+    quantity = _quantity(unit.quantity, signal, description, ledger)
     if not quantity:
         return None
-    ledger.know("unit", f"{signal.unit or said.unit} ({quantity})", origin)
+    ledger.know("unit", f"{signal.unit or description.unit} ({quantity})", origin)
     return quantity, unit.factor
 
 
-def force_unit(signal: Signal, said: Description, ledger: Ledger) -> float | None:
+def force_unit(signal: Signal, description: Description, ledger: Ledger) -> float | None:
     """Factor to N of a force over time."""
-    found = _either(signal.unit, said.force_unit, ("force",), ("--force-unit", "N, lbf", signal.name), ledger)
-    if found is None:
+    agreed = _either(signal.unit, description.force_unit, ("force",), ("--force-unit", "N, lbf", signal.name), ledger)
+    if agreed is None:
         return None
-    ledger.know("force", f"{signal.name}, {signal.unit or said.force_unit}", found[1])
-    return found[0].factor
+    ledger.know("force", f"{signal.name}, {signal.unit or description.force_unit}", agreed[1])
+    return agreed[0].factor
 
 
 def _either(
-    in_file: str, said: str, wanted: Sequence[str], texts: tuple[str, str, str], ledger: Ledger
+    in_file: str, given: str, wanted: Sequence[str], texts: tuple[str, str, str], ledger: Ledger
 ) -> tuple[Unit, Origin] | None:
     """The unit that the file or the option names; texts: the option, examples, and whose unit it is."""
     option, examples, name = texts
-    file_unit, said_unit = unit_of(in_file) if in_file else None, unit_of(said) if said else None
-    if said and (said_unit is None or said_unit.quantity not in wanted):
-        ledger.faults.append(f"{option} {said}: not known as a unit of {name}; give one like {examples}")
+    file_unit, said_unit = unit_of(in_file) if in_file else None, unit_of(given) if given else None
+    if given and (said_unit is None or said_unit.quantity not in wanted):
+        ledger.faults.append(f"{option} {given}: not known as a unit of {name}; give one like {examples}")
         return None
     if in_file and (file_unit is None or file_unit.quantity not in wanted):
         ledger.faults.append(
@@ -83,7 +83,7 @@ def _either(
         )
         return None
     if file_unit is not None and said_unit is not None and file_unit != said_unit:
-        ledger.contradict(option, said, in_file)
+        ledger.contradict(option, given, in_file)
         return None
     if file_unit is None and said_unit is None:
         ledger.ask(f"the unit of {name}", f"{option}, such as {examples}")
@@ -91,29 +91,31 @@ def _either(
     return (file_unit, "file") if file_unit is not None else (cast(Unit, said_unit), "option")
 
 
-def _force_of_frf(said: Description, unit: Unit, ledger: Ledger) -> float | None:
+def _force_of_frf(description: Description, unit: Unit, ledger: Ledger) -> float | None:
     """Factor to N of what the response was divided by, where its unit does not hold that."""
     if unit.quantity not in MOTIONS:
-        if said.force_unit:
-            ledger.faults.append(f"--force-unit {said.force_unit}: the unit of the FRF holds that of the force")
+        if description.force_unit:
+            ledger.faults.append(f"--force-unit {description.force_unit}: the unit of the FRF holds that of the force")
         return 1.0
-    force = unit_of(said.force_unit)
+    force = unit_of(description.force_unit)
     if force is None or force.quantity != "force":
         ledger.ask("the unit of the force that the response was divided by", "--force-unit N, or both as --unit g/N")
         return None
     return force.factor
 
 
-def _quantity(by_unit: str, signal: Signal, said: Description, ledger: Ledger) -> str:
+def _quantity(by_unit: str, signal: Signal, description: Description, ledger: Ledger) -> str:
     """Of the response; empty where what is said of it does not agree."""
-    if said.quantity and said.quantity not in MOTIONS:
-        ledger.faults.append(f"--quantity {said.quantity}: none of {', '.join(MOTIONS)}")
+    if description.quantity and description.quantity not in MOTIONS:
+        ledger.faults.append(f"--quantity {description.quantity}: none of {', '.join(MOTIONS)}")
         return ""
-    if said.quantity and said.quantity != by_unit:
-        ledger.faults.append(f"--quantity {said.quantity}: its unit, {signal.unit or said.unit}, is one of {by_unit}")
+    if description.quantity and description.quantity != by_unit:
+        ledger.faults.append(
+            f"--quantity {description.quantity}: its unit, {signal.unit or description.unit}, is one of {by_unit}"
+        )
         return ""
     if signal.quantity and signal.quantity != by_unit:
-        unit = signal.unit or said.unit
+        unit = signal.unit or description.unit
         ledger.faults.append(f"it calls {signal.name} {signal.quantity}, and {unit} is a unit of {by_unit}")
         return ""
     return by_unit

@@ -113,14 +113,14 @@ def motion_of(quantity: str) -> str:
 
 def _tokens(text: str) -> list[tuple[str, str, str, str, str]]:
     """In reverse order: the next one is the last."""
-    found, at = list[tuple[str, str, str, str, str]](), 0
+    tokens, at = list[tuple[str, str, str, str, str]](), 0
     while text[at:].strip():
         token = _TOKEN.match(text, at)
         if token is None:
             raise ValueError(text)
-        found.append(token.groups(default=""))  # type: ignore[arg-type]
+        tokens.append(token.groups(default=""))  # type: ignore[arg-type]
         at = token.end()
-    return found[::-1]
+    return tokens[::-1]
 
 
 def _product(tokens: list[tuple[str, str, str, str, str]]) -> tuple[float, Dimension]:
@@ -130,8 +130,8 @@ def _product(tokens: list[tuple[str, str, str, str, str]]) -> tuple[float, Dimen
         sign = -1 if tokens[-1][3] == "/" else 1
         if tokens[-1][3] in ("*", "/"):
             tokens.pop()
-        other, exponents = _factor(tokens)
-        value *= other**sign
+        factor, exponents = _factor(tokens)
+        value *= factor**sign
         dimension = tuple(a + sign * b for a, b in zip(dimension, exponents, strict=True))  # type: ignore[assignment]
     return value, dimension
 
@@ -149,4 +149,4 @@ def _factor(tokens: list[tuple[str, str, str, str, str]]) -> tuple[float, Dimens
     exponent = int(power or 1)
     if abs(exponent) > 9:
         raise ValueError(power)
-    return value**exponent, tuple(exponent * one for one in dimension)  # type: ignore[return-value]
+    return value**exponent, tuple(exponent * part for part in dimension)  # type: ignore[return-value]

@@ -31,9 +31,9 @@ _TIME = re.compile(r"(t|time|time_domain|tim)", re.IGNORECASE)
 def recognised(variables: Mapping[str, Any]) -> Contents | None:
     """What the variables of a file mean where they are of a known layout; None where they are of none."""
     for layout in (_ours, _signal_calc, _test_lab, _logger, _vectors, _over_time):
-        found = layout(variables)
-        if found is not None:
-            return replace(found, window=window_of(variables))
+        contents = layout(variables)
+        if contents is not None:
+            return replace(contents, window=window_of(variables))
     return None
 
 
@@ -43,11 +43,11 @@ def _ours(v: Mapping[str, Any]) -> Contents | None:
         return None
     texts = {name: v[name] if isinstance(v.get(name), str) else "" for name in ("recorded", "direction", "tool")}
     created = datetime.fromisoformat(texts["recorded"]) if texts["recorded"] else None
-    said = Contents((), created=created, direction=texts["direction"], tool=texts["tool"])
+    labelled = Contents((), created=created, direction=texts["direction"], tool=texts["tool"])
     if "frf" in v:
         signals = [Signal("frequency", v["frequency"], "frequency", "Hz"), Signal("frf", v["frf"], "frf", v["unit"])]
         signals += [Signal("coherence", v["coherence"], "coherence")] if "coherence" in v else []
-        return replace(said, signals=tuple(signals), averages=int(v["averages"]))
+        return replace(labelled, signals=tuple(signals), averages=int(v["averages"]))
     rate = float(v["sample_rate"])
     hits = np.atleast_2d(v["force"]), np.atleast_2d(v["acceleration"])
     signals = []
@@ -56,17 +56,17 @@ def _ours(v: Mapping[str, Any]) -> Contents | None:
             Signal("force", force, "force", "N", rate=rate, record=record),
             Signal("acceleration", acceleration, "response", "m/s^2", rate=rate, record=record),
         ]
-    return replace(said, signals=tuple(signals))
+    return replace(labelled, signals=tuple(signals))
 
 
 def _signal_calc(v: Mapping[str, Any]) -> Contents | None:
     """SignalCalc: the abscissa stands in the real part of the first column, channel 1 is the hammer."""
-    found = [(name, match[1]) for name in v if (match := re.fullmatch(r"H1_(\d+)", name)) and _is_pairs(v[name])]
-    if not found:
+    frfs = [(name, match[1]) for name in v if (match := re.fullmatch(r"H1_(\d+)", name)) and _is_pairs(v[name])]
+    if not frfs:
         return None
-    signals = [Signal("frequency", np.real(v[found[0][0]][:, 0]), "frequency", "Hz")]
+    signals = [Signal("frequency", np.real(v[frfs[0][0]][:, 0]), "frequency", "Hz")]
     units, names = _texts(v.get("Unit")), _texts(v.get("ChanName"))
-    for name, channel in found:
+    for name, channel in frfs:
         label = f"{name} {_at(names, channel)}".strip()
         unit = f"({_at(units, channel)})/({_at(units, '1')})" if _at(units, channel) and _at(units, "1") else ""
         signals.append(Signal(label, v[name][:, 1], "frf", unit))
@@ -84,7 +84,7 @@ def _is_pairs(value: Any) -> bool:
 def _texts(value: Any) -> list[str]:
     if isinstance(value, str):
         return [value.strip()]
-    return [str(one).strip() for one in value] if isinstance(value, (list, tuple, np.ndarray)) else []
+    return [str(text).strip() for text in value] if isinstance(value, (list, tuple, np.ndarray)) else []
 
 
 def _at(texts: Sequence[str], channel: str) -> str:
@@ -126,11 +126,11 @@ def _logger(v: Mapping[str, Any]) -> Contents | None:
         signals = [Signal("frequency", np.arange(columns.shape[1]) * rate / float(v["npts"]), "frequency", "Hz")]
         with_coherence = bool(v.get("tfun", 0)) and len(columns) == 2
         signals.append(Signal("yspec:1", columns[0], "frf"))
-        rest = [("coherence", columns[1].real)] if with_coherence else [("frf", one) for one in columns[1:]]
-        signals += [Signal(f"yspec:{i}", one, role) for i, (role, one) in enumerate(rest, 2)]  # type: ignore[arg-type]
+        roles = [("coherence", columns[1].real)] if with_coherence else [("frf", column) for column in columns[1:]]
+        signals += [Signal(f"yspec:{i}", column, role) for i, (role, column) in enumerate(roles, 2)]  # type: ignore[arg-type]
         return Contents(tuple(signals))
     columns = np.atleast_2d(v["indata"].T)
-    return Contents(tuple(Signal(f"indata:{i}", one, rate=rate) for i, one in enumerate(columns, 1)))
+    return Contents(tuple(Signal(f"indata:{i}", column, rate=rate) for i, column in enumerate(columns, 1)))
 
 
 def _vectors(v: Mapping[str, Any]) -> Contents | None:
@@ -140,7 +140,9 @@ def _vectors(v: Mapping[str, Any]) -> Contents | None:
     for name, axis in arrays.items():
         if _FREQUENCY.fullmatch(name) and _rises(axis):
             frfs = [
-                one for one in _of_length(arrays, axis.size) if np.iscomplexobj(one[1]) and not _NO_FRF.match(one[0])
+                entry
+                for entry in _of_length(arrays, axis.size)
+                if np.iscomplexobj(entry[1]) and not _NO_FRF.match(entry[0])
             ]
             if frfs:
                 return Contents(tuple(_frf_signals(arrays, name, frfs)))

@@ -20,13 +20,13 @@ def window_of(variables: Mapping[str, Any]) -> str:
     """As `Contents.window`."""
     named = next((value for name, value in variables.items() if _NAME.fullmatch(name) and isinstance(value, str)), "")
     responses = (name[1:] for name in variables if re.fullmatch(r"W([2-9]|\d\d)", name))
-    seen = [_seen(variables.get(f"X{number}"), variables[f"W{number}"]) for number in responses]
-    return named or next(filter(None, seen), "")
+    windows = [_seen(variables.get(f"X{number}"), variables[f"W{number}"]) for number in responses]
+    return named or next(filter(None, windows), "")
 
 
 def _seen(before: Any, behind: Any) -> str:
     """The window between two signals (n, 2) of time and value; empty where they are the same, or none."""
-    if not all(isinstance(one, np.ndarray) and one.ndim == 2 and one.shape[1] == 2 for one in (before, behind)):
+    if not all(isinstance(pairs, np.ndarray) and pairs.ndim == 2 and pairs.shape[1] == 2 for pairs in (before, behind)):
         return ""
     if before.shape != behind.shape or not np.any(before[:, 1]) or np.array_equal(before[:, 1], behind[:, 1]):
         return ""

@@ -58,15 +58,15 @@ def _segment(
         raise DataError(f"{place} ({error})") from error
     units = [_word(header.get("Y_Unit_Label", []), i) for i in at]
     names = [_word(lines[end + 1].split(split) if end + 1 < after else [], column) for column in columns]
-    found = list[Signal]()
+    signals = list[Signal]()
     for i, column in enumerate(columns):
         if samples[i]:
             cells = _column(path, lines, (end + 2, after, column, samples[i]), split, _comma(head, lines, end, split))
             name, by_name = name_and_unit(names[i] or f"channel {i + 1}")
             unit = units[i] or by_name
             rate = 1 / steps[i] if steps[i] > 0 else None
-            found.append(Signal(name, cells, role_of(name, unit), unit, rate=rate, record=record))
-    return found
+            signals.append(Signal(name, cells, role_of(name, unit), unit, rate=rate, record=record))
+    return signals
 
 
 def _word(words: Sequence[str], i: int) -> str:
@@ -75,8 +75,8 @@ def _word(words: Sequence[str], i: int) -> str:
 
 def _comma(head: Mapping[str, str], lines: Sequence[str], end: int, split: str) -> bool:
     """Whether the decimal sign is a comma; where the header does not say, as the first row has it."""
-    said = head.get("Decimal_Separator", "")
-    return said == "," if said else split != "," and "," in (lines[end + 2] if end + 2 < len(lines) else "")
+    sign = head.get("Decimal_Separator", "")
+    return sign == "," if sign else split != "," and "," in (lines[end + 2] if end + 2 < len(lines) else "")
 
 
 def _column(

@@ -33,9 +33,9 @@ def read_mat(path: Path) -> Contents:
     """Its arrays; DataError where it is damaged or unpacks out of proportion."""
     _refuse_crash(path)
     variables = _variables(path)
-    known = recognised(variables)
-    if known is not None:
-        return known
+    contents = recognised(variables)
+    if contents is not None:
+        return contents
     return Contents(tuple(_columns(variables)), window=window_of(variables))
 
 
@@ -68,12 +68,12 @@ def _of_v5(path: Path) -> dict[str, Any]:
             unpacked = sum(16 * math.prod(shape) for _, shape, _ in scipy.io.whosmat(path))
             if unpacked > max(HARMLESS, RATIO * size):
                 raise DataError(f"{path}: {size / 1e6:.3g} MB that unpack to {unpacked / 1e6:.4g} MB; no tap test does")
-            found = scipy.io.loadmat(path, simplify_cells=True)
+            variables = scipy.io.loadmat(path, simplify_cells=True)
     except DataError:
         raise
     except Exception as error:
         raise DataError(f"{path}: damaged or cut short ({type(error).__name__}: {error}); export it anew") from error
-    return {name: value for name, value in found.items() if not name.startswith("__")}
+    return {name: value for name, value in variables.items() if not name.startswith("__")}
 
 
 def _of_v73(path: Path) -> dict[str, Any]:
@@ -81,24 +81,24 @@ def _of_v73(path: Path) -> dict[str, Any]:
     try:
         with h5py.File(path, "r") as file:
             check_unpacked(file, path.stat().st_size, path)
-            return {name: _plain(item) for name, item in file.items() if name != "#refs#"}
+            return {name: _plain(node) for name, node in file.items() if name != "#refs#"}
     except DataError:
         raise
     except Exception as error:
         raise DataError(f"{path}: damaged or cut short ({type(error).__name__}: {error}); export it anew") from error
 
 
-def _plain(item: Any) -> Any:
-    if isinstance(item, h5py.Group):
-        return {name: _plain(one) for name, one in item.items()}
-    values = item[()]
-    kind = item.attrs.get("MATLAB_class", b"")
-    if item.attrs.get("MATLAB_empty", 0):
+def _plain(node: Any) -> Any:
+    if isinstance(node, h5py.Group):
+        return {name: _plain(child) for name, child in node.items()}
+    values = node[()]
+    kind = node.attrs.get("MATLAB_class", b"")
+    if node.attrs.get("MATLAB_empty", 0):
         return np.empty(0)
     if values.dtype.names == ("real", "imag"):
         values = values["real"] + 1j * values["imag"]
     if values.dtype.kind == "O":
-        cells = [_plain(item.file[reference]) for reference in values.ravel()]
+        cells = [_plain(node.file[reference]) for reference in values.ravel()]
         return cells[0] if len(cells) == 1 else cells
     if kind == b"char":
         return "".join(map(chr, values.T.ravel()))

@@ -30,19 +30,19 @@ def read_sep005(path: Path) -> Contents:
 def contents_of(place: str, channels: Sequence[Mapping[str, Any]]) -> Contents:
     """What a list of SEP005 dictionaries holds; place: for errors. Channels of one group were recorded together."""
     signals, groups = list[Signal](), dict[str, int]()
-    for number, one in enumerate(channels, 1):
+    for number, channel in enumerate(channels, 1):
         where = f"{place}: channel {number}"
-        missing = [key for key in _NEEDED if key not in one] + ([] if {"fs", "time"} & one.keys() else ["fs"])
+        missing = [key for key in _NEEDED if key not in channel] + ([] if {"fs", "time"} & channel.keys() else ["fs"])
         if missing:
             raise DataError(f"{where} has no {', '.join(missing)}; SEP005 asks for them")
-        record = groups.setdefault(str(one.get("group", "")), len(groups))
+        record = groups.setdefault(str(channel.get("group", "")), len(groups))
         try:
-            values = np.asarray(one["data"], dtype=np.float64).ravel()
-            rate = None if one.get("fs") is None else float(one["fs"])
-            time = None if rate is not None else np.asarray(one["time"], dtype=np.float64)
+            values = np.asarray(channel["data"], dtype=np.float64).ravel()
+            rate = None if channel.get("fs") is None else float(channel["fs"])
+            time = None if rate is not None else np.asarray(channel["time"], dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise DataError(f"{where}: {error}") from error
-        name, unit = str(one["name"]), str(one["unit_str"] or "")
+        name, unit = str(channel["name"]), str(channel["unit_str"] or "")
         if rate is not None and not rate > 0:
             raise DataError(f"{where}: fs={rate} Hz is not > 0")
         signals.append(Signal(name, values, role_of(name, unit), unit, rate=rate, record=record))

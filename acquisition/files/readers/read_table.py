@@ -70,9 +70,9 @@ def read_table(path: Path) -> Contents:
     """The columns of a text file; DataError with the line where it is no table."""
     lines, comments = _lines(text_of(path))
     first, layout = _layout(path, lines)
-    said = [(key.strip().lower(), value.strip()) for key, _, value in (one.partition(":") for one in comments)]
-    layout.keys = dict(said)
-    layout.machines = tuple(dict.fromkeys(value for key, value in said if key == "machine" and value))
+    pairs = [(key.strip().lower(), value.strip()) for key, _, value in (comment.partition(":") for comment in comments)]
+    layout.keys = dict(pairs)
+    layout.machines = tuple(dict.fromkeys(value for key, value in pairs if key == "machine" and value))
     rows = lines[first:]
     behind = _behind(layout, rows.texts)
     layout.heading = behind or layout.heading
@@ -88,10 +88,10 @@ def _lines(text: str) -> tuple[NumberedLines, list[str]]:
     texts = text.splitlines()
     if "#" not in text and all(map(str.strip, texts)):
         return NumberedLines(texts, range(1, len(texts) + 1)), []
-    there = [(line, number) for number, line in enumerate(texts, 1) if line.strip()]
-    comments = [line.strip()[1:] for line, _ in there if line.lstrip().startswith("#")]
-    there = [one for one in there if not one[0].lstrip().startswith("#")]
-    return NumberedLines([line for line, _ in there], [number for _, number in there]), comments
+    numbered = [(line, number) for number, line in enumerate(texts, 1) if line.strip()]
+    comments = [line.strip()[1:] for line, _ in numbered if line.lstrip().startswith("#")]
+    numbered = [entry for entry in numbered if not entry[0].lstrip().startswith("#")]
+    return NumberedLines([line for line, _ in numbered], [number for _, number in numbered]), comments
 
 
 def _layout(path: Path, lines: NumberedLines) -> tuple[int, Layout]:
@@ -160,8 +160,8 @@ def _behind(layout: Layout, rows: Sequence[str]) -> list[str]:
 
 def _values(path: Path, layout: Layout, rows: NumberedLines, width: int) -> NDArray[np.float64]:
     """Shape (n_columns, n_rows)."""
-    known = _at_once(layout, rows.texts, width)
-    return _one_by_one(path, layout, rows, width) if known is None else known
+    values = _at_once(layout, rows.texts, width)
+    return _one_by_one(path, layout, rows, width) if values is None else values
 
 
 def _at_once(layout: Layout, rows: Sequence[str], width: int) -> NDArray[np.float64] | None:
@@ -201,8 +201,8 @@ def _contents(path: Path, layout: Layout, values: NDArray[np.float64]) -> Conten
         for i, ((name, unit), row) in enumerate(zip(headings, values, strict=True), 1)
     ]
     signals = [_with_level(signal) for signal in signals]
-    said, keys = iter(layout.keys.get(key, "") for key in ("averages", "recorded", "direction", "tool")), layout.keys
-    averages, recorded, direction, tool = said
+    texts, keys = iter(layout.keys.get(key, "") for key in ("averages", "recorded", "direction", "tool")), layout.keys
+    averages, recorded, direction, tool = texts
     try:
         created = datetime.fromisoformat(recorded).astimezone() if recorded else None
         n_averages = int(averages) if averages else None

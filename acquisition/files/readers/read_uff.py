@@ -41,23 +41,23 @@ class DataSets:
 
 def read_uff(path: Path) -> Contents:
     """Its FRFs with their coherence, or its signals over time; DataError with the data set where it is damaged."""
-    found = _data_sets(path, path.read_bytes())
-    frfs = [one for one in found.functions if one.type == _FRF]
-    kinds = sorted({one.type for one in found.functions} - {_TIME, _FRF, _COHERENCE})
-    signals = list(_frf_signals(found, frfs)) if frfs else list(_time_signals(found))
+    sets = _data_sets(path, path.read_bytes())
+    frfs = [function for function in sets.functions if function.type == _FRF]
+    kinds = sorted({function.type for function in sets.functions} - {_TIME, _FRF, _COHERENCE})
+    signals = list(_frf_signals(sets, frfs)) if frfs else list(_time_signals(sets))
     if not signals:
-        what = f"functions of type {', '.join(map(str, kinds))}" if kinds else "no data set 58"
-        raise DataError(f"{path}: holds {what}; FRFs (type 4) and signals over time (type 1) are read")
-    first = frfs[0] if frfs else found.functions[0]
-    averages = {one.averages for one in frfs if one.averages}
+        content = f"functions of type {', '.join(map(str, kinds))}" if kinds else "no data set 58"
+        raise DataError(f"{path}: holds {content}; FRFs (type 4) and signals over time (type 1) are read")
+    first = frfs[0] if frfs else sets.functions[0]
+    averages = {function.averages for function in frfs if function.averages}
     return Contents(
         tuple(signals),
         averages=averages.pop() if len(averages) == 1 else None,
         created=_created(first),
-        direction=_direction(found),
+        direction=_direction(sets),
         tool=first.keys.get("tool", ""),
-        machines=found.models,
-        window=next((one.window for one in (frfs or found.functions) if one.window), ""),
+        machines=sets.models,
+        window=next((function.window for function in (frfs or sets.functions) if function.window), ""),
         notes=tuple(_notes(frfs)),
     )
 
@@ -89,65 +89,67 @@ def _data_sets(path: Path, content: bytes) -> DataSets:
     return DataSets(functions, system, tuple(models))
 
 
-def _frf_signals(found: DataSets, frfs: Sequence[Function]) -> Iterator[Signal]:
+def _frf_signals(sets: DataSets, frfs: Sequence[Function]) -> Iterator[Signal]:
     """Each in a record of its own, turned to the positive direction of both axes."""
-    for record, one in enumerate(frfs):
-        unit, quantity = _frf_unit(one, found.system)
-        sign = -1.0 if one.response_direction * one.reference_direction < 0 else 1.0
-        yield Signal("frequency", one.abscissa, "frequency", one.abscissa_axis.unit or "Hz", record=record)
-        yield Signal(one.name, sign * one.values, "frf", unit, quantity, record=record)
-        for other in found.functions:
-            if other.type == _COHERENCE and other.place == one.place and other.values.size == one.values.size:
-                yield Signal(f"coherence of {one.name}", other.values, "coherence", record=record)
+    for record, frf in enumerate(frfs):
+        unit, quantity = _frf_unit(frf, sets.system)
+        sign = -1.0 if frf.response_direction * frf.reference_direction < 0 else 1.0
+        yield Signal("frequency", frf.abscissa, "frequency", frf.abscissa_axis.unit or "Hz", record=record)
+        yield Signal(frf.name, sign * frf.values, "frf", unit, quantity, record=record)
+        for function in sets.functions:
+            if function.type == _COHERENCE and function.place == frf.place and function.values.size == frf.values.size:
+                yield Signal(f"coherence of {frf.name}", function.values, "coherence", record=record)
                 break
 
 
-def _frf_unit(one: Function, system: tuple[str, str] | None) -> tuple[str, str]:
+def _frf_unit(frf: Function, system: tuple[str, str] | None) -> tuple[str, str]:
     """Unit and quantity of the response, as far as the file tells."""
-    quantity, per_time = _MOTIONS.get(one.ordinate.type, ("", ""))
-    top, below = one.ordinate.unit, one.denominator.unit
+    quantity, per_time = _MOTIONS.get(frf.ordinate.type, ("", ""))
+    top, below = frf.ordinate.unit, frf.denominator.unit
     if not top and system and quantity:
         top = f"{system[0]}{per_time}"
-    if not below and system and one.denominator.type in _FORCES:
+    if not below and system and frf.denominator.type in _FORCES:
         below = system[1]
     return (f"({top})/({below})" if top and below else top), quantity
 
 
-def _time_signals(found: DataSets) -> Iterator[Signal]:
+def _time_signals(sets: DataSets) -> Iterator[Signal]:
     """Channels; where one comes again, the next hit begins."""
-    record, seen = 0, set[tuple[object, ...]]()
-    for one in (function for function in found.functions if function.type == _TIME):
-        if (one.place, one.ordinate.type) in seen:
-            record, seen = record + 1, set()
-        seen.add((one.place, one.ordinate.type))
-        quantity, per_time = _MOTIONS.get(one.ordinate.type, ("force" if one.ordinate.type in _FORCES else "", ""))
-        unit = one.ordinate.unit
-        if not unit and found.system and quantity:
-            unit = found.system[1] if quantity == "force" else f"{found.system[0]}{per_time}"
+    record, places = 0, set[tuple[object, ...]]()
+    for function in (listed for listed in sets.functions if listed.type == _TIME):
+        if (function.place, function.ordinate.type) in places:
+            record, places = record + 1, set()
+        places.add((function.place, function.ordinate.type))
+        quantity, per_time = _MOTIONS.get(
+            function.ordinate.type, ("force" if function.ordinate.type in _FORCES else "", "")
+        )
+        unit = function.ordinate.unit
+        if not unit and sets.system and quantity:
+            unit = sets.system[1] if quantity == "force" else f"{sets.system[0]}{per_time}"
         role: Role = "" if not quantity else "force" if quantity == "force" else "response"
-        rate = 1 / one.step if one.step else None
-        yield Signal(one.name, one.values, role, unit, quantity, rate=rate, record=record)
+        rate = 1 / function.step if function.step else None
+        yield Signal(function.name, function.values, role, unit, quantity, rate=rate, record=record)
         if rate is None:
-            yield Signal("time", one.abscissa, "time", one.abscissa_axis.unit or "s", record=record)
+            yield Signal("time", function.abscissa, "time", function.abscissa_axis.unit or "s", record=record)
 
 
-def _direction(found: DataSets) -> str:
+def _direction(sets: DataSets) -> str:
     """At the tool tip, where all responses have the same."""
-    responses = {abs(one.response_direction) for one in found.functions if one.ordinate.type in _MOTIONS}
+    responses = {abs(function.response_direction) for function in sets.functions if function.ordinate.type in _MOTIONS}
     return {1: "x", 2: "y", 3: "z"}.get(responses.pop(), "") if len(responses) == 1 else ""
 
 
 def _notes(frfs: Sequence[Function]) -> Iterator[str]:
-    turned = sum(one.response_direction * one.reference_direction < 0 for one in frfs)
+    turned = sum(frf.response_direction * frf.reference_direction < 0 for frf in frfs)
     if turned:
         yield f"{turned} FRF(s) of opposite directions, turned round"
-    if any(abs(one.response_direction) != abs(one.reference_direction) and one.reference_direction for one in frfs):
+    if any(abs(frf.response_direction) != abs(frf.reference_direction) and frf.reference_direction for frf in frfs):
         yield "hit and response differ in direction"
 
 
-def _created(one: Function) -> datetime | None:
+def _created(function: Function) -> datetime | None:
     """The third line, or that of our own files; local time where it has no zone."""
-    text = one.keys.get("recorded") or one.lines[2].strip()
+    text = function.keys.get("recorded") or function.lines[2].strip()
     for form in _DATES:
         try:
             return datetime.strptime(text, form).astimezone()

@@ -64,16 +64,16 @@ class Function:
     @property
     def averages(self) -> int | None:
         """Hits averaged, where the identification says so."""
-        said = self.keys.get("averages", "") or "".join(
+        number = self.keys.get("averages", "") or "".join(
             re.findall(r"(?i)\baverages?\s*[:=]\s*(\d+)", " ".join(self.lines))[:1]
         )
-        return int(said) if said.strip().isdigit() else None
+        return int(number) if number.strip().isdigit() else None
 
     @property
     def window(self) -> str:
         """Over the response, where the identification names one."""
-        said = re.search(r"(?i)\b(?:response )?window\s*[:=]\s*([^;]+)", "; ".join(self.lines))
-        return said[1].strip() if said else ""
+        match = re.search(r"(?i)\b(?:response )?window\s*[:=]\s*([^;]+)", "; ".join(self.lines))
+        return match[1].strip() if match else ""
 
 
 def read_function(place: str, content: bytes, begin: int) -> tuple[Function, int]:
@@ -119,7 +119,7 @@ def _function(
     response, reference = (_point(six[31:55]), _point(six[56:80]))
     where = " ".join(filter(None, [_named(response), "over" if _named(reference) else "", _named(reference)]))
     label = lines[9].ljust(80)[26:46].strip()
-    made = Function(
+    function = Function(
         tuple(lines[1:6]),
         int(six[:5]),
         where or label or "function",
@@ -131,12 +131,12 @@ def _function(
         values,
         *(_axis(line) for line in lines[8:11]),
     )
-    exact = made.keys.get("step")
+    exact = function.keys.get("step")
     if exact and step and abs(float(exact) / step - 1) < 1e-4:
-        start = float(made.keys.get("start", abscissa[0]))
-        object.__setattr__(made, "abscissa", start + float(exact) * np.arange(values.size))
-        object.__setattr__(made, "step", float(exact))
-    return made
+        start = float(function.keys.get("start", abscissa[0]))
+        object.__setattr__(function, "abscissa", start + float(exact) * np.arange(values.size))
+        object.__setattr__(function, "step", float(exact))
+    return function
 
 
 def _point(text: str) -> tuple[str, int, int]:
@@ -166,13 +166,13 @@ def _text(place: str, content: bytes, begin: int, n: int) -> tuple[NDArray[np.fl
     """n numbers, in columns that may touch each other."""
     end = content.find(b"\n    -1", begin - 1)
     body = content[begin : end if end >= 0 else len(content)]
-    found = _NUMBER.findall(body)
-    rest = _NUMBER.sub(b"", body).split()
-    if rest:
-        raise DataError(f"{place}: {rest[0][:20]!r} stands among its values")
-    if len(found) != n or end < 0:
-        raise DataError(f"{place}: {len(found)} of {n} numbers are there; it is cut short or damaged")
-    return np.array([float(word.replace(b"D", b"E").replace(b"d", b"e")) for word in found]), begin + len(body)
+    numbers = _NUMBER.findall(body)
+    strays = _NUMBER.sub(b"", body).split()
+    if strays:
+        raise DataError(f"{place}: {strays[0][:20]!r} stands among its values")
+    if len(numbers) != n or end < 0:
+        raise DataError(f"{place}: {len(numbers)} of {n} numbers are there; it is cut short or damaged")
+    return np.array([float(word.replace(b"D", b"E").replace(b"d", b"e")) for word in numbers]), begin + len(body)
 
 
 def _bytes(

@@ -19,7 +19,7 @@ def check_unpacked(file: h5py.File, packed: int, path: Path) -> None:
     """DataError for a file of `packed` bytes whose data sets are out of proportion; none of them is read."""
     sizes: list[int] = []
     try:
-        file.visititems(lambda _, item: sizes.append(_size(item)) if isinstance(item, h5py.Dataset) else None)
+        file.visititems(lambda _, node: sizes.append(_size(node)) if isinstance(node, h5py.Dataset) else None)
     except (OSError, RuntimeError, TypeError, ValueError) as error:
         raise DataError(f"{path}: no readable HDF5 file ({error}); take it again from a backup") from error
     if sum(sizes) > max(HARMLESS, RATIO * packed):

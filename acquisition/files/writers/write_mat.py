@@ -37,13 +37,13 @@ def mat_of_hits(hits: Sequence[Hit], labels: Labels) -> bytes:
 def _mat(variables: dict[str, Any], labels: Labels) -> bytes:
     import scipy.io  # it takes a while, and few files need it
 
-    said = {
+    texts = {
         "written_by": "lobewatch",
         "recorded": labels.created.isoformat() if labels.created else "",
         "direction": labels.direction,
         "tool": labels.tool,
         "window": labels.window,
     }
-    made = io.BytesIO()
-    scipy.io.savemat(made, said | variables, oned_as="column")
-    return made.getvalue()
+    buffer = io.BytesIO()
+    scipy.io.savemat(buffer, texts | variables, oned_as="column")
+    return buffer.getvalue()

@@ -11,8 +11,8 @@ from acquisition.hit import Hit
 
 def sep005_of_hits(hits: Sequence[Hit], labels: Labels) -> bytes:
     """Force (N) and acceleration (m/s^2) of each hit, exactly; the group tells the hits apart."""
-    said = {"start_timestamp": labels.created.isoformat()} if labels.created else {}
-    said |= {key: value for key, value in (("direction", labels.direction), ("tool", labels.tool)) if value}
+    texts = {"start_timestamp": labels.created.isoformat()} if labels.created else {}
+    texts |= {key: value for key, value in (("direction", labels.direction), ("tool", labels.tool)) if value}
     channels = [
         {
             "name": name,
@@ -20,7 +20,7 @@ def sep005_of_hits(hits: Sequence[Hit], labels: Labels) -> bytes:
             "unit_str": unit,
             "fs": hit.sample_rate,
             "group": f"hit {number}",
-            **said,
+            **texts,
             "data": getattr(hit, name).tolist(),
         }
         for number, hit in enumerate(hits, 1)

@@ -32,7 +32,7 @@ def table_of_hits(hits: Sequence[Hit], labels: Labels) -> bytes:
 
 
 def _table(columns: dict[str, NDArray[np.float64]], labels: Labels, averages: int | None = None) -> bytes:
-    said = {
+    keys = {
         "written by": "lobewatch",
         "recorded": labels.created.isoformat() if labels.created else "",
         "direction": labels.direction,
@@ -40,7 +40,7 @@ def _table(columns: dict[str, NDArray[np.float64]], labels: Labels, averages: in
         "window": labels.window.replace("none", ""),
         "averages": "" if averages is None else str(averages),
     }
-    lines = [f"# {key}: {value}" for key, value in said.items() if value]
+    lines = [f"# {key}: {value}" for key, value in keys.items() if value]
     lines.append(",".join(columns))
     lines += [",".join(map(repr, row)) for row in zip(*(column.tolist() for column in columns.values()), strict=True)]
     return ("\n".join(lines) + "\n").encode("utf-8")

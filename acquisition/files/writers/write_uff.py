@@ -34,10 +34,10 @@ def uff_of_frf(frf: Frf, labels: Labels) -> bytes:
     values, _ = as_measured(frf)
     ordinate = _ORDINATES[frf.measured_as]
     axis = _Axis(frf.frequency, (18, "Frequency", "Hz"))
-    said = f"averages={frf.n_averages}"
-    sets = [_function(4, axis, values, (ordinate, _FORCE), labels, said)]
+    averages = f"averages={frf.n_averages}"
+    sets = [_function(4, axis, values, (ordinate, _FORCE), labels, averages)]
     if frf.coherence is not None:
-        sets.append(_function(6, axis, frf.coherence, (_NONE, _NONE), labels, said))
+        sets.append(_function(6, axis, frf.coherence, (_NONE, _NONE), labels, averages))
     return _file(sets, labels)
 
 
@@ -67,14 +67,14 @@ def _function(
     values: NDArray[np.float64] | NDArray[np.complex128],
     ordinates: tuple[tuple[int, str, str], tuple[int, str, str]],
     labels: Labels,
-    said: str,
+    extra: str,
 ) -> list[str]:
     """One data set 58."""
     node = {"x": 1, "y": 2, "z": 3}.get(labels.direction, 0)
     exact = f"step={axis.step!r};start={float(axis.values[0])!r};" if axis.is_even else ""
     recorded = f"window={labels.window}" + (f";recorded={labels.created.isoformat()}" if labels.created else "")
     stamp = f"{labels.created:%d-%b-%y %H:%M:%S}" if labels.created else "NONE"
-    lines = [f"{58:6d}", labels.name, exact + said, stamp, recorded, f"tool={labels.plain_tool}"]
+    lines = [f"{58:6d}", labels.name, exact + extra, stamp, recorded, f"tool={labels.plain_tool}"]
     lines[1:6] = [_line(text) for text in lines[1:6]]
     point = f" {'NONE':10s}{1:10d}{node:4d}"
     lines.append(f"{kind:5d}{0:10d}{0:5d}{0:10d}{point}{point}")
@@ -108,11 +108,11 @@ def _rows(axis: _Axis, values: NDArray[np.float64] | NDArray[np.complex128]) -> 
 
 
 def _file(sets: Sequence[list[str]], labels: Labels) -> bytes:
-    made = labels.created or datetime.now(UTC)
-    day = f"{made:%d-%b-%y}{made:%H:%M:%S}".ljust(20)
+    written = labels.created or datetime.now(UTC)
+    day = f"{written:%d-%b-%y}{written:%H:%M:%S}".ljust(20)
     header = [f"{151:6d}", _line(labels.name), "NONE", "lobewatch", day, day, "lobewatch", day]
     units = [f"{164:6d}", f"{1:10d}{'SI: Meter (newton)':20s}{2:10d}"]
     units += [f"{1.0:25.17E}{1.0:25.17E}{1.0:25.17E}", f"{273.15:25.17E}"]
     mark = "    -1"
-    lines = [line for one in (header, units, *sets) for line in (mark, *one, mark)]
+    lines = [line for data_set in (header, units, *sets) for line in (mark, *data_set, mark)]
     return ("\n".join(lines) + "\n").encode("utf-8")

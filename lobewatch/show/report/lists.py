@@ -1,4 +1,4 @@
-"""Lists of the report: tools and directions, test cuts, tap tests."""
+"""Lists of the report: tools and directions, what was done, test cuts, tap tests."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 from lobewatch.decay import Light, SeriesStanding
 from lobewatch.decay.light import LIGHTS as HARM
 from lobewatch.history import Row
+from lobewatch.machine.journal.event import MaintenanceEvent
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT
 from lobewatch.measuring.estimate import Estimate
 from lobewatch.show.history.describe_cut import heard_text
@@ -15,7 +16,7 @@ from lobewatch.show.programs.verdicts import WORDS
 from lobewatch.show.report.figure_data import Numbers
 from lobewatch.show.report.first_screen import KINDS, LIGHTS
 from lobewatch.show.report.material import ReportMaterial
-from lobewatch.show.report.section import DataTable, Download, Paragraph, Section, TableCell
+from lobewatch.show.report.section import BulletList, DataTable, Paragraph, Section, TableCell
 from lobewatch.show.trends.describe_trend import rate_text, short_text
 
 NUMBER_HEADS = (
@@ -56,6 +57,28 @@ def _series_row(series: SeriesStanding) -> list[str | TableCell]:
     ]
 
 
+def happened(material: ReportMaterial) -> list[Section]:
+    """A line for each event of the machine and each test that does not count, oldest first."""
+    files = material.analysis.files
+    reasons = {entry.id: entry.excluded for entry in files.excluded}
+    lines = [(event.time, event_line(event)) for event in files.events]
+    lines += [(row.time, _excluded_line(row, reasons[row.tap_id])) for row in material.excluded_rows]
+    if not lines:
+        return []
+    heading = "What was done, and tests that do not count"
+    return [Section(heading, [BulletList([line for _, line in sorted(lines)])])]
+
+
+def event_line(event: MaintenanceEvent) -> str:
+    """Day and text of an event."""
+    return f"{event.time.astimezone():%Y-%m-%d}: {event.text}{' (new baseline)' if event.new_baseline else ''}"
+
+
+def _excluded_line(row: Row, reason: str) -> str:
+    value = f", f_n {row.frequency.value:.1f} Hz" if row.frequency.is_known else ""
+    return f"{row.time.astimezone():%Y-%m-%d}: tap test excluded ({reason}){value}"
+
+
 def test_cuts(material: ReportMaterial) -> list[Section]:
     """Date, what was cut, speed, depth, what it sounded like, who heard it."""
     rows = [
@@ -80,9 +103,9 @@ def tap_tests(material: ReportMaterial) -> list[Section]:
     """Date, tool, direction, values, words of then; the same as numbers, oldest first."""
     history = material.analysis.history.current
     heads = ["when", "tool", "in", "f_n (Hz)", "ζ (%)", "K (N/µm)", "bearings (N/µm)", "said of it"]
-    table = DataTable(heads, [_tap_row(row) for row in reversed(history)], "words taps")
-    numbers = Download(Numbers(NUMBER_HEADS, [_tap_numbers(row) for row in history]), "taps")
-    return [Section("Tap tests", [Paragraph(f"{COUNTING}.", is_small=True), table, numbers], is_framed=False)]
+    numbers = Numbers(NUMBER_HEADS, [_tap_numbers(row) for row in history])
+    table = DataTable(heads, [_tap_row(row) for row in reversed(history)], "words taps", numbers=numbers, key="taps")
+    return [Section("Tap tests", [Paragraph(f"{COUNTING}.", is_small=True), table], is_framed=False)]
 
 
 def _tap_row(row: Row) -> list[str]:

@@ -25,7 +25,7 @@ def page(template: str, **content: Any) -> str:
     room = resources.files("lobewatch.show.report")
     loader = jinja2.FunctionLoader(lambda name: room.joinpath(name).read_text(encoding="utf-8"))
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
-    environment.filters |= {"in_css": _in_css, "named": _named, "macro_name": _macro_name}
+    environment.filters |= {"in_css": _in_css, "named": _named, "macro_name": _macro_name, "next": next}
     return environment.get_template(template).render(_static() | content)
 
 

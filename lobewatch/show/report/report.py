@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from datetime import datetime
 from itertools import count
 from pathlib import Path
@@ -14,7 +13,6 @@ from lobewatch.show.history.describe_history import conditions_texts
 from lobewatch.show.report.first_screen import first_screen
 from lobewatch.show.report.material import ReportMaterial, report_material
 from lobewatch.show.report.page import page, write_page
-from lobewatch.show.report.section import Download, Part, Section
 from lobewatch.show.report.sections import SECTIONS
 
 
@@ -38,20 +36,9 @@ def render_report(logbook: Logbook, tool: str, direction: str, now: datetime | N
 def _content(analysis: Analysis, tool: str, direction: str, now: datetime | None) -> dict[str, Any]:
     """All that the template shows, from one analysis."""
     material = report_material(analysis, tool, direction, now)
-    groups = _numbered([make(material) for make in SECTIONS])
+    groups = [make(material) for make in SECTIONS]
     has_plots = any(section.has_plot for sections in groups for section in sections)
-    return {"groups": groups, "has_plots": has_plots, **_frame(material)}
-
-
-def _numbered(groups: Sequence[Sequence[Section]]) -> list[list[Section]]:
-    """Sections whose downloads all have a key: those without one are numbered."""
-    numbers = map(str, count(1))
-    return [[section._replace(parts=[*_with_keys(section, numbers)]) for section in sections] for sections in groups]
-
-
-def _with_keys(section: Section, numbers: Iterator[str]) -> Iterator[Part]:
-    for part in section.parts:
-        yield part._replace(key=next(numbers)) if isinstance(part, Download) and not part.key else part
+    return {"groups": groups, "has_plots": has_plots, "numbering": count(1), **_frame(material)}
 
 
 def _frame(material: ReportMaterial) -> dict[str, Any]:

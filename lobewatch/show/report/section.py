@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from matplotlib.figure import Figure
+
+from lobewatch.show.figures.style import svg
 from lobewatch.show.report.figure_data import Numbers
 
 
@@ -44,6 +47,10 @@ class DataTable(NamedTuple):
     """Classes of the style sheet: "words" for text to the left."""
     if_empty: str = ""
     """Text in place of the rows where there are none."""
+    numbers: Numbers | None = None
+    """The table with all digits, to be saved as CSV."""
+    key: str = ""
+    """Name of the numbers in the page."""
 
 
 class Drawing(NamedTuple):
@@ -51,15 +58,8 @@ class Drawing(NamedTuple):
 
     svg: str
     """The <svg> element."""
-
-
-class Download(NamedTuple):
-    """A button that saves numbers as CSV."""
-
-    numbers: Numbers | None
-    """The numbers; None for no button."""
-    key: str = ""
-    """Name of the numbers in the page; their place among those without one where not given."""
+    numbers: Numbers | None = None
+    """What is drawn, to be saved as CSV."""
 
 
 class Fragment(NamedTuple):
@@ -71,7 +71,7 @@ class Fragment(NamedTuple):
     """Values that the template shows."""
 
 
-Part = Paragraph | BulletList | DataTable | Drawing | Download | Fragment
+Part = Paragraph | BulletList | DataTable | Drawing | Fragment
 
 
 class Section(NamedTuple):
@@ -85,3 +85,8 @@ class Section(NamedTuple):
     """Whether a line end stands before and after it in the file; without any meaning on the page."""
     has_plot: bool = False
     """Whether the page must bring the script that plots."""
+
+
+def picture_section(heading: str, text: str, figure: Figure, numbers: Numbers | None = None) -> Section:
+    """A picture below what is to be known to read it; numbers: what is drawn."""
+    return Section(heading, [Paragraph(text, is_small=True), Drawing(svg(figure), numbers)])

@@ -14,11 +14,10 @@ from lobewatch.decay.series_history import SeriesHistory, preload_of
 from lobewatch.show.programs.advice import ProgramAdvice, advice_lines, decay_text
 from lobewatch.show.programs.doubts import reading_lines
 from lobewatch.show.programs.verdicts import WORDS, band_text, limit_text, margin_text, turning_text, verdict_text
-from lobewatch.show.report.lists import tap_tests, test_cuts, tools_and_directions
-from lobewatch.show.report.lobe_sections import lobe_diagram, lobes_over_time, pockets_over_time
+from lobewatch.show.report.lists import happened, tap_tests, test_cuts, tools_and_directions
 from lobewatch.show.report.material import ReportMaterial
+from lobewatch.show.report.picture_sections import lobes_over_time, pictures
 from lobewatch.show.report.section import DataTable, Fragment, Paragraph, Section, TableCell
-from lobewatch.show.report.trend_sections import frequency_response, happened, values_over_time
 from lobewatch.show.trends.describe_trend import ASSUMED, dates_rows, preload_text, sentence
 from lobewatch.tool import ABOUT_DIRECTIONS
 from lobewatch.verdicts import Word
@@ -132,12 +131,6 @@ def _model_changes(history: SeriesHistory) -> list[list[str]]:
             change = f"{100 * (values[-1] / values[0] - 1):+.2f} %"
             rows.append([f"{label} tip stiffness, model (N/µm)", start, now, change])
     return rows
-
-
-def pictures(material: ReportMaterial) -> list[Section]:
-    """Values over time, lobes, pockets, frequency response."""
-    makers = values_over_time, lobe_diagram, pockets_over_time, frequency_response
-    return [section for make in makers for section in make(material)]
 
 
 def newest_modes(material: ReportMaterial) -> list[Section]:

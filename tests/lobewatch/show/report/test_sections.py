@@ -16,7 +16,6 @@ from lobewatch.show.report.report import render_report
 from lobewatch.show.report.section import (
     BulletList,
     DataTable,
-    Download,
     Drawing,
     Paragraph,
     Section,
@@ -42,10 +41,8 @@ def hours(material: ReportMaterial) -> list[Section]:
                 Paragraph(""),
                 BulletList(["early", "late"]),
                 DataTable(["hour", "how"], [["9", TableCell("fine", "ok")]], "words"),
-                DataTable(["minute"], [], if_empty="not looked at"),
-                Drawing(svg(figure)),
-                Download(Numbers(["hour"], [[hour] for hour in taken])),
-                Download(Numbers(["minute"], []), "minutes"),
+                DataTable(["minute"], [], if_empty="not looked at", numbers=Numbers(["minute"], []), key="minutes"),
+                Drawing(svg(figure), Numbers(["hour"], [[hour] for hour in taken])),
             ],
         )
     ]

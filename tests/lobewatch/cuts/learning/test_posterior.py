@@ -11,11 +11,11 @@ from lobes import Cut, stability_boundary
 from lobewatch.cuts.learning.contradicting import Contradiction, contradiction, learn_from_consistent
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.likelihood import MISJUDGED, log_likelihood, most_likely, predict_cut
-from lobewatch.cuts.learning.posterior import Posterior
+from lobewatch.cuts.learning.posterior import Posterior, prior
 from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.machine.journal.heard_cut import CutWord
 from modal import Mode
-from tests.lobewatch.cuts.learning.conftest import Mill
+from tests.lobewatch.cuts.learning.conftest import Mill, doubt
 
 TEETH = 800.0
 """Tooth frequency at 12 000 rpm (Hz)."""
@@ -172,3 +172,103 @@ def test_what_contradicts_is_named_and_left_out(mill: Mill) -> None:
     cut = mill.hear(20000, 4e-3)
     assert contradiction(learnt.predict(cut)) is None
     assert contradiction(learnt.predict(replace(cut, frequency=1150.0))) is Contradiction.FREQUENCY
+
+
+def weighted(*log_weight: float, cuts: tuple[CutEvidence, ...] = ()) -> Posterior:
+    """The first draws of a prior with weights."""
+    learnt = Mill().prior
+    return replace(learnt, draws=learnt.draws[: len(log_weight)], log_weight=np.array(log_weight), cuts=cuts)
+
+
+def test_weights_are_shares_whatever_their_logarithms_begin_at() -> None:
+    learnt = weighted(-2000.0, -2000.0 + np.log(3.0))
+    assert learnt.weights == pytest.approx([0.25, 0.75])
+    assert learnt.size == pytest.approx(1 / (0.25**2 + 0.75**2))
+
+
+def test_intervals_hold_95_percent_of_the_weight() -> None:
+    """Of 700 draws of which half have ten times the weight, against the weighted distribution itself."""
+    log_weight = np.where(np.arange(700) % 2 == 0, 0.0, np.log(10.0))
+    learnt = replace(Mill().prior, log_weight=log_weight)
+    values, interval = learnt.draws.ratios()["tangential"], learnt.intervals["tangential"]
+    assert np.sum(learnt.weights[values < interval.low]) == pytest.approx(0.025, abs=0.003)
+    assert np.sum(learnt.weights[values > interval.high]) == pytest.approx(0.025, abs=0.003)
+    assert interval.mean == pytest.approx(np.sum(learnt.weights * values))
+    assert interval.std**2 == pytest.approx(np.sum(learnt.weights * values**2) - interval.mean**2)
+
+
+def test_frequencies_stay_open_until_chatter_was_heard_twice(mill: Mill) -> None:
+    chatter = CutEvidence(mill.cut, 12000, 3e-3, "chatter", 1450.0)
+    stable, untold = replace(chatter, word="stable"), replace(chatter, frequency=np.nan)
+    for cuts, is_open in (((chatter, stable, untold), True), ((chatter, chatter), False), ((), True)):
+        intervals = weighted(*[0.0] * 5, *[-50.0] * 100, cuts=cuts).intervals
+        for side in "xy":
+            interval = intervals[f"frequency_{side}"]
+            assert (interval.low <= 0.90 and interval.high >= 1.05) is is_open
+        assert intervals["stiffness_x"].high < 1.3
+    flip = replace(untold, word="flip")
+    assert weighted(0.0, 0.0, cuts=(flip, flip)).frequencies == 2
+
+
+@pytest.mark.parametrize(("off", "share", "is_far"), [
+    (0.944, 0.51, True), (0.946, 0.51, False), (1.026, 0.51, True), (1.024, 0.51, False), (0.93, 0.49, False),
+])  # fmt: skip
+def test_a_spindle_is_far_off_where_more_than_half_of_the_weight_is_outside_of_95_percent(
+    mill: Mill, off: float, share: float, is_far: bool
+) -> None:
+    chatter = CutEvidence(mill.cut, 12000, 3e-3, "chatter", 1450.0)
+    values = np.linspace(-6, 6, 4001)
+    for column in (0, 3):
+        learnt = mill.prior
+        draws = learnt.draws[np.zeros(4001, dtype=np.intp)]
+        draws.normal[:] = 0.0
+        draws.normal[:, column] = values
+        frequency = draws.ratios()["frequency_x" if column == 0 else "frequency_y"]
+        place = int(np.argmin(np.abs(frequency - off)))
+        both = draws[np.array([place, 2000])]
+        log_weight = np.log([share, 1 - share])
+        assert replace(learnt, draws=both, log_weight=log_weight, cuts=(chatter, chatter)).is_far_off is is_far
+        assert not replace(learnt, draws=both, log_weight=log_weight, cuts=(chatter,)).is_far_off
+
+
+def test_draws_that_are_ruled_out_are_not_looked_at_any_more(mill: Mill) -> None:
+    learnt = weighted(0.0, np.log(1.3e-6), np.log(0.7e-6), -1.0)
+    evidence = learnt.predict(CutEvidence(mill.cut, 12000, 2e-3, "stable"))
+    assert len(evidence.before.draws) == len(evidence.prediction.excess) == 3
+    assert evidence.before.log_weight.tolist() == [0.0, np.log(1.3e-6), -1.0]
+
+
+def test_a_cut_weighs_draws_by_its_likelihood_and_an_old_one_less(mill: Mill) -> None:
+    cut = CutEvidence(mill.cut, 12000, 1.2e-3, "stable")
+    for moved in (1.0, 1.03):
+        evidence = mill.prior.predict(replace(cut, moved=moved))
+        learnt = evidence.learn()
+        weight = np.exp(-(((moved - 1) / 0.02) ** 2) / 2)
+        assert learnt.log_weight == pytest.approx(weight * np.log(1 - evidence.prediction.chance))
+        assert (learnt.cuts, learnt.refreshed) == ((evidence.cut,), 0)
+
+
+def test_samples_are_drawn_as_often_as_their_weight_says_but_for_one() -> None:
+    learnt = weighted(*np.log([0.5, 0.25, 0.2, 0.05]))
+    sample = learnt.sample(40)
+    counts = [int(np.sum(np.all(sample.normal == normal, axis=1))) for normal in learnt.draws.normal]
+    assert sum(counts) == 40
+    assert np.abs(np.array(counts) - [20, 10, 8, 2]).max() <= 1
+
+
+def test_draws_that_are_made_anew_are_those_of_prior_and_likelihood() -> None:
+    """Against 12 000 draws that are only weighted: mean and spread of what three cuts have taught."""
+    mill = Mill(frequency=(0.985, 0.945))
+    cuts = [mill.chatter(speed) for speed in (9500, 13500, 11000)]
+    few, many = mill.prior, prior(mill.middle, doubt(), 12000, seed=1)
+    for cut in cuts:
+        few = few.learn_from(cut)
+        many = replace(many, log_weight=many.log_weight + log_likelihood(cut, predict_cut(cut, many.draws)))
+    assert few.refreshed >= 1
+    assert len(few.draws) == 500
+    many = replace(many, cuts=few.cuts)
+    assert many.size > 300
+    for name, interval in few.intervals.items():
+        weighted_only = many.intervals[name]
+        assert interval.mean == pytest.approx(weighted_only.mean, abs=0.3 * weighted_only.std), name
+        assert interval.std == pytest.approx(weighted_only.std, rel=0.25), name

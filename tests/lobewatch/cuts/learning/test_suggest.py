@@ -9,9 +9,10 @@ import pytest
 
 from lobes import Cut, stability_boundary, zero_order
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.grid import floor_depth, zero_order_trust
+from lobewatch.cuts.learning.grid import floor_depth, speeds_between, zero_order_trust
 from lobewatch.cuts.learning.likelihood import predict_cut
 from lobewatch.cuts.learning.suggest import suggest
+from modal import Mode
 from tests.lobewatch.cuts.learning.conftest import Mill
 
 
@@ -65,3 +66,88 @@ def test_zero_order_is_corrected_where_it_is_not_exact(mill: Mill) -> None:
     mean = zero_order([mill.x], [mill.y], slender, speeds).depth
     assert share == pytest.approx(np.minimum(true, 0.02) / np.minimum(mean, 0.02))
     assert np.max(np.abs(share - 1)) > 0.1
+
+
+def test_speeds_are_steps_of_0_8_percent_that_can_be_set_between_the_ends() -> None:
+    speeds = speeds_between(4005.0, 20000.0)
+    assert (speeds[0], speeds[-1]) == (4005.0, 20000.0)
+    assert np.all(speeds[1:] % 10 == 0)
+    steps = np.diff(np.log(speeds))
+    assert np.mean(steps) == pytest.approx(0.008, rel=0.02)
+    assert np.max(np.abs(steps - 0.008)) < 2 * 5 / 4000
+    assert speeds_between(5000.0, 5010.0).tolist() == [5000.0, 5010.0]
+
+
+def test_zero_order_is_believed_between_a_tenth_and_three_times_the_truth(mill: Mill) -> None:
+    """At low immersion both limits leave these somewhere between 4000 and 30 000 rpm; where none is deep it is 1."""
+    speeds, slender = speeds_between(4000, 30000), Cut(1, 0.03, "down", 2.8e9, 2e8)
+    share = zero_order_trust([mill.x], [mill.y], slender, (0.0,), speeds, 0.5)
+    true = np.minimum(stability_boundary([mill.x], [mill.y], slender, speeds, 0.5).depth, 0.5)
+    ratio = true / np.minimum(zero_order([mill.x], [mill.y], slender, speeds).depth, 0.5)
+    assert np.max(ratio) > 3.6
+    assert np.max(share) == 3.0
+    assert np.min(share) >= 0.1
+    assert np.all(zero_order_trust([mill.x], [mill.y], slender, (0.0,), speeds, 1e-5) == 1)
+
+
+def test_zero_order_is_compared_in_the_worst_direction_of_feed() -> None:
+    mill = Mill(cut=Cut(2, 0.1, "down", 1.4e9, 5e8))
+    speeds = np.array([9000.0, 15000.0])
+    angles = (0.0, np.pi / 2)
+    share = zero_order_trust([mill.x], [mill.y], mill.cut, angles, speeds, 0.05)
+    cuts = [replace(mill.cut, feed_angle=angle) for angle in angles]
+    true = np.min([stability_boundary([mill.x], [mill.y], cut, speeds, 0.05).depth for cut in cuts], axis=0)
+    mean = np.min([zero_order([mill.x], [mill.y], cut, speeds).depth for cut in cuts], axis=0)
+    assert share == pytest.approx(np.minimum(true, 0.05) / np.minimum(mean, 0.05))
+
+
+def test_the_gain_is_that_over_the_best_cut_so_far_by_the_chance_that_it_is_stable(mill: Mill) -> None:
+    grid, learnt = mill.grid, mill.prior
+    best = CutEvidence(mill.cut, 8000, 1e-3, "stable")
+    louder = CutEvidence(mill.cut, 20000, 3e-3, "chatter")
+    suggestion = suggest(learnt, grid, [best, louder], 1)
+    assert suggestion is not None
+    rate = suggestion.speed_rpm * suggestion.depth
+    assert suggestion.gain == pytest.approx((1 - suggestion.chance) * (rate - 8.0) / 8.0)
+    first = suggest(learnt, grid, (), 1)
+    assert first is not None
+    assert first.gain == np.inf
+
+
+def test_a_gain_below_half_a_percent_of_the_best_so_far_is_none(mill: Mill) -> None:
+    """One speed, at which any spindle is stable to the end of the flutes: what is gained is certain."""
+    grid = replace(mill.grid, speeds=np.array([12000.0]), deepest=np.array([2e-4]), trust=np.ones(1))
+    rate = 12000 * 2e-4
+    for gain, is_worth in ((0.0055, True), (0.0045, False)):
+        best = CutEvidence(mill.cut, rate / (1 + gain) / 1e-4, 1e-4, "stable")
+        suggestion = suggest(mill.prior, grid, [best], 1)
+        assert (suggestion is not None) is is_worth
+        if suggestion is not None:
+            assert suggestion.gain == pytest.approx(0.98 * gain, rel=1e-3)
+
+
+def test_a_cut_settles_what_its_outcome_depends_on_most() -> None:
+    """Where lobes are far away the force; on the steep side of a pocket of a slender spindle the frequency."""
+    plain = Mill()
+    grid = replace(plain.grid, speeds=np.array([4500.0]), deepest=np.array([0.012]), trust=np.ones(1))
+    suggestion = suggest(plain.prior, grid, (), 1)
+    assert suggestion is not None
+    assert suggestion.settles == "tangential"
+    steep = Mill(x=Mode(1400.0, 0.003, 2.5e7), y=Mode(1400.0, 0.003, 2.5e7))
+    settled = set()
+    for speed in np.arange(19000.0, 22000.0, 500.0):
+        grid = replace(steep.grid, speeds=np.array([speed]), deepest=np.array([0.012]), trust=np.ones(1))
+        suggestion = suggest(steep.prior, grid, (), 1)
+        settled |= {suggestion.settles} if suggestion else set()
+    assert settled & {"frequency_x", "frequency_y"}
+
+
+def test_where_zero_order_is_not_exact_a_cut_is_made_shallower_until_it_is_likely_stable() -> None:
+    """Zero order is told to be three times too shallow: what it proposes chatters."""
+    mill = Mill(cut=Cut(2, 0.3, "down", 1.4e9, 5e8))
+    grid = replace(mill.grid, trust=np.full(mill.grid.speeds.shape, 1.7))
+    suggestion = suggest(mill.prior, grid, (), 1)
+    assert suggestion is not None
+    chance = predict_cut(grid.evidence(suggestion.speed_rpm, suggestion.depth), mill.prior.draws).chance
+    assert np.mean(chance) < 0.55
+    assert floor_depth(suggestion.depth) == suggestion.depth

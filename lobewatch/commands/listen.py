@@ -57,7 +57,7 @@ def listen(
     from lobewatch.machine.settings.cut_setting import choose_cut
     from lobewatch.notify.telling import telling
     from lobewatch.show.cuts.describe_listened import listened_json, listened_texts
-    from lobewatch.show.history.describe_cut import about_tool, otherwise
+    from lobewatch.show.history.describe_cut import contradiction_remark, untapped_remarks
     from lobewatch.tap.listening.hear_cut import cut_pictures, hear_cut, judge_live
 
     logbook = Logbook.open(machine)
@@ -87,7 +87,7 @@ def listen(
             earlier, stored = logbook.cuts, keep_listened(logbook.folder, comparison, signal, date)
             pictures.show(saved=stored.id)
             contrary = contradicting_cuts(stored, earlier) if stored.counts else ()
-            remarks = [*about_tool(logbook, stored), *map(otherwise, contrary)]
+            remarks = [*untapped_remarks(logbook, stored), *map(contradiction_remark, contrary)]
             payload |= {"id": stored.id, "remarks": [remark.code for remark in remarks]}
             emit(payload, as_json, *listened_texts(comparison), f"saved {stored.id}")
     notes.print(*(f"note: {remark}" for remark in remarks), sep="\n", end="\n" if remarks else "", markup=False)

@@ -39,14 +39,14 @@ def observe(
     from lobewatch.machine.additions.observe_cut import contradicting_cuts, observe_cut
     from lobewatch.machine.settings.cut_setting import cut_setting
     from lobewatch.notify.telling import telling
-    from lobewatch.show.history.describe_cut import about_tool, cut_json, cut_text, otherwise
+    from lobewatch.show.history.describe_cut import contradiction_remark, cut_json, cut_text, untapped_remarks
 
     if stable == chatter:
         raise ValueError(f"{'both' if stable else 'neither'} of --stable and --chatter: give one, what was heard")
     logbook = Logbook.open(machine)
     setting = cut_setting(logbook.machine, program, speed, depth)
     heard = observe_cut(setting, "stable" if stable else "chatter", frequency, date)
-    remarks = [*about_tool(logbook, heard), *map(otherwise, contradicting_cuts(heard, logbook.cuts))]
+    remarks = [*untapped_remarks(logbook, heard), *map(contradiction_remark, contradicting_cuts(heard, logbook.cuts))]
     with telling(logbook):
         stored = keep_cut(logbook.folder, heard)
         payload = {"cut": cut_json(stored), "remarks": [remark.code for remark in remarks]}

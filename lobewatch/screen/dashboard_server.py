@@ -28,7 +28,7 @@ from lobewatch.screen.web_thread import WebThread
 from lobewatch.show.plant.plant_rows import plant_row
 from lobewatch.show.report.page import script_sources
 from lobewatch.show.report.report import render_report
-from lobewatch.show.terminal.printer import Watched
+from lobewatch.show.terminal.printer import RunningTest
 from lobewatch.tap.spool import interrupted_tests
 
 REPORT_POLICY = (
@@ -103,7 +103,7 @@ class DashboardServer(WebThread):
             raise web.HTTPNotFound(text="there is no such machine")
         return key, MachineFolder(self._machines[key])
 
-    def _find_test(self, request: web.Request) -> Watched:
+    def _find_test(self, request: web.Request) -> RunningTest:
         """Newest test of a machine: a page that has watched one to its end sees the next."""
         test = self._tests.get(request.match_info["machine"])
         if test is None:

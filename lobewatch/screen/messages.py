@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobewatch.logbook.cut_comparison import CutComparison
-from lobewatch.show.cuts.describe_listened import listened_texts, next_step, why
+from lobewatch.show.cuts.describe_listened import listened_texts, next_step, reason_text
 from lobewatch.tap.listening.cut_state import CutState
 from lobewatch.tap.state import Plots, TakenHit, TapState
 
@@ -55,7 +55,7 @@ def cut_message(state: CutState) -> str:
             "title": state.title,
             "device": state.device,
             "saved": state.saved,
-            "reason": state.reason if state.comparison is None else why(state.comparison),
+            "reason": state.reason if state.comparison is None else reason_text(state.comparison),
             "level": _finite(state.level),
             "left": _finite(state.left),
             "cut_seconds": _finite(state.cut_seconds),
@@ -98,7 +98,7 @@ def _heard(comparison: CutComparison) -> dict[str, Any]:
     return {
         "chatter_frequency_hz": None if chatter is None else chatter.frequency,
         "speed_rpm": None if comparison.heard.turning is None else comparison.speed_rpm,
-        "texts": [text for text in listened_texts(comparison)[1:] if text != why(comparison)],
+        "texts": [text for text in listened_texts(comparison)[1:] if text != reason_text(comparison)],
         "next_step": next_step(comparison),
     }
 

@@ -11,7 +11,7 @@ from aiohttp import web
 from lobewatch.screen.feed import Messages, State, feed
 from lobewatch.screen.guard import MAY_ALTER, OPEN
 from lobewatch.screen.messages import plots_message, state_message
-from lobewatch.show.terminal.printer import Watched
+from lobewatch.show.terminal.printer import RunningTest
 
 TYPES = {"css": "text/css", "html": "text/html", "js": "text/javascript", "svg": "image/svg+xml"}
 """Content types of the files of pages, by the ending of their names."""
@@ -57,7 +57,7 @@ def add_feed(
     application.router.add_get(f"{prefix}access", access)
 
 
-def add_session(application: web.Application, prefix: str, find: Callable[[web.Request], Watched]) -> None:
+def add_session(application: web.Application, prefix: str, find: Callable[[web.Request], RunningTest]) -> None:
     """Serve the screen of a session: its feed, undo and stop. `find` raises HTTPNotFound where there is none."""
 
     async def undo(request: web.Request) -> web.Response:

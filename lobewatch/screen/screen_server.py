@@ -6,7 +6,7 @@ from lobewatch.screen.feed import Messages
 from lobewatch.screen.messages import curves_message, cut_message
 from lobewatch.screen.routes import add_feed, add_pages, add_session
 from lobewatch.screen.web_thread import WebThread
-from lobewatch.show.terminal.printer import Watched
+from lobewatch.show.terminal.printer import RunningTest
 from lobewatch.tap.listening.cut_state import CutState
 from lobewatch.tap.publisher import Pictures
 
@@ -20,7 +20,7 @@ class ScreenServer(WebThread):
 
     def __init__(
         self,
-        session: Watched,
+        session: RunningTest,
         *,
         listen: str = "127.0.0.1",
         port: int = 0,

@@ -21,7 +21,7 @@ WHY: Mapping[str, str] = {
     "number of teeth, or chatter that has locked to the spindle, sounds alike; cut at a speed 3 % away",
     "faint": "lines beside those of the spindle, too faint to be called chatter; cut longer or a little deeper",
 }
-"""What is wrong, and what to do, by the reason why it cannot be told."""
+"""Fault and cure by the reason why it cannot be told."""
 
 
 NEXT: Mapping[str, str] = {
@@ -30,15 +30,15 @@ NEXT: Mapping[str, str] = {
     "flip": "cut at another speed, or less deep; lobewatch suggest names the next test cut",
     "cannot tell": "listen again; this one teaches nothing",
 }
-"""What to do, by the word."""
+"""Next step by the word."""
 
 
 def next_step(comparison: CutComparison) -> str:
-    """What to do now, in a line."""
+    """The next step, in a line."""
     return NEXT[comparison.heard.word]
 
 
-def why(comparison: CutComparison) -> str:
+def reason_text(comparison: CutComparison) -> str:
     """What the word rests on, or why it cannot be told, in a line."""
     heard = comparison.heard
     return WHY[heard.reason] if heard.word == "cannot tell" else _energy(heard.ratio)
@@ -93,7 +93,7 @@ def _seconds(comparison: CutComparison) -> float:
 
 
 def listened_json(comparison: CutComparison) -> dict[str, Any]:
-    """All of it."""
+    """A cut with all that was heard of it."""
     heard, chatter, expected = comparison.heard, comparison.heard.chatter, comparison.predicted
     return {
         "word": heard.word,

@@ -23,11 +23,11 @@ MARKS = {
 }
 """Label, colour and mark of lines."""
 SHOWN = 1e-4
-"""Of the loudest amplitude, drawn downwards."""
+"""Share of the loudest amplitude down to which is drawn."""
 
 
 def save_listened(comparison: CutComparison, path: Path) -> None:
-    """The same figure as a file."""
+    """Write the picture of a cut to a file."""
     save_figure(listened_figure(comparison), path)
 
 
@@ -57,7 +57,7 @@ def listened_figure(comparison: CutComparison) -> Figure:
 
 
 def _modes(axis: Axes, assembly: Assembly) -> None:
-    """Of the tool as it was tapped."""
+    """Modes of the tool as it was tapped."""
     for name, modes, dashes in (("x", assembly.x, ":"), ("y", assembly.y, "--")):
         for number, mode in enumerate(modes or ()):
             label = f"modes in {name}, at rest" if number == 0 else None

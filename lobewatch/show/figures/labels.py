@@ -10,17 +10,17 @@ from matplotlib.axes import Axes
 Side = Literal["right", "left", "above", "below"]
 SIDES: dict[Side, tuple[float, float]] = {"right": (1, 0), "left": (-1, 0), "above": (0, 1), "below": (0, -1)}
 SIZE = 8.5
-"""Of the letters (points)."""
+"""Size of the letters (points)."""
 WIDE, HIGH = 0.62, 1.35
 """A letter and a line, at most, over the size."""
 AWAY = 9.0
-"""From a place to its words (points)."""
+"""Distance from a place to its words (points)."""
 PAPER = {"color": "white", "alpha": 0.75, "pad": 1, "lw": 0}
-"""Behind words that stand on lines."""
+"""Look of the paper behind words that stand on lines."""
 
 
 class _Box(NamedTuple):
-    """In points of the axes."""
+    """A rectangle in points of the axes."""
 
     left: float
     low: float
@@ -35,7 +35,7 @@ class _Box(NamedTuple):
 
 
 class PictureLabels:
-    """Those of one picture, whose limits are set already."""
+    """Words in one picture, whose limits are set already."""
 
     def __init__(self, axes: Axes) -> None:
         """None yet."""

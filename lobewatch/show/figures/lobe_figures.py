@@ -171,7 +171,7 @@ def _draw_program(axes: Axes, verdict: Verdict, labels: PictureLabels) -> None:
 
 
 def heard_of(cuts: Sequence[HeardCut], name: str, tool: str, cut: Cut) -> list[HeardCut]:
-    """Those with this tool, cutter and immersion that count: of the cut of this name, or of the same coefficients."""
+    """Test cuts of this tool, cutter and immersion that count: of the cut of this name, or of the same coefficients."""
     alike = [heard for heard in cuts if heard.counts and heard.tool == tool and geometry(heard.cut) == geometry(cut)]
     force = cut.tangential, cut.radial
     return [heard for heard in alike if heard.program == name or (heard.cut.tangential, heard.cut.radial) == force]

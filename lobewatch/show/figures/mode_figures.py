@@ -20,7 +20,7 @@ from modal import Extraction, FittedBand, Mode, Trust, trust_of
 COLUMNS = 4
 """Circles in a row."""
 MOST_CIRCLES = 8
-"""Of more modes those that are believed most and have the highest peaks of accelerance are drawn."""
+"""Circles at most: of more modes those that are believed most and have the highest peaks of accelerance are drawn."""
 LEAST_APART = 0.014
 """Between labels of modes that are close (share of the axis)."""
 LEGEND = 0.08
@@ -30,7 +30,7 @@ REACH = 3.0
 
 
 MARKS = {Trust.TRUSTED: "", Trust.DOUBTFUL: " ?", Trust.REJECTED: " -"}
-"""Behind the frequency of a mode."""
+"""Mark behind the frequency of a mode."""
 
 
 def modes_figure(state: Extraction, modes: Sequence[Mode], title: str) -> Figure:
@@ -148,12 +148,12 @@ def _draw_circle(axes: Axes, state: Extraction, band: FittedBand, mode: Mode) ->
 
 
 def _mobility(frequency: NDArray[np.float64], receptance: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """(mm/s/N)."""
+    """Mobility (mm/s/N)."""
     return np.asarray(2j * np.pi * 1e3 * frequency * receptance)
 
 
 def _phase(mode: Mode) -> str:
-    """Of the modal constant against that of a real mode, with its error."""
+    """Phase of the modal constant against that of a real mode, with its error."""
     if not mode.phase_deg:
         return "real"
     return f"phase {plus_minus(mode.phase_deg, mode.phase_deg_std or None)}°"

@@ -23,7 +23,7 @@ SHAPES = ((NOW, "-"), (ALARM, "--"), (GOOD, "-."), (THEN, ":"))
 
 
 def model_figure(picture: ModelPicture) -> Figure:
-    """All of it on one page."""
+    """All pictures of the model on one page."""
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(12.0, 10.0), layout="constrained")
         axes: dict[str, Axes] = figure.subplot_mosaic(

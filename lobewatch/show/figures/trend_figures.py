@@ -25,7 +25,7 @@ AHEAD = 0.5
 
 
 class Marks(NamedTuple):
-    """What stands beside a trend."""
+    """Marks beside a trend."""
 
     events: Sequence[tuple[datetime, str]] = ()
     """Times and texts of what was done."""

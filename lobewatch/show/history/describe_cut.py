@@ -11,18 +11,18 @@ from lobewatch.machine.journal.heard_cut import HeardCut
 
 
 def cut_text(cut: HeardCut) -> str:
-    """One line."""
+    """A test cut in one line."""
     return f"{cut.id}: {cut.at.astimezone():%Y-%m-%d %H:%M} {cut_words(cut)}"
 
 
 def cut_words(cut: HeardCut) -> str:
-    """What was cut, and what it sounded like."""
+    """Name, speed and depth of a test cut, and what it sounded like."""
     named = cut.program or "reference cut"
     return f"{named} at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm: {heard_text(cut)}, by {cut.by}"
 
 
 def heard_text(cut: HeardCut) -> str:
-    """What it sounded like."""
+    """Sound of a test cut, in words."""
     heard: str = cut.word
     if cut.chatter_frequency_hz is not None:
         error = cut.chatter_frequency_std_hz
@@ -51,16 +51,16 @@ def cut_json(cut: HeardCut) -> dict[str, Any]:
     }
 
 
-def about_tool(logbook: Logbook, cut: HeardCut) -> list[Remark]:
-    """That its tool was never tapped; nothing where it was."""
+def untapped_remarks(logbook: Logbook, cut: HeardCut) -> list[Remark]:
+    """A remark that the tool was never tapped; none where it was."""
     if any(tap.tool == cut.tool for tap in logbook.taps):
         return []
     text = "was never tapped: the cut is kept, and counts when it is"
     return [Remark("tool-not-tapped", cut.tool, text, f"tap it with: lobewatch tap {logbook.folder.path}")]
 
 
-def otherwise(cut: HeardCut) -> Remark:
-    """That a cut was heard otherwise before."""
+def contradiction_remark(cut: HeardCut) -> Remark:
+    """A remark that a cut was heard otherwise before."""
     text = f"heard otherwise at the same point ({cut_words(cut)}); both are kept"
     cure = f"lobewatch exclude MACHINE {cut.id} --reason TEXT takes out the one that is wrong"
     return Remark("cuts-contradict", cut.id, text, cure)

@@ -32,7 +32,7 @@ CONDITION_WORDS = {
     "reclamped": "clamped anew",
     "note": "note: {}",
 }
-"""How a condition of a tap test is told, by its name."""
+"""Words for a condition of a tap test, by its name."""
 
 
 def event_text(event: MaintenanceEvent) -> str:
@@ -48,7 +48,7 @@ def event_json(event: MaintenanceEvent) -> dict[str, Any]:
 
 
 def history_json(logbook: Logbook) -> dict[str, Any]:
-    """All of it; an excluded tap test has no values, those of one that is kept count for nothing."""
+    """The whole history; an excluded tap test has no values, those of one that is kept count for nothing."""
     return {
         "machine": logbook.machine.machine.name,
         "taps": [_tap_json(row, logbook) for row in logbook.history.rows],
@@ -126,7 +126,7 @@ def _excluded_json(tap: TapEntry) -> dict[str, Any]:
 
 
 def _utc(time: datetime) -> str:
-    """All alike, so that they sort as texts."""
+    """A time as text, all alike, so that they sort."""
     return time.astimezone(UTC).isoformat(timespec="microseconds")
 
 
@@ -151,5 +151,5 @@ def _said(line: Mapping[str, Any]) -> str:
 
 
 def conditions_texts(conditions: Conditions) -> list[str]:
-    """What a tap test was taken under, as far as that is known, a few words each."""
+    """Conditions of a tap test that are known, a few words each."""
     return [words.format(conditions.known[name]) for name, words in CONDITION_WORDS.items() if name in conditions.known]

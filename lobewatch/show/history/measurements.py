@@ -20,7 +20,7 @@ from lobewatch.tool import lobes_of
 
 
 def measurement_json(m: Measurement, logbook: Logbook) -> dict[str, Any]:
-    """All of a measurement, the diagrams of its tool as it was known then, and the programs as they stand now."""
+    """A measurement, the diagrams of its tool as it was known then, and the programs as they stand now."""
     assembly = logbook.assembly(until=m.tap_id)
     return {
         "tap_id": m.tap_id,
@@ -62,5 +62,5 @@ def _conditions(m: Measurement, logbook: Logbook) -> Conditions:
 
 
 def _asked(question: Remark) -> str:
-    """What is asked, and the command that answers."""
+    """A question with its code."""
     return f"question ({question.code}): {question.text}"

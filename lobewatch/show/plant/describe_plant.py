@@ -18,7 +18,7 @@ COLUMNS = ("key", "name", "light", "fall", "fall_std", "series", "last_tap", "da
 """Keys of a row of the dashboard, in the order of the CSV."""
 HEADINGS = ("folder", "machine", "light", "fallen (%)", "last tap", "limit ahead", "why", "next")
 NARROWEST = 24
-"""Of the last two columns, which are broken to fit."""
+"""Width of the last two columns at least, which are broken to fit."""
 
 
 def plant_text(rows: Sequence[Mapping[str, Any]], width: int) -> str:

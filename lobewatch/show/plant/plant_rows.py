@@ -16,12 +16,12 @@ EPOCH = date(1970, 1, 1)
 
 
 def plant_rows(machines: Sequence[MachineStanding]) -> list[dict[str, Any]]:
-    """In the order of the standings; the series is the one that fell most."""
+    """Rows in the order of the standings; the series is the one that fell most."""
     return [plant_row(machine) for machine in machines]
 
 
 def plant_row(machine: MachineStanding) -> dict[str, Any]:
-    """Of one machine."""
+    """Row of one machine."""
     summary, dated = machine.summary, machine.dated
     worst = summary.series[0] if summary.series else None
     remarks = joined(dated.remarks)

@@ -113,7 +113,7 @@ def _lines(table: TapTable) -> Iterator[str]:
 
 
 def _cells(numbers: Floats) -> list[str]:
-    """Of each line, with commas between; as JSON says them, which is quick, and nothing for NaN."""
+    """Cells of each line with commas between, by the encoder of JSON, which is quick; nothing for NaN."""
     if not len(numbers):
         return []
     digits = np.array([DIGITS_OF_ERRORS if name.endswith("_std") else DIGITS for name in NUMBERS])
@@ -122,7 +122,7 @@ def _cells(numbers: Floats) -> list[str]:
 
 
 def rounded(values: Floats, digits: NDArray[np.intp]) -> Floats:
-    """To significant digits, of each column (n, c) its own (c,); fewer of what is below 1e-16."""
+    """Values to significant digits, of each column (n, c) its own (c,); fewer of what is below 1e-16."""
     with np.errstate(divide="ignore", invalid="ignore"):
         places = digits - 1 - np.floor(np.log10(np.abs(values)))
     places = np.clip(np.nan_to_num(places), 1 - _TENS.size, _TENS.size - 1).astype(np.intp)
@@ -152,7 +152,7 @@ def _write_parquet(tables: Iterable[TapTable], path: Path) -> int:
 
 
 def _columns(table: TapTable) -> dict[str, NDArray[Any]]:
-    """As arrays, by name."""
+    """Columns of a table as arrays, by name."""
     n, of_series = len(table.tap_id), np.array(table.of_series, np.int64)
     tools, directions = (np.array([place[part] for place in table.series], object) for part in (0, 1))
     return {
@@ -174,4 +174,4 @@ WRITERS: dict[str, Callable[[Iterable[TapTable], Path], int]] = {
     ".csv.gz": _write_zipped,
     ".parquet": _write_parquet,
 }
-"""By the ending of the name."""
+"""Writer of a table by the ending of the file name."""

@@ -40,7 +40,7 @@ def comparison_json(comparison: LobeComparison, remarks: Sequence[Remark]) -> di
 
 
 def comparison_texts(comparison: LobeComparison, remarks: Sequence[Remark]) -> list[str | Table]:
-    """The same for people."""
+    """The diagram now, its pockets and the verdicts for people."""
     now = comparison.now
     texts: list[str | Table] = [
         f"{now.name}: {now.lobes.stated_method}, from the {now.source} of {now.assembly.tap_id}",
@@ -130,7 +130,7 @@ def materials_json(machine: Machine) -> list[dict[str, Any]]:
 
 
 def material_lines(machine: Machine) -> Iterator[str]:
-    """The same, a line each."""
+    """Cutting coefficients, a line each."""
     for material in materials_json(machine):
         kt, kr = material["tangential_n_per_mm2"], material["radial_n_per_mm2"]
         about = "; ".join(filter(None, (material["note"], material["source"])))

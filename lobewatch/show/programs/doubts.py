@@ -16,12 +16,12 @@ from lobewatch.verdicts.doubt import Doubt, Span
 from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
 
 PAGE = "docs/lobes.md"
-"""Where the sizes come from."""
+"""Page that says where the sizes come from."""
 AT_REST = (
     "The words hold for the spindle as tapped, at rest, and low..high for 98 % of the doubt. turning: chance of "
     "chatter once it turns and cuts, where f_n, zeta, K and the cutting force may differ; plausible, not measured."
 )
-"""What must be known to read a table of verdicts."""
+"""Sentences that a table of verdicts is read by."""
 GIVEN = "machine.toml"
 SIZES = "frequency", "damping_ratio", "stiffness", "phase_deg"
 DEGREE = 180 / np.pi
@@ -37,7 +37,7 @@ NAMES = {
     "stiffness_x": "K in x",
     "stiffness_y": "K in y",
 }
-"""What test cuts teach, as people call it, by the name of the factor."""
+"""Terms of what test cuts teach, by the name of the factor."""
 
 Floats = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ def doubt_json(verdict: Verdict) -> dict[str, Any] | None:
 
 
 def reading_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
-    """What stands below a table of verdicts: what the words mean, and the doubt; nothing where nothing was judged."""
+    """Lines below a table of verdicts: what the words mean, and the doubt; none where nothing was judged."""
     doubts = doubt_lines(verdicts, machine)
     judged = [verdict for verdict in verdicts if verdict.draws is not None and verdict.assembly is not None]
     taught = [verdict for verdict in judged if verdict.cuts]
@@ -78,7 +78,7 @@ def _cuts(at_speed: SpindleAtSpeed) -> str:
 
 
 def doubt_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
-    """One for all programs that have it alike."""
+    """Doubt of the programs, a line for all that have it alike."""
     named: dict[str, list[str]] = {}
     for verdict in verdicts:
         if verdict.draws is not None and verdict.assembly is not None:
@@ -115,7 +115,7 @@ def _learnt(at_speed: SpindleAtSpeed, speed: float) -> Iterator[str]:
 
 
 def _clamping(widths: Floats, assembly: Assembly, given: DoubtTable) -> Iterator[str]:
-    """From tap test to tap test, once where both directions have it alike."""
+    """Scatter from tap test to tap test, once where both directions have it alike."""
     places = {"x": 0, "y": len(assembly.x or ())}
     texts = {}
     for side in assembly.directions:

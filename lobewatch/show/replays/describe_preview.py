@@ -15,7 +15,7 @@ from lobewatch.show.spindle.describe_modes import NOT_IN_FILE, fact_lines, in_or
 from lobewatch.show.terminal.output import emit, table
 
 ONE_BY_ONE = 6
-"""So many files are told in full, more of them in a line each."""
+"""Files that are told in full at most; more of them get a line each."""
 
 
 def show_preview(previews: Sequence[Preview], passed: Sequence[Path], *, as_json: bool) -> None:
@@ -112,7 +112,7 @@ def _row(preview: Preview) -> list[str]:
 
 
 def _below(previews: Sequence[Preview]) -> list[str]:
-    """What was taken for want of a word, asked and refused; each once."""
+    """Lines on what was taken for want of a word, asked and refused; each once."""
     facts = dict.fromkeys(fact for preview in previews if preview.recording for fact in preview.recording.facts)
     lines = fact_lines(facts, NOT_IN_FILE)
     for preview in previews:

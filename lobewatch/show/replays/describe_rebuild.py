@@ -10,7 +10,7 @@ from lobewatch.show.terminal.output import remark_json, remark_lines
 
 
 class MachineRebuild(NamedTuple):
-    """What has become of one machine."""
+    """Outcome of a rebuild of one machine."""
 
     repairs: Sequence[str]
     """Sentences on the files that were mended, a line each."""

@@ -17,11 +17,11 @@ from lobewatch.show.programs.verdicts import program_texts, programs_json
 from lobewatch.show.terminal.output import emit, notes, table
 
 IN_FULL = 3
-"""So many tap tests are told in full, more of them summed up."""
+"""Tap tests that are told in full at most; more of them are summed up."""
 MANY = 12
-"""So many files are told one by one where they were stored already, more of them by their number ..."""
+"""Files of a replay above which those that were stored already are told by their number ..."""
 FEW = 3
-"""... unless no more than these were."""
+"""... unless these at most were."""
 
 
 def show_replay(

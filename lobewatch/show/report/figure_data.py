@@ -32,7 +32,7 @@ class Numbers(NamedTuple):
 
     @property
     def text(self) -> str:
-        """As JSON that can stand within a page; what is not finite is null."""
+        """The table as JSON that can stand within a page; what is not finite is null."""
         lines = [[_cell(value) for value in line] for line in self.lines]
         exact = json.dumps({"heads": list(self.heads), "lines": lines}, ensure_ascii=False, separators=(",", ":"))
         return exact.replace("<", "\\u003c").replace("&", "\\u0026")

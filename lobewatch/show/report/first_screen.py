@@ -18,7 +18,7 @@ from lobewatch.verdicts import Word
 
 LIGHTS = {Light.ALARM: "✗ ALARM", Light.UNKNOWN: "? UNKNOWN", Light.WARN: "! WARNING", Light.GOOD: "✓ GOOD"}
 KINDS = {Light.GOOD: "ok", Light.ALARM: "bad"}
-"""How a light looks; the others are doubtful."""
+"""Class of a light in the style sheet; the others are doubtful."""
 FEW = 3
 """Reasons on the first screen; the others stand below it."""
 

@@ -15,7 +15,7 @@ from lobewatch.show.report.first_screen import KINDS, LIGHTS
 from lobewatch.show.report.page import page, write_page
 
 WIDE, HIGH = 140, 32
-"""Of a small course, in its own units."""
+"""Size of a small course, in its own units."""
 
 
 def write_fleet_report(rows: Sequence[Mapping[str, Any]], folder: Path, path: Path | None, now: datetime) -> Path:
@@ -39,7 +39,7 @@ def _plain(value: Any) -> Any:
 
 
 def _machine(row: Mapping[str, Any]) -> dict[str, Any]:
-    """As the template takes it."""
+    """A machine as the template takes it."""
     left, last = row["days_left"], row["last_tap"]
     due = (
         "never tapped" if left is None else f"in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue"

@@ -33,7 +33,7 @@ NUMBER_HEADS = (
 VALUE_FORMATS = (("{:.2f}", 1.0), ("{:.3f}", 0.01), ("{:.3f}", 1e6), ("{:.1f}", 1e6))
 """Format and size of the unit of f_n, zeta, K and the stiffness of a bearing."""
 COUNTING = "Those that count, the newest first"
-"""Which of them a list holds."""
+"""Words for what a list holds."""
 
 
 def tools_and_directions(material: ReportMaterial) -> list[Section]:
@@ -57,7 +57,7 @@ def _series_row(series: SeriesStanding) -> list[str | TableCell]:
     ]
 
 
-def happened(material: ReportMaterial) -> list[Section]:
+def events_and_exclusions(material: ReportMaterial) -> list[Section]:
     """A line for each event of the machine and each test that does not count, oldest first."""
     files = material.analysis.files
     reasons = {entry.id: entry.excluded for entry in files.excluded}

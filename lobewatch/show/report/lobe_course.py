@@ -52,7 +52,7 @@ class LobeCourse(NamedTuple):
 
     @property
     def labels(self) -> list[str]:
-        """What each is called."""
+        """Names of the diagrams."""
         return [*(f"{time:%Y-%m-%d}" for time in self.times), *self.ahead]
 
     @property

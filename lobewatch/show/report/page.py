@@ -17,7 +17,7 @@ from acquisition import DataError, atomic_write
 from acquisition.errors import NOT_ALLOWED
 
 NOTICE = "/* uPlot 1.6.32, (c) 2022 Leon Sorokin, MIT licence */"
-"""In place of the first line of its script, which has an address: a page names none."""
+"""First line of the script of the plots in place of its own, which has an address: a page names none."""
 
 
 def page(template: str, **content: Any) -> str:

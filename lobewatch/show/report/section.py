@@ -59,7 +59,7 @@ class Drawing(NamedTuple):
     svg: str
     """The <svg> element."""
     numbers: Numbers | None = None
-    """What is drawn, to be saved as CSV."""
+    """Numbers of the picture, to be saved as CSV."""
 
 
 class Fragment(NamedTuple):
@@ -80,7 +80,7 @@ class Section(NamedTuple):
     heading: str
     """Heading; empty for none."""
     parts: Sequence[Part]
-    """What is shown below it, from above."""
+    """Parts below the heading, from above."""
     is_framed: bool = True
     """Whether a line end stands before and after it in the file; without any meaning on the page."""
     has_plot: bool = False

@@ -14,7 +14,7 @@ from lobewatch.decay.series_history import SeriesHistory, preload_of
 from lobewatch.show.programs.advice import ProgramAdvice, advice_lines, decay_text
 from lobewatch.show.programs.doubts import reading_lines
 from lobewatch.show.programs.verdicts import WORDS, band_text, limit_text, margin_text, turning_text, verdict_text
-from lobewatch.show.report.lists import happened, tap_tests, test_cuts, tools_and_directions
+from lobewatch.show.report.lists import events_and_exclusions, tap_tests, test_cuts, tools_and_directions
 from lobewatch.show.report.material import ReportMaterial
 from lobewatch.show.report.picture_sections import lobes_over_time, pictures
 from lobewatch.show.report.section import DataTable, Fragment, Paragraph, Section, TableCell
@@ -49,7 +49,7 @@ def programs(material: ReportMaterial) -> list[Section]:
 
 
 def _program_row(program: ProgramAdvice) -> dict[str, Any]:
-    """What `lobewatch check` says."""
+    """A row of the table, as `lobewatch check` says it."""
     verdict, at_first = program.verdict, program.at_first
     return {
         "name": verdict.program.name,
@@ -153,7 +153,7 @@ SECTIONS: tuple[Callable[[ReportMaterial], Sequence[Section]], ...] = (
     until_when,
     notes,
     changes,
-    happened,
+    events_and_exclusions,
     pictures,
     lobes_over_time,
     tools_and_directions,
@@ -161,4 +161,4 @@ SECTIONS: tuple[Callable[[ReportMaterial], Sequence[Section]], ...] = (
     test_cuts,
     tap_tests,
 )
-"""What makes the sections, in the order of the page; each gives none where there is nothing to show."""
+"""Functions that make the sections, in the order of the page; each gives none where there is nothing to show."""

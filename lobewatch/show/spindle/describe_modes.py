@@ -16,7 +16,7 @@ from lobewatch.show.terminal.output import table
 from modal import Mode, Trust, trust_of, trust_rules
 
 ORDER = (Trust.TRUSTED, Trust.DOUBTFUL, Trust.REJECTED)
-"""In which modes are shown."""
+"""Order in which modes are shown."""
 LEAST_PHASE = 1.0
 """Phase of a modal constant worth a column (degrees)."""
 HIGH_CORRELATION = 0.5
@@ -89,7 +89,7 @@ def _notes(mode: Mode) -> str:
 
 
 def mode_lines(modes: Sequence[Mode]) -> list[str]:
-    """What stands below a table of modes: where ± comes from, and correlated errors."""
+    """Lines below a table of modes: where ± comes from, and correlated errors."""
     hits = max((mode.n_hits for mode in modes), default=0)
     lines = [f"± is the standard error over the {hits} hits (jackknife, {hits - 1} degrees of freedom)"] if hits else []
     for (i, j), names in (((0, 1), "f_n and zeta"), ((0, 2), "f_n and K"), ((1, 2), "zeta and K")):
@@ -194,6 +194,6 @@ def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> list
 
 
 def fact_lines(facts: Iterable[Fact], origins: Sequence[str] = tuple(ORIGINS)) -> list[str]:
-    """What is known of a file, a line for each place that it is from."""
+    """Facts on a file, a line for each place that it is from."""
     texts = {origin: [f"{fact.name} {fact.value}" for fact in facts if fact.origin == origin] for origin in origins}
     return [f"{ORIGINS[origin]}: {'; '.join(words)}" for origin, words in texts.items() if words]

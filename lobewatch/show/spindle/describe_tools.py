@@ -31,7 +31,7 @@ def tools_json(calibration: ToolsCalibration) -> dict[str, Any]:
 
 
 def tools_texts(calibration: ToolsCalibration) -> list[str | Table]:
-    """The same for people."""
+    """The fit, what it rests on, and other tools, for people."""
     label = [f"model: {calibration.label}"] if calibration.label else []
     taps = [
         f"spindle {number}: tool {tap.tool}, {tap.tap_id}, mode {tap.number} is followed"
@@ -54,7 +54,7 @@ def _to_enter(calibration: ToolsCalibration) -> list[str]:
 
 
 def _joint_lines(joints: tuple[Joint, ...]) -> list[str]:
-    """As they stand in machine.toml."""
+    """Joints as they stand in machine.toml."""
     if not joints:
         return []
     lines = [

@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any, Self
 
 PAGE_UP = ("\x1b[5~", "\xe0I", "\0I")
-"""As terminals and as Windows send it: presenters and foot switches do."""
+"""Page Up as terminals and as Windows send it: presenters and foot switches do."""
 SPECIAL = re.compile(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|O.)|[\xe0\0].", re.DOTALL)
 """Arrows and the like."""
 

@@ -25,7 +25,7 @@ from acquisition.names import CONTROL
 Json = Annotated[bool, typer.Option("--json", help="One JSON object on stdout instead of text.")]
 
 INSTEAD = "\ufffd"
-"""What is shown for a control character."""
+"""Character that is shown for a control character."""
 
 
 class Terminal(Console):
@@ -57,9 +57,9 @@ SHORTEST = 10
 GAP = 2
 """Between columns."""
 notes = Terminal(stderr=True, highlight=False, soft_wrap=True, emoji=False)
-"""Progress and remarks."""
+"""Console for progress and remarks."""
 results = Terminal(highlight=False, soft_wrap=True, emoji=False, width=max(Console().width, 120))
-"""What was asked for; wide enough for every table: a narrow terminal may break lines, but no number is cut off."""
+"""Console for results, wide enough for every table: a narrow terminal may break lines, but no number is cut off."""
 
 
 def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
@@ -97,7 +97,7 @@ def printable(text: str) -> str:
 
 
 def _escaped(match: re.Match[str]) -> str:
-    """As JSON writes it inside of text; a newline stands between its lines only."""
+    """A control character as JSON writes it inside of text; a newline stands between its lines only."""
     return match[0] if match[0] == "\n" else f"\\u{ord(match[0]):04x}"
 
 

@@ -15,7 +15,7 @@ INTERVAL = 0.05
 """Between two looks at the test (s)."""
 
 
-class Watched(Protocol):
+class RunningTest(Protocol):
     """A live tap test; all of it may be used from any thread."""
 
     @property
@@ -35,7 +35,7 @@ class Watched(Protocol):
 class TapPrinter:
     """Prints from a thread of its own between __enter__ and __exit__; the test never waits for it."""
 
-    def __init__(self, session: Watched, console: Console) -> None:
+    def __init__(self, session: RunningTest, console: Console) -> None:
         """Nothing is printed yet."""
         self._session, self._console = session, console
         self._ended = threading.Event()
@@ -81,11 +81,11 @@ class TapPrinter:
             if hit.earlier:
                 continue
             good = sum(not earlier.flags for earlier in state.hits[: hit.number])
-            self._console.print(f"{good:3d} / {state.wanted}  {verdict(hit)}  ({hit.peak_force:.0f} N)")
+            self._console.print(f"{good:3d} / {state.wanted}  {verdict_markup(hit)}  ({hit.peak_force:.0f} N)")
         self._told = len(state.hits)
 
 
-def verdict(hit: TakenHit) -> str:
+def verdict_markup(hit: TakenHit) -> str:
     """Symbol, words and cure, with colours."""
     if hit.undone:
         return "[bold]↶ UNDONE[/]"

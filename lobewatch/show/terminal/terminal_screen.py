@@ -17,7 +17,7 @@ from rich.text import Text
 
 from lobewatch.show.terminal.keys import Keys
 from lobewatch.show.terminal.output import Terminal
-from lobewatch.show.terminal.printer import Watched, verdict
+from lobewatch.show.terminal.printer import RunningTest, verdict_markup
 from lobewatch.tap.state import TapState, TapStep
 
 INTERVAL = 0.05
@@ -40,7 +40,7 @@ LOOKS: Mapping[TapStep, tuple[str, str]] = {
 }
 """Symbol and colours of each word, told apart by colour-blind people too."""
 BELLS: Mapping[TapStep, int] = {TapStep.GOOD: 1, TapStep.REFUSED: 2, TapStep.NO_DEVICE: 3}
-"""How often the bell rings."""
+"""Number of bells."""
 LIGHTS: Mapping[str, tuple[str, str]] = {
     "good": ("✓", "black on #2bb48d"),
     "warn": ("!", "black on #f0e442"),
@@ -52,7 +52,7 @@ LIGHTS: Mapping[str, tuple[str, str]] = {
 class TerminalScreen:
     """Shows a test between __enter__ and __exit__ and hands its keys on; the test never waits for it."""
 
-    def __init__(self, session: Watched, console: Console | None = None) -> None:
+    def __init__(self, session: RunningTest, console: Console | None = None) -> None:
         """Nothing is shown yet; console None: standard error."""
         self._session = session
         self._console = console or Terminal(stderr=True, highlight=False, emoji=False)
@@ -130,7 +130,7 @@ def _lines(state: TapState) -> Iterator[RenderableType]:
     for check in (check for check in state.checks if not (state.hits and check.passed)):
         yield Text(f"{'✓' if check.passed else '✗'} {check.name}: {check.text}")
     for hit in state.hits[-SHOWN_HITS:]:
-        yield Text.from_markup(f"{hit.number:3d}  {hit.peak_force:6.0f} N  {verdict(hit)}")
+        yield Text.from_markup(f"{hit.number:3d}  {hit.peak_force:6.0f} N  {verdict_markup(hit)}")
     if state.outcome is not None:
         symbol, style = LIGHTS[state.outcome.light]
         yield Text(f" {symbol} {state.outcome.light.upper()} ", style)

@@ -16,9 +16,9 @@ from lobewatch.tap.stories.demo import DemoTap, SpindleState
 from lobewatch.tap.stories.level_forecast import LevelForecast
 
 KEYS = ("frequency_hz", "damping_ratio", "stiffness_n_per_m", "bearing_stiffness_n_per_m")
-"""Names of the figures of a SpindleState in JSON ..."""
+"""Names of the figures of a SpindleState in JSON."""
 NAMES = ("f_1", "zeta", "K", "bearing stiffness")
-"""... and for people."""
+"""Names of these figures for people."""
 COLUMNS = (("f_1 Hz", 1.0, 2), ("zeta %", 0.01, 3), ("K N/um", 1e6, 3), ("k_b N/um", 1e6, 1))
 """Heading, size of the unit and decimals."""
 

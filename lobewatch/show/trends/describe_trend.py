@@ -75,12 +75,12 @@ def trend_texts(outlook: Outlook, series: SeriesStanding, preload: PreloadLeft |
 
 
 def preload_text(preload: PreloadLeft) -> str:
-    """What is left of the preload."""
+    """Preload that is left, in words."""
     return f"preload left: {preload}"
 
 
 def dates_rows(outlook: Outlook) -> list[tuple[str, str, str]]:
-    """What, when it becomes doubtful, when it is not stable: each program, and the fixed limits."""
+    """Name, when it becomes doubtful, when it is not stable: each program, and the fixed limits."""
     end = outlook.horizon
     rows = [(name, *_fate_texts(fate, end)) for name, fate in outlook.programs.items()]
     for percent, when in outlook.limits.items():
@@ -94,7 +94,7 @@ def _fate_texts(fate: Fate, end: float) -> tuple[str, str]:
 
 
 def sentence(series: SeriesStanding) -> str:
-    """What the series has done so far."""
+    """Course of the series so far, in a sentence."""
     trend = series.trend
     if trend is None:
         return f"{series.name}: unknown"
@@ -135,7 +135,7 @@ def _score(trend: Trend) -> str:
 
 
 def _scores(trend: Trend) -> list[float]:
-    """One a point; NaN where none is judged."""
+    """Scores, one a point; NaN where none is judged."""
     return [*[math.nan] * trend.watched, *map(float, trend.watch.scores)]
 
 

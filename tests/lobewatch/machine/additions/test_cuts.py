@@ -26,7 +26,7 @@ from lobewatch.machine.archive.rebuild import rebuild_files
 from lobewatch.machine.archive.verify import verify
 from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.machine.settings.cut_setting import cut_setting, find_named
-from lobewatch.show.history.describe_cut import about_tool
+from lobewatch.show.history.describe_cut import untapped_remarks
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -105,7 +105,7 @@ def test_a_tool_never_tapped_and_an_earlier_word_at_the_same_point_are_said_and_
     said = [json.loads(one.stdout)["remarks"] for one in (first, again, other)]
     assert said == [["tool-not-tapped"], ["tool-not-tapped", "cuts-contradict"], ["tool-not-tapped"]]
     assert [cut.word for cut in shop.logbook.cuts] == ["stable", "chatter", "chatter"]
-    assert about_tool(shop.logbook, shop.logbook.cuts[0]) == []
+    assert untapped_remarks(shop.logbook, shop.logbook.cuts[0]) == []
 
 
 def test_a_cut_is_taken_out_and_back_and_listed_each_time(shop: Shop) -> None:

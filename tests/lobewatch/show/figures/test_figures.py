@@ -53,8 +53,8 @@ def chattering(name: str) -> Verdict:
 def test_lobes_are_drawn_in_mm_and_programs_where_they_cut() -> None:
     speed = np.linspace(1000.0, 2000.0, 5)
     figure = lobes_figure(speed, {"then": np.full(5, 2e-3), "now": np.full(5, 1e-3)}, [chattering("A")])
-    now, then, mark = figure.axes[0].lines
-    assert then.get_ydata() == pytest.approx(2.0)
+    now, earlier, mark = figure.axes[0].lines
+    assert earlier.get_ydata() == pytest.approx(2.0)
     assert now.get_ydata() == pytest.approx(1.0)
     assert np.asarray(mark.get_xydata()).tolist() == [[1500.0, 3.0]]
     assert svg(figure).startswith("<svg")

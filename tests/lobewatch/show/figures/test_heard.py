@@ -22,7 +22,7 @@ SLOT = Cut(4, 1.0, "down", 1.4e9, 5e8)
 
 
 def heard(word: CutWord, speed_rpm: float, depth: float, **changes: Any) -> HeardCut:
-    made = HeardCut(
+    cut = HeardCut(
         id=f"c{speed_rpm:.0f}",
         at=datetime(2026, 2, 1, tzinfo=UTC),
         program="A",
@@ -39,7 +39,7 @@ def heard(word: CutWord, speed_rpm: float, depth: float, **changes: Any) -> Hear
         by="ear",
         software="lobewatch 1",
     )
-    return replace(made, **changes)
+    return replace(cut, **changes)
 
 
 def test_cuts_stand_where_they_were_made_and_say_what_they_chattered_at() -> None:
@@ -65,9 +65,9 @@ def test_what_cuts_have_taught_is_a_line_in_a_band_of_its_own() -> None:
     lobes = StabilityLobes(speed, depth, depth, np.full(5, "hopf"), depth[:, np.newaxis], "zero order")
     learnt = LobesAtSpeed(4, lobes, LimitBand(speed, 0.5 * depth, 3 * depth))
     (axes,) = lobes_figure(speed, {"now": 2 * depth}, learnt=learnt).axes
-    (line,) = [one for one in axes.lines if one.get_label() == "at speed, learnt from 4 test cuts"]
+    (line,) = [artist for artist in axes.lines if artist.get_label() == "at speed, learnt from 4 test cuts"]
     assert line.get_ydata() == pytest.approx(1.0)
-    (band,) = [one for one in axes.collections if "left open" in str(one.get_label())]
+    (band,) = [artist for artist in axes.collections if "left open" in str(artist.get_label())]
     edge = np.asarray(band.get_paths()[0].vertices)[:, 1]
     assert (edge.min(), edge.max()) == pytest.approx((0.5, 3.0))
 
@@ -76,21 +76,23 @@ def test_lobes_at_speed_are_those_of_modes_and_coefficients_that_were_learnt(sho
     shop.run(("A", 12900, 1.5))
     shop.tap_both(0, 1.0)
     logbook = shop.logbook
-    (rest,) = logbook.verdicts()
-    assert lobes_at_speed([rest], logbook.machine) is None
+    (at_rest,) = logbook.verdicts()
+    assert lobes_at_speed([at_rest], logbook.machine) is None
     for number in range(3):
-        made = heard("stable", 12900.0, 1e-3 + 1e-4 * number, program="A", cut=logbook.machine.build_cut(rest.program))
-        keep_cut(logbook.folder, made)
+        cut = heard(
+            "stable", 12900.0, 1e-3 + 1e-4 * number, program="A", cut=logbook.machine.build_cut(at_rest.program)
+        )
+        keep_cut(logbook.folder, cut)
     logbook = shop.logbook
     (taught,) = logbook.verdicts()
-    found = lobes_at_speed([taught], logbook.machine)
-    assert found is not None
-    assert found.cuts == 3
+    learnt = lobes_at_speed([taught], logbook.machine)
+    assert learnt is not None
+    assert learnt.cuts == 3
     assert taught.assembly is not None
     softer = float(np.min(lobes_of(taught.at_speed.moved(taught.assembly), logbook.machine)["A"].depth))
-    push = (taught.program.tangential_n_per_mm2 or 0) / (rest.program.tangential_n_per_mm2 or 1)
-    assert float(np.min(found.lobes.depth)) == pytest.approx(softer / push, rel=0.1)
-    assert np.all(found.band.low <= found.lobes.depth)
+    push = (taught.program.tangential_n_per_mm2 or 0) / (at_rest.program.tangential_n_per_mm2 or 1)
+    assert float(np.min(learnt.lobes.depth)) == pytest.approx(softer / push, rel=0.1)
+    assert np.all(learnt.band.low <= learnt.lobes.depth)
     html = render_report(logbook, "reference", "x")
     assert ">at speed, learnt from 3 test cuts</text>" in html
     assert "at speed: limiting depth (mm)" in html
@@ -120,8 +122,8 @@ def test_the_report_shows_and_lists_test_cuts(shop: Any) -> None:
     html = render_report(shop.logbook, "reference", "x")
     assert "Test cuts" not in html
     cut = shop.logbook.machine.build_cut(shop.logbook.machine.program[0])
-    made = heard("chatter", 9000.0, 2e-3, program="A <1>", cut=cut, chatter_frequency_hz=1725.0)
-    keep_cut(shop.logbook.folder, made)
+    stored = heard("chatter", 9000.0, 2e-3, program="A <1>", cut=cut, chatter_frequency_hz=1725.0)
+    keep_cut(shop.logbook.folder, stored)
     html = render_report(shop.logbook, "reference", "x")
     assert (
         "<td>A &lt;1&gt;</td><td>reference</td><td>9000</td><td>2</td><td>chatter at 1725 Hz</td><td>ear</td>" in html

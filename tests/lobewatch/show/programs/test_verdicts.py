@@ -38,7 +38,7 @@ def program(name: str = "A", speed: float = 12900.0, depth: float = 2.0) -> Prog
     )
 
 
-def found(
+def a_verdict(
     word: Word = Word.STABLE,
     limit: float = 3e-3,
     low: float = 2e-3,
@@ -78,7 +78,7 @@ def test_there_is_one_table_of_words() -> None:
 def test_no_number_of_a_table_is_cut(
     width: int, name: str, speed: float, depth: float, limit: float, spread: float, word: Word
 ) -> None:
-    one = Verdict(
+    verdict = Verdict(
         program(name, speed, depth),
         word,
         limit=limit,
@@ -86,8 +86,8 @@ def test_no_number_of_a_table_is_cut(
         limit_high=limit * spread,
         chance_turning=0.004,
     )
-    lines = printed(one, width=width)
-    numbers = (f"{speed:g}", f"{depth:g}", limits_text(one), "< 1 %", "> 20 %")
+    lines = printed(verdict, width=width)
+    numbers = (f"{speed:g}", f"{depth:g}", limits_text(verdict), "< 1 %", "> 20 %")
     assert re.search(" +".join(map(re.escape, numbers)), "\n".join(lines)), lines
     assert max(map(len, lines)) <= max(width, 94)
     assert "…" not in "".join(lines) or "…" in name
@@ -105,54 +105,54 @@ def test_long_names_and_large_numbers_fit_80_columns() -> None:
         limit_high=math.inf,
         chance_turning=0.999,
     )
-    lines = printed(large, found())
+    lines = printed(large, a_verdict())
     assert max(map(len, lines)) <= 80
     row = next(line for line in lines if "120000" in line)
     assert re.search(r"120000 +123\.45 +98\.77 \(54\.32\.\.> 2469\) +> 99 % +> 20 % +not stable$", row), row
-    said = " ".join(line[: lines[0].index("speed") - 1].strip() for line in lines[2:])
-    assert re.sub(r"\s", "", name) in re.sub(r"\s", "", said)
+    wrapped = " ".join(line[: lines[0].index("speed") - 1].strip() for line in lines[2:])
+    assert re.sub(r"\s", "", name) in re.sub(r"\s", "", wrapped)
 
 
 @pytest.mark.parametrize(
-    ("one", "text"),
+    ("verdict", "text"),
     [
-        (found(), "3.00 (2.00..4.00)"),
-        (found(limit=0.12345, low=0.1, high=1.23456), "123.5 (100.0..1235)"),
-        (found(limit=math.inf, low=30e-3, high=math.inf), "> 40.00 (30.00..> 40.00)"),
-        (found(limit=math.inf, low=math.inf, high=math.inf), "> 40.00"),
-        (found(Word.UNKNOWN, math.nan, math.nan, math.nan), "-"),
+        (a_verdict(), "3.00 (2.00..4.00)"),
+        (a_verdict(limit=0.12345, low=0.1, high=1.23456), "123.5 (100.0..1235)"),
+        (a_verdict(limit=math.inf, low=30e-3, high=math.inf), "> 40.00 (30.00..> 40.00)"),
+        (a_verdict(limit=math.inf, low=math.inf, high=math.inf), "> 40.00"),
+        (a_verdict(Word.UNKNOWN, math.nan, math.nan, math.nan), "-"),
     ],
 )
-def test_limits_with_their_band(one: Verdict, text: str) -> None:
-    assert limits_text(one) == text
+def test_limits_with_their_band(verdict: Verdict, text: str) -> None:
+    assert limits_text(verdict) == text
 
 
 @pytest.mark.parametrize(
     ("chance", "text"), [(0.0, "< 1 %"), (0.004, "< 1 %"), (0.18, "18 %"), (1.0, "> 99 %"), (math.nan, "-")]
 )
 def test_chance_of_chatter_once_it_turns(chance: float, text: str) -> None:
-    assert turning_text(found(chance=chance)) == text
+    assert turning_text(a_verdict(chance=chance)) == text
 
 
 def test_a_word_says_what_it_must_in_the_same_breath() -> None:
-    beyond = found(drive_limit=1e-3)
+    beyond = a_verdict(drive_limit=1e-3)
     assert verdict_text(beyond) == "stable, beyond the drive (predicted)"
-    assert [is_safe(one) for one in (found(), beyond, found(Word.DOUBTFUL), found(Word.UNKNOWN))] == [True] + [
-        False
-    ] * 3
-    assert verdict_text(found(Word.UNKNOWN)) == "unknown"
+    assert [
+        is_safe(verdict) for verdict in (a_verdict(), beyond, a_verdict(Word.DOUBTFUL), a_verdict(Word.UNKNOWN))
+    ] == [True] + [False] * 3
+    assert verdict_text(a_verdict(Word.UNKNOWN)) == "unknown"
 
 
 def test_json_of_what_is_not_known() -> None:
-    said = verdict_json(Verdict(program(), Word.UNKNOWN))
-    assert (said["stable"], said["verdict"], said["decided_by"], said["doubt"], said["cuts"]) == (
+    payload = verdict_json(Verdict(program(), Word.UNKNOWN))
+    assert (payload["stable"], payload["verdict"], payload["decided_by"], payload["doubt"], payload["cuts"]) == (
         None,
         "unknown",
         None,
         None,
         0,
     )
-    assert all(math.isnan(said[key]) for key in ("limit_mm", "limit_low_mm", "limit_high_mm", "chance_turning"))
+    assert all(math.isnan(payload[key]) for key in ("limit_mm", "limit_low_mm", "limit_high_mm", "chance_turning"))
 
 
 def test_speeds_are_read_in_groups() -> None:

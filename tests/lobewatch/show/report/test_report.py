@@ -29,13 +29,13 @@ def run(*arguments: object) -> Result:
 
 def numbers(html: str, name: str) -> tuple[list[str], list[list[Any]]]:
     """Of the figure with this button."""
-    found = re.search(rf'data-numbers="([^"]+)" data-name="{name}"', html)
-    assert found is not None, name
-    block = re.search(rf'id="{found[1]}">(.*?)</script>', html, re.DOTALL)
+    button = re.search(rf'data-numbers="([^"]+)" data-name="{name}"', html)
+    assert button is not None, name
+    block = re.search(rf'id="{button[1]}">(.*?)</script>', html, re.DOTALL)
     assert block is not None
-    made = json.loads(block[1])
-    assert all(len(line) == len(made["heads"]) for line in made["lines"])
-    return made["heads"], made["lines"]
+    table = json.loads(block[1])
+    assert all(len(line) == len(table["heads"]) for line in table["lines"])
+    return table["heads"], table["lines"]
 
 
 @pytest.fixture
@@ -54,8 +54,8 @@ def test_a_report_says_first_what_matters_and_holds_its_numbers(worn: Shop) -> N
     first = html[html.index('<div class="first">') : html.index("<h2")]
     standing = logbook.standing(now)
     light = {"alarm": "✗ ALARM", "warn": "! WARNING"}[standing.light]
-    for said in (light, "falling since 2026-01-", " % a month now (", "A &lt;1&gt;", "Tap next by 2026-07-14"):
-        assert said in first, said
+    for words in (light, "falling since 2026-01-", " % a month now (", "A &lt;1&gt;", "Tap next by 2026-07-14"):
+        assert words in first, words
     assert standing.next_step in unescape(first)
     assert re.search(r"<td>(not stable|doubtful) (between|not before) .*?</td><td>", first)
     heads, lines = numbers(html, "natural-frequency")
@@ -90,8 +90,8 @@ def test_all_machines_of_a_folder_are_one_page(shop: Shop, tmp_path: Path) -> No
     type(shop)(tmp_path / "fresh")
     (tmp_path / "torn").mkdir()
     (tmp_path / "torn" / "machine.toml").write_text("x =")
-    told = run("report", tmp_path)
-    assert told.exit_code == 0, told.output
+    result = run("report", tmp_path)
+    assert result.exit_code == 0, result.output
     html = (tmp_path / "report.html").read_text("utf-8")
     assert re.findall(r'<th scope="row"><strong>(.*?)</strong>', html)[0] == "m"
     assert "3 machines" in html
@@ -120,16 +120,16 @@ def test_a_name_cannot_end_the_style_sheet() -> None:
 def lights(shop: Shop, path: Path, seed: int) -> tuple[str, str, str]:
     """Of dashboard, report and page of all machines, for a machine tapped at random."""
     random = np.random.default_rng(seed)
-    one = type(shop)(path / "m")
-    one.put("")
+    machine = type(shop)(path / "m")
+    machine.put("")
     frequency, days = 1713.0, float(random.uniform(-900, -600))
     for _ in range(int(random.integers(1, 6))):
         days += random.exponential(60)
         frequency *= 1 - float(random.choice([0.0, 0.002, 0.06]) * random.random())
-        one.tap(days, frequency, "xy"[random.integers(2)], stiffness=3.5e7 * float(random.choice([1.0, 1.0, 5.0])))
-    plant = Plant({"m": one.path}).standings()
-    newest = one.logbook.newest()
-    html = render_report(one.logbook, newest.tool, newest.direction)
+        machine.tap(days, frequency, "xy"[random.integers(2)], stiffness=3.5e7 * float(random.choice([1.0, 1.0, 5.0])))
+    plant = Plant({"m": machine.path}).standings()
+    newest = machine.logbook.newest()
+    html = render_report(machine.logbook, newest.tool, newest.direction)
     assert run("report", path).exit_code == 0
     fleet = (path / "report.html").read_text("utf-8")
     words = {"✗ ALARM": "alarm", "? UNKNOWN": "unknown", "! WARNING": "warn", "✓ GOOD": "good"}

@@ -23,21 +23,21 @@ def printed(*texts: object, **options: object) -> str:
 
 
 def cells(*row: str) -> str:
-    made = table("<name", "value")
-    made.add_row(*row)
-    return printed(made, width=120)
+    rows = table("<name", "value")
+    rows.add_row(*row)
+    return printed(rows, width=120)
 
 
 @pytest.mark.parametrize("text", [HARM, Text(HARM)])
 def test_texts_cannot_steer_the_terminal(text: object) -> None:
-    said = printed(text)
-    assert said.isprintable() or said.rstrip("\n").isprintable()
-    assert "\ufffd" in said
+    output = printed(text)
+    assert output.isprintable() or output.rstrip("\n").isprintable()
+    assert "\ufffd" in output
 
 
 def test_the_console_itself_still_can() -> None:
-    said = printed("[bold]a[/]", force_terminal=True, color_system="standard")
-    assert "\x1b[1ma" in said
+    output = printed("[bold]a[/]", force_terminal=True, color_system="standard")
+    assert "\x1b[1ma" in output
     to = io.StringIO()
     console = Terminal(file=to, force_terminal=True)
     console.bell()
@@ -47,9 +47,9 @@ def test_the_console_itself_still_can() -> None:
 
 def test_lines_of_a_text_stay_and_rows_of_a_table_are_never_broken() -> None:
     assert printed("one\ntwo") == "one\ntwo\n"
-    said = cells("one\ntwo\tthree", "1")
-    assert "one\ufffdtwo\ufffdthree" in said
-    assert said.count("\n") == 2
+    output = cells("one\ntwo\tthree", "1")
+    assert "one\ufffdtwo\ufffdthree" in output
+    assert output.count("\n") == 2
 
 
 @given(st.text())

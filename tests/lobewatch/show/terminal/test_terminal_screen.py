@@ -188,14 +188,14 @@ def test_lines_for_a_log_tell_everything_once() -> None:
     for state in states:
         for _ in range(2):
             printer.show(state)
-    said = console.file.getvalue()  # type: ignore[attr-defined]
-    assert said.count("TAPS, 25600 Hz. TAP the tool") == 1
-    assert said.count("going on with the test begun today") == 1
-    assert said.count("! hum: 1 N rms at 50 Hz") == 1
-    assert "full of room" not in said
-    assert said.count(" / 10") == 1
-    assert "  1 / 10  ✗ DOUBLE HIT  Second peak 12 ms after the first (18 %): let it bounce [back].  (310 N)" in said
-    assert said.count(away) == 1
+    log = console.file.getvalue()  # type: ignore[attr-defined]
+    assert log.count("TAPS, 25600 Hz. TAP the tool") == 1
+    assert log.count("going on with the test begun today") == 1
+    assert log.count("! hum: 1 N rms at 50 Hz") == 1
+    assert "full of room" not in log
+    assert log.count(" / 10") == 1
+    assert "  1 / 10  ✗ DOUBLE HIT  Second peak 12 ms after the first (18 %): let it bounce [back].  (310 N)" in log
+    assert log.count(away) == 1
 
 
 def test_what_a_trial_hit_says_is_a_line_of_its_own_as_it_is_in_no_list() -> None:
@@ -203,8 +203,8 @@ def test_what_a_trial_hit_says_is_a_line_of_its_own_as_it_is_in_no_list() -> Non
     printer = TapPrinter(Session(replace(STATE, hits=())), console)
     printer.show(replace(STATE, word=TapStep.REFUSED, verdict="double hit", trial=True, reason="Bounce back.", hits=()))
     printer.show(replace(STATE, word=TapStep.REFUSED, verdict="too soft", reason="Hit harder.", hits=(GOOD,)))
-    said = console.file.getvalue()  # type: ignore[attr-defined]
-    assert said.splitlines() == ["Bounce back.", "  1 / 10  ✓ GOOD  (231 N)"]
+    log = console.file.getvalue()  # type: ignore[attr-defined]
+    assert log.splitlines() == ["Bounce back.", "  1 / 10  ✓ GOOD  (231 N)"]
 
 
 def test_a_word_ahead_of_its_hit_rings_once_and_the_next_hit_again(terminal: int) -> None:

@@ -20,7 +20,7 @@ from lobewatch.history.history import Row, Values
 from lobewatch.history.row_bytes import encode_row
 from lobewatch.machine import TapEntry
 from lobewatch.tool.assembly import TOGETHER
-from lobewatch.tool.order import Place, earlier, places
+from lobewatch.tool.order import Place, earlier_numbers, places
 from lobewatch.tool.series import FollowedMode
 
 
@@ -52,12 +52,12 @@ class _Archive:
         self._followed = FollowedModes()
 
     def ground(self, place: Place) -> _Ground:
-        before = (self.rows[number] for number in earlier(place, self.places))
+        before = (self.rows[number] for number in earlier_numbers(place, self.places))
         last = next((row.followed for row in before if math.isfinite(row.followed[0]) and not row.questions), None)
-        if place.other is None:
-            return _Ground(place.said, last, "", ())
-        other = self.places[place.other].entry
-        return _Ground(place.said, last, other.id, self._near(place, datetime.fromisoformat(other.time)))
+        if place.across is None:
+            return _Ground(place.remarks, last, "", ())
+        other = self.places[place.across].entry
+        return _Ground(place.remarks, last, other.id, self._near(place, datetime.fromisoformat(other.time)))
 
     def _near(self, place: Place, then: datetime) -> tuple[FollowedMode, ...]:
         if datetime.fromisoformat(place.entry.time) - then <= TOGETHER:
@@ -112,7 +112,7 @@ class StillHolding:
         if tap_id in self._alike:
             return True
         number = self._numbers.get(tap_id)
-        return number is not None and place.other is not None and rows[place.other] is self._then.rows[number]
+        return number is not None and place.across is not None and rows[place.across] is self._then.rows[number]
 
 
 def _content(row: Row) -> bytes:

@@ -15,7 +15,7 @@ from lobewatch.machine import DamagedTapError, MachineFolder
 from lobewatch.measuring.measurement import Measurement, TapFit, interpret_fit, measure
 from lobewatch.measuring.questions import open_questions, with_answers
 from lobewatch.tool.assembly import Assembly, assemble
-from lobewatch.tool.order import Place, earlier
+from lobewatch.tool.order import Place, earlier_numbers
 from lobewatch.tool.prediction import predict
 from lobewatch.tool.series import FollowedMode
 from modal import Mode
@@ -40,10 +40,11 @@ class TapMeasurements:
         """What one tap test says."""
         measurement = self._measurements.pop(place.entry.id, None)
         if measurement is None:
-            before = (rows[number] for number in earlier(place, self._places))
+            before = (rows[number] for number in earlier_numbers(place, self._places))
             last = next((row.mode for row in before if row.mode is not None and not row.questions), None)
             measurement = self._measure(place, last)
-            measurement = replace(measurement, remarks=with_answers((*measurement.remarks, *place.said), place.entry))
+            remarks = with_answers((*measurement.remarks, *place.remarks), place.entry)
+            measurement = replace(measurement, remarks=remarks)
         self._measurements[place.entry.id] = measurement
         if len(self._measurements) > KEPT:
             del self._measurements[next(iter(self._measurements))]
@@ -58,7 +59,7 @@ class TapMeasurements:
     def assembly_after(self, place: Place, rows: Sequence[Row]) -> Assembly:
         """The tool of one tap test as it was known then."""
         newest = self.measurement(place, rows)
-        other = None if place.other is None else self.measurement(self._places[place.other], rows)
+        other = None if place.across is None else self.measurement(self._places[place.across], rows)
         series = self._followed.before(place, rows)
         if newest.followed is not None and not open_questions(newest.remarks):
             series[newest.direction].append(_followed_mode(newest, newest.followed))

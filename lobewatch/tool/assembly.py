@@ -19,11 +19,11 @@ from lobewatch.tool.series import FollowedMode, Scatter, frequency_at, scatter_o
 from modal import Mode
 
 Modes = Sequence[Mode] | None
-"""Of one direction at the tool tip; None where neither direction is known."""
+"""Modes of one direction at the tool tip; None where neither direction is known."""
 ABOUT_DIRECTIONS = ("one-direction", "older-direction")
 """Codes of the remarks on what is known in x and y."""
 TOGETHER = timedelta(hours=24)
-"""Taps in x and y further apart than this are called so."""
+"""Time between the taps in x and y beyond which the older one is moved, and called so; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,17 +31,17 @@ class Assembly:
     """What lobes and verdicts of one tool are computed from."""
 
     tool: str
-    """What is in the spindle."""
+    """Tool in the spindle."""
     time: datetime
-    """Of its newest tap test; of the one that the bearings come from where it is predicted."""
+    """Time of its newest tap test; of the one that the bearings come from where it is predicted."""
     tap_id: str
-    """Of the same, or where the prediction comes from."""
+    """Identity of that tap test, or where the prediction comes from."""
     x: Modes
-    """At the tool tip in x of the machine; like y where x was not tapped."""
+    """Modes at the tool tip in x of the machine; like y where x was not tapped."""
     y: Modes
-    """The same in y."""
+    """Modes at the tool tip in y; like x where y was not tapped."""
     directions: tuple[str, ...]
-    """Those that are known; what is not is taken like the other one, never as rigid."""
+    """Directions that are known; the other one is taken like it, never as rigid."""
     calibration: Calibration | None
     """The model with the newest bearings."""
     taps: Mapping[str, str]
@@ -49,11 +49,11 @@ class Assembly:
     predicted: bool
     """Whether all of it comes from the model, for a tool that was never tapped."""
     remarks: tuple[Remark, ...]
-    """What is not known, and what is in doubt."""
+    """Remarks on what is not known, and what is in doubt."""
     series: Mapping[str, Sequence[FollowedMode]] = field(default_factory=dict)
     """Tap tests of the same tool up to then, by direction; empty where it is predicted."""
     questions: tuple[Remark, ...] = ()
-    """What nobody has answered of these tap tests; until then nothing is sure."""
+    """Questions about these tap tests that nobody has answered; until then nothing is sure."""
 
     @property
     def is_sure(self) -> bool:
@@ -66,23 +66,22 @@ class Assembly:
         return f"predicted, bearings of {self.time:%Y-%m-%d}" if self.predicted else f"{self.time:%Y-%m-%d}"
 
     def scatter(self, direction: str) -> Scatter | None:
-        """From tap test to tap test; None where there are too few."""
+        """Scatter from tap test to tap test; None where there are too few."""
         return scatter_of(self.series.get(direction, ()))
 
 
-def assemble(newest: Measurement, other: Measurement | None, series: Mapping[str, Sequence[FollowedMode]]) -> Assembly:
-    """From the newest tap test of a tool and the newest one in the other direction, however old, where there is one.
+def assemble(newest: Measurement, across: Measurement | None, series: Mapping[str, Sequence[FollowedMode]]) -> Assembly:
+    """The tool by its newest tap test and the newest one across, in the other direction, where there is one.
 
-    series: tap tests of both directions up to the newest. The frequencies of an older direction are moved by as much as
-    those of the newest one have changed since.
+    series: tap tests of both directions up to the newest. The frequencies of an older direction, however old, are moved
+    by as much as those of the newest one have changed since.
     """
-    seen = [newest, *([other] if other is not None else [])]
-    modes: dict[str, Modes] = {one.direction: one.at_tip for one in seen if one.at_tip}
-    moved = None if other is None else _change_since(other.time, series.get(newest.direction, ()))
-    if other is not None and moved is not None and newest.time - other.time > TOGETHER:
-        modes |= {other.direction: [mode.scaled(moved, 1.0, "moved with the other direction") for mode in other.at_tip]}
+    taps = [newest, *([across] if across is not None else [])]
+    modes: dict[str, Modes] = {tap.direction: tap.at_tip for tap in taps if tap.at_tip}
+    moved = None if across is None else _change_since(across.time, series.get(newest.direction, ()))
+    if across is not None and moved is not None and newest.time - across.time > TOGETHER:
+        modes[across.direction] = [mode.scaled(moved, 1.0, "moved with the other direction") for mode in across.at_tip]
     directions = tuple(name for name in ("x", "y") if modes.get(name))
-    calibration = next((one.calibration for one in seen if one.calibration is not None), None)
     return Assembly(
         tool=newest.tool,
         time=newest.time,
@@ -90,40 +89,40 @@ def assemble(newest: Measurement, other: Measurement | None, series: Mapping[str
         x=modes.get("x") or modes.get("y"),
         y=modes.get("y") or modes.get("x"),
         directions=directions,
-        calibration=calibration,
-        taps={one.direction: one.tap_id for one in seen},
+        calibration=next((tap.calibration for tap in taps if tap.calibration is not None), None),
+        taps={tap.direction: tap.tap_id for tap in taps},
         predicted=False,
-        remarks=(*newest.remarks, *_about_directions(newest, other, directions, moved)),
+        remarks=(*newest.remarks, *_about_directions(newest, across, directions, moved)),
         series=series,
-        questions=tuple(in_question(one.tap_id, asked) for one in seen for asked in open_questions(one.remarks)),
+        questions=tuple(in_question(tap.tap_id, asked) for tap in taps for asked in open_questions(tap.remarks)),
     )
 
 
-def untapped_remark(tool: str, known: str) -> Remark:
-    """That one direction alone is known."""
-    missing = "y" if known == "x" else "x"
-    text = f"modes in the {known} direction alone, {missing} taken like {known}"
+def untapped_remark(tool: str, tapped: str) -> Remark:
+    """Remark that one direction alone is known."""
+    missing = "y" if tapped == "x" else "x"
+    text = f"modes in the {tapped} direction alone, {missing} taken like {tapped}"
     return Remark("one-direction", tool, text, f"tap direction {missing} of the same tool too")
 
 
 def _change_since(time: datetime, series: Sequence[FollowedMode]) -> float | None:
     """Frequency of the newest test of a series over that at a time."""
-    then = frequency_at(series, time)
-    return None if then is None else series[-1].frequency / then
+    frequency = frequency_at(series, time)
+    return None if frequency is None else series[-1].frequency / frequency
 
 
 def _about_directions(
-    newest: Measurement, other: Measurement | None, directions: Sequence[str], moved: float | None
+    newest: Measurement, across: Measurement | None, directions: Sequence[str], moved: float | None
 ) -> tuple[Remark, ...]:
     if len(directions) == 1:
         return (untapped_remark(newest.tool, directions[0]),)
-    if other is None or newest.time - other.time <= TOGETHER:
+    if across is None or newest.time - across.time <= TOGETHER:
         return ()
-    days = round((newest.time - other.time) / timedelta(days=1))
-    text = f"direction {other.direction} is that of {other.time:%Y-%m-%d}, {days} day{'s' if days > 1 else ''} older"
+    days = round((newest.time - across.time) / timedelta(days=1))
+    text = f"direction {across.direction} is that of {across.time:%Y-%m-%d}, {days} day{'s' if days > 1 else ''} older"
     if moved is not None:
         text += f", its f_n moved by {100 * (moved - 1):+.1f} % as that of {newest.direction} since"
-    return (Remark("older-direction", newest.tool, text, f"tap direction {other.direction} again"),)
+    return (Remark("older-direction", newest.tool, text, f"tap direction {across.direction} again"),)
 
 
 def speed_grid(machine: Machine) -> NDArray[np.float64]:
@@ -142,12 +141,12 @@ def lobes_of(assembly: Assembly, machine: Machine) -> dict[str, StabilityLobes]:
 def tip_lobes(
     tool: str, x: Modes, y: Modes, machine: Machine, names: Collection[str] | None = None
 ) -> dict[str, StabilityLobes]:
-    """The same of modes at the tip; names: of these cuts alone. Cuts that are alike are worked out once."""
+    """Diagrams of modes at the tip; names: of these cuts alone. Cuts that are alike are worked out once."""
     if not x and not y:
         return {}
-    speeds, known = speed_grid(machine), dict[tuple[Cut, ...], StabilityLobes]()
+    speeds, diagrams = speed_grid(machine), dict[tuple[Cut, ...], StabilityLobes]()
     wanted = {name: cuts for name, cuts in machine.cuts(tool).items() if names is None or name in names}
     for cuts in wanted.values():
-        if cuts not in known:
-            known[cuts] = lowest_of([zero_order(x, y, cut, speeds) for cut in cuts])
-    return {name: known[cuts] for name, cuts in wanted.items()}
+        if cuts not in diagrams:
+            diagrams[cuts] = lowest_of([zero_order(x, y, cut, speeds) for cut in cuts])
+    return {name: diagrams[cuts] for name, cuts in wanted.items()}

@@ -16,7 +16,7 @@ from lobewatch.machine import REFERENCE_CUT, CutTable, Machine
 from lobewatch.tool.assembly import Assembly
 
 MOST_SPEEDS = 400
-"""Speeds of a chart by semi-discretisation."""
+"""Largest number of speeds of a chart by semi-discretisation."""
 DEEPEST = 12.0
 """Depth up to which it looks, as a multiple of the lowest limit by zero order."""
 
@@ -41,21 +41,21 @@ class Chart:
     """The lobes of one cut, and what they came from."""
 
     name: str
-    """Of the cut."""
+    """Name of the cut."""
     table: CutTable
     """The cut as it stands in machine.toml."""
     assembly: Assembly
     """The tool in the spindle, as measured or predicted."""
     source: Dynamics
-    """What of it was used."""
+    """Dynamics of it that were used."""
     x: Tip | None
     """Dynamics at the tool tip in the feed direction; None where they are not known."""
     y: Tip | None
-    """The same normal to the feed."""
+    """Dynamics at the tool tip normal to the feed; None where they are not known."""
     cuts: tuple[Cut, ...]
     """The cut in SI units, one a direction of feed."""
     lobes: StabilityLobes
-    """Its limits."""
+    """Limits of the cut."""
 
 
 def cut_table(machine: Machine, name: str) -> CutTable:

@@ -10,13 +10,17 @@ from acquisition import UNSAID, Conditions, Remark
 from lobewatch.machine import TapEntry
 
 DIVIDING = {"stick_out_mm": ("stick-out", "{:g} mm"), "state": ("state", "{!r}")}
-"""What divides, its name and how a value is told."""
+"""Conditions that divide series, each with its name and how a value is told."""
 
 
 @dataclass(frozen=True)
-class _Series:
+class Mounting:
+    """A tool as it is mounted in one series."""
+
     first: TapEntry
-    known: Conditions
+    """First tap test of the series."""
+    conditions: Conditions
+    """Conditions that were stated of it so far."""
 
 
 class Mountings:
@@ -24,27 +28,29 @@ class Mountings:
 
     def __init__(self) -> None:
         """None yet."""
-        self._series: dict[str, list[_Series]] = {}
+        self._mountings: dict[str, list[Mounting]] = {}
         """By tool, the current one last."""
         self._drawbar: dict[str, float] = {}
 
     def place(self, tap: TapEntry) -> tuple[str, tuple[Remark, ...]]:
         """Identity of the first test of the series of a test, and what is to be said of it."""
-        found = self._series.setdefault(tap.tool, [])
-        if found and tap.conditions is UNSAID:
-            return found[-1].first.id, ()
-        said = [*self._about_drawbar(tap)]
-        current = found[-1] if found else None
-        mounted = tap.conditions.over(current.known) if current else tap.conditions
-        mine = next((one for one in reversed(found) if _is_like(one.known, mounted)), None)
-        if current is not None and mine is not current:
-            said += [_about_change(current, mounted, mine)]
-        if mine is not None:
-            found.remove(mine)
-            found.append(replace(mine, known=mounted))
+        mountings = self._mountings.setdefault(tap.tool, [])
+        if mountings and tap.conditions is UNSAID:
+            return mountings[-1].first.id, ()
+        remarks = [*self._about_drawbar(tap)]
+        current = mountings[-1] if mountings else None
+        conditions = tap.conditions.over(current.conditions) if current else tap.conditions
+        fitting = next(
+            (mounting for mounting in reversed(mountings) if _is_like(mounting.conditions, conditions)), None
+        )
+        if current is not None and fitting is not current:
+            remarks += [_about_change(current, conditions, fitting)]
+        if fitting is not None:
+            mountings.remove(fitting)
+            mountings.append(replace(fitting, conditions=conditions))
         else:
-            found.append(_Series(tap, mounted))
-        return found[-1].first.id, tuple(said)
+            mountings.append(Mounting(tap, conditions))
+        return mountings[-1].first.id, tuple(remarks)
 
     def _about_drawbar(self, tap: TapEntry) -> Iterator[Remark]:
         now, before = tap.conditions.drawbar_kn, self._drawbar.get(tap.tool)
@@ -56,23 +62,24 @@ class Mountings:
             yield Remark("drawbar-changed", tap.tool, text, "where it was not meant, have the drawbar looked at")
 
 
-def _is_like(one: Conditions, other: Conditions) -> bool:
-    """Whether they differ in nothing that is known of both and divides."""
-    return not _differing(one, other)
+def _is_like(first: Conditions, second: Conditions) -> bool:
+    """Whether they differ in nothing that is stated of both and divides."""
+    return not _differing(first, second)
 
 
-def _differing(one: Conditions, other: Conditions) -> list[str]:
-    mine, its = one.known, other.known
-    return [name for name in DIVIDING if name in mine and name in its and mine[name] != its[name]]
+def _differing(first: Conditions, second: Conditions) -> list[str]:
+    stated, also_stated = first.known, second.known
+    return [name for name in DIVIDING if name in stated and name in also_stated and stated[name] != also_stated[name]]
 
 
-def _about_change(before: _Series, now: Conditions, found: _Series | None) -> Remark:
-    changed = {name: DIVIDING[name] for name in _differing(before.known, now)}
-    told = ", ".join(
-        f"{label} {value.format(getattr(now, name))} after {value.format(getattr(before.known, name))}"
+def _about_change(before: Mounting, now: Conditions, earlier: Mounting | None) -> Remark:
+    """Remark on a tool that is mounted otherwise than before; earlier: its series, where it was mounted so once."""
+    changed = {name: DIVIDING[name] for name in _differing(before.conditions, now)}
+    change = ", ".join(
+        f"{label} {value.format(getattr(now, name))} after {value.format(getattr(before.conditions, name))}"
         for name, (label, value) in changed.items()
     )
-    if found is None:
-        return Remark("new-series", before.first.tool, f"{told}: a new series, compared with no test before it")
-    since = datetime.fromisoformat(found.first.time)
-    return Remark("earlier-series", before.first.tool, f"{told}: compared with the series begun {since:%Y-%m-%d}")
+    if earlier is None:
+        return Remark("new-series", before.first.tool, f"{change}: a new series, compared with no test before it")
+    since = datetime.fromisoformat(earlier.first.time)
+    return Remark("earlier-series", before.first.tool, f"{change}: compared with the series begun {since:%Y-%m-%d}")

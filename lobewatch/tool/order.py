@@ -16,19 +16,20 @@ class Place(msgspec.Struct, frozen=True, gc=False):
     """One tap test among all of a machine."""
 
     number: int
-    """From 0, the oldest."""
+    """Number from 0, the oldest."""
     entry: TapEntry
-    """Of the journal."""
+    """Tap test as it stands in the journal."""
     before: int | None
     """Place of the one before it of the same series and direction."""
-    other: int | None
+    across: int | None
     """Place of the newest one before it of the same series in another direction."""
     baseline: datetime | None = None
     """The event before it from which on all comparing begins anew; nothing before that is built on."""
     series: str = ""
-    """Its first tap test: of one tool with one stick-out in one state, both directions, since the baseline."""
-    said: tuple[Remark, ...] = ()
-    """Where the series or the drawbar force is not that of the test before."""
+    """Identity of the first tap test of its series: of one tool with one stick-out in one state, both directions, since
+    the baseline."""
+    remarks: tuple[Remark, ...] = ()
+    """Remarks where the series or the drawbar force is not that of the test before."""
 
 
 class Order:
@@ -37,24 +38,24 @@ class Order:
     def __init__(self, baselines: Sequence[datetime] = ()) -> None:
         """baselines: oldest first. None is shown yet."""
         self.places: list[Place] = []
-        """Of those that were shown."""
+        """Places of those that were shown."""
         self._baselines = baselines
         self._newest: dict[str, dict[str, int]] = {}
         self._mountings = Mountings()
 
     def add(self, tap: TapEntry) -> None:
         """The next one."""
-        found, number = self.places, len(self.places)
-        baseline = _before(tap, self._baselines) if self._baselines else None
-        if found and found[-1].baseline != baseline:
+        number, baseline = len(self.places), _before(tap, self._baselines) if self._baselines else None
+        if self.places and self.places[-1].baseline != baseline:
             self._newest, self._mountings = {}, Mountings()
-        series, said = self._mountings.place(tap)
-        mine, other = self._newest.setdefault(series, {}), None
-        for direction, newest in mine.items():
-            if direction != tap.direction and (other is None or newest > other):
-                other = newest
-        found.append(Place(number, tap, mine.get(tap.direction), other, baseline, series, said))
-        mine[tap.direction] = number
+        series, remarks = self._mountings.place(tap)
+        newest = self._newest.setdefault(series, {})
+        across = None
+        for direction, place in newest.items():
+            if direction != tap.direction and (across is None or place > across):
+                across = place
+        self.places.append(Place(number, tap, newest.get(tap.direction), across, baseline, series, remarks))
+        newest[tap.direction] = number
 
 
 def places(taps: Iterable[TapEntry], baselines: Sequence[datetime] = ()) -> list[Place]:
@@ -67,7 +68,7 @@ def places(taps: Iterable[TapEntry], baselines: Sequence[datetime] = ()) -> list
 
 def _before(tap: TapEntry, baselines: Sequence[datetime]) -> datetime | None:
     time = datetime.fromisoformat(tap.time)
-    return next((one for one in reversed(baselines) if one <= time), None)
+    return next((baseline for baseline in reversed(baselines) if baseline <= time), None)
 
 
 def earlier_numbers(place: Place, among: Sequence[Place]) -> Iterator[int]:

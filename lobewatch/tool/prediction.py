@@ -15,9 +15,10 @@ from lobewatch.tool.assembly import Assembly, Modes, untapped_remark
 from modal import Mode
 
 MODES = 8
-"""Modes worked out; those in which the tip is next to at rest are left out."""
-AT_REST = 50.0
-"""A mode so many times stiffer at the tip than the softest one does not move a limit by more than a few percent."""
+"""Number of modes worked out; those in which the tip is next to at rest are left out."""
+STIFFEST = 50.0
+"""Stiffness at the tip over that of the softest mode, beyond which a mode does not move a limit by more than a few
+percent."""
 
 
 def predict(machine: Machine, newest: Sequence[Measurement], tool: str) -> Assembly:
@@ -30,44 +31,44 @@ def predict(machine: Machine, newest: Sequence[Measurement], tool: str) -> Assem
     if not newest:
         model_state(machine, None, tool)
         raise DataError(f"tool {tool!r} was never tapped, and no tap test has set the bearings of the model yet")
-    found = {one.direction: _in_direction(machine, one, tool) for one in newest}
-    modes: dict[str, Modes] = {direction: seen for direction, (seen, _) in found.items()}
-    ids = " and ".join(one.tap_id for one in newest)
+    predictions = {tap.direction: _in_direction(machine, tap, tool) for tap in newest}
+    modes: dict[str, Modes] = {direction: at_tip for direction, (at_tip, _) in predictions.items()}
+    ids = " and ".join(tap.tap_id for tap in newest)
     remark = Remark("predicted", f"tool {tool!r}", f"predicted by the model with the bearings of {ids}", "tap it")
-    known = tuple(name for name in ("x", "y") if name in modes)
+    directions = tuple(name for name in ("x", "y") if name in modes)
     return Assembly(
         tool=tool,
         time=newest[0].time,
         tap_id=f"prediction from {newest[0].tap_id}",
         x=modes.get("x") or modes.get("y"),
         y=modes.get("y") or modes.get("x"),
-        directions=known,
-        calibration=found[newest[0].direction][1],
+        directions=directions,
+        calibration=predictions[newest[0].direction][1],
         taps={},
         predicted=True,
-        remarks=(remark, *([untapped_remark(tool, known[0])] if len(known) == 1 else [])),
+        remarks=(remark, *([untapped_remark(tool, directions[0])] if len(directions) == 1 else [])),
     )
 
 
-def _in_direction(machine: Machine, one: Measurement, tool: str) -> tuple[list[Mode], Calibration]:
+def _in_direction(machine: Machine, tap: Measurement, tool: str) -> tuple[list[Mode], Calibration]:
     """The modes that the model shows in the band that was looked at, moved along with the softest one."""
-    state, followed = model_state(machine, one, tool), one.followed
+    state, followed = model_state(machine, tap, tool), tap.followed
     if followed is None:
-        raise DataError(f"{one.tap_id}: no mode is followed")
+        raise DataError(f"{tap.tap_id}: no mode is followed")
     frequency, stiffness = modes_at(state.spindle, MODES)
     softest = int(np.argmin(stiffness))
-    seen = stiffness < AT_REST * stiffness[softest]
+    shown = stiffness < STIFFEST * stiffness[softest]
     if machine.mode.band_hz is not None:
         low, high = (edge / followed.frequency * frequency[softest] for edge in machine.mode.band_hz)
-        seen &= (frequency >= low) & (frequency <= high)
+        shown &= (frequency >= low) & (frequency <= high)
     modes = [
         Mode(
             float(frequency[i]),
             followed.damping_ratio,
             float(stiffness[i]),
-            method=f"model, bearings of {one.tap_id}",
+            method=f"model, bearings of {tap.tap_id}",
             phase_deg=followed.phase_deg if i == softest else 0.0,
         )
-        for i in np.flatnonzero(seen).tolist()
+        for i in np.flatnonzero(shown).tolist()
     ]
     return modes, calibrate(state.spindle, float(frequency[softest]), mode=softest + 1)

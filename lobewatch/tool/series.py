@@ -11,22 +11,22 @@ import numpy as np
 from scipy.special import stdtrit
 
 ENOUGH = 8
-"""Tap tests from which on a series tells its own scatter."""
+"""Number of tap tests from which on a series tells its own scatter."""
 RECENT = 12
-"""Tap tests that the rate of the fall is taken from, at most; three at least."""
+"""Largest number of tap tests that the rate of the fall is taken from; three at least."""
 
 
 class FollowedMode(NamedTuple):
     """The mode followed in one tap test."""
 
     time: datetime
-    """When."""
+    """Time of the tap test."""
     frequency: float
     """Natural frequency (Hz)."""
     damping_ratio: float
     """Damping ratio (-)."""
     stiffness: float
-    """Stiffness (N/m)."""
+    """Modal stiffness (N/m)."""
     phase_deg: float = 0.0
     """Phase of the modal constant (degrees)."""
 
@@ -35,17 +35,17 @@ class Scatter(NamedTuple):
     """How far one tap test is from the next, relative but for the phase; half-widths that 95 % stay within."""
 
     frequency: float
-    """Of the natural frequency."""
+    """Half-width of the natural frequency."""
     damping_ratio: float
-    """Of the damping ratio."""
+    """Half-width of the damping ratio."""
     stiffness: float
-    """Of the stiffness."""
+    """Half-width of the stiffness."""
     phase_deg: float = 0.0
-    """Of the phase of the modal constant (degrees)."""
+    """Half-width of the phase of the modal constant (degrees)."""
 
 
 def scatter_of(series: Sequence[FollowedMode]) -> Scatter | None:
-    """From the steps between neighbours, so that a slow fall does not count; None below 8 tap tests."""
+    """Scatter from the steps between neighbours, so that a slow fall does not count; None below 8 tap tests."""
     if len(series) < ENOUGH:
         return None
     values = np.array([point[1:] for point in series])
@@ -76,4 +76,5 @@ def frequency_at(series: Sequence[FollowedMode], time: datetime) -> float | None
     if not behind:
         return None
     near = series[behind - 1 : behind + 1]
-    return float(np.interp(time.timestamp(), [one.time.timestamp() for one in near], [one.frequency for one in near]))
+    times = [point.time.timestamp() for point in near]
+    return float(np.interp(time.timestamp(), times, [point.frequency for point in near]))

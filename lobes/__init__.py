@@ -5,17 +5,24 @@ from lobes.average_angle import average_angle
 from lobes.coefficients import Coefficients, cutting_coefficients, tangential_and_radial
 from lobes.cut import Cut, Direction
 from lobes.cutting_power import deepest_for_drive, mean_torque
-from lobes.floquet import MillingRows, growth, joined_rows, piece_numbers, rows_of
+from lobes.floquet import (
+    MillingRows,
+    ProgramLimit,
+    growth,
+    joined_rows,
+    piece_numbers,
+    program_limit,
+    rows_of,
+    spectral_radius,
+    stability_boundary,
+)
 from lobes.history import SldHistory
 from lobes.history_file import read_history, write_history
 from lobes.lowest_of import lowest_of
 from lobes.milling_system import milling_system
 from lobes.pockets import Pocket, PocketShift, best_pockets, pocket_shifts, pockets
 from lobes.program import Program
-from lobes.program_limit import ProgramLimit, program_limit
 from lobes.radial_lobes import RadialLobes, radial_lobes
-from lobes.spectral_radius import spectral_radius
-from lobes.stability_boundary import stability_boundary
 from lobes.stability_lobes import Lobe, MethodName, Minimum, StabilityLobes
 from lobes.zero_order import zero_order
 

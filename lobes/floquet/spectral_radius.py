@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from lobes.cut import Cut
-from lobes.depths import check_depths
-from lobes.floquet import largest_multipliers, piece_numbers, rows_of
+from lobes.floquet.depths import check_depths
+from lobes.floquet.milling_rows import rows_of
+from lobes.floquet.multipliers import largest_multipliers
+from lobes.floquet.pieces import piece_numbers
 from lobes.milling_system import milling_system
 from lobes.speeds import check_speeds
 from modal import Mode

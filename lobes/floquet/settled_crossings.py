@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lobes.crossings import Growth, find_crossings
-from lobes.floquet import MillingRows, growth, largest_multipliers, piece_numbers
+from lobes.floquet.crossings import Growth, find_crossings
+from lobes.floquet.growth import growth
+from lobes.floquet.milling_rows import MillingRows
+from lobes.floquet.multipliers import largest_multipliers
+from lobes.floquet.pieces import piece_numbers
 
 REAL = 1e-4
 """A multiplier whose angle is this near to pi (rad) is real."""

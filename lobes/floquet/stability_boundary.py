@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from lobes.chatter_frequency import chatter_frequency
 from lobes.cut import Cut
-from lobes.floquet import MillingRows, largest_multipliers, rows_of
+from lobes.floquet.milling_rows import MillingRows, rows_of
+from lobes.floquet.multipliers import largest_multipliers
+from lobes.floquet.settled_crossings import is_flip, settled_crossings
 from lobes.milling_system import MillingSystem, milling_system
-from lobes.settled_crossings import is_flip, settled_crossings
 from lobes.speeds import check_speeds
 from lobes.stability_lobes import StabilityLobes
 from modal import Mode

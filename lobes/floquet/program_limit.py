@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from lobes.floquet import MillingRows, growth, rows_of
+from lobes.floquet.growth import growth
+from lobes.floquet.milling_rows import MillingRows, rows_of
+from lobes.floquet.settled_crossings import settled_crossings
+from lobes.floquet.stability_boundary import chatter_at
 from lobes.milling_system import milling_system
 from lobes.program import SHARES, Modes, Program
-from lobes.settled_crossings import settled_crossings
-from lobes.stability_boundary import chatter_at
 from lobes.stability_lobes import MethodName
 
 DEEPEST = 20.0

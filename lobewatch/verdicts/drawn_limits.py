@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from lobes.program_limit import DEEPEST
+from lobes.floquet.program_limit import DEEPEST
 from lobewatch.verdicts.draws import ProgramDraws
 
 TRIED = np.array([0.75, 1.0, 1.4])

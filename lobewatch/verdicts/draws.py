@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes import MillingRows, Program, ProgramLimit, growth, joined_rows, milling_system, piece_numbers, rows_of
-from lobes.program_limit import DEEPEST
+from lobes.floquet.program_limit import DEEPEST
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.doubt import Doubt

@@ -10,7 +10,7 @@ import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
-from lobes.program_limit import DEEPEST
+from lobes.floquet.program_limit import DEEPEST
 from lobewatch.logbook import Logbook
 from lobewatch.show.programs.doubts import doubt_json, reading_lines
 from lobewatch.show.terminal.output import remark_lines, table

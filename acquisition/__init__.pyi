@@ -74,7 +74,7 @@ from .sensors import (
 from .source import Device, DeviceIdentity, Source
 from .tap import UNSAID, Circumstances, Conditions, SourceFile, TapTest, machine_of, named_in_id, new_tap_id
 from .taps import Faults, TapsEmulator, TapsSource
-from .verdicts import Verdict, average_good, check_hit, judge_hit
+from .verdicts import HitVerdict, average_good, check_hit, judge_hit
 
 __all__ = [
     "STANDARD_GRAVITY",
@@ -111,6 +111,7 @@ __all__ = [
     "Hit",
     "HitFlags",
     "HitSearch",
+    "HitVerdict",
     "MassCalibration",
     "MeasuredRate",
     "MeasuredSkew",
@@ -132,7 +133,6 @@ __all__ = [
     "TapsEmulator",
     "TapsSource",
     "Trigger",
-    "Verdict",
     "atomic_write",
     "average_good",
     "calibrate_by_mass",

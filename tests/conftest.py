@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Channel, HammeredStructure, Hammering, HitFlags, Structure
-from lobewatch.tap.state import Check, Outcome, Plots, TakenHit, TapState, Word
+from lobewatch.tap.state import Check, Outcome, Plots, TakenHit, TapState, TapStep
 
 DATA = Path(__file__).parent / "data"
 
@@ -83,12 +83,12 @@ class ScriptedSession:
     """A live tap test without device and clock: the test says what it shows next."""
 
     def __init__(self) -> None:
-        self.state = TapState(1, Word.CHECKING, "mill-3, tool reference, direction x", device="DI-2108, 51200 Hz")
+        self.state = TapState(1, TapStep.CHECKING, "mill-3, tool reference, direction x", device="DI-2108, 51200 Hz")
         self.undone = threading.Event()
         self.stopped = threading.Event()
         self.refusal = ""
 
-    def show(self, word: Word, **changes: object) -> TapState:
+    def show(self, word: TapStep, **changes: object) -> TapState:
         """The next state."""
         self.state = replace(self.state, revision=self.state.revision + 1, word=word, **changes)  # type: ignore[arg-type]
         return self.state
@@ -97,14 +97,14 @@ class ScriptedSession:
         """The self-check, one line of it failed."""
         passed = [("device", "DI-2108, serial 5C0A"), ("hum", "0.02 N at 50 Hz"), ("disk", "112 GB free")]
         failed = Check("noise floor", False, "4.1 N rms is above 2 N: is the spindle stopped, the hammer at rest?")
-        self.show(Word.CHECKING, checks=(*(Check(name, True, text) for name, text in passed), failed))
+        self.show(TapStep.CHECKING, checks=(*(Check(name, True, text) for name, text in passed), failed))
 
     def hit(self, flags: HitFlags = HitFlags.OK, reason: str = "") -> None:
         """One more hit."""
         good = self.state.good + (not flags)
         taken = TakenHit(len(self.state.hits) + 1, flags, 312.0 + 7 * len(self.state.hits))
         self.show(
-            Word.REFUSED if flags else Word.GOOD,
+            TapStep.REFUSED if flags else TapStep.GOOD,
             verdict=flags.words,
             reason=reason,
             good=good,
@@ -119,7 +119,7 @@ class ScriptedSession:
         """All hits are there."""
         texts = ("f_1 1688.20 ± 0.12 Hz, 1.9 % below the first test", "K 33.1 ± 0.2 N/um, bearing stiffness 1190 N/um")
         done = Outcome("warn", texts, "Tap again in 14 days, and run lobewatch check mill-3 today.")
-        self.show(Word.DONE, reason="", outcome=done)
+        self.show(TapStep.DONE, reason="", outcome=done)
 
     def undo(self) -> None:
         """Take back the last good hit."""
@@ -128,7 +128,7 @@ class ScriptedSession:
         hits = list(self.state.hits)
         last = max(i for i, hit in enumerate(hits) if not hit.flags and not hit.undone)
         hits[last] = replace(hits[last], undone=True)
-        self.show(Word.TAP, hits=tuple(hits), good=self.state.good - 1)
+        self.show(TapStep.TAP, hits=tuple(hits), good=self.state.good - 1)
         self.undone.set()
 
     def stop(self) -> None:

@@ -12,7 +12,7 @@ from acquisition.hits.pulse import Pulse, baseline, find_pulse, samples_before
 from acquisition.verdicts.distance_from_mean import distance_from_mean
 from acquisition.verdicts.find_overload import Overload, find_overload
 from acquisition.verdicts.second_touch import find_second_touch
-from acquisition.verdicts.verdict import Verdict
+from acquisition.verdicts.verdict import HitVerdict
 
 HARD_SHARE_OF_SCALE = 0.9
 """A pulse above this share of the force range is too hard: the sensor may saturate before its converter does."""
@@ -28,7 +28,7 @@ FAR_NOISE_RATIO = 4.0
 """... and at least this many times what the scatter of the hits in the mean would give."""
 
 
-def judge_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | None = None) -> Verdict:
+def judge_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | None = None) -> HitVerdict:
     """All that is wrong with a hit; its flags are falsy when it may be averaged.
 
     Without `mean` and `band` the time signals alone decide. With the mean of 3 or more good hits, one without other
@@ -40,16 +40,16 @@ def judge_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | Non
         findings[HitFlags.LOST_SCANS] = f"{hit.lost_scans} scans are missing in this record"
     if _is_swapped(hit):
         findings[HitFlags.SWAPPED_CHANNELS] = "The force rings and the response does not"
-        return Verdict.of(findings)
+        return HitVerdict.of(findings)
     pulse = find_pulse(hit)
     if pulse is None:
         findings[HitFlags.NO_HIT] = "No hammer pulse stands out of the noise of the force"
-        return Verdict.of(findings)
+        return HitVerdict.of(findings)
     findings |= _strength(hit, pulse, clipped=HitFlags.OVERLOAD_FORCE in findings)
     findings |= _second(hit, pulse) | _cut_off(hit)
     if band is not None or (mean is not None and not findings):
         findings |= _in_frequency(hit, mean if not findings else None, band)
-    return Verdict.of(findings)
+    return HitVerdict.of(findings)
 
 
 def _overloads(hit: Hit) -> dict[HitFlags, str]:

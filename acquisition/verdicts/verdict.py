@@ -9,7 +9,7 @@ from acquisition.hit import HitFlags
 
 
 @dataclass(frozen=True)
-class Verdict:
+class HitVerdict:
     """What is wrong with a hit, and what to do about it."""
 
     flags: HitFlags
@@ -18,7 +18,7 @@ class Verdict:
     """One sentence a flag, in the order of the flags: what was found with its figures, and the cure."""
 
     @classmethod
-    def of(cls, findings: Mapping[HitFlags, str]) -> Verdict:
+    def of(cls, findings: Mapping[HitFlags, str]) -> HitVerdict:
         """The verdict that says these findings (what was found, without the cure)."""
         flags = HitFlags.OK
         for flag in findings:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm, t
 
 from acquisition import Frf, Hit, Structure, estimate_frf, from_accelerance
-from lobewatch.machine.machine_file import parse_machine
+from lobewatch.machine.settings.machine_file import parse_machine
 from lobewatch.tap.emulated_spindle import SAMPLE_RATE, emulated_structure
 from modal import Mode, extract, fit_modes, fit_points, synthesize
 

@@ -26,7 +26,7 @@ def trees() -> Iterator[tuple[str, ast.AST]]:
 def codes_of(tree: ast.AST) -> Iterator[str]:
     """First arguments of Remark(...) that are written out, both branches of a choice between two."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "Remark":
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in ("Remark", "FitRemark"):
             given = [*node.args[:1], *(keyword.value for keyword in node.keywords if keyword.arg == "code")]
             for one in ast.walk(given[0]):
                 if isinstance(one, ast.Constant) and not isinstance(given[0], ast.JoinedStr):

@@ -18,7 +18,7 @@ from acquisition import (
     HitFlags,
     SimulatedSource,
     Trigger,
-    Verdict,
+    HitVerdict,
     average_good,
     capture_hits,
     check_hit,
@@ -53,7 +53,7 @@ def hits(tapper: Callable[..., HammeredStructure], channels: tuple[Channel, Chan
 
 
 def test_a_good_hit_has_no_reason() -> None:
-    assert judge_hit(hit((200, 0, 0.6e-3))) == Verdict(HitFlags.OK, ())
+    assert judge_hit(hit((200, 0, 0.6e-3))) == HitVerdict(HitFlags.OK, ())
     assert judge_hit(hit((200, 0, 0.6e-3))).text == ""
 
 

@@ -232,9 +232,16 @@ def begins_without_a_noun(docstring: str) -> bool:
 
 
 HEADINGS = (
-    "package", "rooms", "circles of rooms", "of files", "files", "lines", "below 50 lines", "generic names / 1000 lines",
+    "package",
+    "rooms",
+    "circles of rooms",
+    "of files",
+    "files",
+    "lines",
+    "below 50 lines",
+    "generic names / 1000 lines",
     "field docstrings without a noun (%)",
-)  # fmt: skip
+)
 
 
 def figures(house: House, package: str) -> tuple[object, ...]:

@@ -14,7 +14,7 @@ DIVIDING = {"stick_out_mm": ("stick-out", "{:g} mm"), "state": ("state", "{!r}")
 
 
 @dataclass(frozen=True)
-class Mounting:
+class MountedTool:
     """A tool as it is mounted in one series."""
 
     first: TapEntry
@@ -23,12 +23,12 @@ class Mounting:
     """Conditions that were stated of it so far."""
 
 
-class Mountings:
+class MountedTools:
     """The series of tap tests that are shown in order of time; what nobody said divides none."""
 
     def __init__(self) -> None:
         """None yet."""
-        self._mountings: dict[str, list[Mounting]] = {}
+        self._mountings: dict[str, list[MountedTool]] = {}
         """By tool, the current one last."""
         self._drawbar: dict[str, float] = {}
 
@@ -49,7 +49,7 @@ class Mountings:
             mountings.remove(fitting)
             mountings.append(replace(fitting, conditions=conditions))
         else:
-            mountings.append(Mounting(tap, conditions))
+            mountings.append(MountedTool(tap, conditions))
         return mountings[-1].first.id, tuple(remarks)
 
     def _about_drawbar(self, tap: TapEntry) -> Iterator[Remark]:
@@ -72,7 +72,7 @@ def _differing(first: Conditions, second: Conditions) -> list[str]:
     return [name for name in DIVIDING if name in stated and name in also_stated and stated[name] != also_stated[name]]
 
 
-def _about_change(before: Mounting, now: Conditions, earlier: Mounting | None) -> Remark:
+def _about_change(before: MountedTool, now: Conditions, earlier: MountedTool | None) -> Remark:
     """Remark on a tool that is mounted otherwise than before; earlier: its series, where it was mounted so once."""
     changed = {name: DIVIDING[name] for name in _differing(before.conditions, now)}
     change = ", ".join(

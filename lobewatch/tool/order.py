@@ -9,7 +9,7 @@ import msgspec
 
 from acquisition import Remark
 from lobewatch.machine import TapEntry
-from lobewatch.tool.mountings import Mountings
+from lobewatch.tool.mountings import MountedTools
 
 
 class Place(msgspec.Struct, frozen=True, gc=False):
@@ -41,13 +41,13 @@ class Order:
         """Places of those that were shown."""
         self._baselines = baselines
         self._newest: dict[str, dict[str, int]] = {}
-        self._mountings = Mountings()
+        self._mountings = MountedTools()
 
     def add(self, tap: TapEntry) -> None:
         """The next one."""
         number, baseline = len(self.places), _before(tap, self._baselines) if self._baselines else None
         if self.places and self.places[-1].baseline != baseline:
-            self._newest, self._mountings = {}, Mountings()
+            self._newest, self._mountings = {}, MountedTools()
         series, remarks = self._mountings.place(tap)
         newest = self._newest.setdefault(series, {})
         across = None

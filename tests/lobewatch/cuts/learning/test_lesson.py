@@ -1,0 +1,33 @@
+"""Which cuts count as those of a program."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import timedelta
+from typing import Any
+
+import pytest
+
+from lobewatch.cuts.learning.lesson import learn_program
+from lobewatch.cuts.learning.suggest import best_removal_rate
+from lobewatch.machine.additions.observe_cut import observe_cut
+from lobewatch.machine.settings.cut_setting import cut_setting
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+
+
+def test_a_cut_of_another_material_or_geometry_is_not_the_best_of_a_program(shop: Shop) -> None:
+    """They teach of the spindle all the same."""
+    shop.tap_both()
+    machine, start = shop.folder.machine, shop.start
+    setting = cut_setting(machine, "A", 12900, 1.0)
+    own = replace(observe_cut(setting, "stable", at=start + timedelta(days=1)), id="c1")
+    deeper = replace(own, depth=1.2e-3)
+    softer = replace(deeper, id="c2", coefficients="brass", cut=replace(own.cut, tangential=0.5 * own.cut.tangential))
+    narrower = replace(deeper, id="c3", cut=replace(own.cut, immersion=0.5 * own.cut.immersion))
+    table = next(program for program in machine.program if program.name == "A")
+    lesson = learn_program(table, shop.logbook.assembly(table.tool), machine, [own, softer, narrower])
+    assert [cut.id for cut in lesson.own_cuts] == ["c1"]
+    assert best_removal_rate(lesson.own_cuts) == pytest.approx(12900 * 1e-3)
+    assert [cut.id for cut in lesson.learnt.cuts] == ["c1", "c2", "c3"]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import io
 import os
 import sys
@@ -14,10 +13,6 @@ import typer
 
 from lobewatch.commands import COMMANDS
 from lobewatch.commands.help_page import HelpCommand, HelpGroup, page_width
-
-COLLECT = 20_000, 20, 20
-"""New objects after which Python looks for unused ones among the young, the older, all: rows of a history stay, and to
-look through ten thousand of them takes longer than what is done with them."""
 
 
 class _Commands(Mapping[str, Any]):
@@ -94,7 +89,6 @@ def _options(
 
 def main() -> None:
     """Run; exit codes: 0 fine, 1 not all is stable (check), 2 wrong use, bad file or no device, 130 Ctrl-C."""
-    gc.set_threshold(*COLLECT)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a console without these characters shows "?" instead

@@ -28,7 +28,7 @@ TOGETHER = timedelta(hours=24)
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """What lobes and verdicts of one tool are computed from."""
+    """A tool in the spindle as tapped: what its lobes and verdicts are computed from."""
 
     tool: str
     """Tool in the spindle."""
@@ -62,7 +62,7 @@ class Assembly:
 
     @property
     def label(self) -> str:
-        """What a legend says."""
+        """Name in a legend."""
         return f"predicted, bearings of {self.time:%Y-%m-%d}" if self.predicted else f"{self.time:%Y-%m-%d}"
 
     def scatter(self, direction: str) -> Scatter | None:

@@ -22,7 +22,7 @@ DEEPEST = 12.0
 
 
 class Method(StrEnum):
-    """How limits are found."""
+    """Method by which limits are found."""
 
     ZERO_ORDER = "zero-order"
     AVERAGE_ANGLE = "average-angle"
@@ -30,7 +30,7 @@ class Method(StrEnum):
 
 
 class Dynamics(StrEnum):
-    """What the lobes are computed from."""
+    """Dynamics that lobes are computed from."""
 
     MODES = "modes"
     FRF = "frf"

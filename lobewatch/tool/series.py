@@ -32,7 +32,7 @@ class FollowedMode(NamedTuple):
 
 
 class Scatter(NamedTuple):
-    """How far one tap test is from the next, relative but for the phase; half-widths that 95 % stay within."""
+    """Half-widths that 95 % of tap tests stay within of the next, relative but for the phase."""
 
     frequency: float
     """Half-width of the natural frequency."""

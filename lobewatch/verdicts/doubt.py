@@ -60,7 +60,7 @@ class LearntDraws:
     """Kr/Kt over its mean, shape (r,)."""
 
     def rows(self, middle: MillingRows, count: int, without: str) -> MillingRows:
-        """So many of them around a middle (a row), at its speed; without: a cause that is taken as known."""
+        """Draws, so many, around a middle (a row), at its speed; without: a cause that is taken as known."""
         take = np.arange(count) % len(self.force)
         rows, spindle = middle[np.zeros(count, dtype=np.intp)], float(without != CUTS)
         force, direction = (
@@ -79,7 +79,7 @@ class LearntDraws:
 
 @dataclass(frozen=True, eq=False)
 class Doubt:
-    """What is not known, by what it comes from."""
+    """Doubt of a program, by what it comes from."""
 
     modes: Mapping[str, Floats]
     """Half-widths of frequency, damping ratio and stiffness (relative) and phase (rad) of the modes in x, then y, shape

@@ -66,6 +66,6 @@ def _brackets(tried: Floats, grown: Floats) -> tuple[Floats, Floats, Floats, Flo
 
 
 def _between(low: Floats, high: Floats, at_low: Floats, at_high: Floats) -> Floats:
-    """Where growth is zero on a line."""
+    """Depths at which growth is zero on a line."""
     share = -at_low / (at_high - at_low)
     return np.where(np.isfinite(high), low + share * (np.where(np.isfinite(high), high, low) - low), np.inf)

@@ -81,7 +81,7 @@ class MeanForce:
         return depth, chatter
 
     def _limits(self, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
-        """The same at tooth frequencies (Hz) (r, s)."""
+        """Limits and chatter frequencies at tooth frequencies (Hz) (r, s)."""
         grid = self._grid()
         depth, chatter = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
         for loop in self._eigenvalues(grid):

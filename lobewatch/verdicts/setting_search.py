@@ -148,7 +148,7 @@ class SettingSearch:
         return float(depths[calm.size - 1 if np.all(calm) else np.argmin(calm) - 1]) if calm[0] else 0.0
 
     def _early(self, speed: float, number: int = FEW) -> ProgramDraws:
-        """So many draws at a speed (rpm), now and when the spindle is tapped again."""
+        """A few draws at a speed (rpm), now and when the spindle is tapped again."""
         few = self.draws[np.arange(number)].at(speed / self.program.speed_rpm)
         return age(few, self.fall * LATER[[0, -1]], self.stiffness_at)
 

@@ -29,7 +29,7 @@ class SpindleAtSpeed:
     remarks: tuple[Remark, ...] = ()
     """Cuts that contradict the others, and frequencies far from those at rest."""
     doubt: Doubt | None = None
-    """What the cuts have left open; None where none has taught anything."""
+    """Doubt that the cuts have left; None where none has taught anything."""
     factors: Floats = field(default_factory=lambda: np.ones((0, 3)))
     """Frequency, damping ratio and stiffness in the middle over those tapped, modes in x, then y, shape (n, 3)."""
     tangential: float = math.nan
@@ -37,9 +37,9 @@ class SpindleAtSpeed:
     radial: float = math.nan
     """Cutting coefficient Kr in the middle of what was learnt (N/mm2)."""
     before: Mapping[str, Span] = field(default_factory=dict)
-    """Intervals before the cuts, over the values at rest, by name ("frequency_x", "tangential" ...) ..."""
+    """Intervals of 95 % before the cuts, over the values at rest, by name ("frequency_x", "tangential" ...)."""
     after: Mapping[str, Span] = field(default_factory=dict)
-    """... and intervals with them."""
+    """Intervals of 95 % with the cuts, alike."""
 
     def moved(self, assembly: Assembly) -> Assembly:
         """A tool with its modes in the middle of what was learnt; as tapped where nothing was."""

@@ -20,7 +20,7 @@ from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
 
 
 class Word(StrEnum):
-    """What is said of a program."""
+    """Word that is said of a program."""
 
     STABLE = "stable"
     """At most 1 % of the doubt chatters, at 95 % confidence."""
@@ -55,7 +55,7 @@ class Ruling(NamedTuple):
 
     @property
     def stable(self) -> bool | None:
-        """In the middle of the doubt; None where it is unknown."""
+        """Whether it is stable in the middle of the doubt; None where it is unknown."""
         return None if self.word is Word.UNKNOWN else self.word is not Word.NOT_STABLE
 
 
@@ -77,7 +77,7 @@ class Verdict:
     limit_low: float = math.nan
     """1 % quantile of the limit over the doubt (m)."""
     limit_high: float = math.nan
-    """99 % quantile (m)."""
+    """99 % quantile of the limit over the doubt (m)."""
     chance_turning: float = math.nan
     """Chance of chatter with the spindle turning, under plausible differences between rest and cut, or those learnt."""
     decided_by: str = ""
@@ -102,7 +102,7 @@ class Verdict:
 
     @property
     def stable(self) -> bool | None:
-        """In the middle of the doubt; None where it is unknown."""
+        """Whether it is stable in the middle of the doubt; None where it is unknown."""
         return self.ruling.stable
 
     @property

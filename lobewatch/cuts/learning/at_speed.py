@@ -85,9 +85,7 @@ def _learnt(lesson: Lesson, tool: Assembly, machine: Machine, remarks: tuple[Rem
 
 def _widths(parts: Sequence[Floats], turned: Floats) -> Floats:
     """Half-widths of 95 % of frequency, damping ratio, stiffness (relative) and phase (rad), shape (n, 4)."""
-    relative = [
-        np.diff(np.quantile(part, ENDS, axis=0), axis=0)[0] / 2 / np.mean(part, axis=0) for part in parts
-    ]
+    relative = [np.diff(np.quantile(part, ENDS, axis=0), axis=0)[0] / 2 / np.mean(part, axis=0) for part in parts]
     return np.stack([*relative, np.std(turned, axis=0) * 2], axis=1)
 
 

@@ -33,7 +33,7 @@ def check(
     """
     from acquisition import DataError
     from lobewatch.logbook import Logbook
-    from lobewatch.show.programs.advice import (
+    from lobewatch.show.programs.describe_advice import (
         ProgramAdvice,
         advice_json,
         advice_lines,
@@ -42,8 +42,8 @@ def check(
         counts,
         summary,
     )
-    from lobewatch.show.programs.doubts import reading_lines
-    from lobewatch.show.programs.verdicts import is_safe
+    from lobewatch.show.programs.describe_doubts import reading_lines
+    from lobewatch.show.programs.describe_verdicts import is_safe
     from lobewatch.show.terminal.output import remark_json, remark_lines
 
     logbook = Logbook.open(machine)

@@ -52,8 +52,8 @@ def tap(
     from lobewatch.machine import MachineFolder
     from lobewatch.measuring.questions import unasked_text
     from lobewatch.notify.telling import tell
-    from lobewatch.show.history.measurements import measurement_json, measurement_texts
-    from lobewatch.show.programs.verdicts import program_texts, programs_json
+    from lobewatch.show.history.describe_measurement import measurement_json, measurement_texts
+    from lobewatch.show.programs.describe_verdicts import program_texts, programs_json
     from lobewatch.show.terminal.printer import TapPrinter
     from lobewatch.show.terminal.terminal_screen import TerminalScreen
     from lobewatch.tap.hit_loop import TapStopped

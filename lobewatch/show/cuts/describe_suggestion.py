@@ -15,8 +15,8 @@ from lobewatch.cuts.learning.contradicting import contradiction_remarks
 from lobewatch.cuts.learning.lesson import Lesson, NextCut
 from lobewatch.cuts.learning.posterior import Interval
 from lobewatch.cuts.learning.suggest import Suggestion
-from lobewatch.show.programs.advice import rpm
-from lobewatch.show.programs.doubts import NAMES
+from lobewatch.show.programs.describe_advice import rpm
+from lobewatch.show.programs.describe_doubts import NAMES
 from lobewatch.show.terminal.output import table
 
 

@@ -14,9 +14,9 @@ from lobes import Pocket, PocketShift, StabilityLobes, cutting_coefficients
 from lobewatch.logbook import LobeComparison
 from lobewatch.logbook.lobe_comparison import NO_POCKET
 from lobewatch.machine import REFERENCE_CUT, Machine
-from lobewatch.show.programs.advice import setting_json
-from lobewatch.show.programs.doubts import at_speed_line
-from lobewatch.show.programs.verdicts import programs_json, verdict_table
+from lobewatch.show.programs.describe_advice import setting_json
+from lobewatch.show.programs.describe_doubts import at_speed_line
+from lobewatch.show.programs.describe_verdicts import programs_json, verdict_table
 from lobewatch.show.terminal.output import remark_json, remark_lines, table
 from lobewatch.verdicts import Setting
 from lobewatch.verdicts.setting_search import LEFT

@@ -12,8 +12,8 @@ from rich.table import Table
 from lobewatch.history import Row
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.replaying.store import ReplayOutcome
-from lobewatch.show.history.measurements import measurement_json, measurement_texts
-from lobewatch.show.programs.verdicts import program_texts, programs_json
+from lobewatch.show.history.describe_measurement import measurement_json, measurement_texts
+from lobewatch.show.programs.describe_verdicts import program_texts, programs_json
 from lobewatch.show.terminal.output import emit, notes, table
 
 IN_FULL = 3

@@ -11,8 +11,8 @@ from acquisition import joined
 from lobewatch.decay import Light, SeriesStanding, Standing
 from lobewatch.logbook.outlook import Fate, Outlook
 from lobewatch.machine import Machine
-from lobewatch.show.programs.advice import ProgramAdvice, rpm
-from lobewatch.show.programs.verdicts import WORDS
+from lobewatch.show.programs.describe_advice import ProgramAdvice, rpm
+from lobewatch.show.programs.describe_verdicts import WORDS
 from lobewatch.show.trends.describe_trend import dates_text, rate_text, short_text
 from lobewatch.verdicts import Word
 

@@ -12,7 +12,7 @@ from lobewatch.machine.journal.event import MaintenanceEvent
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT
 from lobewatch.measuring.estimate import Estimate
 from lobewatch.show.history.describe_cut import heard_text
-from lobewatch.show.programs.verdicts import WORDS
+from lobewatch.show.programs.describe_verdicts import WORDS
 from lobewatch.show.report.figure_data import Numbers
 from lobewatch.show.report.first_screen import KINDS, LIGHTS
 from lobewatch.show.report.material import ReportMaterial

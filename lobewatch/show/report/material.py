@@ -14,7 +14,7 @@ from lobewatch.history.left_out import left_out
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.outlook import Outlook, outlook_of
 from lobewatch.machine import Machine
-from lobewatch.show.programs.advice import ProgramAdvice, advise_program
+from lobewatch.show.programs.describe_advice import ProgramAdvice, advise_program
 from lobewatch.show.report.lobe_course import LobeCourse, lobe_course
 from lobewatch.tool import Assembly
 

@@ -11,9 +11,16 @@ import numpy as np
 from acquisition import joined
 from dsm import plus_minus
 from lobewatch.decay.series_history import SeriesHistory, preload_of
-from lobewatch.show.programs.advice import ProgramAdvice, advice_lines, decay_text
-from lobewatch.show.programs.doubts import reading_lines
-from lobewatch.show.programs.verdicts import WORDS, band_text, limit_text, margin_text, turning_text, verdict_text
+from lobewatch.show.programs.describe_advice import ProgramAdvice, advice_lines, decay_text
+from lobewatch.show.programs.describe_doubts import reading_lines
+from lobewatch.show.programs.describe_verdicts import (
+    WORDS,
+    band_text,
+    limit_text,
+    margin_text,
+    turning_text,
+    verdict_text,
+)
 from lobewatch.show.report.lists import events_and_exclusions, tap_tests, test_cuts, tools_and_directions
 from lobewatch.show.report.material import ReportMaterial
 from lobewatch.show.report.picture_sections import lobes_over_time, pictures

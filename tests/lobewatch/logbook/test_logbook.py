@@ -33,7 +33,7 @@ from lobewatch.machine.rows import read_rows, write_rows
 from lobewatch.measuring import Measurement, measure
 from lobewatch.plant.plant import Plant
 from lobewatch.show.plant.plant_rows import plant_rows
-from lobewatch.show.programs.verdicts import WORDS
+from lobewatch.show.programs.describe_verdicts import WORDS
 from lobewatch.show.report.report import render_report
 from lobewatch.tap.session import outcome_of
 from lobewatch.tool.charts import Dynamics, Method

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lobewatch.machine import ProgramTable
-from lobewatch.show.programs.advice import rpm
-from lobewatch.show.programs.verdicts import (
+from lobewatch.show.programs.describe_advice import rpm
+from lobewatch.show.programs.describe_verdicts import (
     WORDS,
     is_safe,
     limits_text,

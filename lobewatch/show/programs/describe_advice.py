@@ -15,7 +15,7 @@ from acquisition import Remark
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.machine import SpeedRange
-from lobewatch.show.programs.verdicts import verdict_json, verdict_table
+from lobewatch.show.programs.describe_verdicts import verdict_json, verdict_table
 from lobewatch.tool import Assembly
 from lobewatch.verdicts import Advice, Setting, Verdict, Word
 from lobewatch.verdicts.setting_search import LEFT

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from lobes.floquet.program_limit import DEEPEST
 from lobewatch.logbook import Logbook
-from lobewatch.show.programs.doubts import doubt_json, reading_lines
+from lobewatch.show.programs.describe_doubts import doubt_json, reading_lines
 from lobewatch.show.terminal.output import remark_lines, table
 from lobewatch.verdicts import Verdict, Word
 from lobewatch.verdicts.drawn_limits import TRIED

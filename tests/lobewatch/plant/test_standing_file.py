@@ -151,6 +151,17 @@ def test_fresh_standings_are_told_without_numbers_being_read(tapped: Shop) -> No
     assert (told.returncode, b"frequency fallen" in told.stdout or b"m," in told.stdout) == (0, True)
 
 
+def test_rows_of_fresh_standings_are_exported_without_a_logbook(tapped: Shop, tmp_path: Path) -> None:
+    summarise(tapped.logbook)
+    program = (
+        "import sys; from lobewatch.cli import main; sys.argv = ['lobewatch', 'export', *sys.argv[1:]]\n"
+        "try:\n main()\nfinally:\n sys.exit(int('lobewatch.logbook.logbook' in sys.modules))"
+    )
+    table = tmp_path / "fleet.csv"
+    done = subprocess.run([sys.executable, "-c", program, str(tapped.path), str(table)], check=False)
+    assert (done.returncode, len(table.read_text("utf-8").splitlines())) == (0, 7)
+
+
 def test_the_word_on_programs_is_in_it(tapped: Shop) -> None:
     toml = (tapped.path / "machine.toml").read_text("utf-8")
     (tapped.path / "machine.toml").write_text(toml + PROGRAM, "utf-8")

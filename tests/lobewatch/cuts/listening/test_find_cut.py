@@ -81,6 +81,11 @@ def test_a_cut_needs_air_beside_it(air: float, reason: str) -> None:
     assert parts.reason == reason
 
 
+def test_air_may_be_a_twentieth_of_a_recording_and_anywhere_in_it() -> None:
+    for loud in (((0.2, 4.0),), ((0.0, 3.8),)):
+        assert parts_of(recording(4.0, *loud)).reason == ""
+
+
 def test_what_is_below_100_hz_makes_no_cut() -> None:
     """A floor that shakes 20 times as hard for a second, at 60 Hz; at 200 Hz it would be heard."""
     time = np.arange(round(2.0 * RATE)) / RATE

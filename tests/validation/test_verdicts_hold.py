@@ -25,24 +25,24 @@ def share(number: int, of: int) -> str:
 
 
 def test_a_few_programs_called_stable_and_settings_recommended_do_not_chatter() -> None:
-    found = study(count=12, seed=2, truths=4, most_modes=3)
-    assert found.stable
-    assert found.recommended
-    assert found.refused == 0
-    assert chattering(found.stable + found.recommended) == 0
+    counts = study(count=12, seed=2, truths=4, most_modes=3)
+    assert counts.stable
+    assert counts.recommended
+    assert counts.refused == 0
+    assert chattering(counts.stable + counts.recommended) == 0
 
 
 @pytest.mark.long
 @pytest.mark.timeout(14400)
 def test_at_most_1_percent_of_what_is_called_stable_or_recommended_chatters() -> None:
-    found = study(count=200, seed=1, truths=4)
-    stable, recommended = chattering(found.stable), chattering(found.recommended)
-    say(f"{found.stable_programs} programs called stable: {share(stable, len(found.stable))} of their truths chatter")
-    say(f"{found.settings} settings, {found.refused} refused: {share(recommended, len(found.recommended))} chatter")
-    assert min(len(found.stable), len(found.recommended)) >= 300
-    assert upper_limit(stable, len(found.stable)) <= 0.01
-    assert upper_limit(recommended, len(found.recommended)) <= 0.01
-    assert found.refused == 0
+    counts = study(count=200, seed=1, truths=4)
+    stable, recommended = chattering(counts.stable), chattering(counts.recommended)
+    say(f"{counts.stable_programs} programs called stable: {share(stable, len(counts.stable))} of their truths chatter")
+    say(f"{counts.settings} settings, {counts.refused} refused: {share(recommended, len(counts.recommended))} chatter")
+    assert min(len(counts.stable), len(counts.recommended)) >= 300
+    assert upper_limit(stable, len(counts.stable)) <= 0.01
+    assert upper_limit(recommended, len(counts.recommended)) <= 0.01
+    assert counts.refused == 0
 
 
 @pytest.mark.parametrize("count", [2, pytest.param(200, marks=[pytest.mark.long, pytest.mark.timeout(7200)])])
@@ -68,12 +68,12 @@ def test_what_is_stable_in_all_of_the_doubt_with_5_percent_to_spare_is_called_st
         if not np.isfinite(limit):
             continue
         table = program(milling, limit * rng.uniform(0.4, 0.85))
-        known, cut = assembly(milling), as_program(table, MACHINE)
-        drawn = doubt_of(known, table, MACHINE).draw(middle_row(cut, known), 2000, seed=99)
+        tool, cut = assembly(milling), as_program(table, MACHINE)
+        truths = doubt_of(tool, table, MACHINE).draw(middle_row(cut, tool), 2000, seed=99)
         depths = np.full((2000, 1), 1.05 * cut.depth)
-        turned = [drawn.fed_at(angle) for angle in table.feed_angles]
+        turned = [truths.fed_at(angle) for angle in table.feed_angles]
         if all(np.all(growth(rows, depths, piece_numbers(rows, 1.05 * cut.depth)) < 0) for rows in turned):
-            called.append(judge(table, known, MACHINE).word is Word.STABLE)
+            called.append(judge(table, tool, MACHINE).word is Word.STABLE)
     say(f"{share(sum(called), len(called))} called stable")
     assert len(called) >= 30
     assert np.mean(called) >= 0.95

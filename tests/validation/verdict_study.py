@@ -48,7 +48,7 @@ def study(count: int, seed: int, truths: int, most_modes: int = 12) -> Study:
 
     Machines of more modes than most_modes are passed over.
     """
-    found = Study()
+    counts = Study()
     for rng in np.random.default_rng(seed).spawn(count):
         milling = random_case(rng)
         limit = limit_mm(milling) if len(milling.x + milling.y) <= most_modes else math.inf
@@ -56,20 +56,20 @@ def study(count: int, seed: int, truths: int, most_modes: int = 12) -> Study:
             continue
         below, above = (program(milling, limit * rng.uniform(*share)) for share in ((0.3, 0.8), (1.05, 3.0)))
         if judge(below, assembly(milling), MACHINE).word is Word.STABLE:
-            found.stable_programs += 1
-            found.stable += drawn_truths(milling, below, truths, rng)
+            counts.stable_programs += 1
+            counts.stable += drawn_truths(milling, below, truths, rng)
         for setting in settings(milling, above):
-            found.settings += 1
-            found.refused += judge(setting, assembly(milling), MACHINE).word is not Word.STABLE
-            found.recommended += drawn_truths(milling, setting, truths, rng)
-    return found
+            counts.settings += 1
+            counts.refused += judge(setting, assembly(milling), MACHINE).word is not Word.STABLE
+            counts.recommended += drawn_truths(milling, setting, truths, rng)
+    return counts
 
 
 def settings(milling: RandomMilling, table: ProgramTable) -> Iterator[ProgramTable]:
     """The programs that are recommended in place of one."""
     advice = advise(judge(table, assembly(milling), MACHINE), MACHINE)
-    for one in dict.fromkeys(filter(None, (advice.best, advice.here))):
-        yield program(milling, one.depth_mm, one.speed_rpm)
+    for setting in dict.fromkeys(filter(None, (advice.best, advice.here))):
+        yield program(milling, setting.depth_mm, setting.speed_rpm)
 
 
 def drawn_truths(milling: RandomMilling, table: ProgramTable, count: int, rng: np.random.Generator) -> list[Case]:
@@ -100,8 +100,8 @@ def _moved(modes: Modes, rng: np.random.Generator) -> Modes:
 
 def chattering(truths: list[Case]) -> int:
     """How many chatter; a case that is not settled counts."""
-    found = milling_simulation.judge(truths)
-    return int(np.sum(found.chatters | (found.doubt >= np.abs(found.growth))))
+    simulated = milling_simulation.judge(truths)
+    return int(np.sum(simulated.chatters | (simulated.doubt >= np.abs(simulated.growth))))
 
 
 def upper_limit(number: int, of: int) -> float:

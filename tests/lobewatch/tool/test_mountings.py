@@ -36,10 +36,10 @@ def run(*arguments: object) -> Result:
 
 def rows_of(shop: Shop, *conditions: Conditions) -> tuple[Row, ...]:
     """The history of a spindle whose frequency is another one at each test, 12 % lower each."""
-    for number, one in enumerate(conditions):
-        shop.tap(30 * number, 2100.0 * 0.88**number, conditions=one)
-    found: tuple[Row, ...] = shop.logbook.history.rows
-    return found
+    for number, stated in enumerate(conditions):
+        shop.tap(30 * number, 2100.0 * 0.88**number, conditions=stated)
+    rows: tuple[Row, ...] = shop.logbook.history.rows
+    return rows
 
 
 def series_of(rows: tuple[Row, ...]) -> list[int]:
@@ -53,22 +53,22 @@ def codes(row: Row) -> set[str]:
 
 
 @pytest.mark.parametrize(
-    ("other", "told"),
+    ("changed", "text"),
     [
         (Conditions(stick_out_mm=95.0, state="warm"), "stick-out 95 mm after 80 mm: a new series"),
         (Conditions(stick_out_mm=80.0, state="cold"), "state 'cold' after 'warm': a new series"),
     ],
 )
-def test_another_stick_out_or_state_begins_a_new_series(shop: Shop, other: Conditions, told: str) -> None:
-    first, _, last = rows = rows_of(shop, WARM, WARM, other)
+def test_another_stick_out_or_state_begins_a_new_series(shop: Shop, changed: Conditions, text: str) -> None:
+    first, _, last = rows = rows_of(shop, WARM, WARM, changed)
     assert series_of(rows) == [0, 0, 2]
     assert codes(first) == set()
-    (remark,) = [one for one in last.remarks if one.code == "new-series"]
-    assert remark.text.startswith(told)
+    (remark,) = [remark for remark in last.remarks if remark.code == "new-series"]
+    assert remark.text.startswith(text)
     assert not last.questions
     standing = shop.logbook.standing(shop.start + timedelta(days=61))
-    assert [one.is_first for one in standing.series] == [True]
-    assert "frequency-alarm" not in [one.code for one in standing.remarks]
+    assert [series.is_first for series in standing.series] == [True]
+    assert "frequency-alarm" not in [remark.code for remark in standing.remarks]
 
 
 def test_a_series_that_is_not_divided_alarms(shop: Shop) -> None:
@@ -77,8 +77,8 @@ def test_a_series_that_is_not_divided_alarms(shop: Shop) -> None:
 
 
 def test_what_is_unknown_divides_nothing(shop: Shop) -> None:
-    known = Conditions(stick_out_mm=80.0)
-    rows = rows_of(shop, Conditions(), known, Conditions(), Conditions(state="warm"), WARM)
+    stick_out = Conditions(stick_out_mm=80.0)
+    rows = rows_of(shop, Conditions(), stick_out, Conditions(), Conditions(state="warm"), WARM)
     assert series_of(rows) == [0] * 5
     assert [codes(row) for row in rows] == [set()] * 5
 
@@ -117,23 +117,23 @@ def test_another_drawbar_force_is_remarked_only(shop: Shop) -> None:
     rows = rows_of(shop, *force[:1], Conditions(), *force[1:])
     assert series_of(rows) == [0] * 5
     assert [codes(row) for row in rows] == [set(), set(), set(), {"drawbar-changed"}, set()]
-    (remark,) = [one for one in rows[3].remarks if one.code == "drawbar-changed"]
+    (remark,) = [remark for remark in rows[3].remarks if remark.code == "drawbar-changed"]
     assert remark.text.startswith("drawbar force 15 kN, 18 kN before")
 
 
 def test_conditions_of_command_and_machine_file_reach_file_journal_and_history(shop: Shop, beam: Path) -> None:
     shop.edit("[tap]\n", '[tap]\nstick_out_mm = 80\ndrawbar_kn = 18\nstate = "warm"\n')
     options = ("--temperature", "24.5", "--note", "after a crash", "--reclamped")
-    said = run("replay", shop.path, beam, *options, "--json")
+    result = run("replay", shop.path, beam, *options, "--json")
     wanted = Conditions(24.5, 80.0, 18.0, "warm", True, "after a crash")
-    assert json.loads(said.stdout)["measurements"][0]["conditions"] == wanted.known
+    assert json.loads(result.stdout)["measurements"][0]["conditions"] == wanted.known
     (entry,) = shop.folder.taps()
     assert shop.folder.read(entry).circumstances.conditions == entry.conditions == wanted
     for _ in range(2):
         (row,) = Logbook.open(shop.path).history.rows
         assert row.conditions == wanted
-    (told,) = json.loads(run("history", shop.path, "--json").stdout)["taps"]
-    assert (told["conditions"], told["series"]) == (wanted.known, entry.id)
+    (row,) = json.loads(run("history", shop.path, "--json").stdout)["taps"]
+    assert (row["conditions"], row["series"]) == (wanted.known, entry.id)
     (line,) = csv.DictReader(io.StringIO(run("history", shop.path, "--csv").stdout))
     assert (line["temperature_c"], line["state"], line["note"]) == ("24.5", "warm", "after a crash")
     text = run("history", shop.path).stdout
@@ -191,14 +191,14 @@ def test_a_machine_file_with_other_values_is_refused_in_a_sentence(shop: Shop, l
 def test_other_conditions_are_refused_before_anything_is_done(
     shop: Shop, beam: Path, command: str, options: tuple[str, ...], message: str
 ) -> None:
-    what = ("--port", "x") if command == "tap" else (beam,)
+    source = ("--port", "x") if command == "tap" else (beam,)
     with pytest.raises(ValueError, match=message):
-        run(command, shop.path, *what, *options)
+        run(command, shop.path, *source, *options)
     assert shop.folder.taps() == []
 
 
 def test_one_clear_error_and_exit_code_2(shop: Shop, beam: Path) -> None:
     shop.edit("[tap]\n", "[tap]\nstick_out_mm = -3\n")
-    said = CliRunner().invoke(app, ["replay", str(shop.path), str(beam), "--temperature", "warm"])
-    assert said.exit_code == 2
-    assert re.search("Invalid value for '--temperature'", said.output)
+    result = CliRunner().invoke(app, ["replay", str(shop.path), str(beam), "--temperature", "warm"])
+    assert result.exit_code == 2
+    assert re.search("Invalid value for '--temperature'", result.output)

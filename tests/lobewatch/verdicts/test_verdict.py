@@ -59,11 +59,11 @@ def test_a_direction_that_was_not_tapped_is_like_the_other_one_and_widens_the_do
     shop.tap(
         0.1, 1713.0, "y", stiffness=calibrate(shop.folder.machine.model("reference"), 1713.0).modal_stiffness_after
     )
-    for one, both in zip(alone, shop.logbook.verdicts(), strict=True):
-        assert one.limit == pytest.approx(both.limit, rel=1e-4)
-        assert (one.word, both.word) == (Word.DOUBTFUL, Word.STABLE)
-        assert one.limit_low < 0.9 * both.limit_low
-        assert [remark.code for remark in one.remarks] == ["one-direction", "doubt-decides"]
+    for single, double in zip(alone, shop.logbook.verdicts(), strict=True):
+        assert single.limit == pytest.approx(double.limit, rel=1e-4)
+        assert (single.word, double.word) == (Word.DOUBTFUL, Word.STABLE)
+        assert single.limit_low < 0.9 * double.limit_low
+        assert [remark.code for remark in single.remarks] == ["one-direction", "doubt-decides"]
 
 
 def test_a_program_runs_along_one_axis_or_both(shop: Shop) -> None:
@@ -72,35 +72,34 @@ def test_a_program_runs_along_one_axis_or_both(shop: Shop) -> None:
     assembly = shop.logbook.assembly()
     shop.run(("both", 12900, 1))
     shop.edit("radial_depth_mm = 20\n", "radial_depth_mm = 5\n")
-    (found,) = shop.logbook.verdicts()
-    program = as_program(found.program, shop.folder.machine)
-    every = [program_limit(program, assembly.x, assembly.y, [np.radians(15.0 * i)]).limit for i in range(12)]
-    assert found.limit == pytest.approx(min(every))
-    assert found.feed_angle == pytest.approx(np.radians(15.0 * np.argmin(every)))
+    (verdict,) = shop.logbook.verdicts()
+    program = as_program(verdict.program, shop.folder.machine)
+    limits = [program_limit(program, assembly.x, assembly.y, [np.radians(15.0 * i)]).limit for i in range(12)]
+    assert verdict.limit == pytest.approx(min(limits))
+    assert verdict.feed_angle == pytest.approx(np.radians(15.0 * np.argmin(limits)))
 
 
 def test_decay_left_ends_where_the_limit_crosses_the_depth(shop: Shop) -> None:
     shop.tap_both()
-    for found in shop.logbook.verdicts():
-        stiffness_at, remark = softening(found.assembly)
+    for verdict in shop.logbook.verdicts():
+        stiffness_at, remark = softening(verdict.assembly)
         assert remark.code == "decay-assumption"
-        fall = tolerable_decay(found.draws, found.program.depth_mm / 1e3, stiffness_at)
-        program = as_program(found.program, shop.folder.machine)
+        fall = tolerable_decay(verdict.draws, verdict.program.depth_mm / 1e3, stiffness_at)
+        program = as_program(verdict.program, shop.folder.machine)
         if np.isinf(fall):
-            assert limit_after(found, program, 0.2, stiffness_at(0.2)) > program.depth
+            assert limit_after(verdict, program, 0.2, stiffness_at(0.2)) > program.depth
             continue
         assert 0.005 < fall < 0.2
         for side, stable in ((-0.004, True), (0.004, False)):
-            limit = limit_after(found, program, fall + side, stiffness_at(fall + side))
+            limit = limit_after(verdict, program, fall + side, stiffness_at(fall + side))
             assert (limit > program.depth) == stable
 
 
-def limit_after(found: Any, program: Program, fall: float, stiffness: float) -> float:
+def limit_after(verdict: Any, program: Program, fall: float, stiffness: float) -> float:
     """Limit in the middle with all frequencies fallen."""
-    x, y = (
-        [mode.scaled(1 - fall, stiffness, "aged") for mode in modes] for modes in (found.assembly.x, found.assembly.y)
-    )
-    return program_limit(program, x, y, found.program.feed_angles).limit
+    tool = verdict.assembly
+    x, y = ([mode.scaled(1 - fall, stiffness, "aged") for mode in modes] for modes in (tool.x, tool.y))
+    return program_limit(program, x, y, verdict.program.feed_angles).limit
 
 
 def test_k_follows_the_model_as_the_frequency_falls_and_stays_without_one(shop: Shop) -> None:
@@ -120,5 +119,5 @@ def test_k_follows_the_model_as_the_frequency_falls_and_stays_without_one(shop: 
 def test_a_chattering_program_has_no_decay_left(shop: Shop) -> None:
     shop.run(("A", 12900, 6))
     shop.tap_both()
-    (found,) = shop.logbook.verdicts()
-    assert tolerable_decay(found.draws, 6e-3, softening(found.assembly)[0]) == 0.0
+    (verdict,) = shop.logbook.verdicts()
+    assert tolerable_decay(verdict.draws, 6e-3, softening(verdict.assembly)[0]) == 0.0

@@ -28,28 +28,28 @@ def hear(shop: Shop, speed: float, depth_mm: float, word: Any, frequency: float 
 
 
 def judged(shop: Shop, name: str = "A") -> Any:
-    (found,) = (one for one in shop.logbook.verdicts() if one.program.name == name)
-    return found
+    (verdict,) = (verdict for verdict in shop.logbook.verdicts() if verdict.program.name == name)
+    return verdict
 
 
 def test_verdicts_are_at_speed_from_the_first_cut_on_and_narrower_with_more(shop: Shop) -> None:
     shop.tap_both()
-    rest = judged(shop)
-    assert rest.cuts == 0
+    at_rest = judged(shop)
+    assert at_rest.cuts == 0
     hear(shop, 12900, 3.0, "stable")
-    one = judged(shop)
+    first = judged(shop)
     for speed, depth in ((8700, 2.2), (12900, 3.4)):
         hear(shop, speed, depth, "stable")
     hear(shop, 8700, 3.0, "chatter", 1710.0)
     four = judged(shop)
-    assert (one.cuts, four.cuts) == (1, 4)
-    assert (rest.draws.doubt.learnt is None, four.draws.doubt.learnt is None) == (True, False)
-    assert four.limit_high / four.limit_low < one.limit_high / one.limit_low
-    assert four.limit_low > one.limit_low
+    assert (first.cuts, four.cuts) == (1, 4)
+    assert (at_rest.draws.doubt.learnt is None, four.draws.doubt.learnt is None) == (True, False)
+    assert four.limit_high / four.limit_low < first.limit_high / first.limit_low
+    assert four.limit_low > first.limit_low
     assert four.word is Word.STABLE
-    assert four.chance_turning < rest.chance_turning
-    assert four.program.tangential_n_per_mm2 < rest.program.tangential_n_per_mm2
-    assert [two.rows.tangential[0] for two in (rest.draws, four.draws)] == pytest.approx(
+    assert four.chance_turning < at_rest.chance_turning
+    assert four.program.tangential_n_per_mm2 < at_rest.program.tangential_n_per_mm2
+    assert [draws.rows.tangential[0] for draws in (at_rest.draws, four.draws)] == pytest.approx(
         [1.4e9, four.program.tangential_n_per_mm2 * 1e6]
     )
 
@@ -58,9 +58,9 @@ def test_what_holds_at_rest_and_what_at_speed_stands_below_the_diagram(shop: Sho
     shop.tap_both()
     assert "at rest" not in CliRunner().invoke(app, ["lobes", str(shop.path)]).stdout
     hear(shop, 12900, 3.0, "stable")
-    told = " ".join(CliRunner().invoke(app, ["lobes", str(shop.path)]).stdout.split())
-    assert "as it turns, from 1 cut" in told
-    assert "the diagram and its pockets are of the spindle at rest" in told
+    text = " ".join(CliRunner().invoke(app, ["lobes", str(shop.path)]).stdout.split())
+    assert "as it turns, from 1 cut" in text
+    assert "the diagram and its pockets are of the spindle at rest" in text
     assert "the diagram is of the spindle at rest" in " ".join(
         CliRunner().invoke(app, ["lobes", str(shop.path), "--cut", "A"]).stdout.split()
     )
@@ -69,17 +69,17 @@ def test_what_holds_at_rest_and_what_at_speed_stands_below_the_diagram(shop: Sho
 def test_the_history_keeps_the_word_that_the_cuts_have_made_and_forgets_it_with_them(shop: Shop) -> None:
     shop.tap_both()
     before = shop.logbook.verdicts()
-    assert words(shop.logbook) == {one.program.name: one.word for one in before}
+    assert words(shop.logbook) == {verdict.program.name: verdict.word for verdict in before}
     cut = hear(shop, 12900, 1.5, "chatter")
     after = shop.logbook.verdicts()
-    assert words(shop.logbook) == {one.program.name: one.word for one in after}
+    assert words(shop.logbook) == {verdict.program.name: verdict.word for verdict in after}
     assert judged(shop).word is not Word.STABLE
     exclude(shop.folder, cut.id, "a chip was stuck")
     again = shop.logbook.verdicts()
-    assert words(shop.logbook) == {one.program.name: one.word for one in before}
-    for then, now in zip(before, again, strict=True):
-        assert (now.limit, now.limit_low, now.limit_high) == (then.limit, then.limit_low, then.limit_high)
-        assert np.array_equal(now.draws.rows.frequency, then.draws.rows.frequency)
+    assert words(shop.logbook) == {verdict.program.name: verdict.word for verdict in before}
+    for earlier, now in zip(before, again, strict=True):
+        assert (now.limit, now.limit_low, now.limit_high) == (earlier.limit, earlier.limit_low, earlier.limit_high)
+        assert np.array_equal(now.draws.rows.frequency, earlier.draws.rows.frequency)
 
 
 def words(logbook: Logbook) -> dict[str, Word]:
@@ -92,9 +92,9 @@ def test_cuts_of_another_tool_say_nothing_and_what_contradicts_is_said(shop: Sho
     shop.tap(0.2, 1500.0, tool="long")
     for depth, word in ((3.0, "stable"), (3.1, "stable"), (0.3, "chatter")):
         hear(shop, 12900, depth, word)
-    found = judged(shop)
-    assert found.cuts == 2
-    assert [remark.about for remark in found.remarks if remark.code == "cut-unexplained"] == ["c3"]
+    verdict = judged(shop)
+    assert verdict.cuts == 2
+    assert [remark.about for remark in verdict.remarks if remark.code == "cut-unexplained"] == ["c3"]
     shop.edit('tool = "reference"', 'tool = "long"')
     assert judged(shop).cuts == 0
 

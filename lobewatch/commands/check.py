@@ -33,18 +33,8 @@ def check(
     """
     from acquisition import DataError
     from lobewatch.logbook import Logbook
-    from lobewatch.show.programs.describe_advice import (
-        ProgramAdvice,
-        advice_json,
-        advice_lines,
-        advice_table,
-        advise_program,
-        counts,
-        summary,
-    )
-    from lobewatch.show.programs.describe_doubts import reading_lines
+    from lobewatch.show.programs.describe_advice import ProgramAdvice, advise_program, check_json, check_texts
     from lobewatch.show.programs.describe_verdicts import is_safe
-    from lobewatch.show.terminal.output import remark_json, remark_lines
 
     logbook = Logbook.open(machine)
     if not logbook.machine.program:
@@ -57,18 +47,7 @@ def check(
             notes.print(f"{len(programs)} of {count} programs are checked; the others take a while too")
             slow = True
         programs.append(advise_program(logbook, verdict))
-    emit(
-        {
-            "programs": [advice_json(advice) for advice in programs],
-            **counts(programs),
-            "remarks": [remark_json(remark) for remark in logbook.remarks],
-        },
-        as_json,
-        advice_table(programs),
-        *(line for advice in programs for line in advice_lines(advice, logbook.machine.speed)),
-        *reading_lines([advice.verdict for advice in programs], logbook.machine),
-        *remark_lines([*logbook.remarks, *(remark for advice in programs for remark in advice.notes)]),
-        summary(programs),
-    )
+    remarks = logbook.remarks
+    emit(check_json(programs, remarks), as_json, *check_texts(programs, remarks, logbook.machine))
     if not all(is_safe(advice.verdict) for advice in programs):
         raise typer.Exit(1)

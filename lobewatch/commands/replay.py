@@ -75,7 +75,7 @@ def replay(
     from lobewatch.measuring.questions import check_codes, unasked_text
     from lobewatch.measuring.workers.share_work import Workers
     from lobewatch.notify.telling import telling
-    from lobewatch.show.replays.describe_preview import show_preview
+    from lobewatch.show.replays.describe_preview import preview_refusal, show_preview
     from lobewatch.show.replays.describe_replay import show_replay
     from lobewatch.show.replays.progress import ReplayProgress
 
@@ -89,20 +89,16 @@ def replay(
     workers = Workers(jobs, scheduler)
     logbook, (recordings, passed) = Logbook.open(machine), find_files(files)
     if dry_run:
-        with ReplayProgress() as progress:
-            previews = preview_recordings(logbook, recordings, description, progress, workers)
+        with ReplayProgress() as bar:
+            previews = preview_recordings(logbook, recordings, description, bar, workers)
         show_preview(previews, passed, as_json=as_json)
-        n_refused = sum(bool(preview.refused) for preview in previews)
-        if n_refused:
-            reasons = "cannot be used as they are; the reasons stand above"
-            raise DataError(f"{n_refused} of {len(recordings)} file(s) {reasons}")
+        if any(preview.refused for preview in previews):
+            raise DataError(preview_refusal(previews))
         return
     codes = check_codes(accept or ())
     with telling(logbook):
-        with ReplayProgress() as progress:
-            outcome = logbook.replay_all(
-                recordings, description, workers=workers, keep_going=keep_going, progress=progress
-            )
+        with ReplayProgress() as bar:
+            outcome = logbook.replay_all(recordings, description, workers=workers, keep_going=keep_going, progress=bar)
         unasked = logbook.accept(outcome.tap_ids, codes)
         accepted = [code for code in codes if code not in unasked]
         show_replay(outcome, logbook, len(recordings), passed, accepted, as_json=as_json)

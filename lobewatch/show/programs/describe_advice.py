@@ -14,8 +14,10 @@ from rich.table import Table
 from acquisition import Remark
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.analysis import Analysis
-from lobewatch.machine import SpeedRange
+from lobewatch.machine import Machine, SpeedRange
+from lobewatch.show.programs.describe_doubts import reading_lines
 from lobewatch.show.programs.describe_verdicts import verdict_json, verdict_table
+from lobewatch.show.terminal.output import remark_json, remark_lines
 from lobewatch.tool import Assembly
 from lobewatch.verdicts import Advice, Setting, Verdict, Word
 from lobewatch.verdicts.setting_search import LEFT
@@ -59,6 +61,28 @@ def advise_program(logbook: Logbook | Analysis, verdict: Verdict) -> ProgramAdvi
     return ProgramAdvice(verdict, logbook.advice(verdict), logbook.ruling_then(verdict))
 
 
+def check_json(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark]) -> dict[str, Any]:
+    """All programs; remarks: on the files."""
+    return {
+        "programs": [advice_json(program) for program in programs],
+        **counts(programs),
+        "remarks": [remark_json(remark) for remark in remarks],
+    }
+
+
+def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], machine: Machine) -> list[str | Table]:
+    """All programs for people: the table, what is called for, how to read it, how many there are of each word."""
+    decays = [decay_text(program.advice) for program in programs]
+    verdicts = [program.verdict for program in programs]
+    return [
+        verdict_table(verdicts, decays),
+        *(line for program in programs for line in advice_lines(program, machine.speed)),
+        *reading_lines(verdicts, machine),
+        *remark_lines([*remarks, *(remark for program in programs for remark in program.notes)]),
+        summary(programs),
+    ]
+
+
 def advice_json(program: ProgramAdvice) -> dict[str, Any]:
     """One program."""
     return verdict_json(program.verdict) | {
@@ -69,12 +93,6 @@ def advice_json(program: ProgramAdvice) -> dict[str, Any]:
         "tolerable_decay": program.advice.decay,
         "remarks": [asdict(remark) for remark in program.remarks],
     }
-
-
-def advice_table(programs: Sequence[ProgramAdvice]) -> Table:
-    """Programs, a line each."""
-    decays = [decay_text(program.advice) for program in programs]
-    return verdict_table([program.verdict for program in programs], decays)
 
 
 def decay_text(advice: Advice) -> str:

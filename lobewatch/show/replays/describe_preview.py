@@ -66,6 +66,12 @@ def preview_summary(previews: Sequence[Preview], n_passed: int) -> str:
     return f"{count}{passed}; nothing is stored (--dry-run)"
 
 
+def preview_refusal(previews: Sequence[Preview]) -> str:
+    """How many files cannot be used."""
+    refused = sum(bool(preview.refused) for preview in previews)
+    return f"{refused} of {len(previews)} file(s) cannot be used as they are; the reasons stand above"
+
+
 def _in_full(preview: Preview) -> list[str]:
     if preview.known:
         return [f"{preview.file}: stored already as {preview.known}"]

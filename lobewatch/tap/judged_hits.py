@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from acquisition import Hit, HitFlags, RunningMean, Verdict, judge_hit
+from acquisition import Hit, HitFlags, HitVerdict, RunningMean, judge_hit
 from lobewatch.machine.settings.machine_file import Machine
 from lobewatch.tap.in_progress import TapInProgress
 
@@ -36,12 +36,12 @@ class JudgedHits:
         """Progress of the test in words."""
         return f"{self.tap.good} of {self.wanted} good hits"
 
-    def judge(self, hit: Hit) -> Verdict:
+    def judge(self, hit: Hit) -> HitVerdict:
         """Verdict on a hit, against the mean too where that has enough hits to tell how far they scatter."""
         mean = self.mean.frf if len(self.mean.hits) >= FEWEST_FOR_MEAN else None
         return judge_hit(hit, mean, self._band)
 
-    def add(self, hit: Hit, verdict: Verdict) -> None:
+    def add(self, hit: Hit, verdict: HitVerdict) -> None:
         """Keep a hit; on the disk when this returns."""
         self.tap.add(hit, verdict.flags, verdict.text)
         if not verdict.flags:
@@ -52,10 +52,10 @@ class JudgedHits:
         good = [i for i, flags in enumerate(self.tap.flags) if not flags]
         if not good:
             return None
-        self._take_out(good[-1], Verdict(HitFlags.UNDONE))
+        self._take_out(good[-1], HitVerdict(HitFlags.UNDONE))
         return good[-1]
 
-    def look_back(self) -> tuple[int, Verdict] | None:
+    def look_back(self) -> tuple[int, HitVerdict] | None:
         """Judge the first hits, which had no mean to be compared with, against the mean of all others.
 
         Takes the first of them that does not fit out of the mean, and returns its index and why.
@@ -70,6 +70,6 @@ class JudgedHits:
                 return number, verdict
         return None
 
-    def _take_out(self, number: int, verdict: Verdict) -> None:
+    def _take_out(self, number: int, verdict: HitVerdict) -> None:
         self.tap.take_out(number, verdict.flags, verdict.text)
         self.mean.remove(self.tap.hits[number])

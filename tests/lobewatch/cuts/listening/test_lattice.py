@@ -113,9 +113,9 @@ def test_a_line_belongs_to_the_exact_lattice_within_0_6_bins(bins: float, is_tak
 
 
 def test_where_lines_say_nothing_or_pull_too_far_the_speed_stays_what_it_was() -> None:
-    """Two lines without multiples, one spacing: f and f_c follow from two, f alone from none; 0.5 % is too far."""
+    """A line of chatter alone says nothing of the speed; 0.5 % is too far."""
     nothing = refine_speed(TURN, lines([CHATTER]), BIN)
-    assert (nothing.frequency, nothing.error, nothing.share) == (TURN, np.inf, 0.0)
+    assert (nothing.frequency, nothing.error, nothing.share, nothing.agreeing) == (TURN, np.inf, 0.0, 0)
     assert nothing.misfit == 10**2
     for off, kept in ((0.0046, False), (0.0054, True)):
         slow = refine_speed(TURN, lines([TURN * (1 + off)]), TURN * 0.01)

@@ -3,6 +3,7 @@
 from .advice import Advice, advise, robust_pockets
 from .doubt import Doubt, doubt_of
 from .setting_search import Setting
+from .spindle_at_speed import SpindleAtSpeed
 from .verdict import Ruling, Verdict, Word
 
 __all__ = [
@@ -10,6 +11,7 @@ __all__ = [
     "Doubt",
     "Ruling",
     "Setting",
+    "SpindleAtSpeed",
     "Verdict",
     "Word",
     "advise",

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from acquisition import DataError, Remark
 from lobewatch.machine.archive.cut_recordings import verify_cuts
-from lobewatch.machine.archive.verify_spool import verify_spool
+from lobewatch.machine.archive.verify_spool import damaged_file, file_set_aside, verify_spool
 from lobewatch.machine.contents import (
     committed_cuts,
     committed_taps,
@@ -75,7 +75,7 @@ def verify(path: Path) -> Verification:
         cure = (
             f"put it back from a backup; without one, {command('rebuild', path)} takes the copy in the newest tap test"
         )
-        missing = Remark("file-damaged", "machine.toml", "is missing beside tap tests", cure)
+        missing = damaged_file("machine.toml", "is missing beside tap tests", cure)
         return Verification((missing,), (), 0)
     folder = MachineFolder(path)
     journal = folder.journal
@@ -163,7 +163,7 @@ def _verify_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterat
         cure = (
             "correct it; without a way to, move it away: lobewatch rebuild then takes the copy in the newest tap test"
         )
-        yield Remark("file-damaged", "machine.toml", str(error), cure)
+        yield damaged_file("machine.toml", str(error), cure)
         return
     newest = max(sound, key=lambda entry: entry.time, default=None)
     copy = ""
@@ -180,20 +180,20 @@ def _verify_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterat
 def _verify_history(folder: MachineFolder) -> Iterator[Remark]:
     if folder.history.exists() and read_rows(folder.history).is_damaged:
         cure = f"{command('rebuild', folder.path)} makes it anew, and so does any command that reads it"
-        yield Remark("file-damaged", folder.history.name, "altered since it was written", cure)
+        yield damaged_file(folder.history.name, "altered since it was written", cure)
 
 
 def _verify_devices(folder: MachineFolder) -> Iterator[Remark]:
     try:
         read_known_devices(folder)
     except DataError as error:
-        yield Remark("file-damaged", "daq.json", str(error).removeprefix(f"{folder.path / 'daq.json'}: "))
+        yield damaged_file("daq.json", str(error).removeprefix(f"{folder.path / 'daq.json'}: "))
 
 
 def _verify_names(folder: Path) -> Iterator[Remark]:
     for path in sorted(folder.iterdir()):
         if path.suffix in (".tmp", ".torn", ".damaged") or path.name == "damaged":
-            yield Remark("set-aside", path.name, "left over or set aside", "delete it when you do not need it")
+            yield file_set_aside(path.name, "left over or set aside", "delete it when you do not need it")
         elif path.name == "report.html":
             yield Remark(
                 "not-verified", path.name, "a report is not verified", command("report", folder) + " writes it anew"

@@ -14,6 +14,16 @@ from lobewatch.machine.journal.journal import command
 ALTERED = "altered or cut short since it was written"
 
 
+def damaged_file(about: str, text: str, cure: str = "") -> Remark:
+    """Remark on a file that is missing or not as it was written, and that nothing else has a word for."""
+    return Remark("file-damaged", about, text, cure)
+
+
+def file_set_aside(about: str, text: str, cure: str) -> Remark:
+    """Remark on a file that harms nothing."""
+    return Remark("set-aside", about, text, cure)
+
+
 def verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
     """Remarks on the files of interrupted tests.
 
@@ -32,22 +42,22 @@ def verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
 def _verify_test(folder: Path, path: Path) -> Iterator[Remark]:
     cure = f"put it back from a backup, or {command('tap', folder)} goes on with the others{_or_delete(path)}"
     about = path.relative_to(folder).as_posix()
-    yield from (Remark("file-damaged", f"{about}/{name}", "missing", cure) for name in _missing_hits(path))
+    yield from (damaged_file(f"{about}/{name}", "missing", cure) for name in _missing_hits(path))
 
 
 def _verify_file(folder: Path, path: Path) -> Iterator[Remark]:
     about, tap = path.relative_to(folder).as_posix(), command("tap", folder)
     if path.suffix == ".h5" and not is_sealed(path.read_bytes()):
         cure = f"{tap} sets it aside and goes on with the others{_or_delete(path.parent)}"
-        yield Remark("file-damaged", about, ALTERED, cure)
+        yield damaged_file(about, ALTERED, cure)
     elif path.name == "setup.json" and not _is_whole_set_up(path):
         cure = f"{tap} sets it aside and chooses the set-up anew{_or_delete(path.parent)}"
-        yield Remark("file-damaged", about, ALTERED, cure)
+        yield damaged_file(about, ALTERED, cure)
     elif path.suffix == ".tmp":
-        yield Remark("set-aside", about, "half written", f"{tap} removes it")
+        yield file_set_aside(about, "half written", f"{tap} removes it")
     elif path.suffix == ".damaged":
         cure = "delete it when you do not need it"
-        yield Remark("set-aside", about, "a damaged file of an interrupted test", cure)
+        yield file_set_aside(about, "a damaged file of an interrupted test", cure)
 
 
 def _or_delete(test: Path) -> str:

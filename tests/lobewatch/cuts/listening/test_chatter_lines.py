@@ -92,14 +92,16 @@ def test_of_two_that_explain_as_much_the_larger_displacement_names_chatter() -> 
     assert named(1.1) == 1310.0
 
 
-@pytest.mark.parametrize(("clearness", "name"), [(4.5, 1450.0), (5.7, 1310.0)])
-def test_lines_speak_as_they_stand_clear_and_displacement_counts_three_tenths(clearness: float, name: str) -> None:
+@pytest.mark.parametrize(("clearness", "frequency"), [(4.5, 1450.0), (5.7, 1310.0)])
+def test_lines_speak_as_they_stand_clear_and_displacement_counts_three_tenths(
+    clearness: float, frequency: float
+) -> None:
     """Explained 4 + log c against 4, displacement 0.5 against 1: 1 + 0.3 / 2 is 4 / (4 + log c) + 0.3 at c = 5.1."""
     amplitude = 10.0 * np.sqrt(0.5) * (1310.0 / 1450.0) ** 2
     heard = SpectralLines(
         np.array([1450.0, 1310.0, 2620.0]), np.array([10.0, amplitude, 0.5]), np.array([1e4, 1e4, clearness])
     )
-    assert chatter_lines(heard, TEETH, BIN).frequency == name
+    assert chatter_lines(heard, TEETH, BIN).frequency == frequency
 
 
 def test_the_largest_displacement_is_found_among_many_loud_lines() -> None:

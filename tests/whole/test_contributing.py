@@ -22,7 +22,7 @@ from lobewatch.tap.emulated_spindle import CHANNELS
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-ROOMS = {"show/", "screen/", "commands/", "analysis/", "sensors/", "tap/"}
+ROOMS = {"show/", "screen/", "commands/", "logbook/", "sensors/", "tap/"}
 """Named without their package."""
 
 
@@ -91,6 +91,6 @@ def test_the_format_is_read(environment: dict[str, str], structure: Structure, t
 def test_every_file_and_command_that_is_named_is_there() -> None:
     text = re.sub(r"^```.*?^```", "", PAGE, flags=re.MULTILINE | re.DOTALL)
     files = {place for place in re.findall(r"`([\w.*/-]*/[\w.*/-]*)`", text) if "NAME" not in place} - ROOMS
-    assert {"acquisition/devices/driver.py", ".ci/lock", "lobewatch/show/report.html"} <= files
+    assert {"acquisition/devices/driver.py", ".ci/lock", "lobewatch/show/report/sections.py"} <= files
     assert {place for place in files if not list(ROOT.glob(place.rstrip("/")))} == set()
     assert set(re.findall(r"^\$ lobewatch ([a-z]+)", PAGE, re.MULTILINE)) <= COMMANDS.keys()

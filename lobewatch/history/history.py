@@ -40,31 +40,31 @@ class Row:
     """One measurement of the history: what was measured, and what was said of the programs where that was asked."""
 
     tap_id: str
-    """Of the tap test."""
+    """Identity of the tap test."""
     time: datetime
-    """When it was taken."""
+    """Time of the tap test."""
     tool: str
-    """What was in the spindle."""
+    """Tool in the spindle."""
     direction: str
     """Direction at the tool tip, "x" or "y"."""
     frequency: Estimate = UNKNOWN
-    """Of the mode followed (Hz)."""
+    """Natural frequency of the mode followed (Hz)."""
     damping_ratio: Estimate = UNKNOWN
-    """Of the mode followed (-)."""
+    """Damping ratio of the mode followed (-)."""
     stiffness: Estimate = UNKNOWN
-    """Of the mode followed, where it was tapped (N/m)."""
+    """Modal stiffness of the mode followed, where it was tapped (N/m)."""
     phase_deg: Estimate = UNKNOWN
-    """Of the modal constant of the mode followed (degrees)."""
+    """Phase of the modal constant of the mode followed (degrees)."""
     bearing_stiffness: Estimate = UNKNOWN
     """Mean of the bearings of the recalibrated model (N/m)."""
     static_tip_stiffness: float = np.nan
-    """Of the recalibrated model (N/m)."""
+    """Static stiffness of the recalibrated model at the tool tip (N/m)."""
     modal_tip_stiffness: float = np.nan
-    """Of the recalibrated model (N/m)."""
+    """Modal stiffness of the recalibrated model at the tool tip (N/m)."""
     modes: tuple[Values, ...] = ()
     """All modes found."""
     remarks: tuple[Remark, ...] = ()
-    """What could not be done, and what is in doubt."""
+    """Remarks on what could not be done, and what is in doubt."""
     x: tuple[Values, ...] = ()
     """Modes at the tool tip in x of the assembly as it was then; empty where no direction was known."""
     y: tuple[Values, ...] = ()
@@ -76,7 +76,7 @@ class Row:
     series: str = ""
     """The first tap test of those that it is compared with: of one tool with one stick-out in one state."""
     conditions: Conditions = UNSAID
-    """What it was taken under."""
+    """Conditions that it was taken under."""
     software: str = ""
     """Name and version of the program that made the row."""
 
@@ -114,7 +114,7 @@ class History:
     """All measurements of a machine, in order of time."""
 
     settings_hash: str
-    """Of the settings that it was made with."""
+    """Hash of the settings that it was made with."""
     software: str
     """Name and version of the program that made it."""
     rows: tuple[Row, ...]
@@ -122,7 +122,7 @@ class History:
     baseline: datetime | None = None
     """The newest event from which on all comparing begins anew."""
     kept: tuple[Row, ...] = ()
-    """Of tap tests whose files cannot be used now, as they were worked out before; they count for nothing."""
+    """Rows of tap tests whose files cannot be used now, as they were worked out before; they count for nothing."""
 
     @cached_property
     def current(self) -> list[Row]:

@@ -35,13 +35,13 @@ class _Ground(NamedTuple):
     """What a tap test builds on, but for its own file."""
 
     said: tuple[Remark, ...]
-    """Of its mounting."""
+    """Remarks on its mounting."""
     last: Values | None
     """The mode followed before it."""
     other: str
     """Tap test that the other direction is taken from; empty without any."""
     near: tuple[FollowedMode, ...]
-    """Where that is so old that it is moved: what it is moved by."""
+    """Modes that it is moved by where it is that old."""
 
 
 class _Archive:

@@ -27,13 +27,13 @@ class CutComparison:
     """What was heard beside what the tap tests predict."""
 
     setting: CutSetting
-    """What was cut."""
+    """Setting that was cut with."""
     heard: HeardSound
-    """What it sounds like."""
+    """Sound of the cut."""
     assembly: Assembly | None
     """The tool as it was tapped; None where it was not and cannot be predicted."""
     predicted: ExpectedSound | None
-    """By its modes, at the speed that was heard (that was set where none was); None without them."""
+    """Sound by its modes, at the speed that was heard (that was set where none was); None without them."""
 
     @property
     def tooth_frequency(self) -> float:

@@ -29,17 +29,17 @@ class LobeComparison:
     """One cut, then and now."""
 
     now: Chart
-    """From the newest tap tests, or predicted."""
+    """Chart from the newest tap tests, or predicted."""
     then: Chart | None
-    """From the first tap tests of the same tool and directions; None where there are no earlier ones."""
+    """Chart from the first tap tests of the same tool and directions; None where there are no earlier ones."""
     pockets: Sequence[Setting]
     """Safe settings of now, whatever the method of the chart, the largest removal rate first."""
     shifts: Sequence[PocketShift]
-    """How the pockets of the diagram moved; nothing of it is recommended."""
+    """Shifts of the pockets of the diagram; nothing of them is recommended."""
     verdicts: Sequence[Verdict]
-    """On the programs with this same cut: not by the method of the chart, but those of `Logbook.verdicts`."""
+    """Verdicts on the programs with this same cut: not by the method of the chart, but those of `Logbook.verdicts`."""
     remarks: Sequence[Remark]
-    """What the chart rests on, and why there are no pockets."""
+    """Remarks on what the chart rests on, and why there are no pockets."""
 
 
 def compare_lobes(logbook: Logbook, tool: str | None, cut: str, source: Dynamics, method: Method) -> LobeComparison:

@@ -25,7 +25,7 @@ class ModelPicture:
     spindle: Spindle
     """The shaft."""
     modes: Modes
-    """Its modes along the shaft."""
+    """Modes along the shaft."""
     curve: tuple[_Float, _Float]
     """Bearing stiffness (N/m) and frequency (Hz) of the followed mode, shape (n,) each."""
     points: tuple[_Float, _Float]
@@ -35,9 +35,9 @@ class ModelPicture:
     highest_speed: float
     """End of the speed range of the machine (rpm)."""
     frf_place: str
-    """Where force and motion of the frequency responses are, in words."""
+    """Place of force and motion of the frequency responses, in words."""
     model_frf: Frf
-    """Of the model."""
+    """Frequency response of the model."""
     measured_frf: Frf | None
     """Newest measured one of the same tool."""
 

@@ -25,11 +25,11 @@ class Fate:
     """What becomes of one program; dates in days since 1970."""
 
     critical: CriticalFall
-    """How far the frequency of its newest tap tests may fall."""
+    """Falls that the frequency of its newest tap tests may take."""
     doubtful: DateRange | None
-    """When it becomes doubtful; None where nothing can be foretold."""
+    """Date on which it becomes doubtful; None where nothing can be foretold."""
     not_stable: DateRange | None
-    """When it is not stable any more; None where nothing can be foretold."""
+    """Date from which it is not stable any more; None where nothing can be foretold."""
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class Outlook:
     """What becomes of a machine if it is used as before."""
 
     standing: Standing
-    """As it stands now."""
+    """Standing of the machine now."""
     programs: Mapping[str, Fate]
-    """By name."""
+    """Fate of each program, by its name."""
     limits: Mapping[float, DateRange | None]
-    """When the worst of its series has fallen by so much (%), those of machine.toml; None where it cannot be told."""
+    """Dates on which the worst of its series has fallen by the limits of machine.toml (%); None where it cannot be told."""
 
     @property
     def horizon(self) -> float:

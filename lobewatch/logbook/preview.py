@@ -21,17 +21,17 @@ class Preview:
     """What would become of one file."""
 
     file: Path
-    """Where it lies."""
+    """Path of the file."""
     known: str = ""
     """The tap test that it is stored as already."""
     refused: str = ""
-    """Why it cannot be used, and what to say of it."""
+    """Reason why it cannot be used, and what to say of it."""
     recording: Recording | None = None
-    """How it is understood."""
+    """Recording as it is understood."""
     tap: TapTest | None = None
     """The tap test that it would be."""
     measurement: Measurement | None = None
-    """What that says; its remarks hold the questions that would be asked."""
+    """Measurement of that; its remarks hold the questions that would be asked."""
 
 
 def preview_recordings(

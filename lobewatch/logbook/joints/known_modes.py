@@ -37,7 +37,7 @@ class Start(NamedTuple):
     """Factors to begin with, and the modes that are found with them."""
 
     cost: float
-    """How far all modes are from the model."""
+    """Distance of all modes from the model."""
     bearings: float
     """Factor on the bearings."""
     radial: float
@@ -57,7 +57,7 @@ class KnownModes:
     matches: tuple[Match, ...]
     """One a tap test."""
     grouping: Grouping
-    """Which parts share a factor."""
+    """Grouping of the parts that share a factor."""
     fit: StiffnessFit
     """The model."""
 

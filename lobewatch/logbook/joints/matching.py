@@ -23,9 +23,9 @@ class Match(NamedTuple):
     """The modes of a tap test in a model."""
 
     cost: float
-    """How far they are from those of the model, a sum of squares."""
+    """Distance from those of the model, a sum of squares."""
     modes: tuple[tuple[int, Mode], ...]
-    """Those found, with their number in the model, in order."""
+    """Modes with their numbers in the model, in order."""
 
 
 def match(tap: TappedTool, frequency: Sequence[float], stiffness: Sequence[float]) -> Match:

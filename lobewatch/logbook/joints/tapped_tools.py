@@ -24,11 +24,11 @@ class TappedTool:
     """One tool with its newest tap test."""
 
     tool: str
-    """What is in the spindle."""
+    """Tool in the spindle."""
     tap_id: str
-    """Of the tap test."""
+    """Identity of the tap test."""
     time: datetime
-    """When it was taken."""
+    """Time of the tap test."""
     spindle: Spindle
     """The model with this tool, as machine.toml has it."""
     number: int

@@ -33,19 +33,19 @@ class ToolsCalibration:
     """One model for several tools."""
 
     label: str
-    """Of the model, as machine.toml has it."""
+    """Label of the model in machine.toml."""
     taps: tuple[TappedTool, ...]
-    """What it was fitted to, one a spindle of the fit."""
+    """Tools that it was fitted to, one a spindle of the fit."""
     fit: StiffnessFit
     """The stiffness of bearings and joints."""
     predicted: dict[str, PredictedMode]
     """The softest mode at the tip of each tool that was not fitted to, by its name; empty where factors are shared."""
     joints: tuple[Joint, ...]
-    """What to write into machine.toml, as found; empty where that would be no improvement."""
+    """Joints to write into machine.toml; empty where that would be no improvement."""
     left_out: dict[str, tuple[float, ...]]
     """Frequencies (Hz) of other modes of the tap tests that the model has nowhere near, by tool."""
     remarks: tuple[Remark, ...]
-    """What makes the fit doubtful beside its own remarks."""
+    """Remarks on what makes the fit doubtful, beside its own."""
 
 
 def calibrate_tools(

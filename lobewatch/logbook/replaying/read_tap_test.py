@@ -39,7 +39,7 @@ class Setup(NamedTuple):
     """The machine that a recording is of."""
 
     machine: Machine
-    """As it was read."""
+    """Tables of machine.toml as they were read."""
     toml: str
     """The text of its machine.toml, a copy of which becomes a part of the tap test."""
 

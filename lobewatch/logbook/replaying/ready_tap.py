@@ -26,15 +26,15 @@ class ReadyTap:
     digest: str
     """SHA-256 of the file."""
     temporary: Path
-    """Its tap file, on the disk."""
+    """Path of its tap file under a temporary name."""
     entry: TapEntry
-    """Of that."""
+    """Journal entry of that."""
     created: datetime
-    """When it was recorded."""
+    """Time of the recording."""
     fit: TapFit
     """The modes in it."""
     taken: tuple[str, ...]
-    """What was taken for granted where the file does not say it."""
+    """Facts that were taken for granted where the file does not say them."""
 
 
 def make_ready(folder: MachineFolder, file: Path, description: Description) -> ReadyTap:

@@ -33,7 +33,7 @@ class ReplayOutcome:
     refused: Mapping[Path, str] = field(default_factory=dict)
     """Files that cannot be used, and why."""
     taken: Sequence[str] = ()
-    """What was taken for granted where files do not say it, each once."""
+    """Facts that were taken for granted where files do not say them, each once."""
     fits: Mapping[str, TapFit] = field(default_factory=dict)
     """The modes of the new tap tests, by identity."""
 

@@ -28,7 +28,7 @@ class FileReading:
     tap: TapTest
     """The tap test that it would be."""
     recording: Recording
-    """How it is understood."""
+    """Recording as it is understood."""
     fit: TapFit
     """The modes in it."""
 
@@ -40,15 +40,15 @@ class TapDraft:
     digest: str
     """SHA-256 of the file."""
     content: bytes
-    """Its tap file."""
+    """Bytes of its tap file."""
     entry: TapEntry
-    """Of that."""
+    """Journal entry of that."""
     created: datetime
-    """When it was recorded."""
+    """Time of the recording."""
     fit: TapFit
     """The modes in it."""
     taken: tuple[str, ...]
-    """What was taken for granted where the file does not say it."""
+    """Facts that were taken for granted where the file does not say them."""
 
 
 @dataclass(frozen=True)
@@ -56,15 +56,15 @@ class FileRequest:
     """One file, with all that another computer has to know of it."""
 
     file: Path
-    """Where it lies, from the root on."""
+    """Path of the file, from the root on."""
     content: bytes
     """All of it."""
     said: Description
-    """What a person says of it."""
+    """Description that a person gives of it."""
     machine_toml: str
     """The machine that it is of."""
     fault: str = ""
-    """Why it cannot be read."""
+    """Reason why it cannot be read; empty where it can."""
 
     @classmethod
     def of(cls, file: Path, description: Description, machine_toml: str) -> Self:

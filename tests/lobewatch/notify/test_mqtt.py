@@ -100,7 +100,7 @@ def test_a_sender_that_breaks_off_leaves_its_last_will(mosquitto: Mosquitto) -> 
     program = (
         "import os, sys; from lobewatch.machine.settings.notify_table import broker_of\n"
         "from lobewatch.notify import mqtt\n"
-        "mqtt.connected(broker_of(sys.argv[1])); os._exit(1)"
+        "mqtt.connect(broker_of(sys.argv[1])); os._exit(1)"
     )
     subprocess.run([sys.executable, "-c", program, mosquitto.address], check=False)
     assert json.loads(received(mosquitto, "lobewatch/sender").payload) == {"sender": "lost"}

@@ -157,3 +157,12 @@ def test_json_of_what_is_not_known() -> None:
 
 def test_speeds_are_read_in_groups() -> None:
     assert [rpm(speed) for speed in (950.0, 12640.0, 12640.5, 123456.0)] == ["950", "12 640", "12 640.5", "123 456"]
+
+
+def test_json_says_limits_in_millimetres_and_angles_in_degrees() -> None:
+    verdict = a_verdict(Word.DOUBTFUL, drive_limit=7e-3, feed_angle=math.pi / 2, chatter_frequency=1700.0)
+    said = verdict_json(verdict)
+    limits = [said[name] for name in ("limit_mm", "limit_low_mm", "limit_high_mm", "drive_limit_mm")]
+    assert limits == pytest.approx([3.0, 2.0, 4.0, 7.0])
+    assert said["depth_margin"] == pytest.approx(3.0 / 2.0 - 1)
+    assert (said["worst_feed_deg"], said["chatter_frequency_hz"]) == (pytest.approx(90.0), 1700.0)

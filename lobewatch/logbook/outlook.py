@@ -41,7 +41,7 @@ class Outlook:
     programs: Mapping[str, Fate]
     """Fate of each program, by its name."""
     limits: Mapping[float, DateRange | None]
-    """Dates on which the worst of its series has fallen by each limit (%) of machine.toml; None where none can be told."""
+    """Dates when the worst of its series has fallen by each limit (%) of machine.toml; None where nobody can tell."""
 
     @property
     def horizon(self) -> float:

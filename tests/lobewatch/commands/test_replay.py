@@ -135,6 +135,15 @@ def test_one_bad_file_costs_only_itself_where_it_may(shop: Shop, folder: Path) -
     assert len(taps(shop)) == 3
 
 
+def test_where_no_file_can_be_used_nothing_is_kept_going_with(shop: Shop, tmp_path: Path) -> None:
+    files = [tmp_path / name for name in ("a.csv", "b.csv")]
+    for file in files:
+        file.write_text(f"no recording: {file.name}", "utf-8")
+    with pytest.raises(DataError, match="none of the 2 files can be used; nothing is stored"):
+        run("replay", shop.path, *files, "--keep-going", "--date", "2024-05-01")
+    assert shop.logbook.taps == []
+
+
 def test_notes_beside_recordings_are_passed_over_and_refused_by_name(shop: Shop, folder: Path) -> None:
     notes = folder / "Notizen Fräser.txt"
     notes.write_text("3 Schläge, harte Spitze\n24.05.2024\n", encoding="utf-8")

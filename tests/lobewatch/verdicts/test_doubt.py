@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lobes import Cut, MillingRows, Program
-from lobewatch.verdicts.doubt import CUTS, LearntDraws
+from lobewatch.verdicts.doubt import CUTS, LearntDraws, doubt_of
 from lobewatch.verdicts.draws import middle_row
 from modal import Mode
 from tests.lobewatch.conftest import Shop
@@ -50,3 +50,16 @@ def test_what_is_taken_as_known_stays_in_the_middle(middle: MillingRows) -> None
     assert without_coefficients.stiffness == pytest.approx(middle.stiffness * DRAWS.stiffness)
     assert without_coefficients.tangential == pytest.approx([1400e6, 1400e6])
     assert without_coefficients.radial == pytest.approx([500e6, 500e6])
+
+
+def test_a_prediction_is_doubted_as_machine_toml_says(shop: Shop) -> None:
+    shop.tap_both()
+    machine, tapped = shop.logbook.machine, shop.logbook.assembly()
+    predicted = replace(
+        tapped, x=[Mode(1700.0, 0.03, 3e7, phase_deg=10.0)], y=[Mode(1500.0, 0.02, 2e7)], predicted=True
+    )
+    widths = doubt_of(predicted, machine.program[0], machine).modes["prediction"]
+    given = machine.doubt
+    percents = [given.predicted_frequency_percent, given.predicted_damping_percent, given.predicted_stiffness_percent]
+    assert widths[:, :3] == pytest.approx(np.tile(np.array(percents) / 100, (2, 1)))
+    assert widths[:, 3] == pytest.approx([np.radians(10.0), 0.0])

@@ -1,4 +1,4 @@
-"""The error of a frequency of a tapped tool: that of the fit, and the scatter of mounting it, as a standard deviation."""
+"""Error of a frequency of a tapped tool: that of the fit, and the scatter of mounting as a standard deviation."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import shutil
 import socket
 import subprocess
 import time
-from contextlib import suppress
+from contextlib import closing, suppress
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -94,11 +94,13 @@ def test_a_real_prometheus_reads_the_server_and_fires_a_rule(mills: Path, tmp_pa
 
 def wait_for_alerts(port: int) -> list[dict[str, Any]]:
     for _ in range(300):
-        with suppress(OSError, ValueError, http.client.HTTPException):
-            connection = http.client.HTTPConnection("127.0.0.1", port, timeout=5)
+        with (
+            suppress(OSError, ValueError, http.client.HTTPException),
+            closing(http.client.HTTPConnection("127.0.0.1", port, timeout=5)) as connection,
+        ):
             connection.request("GET", "/api/v1/alerts")
-            alerts: list[dict[str, Any]] = json.loads(connection.getresponse().read())["data"]["alerts"]
-            connection.close()
+            with connection.getresponse() as answer:
+                alerts: list[dict[str, Any]] = json.load(answer)["data"]["alerts"]
             if alerts:
                 return alerts
         time.sleep(0.2)

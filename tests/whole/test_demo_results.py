@@ -6,37 +6,66 @@ A change that is meant shows here: the new text lies in the folder that the fail
 from __future__ import annotations
 
 import importlib
-import os
 import pkgutil
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from datetime import datetime, tzinfo
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
+from PIL import Image
 from typer.testing import CliRunner
 
 import lobewatch
+from acquisition.devices import find_driver
+from acquisition.emulation import Passage
 from lobewatch.cli import app
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.settings.cut_setting import cut_setting
+from lobewatch.tap.emulated_cut import emulate_cut
 
-SEEN = Path(__file__).parents[1] / "data" / "demo"
+DATA = Path(__file__).parents[1] / "data"
+SEEN = DATA / "demo"
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 SAME = 1e-6
 """Relative difference that another processor makes at most."""
 QUESTIONS = {
-    "check": [],
-    "check --json": [],
-    "trend": [],
-    "trend --json": [],
-    "suggest": ["--program", "B: slot at 6 200 rpm"],
-    "suggest --json": ["--program", "B: slot at 6 200 rpm"],
-    "lobes": [],
-    "lobes --json": ["--method", "zero-order"],
-    "model": [],
-    "model --json": ["--tool", "long end mill"],
-    "history": [],
-    "history --json": [],
-    "status": [],
+    "demo": "demo --seed 5",
+    "check": "check DEMO",
+    "check.json": "check DEMO --json",
+    "trend": "trend DEMO",
+    "trend.json": "trend DEMO --json",
+    "suggest": "suggest DEMO --program B --json",
+    "lobes": "lobes DEMO --figure lobes.png",
+    "lobes.json": "lobes DEMO --method zero-order --json --radial radial.png --waterfall waterfall.png",
+    "model": "model DEMO --figure model.png",
+    "model.json": "model DEMO --tool LONG --json",
+    "history": "history DEMO",
+    "history.json": "history DEMO --json",
+    "status": "status DEMO",
+    "modes.json": "modes BEAM --json --figure modes.png",
+    "listen": "listen DEMO --program A --depth 6 --port PORT --out listen.png",
+    "check learnt": "check DEMO --json",
+    "suggest learnt": "suggest DEMO --program A --json",
+    "lobes learnt": "lobes DEMO --cut A --figure learnt.png",
+    "report": "report DEMO",
 }
+"""Commands by the name of what they print, in this order."""
+MEANT = {
+    "DEMO": "lobewatch-demo",
+    "LONG": "long end mill",
+    "A": "A: slot at 12 600 rpm",
+    "B": "B: slot at 6 200 rpm",
+    "BEAM": str(DATA / "ladisk_beam" / "acceleration.lvm"),
+}
+PICTURES = ("lobes", "radial", "waterfall", "model", "modes", "listen", "learnt")
+SMALLER = 3
+"""Dots of a picture, each way, that are one in what is kept."""
+PALE = 3.0
+"""Difference of such a dot (of 255) that no eye sees."""
 
 
 class January(datetime):
@@ -49,37 +78,62 @@ class January(datetime):
 
 
 @pytest.fixture(scope="module")
-def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """What is printed, by command."""
-    here, runner = Path.cwd(), CliRunner(env={"COLUMNS": "100"})
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
+    """What is printed, by name; the pictures lie in the present folder."""
     with pytest.MonkeyPatch.context() as patch:
         for name in [module.name for module in pkgutil.walk_packages(lobewatch.__path__, "lobewatch.")]:
             module = importlib.import_module(name)
             if getattr(module, "datetime", None) is datetime:
                 patch.setattr(module, "datetime", January)
-        os.chdir(tmp_path_factory.mktemp("demo"))
-        try:
-            printed = {"demo": runner.invoke(app, ["demo", "--seed", "5"]).stdout}
-            for question, options in QUESTIONS.items():
-                command, *more = question.split()
-                told = runner.invoke(app, [command, "lobewatch-demo", *more, *options])
-                assert told.exit_code in (0, 1), told.output
-                printed[question] = told.stdout
-            page = Path("lobewatch-demo/report.html").read_text("utf-8")
-        finally:
-            os.chdir(here)
-    printed["report"] = re.sub(r"<(style|script|svg).*?</\1>\n*", "", page, flags=re.DOTALL)
-    return {question: re.sub(r"(?<=_[xy]_)[0-9a-f]{4}\b", "0000", text) for question, text in printed.items()}
+        patch.chdir(tmp_path_factory.mktemp("demo"))
+        printed = {name: answer(command) for name, command in QUESTIONS.items()}
+        page = Path("lobewatch-demo/report.html").read_text("utf-8")
+        printed["report"] = re.sub(r"<(style|script|svg).*?</\1>\n*", "", page, flags=re.DOTALL)
+        yield {name: re.sub(r"(?<=_[xy]_)[0-9a-f]{4}\b", "0000", text) for name, text in printed.items()}
+
+
+def answer(command: str) -> str:
+    """What a command prints; on the port of the emulated cut where it asks for one."""
+    with port_of_a_cut() if "PORT" in command else nullcontext("") as port:
+        words = [(MEANT | {"PORT": port}).get(word, word) for word in command.split()]
+        told = CliRunner(env={"COLUMNS": "100"}).invoke(app, words)
+    assert told.exit_code in (0, 1), told.output
+    return told.stdout
+
+
+@contextmanager
+def port_of_a_cut() -> Iterator[str]:
+    """A is cut again and again, too deep."""
+    folder, passage = MachineFolder("lobewatch-demo"), Passage(before=1.2, ramp=0.05, steady=0.7, after=0.6)
+    setting = cut_setting(folder.machine, MEANT["A"], None, 6.0)
+    with emulate_cut(folder, find_driver("taps"), setting, realtime=False, passage=passage).device as device:
+        yield device.port
 
 
 @pytest.mark.timeout(300)
-@pytest.mark.parametrize("question", ["demo", "report", *QUESTIONS])
-def test_the_answer_is_the_one_that_was_looked_at(
-    answers: dict[str, str], question: str, tmp_path: Path
-) -> None:
-    seen = SEEN / f"{question.replace(' --', '.')}{'' if '--json' in question else '.txt'}"
-    (tmp_path / seen.name).write_text(answers[question], "utf-8")
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_the_answer_is_the_one_that_was_looked_at(demo: dict[str, str], name: str, tmp_path: Path) -> None:
+    seen, new = SEEN / f"{name}.txt", tmp_path / f"{name}.txt"
+    new.write_text(demo[name], "utf-8")
     expected = seen.read_text("utf-8") if seen.exists() else ""
-    assert NUMBER.split(answers[question]) == NUMBER.split(expected), f"what is new: {tmp_path / seen.name}"
-    found, wanted = ([*map(float, NUMBER.findall(text))] for text in (answers[question], expected))
-    assert found == pytest.approx(wanted, rel=SAME, abs=1e-12), f"what is new: {tmp_path / seen.name}"
+    assert NUMBER.split(demo[name]) == NUMBER.split(expected), f"what is new: {new}"
+    found, wanted = ([*map(float, NUMBER.findall(text))] for text in (demo[name], expected))
+    assert found == pytest.approx(wanted, rel=SAME, abs=1e-12), f"what is new: {new}"
+
+
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("name", PICTURES)
+@pytest.mark.usefixtures("demo")
+def test_the_picture_is_the_one_that_was_looked_at(name: str, tmp_path: Path) -> None:
+    seen, new = SEEN / f"{name}.png", tmp_path / f"{name}.png"
+    with Image.open(f"{name}.png") as drawn:
+        drawn.convert("RGB").reduce(SMALLER).save(new, optimize=True)
+    found, expected = pixels(new), pixels(seen)
+    assert found.shape == expected.shape, f"what is new: {new}"
+    assert np.max(np.abs(found - expected)) < PALE, f"what is new: {new}"
+
+
+def pixels(path: Path) -> NDArray[np.float64]:
+    """Colours of a picture, 0 to 255."""
+    with Image.open(path) as picture:
+        return np.asarray(picture, dtype=np.float64)

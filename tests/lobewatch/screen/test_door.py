@@ -195,19 +195,20 @@ def test_one_computer_is_one_place(host: str, place: str) -> None:
 
 @contextlib.contextmanager
 def knocking_at(server: ScreenServer, held: int) -> Iterator[list[int]]:
-    """Another process begins requests and ends none; yields what will say how many, by hundreds."""
+    """Another process has begun requests, ends none and goes on; yields what will say how many, by hundreds."""
     count = list[int]()
     if not held:
         yield count
         return
     arguments = [sys.executable, "-c", KNOCK, str(port_of(server)), str(held)]
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as attacker:
+        assert attacker.stdout is not None
+        count.extend(int(attacker.stdout.readline()) for _ in range(2))
         try:
             yield count
             assert attacker.poll() is None
         finally:
             attacker.kill()
-        assert attacker.stdout is not None
         count.extend(map(int, attacker.stdout))
 
 

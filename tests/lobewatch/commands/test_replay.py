@@ -112,6 +112,15 @@ def test_a_dry_run_says_the_same_whoever_reads(shop: Shop, folder: Path) -> None
     assert len(taps(shop)) == 0
 
 
+def test_a_dry_run_names_the_tap_test_that_a_file_is_already(shop: Shop, folder: Path) -> None:
+    run("replay", shop.path, folder / "b 20240501.csv", "--date-pattern", "%Y%m%d")
+    (stored,) = shop.folder.taps()
+    said = json.loads(run("replay", shop.path, folder, "--date-pattern", "%Y%m%d", "--dry-run", "--json").stdout)
+    first, *others = said["files"]
+    assert (Path(first["file"]).name, first["known"]) == ("b 20240501.csv", stored.id)
+    assert [one["known"] for one in others] == ["", ""]
+
+
 def test_a_dry_run_asks_what_the_replay_would_ask(shop: Shop, beam: Path) -> None:
     shop.edit("band_hz = [1200, 2200]", "band_hz = [1200, 1800]")
     said = json.loads(run("replay", shop.path, beam, "--dry-run", "--json").stdout)

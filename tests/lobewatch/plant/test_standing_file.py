@@ -8,6 +8,7 @@ import subprocess
 import sys
 from datetime import datetime, timedelta
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -170,3 +171,10 @@ def test_the_word_on_programs_is_in_it(tapped: Shop) -> None:
     found = Logbook.open(tapped.path).standing(now(tapped))
     assert (dated.light, dated.remarks) == (found.light, found.remarks)
     assert summary.programs == {name: one.word for name, one in (tapped.logbook.history.rows[-1].rulings or {}).items()}
+
+
+def test_every_byte_is_looked_at_again_every_six_hours(tapped: Shop) -> None:
+    waits = list[float]()
+    end = SimpleNamespace(is_set=lambda: False, wait=lambda seconds: waits.append(seconds) or len(waits) > 1)
+    Plant({"m": tapped.path}).verify_until(end)  # type: ignore[arg-type]
+    assert waits == [6 * 3600.0] * 2

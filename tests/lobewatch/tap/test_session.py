@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from acquisition import Channel, Circumstances, DataError, HammeredStructure, TapTest, new_tap_id, write_hit
+from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.session import TapSession
@@ -77,6 +78,31 @@ def test_a_saved_test_is_called_saved_whatever_is_wrong_with_the_others(
         session.run()
     assert len(folder.taps()) == 1
     assert session.state.word is TapStep.FAILED
+
+
+def test_a_saved_test_that_is_damaged_at_once_is_told_without_the_other_damage(
+    folder: MachineFolder,
+    tapper: Tapper,
+    channels: Pair,
+    monkeypatch: pytest.MonkeyPatch,
+    simulated: Simulate,
+    session_of: OpenSession,
+) -> None:
+    def damage(logbook: Logbook, *_: object) -> list[str]:
+        for path in logbook.folder.path.glob("taps/*.h5"):
+            path.write_bytes(path.read_bytes()[:-1000])
+        return []
+
+    session_of(folder, lambda: simulated(tapper(), channels)).run()
+    (older,) = folder.taps()
+    monkeypatch.setattr("lobewatch.tap.session.Logbook.accept", damage)
+    session = session_of(folder, lambda: simulated(tapper(), channels))
+    with pytest.raises(DataError, match="what it means cannot be worked out") as told:
+        session.run()
+    (newer,) = (path.stem for path in folder.path.glob("taps/*.h5") if path.stem != older.id)
+    said = str(told.value)
+    assert older.id not in said
+    assert f"cannot be worked out: taps/{newer}.h5" in said
 
 
 @pytest.mark.parametrize(

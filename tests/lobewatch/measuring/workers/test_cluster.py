@@ -108,3 +108,12 @@ def test_what_a_cluster_cannot_do_is_one_sentence(cluster: LocalCluster, monkeyp
 def test_a_process_that_is_ended_from_outside_is_one_sentence() -> None:
     with pytest.raises(DataError, match="one of the 2 processes was ended from outside; nothing is stored; try again"):
         [*share_work(os._exit, [1, 1], Workers(2))]
+
+
+def test_work_is_handed_out_three_tasks_a_worker_ahead() -> None:
+    taken = list[int]()
+    tasks = (taken.append(number) or -number for number in range(20))
+    results = share_work(abs, tasks, Workers(2))
+    assert next(results) == 0
+    assert len(taken) == 6
+    assert [*results] == list(range(1, 20))

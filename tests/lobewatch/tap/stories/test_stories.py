@@ -120,6 +120,14 @@ def test_an_emulated_month_is_seeded_and_falls_with_the_story(folder: MachineFol
     assert frequency(23) / frequency(0) == pytest.approx(0.9, abs=0.005)
 
 
+def test_an_emulated_month_has_the_temperature_of_its_season(folder: MachineFolder) -> None:
+    wear = Wear.of(folder, MONTHS, Story.STEADY)
+    for month, warmth in ((0, -10.0), (2, -5.0), (3, 0.0), (6, 10.0)):
+        spindle = mounted_spindle(folder, Story.STEADY, MONTHS, month, Mounting(swing=10.0), 1)
+        shift = float(natural_frequencies(spindle, 1)[0]) / wear.frequency(month) - 1
+        assert shift == pytest.approx(-1.5e-4 * warmth, abs=2e-6)
+
+
 def test_the_truth_is_looked_up_by_the_story(folder: MachineFolder) -> None:
     wear = Wear.of(folder, MONTHS, Story.STEADY)
     month = wear.month_of(0.88 * wear.frequency(0))

@@ -6,9 +6,9 @@ import json
 import shutil
 import subprocess
 import sys
+import threading
 from datetime import datetime, timedelta
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -175,6 +175,11 @@ def test_the_word_on_programs_is_in_it(tapped: Shop) -> None:
 
 def test_every_byte_is_looked_at_again_every_six_hours(tapped: Shop) -> None:
     waits = list[float]()
-    end = SimpleNamespace(is_set=lambda: False, wait=lambda seconds: waits.append(seconds) or len(waits) > 1)
-    Plant({"m": tapped.path}).verify_until(end)  # type: ignore[arg-type]
-    assert waits == [6 * 3600.0] * 2
+
+    class Third(threading.Event):
+        def wait(self, timeout: float | None = None) -> bool:
+            waits.append(timeout or 0.0)
+            return len(waits) == 3
+
+    Plant({"m": tapped.path}).verify_until(Third())
+    assert waits == [6 * 3600.0] * 3

@@ -111,9 +111,8 @@ def test_a_process_that_is_ended_from_outside_is_one_sentence() -> None:
 
 
 def test_work_is_handed_out_three_tasks_a_worker_ahead() -> None:
-    taken = list[int]()
-    tasks = (taken.append(number) or -number for number in range(20))
+    tasks = iter(range(0, -20, -1))
     results = share_work(abs, tasks, Workers(2))
     assert next(results) == 0
-    assert len(taken) == 6
-    assert [*results] == list(range(1, 20))
+    assert next(tasks) == -6
+    assert [*results] == [1, 2, 3, 4, 5, *range(7, 20)]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 import re
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from datetime import datetime, tzinfo
@@ -59,7 +60,7 @@ MEANT = {
     "LONG": "long end mill",
     "A": "A: slot at 12 600 rpm",
     "B": "B: slot at 6 200 rpm",
-    "BEAM": str(DATA / "ladisk_beam" / "acceleration.lvm"),
+    "BEAM": "acceleration.lvm",
 }
 PICTURES = ("lobes", "radial", "waterfall", "model", "modes", "listen", "learnt")
 SMALLER = 3
@@ -86,6 +87,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
             if getattr(module, "datetime", None) is datetime:
                 patch.setattr(module, "datetime", January)
         patch.chdir(tmp_path_factory.mktemp("demo"))
+        shutil.copy(DATA / "ladisk_beam" / "acceleration.lvm", ".")
         printed = {name: answer(command) for name, command in QUESTIONS.items()}
         page = Path("lobewatch-demo/report.html").read_text("utf-8")
         printed["report"] = re.sub(r"<(style|script|svg).*?</\1>\n*", "", page, flags=re.DOTALL)

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 from typer.testing import CliRunner
@@ -26,6 +27,8 @@ from acquisition.emulation import Passage
 from lobewatch.cli import app
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.cut_setting import cut_setting
+from lobewatch.show.figures.style import save_figure, svg
+from lobewatch.show.report import section
 from lobewatch.tap.emulated_cut import emulate_cut
 
 DATA = Path(__file__).parents[1] / "data"
@@ -62,7 +65,9 @@ MEANT = {
     "B": "B: slot at 6 200 rpm",
     "BEAM": "acceleration.lvm",
 }
-PICTURES = ("lobes", "radial", "waterfall", "model", "modes", "listen", "learnt")
+ORDINATES = ("natural frequency", "bearing stiffness", "limiting depth", "date", "Re")
+"""Names of the pictures of the report."""
+PICTURES = ("lobes", "radial", "waterfall", "model", "modes", "listen", "learnt", *(f"report {y}" for y in ORDINATES))
 SMALLER = 3
 """Dots of a picture, each way, that are one in what is kept."""
 PALE = 3.0
@@ -86,12 +91,19 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
             module = importlib.import_module(name)
             if getattr(module, "datetime", None) is datetime:
                 patch.setattr(module, "datetime", January)
+        patch.setattr(section, "svg", svg_and_png)
         patch.chdir(tmp_path_factory.mktemp("demo"))
         shutil.copy(DATA / "ladisk_beam" / "acceleration.lvm", ".")
         printed = {name: answer(command) for name, command in QUESTIONS.items()}
         page = Path("lobewatch-demo/report.html").read_text("utf-8")
         printed["report"] = re.sub(r"<(style|script|svg).*?</\1>\n*", "", page, flags=re.DOTALL)
         yield {name: re.sub(r"(?<=_[xy]_)[0-9a-f]{4}\b", "0000", text) for name, text in printed.items()}
+
+
+def svg_and_png(figure: Figure) -> str:
+    """A picture of the report, the newest kept as a file too, by its ordinate."""
+    save_figure(figure, Path(f"report {figure.axes[0].get_ylabel().partition(' (')[0]}.png"))
+    return svg(figure)
 
 
 def answer(command: str) -> str:

@@ -90,8 +90,9 @@ class Shop:
         text = (self.path / "machine.toml").read_text("utf-8")
         about = Circumstances("m", when, tool, direction, "", text, conditions=conditions)
         frf = synthesize([Mode(frequency, damping_ratio, stiffness)], LINES)
-        self.folder.commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
-        return new_tap_id(about)
+        tap = TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance))
+        self.folder.commit(tap)
+        return tap.id
 
     def tap_both(self, days: float = 0.0, share: float = 1.0) -> None:
         """Both directions; share: of the frequency of the new spindle."""

@@ -11,7 +11,7 @@ from matplotlib.dates import date2num
 
 from acquisition import Frf
 from lobewatch.machine import Limits, ProgramTable
-from lobewatch.show.figures.lobe_figures import lobes_figure
+from lobewatch.show.figures.lobe_figures import lobes_figure, waterfall_figure
 from lobewatch.show.figures.style import new_axes, svg
 from lobewatch.show.figures.trend_figures import Marks, frf_figure, trend_figure
 from lobewatch.verdicts import Verdict, Word
@@ -58,6 +58,12 @@ def test_lobes_are_drawn_in_mm_and_programs_where_they_cut() -> None:
     assert now.get_ydata() == pytest.approx(1.0)
     assert np.asarray(mark.get_xydata()).tolist() == [[1500.0, 3.0]]
     assert svg(figure).startswith("<svg")
+
+
+def test_a_map_without_any_limit_ends_at_a_millimetre() -> None:
+    speed = np.linspace(1000.0, 2000.0, 5)
+    (mesh,) = waterfall_figure(speed, TIMES, np.full((3, 5), np.inf)).axes[0].collections
+    assert mesh.get_clim() == (0, 1)
 
 
 def test_receptance_is_drawn_in_nm_per_n() -> None:

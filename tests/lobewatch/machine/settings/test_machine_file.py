@@ -44,6 +44,12 @@ def test_a_fresh_machine_needs_no_spindle() -> None:
     assert list(machine.cuts("anything")) == [REFERENCE_CUT]
 
 
+def test_a_table_that_is_left_out_says_what_the_fresh_machine_file_says() -> None:
+    fresh, bare = parse_machine(FRESH), parse_machine('[machine]\nname = "m"\n')
+    for table in ("tap", "daq", "mode", "limits", "speed", "drive", "doubt", "notify"):
+        assert getattr(bare, table) == getattr(fresh, table), table
+
+
 @pytest.mark.parametrize("text", [EXAMPLE, FRESH], ids=["example", "fresh"])
 def test_the_doubt_in_comments_is_the_default_and_complete(text: str) -> None:
     block = text[text.index("# [doubt]") :].partition("\n\n")[0]

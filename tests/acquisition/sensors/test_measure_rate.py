@@ -238,6 +238,17 @@ def test_what_does_not_follow_the_clock_is_not_measured(folder: MachineFolder) -
     assert not (folder.path / "daq.json").exists()
 
 
+def test_what_the_first_versions_kept_without_a_checksum_is_known(folder: MachineFolder) -> None:
+    check(folder, Stream(even(25601.0)))
+    path = folder.path / "daq.json"
+    path.write_text(
+        json.dumps([{k: v for k, v in entry.items() if k != "crc"} for entry in json.loads(path.read_text())])
+    )
+    again = Stream(even(25601.0))
+    assert check(folder, again) == 25600.0
+    assert again.starts == 0
+
+
 @pytest.mark.parametrize("content", [b"{", b'[{"model": 1}]', b"\xff"])
 def test_a_damaged_memory_is_said(folder: MachineFolder, content: bytes) -> None:
     (folder.path / "daq.json").write_bytes(content)

@@ -263,6 +263,15 @@ def test_calibrate(run: Run, trial: MachineFolder) -> None:
     refused(run("calibrate", "plain", "--frequency", 1550), "no model: add a [spindle] table")
 
 
+def test_calibrate_by_another_mode_than_that_of_the_machine(run: Run, trial: MachineFolder) -> None:
+    drawn = trial.machine.model("reference")
+    worn = replace(drawn, bearings=[replace(b, stiffness=0.7 * b.stiffness) for b in drawn.bearings])
+    third = natural_frequencies(worn, 3)[2]
+    said = run("calibrate", "trial", "--frequency", third, "--mode", 3, "--frequency-std", 0.5, "--json").json
+    assert said["bearing_stiffness_n_per_m"] == pytest.approx(0.7 * drawn.bearings[0].stiffness, rel=1e-6)
+    assert said["bearing_stiffness_n_per_m_std"] > 0
+
+
 def test_calibrate_groups(run: Run, trial: MachineFolder) -> None:
     toml = trial.toml.read_text("utf-8")
     for position, group in ((166, "front"), (203.5, "front"), (241, "front")):

@@ -286,6 +286,11 @@ def test_calibrate_groups(run: Run, trial: MachineFolder) -> None:
     said = run("calibrate", "trial", *measured, "--group", "front", "--group", "bearings", "--json").json
     assert said["factor"] == pytest.approx([0.5, 0.8], rel=1e-6)
     assert "stiffness front" in run("calibrate", "trial", *measured).out
+    front = replace(
+        drawn, bearings=[replace(b, stiffness=(0.5 if b.group == "front" else 1) * b.stiffness) for b in drawn.bearings]
+    )
+    said = run("calibrate", "trial", "--frequency", natural_frequencies(front, 1)[0], "--group", "front", "--json").json
+    assert said["bearing_stiffness_n_per_m"] == pytest.approx(0.5 * drawn.bearings[0].stiffness, rel=1e-6)
     refused(run("calibrate", "trial", *measured, "--group", "tail"), "tail", "front")
 
 

@@ -14,6 +14,7 @@ from lobewatch.machine.additions.correct import add_event
 from lobewatch.machine.archive.rebuild import rebuild_files
 from lobewatch.machine.archive.verify import verify
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.journal.journal_text import JournalText, scan
 from lobewatch.machine.new_folder import make_machine_folder
 
 MakeTap = Callable[..., TapTest]
@@ -187,6 +188,16 @@ def test_a_flipped_bit_in_a_long_journal_is_named(folder: MachineFolder) -> None
     for at in range(0, len(whole), 397):
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 4]) + whole[at + 1 :])
         assert "journal.jsonl: " in told(folder), at
+
+
+def test_only_what_was_appended_is_read_anew(folder: MachineFolder) -> None:
+    path = folder.path / NAMES[0]
+    before = scan(path, JournalText(exists=False))
+    assert scan(path, before) is before
+    folder.journal.append({"kind": "note", "text": "x"})
+    after = scan(path, before)
+    assert (len(after.chain), after.broken) == (len(before.chain) + 1, 0)
+    assert all(old is new for old, new in zip(before.chain, after.chain, strict=False))
 
 
 def test_a_journal_of_another_machine_is_named_and_mended(tmp_path: Path, make_tap: MakeTap) -> None:

@@ -152,9 +152,8 @@ class HitSearch:
             crossing = self._find_crossing()
             if crossing is None:
                 return False
-            quiet = self._codes[
-                1, crossing - before : crossing - before // 5
-            ]  # the pulse may begin before its crossing
+            # The pulse may begin before its crossing.
+            quiet = self._codes[1, crossing - before : crossing - before // 5]
             if self._rest is None or self._rest.holds(quiet):
                 self._crossing = crossing
                 return True

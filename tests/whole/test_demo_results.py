@@ -9,6 +9,7 @@ import importlib
 import pkgutil
 import re
 import shutil
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from datetime import datetime, tzinfo
@@ -94,12 +95,15 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
             if getattr(module, "datetime", None) is datetime:
                 patch.setattr(module, "datetime", January)
         patch.setattr(section, "svg", svg_and_png)
+        patch.setenv("TZ", "UTC")
+        time.tzset()
         patch.chdir(tmp_path_factory.mktemp("demo"))
         shutil.copy(DATA / "ladisk_beam" / "acceleration.lvm", ".")
         printed = {name: answer(command) for name, command in QUESTIONS.items()}
         page = Path("lobewatch-demo/report.html").read_text("utf-8")
         printed["report"] = re.sub(r"<(style|script|svg).*?</\1>\n*", "", page, flags=re.DOTALL)
         yield {name: ARBITRARY.sub("0", text) for name, text in printed.items()}
+    time.tzset()
 
 
 def svg_and_png(figure: Figure) -> str:

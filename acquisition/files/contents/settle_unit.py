@@ -72,8 +72,8 @@ def _either(
 ) -> tuple[Unit, Origin] | None:
     """The unit that the file or the option names; texts: the option, examples, and whose unit it is."""
     option, examples, name = texts
-    file_unit, said_unit = unit_of(in_file) if in_file else None, unit_of(given) if given else None
-    if given and (said_unit is None or said_unit.quantity not in wanted):
+    file_unit, given_unit = unit_of(in_file) if in_file else None, unit_of(given) if given else None
+    if given and (given_unit is None or given_unit.quantity not in wanted):
         ledger.faults.append(f"{option} {given}: not known as a unit of {name}; give one like {examples}")
         return None
     if in_file and (file_unit is None or file_unit.quantity not in wanted):
@@ -82,13 +82,13 @@ def _either(
             "where that is wrong say with --columns what it is"
         )
         return None
-    if file_unit is not None and said_unit is not None and file_unit != said_unit:
+    if file_unit is not None and given_unit is not None and file_unit != given_unit:
         ledger.contradict(option, given, in_file)
         return None
-    if file_unit is None and said_unit is None:
+    if file_unit is None and given_unit is None:
         ledger.ask(f"the unit of {name}", f"{option}, such as {examples}")
         return None
-    return (file_unit, "file") if file_unit is not None else (cast(Unit, said_unit), "option")
+    return (file_unit, "file") if file_unit is not None else (cast(Unit, given_unit), "option")
 
 
 def _force_of_frf(description: Description, unit: Unit, ledger: Ledger) -> float | None:

@@ -8,60 +8,18 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from acquisition import TapsEmulator
-from dsm import natural_frequencies
 from lobes import read_history
-from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.show.report.report import render_report
 from lobewatch.tap.emulated_spindle import emulated_structure, emulator
-
-
-class Said(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-    @property
-    def json(self) -> dict[str, Any]:
-        parsed: dict[str, Any] = json.loads(self.out)
-        return parsed
-
-
-Run = Callable[..., Said]
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """Runs a command in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def command(*arguments: object) -> Said:
-        monkeypatch.setattr(sys, "argv", ["lobewatch", *map(str, arguments)])
-        capsys.readouterr()
-        try:
-            main()
-        except SystemExit as end:
-            code = end.code if isinstance(end.code, int) else int(end.code is not None)
-        said = capsys.readouterr()
-        return Said(code, said.out, said.err)
-
-    return command
-
-
-@pytest.fixture
-def trial(run: Run) -> MachineFolder:
-    """A machine folder with the example spindle."""
-    assert run("init", "trial", "--example").code == 0
-    return MachineFolder("trial")
+from tests.lobewatch.commands.conftest import Run, refused
 
 
 @pytest.fixture
@@ -72,16 +30,6 @@ def device(trial: MachineFolder) -> Iterator[TapsEmulator]:
     structure = emulated_structure(table.build(), table.damping_ratio)
     with emulator(structure, np.random.default_rng(1), realtime=False) as emulated:
         yield emulated
-
-
-def refused(said: Said, *words: str) -> None:
-    """Exit code 2 and one sentence with these words, no traceback, nothing on stdout."""
-    assert said.code == 2
-    assert said.err.startswith("error: ")
-    assert said.err.count("\n") == 1, said.err
-    assert said.out == ""
-    for word in words:
-        assert word in said.err
 
 
 def test_a_live_tap_finds_the_emulated_spindle(run: Run, trial: MachineFolder, device: TapsEmulator) -> None:
@@ -241,57 +189,6 @@ def test_a_name_with_markup_is_shown_as_it_is(run: Run, trial: MachineFolder, de
     assert "<b>[bold]" not in html
     assert "&lt;b&gt;[bold]&amp;x" in html
     assert callable(render_report)
-
-
-def test_calibrate(run: Run, trial: MachineFolder) -> None:
-    said = run("calibrate", "trial", "--frequency", 1550, "--frequency-std", 0.4, "--json").json
-    assert said["bearing_stiffness_n_per_m"] == pytest.approx(6.863e8, rel=1e-4)
-    assert said["bearing_stiffness_n_per_m_std"] == pytest.approx(0.4 / 1550 / said["sensitivity"] * 6.863e8, rel=1e-3)
-    assert "surrogate" in run("calibrate", "trial", "--frequency", 1550).out
-    refused(run("calibrate", "trial", "--frequency", 2500), "2301.1 Hz (rigid bearings)")
-    refused(run("calibrate", "trial", "--frequency", -1), "-1")
-    dampers = run("calibrate", "trial", "--frequency", 1713.05, "--damping-ratio", 0.03, "--json").json
-    assert dampers["bearing_damping_n_s_per_m"] > 0
-    assert "bearing damping" in run("calibrate", "trial", "--frequency", 1713.05, "--damping-ratio", 0.03).out
-    refused(run("calibrate", "trial", "--frequency", 1713.05, "--damping-ratio", 0.9), "0.9")
-    twice = ("--frequency-std", 1, "--frequency-std", 2)
-    refused(run("calibrate", "trial", "--frequency", 1550, *twice), "2 --frequency-std for 1 --frequency")
-    refused(run("calibrate", "trial", "--frequency", 1550, "--mode", 1, "--mode", 2), "2 --mode for 1 --frequency")
-    refused(run("calibrate", "trial", "--frequency", 1550, "--frequency", 1e9), "puts mode 2 at 1e+09 Hz")
-    refused(run("calibrate", "trial", "--frequency", 1e11), "needs more than 1000 elements")
-    run("init", "plain")
-    refused(run("calibrate", "plain", "--frequency", 1550), "no model: add a [spindle] table")
-
-
-def test_calibrate_by_another_mode_than_that_of_the_machine(run: Run, trial: MachineFolder) -> None:
-    drawn = trial.machine.model("reference")
-    worn = replace(drawn, bearings=[replace(b, stiffness=0.7 * b.stiffness) for b in drawn.bearings])
-    third = natural_frequencies(worn, 3)[2]
-    said = run("calibrate", "trial", "--frequency", third, "--mode", 3, "--frequency-std", 0.5, "--json").json
-    assert said["bearing_stiffness_n_per_m"] == pytest.approx(0.7 * drawn.bearings[0].stiffness, rel=1e-6)
-    assert said["bearing_stiffness_n_per_m_std"] > 0
-
-
-def test_calibrate_groups(run: Run, trial: MachineFolder) -> None:
-    toml = trial.toml.read_text("utf-8")
-    for position, group in ((166, "front"), (203.5, "front"), (241, "front")):
-        toml = toml.replace(f"position_mm = {position} ", f'position_mm = {position}, group = "{group}" ')
-    trial.toml.write_text(toml, "utf-8")
-    drawn = trial.machine.model("reference")
-    worn = replace(
-        drawn,
-        bearings=[replace(b, stiffness=b.stiffness * (0.5 if b.group == "front" else 0.8)) for b in drawn.bearings],
-    )
-    measured = [word for f in natural_frequencies(worn, 4) for word in ("--frequency", f)]
-    said = run("calibrate", "trial", *measured, "--group", "front", "--group", "bearings", "--json").json
-    assert said["factor"] == pytest.approx([0.5, 0.8], rel=1e-6)
-    assert "stiffness front" in run("calibrate", "trial", *measured).out
-    front = replace(
-        drawn, bearings=[replace(b, stiffness=(0.5 if b.group == "front" else 1) * b.stiffness) for b in drawn.bearings]
-    )
-    said = run("calibrate", "trial", "--frequency", natural_frequencies(front, 1)[0], "--group", "front", "--json").json
-    assert said["bearing_stiffness_n_per_m"] == pytest.approx(0.5 * drawn.bearings[0].stiffness, rel=1e-6)
-    refused(run("calibrate", "trial", *measured, "--group", "tail"), "tail", "front")
 
 
 def test_init(run: Run, trial: MachineFolder) -> None:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from itertools import combinations, pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from matplotlib.patches import Rectangle
 
 from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
 from lobes import Cut, radial_lobes, stability_boundary, zero_order
-from lobewatch.cli import main
 from lobewatch.history.history_columns import row_lobes
 from lobewatch.logbook import Logbook, compare_lobes
 from lobewatch.machine import ProgramTable, drive_limit
@@ -33,36 +31,11 @@ from lobewatch.verdicts import Setting, Verdict, Word
 from lobewatch.verdicts.advice import robust_pockets
 from lobewatch.verdicts.limit_band import LimitBand, limit_band
 from modal import Mode, synthesize
+from tests.lobewatch.commands.conftest import Run
 
 START = datetime(2026, 1, 15, 9, tzinfo=UTC)
 LINES = np.arange(4.0, 4000.0, 4.0)
 MODEL = "# The spindle of the example"
-
-
-class Said(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Said]
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    monkeypatch.chdir(tmp_path)
-
-    def command(*arguments: str) -> Said:
-        monkeypatch.setattr(sys, "argv", ["lobewatch", *arguments])
-        capsys.readouterr()
-        code: Any = 0
-        try:
-            main()
-        except SystemExit as end:
-            code = end.code or 0
-        return Said(code, *capsys.readouterr())
-
-    return command
 
 
 @pytest.fixture

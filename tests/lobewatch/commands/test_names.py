@@ -3,53 +3,23 @@
 from __future__ import annotations
 
 import json
-import sys
-from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from acquisition import Circumstances, TapTest, from_accelerance, new_tap_id
-from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from modal import Mode, synthesize
+from tests.lobewatch.commands.conftest import Run
 
 LINES = np.arange(4.0, 4000.0, 4.0)
 FORMULA = r"cost $5 \frac to $6"
 """To matplotlib a broken formula."""
 CLEAR = "\x1b[2J"
 """Clears a terminal."""
-
-
-class Said(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Said]
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """Runs a command in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def command(*arguments: object) -> Said:
-        monkeypatch.setattr(sys, "argv", ["lobewatch", *map(str, arguments)])
-        capsys.readouterr()
-        code: Any = 0
-        try:
-            main()
-        except SystemExit as end:
-            code = end.code or 0
-        return Said(code, *capsys.readouterr())
-
-    return command
 
 
 @pytest.fixture

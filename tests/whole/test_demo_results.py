@@ -35,8 +35,8 @@ from lobewatch.tap.emulated_cut import emulate_cut
 DATA = Path(__file__).parents[1] / "data"
 SEEN = DATA / "demo"
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-ARBITRARY = re.compile(r"(?<=_[xy]_)[0-9a-f]{4}\b|(?<=\"worst_feed_deg\": )[0-9.]+")
-"""Ends of identities, and which of two directions of feed with the same limit is named: rounding decides that."""
+ARBITRARY = re.compile(r"(?<=_[xy]_)[0-9a-f]{4}\b|(?<=\"worst_feed_deg\": )[0-9.]+|(?<=by lobewatch )[0-9.]+\d")
+"""Ends of identities, which of two directions of feed with the same limit is named (rounding decides), the version."""
 SAME = 3e-5
 """Relative difference that another processor makes at most: 6e-6 was seen."""
 QUESTIONS = {

@@ -40,6 +40,15 @@ class DataError(ValueError):
     """A file cannot be used for a tap test."""
 
 
+def failure_text(error: Exception) -> str:
+    """Any error in a sentence; the kind of one that nobody has foreseen, too."""
+    if isinstance(error, OSError) and error.filename and error.strerror:
+        return system_failure(error)
+    if isinstance(error, (ValueError, OSError, ArithmeticError)):
+        return str(error)
+    return f"{type(error).__name__}, which should not be: {error}"
+
+
 def system_failure(error: OSError) -> str:
     """An error of the operating system in a sentence: where, what, and what to do where that is known."""
     failure = f"{error.filename or 'the disk'}: {error.strerror or error}"

@@ -97,24 +97,16 @@ def main() -> None:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
-    except (ValueError, OSError, ArithmeticError) as error:
+    except Exception as error:
         if "--debug" in sys.argv:
             raise
         from rich.markup import escape
 
+        from acquisition.errors import failure_text
         from lobewatch.show.terminal.output import notes
 
-        notes.print("[bold red]error:[/]", escape(_sentence(error)))
+        notes.print("[bold red]error:[/]", escape(failure_text(error)))
         sys.exit(2)
-
-
-def _sentence(error: Exception) -> str:
-    """The error with the name of its file, for the errors of the operating system."""
-    if isinstance(error, OSError) and error.filename and error.strerror:
-        from acquisition.errors import system_failure
-
-        return system_failure(error)
-    return str(error)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ from acquisition.channel import Channel
 from acquisition.errors import DataError
 from acquisition.files.readers.unpacked import check_unpacked
 from acquisition.files.seal import is_broken, sealed
+from acquisition.regular_file import read_regular
 
 FORMAT = "lobewatch-cut"
 VERSION = 1
@@ -78,7 +79,7 @@ def _in_a_row(extreme: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def is_cut_file(path: Path) -> bool:
     """Whether it is a recording of ours; DataError where it is a damaged one."""
-    content = path.read_bytes()
+    content = read_regular(path)
     if not content.startswith(b"\x89HDF\r\n\x1a\n"):
         return False
     if is_broken(content):
@@ -111,7 +112,7 @@ def write_cut_signal(path: Path, signal: CutSignal, about: Mapping[str, Any]) ->
 
 def read_cut_signal(path: Path) -> tuple[CutSignal, dict[str, Any]]:
     """What `write_cut_signal` has written; DataError where it is no such file, or a damaged one."""
-    content = path.read_bytes()
+    content = read_regular(path)
     if is_broken(content):
         raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
     try:

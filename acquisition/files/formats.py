@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import logging
+import math
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from acquisition.files.readers.read_uff import UFF
 from acquisition.files.readers.read_wav import WAV
 from acquisition.files.tap_recording import TAP_FILE
 from acquisition.plugin import load_plugin, not_loaded, package_of
+from acquisition.regular_file import open_regular
 from acquisition.remark import Remark
 
 GROUP = "lobewatch.formats"
@@ -37,7 +39,7 @@ def known_formats() -> tuple[Format, ...]:
 
 def format_of(path: Path) -> Format:
     """The format of a file by its content; DataError for one that is empty or of no known format."""
-    with path.open("rb") as file:
+    with open_regular(path, math.inf) as file:
         head = file.read(HEAD)
     if not head:
         raise DataError(f"{path}: the file is empty")

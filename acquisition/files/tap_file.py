@@ -27,6 +27,7 @@ from acquisition.files.readers.unpacked import check_unpacked
 from acquisition.files.seal import is_broken, sealed
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
+from acquisition.regular_file import read_regular
 from acquisition.tap import Circumstances, Conditions, SourceFile, TapTest
 
 FORMAT = "lobewatch-tap"
@@ -105,7 +106,7 @@ def read_hit_name(path: Path | str) -> str:
 
 
 def _open(path: Path) -> h5py.File:
-    content = path.read_bytes()
+    content = read_regular(path)
     if is_broken(content):
         raise DataError(f"{path}: altered since it was written (SHA-256 differs); take it again from a backup")
     try:

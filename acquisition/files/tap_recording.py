@@ -9,6 +9,7 @@ from acquisition.files.readers.format import Format
 from acquisition.files.tap_file import read_tap, read_tap_hits
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
+from acquisition.regular_file import read_regular
 from acquisition.tap import Circumstances
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -26,7 +27,7 @@ def read_tap_recording(path: Path) -> list[Hit] | Frf:
 def is_all_in(path: Path, hits: Sequence[Hit]) -> bool:
     """Whether a file is a live tap test of ours, and hits read from it are all of its hits: no signal is lost without
     the file."""
-    if not hits or not path.read_bytes().startswith(MAGIC):
+    if not hits or not read_regular(path).startswith(MAGIC):
         return False
     tap = read_tap(path)
     return tap.source is None and len(tap.hits) == len(hits)

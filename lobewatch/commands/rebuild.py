@@ -39,6 +39,7 @@ def rebuild(
       lobewatch rebuild mills --scheduler tcp://10.0.0.5:8786
     """
     from acquisition import DataError
+    from acquisition.errors import failure_text
     from lobewatch.measuring.workers.share_work import Workers
     from lobewatch.show.replays.describe_rebuild import (
         MachineRebuild,
@@ -57,8 +58,8 @@ def rebuild(
     for folder in folders:
         try:
             outcomes[folder.name] = _rebuild_machine(folder, workers)
-        except DataError as error:
-            refused.append(str(error))
+        except Exception as error:  # noqa: BLE001 - whatever is wrong with it must cost only itself
+            refused.append(failure_text(error))
     emit(folder_rebuild_json(outcomes), as_json, *folder_rebuild_texts(outcomes, len(folders)))
     if refused:
         raise DataError("\n".join([f"{len(refused)} of {len(folders)} machines cannot be rebuilt", *refused]))

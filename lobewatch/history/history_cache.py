@@ -8,7 +8,7 @@ from itertools import zip_longest
 from operator import is_
 
 from acquisition import Remark
-from acquisition.errors import system_failure
+from acquisition.errors import failure_text
 from lobewatch.history.history import History, Row, empty_history
 from lobewatch.history.kept_rows import kept_aside
 from lobewatch.history.row_bytes import decode_row, encode_row
@@ -83,8 +83,7 @@ class HistoryCache:
             with self._folder.locked():
                 self._store(history)
         except (BusyError, OSError) as error:
-            reason = system_failure(error) if isinstance(error, OSError) else str(error)
-            text = f"not brought up to date on the disk, worked out in memory: {reason}"
+            text = f"not brought up to date on the disk, worked out in memory: {failure_text(error)}"
             remark = Remark("history-in-memory", self._folder.history.name, text)
             self.remarks += [] if remark in self.remarks else [remark]
 

@@ -94,7 +94,7 @@ def _all_understood(
 ) -> Iterator[FileReading | str]:
     """Each file in turn, or why it cannot be used; DataError as `share_work`."""
     if workers.are_elsewhere:
-        toml = logbook.folder.toml.read_text("utf-8")
+        toml = logbook.folder.toml_text
         yield from share_work(read_requested_file, (FileRequest.of(file, description, toml) for file in files), workers)
         return
     for file in files:

@@ -46,7 +46,7 @@ class Question:
 def rebuild_history(logbook: Logbook, workers: Workers, progress: Progress = lambda _done, _of: None) -> int:
     """Write it anew and say how many rows it has; equal bit by bit whoever works."""
     logbook.folder.history.unlink(missing_ok=True)
-    toml = logbook.folder.toml.read_text("utf-8")
+    toml = logbook.folder.toml_text
     if workers.are_elsewhere:
         entries = [place.entry for place in logbook.files.places]
         fits = share_work(modes_of, (_content(logbook, entry, toml) for entry in entries), workers)

@@ -11,6 +11,7 @@ from datetime import datetime
 from pathlib import Path
 
 from acquisition import Remark
+from acquisition.regular_file import open_regular, read_regular
 from lobewatch.machine.journal.doubtful import read_doubtful
 from lobewatch.machine.journal.event import MaintenanceEvent, events_of
 from lobewatch.machine.journal.exclusion import exclusion_reasons
@@ -122,7 +123,7 @@ def fault_of(folder: Path, entry: TapEntry | RecordingFile) -> str:
     OSError where this program can open no more files.
     """
     try:
-        with open(f"{folder}/{entry.file}", "rb", buffering=0) as file:  # noqa: PTH123 - of dozens at every look
+        with open_regular(f"{folder}/{entry.file}") as file:
             size = os.fstat(file.fileno()).st_size
             if size != entry.size:
                 return f"{size} bytes, not {entry.size} as when it was written"
@@ -134,8 +135,16 @@ def fault_of(folder: Path, entry: TapEntry | RecordingFile) -> str:
     except OSError as error:
         if error.errno in (errno.EMFILE, errno.ENFILE):  # nothing is said of this file
             raise
-        return f"cannot be read ({os.strerror(error.errno or 0)})"
+        return f"cannot be read ({error.strerror})"
     return ""
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file; empty where it cannot be read."""
+    try:
+        return hashlib.sha256(read_regular(path)).hexdigest()
+    except OSError:
+        return ""
 
 
 def tap_damage(folder: Path, entry: TapEntry, fault: str, is_given_up: bool = False) -> Remark:

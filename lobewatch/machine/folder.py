@@ -29,6 +29,7 @@ from lobewatch.machine.folder_path import mark_of, named_folder
 from lobewatch.machine.journal.journal import Journal, Reading, command
 from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
 from lobewatch.machine.settings.machine_file import Machine, read_machine
+from lobewatch.machine.toml_text import toml_text
 
 
 class BusyError(DataError):
@@ -41,12 +42,12 @@ class MachineFolder:
     def __init__(self, path: Path | str) -> None:
         """DataError where this is no machine folder."""
         self.path = named_folder(path)
-        if not self.toml.is_file() and tap_files(self.path):
+        if not self.toml.exists() and tap_files(self.path):
             raise DataError(
                 f"{self.toml}: is missing beside tap tests; put it back from a backup; without one, "
                 f"{command('rebuild', self.path)} takes the copy in the newest of them"
             )
-        if not self.toml.is_file():
+        if not self.toml.exists():
             raise DataError(
                 f"{self.path}: no machine.toml in it; make a machine folder with: lobewatch init {self.path}"
             )
@@ -55,6 +56,11 @@ class MachineFolder:
     def toml(self) -> Path:
         """The machine file."""
         return self.path / "machine.toml"
+
+    @property
+    def toml_text(self) -> str:
+        """The text of the machine file as it is now; what `toml_text` of the machine file raises."""
+        return toml_text(self.toml)
 
     @property
     def history(self) -> Path:

@@ -10,6 +10,7 @@ from datetime import UTC, datetime
 import msgspec
 
 from acquisition import DataError, Device, DeviceError, MeasuredRate, atomic_write, check_rate, measure_rate
+from acquisition.regular_file import SMALL, read_regular
 from lobewatch.machine.folder import MachineFolder
 
 
@@ -97,7 +98,7 @@ def read_known_devices(folder: MachineFolder) -> list[KnownDevice]:
     """Devices in daq.json; DataError where that is damaged."""
     path = folder.path / "daq.json"
     try:
-        entries = msgspec.json.decode(path.read_bytes(), type=list[KnownDevice])
+        entries = msgspec.json.decode(read_regular(path, SMALL), type=list[KnownDevice])
     except FileNotFoundError:
         return []
     except (msgspec.DecodeError, UnicodeDecodeError) as error:

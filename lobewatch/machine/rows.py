@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition.atomic import atomic_write
+from acquisition.regular_file import read_regular
 
 MAKE = b"lobewatch rows 1\n"
 _HEAD = struct.Struct("<II")
@@ -34,7 +35,7 @@ class Rows:
 
 def read_rows(path: Path) -> Rows:
     """The sound rows of a file; FileNotFoundError where there is none."""
-    content = path.read_bytes()
+    content = read_regular(path)
     if not content.startswith(MAKE):
         return Rows((), 0, len(content), not MAKE.startswith(content))
     rows, at, is_damaged = list[bytes](), len(MAKE), False

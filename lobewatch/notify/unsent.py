@@ -10,6 +10,7 @@ import msgspec
 
 from acquisition import DataError
 from acquisition.atomic import atomic_write
+from acquisition.regular_file import SMALL, read_regular
 from lobewatch.machine import BusyError, MachineFolder
 from lobewatch.machine.settings.notify_table import Broker
 from lobewatch.notify.mqtt import send
@@ -53,7 +54,7 @@ def _left_over(broker: Broker, places: Iterable[Path]) -> dict[Path, tuple[str, 
     messages = {}
     for path in sorted(path for place in places for path in place.glob(f"*/{UNSENT}")):
         try:
-            unsent = msgspec.json.decode(path.read_bytes(), type=Unsent)
+            unsent = msgspec.json.decode(read_regular(path, SMALL), type=Unsent)
         except (OSError, ValueError):
             continue
         if tuple(unsent.broker) == tuple(broker[:3]):

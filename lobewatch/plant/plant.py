@@ -11,6 +11,7 @@ from typing import NamedTuple
 import lobewatch.machine as machine
 import lobewatch.plant as plant
 from acquisition import DataError, Remark
+from acquisition.errors import failure_text
 from lobewatch.decay.light import Light
 from lobewatch.machine.folder_path import mark_of
 from lobewatch.plant.standing_file import LASTING, read_standing
@@ -85,8 +86,8 @@ class Plant:
                     return
                 try:
                     damage = machine.verify(path).damage
-                except (ValueError, OSError):
-                    continue  # its standing says it
+                except Exception:  # noqa: BLE001 - its standing says it
+                    continue
                 with self._lock:
                     if damage != self._damage.get(key, ()):
                         self._summaries.pop(key, None)
@@ -106,9 +107,9 @@ class Plant:
         mark = mark_of(path)
         try:
             summary = (None if key in self._outdated else read_standing(path, now)) or plant.summarise_folder(path, now)
-        except (ValueError, OSError) as error:
+        except Exception as error:  # noqa: BLE001 - whatever is wrong with it must not cost the others their standing
             self._summaries.pop(key, None)
-            return unreadable_summary(last.summary.name if last else key, str(error))
+            return unreadable_summary(last.summary.name if last else key, failure_text(error))
         self._outdated.discard(key)
         if mark == mark_of(path):  # else somebody has written meanwhile
             self._summaries[key] = _ReadSummary(mark_of(path, summary.newest_file), now, summary)

@@ -11,6 +11,7 @@ from pathlib import Path
 import msgspec
 
 from acquisition.atomic import atomic_write
+from acquisition.regular_file import SMALL, read_regular
 from lobewatch.machine.folder_path import mark_of
 from lobewatch.plant.summary import Summary
 
@@ -45,7 +46,7 @@ def read_standing(folder: Path, now: datetime) -> Summary | None:
     """The summary beside a machine, where it fits its files; None for none, torn, altered, old, of another version,
     or of another folder."""
     try:
-        content = (folder / STANDING).read_bytes()
+        content = read_regular(folder / STANDING, SMALL)
         body = b"{" + content[HEAD:]
         if content[:HEAD] != _head(body):
             return None

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import lobewatch.plant as plant
+from acquisition.errors import failure_text
 from lobewatch.machine.rows import read_rows
 from lobewatch.plant.standing_file import read_standing, software
 from lobewatch.plant.summary import Summary
@@ -153,5 +154,5 @@ def all_tables(machines: Mapping[str, Path], damaged: dict[str, str]) -> Iterato
     for key in sorted(machines):
         try:
             yield tap_table(key, machines[key])
-        except (ValueError, OSError) as error:
-            damaged[key] = str(error)
+        except Exception as error:  # noqa: BLE001 - whatever is wrong with it must not cost the others their lines
+            damaged[key] = failure_text(error)

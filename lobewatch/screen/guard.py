@@ -13,6 +13,7 @@ from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 from yarl import URL
 
+from acquisition.errors import failure_text
 from lobewatch.screen.door import Door
 
 OPEN = "open-"
@@ -97,7 +98,7 @@ def _guard(tokens: Tokens, listen: str, door: Door) -> Middleware:
         except web.HTTPException as refusal:
             return web.json_response({"error": refusal.text or refusal.reason}, status=refusal.status)
         except (ValueError, OSError) as error:
-            return web.json_response({"error": str(error)}, status=409)
+            return web.json_response({"error": failure_text(error)}, status=409)
         except Exception:  # noqa: BLE001 - the page must not see a traceback, the log must
             _log.exception("%s %s failed", request.method, request.path)
             return web.json_response({"error": "lobewatch failed here; see its terminal"}, status=500)

@@ -215,7 +215,7 @@ def plan_session(
         tool,
         tap_direction(direction),
         operator,
-        folder.toml.read_text("utf-8"),
+        folder.toml_text,
         conditions=conditions.over(machine.tap.conditions(tool)),
     )
     return TapSession(folder, Plug(machine.daq, port).open, about, resume=resume, accept=accept)

@@ -16,6 +16,7 @@ from pathlib import Path
 from acquisition import Circumstances, Hit, HitFlags, Trigger, atomic_write, read_tap_hits
 from acquisition.files.seal import is_sealed
 from acquisition.files.tap_file import read_hit_name
+from acquisition.regular_file import SMALL, IrregularFileError, read_regular
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.journal.doubtful import has_whole_hits
 
@@ -77,14 +78,14 @@ def spooled_trigger(folder: Path, damaged: list[Path]) -> Trigger | None:
     """Trigger by which the hits were recorded; None where it was not kept, or is damaged and set aside."""
     path = folder / SETUP
     try:
-        fields = json.loads(path.read_text("utf-8"))
+        fields = json.loads(read_regular(path, SMALL))
         crc = fields.pop("crc", None)  # not in the first files
         if crc not in (None, _crc(fields)):
             raise ValueError("altered")
         return Trigger(**fields)
     except FileNotFoundError:
         return None
-    except (ValueError, TypeError, AttributeError):
+    except (ValueError, TypeError, AttributeError, RecursionError, IrregularFileError):
         damaged.append(_set_aside(path))
         return None
 
@@ -111,14 +112,14 @@ def _crc(fields: object) -> int:
 
 def _read(path: Path) -> SpooledHit | None:
     """A hit; None where its file is damaged."""
-    if not is_sealed(path.read_bytes()) and not has_whole_hits(path):
-        return None
     try:
+        if not is_sealed(read_regular(path)) and not has_whole_hits(path):
+            return None
         if read_hit_name(path) not in ("", path.name):
             return None
         (hit,), about, (flags,) = read_tap_hits(path)
         return SpooledHit(int(path.stem), hit, flags, about)
-    except (ValueError, KeyError, TypeError, RuntimeError):
+    except (ValueError, KeyError, TypeError, RuntimeError, IrregularFileError):
         return None
     except OSError as error:
         if error.errno is not None:  # of the system, not of HDF5: the file may be sound

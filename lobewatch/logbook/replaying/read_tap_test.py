@@ -46,7 +46,7 @@ class Setup(NamedTuple):
     @classmethod
     def of(cls, folder: MachineFolder) -> Self:
         """As it is now."""
-        return cls(folder.machine, folder.toml.read_text("utf-8"))
+        return cls(folder.machine, folder.toml_text)
 
 
 def read_tap_test(

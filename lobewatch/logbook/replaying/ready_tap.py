@@ -49,7 +49,7 @@ def make_all_ready(
     if not workers.are_elsewhere:
         yield from (_ready_or_reason(folder, file, description) for file in files)
         return
-    toml = folder.toml.read_text("utf-8")
+    toml = folder.toml_text
     asked = (FileRequest.of(file, description, toml) for file in files)
     for draft in share_work(draft_requested_tap, asked, workers):
         yield draft if isinstance(draft, str) else _write(folder, draft)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from acquisition import DataError, Remark
 from acquisition.files.cut_file import read_cut_signal
+from acquisition.regular_file import read_regular
 from lobewatch.machine.contents import committed_cuts, fault_of, ids_given_up
 from lobewatch.machine.journal.heard_cut import HeardCut, RecordingFile, cut_of_line
 from lobewatch.machine.journal.journal import Journal
@@ -41,7 +42,7 @@ def mend_cuts(folder: Path, journal: Journal, put_aside: Callable[[Path], Path])
         if cut is None or cut.id in {entered.id for entered in committed_cuts(journal.read())}:
             yield f"cuts/{path.name}: put into {put_aside(path).relative_to(folder).as_posix()}"
             continue
-        content = path.read_bytes()
+        content = read_regular(path)
         recording = RecordingFile(cut.id, hashlib.sha256(content).hexdigest(), len(content))
         journal.append(replace(cut, recording=recording).line | {"time": datetime.now(UTC).isoformat()})
         yield f"cuts/{path.name}: entered in the journal"

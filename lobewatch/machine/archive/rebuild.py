@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,8 +12,9 @@ from filelock import FileLock, Timeout
 
 from acquisition import DataError, read_tap
 from acquisition.atomic import atomic_write, make_folder
+from acquisition.regular_file import IrregularFileError, read_regular
 from lobewatch.machine.archive.cut_recordings import mend_cuts
-from lobewatch.machine.contents import committed_taps, fault_of, ids_given_up, tap_files
+from lobewatch.machine.contents import committed_taps, fault_of, ids_given_up, sha256_of, tap_files
 from lobewatch.machine.folder import BusyError, MachineFolder
 from lobewatch.machine.journal.doubtful import read_doubtful
 from lobewatch.machine.journal.journal import JOURNAL, Journal
@@ -84,7 +84,7 @@ def _return_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator[
     by_content = {entry.sha256: entry for entry in committed.values()}
     misplaced: dict[Path, TapEntry] = {}
     for path in tap_files(folder).values():
-        entry = by_content.get(hashlib.sha256(path.read_bytes()).hexdigest()) if _can_be_read(path) else None
+        entry = by_content.get(sha256_of(path))
         if entry is not None and path != folder / entry.file:
             misplaced[path] = entry
     asides = {_put_aside(folder, path): entry for path, entry in misplaced.items()}
@@ -122,20 +122,22 @@ def _give_up_lost(folder: Path, journal: Journal) -> Iterator[str]:
     for name, entry in committed_taps(reading).items():
         if not fault_of(folder, entry):
             continue
-        if _can_be_read(folder / entry.file):
+        if (folder / entry.file).exists() and not _may_be_sound(folder / entry.file):
             _put_aside(folder, folder / entry.file)
         if name not in ids_given_up(reading):
             journal.append({"kind": "lost", "tap": name, "time": datetime.now(UTC).isoformat()})
             yield f"{entry.file}: lost; all goes on without it, and with it again when it is put back from a backup"
 
 
-def _can_be_read(path: Path) -> bool:
-    """Whether a file can be read just now; one that cannot may be sound, and stays where it is."""
+def _may_be_sound(path: Path) -> bool:
+    """Whether a file cannot be read just now; it stays where it is."""
     try:
-        path.read_bytes()
-    except OSError:
+        read_regular(path)
+    except IrregularFileError:
         return False
-    return True
+    except OSError:
+        return True
+    return False
 
 
 def _restore_machine_file(folder: Path) -> Iterator[str]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import difflib
-import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition import DataError, Remark
+from acquisition.errors import failure_text
 from lobewatch.machine.archive.cut_recordings import verify_cuts
 from lobewatch.machine.archive.verify_spool import damaged_file, file_set_aside, verify_spool
 from lobewatch.machine.contents import (
@@ -19,6 +19,7 @@ from lobewatch.machine.contents import (
     ids_given_up,
     is_explained,
     missing_journal,
+    sha256_of,
     tap_damage,
     tap_files,
     unlisted_file,
@@ -126,11 +127,11 @@ def _verify_taps(
         yield missing_journal(folder, len(extra))
     for name, fault in faults.items():
         entry, path = committed[name], folder / committed[name].file
-        namesake = by_content.get(_sha256(path)) if path.is_file() else None
+        namesake = by_content.get(sha256_of(path))
         text = f"it is {namesake.file} under another name" if namesake else fault
         yield tap_damage(folder, entry, text, name in given_up and not path.exists())
     for path in extra:
-        original = by_content.get(_sha256(path))
+        original = by_content.get(sha256_of(path))
         yield _extra_file(folder, path, original, original is not None and original.id in faults)
 
 
@@ -163,31 +164,38 @@ def _verify_machine_file(folder: MachineFolder, sound: list[TapEntry]) -> Iterat
         cure = (
             "correct it; without a way to, move it away: lobewatch rebuild then takes the copy in the newest tap test"
         )
-        yield damaged_file("machine.toml", str(error), cure)
+        yield damaged_file("machine.toml", failure_text(error), cure)
         return
     newest = max(sound, key=lambda entry: entry.time, default=None)
     copy = ""
     with contextlib.suppress(DataError):  # a newer lobewatch has written it
         copy = folder.read(newest).circumstances.machine_toml if newest else ""
-    text = folder.toml.read_text("utf-8")
+    text = folder.toml_text
     if newest is not None and copy and text != copy:
-        changed = [line for line in difflib.ndiff(copy.splitlines(), text.splitlines()) if line[:2] in ("+ ", "- ")]
+        differences = list(difflib.unified_diff(copy.splitlines(), text.splitlines(), n=0, lineterm=""))[2:]
+        changed = [f"{line[0]} {line[1:]}" for line in differences if line[0] in "+-"]
         first = changed[0] if changed else "line ends"
         differing = f"{len(changed)} lines differ from the copy in {newest.file}, first: {first}"
         yield Remark("machine-file-edited", "machine.toml", differing)
 
 
 def _verify_history(folder: MachineFolder) -> Iterator[Remark]:
-    if folder.history.exists() and read_rows(folder.history).is_damaged:
+    fault = ""
+    try:
+        if folder.history.exists() and read_rows(folder.history).is_damaged:
+            fault = "altered since it was written"
+    except OSError as error:
+        fault = failure_text(error).removeprefix(f"{folder.history}: ")
+    if fault:
         cure = f"{command('rebuild', folder.path)} makes it anew, and so does any command that reads it"
-        yield damaged_file(folder.history.name, "altered since it was written", cure)
+        yield damaged_file(folder.history.name, fault, cure)
 
 
 def _verify_devices(folder: MachineFolder) -> Iterator[Remark]:
     try:
         read_known_devices(folder)
-    except DataError as error:
-        yield damaged_file("daq.json", str(error).removeprefix(f"{folder.path / 'daq.json'}: "))
+    except (DataError, OSError) as error:
+        yield damaged_file("daq.json", failure_text(error).removeprefix(f"{folder.path / 'daq.json'}: "))
 
 
 def _verify_names(folder: Path) -> Iterator[Remark]:
@@ -208,7 +216,3 @@ def _verify_names(folder: Path) -> Iterator[Remark]:
     for path in sorted(taps.iterdir()) if taps.is_dir() else []:
         if path.name not in {file.name for file in tap_files(folder).values()}:
             yield Remark("not-verified", f"taps/{path.name}", "no tap file, does not count", "take it out of taps/")
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()

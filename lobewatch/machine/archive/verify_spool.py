@@ -8,7 +8,9 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from acquisition import Remark, Trigger
+from acquisition.errors import failure_text
 from acquisition.files.seal import is_sealed
+from acquisition.regular_file import SMALL, read_regular
 from lobewatch.machine.journal.journal import command
 
 ALTERED = "altered or cut short since it was written"
@@ -37,6 +39,8 @@ def verify_spool(folder: Path, saved: Collection[str]) -> Iterator[Remark]:
             yield from _verify_test(folder, path) if path.is_dir() else _verify_file(folder, path)
         except FileNotFoundError:
             continue
+        except OSError as error:
+            yield damaged_file(path.relative_to(folder).as_posix(), failure_text(error).removeprefix(f"{path}: "))
 
 
 def _verify_test(folder: Path, path: Path) -> Iterator[Remark]:
@@ -47,7 +51,7 @@ def _verify_test(folder: Path, path: Path) -> Iterator[Remark]:
 
 def _verify_file(folder: Path, path: Path) -> Iterator[Remark]:
     about, tap = path.relative_to(folder).as_posix(), command("tap", folder)
-    if path.suffix == ".h5" and not is_sealed(path.read_bytes()):
+    if path.suffix == ".h5" and not is_sealed(read_regular(path)):
         cure = f"{tap} sets it aside and goes on with the others{_or_delete(path.parent)}"
         yield damaged_file(about, ALTERED, cure)
     elif path.name == "setup.json" and not _is_whole_set_up(path):
@@ -66,10 +70,10 @@ def _or_delete(test: Path) -> str:
 
 def _is_whole_set_up(path: Path) -> bool:
     try:
-        settings = json.loads(path.read_bytes())
+        settings = json.loads(read_regular(path, SMALL))
         crc = settings.pop("crc", None)
         return bool(Trigger(**settings)) and crc in (None, zlib.crc32(json.dumps(settings, sort_keys=True).encode()))
-    except (ValueError, TypeError, AttributeError):
+    except (ValueError, TypeError, AttributeError, RecursionError):
         return False
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from acquisition import read_tap, read_tap_hits
 from acquisition.files.seal import is_broken, is_sealed
+from acquisition.regular_file import IrregularFileError, read_regular
 from lobewatch.machine.journal.tap_entry import TapEntry
 
 PATIENCE = 60.0
@@ -22,7 +23,10 @@ PATIENCE = 60.0
 
 def read_doubtful(path: Path) -> TapEntry | None:
     """Entry of the tap test in a file; None where it is no whole one."""
-    content = path.read_bytes()
+    try:
+        content = read_regular(path)
+    except IrregularFileError:
+        return None
     if is_broken(content):
         return None
     return _read(path) if is_sealed(content) else _read_apart(path)
@@ -30,14 +34,14 @@ def read_doubtful(path: Path) -> TapEntry | None:
 
 def _read(path: Path) -> TapEntry | None:
     try:
-        return TapEntry.of(read_tap(path), path.read_bytes())
+        return TapEntry.of(read_tap(path), read_regular(path))
     except (ValueError, KeyError, TypeError, RuntimeError, OSError):
         return None
 
 
 def has_whole_hits(path: Path) -> bool:
     """Whether the hits of a file without a seal can be read."""
-    return not is_broken(path.read_bytes()) and _run_apart("hits", path) is not None
+    return not is_broken(read_regular(path)) and _run_apart("hits", path) is not None
 
 
 def _read_apart(path: Path) -> TapEntry | None:

@@ -12,7 +12,6 @@ import hashlib
 import json
 import os
 import shlex
-import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,8 +21,10 @@ import msgspec
 
 from acquisition import DataError, Remark, machine_of, named_in_id
 from acquisition.atomic import atomic_write, sync_folder
+from acquisition.regular_file import read_regular
 from lobewatch.machine.journal.journal_text import Entry, JournalText, crc_of, scan
 from lobewatch.machine.journal.tap_entry import TAP_LINE
+from lobewatch.machine.toml_text import toml_tables, toml_text
 
 JOURNAL = "journal.jsonl"
 COPY = "journal.copy.jsonl"
@@ -123,7 +124,7 @@ class Journal:
         """Write both files anew from these lines, in a chain of their own; what was there is kept beside them."""
         for path in (self.path, self.copy):
             if path.exists():
-                keep_aside(path, path.read_bytes(), "damaged")
+                keep_aside(path, read_regular(path), "damaged")
         lines: list[bytes] = []
         for number, entry in enumerate(entries, 1):
             lines.append(as_line(entry, number, lines[-1] if lines else b""))
@@ -137,7 +138,7 @@ class Journal:
         if reading.torn:
             keep_aside(self.path, reading.torn, "torn")
         for path in (self.path, self.copy):
-            if (path.read_bytes() if path.exists() else b"") != whole:
+            if (read_regular(path) if path.exists() else b"") != whole:
                 atomic_write(path, whole)
 
     def _damage_of_journal(self, journal: JournalText, copy: JournalText) -> Iterator[Remark]:
@@ -190,7 +191,7 @@ def _foreign_fault(folder: Path, lines: Sequence[bytes]) -> str:
 
 def _machine_name(folder: Path) -> str:
     try:
-        return str(tomllib.loads((folder / "machine.toml").read_text("utf-8"))["machine"]["name"])
+        return str(toml_tables(toml_text(folder / "machine.toml"))["machine"]["name"])
     except (OSError, ValueError, KeyError, TypeError):
         return ""
 

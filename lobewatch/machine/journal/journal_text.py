@@ -11,9 +11,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from acquisition.regular_file import open_regular
+
 Entry = dict[str, Any]
 PREVIOUS = b'"previous": "'
 """Bytes of a line before the SHA-256 of the line before it."""
+LARGEST = 200_000_000
+"""Bytes of a journal; chosen, some ten times that of 20 000 tap tests."""
 PIECE = 1 << 18
 """Bytes that are compared at once."""
 
@@ -42,7 +46,7 @@ def scan(path: Path, before: JournalText) -> JournalText:
     """Read a file of the journal line by line, from where it is as it was read before on."""
     if not path.exists():
         return JournalText(exists=False)
-    with path.open("rb", buffering=0) as file:
+    with open_regular(path, LARGEST) as file:
         begun = before if _begins_with(file, before.whole) else JournalText(exists=False)
         file.seek(len(begun.whole))
         content = file.read()
@@ -103,7 +107,7 @@ def _parse(line: bytes) -> Entry | None:
         entry: Entry = json.loads(line)
         crc = entry.pop("crc")
         return entry if crc == crc_of(entry) and isinstance(entry["previous"], str) and "kind" in entry else None
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
 
 

@@ -31,6 +31,7 @@ from lobewatch.machine.settings.spindle_tables import (
     ToolTable,
 )
 from lobewatch.machine.settings.toml_table import Table, check_texts
+from lobewatch.machine.toml_text import toml_tables, toml_text
 
 REFERENCE_CUT = "reference cut"
 """Name of [reference_cut] beside the names of programs."""
@@ -167,25 +168,22 @@ def _hash(*settings: object) -> str:
 
 
 def read_machine(path: Path) -> Machine:
-    """The machine file; DataError with the place for what is wrong in it."""
-    try:
-        return parse_machine(path.read_text(encoding="utf-8"), str(path))
-    except UnicodeDecodeError as error:
-        raise DataError(f"{path}: no UTF-8 text at byte {error.start}; save it as UTF-8") from error
+    """The machine file; DataError with the place for what is wrong in it, OSError where it cannot be read."""
+    return parse_machine(toml_text(path), str(path))
 
 
 def parse_machine(text: str, name: str = "machine.toml") -> Machine:
     """The machine file from its text; DataError with the place for what is wrong in it."""
     tables: dict[str, Any] = {}
     try:
-        tables = tomllib.loads(text)
+        tables = toml_tables(text)
         check_texts(tables)
         return msgspec.convert(tables, Machine)
     except tomllib.TOMLDecodeError as error:
         raise DataError(f"{name}: {error}{_comma_hint(text)}") from error
     except msgspec.ValidationError as error:
         raise DataError(f"{name}: {_readable(str(error), tables, _keys())}") from error
-    except ValueError as error:
+    except (ValueError, ArithmeticError, RecursionError) as error:
         raise DataError(f"{name}: {error}") from error
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from acquisition import Description
+from acquisition.errors import failure_text
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_sound import read_sound
 from lobewatch.logbook import Logbook
@@ -65,7 +66,7 @@ def cut_pictures(logbook: Logbook, setting: CutSetting) -> Iterator[Pictures[Cut
         pictures.show(word=CutStep.FAILED, reason="Stopped at the terminal.", level=None, left=None)
         raise
     except (OSError, RuntimeError, ValueError) as error:
-        pictures.show(word=CutStep.FAILED, reason=str(error), level=None, left=None)
+        pictures.show(word=CutStep.FAILED, reason=failure_text(error), level=None, left=None)
         raise
 
 

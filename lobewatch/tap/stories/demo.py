@@ -149,7 +149,7 @@ def _plan(
 
 def _take(folder: MachineFolder, plan: PlannedTap, random: np.random.Generator) -> str:
     """Take and commit one tap test as a session without a person does; its id."""
-    machine, toml = folder.machine, folder.toml.read_text("utf-8")
+    machine, toml = folder.machine, folder.toml_text
     where = machine.machine.name, plan.date, machine.tap.tool, plan.direction
     about = Circumstances(*where, "the demo", toml, conditions=plan.conditions)
     publisher = Publisher(TapState(0, TapStep.CHECKING, "", wanted=machine.tap.hits), time.monotonic)

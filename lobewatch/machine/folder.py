@@ -29,7 +29,7 @@ from lobewatch.machine.folder_path import mark_of, named_folder
 from lobewatch.machine.journal.journal import Journal, Reading, command
 from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
 from lobewatch.machine.settings.machine_file import Machine, read_machine
-from lobewatch.machine.toml_text import toml_text
+from lobewatch.machine.settings.toml_text import toml_text
 
 
 class BusyError(DataError):

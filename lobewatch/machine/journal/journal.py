@@ -24,7 +24,7 @@ from acquisition.atomic import atomic_write, sync_folder
 from acquisition.regular_file import read_regular
 from lobewatch.machine.journal.journal_text import Entry, JournalText, crc_of, scan
 from lobewatch.machine.journal.tap_entry import TAP_LINE
-from lobewatch.machine.toml_text import toml_tables, toml_text
+from lobewatch.machine.settings.toml_text import toml_tables, toml_text
 
 JOURNAL = "journal.jsonl"
 COPY = "journal.copy.jsonl"

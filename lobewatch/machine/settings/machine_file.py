@@ -31,7 +31,7 @@ from lobewatch.machine.settings.spindle_tables import (
     ToolTable,
 )
 from lobewatch.machine.settings.toml_table import Table, check_texts
-from lobewatch.machine.toml_text import toml_tables, toml_text
+from lobewatch.machine.settings.toml_text import toml_tables, toml_text
 
 REFERENCE_CUT = "reference cut"
 """Name of [reference_cut] beside the names of programs."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import io
 import os
+import signal
 import sys
+import threading
 from collections.abc import Iterator, Mapping, MutableMapping
 from importlib import import_module
 from typing import Annotated, Any, cast
@@ -88,7 +90,9 @@ def _options(
 
 
 def main() -> None:
-    """Run; exit codes: 0 fine, 1 not all is stable (check), 2 wrong use, bad file or no device, 130 Ctrl-C."""
+    """Run; exit codes: 0 fine, 1 not all is stable (check), 2 wrong use, bad file or no device, 130 Ctrl-C or ended."""
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, signal.default_int_handler)  # a service is ended as by Ctrl-C
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a console without these characters shows "?" instead

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 import tomllib
@@ -69,7 +68,7 @@ def test_the_driver_taps(environment: dict[str, str], tmp_path: Path) -> None:
             assert "acme: ACME-1, serial number 0042" in run(environment, "ports", "--port", port).stdout
             said = run(environment, "tap", trial, "--port", port, "--json")
         finally:
-            process.send_signal(signal.SIGINT)
+            process.terminate()
     assert said.returncode == 0, said.stderr
     assert json.loads(said.stdout)["followed"]["frequency_hz"] == pytest.approx(1713.05, rel=1e-3)
 

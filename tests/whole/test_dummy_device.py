@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -61,7 +60,7 @@ def emulated(*options: str) -> Iterator[str]:
             assert json.loads(served)["frequency_hz"] == pytest.approx(1713.05, abs=0.01)
             yield json.loads(served)["port"]
         finally:
-            process.send_signal(signal.SIGINT)
+            process.terminate()
             _, err = process.communicate(timeout=20)
             assert (process.returncode, "Traceback" in err) == (130, False), err
 

@@ -8,7 +8,7 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -286,14 +286,27 @@ def test_a_scatter_that_cannot_be_is_refused_before_anything_is_made(run: Run, s
     assert not list(Path().iterdir())
 
 
-def test_the_emulator_command_serves_a_port_and_ends_quietly_with_ctrl_c(trial: MachineFolder, run: Run) -> None:
+@pytest.mark.parametrize(
+    ("ended_by", "ctrl_c"),
+    [(signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_IGN)],
+    ids=["ctrl-c", "terminated under nohup"],
+)
+def test_the_emulator_command_serves_a_port_and_ends_quietly(
+    trial: MachineFolder, run: Run, ended_by: int, ctrl_c: Callable[..., object] | int
+) -> None:
     command = [sys.executable, "-m", "lobewatch.cli", "emulate", "taps", "trial", "--fast", "--seed", "4", "--json"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, ctrl_c),
+    ) as process:
         assert process.stdout is not None
         served = json.loads(process.stdout.readline())
         assert served["frequency_hz"] == pytest.approx(1713.05, abs=0.01)
         assert run("tap", "trial", "--port", served["port"]).code == 0
-        process.send_signal(signal.SIGINT)
+        process.send_signal(ended_by)
         _, err = process.communicate(timeout=20)
     assert process.returncode == 130
     assert "Traceback" not in err

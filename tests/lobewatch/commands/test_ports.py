@@ -6,7 +6,6 @@ import errno
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -304,7 +303,7 @@ def test_the_emulator_command_serves_a_dataq_device(run: Any, trial: MachineFold
         served = json.loads(process.stdout.readline())
         assert served["frequency_hz"] == pytest.approx(1713.05, abs=0.01)
         assert "dataq: DI-4108" in run("ports", "--port", served["port"]).out
-        process.send_signal(signal.SIGINT)
+        process.terminate()
         _, err = process.communicate(timeout=20)
     assert process.returncode == 130
     assert "Traceback" not in err

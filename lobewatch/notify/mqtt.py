@@ -1,4 +1,4 @@
-"""Retained messages to an MQTT 5 broker, each acknowledged; a broker that is away costs a few seconds and no error."""
+"""Retained messages to MQTT 5 brokers, each acknowledged; brokers that are away cost a few seconds and no error."""
 
 from __future__ import annotations
 
@@ -12,63 +12,103 @@ import msgspec
 from acquisition import DataError
 from lobewatch.machine.settings.notify_table import Broker
 
-PATIENCE = 3.0
-"""Time for the connection, and for the acknowledgements of all messages (s)."""
+PATIENCE = 4.0
+"""Time for all brokers together, from the lookup of their names to the last acknowledgement (s); chosen."""
 KEEP_ALIVE = 10
 """Time between signs of life (s); after half as long again without one the broker takes the sender for lost."""
-LOST, DONE = ({"sender": word} for word in ("lost", "done"))
+LOST, DONE = (msgspec.json.encode({"sender": word}) for word in ("lost", "done"))
 """Messages at PREFIX/sender: the last will of a sender that broke off, and the word of one that has told all."""
 
 
-def connect(broker: Broker) -> Any:
-    """Client of paho, connected, its last will deposited.
+def send(batches: Mapping[Broker, Mapping[str, bytes]]) -> dict[Broker, str]:
+    """Put messages, by broker and topic, where they stay: to all brokers at once, for PATIENCE at most.
 
-    DataError with the reason where the broker cannot be reached in time or refuses, and without paho.
+    Returns why not, for each broker that has not acknowledged all.
     """
-    try:
-        from paho.mqtt import client as paho
-        from paho.mqtt.enums import CallbackAPIVersion
-    except ImportError as error:
-        raise DataError('MQTT needs paho-mqtt; install it with: pip install "lobewatch[mqtt]"') from error
-    client = paho.Client(CallbackAPIVersion.VERSION2, protocol=paho.MQTTv5)
-    client.connect_timeout = PATIENCE
-    if broker.user:
-        client.username_pw_set(broker.user, broker.password or None)
-    if broker.scheme == "mqtts":
-        client.tls_set()
-    client.will_set(f"{broker.prefix}/sender", msgspec.json.encode(LOST), qos=1, retain=True)
-    answered, answer = threading.Event(), list[Any]()
-
-    def on_connect(_client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
-        answer.append(reason)
-        answered.set()
-
-    client.on_connect = on_connect
-    try:
-        client.connect(broker.host, broker.port, KEEP_ALIVE)
-    except (OSError, ValueError) as error:
-        raise DataError(f"{broker.address}: cannot be reached ({error})") from error
-    client.loop_start()
-    if not answered.wait(PATIENCE) or answer[0].is_failure:
-        client.loop_stop()
-        why = f"refuses ({answer[0]}); see user and password" if answer else f"does not answer within {PATIENCE:g} s"
-        raise DataError(f"{broker.address}: {why}")
-    return client
+    end = time.monotonic() + PATIENCE
+    sendings = {broker: Sending(broker, messages, end) for broker, messages in batches.items()}
+    for sending in sendings.values():
+        sending.start()
+    for sending in sendings.values():
+        sending.join(max(end - time.monotonic(), 0.0))
+    return {broker: why for broker, sending in sendings.items() if (why := sending.failure)}
 
 
-def send(broker: Broker, messages: Mapping[str, bytes]) -> None:
-    """Put messages, by topic, where they stay; DataError with the reason where not all were acknowledged in time."""
-    client = connect(broker)
-    try:
-        sent = [client.publish(topic, content, qos=1, retain=True) for topic, content in messages.items()]
-        sent.append(client.publish(f"{broker.prefix}/sender", msgspec.json.encode(DONE), qos=1, retain=True))
-        end = time.monotonic() + PATIENCE
-        for message in sent:
-            message.wait_for_publish(max(end - time.monotonic(), 0.0))
-        if not all(message.is_published() for message in sent):
-            raise DataError(f"{broker.address}: has not acknowledged within {PATIENCE:g} s")
+class Sending(threading.Thread):
+    """One attempt to send to one broker; left behind where it does not end, for nothing ends a lookup that hangs."""
+
+    def __init__(self, broker: Broker, messages: Mapping[str, bytes], end: float) -> None:
+        """end: when nobody waits for it any more (monotonic clock, s)."""
+        super().__init__(name=f"to {broker.address}", daemon=True)
+        self._broker, self._end = broker, end
+        self._waiting = {**messages, f"{broker.prefix}/sender": DONE}
+        self._n_left = len(self._waiting)
+        self._reach("cannot be reached")
+
+    def run(self) -> None:
+        """Send all, or set down why not; without its last word the broker publishes the last will."""
+        client = None
+        try:
+            client = self._make_client()
+            client.connect(self._broker.host, self._broker.port, KEEP_ALIVE)
+            self._exchange(client)
+        except DataError as error:
+            self.failure = f"{self._broker.address}: {error}"
+        except Exception as error:  # noqa: BLE001  (what paho does with the bytes of a stranger is not for us to say)
+            self.failure = f"{self._broker.address}: {self._stage} ({error})"
+        finally:
+            if client is not None and (connection := client.socket()) is not None:
+                connection.close()
+
+    def _reach(self, stage: str) -> None:
+        """Set down what is to be said where it goes no further than this."""
+        self._stage = stage
+        self.failure = f"{self._broker.address}: {stage} within {PATIENCE:g} s"
+
+    def _make_client(self) -> Any:
+        """Client of paho, not connected yet; DataError without paho."""
+        try:
+            from paho.mqtt import client as paho
+            from paho.mqtt.enums import CallbackAPIVersion
+        except ImportError as error:
+            raise DataError('MQTT needs paho-mqtt; install it with: pip install "lobewatch[mqtt]"') from error
+        client = paho.Client(CallbackAPIVersion.VERSION2, protocol=paho.MQTTv5)
+        client.connect_timeout = PATIENCE / 2  # for each address of a name: the second has a chance where one is silent
+        if self._broker.user:
+            client.username_pw_set(self._broker.user, self._broker.password or None)
+        if self._broker.scheme == "mqtts":
+            client.tls_set()
+        client.will_set(f"{self._broker.prefix}/sender", LOST, qos=1, retain=True)
+        client.on_socket_open = self._on_socket_open
+        client.on_connect, client.on_publish = self._on_connect, self._on_publish
+        return client
+
+    def _exchange(self, client: Any) -> None:
+        """Read and write until all is acknowledged, or nobody waits any more."""
+        from paho.mqtt.client import error_string
+
+        while self._n_left:
+            if (left := self._end - time.monotonic()) <= 0:
+                return
+            if code := client.loop(left):
+                raise ConnectionError(error_string(code).rstrip("."))
         client.disconnect()
-    except (RuntimeError, ValueError) as error:  # paho: the connection is gone, the queue is full
-        raise DataError(f"{broker.address}: {error}") from error
-    finally:
-        client.loop_stop()
+        self.failure = ""
+
+    def _on_socket_open(self, *_: Any) -> None:
+        """Refuse to begin when another attempt may be under way already."""
+        if time.monotonic() > self._end:
+            raise TimeoutError
+        self._reach("does not answer")
+
+    def _on_connect(self, client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
+        if reason.is_failure:
+            raise DataError(f"refuses ({reason}); see user and password")
+        self._reach("has not acknowledged")
+        for topic, content in self._waiting.items():
+            client.publish(topic, content, qos=1, retain=True)
+
+    def _on_publish(self, _client: Any, _data: Any, _number: int, reason: Any, _properties: Any) -> None:
+        if reason.is_failure:
+            raise DataError(f"refuses a message ({reason}); see what the user may write")
+        self._n_left -= 1

@@ -42,28 +42,26 @@ def tell(logbook: Logbook) -> None:
 
 def notify(
     standings: Iterable[MachineStanding], machines: Mapping[Path, Machine] | None = None, now: datetime | None = None
-) -> int:
-    """Send the standings of machines whose machine.toml names a broker.
+) -> None:
+    """Send the standings of machines whose machine.toml names a broker; a note says why where one is not told.
 
-    machines: those that are read already. Returns how many brokers could not be told; why stands in a note.
+    machines: those that are read already.
     """
     now, machines = now or datetime.now(UTC), machines or {}
-    by_broker: dict[Broker, list[MachineStanding]] = {}
+    batches: dict[Broker, dict[Path, tuple[str, bytes]]] = {}
     for standing in standings:
         try:
             machine: Machine = machines.get(standing.path) or read_machine(standing.path / "machine.toml")
         except (ValueError, OSError):
             continue  # who is to be told cannot be read
-        if machine.notify.broker is not None:
-            by_broker.setdefault(machine.notify.broker, []).append(standing)
-    failures = 0
-    for broker, group in by_broker.items():
-        messages = {machine.path: (topic_of(broker.prefix, machine.key), message_of(machine, now)) for machine in group}
-        why = deliver(broker, messages)
+        if (broker := machine.notify.broker) is not None:
+            message = topic_of(broker.prefix, standing.key), message_of(standing, now)
+            batches.setdefault(broker, {})[standing.path] = message
+    failures = deliver(batches)
+    for broker in batches:
+        why = failures.get(broker, "")
         if why:
-            failures += 1
             notes.print(f"note: nobody was told by MQTT: {why}; it goes with the next command", markup=False)
-    return failures
 
 
 def topic_of(prefix: str, key: str) -> str:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 
 import msgspec
 
-from acquisition import DataError
 from acquisition.atomic import atomic_write
 from acquisition.regular_file import SMALL, read_regular
 from lobewatch.machine import BusyError, MachineFolder
@@ -30,29 +29,28 @@ class Unsent(msgspec.Struct, frozen=True):
     """Scheme, host and port of the broker."""
 
 
-def deliver(broker: Broker, messages: Mapping[Path, tuple[str, bytes]]) -> str:
-    """Send messages (topic and content by machine folder) with those left over beside; why not, empty where all went.
+def deliver(batches: Mapping[Broker, Mapping[Path, tuple[str, bytes]]]) -> dict[Broker, str]:
+    """Send messages (topic and content, by broker and machine folder) with those left over beside.
 
-    What does not go is kept beside its machine.
+    Returns why not, for each broker that did not take all. What does not go is kept beside its machine.
     """
-    left_over = _left_over(broker, {folder.resolve().parent for folder in messages})
-    pending = left_over | dict(messages)
-    try:
-        send(broker, dict(pending.values()))
-    except DataError as error:
-        for folder, (topic, content) in messages.items():
+    fresh = {folder.resolve() for messages in batches.values() for folder in messages}
+    pending = {broker: _left_over(broker, messages, fresh) | dict(messages) for broker, messages in batches.items()}
+    failures = send({broker: dict(messages.values()) for broker, messages in pending.items()})
+    for broker in failures:
+        for folder, (topic, content) in batches[broker].items():
             _keep(folder, Unsent(topic, msgspec.Raw(content), broker[:3]))
-        return str(error)
-    for folder in pending:
+    for folder in (folder for broker in pending.keys() - failures.keys() for folder in pending[broker]):
         with contextlib.suppress(OSError):
             (folder / UNSENT).unlink(missing_ok=True)
-    return ""
+    return failures
 
 
-def _left_over(broker: Broker, places: Iterable[Path]) -> dict[Path, tuple[str, bytes]]:
-    """Messages to the same broker, beside machines in these folders."""
+def _left_over(broker: Broker, folders: Iterable[Path], fresh: Container[Path]) -> dict[Path, tuple[str, bytes]]:
+    """Messages to the same broker, of machines beside these but for those with a fresh one."""
     messages = {}
-    for path in sorted(path for place in places for path in place.glob(f"*/{UNSENT}")):
+    places = {folder.resolve().parent for folder in folders}
+    for path in sorted(path for place in places for path in place.glob(f"*/{UNSENT}") if path.parent not in fresh):
         try:
             unsent = msgspec.json.decode(read_regular(path, SMALL), type=Unsent)
         except (OSError, ValueError):

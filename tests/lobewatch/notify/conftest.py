@@ -1,4 +1,4 @@
-"""A real broker."""
+"""A real broker, and what it has received; machines that name a broker; commands."""
 
 from __future__ import annotations
 
@@ -6,14 +6,48 @@ import os
 import shutil
 import socket
 import subprocess
+import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
+from paho.mqtt import subscribe
+from typer.testing import CliRunner, Result
+
+from lobewatch.cli import app
 
 PATHS = f"{os.environ['PATH']}:/usr/sbin:/usr/local/sbin"
 MOSQUITTO, PASSWD = (shutil.which(name, path=PATHS) for name in ("mosquitto", "mosquitto_passwd"))
+
+LONG = 90
+"""Time after which a command is taken for hanging (s): far more than it needs on any computer."""
+
+
+def machine(path: Path, address: str) -> Path:
+    """A machine that names a broker."""
+    path.mkdir(parents=True)
+    (path / "machine.toml").write_text(f'[machine]\nname = "{path.name}"\n[notify]\nmqtt = "{address}"\n', "utf-8")
+    return path
+
+
+def run(*arguments: object) -> Result:
+    """A command in this process."""
+    return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
+
+
+def started(*arguments: object, before: str = "") -> subprocess.CompletedProcess[str]:
+    """A command in a process of its own, which has to end, threads and all."""
+    program = f"import sys\n{before}\nsys.argv[0] = 'lobewatch'\nfrom lobewatch.cli import main\nmain()"
+    command = [sys.executable, "-c", program, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=LONG, check=False)
+
+
+def received(broker: Mosquitto, topic: str, **how: Any) -> Any:
+    """The message that stands at a topic."""
+    ask: Any = subscribe.simple
+    return ask(topic, qos=1, hostname="127.0.0.1", port=broker.port, **how)
 
 
 class Mosquitto:
@@ -30,8 +64,9 @@ class Mosquitto:
     def address(self) -> str:
         return f"mqtt://127.0.0.1:{self.port}"
 
-    def start(self, user: str = "", password: str = "") -> None:
-        lines = [f"listener {self.port} 127.0.0.1", "user root", "persistence false"]
+    def start(self, user: str = "", password: str = "", more: Sequence[str] = ()) -> None:
+        """more: lines of its configuration."""
+        lines = [f"listener {self.port} 127.0.0.1", "user root", "persistence false", *more]
         if user:
             subprocess.run([str(PASSWD), "-b", "-c", str(self.folder / "users"), user, password], check=True)
             lines += ["allow_anonymous false", f"password_file {self.folder / 'users'}"]

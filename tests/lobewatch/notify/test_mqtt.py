@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import socket
 import subprocess
 import sys
 import time
@@ -13,28 +12,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from paho.mqtt import subscribe
-from typer.testing import CliRunner, Result
 
 from acquisition import DataError
-from lobewatch.cli import app
 from lobewatch.machine.settings.machine_file import parse_machine
 from lobewatch.machine.settings.notify_table import broker_of
 from lobewatch.notify import mqtt
+from tests.lobewatch.notify.conftest import Mosquitto, received, run
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
-Mosquitto = Any
-"""Of conftest.py."""
-
-
-def run(*arguments: object) -> Result:
-    return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
-
-
-def received(broker: Mosquitto, topic: str, **how: Any) -> Any:
-    ask: Any = subscribe.simple
-    return ask(topic, qos=1, hostname="127.0.0.1", port=broker.port, **how)
 
 
 @pytest.fixture
@@ -98,22 +84,16 @@ def test_a_wrong_password_is_said_and_fails_nothing(
 def test_a_sender_that_breaks_off_leaves_its_last_will(mosquitto: Mosquitto) -> None:
     mosquitto.start()
     program = (
-        "import os, sys; from lobewatch.machine.settings.notify_table import broker_of\n"
+        "import os, sys; from paho.mqtt.client import Client\n"
+        "from lobewatch.machine.settings.notify_table import broker_of\n"
         "from lobewatch.notify import mqtt\n"
-        "mqtt.connect(broker_of(sys.argv[1])); os._exit(1)"
+        "Client.publish = lambda *_, **__: os._exit(1)\n"
+        "mqtt.send({broker_of(sys.argv[1]): {}})"
     )
     subprocess.run([sys.executable, "-c", program, mosquitto.address], check=False)
     assert json.loads(received(mosquitto, "lobewatch/sender").payload) == {"sender": "lost"}
-    mqtt.send(broker_of(mosquitto.address), {"lobewatch/a/standing": b"{}"})
+    assert mqtt.send({broker_of(mosquitto.address): {"lobewatch/a/standing": b"{}"}}) == {}
     assert json.loads(received(mosquitto, "lobewatch/sender").payload) == {"sender": "done"}
-
-
-def test_a_silent_broker_is_waited_for_a_few_seconds_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mqtt, "PATIENCE", 0.3)
-    with socket.create_server(("127.0.0.1", 0)) as silent:
-        address = f"mqtt://127.0.0.1:{silent.getsockname()[1]}"
-        with pytest.raises(DataError, match=r"does not answer within 0\.3 s"):
-            mqtt.send(broker_of(address), {"a": b"{}"})
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,221 @@
+"""Brokers that do not do their part: a command ends soon, says one sentence for each, and keeps what was not sent."""
+
+from __future__ import annotations
+
+import json
+import re
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lobewatch.machine.settings.notify_table import broker_of
+from lobewatch.notify import mqtt
+from tests.lobewatch.notify.conftest import Mosquitto, machine, received, run, started
+from tests.lobewatch.notify.fake_broker import (
+    CONNECT,
+    PUBLISH,
+    TAKEN,
+    FakeBroker,
+    acknowledge_the_first,
+    answer_byte_by_byte,
+    babble,
+    hang_up,
+    hang_up_later,
+    never_acknowledge,
+    obey,
+    refuse,
+    say_nothing,
+    say_nothing_more,
+    talk_rubbish,
+)
+
+LATE = r" within [\d.]+ s"
+BAD = {
+    say_nothing: f"does not answer{LATE}",
+    answer_byte_by_byte: f"does not answer{LATE}",
+    say_nothing_more: f"has not acknowledged{LATE}",
+    never_acknowledge: f"has not acknowledged{LATE}",
+    acknowledge_the_first: f"has not acknowledged{LATE}",
+    babble: f"has not acknowledged{LATE}",
+    refuse: r"refuses \(Not authorized\); see user and password",
+    hang_up: r"(cannot be reached|does not answer) \(.*\)",
+    hang_up_later: r"has not acknowledged \(.*\)",
+    talk_rubbish: r"does not answer \(.*\)",
+}
+"""Sentence on each way to be bad."""
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mqtt, "PATIENCE", 0.5)
+
+
+@pytest.fixture
+def unaccepted() -> Iterator[str]:
+    """Address where the system takes connections that no program ever takes from it."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        yield f"mqtt://127.0.0.1:{server.getsockname()[1]}"
+
+
+@pytest.fixture
+def unused() -> str:
+    """Address where nobody listens."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return f"mqtt://127.0.0.1:{server.getsockname()[1]}"
+
+
+def test_a_command_ends_though_the_broker_never_acknowledges(tmp_path: Path) -> None:
+    with FakeBroker(never_acknowledge) as broker:
+        mill = machine(tmp_path / "a", broker.address)
+        said = started("event", mill, "oiled")
+        assert said.returncode == 0
+        assert said.stdout.startswith("saved ")
+        assert f"{broker.address}: has not acknowledged within 4 s; it goes with the next command" in said.stderr
+        assert json.loads((mill / "unsent.json").read_text())["topic"] == "lobewatch/a/standing"
+
+
+def test_a_plant_of_bad_brokers_is_told_in_parallel_and_the_good_one_too(
+    tmp_path: Path, unaccepted: str, unused: str, mosquitto: Mosquitto
+) -> None:
+    mosquitto.start()
+    plant = tmp_path / "plant"
+    machine(plant / "good", mosquitto.address)
+    with ExitStack() as stack:
+        sentences = {unaccepted: f"does not answer{LATE}", unused: r"cannot be reached \(.*refused\)"}
+        sentences |= {stack.enter_context(FakeBroker(talk)).address: text for talk, text in BAD.items()}
+        encrypted = [unaccepted, stack.enter_context(FakeBroker(talk_rubbish)).address]
+        sentences |= {address.replace("mqtt", "mqtts"): r"cannot be reached \(.*\)" for address in encrypted}
+        mills = [machine(plant / f"m{number}", address) for number, address in enumerate(sentences)]
+        said = started("status", plant, "--notify")
+    assert said.returncode == 0
+    notes = [line for line in said.stderr.splitlines() if "MQTT" in line]
+    assert len(notes) == len(sentences)
+    for address, text in sentences.items():
+        assert re.search(f"by MQTT: {address}: {text}; it goes with the next command$", said.stderr, re.MULTILINE)
+    assert all((mill / "unsent.json").exists() for mill in mills)
+    assert json.loads(received(mosquitto, "lobewatch/good/standing").payload)["machine"] == "good"
+
+
+def test_no_broker_waits_for_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mqtt, "PATIENCE", 30.0)
+    together = threading.Barrier(5)
+
+    def wait_for_all(broker: FakeBroker, connection: socket.socket) -> None:
+        together.wait(60)
+        obey(broker, connection)
+
+    with ExitStack() as stack:
+        brokers = [stack.enter_context(FakeBroker(wait_for_all)) for _ in range(5)]
+        for number, broker in enumerate(brokers):
+            machine(tmp_path / "plant" / f"m{number}", broker.address)
+        said = run("status", tmp_path / "plant", "--notify")
+        assert "nobody was told" not in said.stderr
+        assert [sum(kind == PUBLISH for kind, _ in broker.received) for broker in brokers] == 5 * [2]
+
+
+@pytest.mark.usefixtures("impatient")
+@pytest.mark.parametrize("talk", BAD, ids=lambda talk: talk.__name__)
+def test_each_way_to_be_bad_is_one_sentence(talk: Callable[[FakeBroker, socket.socket], None]) -> None:
+    with FakeBroker(talk) as bad, FakeBroker(obey) as good:
+        ours, other = broker_of(bad.address), broker_of(good.address)
+        failures = mqtt.send({ours: {"a": b"{}", "b": b"{}"}, other: {"a": b"{}"}})
+        assert [*failures] == [ours]
+        assert re.fullmatch(f"{bad.address}: {BAD[talk]}", failures[ours])
+
+
+def test_a_name_that_is_looked_up_for_ever_keeps_no_command(tmp_path: Path) -> None:
+    hang = "import socket, time\nsocket.getaddrinfo = lambda *_, **__: time.sleep(3600)"
+    said = started("event", machine(tmp_path / "a", "mqtt://nowhere.example"), "oiled", before=hang)
+    assert said.returncode == 0
+    assert "mqtt://nowhere.example:1883: cannot be reached within 4 s" in said.stderr
+
+
+@pytest.mark.usefixtures("impatient")
+def test_what_is_looked_up_too_late_is_not_sent_over_newer_messages(monkeypatch: pytest.MonkeyPatch) -> None:
+    look_up, is_up = socket.getaddrinfo, threading.Event()
+
+    def look_up_late(*arguments: Any, **more: Any) -> Any:
+        is_up.wait()
+        return look_up(*arguments, **more)
+
+    monkeypatch.setattr(socket, "getaddrinfo", look_up_late)
+    with FakeBroker(obey) as broker:
+        target = broker_of(broker.address)
+        assert mqtt.send({target: {"a": b"{}"}}) == {target: f"{broker.address}: cannot be reached within 0.5 s"}
+        sending = next(thread for thread in threading.enumerate() if thread.name == f"to {broker.address}")
+        is_up.set()
+        sending.join()
+    assert broker.received == []
+
+
+def test_a_message_left_over_does_not_go_with_a_newer_one_of_its_machine(tmp_path: Path) -> None:
+    with FakeBroker(obey) as broker:
+        machine(tmp_path / "a", f"{broker.address}/one")
+        later = machine(tmp_path / "b", f"{broker.address}/two")
+        old = {"topic": "two/b/standing", "message": {}, "broker": broker_of(broker.address)[:3]}
+        (later / "unsent.json").write_text(json.dumps(old))
+        assert "nobody was told" not in run("status", tmp_path, "--notify").stderr
+        assert sum(b"two/b/standing" in content for kind, content in broker.received if kind == PUBLISH) == 1
+    assert not (later / "unsent.json").exists()
+
+
+def test_a_message_that_the_broker_does_not_take_is_kept(tmp_path: Path, mosquitto: Mosquitto) -> None:
+    rights = tmp_path / "rights"
+    rights.write_text("topic readwrite lobewatch/sender\ntopic read #\n")
+    mosquitto.start(more=[f"acl_file {rights}"])
+    mill = machine(tmp_path / "a", mosquitto.address)
+    assert "refuses a message (Not authorized); see what the user may write" in run("event", mill, "oiled").stderr
+    assert (mill / "unsent.json").exists()
+    assert json.loads(received(mosquitto, "lobewatch/sender").payload) == {"sender": "lost"}
+
+
+class Parrot:
+    """Says what it is told to each who connects, and hangs up."""
+
+    words = b""
+
+    def __call__(self, broker: FakeBroker, connection: socket.socket) -> None:
+        assert next(broker.packets(connection))[0] == CONNECT
+        connection.sendall(self.words)
+
+
+PACKETS = st.builds(
+    lambda head, body: bytes([head, len(body)]) + body,
+    st.sampled_from([0x20, 0x30, 0x32, 0x34, 0x40, 0x50, 0x62, 0x70, 0x90, 0xB0, 0xD0, 0xE0, 0xF0]),
+    st.binary(max_size=20),
+)
+RUBBISH = st.one_of(st.binary(max_size=300), st.lists(PACKETS, max_size=6).map(b"".join))
+
+
+@pytest.fixture(scope="module")
+def parrot() -> Iterator[tuple[Parrot, FakeBroker]]:
+    talk = Parrot()
+    with FakeBroker(talk) as broker:
+        yield talk, broker
+
+
+def nothing_but_a_sentence(parrot: tuple[Parrot, FakeBroker], words: bytes, is_taken: bool) -> None:
+    talk, broker = parrot
+    talk.words = TAKEN * is_taken + words
+    target = broker_of(broker.address)
+    assert mqtt.send({target: {"a": b"{}", "b": b"{}"}})[target].startswith(f"{broker.address}: ")
+
+
+@given(words=RUBBISH, is_taken=st.booleans())
+@settings(max_examples=100, deadline=None)
+def test_rubbish_is_one_sentence(parrot: tuple[Parrot, FakeBroker], words: bytes, is_taken: bool) -> None:
+    nothing_but_a_sentence(parrot, words, is_taken)
+
+
+@pytest.mark.long
+@given(words=RUBBISH, is_taken=st.booleans())
+@settings(max_examples=20_000, deadline=None)
+def test_much_rubbish_is_one_sentence(parrot: tuple[Parrot, FakeBroker], words: bytes, is_taken: bool) -> None:
+    nothing_but_a_sentence(parrot, words, is_taken)

@@ -103,7 +103,7 @@ class Sending(threading.Thread):
 
     def _on_connect(self, client: Any, _data: Any, _flags: Any, reason: Any, _properties: Any) -> None:
         if reason.is_failure:
-            raise DataError(f"refuses ({reason}); see user and password")
+            raise DataError(f"refuses ({reason}); {self._broker.withheld or 'see user and password'}")
         self._reach("has not acknowledged")
         for topic, content in self._waiting.items():
             client.publish(topic, content, qos=1, retain=True)

@@ -62,6 +62,8 @@ def notify(
         why = failures.get(broker, "")
         if why:
             notes.print(f"note: nobody was told by MQTT: {why}; it goes with the next command", markup=False)
+        if broker.withheld and broker.withheld not in why:
+            notes.print(f"note: {broker.address}: {broker.withheld}", markup=False)
 
 
 def topic_of(prefix: str, key: str) -> str:

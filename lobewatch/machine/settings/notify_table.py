@@ -12,6 +12,8 @@ PORTS = {"mqtt": 1883, "mqtts": 8883}
 """Port by scheme, where the address names none; mqtts is encrypted."""
 PASSWORD = "LOBEWATCH_MQTT_PASSWORD"
 """Variable of the environment: machine.toml is copied into each tap file, so the password need not stand in it."""
+PASSWORD_HOST = "LOBEWATCH_MQTT_HOST"
+"""Variable of the environment: host, or host:port, that the password is for, whomever a machine.toml names."""
 
 
 class Broker(NamedTuple):
@@ -33,7 +35,20 @@ class Broker(NamedTuple):
     @property
     def address(self) -> str:
         """Address for people: without the password."""
-        return f"{self.scheme}://{self.host}:{self.port}"
+        return f"{self.scheme}://{self.place}"
+
+    @property
+    def place(self) -> str:
+        """Host and port."""
+        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+
+    @property
+    def withheld(self) -> str:
+        """Why this user goes without the password of the environment; empty where there is no such password."""
+        if not self.user or self.password or not os.environ.get(PASSWORD):
+            return ""
+        named = os.environ.get(PASSWORD_HOST) or "not set"
+        return f"{PASSWORD} is not used: {PASSWORD_HOST} is {named}; set it to {self.place} if this broker may have it"
 
 
 class NotifyTable(Table, frozen=True):
@@ -65,6 +80,16 @@ def broker_of(address: str) -> Broker:
     prefix = url.path.strip("/") or "lobewatch"
     if url.scheme not in PORTS or not url.hostname or set(address) & set("#?") or "+" in prefix:
         raise ValueError(refusal)
-    password = unquote(url.password or "") or (os.environ.get(PASSWORD, "") if url.username else "")
-    user = unquote(url.username or "")
-    return Broker(url.scheme, url.hostname, port or PORTS[url.scheme], user, password, prefix)
+    port = port or PORTS[url.scheme]
+    password = unquote(url.password or "") or (_password_for(url.hostname, port) if url.username else "")
+    return Broker(url.scheme, url.hostname, port, unquote(url.username or ""), password, prefix)
+
+
+def _password_for(host: str, port: int) -> str:
+    """Password of the environment, where it is for this host; else empty."""
+    try:
+        named = urlsplit(f"//{os.environ.get(PASSWORD_HOST, '')}")
+        is_for_it = named.hostname == host and named.port in (None, port)
+    except ValueError:
+        is_for_it = False
+    return os.environ.get(PASSWORD, "") if is_for_it else ""

@@ -34,14 +34,15 @@ def test_each_command_is_understood(line: str) -> None:
 
 
 def test_there_is_a_line_for_cron_and_one_for_systemd() -> None:
-    assert [kind for kind, _ in BLOCKS] == ["cron", "ini", "ini", "toml", "yaml", "yaml"]
+    assert [kind for kind, _ in BLOCKS] == ["cron", "ini", "ini", "toml", "sh", "yaml", "yaml"]
     assert all("lobewatch status" in BLOCKS[number][1] for number in (0, 1))
 
 
-def test_the_table_for_machine_toml_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("LOBEWATCH_MQTT_PASSWORD", "secret")
+def test_the_table_for_machine_toml_is_taken_with_the_password(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in re.findall(r"export (\w+)=(\S+)", BLOCKS[4][1]):
+        monkeypatch.setenv(name, value)
     broker = parse_machine(f'[machine]\nname = "m"\n{BLOCKS[3][1]}').notify.broker
-    assert broker == ("mqtt", "broker.example", 1883, "lobewatch", "secret", "plant")
+    assert broker == ("mqtt", "broker.example", 1883, "lobewatch", "...", "plant")
 
 
 def test_each_key_of_a_message_and_each_family_is_explained() -> None:

@@ -71,6 +71,7 @@ def test_a_wrong_password_is_said_and_fails_nothing(
     mosquitto.start("lobewatch", "right-one")
     toml = mill / "machine.toml"
     toml.write_text(toml.read_text("utf-8").replace("mqtt://", "mqtt://lobewatch@"), "utf-8")
+    monkeypatch.setenv("LOBEWATCH_MQTT_HOST", "127.0.0.1")
     monkeypatch.setenv("LOBEWATCH_MQTT_PASSWORD", "wrong-one")
     told = run("event", mill, "oiled")
     assert (told.exit_code, "refuses (Not authorized)" in told.stderr) == (0, True)

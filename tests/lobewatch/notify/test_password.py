@@ -1,0 +1,91 @@
+"""The password of the environment goes to the broker that the environment names, whomever a machine.toml names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from lobewatch.machine.settings.notify_table import broker_of
+from tests.lobewatch.notify.conftest import machine, run
+from tests.lobewatch.notify.fake_broker import CONNECT, FakeBroker, obey, refuse
+
+NOT_USED = "LOBEWATCH_MQTT_PASSWORD is not used: LOBEWATCH_MQTT_HOST is {}; set it to {} if this broker may have it"
+
+
+@pytest.fixture(autouse=True)
+def password(monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.delenv("LOBEWATCH_MQTT_HOST", raising=False)
+    monkeypatch.setenv("LOBEWATCH_MQTT_PASSWORD", "plant-secret")
+    return "plant-secret"
+
+
+@pytest.mark.parametrize(
+    ("named", "address"),
+    [
+        ("broker.example", "mqtt://me@broker.example"),
+        ("broker.example", "mqtts://me@broker.example:9999/hall"),
+        ("broker.example:1883", "mqtt://me@broker.example"),
+        ("Broker.Example:8883", "mqtts://me@broker.EXAMPLE"),
+        ("[fd00::1]:1883", "mqtt://me@[fd00::1]"),
+    ],
+)
+def test_the_named_host_gets_the_password(
+    monkeypatch: pytest.MonkeyPatch, password: str, named: str, address: str
+) -> None:
+    monkeypatch.setenv("LOBEWATCH_MQTT_HOST", named)
+    assert (broker_of(address).password, broker_of(address).withheld) == (password, "")
+
+
+@pytest.mark.parametrize(
+    ("named", "address", "place"),
+    [
+        ("", "mqtt://me@broker.example", "broker.example:1883"),
+        ("broker.example", "mqtt://me@other.example", "other.example:1883"),
+        ("broker.example", "mqtt://me@broker.example.evil", "broker.example.evil:1883"),
+        ("broker.example", "mqtt://broker.example@evil", "evil:1883"),
+        ("broker.example:8883", "mqtt://me@broker.example", "broker.example:1883"),
+        ("broker.example:x", "mqtt://me@broker.example", "broker.example:1883"),
+        ("mqtt://broker.example", "mqtt://me@broker.example", "broker.example:1883"),
+        ("[", "mqtt://me@[fd00::1]", "[fd00::1]:1883"),
+    ],
+)
+def test_no_other_host_gets_it_and_what_to_set_is_said(
+    monkeypatch: pytest.MonkeyPatch, named: str, address: str, place: str
+) -> None:
+    monkeypatch.setenv("LOBEWATCH_MQTT_HOST", named)
+    assert broker_of(address).password == ""
+    assert broker_of(address).withheld == NOT_USED.format(named or "not set", place)
+
+
+def test_nothing_is_withheld_where_no_password_is_wanted_or_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert broker_of("mqtt://broker.example").withheld == ""
+    own = broker_of("mqtt://me:own@broker.example")
+    assert (own.password, own.withheld) == ("own", "")
+    monkeypatch.delenv("LOBEWATCH_MQTT_PASSWORD")
+    assert broker_of("mqtt://me@broker.example").withheld == ""
+
+
+@pytest.mark.parametrize("named", ["", "broker.example"])
+def test_a_copied_machine_does_not_take_the_password_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, password: str, named: str
+) -> None:
+    monkeypatch.setenv("LOBEWATCH_MQTT_HOST", named)
+    with FakeBroker(obey) as stranger:
+        said = run("event", machine(tmp_path / "a", stranger.address.replace("//", "//me@")), "oiled")
+        assert f"note: {stranger.address}: {NOT_USED.format(named or 'not set', stranger.place)}" in said.stderr
+    assert [password.encode() in content for kind, content in stranger.received if kind == CONNECT] == [False]
+    with FakeBroker(refuse) as stranger:
+        said = run("event", machine(tmp_path / "b", stranger.address.replace("//", "//me@")), "oiled")
+        refusal = f"refuses (Not authorized); {NOT_USED.format(named or 'not set', stranger.place)}"
+        assert f"{stranger.address}: {refusal}; it goes" in said.stderr
+        assert said.stderr.count("is not used") == 1
+
+
+def test_the_named_broker_is_told_with_the_password(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, password: str
+) -> None:
+    with FakeBroker(obey) as ours:
+        monkeypatch.setenv("LOBEWATCH_MQTT_HOST", ours.place)
+        assert run("event", machine(tmp_path / "a", ours.address.replace("//", "//me@")), "oiled").stderr == ""
+    assert [password.encode() in content for kind, content in ours.received if kind == CONNECT] == [True]

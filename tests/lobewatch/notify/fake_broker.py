@@ -122,10 +122,10 @@ def say_nothing_more(broker: FakeBroker, connection: socket.socket) -> None:
 
 
 def answer_byte_by_byte(broker: FakeBroker, connection: socket.socket) -> None:
-    """A byte every two seconds."""
+    """A byte every five seconds."""
     for byte in TAKEN:
         connection.sendall(bytes([byte]))
-        if broker.ended.wait(2):
+        if broker.ended.wait(5):
             return
 
 

@@ -6,7 +6,7 @@ import json
 import re
 import socket
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -36,7 +36,9 @@ from tests.lobewatch.notify.fake_broker import (
     talk_rubbish,
 )
 
-LATE = r" within [\d.]+ s"
+PATIENCE = 9.0
+"""Time for a plant (s): enough for what a slow computer has to do in it, less than KEEP_ALIVE."""
+LATE = f" within {PATIENCE:g} s"
 BAD = {
     say_nothing: f"does not answer{LATE}",
     answer_byte_by_byte: f"does not answer{LATE}",
@@ -50,11 +52,6 @@ BAD = {
     talk_rubbish: r"does not answer \(.*\)",
 }
 """Sentence on each way to be bad."""
-
-
-@pytest.fixture
-def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mqtt, "PATIENCE", 0.5)
 
 
 @pytest.fixture
@@ -91,9 +88,11 @@ def test_a_plant_of_bad_brokers_is_told_in_parallel_and_the_good_one_too(
         sentences = {unaccepted: f"does not answer{LATE}", unused: r"cannot be reached \(.*refused\)"}
         sentences |= {stack.enter_context(FakeBroker(talk)).address: text for talk, text in BAD.items()}
         encrypted = [unaccepted, stack.enter_context(FakeBroker(talk_rubbish)).address]
-        sentences |= {address.replace("mqtt", "mqtts"): r"cannot be reached \(.*\)" for address in encrypted}
+        sentences |= {address.replace("mqtt", "mqtts"): rf"cannot be reached({LATE}| \(.*\))" for address in encrypted}
         mills = [machine(plant / f"m{number}", address) for number, address in enumerate(sentences)]
-        said = started("status", plant, "--notify")
+        said = started(
+            "status", plant, "--notify", before=f"from lobewatch.notify import mqtt; mqtt.PATIENCE = {PATIENCE}"
+        )
     assert said.returncode == 0
     notes = [line for line in said.stderr.splitlines() if "MQTT" in line]
     assert len(notes) == len(sentences)
@@ -120,16 +119,6 @@ def test_no_broker_waits_for_another(tmp_path: Path, monkeypatch: pytest.MonkeyP
         assert [sum(kind == PUBLISH for kind, _ in broker.received) for broker in brokers] == 5 * [2]
 
 
-@pytest.mark.usefixtures("impatient")
-@pytest.mark.parametrize("talk", BAD, ids=lambda talk: talk.__name__)
-def test_each_way_to_be_bad_is_one_sentence(talk: Callable[[FakeBroker, socket.socket], None]) -> None:
-    with FakeBroker(talk) as bad, FakeBroker(obey) as good:
-        ours, other = broker_of(bad.address), broker_of(good.address)
-        failures = mqtt.send({ours: {"a": b"{}", "b": b"{}"}, other: {"a": b"{}"}})
-        assert [*failures] == [ours]
-        assert re.fullmatch(f"{bad.address}: {BAD[talk]}", failures[ours])
-
-
 def test_a_name_that_is_looked_up_for_ever_keeps_no_command(tmp_path: Path) -> None:
     hang = "import socket, time\nsocket.getaddrinfo = lambda *_, **__: time.sleep(3600)"
     said = started("event", machine(tmp_path / "a", "mqtt://nowhere.example"), "oiled", before=hang)
@@ -137,8 +126,8 @@ def test_a_name_that_is_looked_up_for_ever_keeps_no_command(tmp_path: Path) -> N
     assert "mqtt://nowhere.example:1883: cannot be reached within 4 s" in said.stderr
 
 
-@pytest.mark.usefixtures("impatient")
 def test_what_is_looked_up_too_late_is_not_sent_over_newer_messages(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mqtt, "PATIENCE", 0.5)
     look_up, is_up = socket.getaddrinfo, threading.Event()
 
     def look_up_late(*arguments: Any, **more: Any) -> Any:
@@ -216,6 +205,6 @@ def test_rubbish_is_one_sentence(parrot: tuple[Parrot, FakeBroker], words: bytes
 
 @pytest.mark.long
 @given(words=RUBBISH, is_taken=st.booleans())
-@settings(max_examples=20_000, deadline=None)
+@settings(max_examples=5_000, deadline=None)
 def test_much_rubbish_is_one_sentence(parrot: tuple[Parrot, FakeBroker], words: bytes, is_taken: bool) -> None:
     nothing_but_a_sentence(parrot, words, is_taken)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping
 from dataclasses import fields
@@ -18,6 +16,7 @@ from lobewatch.logbook import Logbook
 from lobewatch.machine import TapEntry
 from lobewatch.machine.journal.event import MaintenanceEvent
 from lobewatch.show.history.describe_cut import cut_json, cut_words
+from lobewatch.show.terminal.csv_text import csv_text
 
 VALUES = {"frequency_hz": "frequency", "damping_ratio": "damping_ratio", "stiffness_n_per_m": "stiffness"}
 """Field of a row by its name in CSV and JSON."""
@@ -64,16 +63,14 @@ def history_csv(logbook: Logbook) -> str:
     names = [program.name for program in logbook.machine.program]
     values = [heading for name in VALUES for heading in (name, f"{name}_std")]
     verdicts = {name: f"verdict: {name}" for name in names}
-    written = io.StringIO()
     heads = [*COLUMNS, *values, *UNDER, "questions", *verdicts.values(), "reason", "text"]
-    writer = csv.DictWriter(written, heads, restval="", lineterminator="\n")
-    writer.writeheader()
+    rows: list[list[Any]] = [heads]
     for line in _lines(logbook):
         cells = {key: value for key, value in line.items() if key in heads} | line.get("conditions", {})
         cells |= {verdicts[name]: word for name, word in line.get("verdicts", {}).items()}
         cells["questions"] = " ".join(line.get("questions", ()))
-        writer.writerow({key: _cell(value) for key, value in cells.items()})
-    return written.getvalue()
+        rows.append([_cell(cells.get(head)) for head in heads])
+    return csv_text(rows)
 
 
 def history_lines(logbook: Logbook) -> list[str]:

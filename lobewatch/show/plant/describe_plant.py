@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,6 +10,7 @@ from typing import Any
 
 from rich.cells import cell_len
 
+from lobewatch.show.terminal.csv_text import csv_text
 from lobewatch.show.terminal.output import printable
 
 COLUMNS = ("key", "name", "light", "fall", "fall_std", "series", "last_tap", "days_left", "note", "next_step")
@@ -31,11 +30,7 @@ def plant_text(rows: Sequence[Mapping[str, Any]], width: int) -> str:
 
 def plant_csv(rows: Sequence[Mapping[str, Any]]) -> str:
     """A line a machine below the headings."""
-    written = io.StringIO()
-    writer = csv.DictWriter(written, COLUMNS, extrasaction="ignore", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return written.getvalue()
+    return csv_text([COLUMNS, *([row[name] for name in COLUMNS] for row in rows)])
 
 
 def limit_text(ahead: Mapping[str, Any] | None) -> str:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import gzip
-import io
 import secrets
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator
@@ -18,6 +16,7 @@ from numpy.typing import NDArray
 
 from acquisition import DataError
 from lobewatch.plant.tap_table import NUMBERS, TapTable
+from lobewatch.show.terminal.csv_text import csv_cell
 
 COLUMNS = ("folder", "machine", "tap_id", "time", "tool", "direction", "series", *NUMBERS, "remarks")
 DIGITS, DIGITS_OF_ERRORS = 7, 3
@@ -105,8 +104,8 @@ def _write_lines(tables: Iterable[TapTable], file: IO[bytes] | gzip.GzipFile) ->
 
 
 def _lines(table: TapTable) -> Iterator[str]:
-    begin = f"{_quoted(table.folder)},{_quoted(table.machine)},"
-    series = [f"{_quoted(tool)},{direction},{n}" for n, (tool, direction) in enumerate(table.series, 1)]
+    begin = f"{csv_cell(table.folder)},{csv_cell(table.machine)},"
+    series = [f"{csv_cell(tool)},{direction},{n}" for n, (tool, direction) in enumerate(table.series, 1)]
     times = np.datetime_as_string(np.floor(table.time).astype("datetime64[s]")).tolist()
     taps = zip(table.tap_id, times, table.of_series, _cells(table.numbers), table.remarks, strict=True)
     return (f"{begin}{tap_id},{time}Z,{series[n - 1]},{cells},{remarks}\n" for tap_id, time, n, cells, remarks in taps)
@@ -128,13 +127,6 @@ def rounded(values: Floats, digits: NDArray[np.intp]) -> Floats:
     places = np.clip(np.nan_to_num(places), 1 - _TENS.size, _TENS.size - 1).astype(np.intp)
     up, down = _TENS[np.maximum(places, 0)], _TENS[np.maximum(-places, 0)]
     return np.asarray(np.rint(values * up / down) * down / up)
-
-
-def _quoted(text: str) -> str:
-    """A name as a cell."""
-    written = io.StringIO()
-    csv.writer(written, lineterminator="").writerow([text])
-    return written.getvalue()
 
 
 def _write_parquet(tables: Iterable[TapTable], path: Path) -> int:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from typing import Any
 
@@ -17,6 +15,7 @@ from lobewatch.decay.forecast import DateRange
 from lobewatch.decay.shapes import Shape
 from lobewatch.decay.trend import Trend, date, days_of
 from lobewatch.logbook.outlook import Fate, Outlook
+from lobewatch.show.terminal.csv_text import csv_text
 from lobewatch.show.terminal.output import table
 
 ASSUMED = "Dates hold if the machine is used as before; an acceleration that is not yet visible cannot be foreseen."
@@ -48,17 +47,13 @@ def trend_json(outlook: Outlook, series: SeriesStanding, preload: PreloadLeft | 
 
 def trend_csv(series: SeriesStanding) -> str:
     """A line a point, headings on top."""
-    written = io.StringIO()
-    heads = ["time", "percent", "error_percent", "temperature_c", "taps", "score"]
-    writer = csv.writer(written, lineterminator="\n")
-    writer.writerow(heads)
+    rows: list[list[Any]] = [["time", "percent", "error_percent", "temperature_c", "taps", "score"]]
     trend = series.trend
     if trend is not None:
         for point, score in zip(trend.points, _scores(trend), strict=True):
             numbers = (point.percent, point.error, point.temperature)
-            row = [point.time.isoformat(), *map(_cell, numbers), len(point.taps), _cell(score)]
-            writer.writerow(row)
-    return written.getvalue()
+            rows.append([point.time.isoformat(), *map(_cell, numbers), len(point.taps), _cell(score)])
+    return csv_text(rows)
 
 
 def trend_texts(outlook: Outlook, series: SeriesStanding, preload: PreloadLeft | None) -> list[str | Table]:

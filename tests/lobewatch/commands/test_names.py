@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import csv
+import gzip
+import io
 import json
+import sqlite3
+from contextlib import closing
 from datetime import UTC, datetime
 from pathlib import Path
 
+import duckdb
 import numpy as np
 import pytest
 
@@ -20,6 +26,8 @@ FORMULA = r"cost $5 \frac to $6"
 """To matplotlib a broken formula."""
 CLEAR = "\x1b[2J"
 """Clears a terminal."""
+RUNS = "=cmd|' /C calc'!A0"
+"""Starts a program, where a spreadsheet takes it for a formula."""
 
 
 @pytest.fixture
@@ -33,10 +41,13 @@ def folder(tmp_path: Path) -> MachineFolder:
         text = text.replace(old, f"'{FORMULA}'")
     toml.write_text(text, "utf-8")
     made = MachineFolder(tmp_path / "m")
-    about = Circumstances(FORMULA, datetime(2026, 1, 15, tzinfo=UTC), "reference", machine_toml=text)
-    frf = synthesize([Mode(1713.0, 0.029, 3.5e7)], LINES)
-    made.commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
+    tap(made, Circumstances(FORMULA, datetime(2026, 1, 15, tzinfo=UTC), "reference", machine_toml=text))
     return made
+
+
+def tap(folder: MachineFolder, about: Circumstances) -> None:
+    frf = synthesize([Mode(1713.0, 0.029, 3.5e7)], LINES)
+    folder.commit(TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance)))
 
 
 def test_names_like_formulas_stand_in_report_pictures_and_tables(run: Run, folder: MachineFolder) -> None:
@@ -52,6 +63,30 @@ def test_names_like_formulas_stand_in_report_pictures_and_tables(run: Run, folde
     assert run("model", "m", "--figure", "model.svg").code == 0
     assert FORMULA in run("check", "m").out
     assert json.loads(run("check", "m", "--json").out)["programs"][0]["name"] == FORMULA
+
+
+def test_no_name_runs_in_a_spreadsheet(run: Run, folder: MachineFolder) -> None:
+    """In tables with commas; for programs it stays as it is."""
+    toml = folder.path / "machine.toml"
+    toml.write_text(toml.read_text("utf-8").replace(f"'{FORMULA}'", f'"{RUNS}"'), "utf-8")
+    tap(folder, Circumstances("m", datetime(2026, 2, 15, tzinfo=UTC), "-tool", machine_toml=toml.read_text("utf-8")))
+    assert run("event", "m", "+1 bearing").code == 0
+    for name in ("fleet.csv", "fleet.csv.gz", "fleet.sqlite", "fleet.parquet"):
+        assert run("export", ".", name).code == 0
+    (first, second) = csv.DictReader(io.StringIO(Path("fleet.csv").read_text("utf-8")))
+    assert (first["machine"], second["tool"]) == (f"'{RUNS}", "'-tool")
+    assert gzip.decompress(Path("fleet.csv.gz").read_bytes()) == Path("fleet.csv").read_bytes()
+    (line,) = csv.DictReader(io.StringIO(run("status", ".", "--csv").out))
+    assert line["name"] == f"'{RUNS}"
+    lines = [*csv.DictReader(io.StringIO(run("history", "m", "--csv").out))]
+    assert [(line["kind"], line["tool"], line["text"]) for line in lines[1:]] == [
+        ("tap", "'-tool", ""),
+        ("event", "", "'+1 bearing"),
+    ]
+    with closing(sqlite3.connect("fleet.sqlite")) as base, closing(duckdb.connect()) as other:
+        names = {(RUNS, "reference"), (RUNS, "-tool")}
+        assert {*base.execute("SELECT machine, tool FROM taps")} == names
+        assert {*other.sql("SELECT machine, tool FROM 'fleet.parquet'").fetchall()} == names
 
 
 @pytest.mark.parametrize(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import http.client
+import io
 import json
 from collections.abc import Callable
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from lobewatch.screen import DashboardServer
 from lobewatch.show.plant.plant_rows import plant_rows
 from lobewatch.show.report.fleet import render_fleet
 from lobewatch.show.report.report import render_report
+from lobewatch.show.terminal.csv_text import csv_text
 
 Browser = Any
 """Chromium on one page: Browser of conftest.py."""
@@ -44,6 +47,31 @@ BREAKS = """(() => {
   return wrong.map((one) => one.textContent);
 })()"""
 """Headings after which a page may end before anything of what they stand over."""
+SAVED = """(() => {
+  const saved = [], made = URL.createObjectURL;
+  URL.createObjectURL = (blob) => { saved.push(blob.text()); return made.call(URL, blob); };
+  HTMLAnchorElement.prototype.click = () => {};
+  document.querySelectorAll("button[data-numbers]").forEach((button) => button.click());
+  Promise.all(saved).then(arguments[0]);
+})()"""
+"""The texts of all files that the buttons of a page save."""
+NAMES = [
+    "=cmd|' /C calc'!A0",
+    "@a",
+    "-1-1",
+    '=a,"b"',
+    "\t=1",
+    "\r=1",
+    "-",
+    "-5 mm",
+    "-0.5",
+    "+3",
+    "-.5e-3",
+    "1e-3",
+    "a=b",
+    "ä",
+]
+"""Of machines; some of them would run in a spreadsheet."""
 
 
 def test_the_slider_shows_the_lobes_of_each_test_and_no_side_is_cut_off(browser: Browser, shop: Shop) -> None:
@@ -140,3 +168,17 @@ def test_on_paper_no_heading_is_apart_from_its_figure_and_nothing_is_cut_off(
             assert "counter(page)" in browser.ask("document.styleSheets[0].ownerNode.textContent.match(/@page.*/)[0]")
         finally:
             browser.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+
+
+def test_what_the_buttons_save_does_not_run_in_a_spreadsheet(
+    browser: Browser, reports: list[Path], tmp_path: Path
+) -> None:
+    """Cell by cell as the commands write it."""
+    (row, _) = plant_rows(Plant(find_machines(reports[0].parent)).standings())
+    page = tmp_path / "fleet.html"
+    page.write_text(render_fleet([{**row, "name": name} for name in NAMES], "plant", datetime.now(UTC)), "utf-8")
+    browser.open(page.as_uri())
+    (saved,) = browser.driver.execute_async_script(SAVED)
+    shown = [line["name"] for line in csv.DictReader(io.StringIO(saved, newline=""))]
+    assert shown == [cell for (cell,) in csv.reader(io.StringIO(csv_text([[name] for name in NAMES]), newline=""))]
+    assert shown[0] == f"'{NAMES[0]}"

@@ -2,9 +2,11 @@
 // Numbers of each figure as a file, and the lobes of every test in turn.
 (function () {
   const read = (id) => JSON.parse(document.getElementById(id).textContent);
+  // What a spreadsheet takes for a formula, never a number: as in csv_text.py.
+  const formula = /^(?![+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?$)[=+\-@\t\r]/;
   const cell = (value) => {
-    const text = value === null ? "" : String(value);
-    return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+    const text = (value === null ? "" : String(value)).replace(formula, "'$&");
+    return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
   };
 
   function save(button) {

@@ -80,7 +80,7 @@ class HistoryCache:
     def store(self, history: History) -> None:
         """Write what is new of it, under the lock where that can be had at once; else a remark says so."""
         try:
-            with self._folder.locked():
+            with self._folder.locked(patience=0):
                 self._store(history)
         except (BusyError, OSError) as error:
             text = f"not brought up to date on the disk, worked out in memory: {failure_text(error)}"

@@ -1,7 +1,8 @@
 """What is known of one machine: machine.toml, its folder, its journal, its devices."""
 
 from .archive.verify import verify
-from .folder import BusyError, MachineFolder
+from .folder import MachineFolder
+from .folder_lock import BusyError
 from .journal.tap_entry import DamagedTapError, TapEntry
 from .known_devices import checked_rate, has_clock, known_rate, use_rate
 from .new_folder import make_machine_folder

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from datetime import UTC, datetime
 from functools import cached_property
 from pathlib import Path
 
 import msgspec
-from filelock import FileLock, Timeout
 
 from acquisition import DataError, Remark, TapTest, read_tap, write_tap
 from acquisition.atomic import make_folder, sync_folder
-from acquisition.errors import NOT_ALLOWED
 from lobewatch.machine.contents import (
     FolderContents,
     committed_taps,
@@ -25,15 +23,12 @@ from lobewatch.machine.contents import (
     tap_damage,
     tap_files,
 )
+from lobewatch.machine.folder_lock import PATIENCE, FolderLock
 from lobewatch.machine.folder_path import mark_of, named_folder
 from lobewatch.machine.journal.journal import Journal, Reading, command
 from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
 from lobewatch.machine.settings.machine_file import Machine, read_machine
 from lobewatch.machine.settings.toml_text import toml_text
-
-
-class BusyError(DataError):
-    """Another program writes to the folder."""
 
 
 class MachineFolder:
@@ -88,29 +83,16 @@ class MachineFolder:
         return mark_of(self.path)
 
     @cached_property
-    def _lock(self) -> FileLock:
-        return FileLock(self.path / ".lock", timeout=0)
+    def _lock(self) -> FolderLock:
+        return FolderLock(self.path)
 
-    @contextlib.contextmanager
-    def locked(self) -> Iterator[None]:
-        """Keep other programs from writing here, once or several times over; BusyError where one already does.
+    def locked(self, patience: float = PATIENCE) -> AbstractContextManager[None]:
+        """Keep other programs from writing here, once or several times over; BusyError where one still does after
+        `patience` (s). 0 is for what can be left undone: a person who has asked for something waits.
 
         OSError where this folder can only be read.
         """
-        lock = self._lock
-        try:
-            lock.acquire()
-        except Timeout as error:
-            raise BusyError(f"{self.path}: another lobewatch is writing here; wait until it is done") from error
-        except OSError as error:
-            if error.errno not in NOT_ALLOWED:
-                raise
-            text = f"{error.strerror}: it can be read, not written; copy it to where you may write"
-            raise OSError(error.errno, text, str(self.path)) from error
-        try:
-            yield
-        finally:
-            lock.release()
+        return self._lock.held(patience)
 
     def contents(self) -> FolderContents:
         """The committed tap tests and their files: which can be used, which cannot, and why."""

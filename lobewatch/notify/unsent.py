@@ -61,5 +61,5 @@ def _left_over(broker: Broker, folders: Iterable[Path], fresh: Container[Path]) 
 
 
 def _keep(folder: Path, unsent: Unsent) -> None:
-    with contextlib.suppress(BusyError, OSError), MachineFolder(folder).locked():
+    with contextlib.suppress(BusyError, OSError), MachineFolder(folder).locked(patience=0):
         atomic_write(folder / UNSENT, msgspec.json.encode(unsent))

@@ -48,7 +48,7 @@ def summarise(logbook: Logbook, now: datetime | None = None) -> Summary:
     mark = mark_of(logbook.folder.path, summary.newest_file)
     if logbook.is_current:
         try:
-            with logbook.folder.locked():
+            with logbook.folder.locked(patience=0):
                 write_standing(logbook.folder.path, summary, mark, now)
         except (BusyError, OSError):
             pass  # it is made anew by the next who asks

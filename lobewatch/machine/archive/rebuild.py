@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
-
-from filelock import FileLock, Timeout
 
 from acquisition import DataError, read_tap
 from acquisition.atomic import atomic_write, make_folder
 from acquisition.regular_file import IrregularFileError, read_regular
 from lobewatch.machine.archive.cut_recordings import mend_cuts
 from lobewatch.machine.contents import committed_taps, fault_of, ids_given_up, sha256_of, tap_files
-from lobewatch.machine.folder import BusyError, MachineFolder
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.folder_lock import PATIENCE, FolderLock
 from lobewatch.machine.journal.doubtful import read_doubtful
 from lobewatch.machine.journal.journal import JOURNAL, Journal
 from lobewatch.machine.journal.tap_entry import TapEntry
@@ -37,7 +35,7 @@ def rebuild_files(path: Path) -> list[str]:
     """
     if not (path / "machine.toml").is_file() and not tap_files(path):
         MachineFolder(path)
-    with _locked(path):
+    with FolderLock(path).held(PATIENCE):
         journal = Journal(path)
         reading = journal.read()
         committed = committed_taps(reading)
@@ -67,16 +65,6 @@ def _missing_lines(entries: Sequence[Mapping[str, Any]], n_fresh: int) -> Iterat
     missing = sorted(set(range(first, max(numbers, default=0))) - numbers)
     if len(missing) > n_fresh:
         yield f"{JOURNAL}: of lines {', '.join(map(str, missing))} neither copy is sound; {ENTER_AGAIN}"
-
-
-@contextlib.contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """Lock of the folder as MachineFolder.locked, also without a machine.toml."""
-    try:
-        with FileLock(path / ".lock", timeout=0):
-            yield
-    except Timeout as error:
-        raise BusyError(f"{path}: another lobewatch is writing here; wait until it is done") from error
 
 
 def _return_misplaced(folder: Path, committed: dict[str, TapEntry]) -> Iterator[str]:

@@ -24,7 +24,8 @@ from lobewatch.machine.contents import (
     tap_files,
     unlisted_file,
 )
-from lobewatch.machine.folder import BusyError, MachineFolder
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.folder_lock import HOLDER, LOCK
 from lobewatch.machine.journal.doubtful import read_doubtful
 from lobewatch.machine.journal.journal import COPY, JOURNAL, Journal, Reading, command
 from lobewatch.machine.journal.tap_entry import TapEntry
@@ -42,7 +43,8 @@ OURS = (
     "standing.json",
     "unsent.json",
     "report.html",
-    ".lock",
+    LOCK,
+    HOLDER,
     "taps",
     "cuts",
     "spool",
@@ -104,14 +106,14 @@ def enter_explained(folder: MachineFolder) -> list[str]:
     """
     journal, adopted = folder.journal, list[str]()
     try:
-        with folder.locked():
+        with folder.locked(patience=0):
             committed = set(committed_taps(journal.read()))
             for name, path in tap_files(folder.path).items():
                 entry = read_doubtful(path) if name not in committed else None
                 if entry is not None and entry.id == name and is_explained(folder.path, entry):
                     journal.append(entry.line)
                     adopted.append(entry.file)
-    except (BusyError, DataError, OSError):
+    except (DataError, OSError):
         return adopted
     return adopted
 

@@ -9,7 +9,9 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ import pytest
 from acquisition import TapsEmulator
 from lobes import read_history
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.folder_lock import PATIENCE, FolderLock
 from lobewatch.show.report.report import render_report
 from lobewatch.tap.emulated_spindle import emulated_structure, emulator
 from tests.lobewatch.commands.conftest import Run, refused
@@ -77,12 +80,83 @@ def test_an_interrupted_tap_is_gone_on_with_and_new_begins_anew(
     assert running.id in {entry.id for entry in trial.taps()}
 
 
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+SHORT = """
+import time
+from filelock import FileLock
+while True:
+    with FileLock(".lock"):
+        time.sleep(0.05)
+    time.sleep(0.005)
+"""
+"""A program that writes for a moment, again and again."""
+TAP = "import sys; sys.argv[0] = 'lobewatch'; from lobewatch.cli import main; main()"
+
+
+@pytest.mark.parametrize("rounds", [3, pytest.param(8, marks=pytest.mark.long)])
+def test_a_tap_waits_for_those_who_write_for_a_moment(
+    run: Run, trial: MachineFolder, device: TapsEmulator, rounds: int
+) -> None:
+    with subprocess.Popen([sys.executable, "-c", SHORT], cwd=trial.path) as writer:
+        try:
+            taps = [run("tap", "trial", "--port", device.port) for _ in range(rounds)]
+        finally:
+            writer.kill()
+    assert [(said.code, said.err) for said in taps if said.code] == []
+    assert len(trial.taps()) == rounds
+
+
+def test_who_must_wait_for_a_tap_test_too_long_is_told_so(run: Run, trial: MachineFolder) -> None:
+    table = trial.machine.spindle
+    assert table is not None
+    structure = emulated_structure(table.build(), table.damping_ratio)
+    with emulator(structure, np.random.default_rng(1), realtime=True) as slow:
+        command = [sys.executable, "-c", TAP, "tap", "trial", "--port", slow.port]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+            assert process.stderr is not None
+            assert process.stderr.readline()
+            holder = f"`lobewatch tap` (process {process.pid}, since "
+            refused(run("tap", "trial", "--port", "x"), holder, ") is writing here; wait until it is done")
+            process.send_signal(signal.SIGINT)
+            process.communicate()
+    assert process.returncode == 130
+    assert run("event", "trial", "oiled").code == 0
+
+
+@pytest.mark.parametrize(
+    ("patience", "command"),
+    [
+        (0.0, ("history",)),
+        (0.0, ("status",)),
+        (0.0, ("verify",)),
+        (PATIENCE, ("event", "oiled")),
+        (PATIENCE, ("exclude", "202601", "--reason", "trial")),
+        (PATIENCE, ("observe", "--program", "A", "--speed", "9000", "--depth", "1", "--stable")),
+        (PATIENCE, ("rebuild",)),
+    ],
+)
+def test_only_who_was_asked_to_write_waits(
+    run: Run, shop: Shop, monkeypatch: pytest.MonkeyPatch, patience: float, command: tuple[str, ...]
+) -> None:
+    shop.tap(0, 1713.0)
+    shop.tap_both(30)
+    waited, held = [], FolderLock.held
+
+    def asked(lock: FolderLock, patience: float) -> AbstractContextManager[None]:
+        waited.append(patience)
+        return held(lock, patience)
+
+    monkeypatch.setattr(FolderLock, "held", asked)
+    name, *options = command
+    assert run(name, shop.path, *options).code == 0
+    assert waited[0] == patience
+
+
 def test_a_tap_without_a_device(run: Run, trial: MachineFolder) -> None:
     refused(run("tap", "trial"), "no port: give --port, or port in [daq]")
     refused(run("tap", "trial", "--port", "/dev/ttyNOPE"), "/dev/ttyNOPE cannot be opened", "No such file", "cable")
     refused(run("tap", "trial", "--port", "x", "--direction", "z"), "direction='z'")
-    with trial.locked():
-        refused(run("tap", "trial", "--port", "x"), "another lobewatch is writing here")
 
 
 def test_a_taken_port(run: Run, trial: MachineFolder, device: TapsEmulator) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from acquisition import Circumstances, DataError, Frf, SourceFile, TapTest, new_tap_id
+from lobewatch.machine import BusyError
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 
@@ -81,8 +82,8 @@ def test_an_altered_or_missing_file_is_named(folder: MachineFolder) -> None:
 
 
 def test_two_writers_are_told_apart(folder: MachineFolder) -> None:
-    refusal = pytest.raises(DataError, match="another lobewatch is writing here")
-    with folder.locked(), refusal, MachineFolder(folder.path).locked():
+    refusal = pytest.raises(BusyError, match="is writing here; wait until it is done")
+    with folder.locked(), refusal, MachineFolder(folder.path).locked(patience=0):
         pass
     with folder.locked():
         pass

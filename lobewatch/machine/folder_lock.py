@@ -1,0 +1,100 @@
+"""The lock of a machine folder: one program writes there at a time, and says beside the lock which one it is."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Self
+
+import msgspec
+from filelock import FileLock, Timeout
+
+from acquisition import DataError
+from acquisition.errors import NOT_ALLOWED
+
+LOCK, HOLDER = ".lock", ".lock.holder"
+"""Names of the file that is locked, and of that which says who holds it: a locked file cannot be read everywhere."""
+PATIENCE = 5.0
+"""Time for which another program is waited for (s); as SQLite does by default in Python."""
+POLL_TIME = 0.01
+"""Time between two looks whether it is done (s)."""
+
+
+class BusyError(DataError):
+    """Another program writes to the folder."""
+
+
+class Holder(msgspec.Struct, frozen=True):
+    """The program that holds the lock."""
+
+    command: str
+    """Command that a person has given, without what it is about."""
+    process: int
+    """Number of its process."""
+    since: datetime
+    """Time from which on it holds the lock."""
+
+    @classmethod
+    def current(cls) -> Self:
+        """This program, from now on."""
+        program, *arguments = sys.argv or [""]
+        name = "python" if program in ("", "-", "-c") else Path(program).stem
+        words = [name, *[word for word in arguments if not word.startswith("-")][:1]]
+        return cls(" ".join(words), os.getpid(), datetime.now(UTC))
+
+    def __str__(self) -> str:
+        """For people."""
+        return f"`{self.command}` (process {self.process}, since {self.since.astimezone():%H:%M})"
+
+
+class FolderLock:
+    """Of one folder; whoever has this object may hold it several times over in one thread."""
+
+    def __init__(self, folder: Path) -> None:
+        """Not held yet."""
+        self._folder, self._lock = folder, FileLock(folder / LOCK)
+
+    @contextlib.contextmanager
+    def held(self, patience: float) -> Iterator[None]:
+        """Keep other programs from writing here; BusyError where one does for longer than `patience` (s).
+
+        OSError where this folder can only be read.
+        """
+        self._acquire(patience)
+        try:
+            yield
+        finally:
+            if self._lock.lock_counter == 1:
+                with contextlib.suppress(OSError):
+                    self._holder.unlink(missing_ok=True)
+            self._lock.release()
+
+    def _acquire(self, patience: float) -> None:
+        try:
+            self._lock.acquire(patience, POLL_TIME)
+        except Timeout as error:
+            holder = self._read_holder() or "another lobewatch"
+            raise BusyError(f"{self._folder}: {holder} is writing here; wait until it is done") from error
+        except OSError as error:
+            if error.errno not in NOT_ALLOWED:
+                raise
+            text = f"{error.strerror}: it can be read, not written; copy it to where you may write"
+            raise OSError(error.errno, text, str(self._folder)) from error
+        if self._lock.lock_counter == 1:
+            with contextlib.suppress(OSError):  # the lock holds without it
+                self._holder.write_bytes(msgspec.json.encode(Holder.current()))
+
+    @property
+    def _holder(self) -> Path:
+        return self._folder / HOLDER
+
+    def _read_holder(self) -> Holder | None:
+        """What the program that holds the lock says of itself; None where it has not said it yet."""
+        try:
+            return msgspec.json.decode(self._holder.read_bytes(), type=Holder)
+        except (OSError, msgspec.MsgspecError):
+            return None

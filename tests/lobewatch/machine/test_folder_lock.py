@@ -1,0 +1,114 @@
+"""The lock of a machine folder: waited for, and whoever holds it is named."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from lobewatch.machine import BusyError, MachineFolder
+from lobewatch.machine.folder_lock import HOLDER
+from lobewatch.machine.new_folder import make_machine_folder
+
+HOLD = """
+import sys, time
+from lobewatch.machine import MachineFolder
+sys.argv = ["/usr/bin/lobewatch", "--debug", "sensors", "mill"]
+with MachineFolder(PATH).locked():
+    print(flush=True)
+    sys.stdin.readline()
+    time.sleep(0.3)
+"""
+"""Holds the lock until it is told to go on, and a moment longer."""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> MachineFolder:
+    make_machine_folder(tmp_path / "m", "new_machine.toml")
+    return MachineFolder(tmp_path / "m")
+
+
+@contextmanager
+def holding(folder: MachineFolder) -> Iterator[subprocess.Popen[str]]:
+    """Another program that holds the lock already."""
+    program = HOLD.replace("PATH", repr(str(folder.path)))
+    line = [sys.executable, "-c", program]
+    with subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "\n"
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def test_whoever_holds_it_is_named(folder: MachineFolder) -> None:
+    with holding(folder) as process:
+        holder = rf"`lobewatch sensors` \(process {process.pid}, since \d\d:\d\d\)"
+        with pytest.raises(BusyError, match=f"m: {holder} is writing here; wait until it is done$"):
+            folder.locked(patience=0.05).__enter__()
+
+
+def test_it_is_waited_for(folder: MachineFolder) -> None:
+    with holding(folder) as process:
+        assert process.stdin is not None
+        process.stdin.write("\n")
+        process.stdin.flush()
+        with folder.locked():
+            assert (folder.path / HOLDER).exists()
+    assert not (folder.path / HOLDER).exists()
+
+
+def test_a_name_that_a_killed_program_has_left_is_not_believed(folder: MachineFolder) -> None:
+    with holding(folder) as process:
+        process.kill()
+        process.wait()
+        assert (folder.path / HOLDER).exists()
+        with folder.locked(patience=0), pytest.raises(BusyError, match=rf"process {os.getpid()}, since"):
+            MachineFolder(folder.path).locked(patience=0).__enter__()
+
+
+@pytest.mark.parametrize("content", [None, b"", b'{"command":"lobew', b'{"command":1}', b"\xff"])
+def test_one_that_has_not_said_its_name_holds_it_all_the_same(folder: MachineFolder, content: bytes | None) -> None:
+    with holding(folder):
+        (folder.path / HOLDER).unlink()
+        if content is not None:
+            (folder.path / HOLDER).write_bytes(content)
+        with pytest.raises(BusyError, match=r"m: another lobewatch is writing here; wait until it is done$"):
+            folder.locked(patience=0).__enter__()
+
+
+def test_held_twice_it_is_held_until_the_outer_end(folder: MachineFolder) -> None:
+    with folder.locked():
+        with folder.locked():
+            pass
+        assert (folder.path / HOLDER).exists()
+        with pytest.raises(BusyError):
+            MachineFolder(folder.path).locked(patience=0).__enter__()
+    with MachineFolder(folder.path).locked(patience=0):
+        pass
+
+
+def test_ctrl_c_ends_the_waiting(folder: MachineFolder) -> None:
+    """The folder can be locked again afterwards."""
+
+    def pressed(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGALRM, pressed)
+    try:
+        with holding(folder):
+            signal.setitimer(signal.ITIMER_REAL, 0.2)
+            with pytest.raises(KeyboardInterrupt):
+                folder.locked(patience=100).__enter__()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    with folder.locked():
+        pass

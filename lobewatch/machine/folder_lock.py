@@ -14,7 +14,9 @@ import msgspec
 from filelock import FileLock, Timeout
 
 from acquisition import DataError
+from acquisition.atomic import atomic_write
 from acquisition.errors import NOT_ALLOWED
+from acquisition.regular_file import SMALL, read_regular
 
 LOCK, HOLDER = ".lock", ".lock.holder"
 """Names of the file that is locked, and of that which says who holds it: a locked file cannot be read everywhere."""
@@ -86,7 +88,7 @@ class FolderLock:
             raise OSError(error.errno, text, str(self._folder)) from error
         if self._lock.lock_counter == 1:
             with contextlib.suppress(OSError):  # the lock holds without it
-                self._holder.write_bytes(msgspec.json.encode(Holder.current()))
+                atomic_write(self._holder, msgspec.json.encode(Holder.current()), lasting=False)
 
     @property
     def _holder(self) -> Path:
@@ -95,6 +97,6 @@ class FolderLock:
     def _read_holder(self) -> Holder | None:
         """What the program that holds the lock says of itself; None where it has not said it yet."""
         try:
-            return msgspec.json.decode(self._holder.read_bytes(), type=Holder)
+            return msgspec.json.decode(read_regular(self._holder, SMALL), type=Holder)
         except (OSError, msgspec.MsgspecError):
             return None

@@ -22,7 +22,7 @@ from lobewatch.machine.journal.doubtful import has_whole_hits
 
 RESUMABLE = timedelta(hours=12)
 """Age from which an interrupted test is not gone on with."""
-HALF_WRITTEN = (".journal*.tmp", ".history.*.tmp", "taps/.*.tmp", "spool/**/.*.tmp")
+HALF_WRITTEN = (".journal*.tmp", ".history.*.tmp", "taps/.*.tmp", "spool/**/.*.tmp", ".lock.holder.*.tmp")
 """Temporary names of what is written under the lock."""
 SETUP = "setup.json"
 """File with the trigger of a test."""

@@ -51,7 +51,7 @@ def added(path: Path, content: str) -> None:
 
 
 def folder_in_place(path: Path) -> None:
-    path.unlink()
+    path.unlink(missing_ok=True)
     path.mkdir()
 
 
@@ -85,6 +85,8 @@ HOSTILE: dict[str, Callable[[Path], None]] = {
     "unlisted sparse": lambda m: sparse(m / "taps" / "other.h5"),
     "daq.json a pipe": lambda m: pipe(m / "daq.json"),
     "unsent a pipe": lambda m: pipe(m / "unsent.json"),
+    "holder of the lock a pipe": lambda m: pipe(m / ".lock.holder"),
+    "lock a folder": lambda m: folder_in_place(m / ".lock"),
     "spool": spooled,
     "cuts": in_cuts,
 }

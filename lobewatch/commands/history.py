@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, emit, notes, results
+from lobewatch.show.terminal.output import Json, emit, note_remarks, results
 
 
 def history(
@@ -44,5 +44,4 @@ def history(
     else:
         emit(history_json(logbook), as_json, *history_lines(logbook))
     kept = [remark for row in logbook.history.kept for remark in row.remarks if remark.code == "row-kept"]
-    for remark in (*logbook.remarks, *kept):
-        notes.print(f"note: {remark}", markup=False)
+    note_remarks([*logbook.remarks, *kept])

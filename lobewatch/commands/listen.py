@@ -11,7 +11,7 @@ import typer
 
 from lobewatch.commands.file_options import FileOptions, takes_file_options
 from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, note_remarks, notes
 from lobewatch.show.terminal.show_address import Listen, Token, WatchToken, serving
 
 
@@ -90,4 +90,4 @@ def listen(
             remarks = [*untapped_remarks(logbook, stored), *map(contradiction_remark, contrary)]
             payload |= {"id": stored.id, "remarks": [remark.code for remark in remarks]}
             emit(payload, as_json, *listened_texts(comparison), f"saved {stored.id}")
-    notes.print(*(f"note: {remark}" for remark in remarks), sep="\n", end="\n" if remarks else "", markup=False)
+    note_remarks(remarks)

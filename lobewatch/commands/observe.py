@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, note_remarks
 
 
 def observe(
@@ -51,5 +51,4 @@ def observe(
         stored = keep_cut(logbook.folder, heard)
         payload = {"cut": cut_json(stored), "remarks": [remark.code for remark in remarks]}
         emit(payload, as_json, f"saved {cut_text(stored)}")
-    for remark in remarks:
-        notes.print(f"note: {remark}", markup=False)
+    note_remarks(remarks)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, emit
+from lobewatch.show.terminal.output import Json, emit, note_remarks
 
 if TYPE_CHECKING:
     from lobewatch.measuring.workers.share_work import Workers
@@ -23,7 +23,7 @@ def rebuild(
         int, typer.Option(min=1, max=64, help="Processes that work at once; what they find is the same.")
     ] = 1,
     scheduler: Annotated[
-        str, typer.Option(help="Address of a Dask scheduler whose workers work, such as tcp://10.0.0.5:8786.")
+        str, typer.Option(help="Address of a Dask scheduler whose workers work, such as tls://10.0.0.5:8786.")
     ] = "",
     as_json: Json = False,
 ) -> None:
@@ -36,7 +36,7 @@ def rebuild(
     Examples:
 
       lobewatch rebuild mill-3
-      lobewatch rebuild mills --scheduler tcp://10.0.0.5:8786
+      lobewatch rebuild mills --scheduler tls://10.0.0.5:8786
     """
     from acquisition import DataError
     from acquisition.errors import failure_text
@@ -50,6 +50,7 @@ def rebuild(
     )
 
     workers, folders = Workers(jobs, scheduler), _machines_in(machine)
+    note_remarks(workers.remarks)
     if not folders:
         outcome = _rebuild_machine(machine, workers)
         emit(rebuild_json(outcome), as_json, *rebuild_texts(outcome))

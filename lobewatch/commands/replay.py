@@ -10,7 +10,7 @@ import typer
 
 from lobewatch.commands.file_options import FileOptions, takes_file_options
 from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json
+from lobewatch.show.terminal.output import Json, note_remarks
 
 
 @takes_file_options()
@@ -43,7 +43,7 @@ def replay(
         int, typer.Option(min=1, max=64, help="Processes that read and fit at once; what they find is the same.")
     ] = 1,
     scheduler: Annotated[
-        str, typer.Option(help="Address of a Dask scheduler whose workers read and fit, such as tcp://10.0.0.5:8786.")
+        str, typer.Option(help="Address of a Dask scheduler whose workers read and fit, such as tls://10.0.0.5:8786.")
     ] = "",
     accept: Annotated[
         list[str] | None,
@@ -87,6 +87,7 @@ def replay(
         conditions=Conditions(temperature_c=temperature, note=note, reclamped=reclamped),
     )
     workers = Workers(jobs, scheduler)
+    note_remarks(workers.remarks)
     logbook, (recordings, passed) = Logbook.open(machine), find_files(files)
     if dry_run:
         with ReplayProgress() as bar:

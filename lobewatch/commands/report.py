@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, emit, note_remarks
 
 
 def report(
@@ -41,8 +41,7 @@ def report(
     else:
         logbook = Logbook.open(machine)
         path = write_report(logbook, out, tool, direction)
-        for remark in logbook.remarks:
-            notes.print(f"note: {remark}", markup=False)
+        note_remarks(logbook.remarks)
     emit({"report": str(path)}, as_json, f"report: {path}")
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, emit, notes, results
+from lobewatch.show.terminal.output import Json, emit, note_remarks, results
 
 
 def trend(
@@ -44,6 +44,5 @@ def trend(
         preload = preload_of(series.history, logbook.machine)
         texts = [] if as_json else trend_texts(machine_outlook, series, preload)
         emit(trend_json(machine_outlook, series, preload), as_json, *texts)
-    for remark in [*machine_outlook.standing.remarks, *logbook.remarks]:
-        notes.print(f"note: {remark}", markup=False)
+    note_remarks([*machine_outlook.standing.remarks, *logbook.remarks])
     raise typer.Exit(int(machine_outlook.standing.light is Light.ALARM))

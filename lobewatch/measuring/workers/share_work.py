@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from typing import Any, NamedTuple, TypeVar
 
-from acquisition import DataError
-from lobewatch.measuring.workers.cluster import cluster
+from acquisition import DataError, Remark
+from lobewatch.measuring.workers.cluster import cluster, scheduler_remarks
 from lobewatch.measuring.workers.software import SOFTWARE, Software
 
 Task = TypeVar("Task")
@@ -40,6 +40,11 @@ class Workers:
     def are_elsewhere(self) -> bool:
         """Whether another process does the work."""
         return self.jobs > 1 or bool(self.scheduler)
+
+    @property
+    def remarks(self) -> list[Remark]:
+        """Remarks on how they are reached; DataError where the scheduler has no address of one."""
+        return scheduler_remarks(self.scheduler) if self.scheduler else []
 
 
 class Team(NamedTuple):

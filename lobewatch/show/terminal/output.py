@@ -119,3 +119,9 @@ def remark_json(remark: Remark) -> dict[str, str]:
 def remark_lines(remarks: Sequence[Remark]) -> list[str]:
     """A line each; those that say the same of several things once."""
     return [f"note: {remark}" for remark in joined(remarks)]
+
+
+def note_remarks(remarks: Iterable[Remark]) -> None:
+    """Print remarks beside the results, a line each."""
+    for remark in remarks:
+        notes.print(f"note: {remark}", markup=False)

@@ -3,35 +3,20 @@
 from __future__ import annotations
 
 import json
-import shutil
-import subprocess
 from pathlib import Path
 
 import pytest
 
+from tests.lobewatch.authority import certify
 from tests.lobewatch.notify.conftest import Mosquitto, machine, received, started
-
-NEW_KEY = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes")
-
-
-def openssl(folder: Path, *arguments: str) -> None:
-    subprocess.run(["openssl", *arguments], cwd=folder, check=True, capture_output=True)
 
 
 @pytest.fixture
 def authority(tmp_path: Path, mosquitto: Mosquitto) -> Path:
     """Certificate of the authority; the broker has one by it, for its address and the name broker.example."""
-    if shutil.which("openssl") is None:
-        pytest.skip("openssl is not installed")
-    where = tmp_path / "certificates"
-    where.mkdir()
-    openssl(where, "req", "-x509", *NEW_KEY, "-keyout", "ca.key", "-out", "ca.pem", "-subj", "/CN=Plant")
-    openssl(where, "req", *NEW_KEY, "-keyout", "broker.key", "-out", "broker.csr", "-subj", "/CN=broker.example")
-    (where / "names").write_text("subjectAltName=DNS:broker.example,IP:127.0.0.1")
-    by = ("-CA", "ca.pem", "-CAkey", "ca.key", "-CAcreateserial", "-extfile", "names")
-    openssl(where, "x509", "-req", "-in", "broker.csr", *by, "-out", "broker.pem")
-    mosquitto.start(more=[f"certfile {where / 'broker.pem'}", f"keyfile {where / 'broker.key'}"])
-    return where / "ca.pem"
+    made = certify(tmp_path / "certificates", "DNS:broker.example,IP:127.0.0.1")
+    mosquitto.start(more=[f"certfile {made.certificate}", f"keyfile {made.key}"])
+    return made.authority
 
 
 def test_ssl_cert_file_names_the_authority(

@@ -3,28 +3,37 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
+import socket
+import subprocess
+import sys
+import threading
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from distributed import Client, LocalCluster
+from distributed import Client, LocalCluster, Security
 from typer.testing import CliRunner
 
 from acquisition import DataError, Description
 from lobewatch import Logbook
 from lobewatch.cli import app
 from lobewatch.machine.new_folder import make_machine_folder
+from lobewatch.measuring.workers.cluster import scheduler_remarks
 from lobewatch.measuring.workers.share_work import Workers, share_work
 from lobewatch.measuring.workers.software import SOFTWARE
+from tests.lobewatch.authority import certify
 from tests.lobewatch.logbook.replaying.test_replaying import text_files, values
 
+PAGE = (Path(__file__).parents[4] / "docs" / "performance-replay.md").read_text("utf-8")
 SAID = Description(date_pattern="%Y-%m-%d")
 
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[LocalCluster]:
-    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as made:
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0") as made:
         yield made
 
 
@@ -103,6 +112,80 @@ def test_what_a_cluster_cannot_do_is_one_sentence(cluster: LocalCluster, monkeyp
         DataError, match=r"a worker has lobewatch .*, here is lobewatch .*, numpy 1\.0, .* the same on all"
     ):
         [*share_work(abs, [-1], workers)]
+
+
+@pytest.mark.parametrize("address", ["", "x", "foo://h:1", "tls://", "tcp://[::1", "tcp://h:port", "inproc://x"])
+def test_what_is_no_address_of_a_scheduler_is_one_sentence(address: str) -> None:
+    with pytest.raises(DataError, match=rf"^--scheduler {re.escape(address)}: is no address .* give tls://HOST:PORT"):
+        scheduler_remarks(address)
+    with pytest.raises(DataError, match="is no address"):
+        [*share_work(abs, [1], Workers(scheduler=address or "/"))]
+
+
+def test_who_answers_and_is_no_scheduler_is_one_sentence() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def refuse() -> None:
+            connection, _ = server.accept()
+            with connection, suppress(OSError):
+                connection.sendall(b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n")
+                connection.recv(1000)
+
+        stranger = threading.Thread(target=refuse)
+        stranger.start()
+        address = f"127.0.0.1:{server.getsockname()[1]}"
+        with pytest.raises(DataError, match=f"^--scheduler {address}: no Dask scheduler answers there"):
+            [*share_work(abs, [1], Workers(scheduler=address))]
+        stranger.join()
+
+
+@pytest.mark.parametrize("address", ["tcp://10.0.0.5:8786", "mill-pc:8786", "tcp://[fd00::1]:8786", "ws://mill-pc:80"])
+def test_a_scheduler_elsewhere_without_encryption_is_remarked(address: str) -> None:
+    (remark,) = Workers(scheduler=address).remarks
+    assert (remark.code, remark.about) == ("scheduler-open", f"--scheduler {address}")
+
+
+@pytest.mark.parametrize(
+    "address", ["tls://10.0.0.5:1", "wss://mill-pc:1", "localhost:1", "127.9.0.1:1", "[::1]:1", ""]
+)
+def test_an_encrypted_one_and_one_of_this_computer_is_not(address: str) -> None:
+    assert Workers(scheduler=address).remarks == []
+    assert Workers(scheduler=f"tcp://{socket.gethostname().upper()}:8786").remarks == []
+
+
+@pytest.mark.parametrize("command", [["rebuild"], ["replay", "--dry-run", "hits.csv"]])
+def test_the_remark_comes_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: list[str]) -> None:
+    monkeypatch.setattr("lobewatch.measuring.workers.cluster.ANSWER", 0.3)
+    monkeypatch.chdir(tmp_path)
+    Path("hits.csv").write_text("Freq (Hz),Real (m/N),Imag\n1,2,3\n")
+    plain_machine(tmp_path / "m")
+    name, *options = command
+    said = CliRunner().invoke(app, [name, "m", *options, "--scheduler", "nowhere.invalid:8786"])
+    assert said.stderr.startswith("note: --scheduler nowhere.invalid:8786: unencrypted, and whoever can reach it can")
+    assert "no Dask scheduler answers there" in str(said.exception)
+
+
+def test_a_scheduler_with_tls_as_the_page_says(tmp_path: Path) -> None:
+    ca, certificate, key = certify(tmp_path / "certificates", "DNS:cluster")
+    both = {f"tls_{role}_cert": str(certificate) for role in ("scheduler", "worker", "client")}
+    both |= {name.replace("cert", "key"): str(key) for name in both}
+    security = Security(tls_ca_file=str(ca), require_encryption=True, **both)
+    named = dict(re.findall(r"export (DASK_\w+)=\S+/(\S+)", PAGE))
+    files = {"ca.pem": ca, "computer.pem": certificate, "computer.key": key}
+    size = {"n_workers": 1, "threads_per_worker": 1}
+    with LocalCluster(**size, dashboard_address="127.0.0.1:0", protocol="tls", security=security) as made:
+        address = made.scheduler_address
+        assert address.startswith("tls://")
+        with pytest.raises(DataError, match=r"TLS configuration.*certificates: docs/performance-replay\.md"):
+            [*share_work(abs, [-1], Workers(scheduler=address))]
+        program = (
+            "import sys; from lobewatch.measuring.workers.share_work import Workers, share_work\n"
+            "if __name__ == '__main__': print(*share_work(abs, [-1, -2], Workers(scheduler=sys.argv[1])))"
+        )
+        known = {name: str(files[file]) for name, file in named.items()}
+        command = [sys.executable, "-c", program, address]
+        said = subprocess.run(command, env=os.environ | known, capture_output=True, text=True, timeout=90, check=False)
+    assert (said.stdout, len(known)) == ("1 2\n", 3)
 
 
 def test_a_process_that_is_ended_from_outside_is_one_sentence() -> None:

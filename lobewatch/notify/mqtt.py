@@ -42,7 +42,7 @@ class Sending(threading.Thread):
         super().__init__(name=f"to {broker.address}", daemon=True)
         self._broker, self._end = broker, end
         self._waiting = {**messages, f"{broker.prefix}/sender": DONE}
-        self._n_left = len(self._waiting)
+        self._n_left, self._refusal = len(self._waiting), ""
         self._reach("cannot be reached")
 
     def run(self) -> None:
@@ -84,7 +84,7 @@ class Sending(threading.Thread):
         return client
 
     def _exchange(self, client: Any) -> None:
-        """Read and write until all is acknowledged, or nobody waits any more."""
+        """Read and write until all is acknowledged, or nobody waits any more; DataError where a message is refused."""
         from paho.mqtt.client import error_string
 
         while self._n_left:
@@ -92,6 +92,8 @@ class Sending(threading.Thread):
                 return
             if code := client.loop(left):
                 raise ConnectionError(error_string(code).rstrip("."))
+        if self._refusal:
+            raise DataError(self._refusal)
         client.disconnect()
         self.failure = ""
 
@@ -110,5 +112,5 @@ class Sending(threading.Thread):
 
     def _on_publish(self, _client: Any, _data: Any, _number: int, reason: Any, _properties: Any) -> None:
         if reason.is_failure:
-            raise DataError(f"refuses a message ({reason}); see what the user may write")
+            self._refusal = f"refuses a message ({reason}); see what the user may write"
         self._n_left -= 1

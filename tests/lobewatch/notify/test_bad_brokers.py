@@ -155,13 +155,17 @@ def test_a_message_left_over_does_not_go_with_a_newer_one_of_its_machine(tmp_pat
     assert not (later / "unsent.json").exists()
 
 
-def test_a_message_that_the_broker_does_not_take_is_kept(tmp_path: Path, mosquitto: Mosquitto) -> None:
+def test_a_message_that_the_broker_does_not_take_is_kept_and_the_others_arrive(
+    tmp_path: Path, mosquitto: Mosquitto
+) -> None:
     rights = tmp_path / "rights"
-    rights.write_text("topic readwrite lobewatch/sender\ntopic read #\n")
+    rights.write_text("topic readwrite lobewatch/sender\ntopic readwrite lobewatch/b/#\n")
     mosquitto.start(more=[f"acl_file {rights}"])
-    mill = machine(tmp_path / "a", mosquitto.address)
-    assert "refuses a message (Not authorized); see what the user may write" in run("event", mill, "oiled").stderr
-    assert (mill / "unsent.json").exists()
+    mills = [machine(tmp_path / "plant" / name, mosquitto.address) for name in "ab"]
+    said = run("status", tmp_path / "plant", "--notify")
+    assert "refuses a message (Not authorized); see what the user may write" in said.stderr
+    assert all((mill / "unsent.json").exists() for mill in mills)
+    assert json.loads(received(mosquitto, "lobewatch/b/standing").payload)["machine"] == "b"
     assert json.loads(received(mosquitto, "lobewatch/sender").payload) == {"sender": "lost"}
 
 

@@ -13,12 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from acquisition import read_tap, read_tap_hits
+from acquisition.apart import run_apart
 from acquisition.files.seal import is_broken, is_sealed
 from acquisition.regular_file import IrregularFileError, read_regular
 from lobewatch.machine.journal.tap_entry import TapEntry
-
-PATIENCE = 60.0
-"""Time that reading one file may take (s)."""
 
 
 def read_doubtful(path: Path) -> TapEntry | None:
@@ -51,10 +49,8 @@ def _read_apart(path: Path) -> TapEntry | None:
 
 def _run_apart(part: str, path: Path) -> dict[str, Any] | None:
     """Output of this file as a program of its own; None where it failed or took too long."""
-    command = [sys.executable, "-m", __name__, part, str(path)]
     try:
-        completed = subprocess.run(command, capture_output=True, timeout=PATIENCE, check=True)
-        output: dict[str, Any] | None = json.loads(completed.stdout)
+        output: dict[str, Any] | None = json.loads(run_apart(__name__, part, str(path)))
         return output
     except (subprocess.SubprocessError, ValueError):
         return None

@@ -145,13 +145,6 @@ def windowed_uff(path: Path, window: str) -> Path:
     return path
 
 
-@pytest.fixture
-def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """MATLAB files are read in this process only."""
-    monkeypatch.setattr("acquisition.files.readers.read_mat.subprocess.run", lambda *_, **__: None)
-
-
-@pytest.mark.usefixtures("at_once")
 @pytest.mark.parametrize(
     ("make", "name"), [(windowed_table, "a.csv"), (windowed_mat, "a.mat"), (windowed_uff, "a.uff")]
 )
@@ -166,7 +159,6 @@ def test_a_window_that_a_file_names_is_known_from_it(tmp_path: Path, make: Calla
         assert np.isnan(look(make(tmp_path / name, "Hanning"), said).window or 0.0)
 
 
-@pytest.mark.usefixtures("at_once")
 def test_the_window_of_signal_calc_is_seen_before_and_behind_it(tmp_path: Path) -> None:
     time, force, response = tapped([0.0], 0.5)
     window = np.exp(-time / 0.08)

@@ -1,0 +1,58 @@
+"""Programs of their own for what may crash: where they import from, and what ends them."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from acquisition.apart import run_apart
+
+
+@pytest.fixture
+def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """File of the module `told_apart`, which can be imported."""
+    monkeypatch.syspath_prepend(tmp_path)
+    return tmp_path / "told_apart.py"
+
+
+def test_what_a_module_prints_comes_back_and_it_gets_its_arguments(program: Path) -> None:
+    program.write_text("import sys\nprint(sys.argv[1:], __name__)")
+    assert run_apart("told_apart", "a", "b c") == b"['a', 'b c'] __main__\n"
+
+
+def test_modules_that_lie_in_the_folder_of_the_user_are_not_taken(
+    program: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program.write_text("import statistics\nprint(statistics.mean([1, 3]))")
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    (folder / "statistics.py").write_text("raise SystemExit('not meant to be imported')")
+    monkeypatch.chdir(folder)
+    assert run_apart("told_apart") == b"2\n"
+
+
+def test_one_that_computes_for_longer_than_it_may_is_ended(program: Path) -> None:
+    program.write_text(
+        "from acquisition.apart import limit_this_program\nlimit_this_program(0.5, 1e9)\nwhile True:\n    pass"
+    )
+    with pytest.raises(subprocess.CalledProcessError) as ended:
+        run_apart("told_apart")
+    assert ended.value.returncode == -signal.SIGXCPU
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="only Linux limits the memory of a program")
+def test_one_that_takes_more_memory_than_it_may_is_refused_it(program: Path) -> None:
+    program.write_text(
+        "from acquisition.apart import limit_this_program\nlimit_this_program(60, 200e6)\nfew = bytes(100_000_000)\n"
+        "try:\n    bytes(400_000_000)\nexcept MemoryError:\n    print('refused')"
+    )
+    assert run_apart("told_apart") == b"refused\n"
+
+
+def test_one_that_waits_for_ever_is_ended(program: Path) -> None:
+    program.write_text("import time\ntime.sleep(600)")
+    with pytest.raises(subprocess.TimeoutExpired):
+        run_apart("told_apart", patience=0.5)

@@ -68,7 +68,8 @@ class NumberedLines:
 
 def read_table(path: Path) -> Contents:
     """The columns of a text file; DataError with the line where it is no table."""
-    lines, comments = _lines(text_of(path))
+    text = text_of(path)
+    lines, comments = _lines(text)
     first, layout = _layout(path, lines)
     pairs = [(key.strip().lower(), value.strip()) for key, _, value in (comment.partition(":") for comment in comments)]
     layout.keys = dict(pairs)
@@ -79,8 +80,22 @@ def read_table(path: Path) -> Contents:
     width = len(layout.words(rows.texts[-1])) if behind else len(_trimmed(layout, rows.texts[0]))
     if layout.heading and not behind and width != len(layout.heading):
         raise DataError(f"{path}: line {rows.numbers[0]}: {width} numbers under {len(layout.heading)} headings")
+    _check_whole(path, layout, rows, text)
     values = _values(path, layout, rows, width)
     return _contents(path, layout, values)
+
+
+def _check_whole(path: Path, layout: Layout, rows: NumberedLines, text: str) -> None:
+    """DataError where a table that we wrote has other rows than its heading says, or ends within the last of them."""
+    rows_written = layout.keys.get("rows")
+    if rows_written is None or layout.keys.get("written by") != "lobewatch":
+        return  # of another program, or of our first versions
+    last = f"{path}: line {rows.numbers[-1]}"
+    cure = "convert it anew, or take out the line that begins with # rows"
+    if rows_written != str(len(rows.texts)):
+        raise DataError(f"{last} ends row {len(rows.texts)} of {rows_written}: cut short or altered; {cure}")
+    if not text.endswith(("\n", "\r")):
+        raise DataError(f"{last} has no line end, so that its last number may be cut short; {cure}")
 
 
 def _lines(text: str) -> tuple[NumberedLines, list[str]]:

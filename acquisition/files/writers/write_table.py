@@ -39,6 +39,7 @@ def _table(columns: dict[str, NDArray[np.float64]], labels: Labels, averages: in
         "tool": labels.plain_tool,
         "window": labels.window.replace("none", ""),
         "averages": "" if averages is None else str(averages),
+        "rows": str(next(iter(columns.values())).size),
     }
     lines = [f"# {key}: {value}" for key, value in keys.items() if value]
     lines.append(",".join(columns))

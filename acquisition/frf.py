@@ -8,6 +8,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from acquisition.hit import LARGEST, flaw
+
 Quantity = Literal["receptance", "mobility", "accelerance"]
 
 
@@ -15,7 +17,7 @@ Quantity = Literal["receptance", "mobility", "accelerance"]
 class Frf:
     """One averaged frequency response function, displacement over force.
 
-    Raises ValueError where shapes differ, the frequency axis does not rise, or a value is not finite.
+    Raises ValueError where shapes differ, the frequency axis does not rise, or a value is not finite or beyond 1e50.
     """
 
     frequency: NDArray[np.float64]
@@ -54,10 +56,10 @@ class Frf:
     def _check_values(self) -> None:
         if self.receptance.shape != self.frequency.shape:
             raise ValueError(f"receptance {self.receptance.shape} and frequency {self.frequency.shape} differ in shape")
-        bad = np.flatnonzero(~np.isfinite(self.receptance))
+        bad = np.flatnonzero(~(np.abs(self.receptance) <= LARGEST))
         if bad.size:
-            line = self.frequency[bad[0]]
-            raise ValueError(f"receptance is not finite at {bad.size} lines, first at {line:g} Hz")
+            first = f"first at {self.frequency[bad[0]]:g} Hz"
+            raise ValueError(f"receptance is {flaw(self.receptance[bad[0]])} at {bad.size} lines, {first}")
         if self.coherence is None:
             return
         if self.coherence.shape != self.frequency.shape:

@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from acquisition.channel import Channel
 
+LARGEST = 1e50
+"""Largest size of a value in SI units: no measurement is larger, and powers of larger ones may be infinite."""
+
 
 class HitFlags(enum.Flag):
     """Why a hit is refused; falsy when all is well. `str()` gives words with the cure."""
@@ -28,6 +31,7 @@ class HitFlags(enum.Flag):
     NARROW_BAND = enum.auto()
     INCONSISTENT = enum.auto()
     UNDONE = enum.auto()
+    NOT_JUDGED = enum.auto()
 
     @property
     def words(self) -> str:
@@ -74,14 +78,20 @@ _WORDS: Mapping[HitFlags, tuple[str, str]] = {
     HitFlags.NARROW_BAND: ("narrow band", "Use a harder hammer tip."),
     HitFlags.INCONSISTENT: ("inconsistent", "Hit the same spot in the same direction as before."),
     HitFlags.UNDONE: ("undone", "Taken back by the operator."),
+    HitFlags.NOT_JUDGED: ("not judged", "Hit again; if it stays, check both sensors and their cables."),
 }
+
+
+def flaw(value: complex) -> str:
+    """What is wrong with a value that is not within LARGEST."""
+    return f"larger than {LARGEST:g}" if np.isfinite(value) else "not finite"
 
 
 @dataclass(frozen=True, eq=False)
 class Hit:
     """Force and response of one hammer hit on one time axis.
 
-    Raises ValueError where the records differ in length, are too short, or hold NaN or inf.
+    Raises ValueError where the records differ in length, are too short, or hold NaN, inf or values beyond 1e50.
     """
 
     force: NDArray[np.float64]
@@ -106,9 +116,9 @@ class Hit:
         for name in ("force", "acceleration"):
             values = np.asarray(getattr(self, name), dtype=np.float64)
             object.__setattr__(self, name, values)
-            bad = np.flatnonzero(~np.isfinite(values))
+            bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
             if bad.size:
-                raise ValueError(f"{name} is not finite at {bad.size} samples, first at sample {bad[0]}")
+                raise ValueError(f"{name} is {flaw(values[bad[0]])} at {bad.size} samples, first at sample {bad[0]}")
         if self.force.shape != self.acceleration.shape or self.force.ndim != 1 or self.force.size < 8:
             raise ValueError(
                 f"force {self.force.shape} and acceleration {self.acceleration.shape} "

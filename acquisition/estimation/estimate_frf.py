@@ -16,6 +16,9 @@ Estimator = Literal["H1", "H2", "Hv"]
 
 Spectra = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128]]
 
+ROUNDING = np.finfo(np.float64).eps ** 2
+"""Share of the largest force power at or below which a line holds rounding alone: of few codes it can be exactly 0."""
+
 
 def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
     """FRF of hits that share sample rate and length, with coherence and usable band.
@@ -23,6 +26,8 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
     H1 = S_fx / S_ff (noise on the response), H2 = S_xx / S_xf (noise on the force), Hv their geometric mean with
     the phase of S_fx. S_fx = mean of conj(F) X. The response window is rectangular; the force is tapered to zero
     after its pulse, which keeps its noise out. Source: ISO 7626-5; Bendat & Piersol, Random Data, ch. 6.
+
+    Lines that no hit excites, beyond the usable band, have receptance 0 and coherence 0.
 
     Raises ValueError for no hits, hits of different length or rate, and hits without a pulse.
     """
@@ -34,14 +39,20 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
 def frf_of_spectra(spectra: Spectra, hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
     """The same from the mean, or the sum, of the spectra of these hits."""
     s_ff, s_xx, s_fx = spectra
+    excited = s_ff > ROUNDING * np.max(s_ff)
     forms: dict[Estimator, Callable[[], NDArray[np.complex128]]] = {
-        "H1": lambda: s_fx * (1 / s_ff),
-        "H2": lambda: s_xx * s_fx / np.abs(s_fx) ** 2,
-        "Hv": lambda: np.sqrt(s_xx / s_ff) * np.exp(1j * np.angle(s_fx)),
+        "H1": lambda: s_fx * _quotient(np.ones_like(s_ff), s_ff, excited),
+        "H2": lambda: _quotient(s_xx * s_fx, np.abs(s_fx) ** 2, excited),
+        "Hv": lambda: np.sqrt(_quotient(s_xx, s_ff, excited)) * np.exp(1j * np.angle(s_fx)),
     }
     frequency = np.fft.rfftfreq(hits[0].force.size, 1 / hits[0].sample_rate)
-    coherence = np.minimum(np.abs(s_fx) ** 2 / (s_ff * s_xx), 1.0) if len(hits) > 1 else None
+    coherence = np.minimum(_quotient(np.abs(s_fx) ** 2, s_ff * s_xx, excited), 1.0) if len(hits) > 1 else None
     return from_accelerance(frequency, forms[estimator](), coherence, len(hits), usable_band(frequency, s_ff))
+
+
+def _quotient(dividend: NDArray[Any], power: NDArray[np.float64], excited: NDArray[np.bool_]) -> NDArray[Any]:
+    """dividend / power at excited lines with any, else 0."""
+    return np.asarray(np.divide(dividend, power, out=np.zeros_like(dividend), where=excited & (power > 0)))
 
 
 def cross_spectra(hits: Sequence[Hit]) -> Spectra:

@@ -65,10 +65,10 @@ class RunningMean:
                 f"{self.hits[0].force.size} samples at {self.hits[0].sample_rate:g} Hz; begin a new test"
             )
         spectra = cross_spectra([hit])
-        sums = self._sums
-        self._sums = spectra if sums is None else (sums[0] + spectra[0], sums[1] + spectra[1], sums[2] + spectra[2])
-        self.hits += (hit,)
-        self._before, self.frf = self.frf, frf_of_spectra(self._sums, self.hits)
+        sums, hits = self._sums, (*self.hits, hit)
+        sums = spectra if sums is None else (sums[0] + spectra[0], sums[1] + spectra[1], sums[2] + spectra[2])
+        self._before, self.frf = self.frf, frf_of_spectra(sums, hits)
+        self._sums, self.hits = sums, hits
 
     def without(self, hit: Hit) -> Frf:
         """H1 of the other hits; ValueError where this one is not in the mean, or alone in it."""

@@ -13,12 +13,13 @@ from acquisition.regular_file import read_regular
 from acquisition.tap import Circumstances
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
-_BEYOND_THE_SIGNALS = HitFlags.UNDONE | HitFlags.INCONSISTENT | HitFlags.NARROW_BAND
+_BEYOND_THE_SIGNALS = HitFlags.UNDONE | HitFlags.INCONSISTENT | HitFlags.NARROW_BAND | HitFlags.NOT_JUDGED
 
 
 def read_tap_recording(path: Path) -> list[Hit] | Frf:
     """The hits of a tap file but for those that their own time signals do not speak against and that were refused all
-    the same: taken back, of another spot, of a force that does not reach far enough. The FRF where none is left."""
+    the same: taken back, of another spot, of a force that does not reach far enough, not judged. The FRF where none is
+    left."""
     hits, _, flags = read_tap_hits(path)
     kept = [hit for hit, flag in zip(hits, flags, strict=True) if not flag & _BEYOND_THE_SIGNALS]
     return kept or read_tap(path).frf

@@ -33,7 +33,8 @@ def judge_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | Non
 
     Without `mean` and `band` the time signals alone decide. With the mean of 3 or more good hits, one without other
     faults is compared with it (INCONSISTENT); with the band that is followed (Hz), its force must reach to the end of
-    it (NARROW_BAND: 20 dB below its largest value). Source: ISO 7626-5 practice; docs/hit-verdicts.md.
+    it (NARROW_BAND: 20 dB below its largest value). With either, it must reach over two lines (TOO_SOFT). Source: ISO
+    7626-5 practice; docs/hit-verdicts.md.
     """
     findings = _overloads(hit)
     if hit.lost_scans:
@@ -116,7 +117,9 @@ def _cut_off(hit: Hit) -> dict[HitFlags, str]:
 
 def _in_frequency(hit: Hit, mean: Frf | None, band: tuple[float, float] | None) -> dict[HitFlags, str]:
     frf = estimate_frf([hit])
-    reach = frf.usable_band[1] if frf.usable_band else np.inf
+    start, reach = frf.usable_band or (0.0, np.inf)
+    if reach <= start:
+        return {HitFlags.TOO_SOFT: f"The force at {start:.3g} Hz is 20 dB below its largest value: no line can be used"}
     findings = {}
     if band is not None and reach < band[1]:
         findings[HitFlags.NARROW_BAND] = f"The force reaches to {reach:.0f} Hz (-20 dB) of the {band[1]:g} Hz wanted"

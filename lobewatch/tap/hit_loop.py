@@ -109,9 +109,14 @@ class HitLoop:
         self._publisher.show(word=self._verdict, verdict=flags.words, trial=trial, reason=reason)
 
     def draw(self, hit: Hit) -> None:
-        """The curves of a hit and of the mean."""
-        if self._guided:
-            self._publisher.show(plots=plots_of(hit, self._hits.mean))
+        """The curves of a hit and of the mean; none where they cannot be worked out."""
+        if not self._guided:
+            return
+        try:
+            plots = plots_of(hit, self._hits.mean)
+        except Exception:  # noqa: BLE001 - as of the verdict: the test goes on without them
+            plots = None
+        self._publisher.show(plots=plots)
 
     def _verdict_age(self, sample_rate: float) -> float:
         """Time for which the verdict has been shown (s); inf where none is."""

@@ -22,6 +22,7 @@ from acquisition import (
 from acquisition.atomic import make_folder
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.reserve import Reserve
+from lobewatch.tap.guarded_verdict import guarded_verdict
 from lobewatch.tap.spool import RESUMABLE, SpooledHit, spooled_hits, spooled_trigger, tidy, write_set_up
 from lobewatch.tap.state import TakenHit
 
@@ -97,7 +98,7 @@ class TapInProgress:
 
     def add_spooled(self, spooled: SpooledHit) -> None:
         """Go on with a hit that is on the disk already."""
-        verdict = judge_hit(spooled.hit)
+        verdict = guarded_verdict(lambda: judge_hit(spooled.hit))
         self._append(spooled.number, spooled.hit, spooled.flags | verdict.flags, verdict.text or spooled.flags.cure)
         self.circumstances = spooled.circumstances
         self.earlier = len(self.hits)

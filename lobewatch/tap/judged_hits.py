@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from acquisition import Hit, HitFlags, HitVerdict, RunningMean, judge_hit
 from lobewatch.machine.settings.machine_file import Machine
+from lobewatch.tap.guarded_verdict import guarded_verdict
 from lobewatch.tap.in_progress import TapInProgress
 
 FEWEST_FOR_MEAN = 3
@@ -37,15 +40,13 @@ class JudgedHits:
         return f"{self.tap.good} of {self.wanted} good hits"
 
     def judge(self, hit: Hit) -> HitVerdict:
-        """Verdict on a hit, against the mean too where that has enough hits to tell how far they scatter."""
-        mean = self.mean.frf if len(self.mean.hits) >= FEWEST_FOR_MEAN else None
-        return judge_hit(hit, mean, self._band)
+        """Verdict on a hit, against the mean too where that has enough hits to tell how far they scatter; a good one is
+        in the mean when this returns."""
+        return guarded_verdict(lambda: self._judge(hit))
 
     def add(self, hit: Hit, verdict: HitVerdict) -> None:
         """Keep a hit; on the disk when this returns."""
         self.tap.add(hit, verdict.flags, verdict.text)
-        if not verdict.flags:
-            self.mean.add(hit)
 
     def undo(self) -> int | None:
         """Take back the last good hit and return its index; None where there is none."""
@@ -63,12 +64,23 @@ class JudgedHits:
         if not FEWEST_FOR_MEAN < len(self.mean.hits) <= 2 * FEWEST_FOR_MEAN:
             return None
         for hit in self.mean.hits[:FEWEST_FOR_MEAN]:
-            verdict = judge_hit(hit, self.mean.without(hit))
+            verdict = guarded_verdict(partial(self._compare, hit))
             if verdict.flags:
                 number = next(i for i, tap_hit in enumerate(self.tap.hits) if tap_hit is hit)
                 self._take_out(number, verdict)
                 return number, verdict
         return None
+
+    def _judge(self, hit: Hit) -> HitVerdict:
+        mean = self.mean.frf if len(self.mean.hits) >= FEWEST_FOR_MEAN else None
+        verdict = judge_hit(hit, mean, self._band)
+        if not verdict.flags:
+            self.mean.add(hit)
+        return verdict
+
+    def _compare(self, hit: Hit) -> HitVerdict:
+        """Verdict on a hit of the mean against the others."""
+        return judge_hit(hit, self.mean.without(hit))
 
     def _take_out(self, number: int, verdict: HitVerdict) -> None:
         self.tap.take_out(number, verdict.flags, verdict.text)

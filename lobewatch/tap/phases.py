@@ -6,9 +6,10 @@ import shutil
 from contextlib import closing
 from dataclasses import replace
 
-from acquisition import DeviceError, Trigger
+from acquisition import DeviceError, Hit, HitVerdict, Trigger
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.connection import Connection, Connector
+from lobewatch.tap.guarded_verdict import guarded_verdict
 from lobewatch.tap.hit_loop import HitLoop
 from lobewatch.tap.judged_hits import JudgedHits
 from lobewatch.tap.live_signal import resting_rms
@@ -57,7 +58,7 @@ class Phases:
         self._tap.baseline = quiet_stretch(connection.signal.record(self._loop.blocks(connection), BASELINE_TIME))
         free = shutil.disk_usage(self._folder.path).free
         calibration = calibration_check(connection.signal.channels, machine.daq.calibration_interval_months)
-        checks = (*self_check(self._tap.baseline, trigger.level if trigger else None, free), calibration)
+        checks = (*_guarded_checks(self._tap.baseline, trigger.level if trigger else None, free), calibration)
         failed = [f"{check.name}: {check.text}." for check in checks if not check.passed]
         self._publisher.show(checks=checks, reason=" ".join(failed))
 
@@ -78,12 +79,17 @@ class Phases:
         while not trial.done:
             if not asked:
                 self._publisher.show(reason=f"{self._publisher.state.reason} {trial.text}".strip())
-            hits = self._loop.hits(connection, self._at_rest(trial.trigger))
-            hit = next(hit for hit in hits if hit is not None)
-            refused = trial.add(hit)
-            self._loop.show_verdict(refused, refused.cure or trial.text, trial=True)
-            self._loop.draw(hit)
-            asked = not refused
+            asked = self._take_trial_hit(connection, trial)
+
+    def _take_trial_hit(self, connection: Connection, trial: Trial) -> bool:
+        """Whether the next hit is of use."""
+        hits = self._loop.hits(connection, self._at_rest(trial.trigger))
+        hit = next(hit for hit in hits if hit is not None)
+        verdict = guarded_verdict(lambda: HitVerdict(trial.add(hit)))
+        flags = verdict.flags
+        self._loop.show_verdict(flags, verdict.text or flags.cure or trial.text, trial=True)
+        self._loop.draw(hit)
+        return not flags
 
     def _take(self, connection: Connection) -> None:
         trigger = self._tap.trigger
@@ -96,3 +102,13 @@ class Phases:
         if not self._guided or self._tap.baseline is None:
             return trigger
         return replace(trigger, rest_rms=resting_rms(self._tap.baseline, trigger.pre_trigger))
+
+
+def _guarded_checks(baseline: Hit, level: float | None, free_bytes: int) -> tuple[Check, ...]:
+    """As `self_check`; where that fails, one line that says so."""
+    try:
+        return self_check(baseline, level, free_bytes)
+    except Exception as error:  # noqa: BLE001 - a check warns and ends no test
+        return (
+            Check("self-check", False, f"it failed ({type(error).__name__}: {error}); the test goes on without it"),
+        )

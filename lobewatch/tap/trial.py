@@ -85,9 +85,10 @@ class Trial:
         flags = check_hit(hit) & ~_USABLE
         if flags:
             return flags
+        needed = _long_enough(ring_down(hit), self._setup.pre_trigger_s)
         self._hits.append(hit)
         if self._setup.record_s is None:
-            self._record = max(self._record, _long_enough(ring_down(hit), self._setup.pre_trigger_s))
+            self._record = max(self._record, needed)
         return flags
 
     def _level(self) -> float:

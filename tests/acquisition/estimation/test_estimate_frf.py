@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from acquisition import (
     Trigger,
     capture_hits,
     check_hit,
+    cross_spectra,
     estimate_frf,
     from_accelerance,
 )
@@ -88,6 +90,44 @@ def test_usable_band_ends_where_the_force_has_fallen_by_20_db(tapper: Tapper, ch
     assert band[1] < 4500.0
 
 
+def few_codes(tapper: Tapper) -> list[Hit]:
+    """Hits whose force has no power at half the sample rate, the last line."""
+    coarse = Channel("force", 2.25e-3, 4.5, 12), Channel("acceleration", 1.02e-3, 5.0, 12)
+    taken = hits(tapper, coarse, 99, force_range=(200.0, 200.0), force_noise=0.0)
+    powers = [cross_spectra([hit])[0] for hit in taken]
+    without = [hit for hit, power in zip(taken, powers, strict=True) if power[-1] < 1e-32 * power.max()]
+    assert len(without) >= 2
+    return without
+
+
+@pytest.mark.parametrize("estimator", ["H1", "H2", "Hv"])
+def test_lines_that_no_hit_excites_are_zero_and_beyond_the_band(tapper: Tapper, estimator: Literal["H1"]) -> None:
+    some = few_codes(tapper)
+    frf, single = estimate_frf(some, estimator), estimate_frf(some[:1], estimator)
+    for one in (frf, single):
+        assert one.receptance[-1] == 0
+        assert one.usable_band is not None
+        assert one.usable_band[1] < one.frequency[-1]
+    assert frf.coherence is not None
+    assert frf.coherence[-1] == 0
+    s_ff, s_xx, s_fx = (spectrum[1:-1] for spectrum in cross_spectra(some))
+    forms = {"H1": s_fx / s_ff, "H2": s_xx / np.conj(s_fx), "Hv": s_fx / np.abs(s_fx) * np.sqrt(s_xx / s_ff)}
+    rising = s_ff > 1e-9 * np.max(s_ff)
+    assert frf.accelerance[:-1][rising] == pytest.approx(forms[estimator][rising], rel=1e-9)
+    assert frf.coherence[:-1][rising] == pytest.approx((np.abs(s_fx) ** 2 / s_ff / s_xx)[rising], rel=1e-9)
+
+
+@pytest.mark.parametrize("estimator", ["H1", "H2", "Hv"])
+def test_an_accelerometer_that_gives_nothing_has_a_receptance_and_a_coherence_of_zero(
+    tapper: Tapper, channels: Pair, estimator: Literal["H1"]
+) -> None:
+    dead = [replace(hit, acceleration=np.zeros(6400)) for hit in hits(tapper, channels, 3)]
+    frf = estimate_frf(dead, estimator)
+    assert not frf.receptance.any()
+    assert frf.coherence is not None
+    assert not frf.coherence.any()
+
+
 def test_skew_of_the_response_channel_is_corrected(tapper: Tapper, channels: Pair) -> None:
     straight = estimate_frf(hits(tapper, channels))
     force, response = channels
@@ -126,6 +166,7 @@ def test_bad_calls_are_refused(tapper: Tapper, channels: Pair) -> None:
     ("arguments", "message"),
     [
         (([1.0, 2.0], [1.0, np.nan]), "not finite at 1 lines, first at 2 Hz"),
+        (([1.0, 2.0], [1.0, 1e60]), "larger than 1e\\+50 at 1 lines, first at 2 Hz"),
         (([1.0, 2.0], [1.0]), "differ in shape"),
         (([2.0, 1.0], [1.0, 1.0]), "strictly rising"),
         (([1.0], [1.0]), "at least 2 lines"),

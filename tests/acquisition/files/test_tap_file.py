@@ -224,7 +224,7 @@ def test_a_direction_that_is_none_and_a_time_without_zone_are_refused() -> None:
         replace(ABOUT, created=datetime(2026, 1, 1))  # noqa: DTZ001
 
 
-@pytest.mark.parametrize("beyond", [HitFlags.UNDONE, HitFlags.INCONSISTENT, HitFlags.NARROW_BAND])
+@pytest.mark.parametrize("beyond", [HitFlags.UNDONE, HitFlags.INCONSISTENT, HitFlags.NARROW_BAND, HitFlags.NOT_JUDGED])
 def test_hits_refused_for_what_their_signals_do_not_show_stay_out_of_a_replay(
     tap: TapTest, tmp_path: Path, beyond: HitFlags
 ) -> None:

@@ -142,11 +142,13 @@ def test_flags_print_as_words_with_the_cure() -> None:
         HitFlags.from_words("bad luck")
 
 
-@pytest.mark.parametrize("broken", [np.nan, np.inf])
-def test_a_record_with_nan_or_inf_is_refused(broken: float) -> None:
+@pytest.mark.parametrize(
+    ("broken", "flaw"), [(np.nan, "not finite"), (np.inf, "not finite"), (-1e60, r"larger than 1e\+50")]
+)
+def test_a_record_with_nan_or_inf_or_what_no_sensor_measures_is_refused(broken: float, flaw: str) -> None:
     force = pulse(200)
     force[700] = broken
-    with pytest.raises(ValueError, match=r"force is not finite at 1 samples, first at sample 700"):
+    with pytest.raises(ValueError, match=rf"force is {flaw} at 1 samples, first at sample 700"):
         Hit(force, force, RATE)
 
 

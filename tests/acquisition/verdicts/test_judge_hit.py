@@ -22,11 +22,14 @@ from acquisition import (
     average_good,
     capture_hits,
     check_hit,
+    cross_spectra,
     estimate_frf,
     judge_hit,
 )
 
 RATE = 25600.0
+NOTHING = 1e-32
+"""Share of the largest power below which a line has none but for rounding."""
 TIME = np.arange(6400) / RATE - 0.02
 
 
@@ -101,6 +104,31 @@ def test_strength_is_judged_against_the_range() -> None:
     noisy = judge_hit(hit((60, 0, 0.6e-3), noise=5.0))
     assert noisy.flags == HitFlags.TOO_SOFT
     assert "below 20 times the noise" in noisy.text
+
+
+@pytest.mark.parametrize(("bits", "range_over_peak"), [(12, 10), (14, 5)])
+def test_300_hits_of_few_codes_are_good_though_their_force_has_no_power_at_some_lines(
+    tapper: Callable[..., HammeredStructure], bits: int, range_over_peak: float
+) -> None:
+    force = Channel("force", 2.25e-3, 2.25e-3 * 200 * range_over_peak, bits)
+    pair = (force, Channel("acceleration", 1.02e-3, 5.0, bits))
+    tapping = tapper(force_range=(200.0, 200.0), force_noise=0.0)
+    few_codes = list(capture_hits(SimulatedSource(tapping, pair, RATE, 3_500_000), Trigger(20.0, 6400, 512)))[:300]
+    powers = [cross_spectra([one])[0] for one in few_codes]
+    assert sum(power.min() < NOTHING * power.max() for power in powers) > 50
+    mean = estimate_frf(few_codes[:3])
+    flags = [judge_hit(one, mean, (500.0, 2000.0)).flags for one in few_codes]
+    assert flags == [HitFlags.OK] * 300
+
+
+def test_a_force_that_begins_20_db_below_its_largest_value_reaches_no_line(hits: list[Hit]) -> None:
+    """The second derivative of a bell, as behind a high pass: its spectrum is f^2 at low frequencies."""
+    x = (TIME - 0.4e-3) / 0.2e-3
+    swinging = replace(hit((200, 0, 0.6e-3)), force=200 * (1 - x**2) * np.exp(-(x**2) / 2))
+    assert check_hit(swinging) == HitFlags.OK
+    for verdict in (judge_hit(swinging, estimate_frf(hits[:3])), judge_hit(swinging, band=(500.0, 2000.0))):
+        assert verdict.flags == HitFlags.TOO_SOFT
+        assert verdict.text == "The force at 4 Hz is 20 dB below its largest value: no line can be used: hit harder."
 
 
 def test_clipped_is_not_too_hard_as_well() -> None:

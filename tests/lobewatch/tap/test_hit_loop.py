@@ -20,11 +20,14 @@ from acquisition import (
     Structure,
     TapsEmulator,
     TapsSource,
+    cross_spectra,
     estimate_frf,
+    judge_hit,
     read_hits,
     read_tap,
     write_hit,
 )
+from acquisition.estimation.estimate_frf import frf_of_spectra
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.plots import plots_of
 from lobewatch.tap.session import TapSession
@@ -120,6 +123,96 @@ def test_a_verdict_does_not_wait_for_the_disk_and_counts_once_it_is_there(
     session = session_of(folder, lambda: simulated(tapper(), channels))
     session.run()
     assert shown == [(TapStep.GOOD, "good", good) for good in range(10)]
+
+
+def failing_at(calls: set[int], function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function that fails at some of its calls, counted from 1."""
+    count = iter(range(1, 1000))
+
+    def called(*arguments: Any) -> Any:
+        if next(count) in calls:
+            raise ZeroDivisionError("Weights sum to zero")
+        return function(*arguments)
+
+    return called
+
+
+def test_a_hit_on_which_the_judging_fails_is_refused_and_kept_and_the_test_goes_on(
+    folder: MachineFolder,
+    tapper: Tapper,
+    channels: Pair,
+    monkeypatch: pytest.MonkeyPatch,
+    simulated: Simulate,
+    session_of: OpenSession,
+) -> None:
+    monkeypatch.setattr("lobewatch.tap.judged_hits.judge_hit", failing_at({3}, judge_hit))
+    states: list[TapState] = []
+    session = session_of(folder, lambda: simulated(tapper(), channels), states.append)
+    tap = session.run()
+    assert tap.flags == (HitFlags.OK, HitFlags.OK, HitFlags.NOT_JUDGED, *[HitFlags.OK] * 8)
+    refused = next(state for state in states if state.word is TapStep.REFUSED)
+    assert (refused.shown_word, refused.reason) == (
+        "NOT JUDGED",
+        "Judging it failed (ZeroDivisionError: Weights sum to zero): hit again; if it stays, check both sensors and "
+        "their cables.",
+    )
+    path = folder.path / "taps" / f"{tap.id}.h5"
+    assert read_tap(path).flags == tap.flags
+    assert len(read_hits(path)) == 10
+
+
+def test_a_first_hit_that_cannot_be_compared_with_the_others_counts_no_more(
+    folder: MachineFolder,
+    tapper: Tapper,
+    channels: Pair,
+    monkeypatch: pytest.MonkeyPatch,
+    simulated: Simulate,
+    session_of: OpenSession,
+) -> None:
+    monkeypatch.setattr("lobewatch.tap.judged_hits.judge_hit", failing_at({6}, judge_hit))  # the 2nd, looked back at
+    tap = session_of(folder, lambda: simulated(tapper(), channels)).run()
+    assert tap.flags == (HitFlags.OK, HitFlags.NOT_JUDGED, *[HitFlags.OK] * 9)
+
+
+def test_a_hit_without_which_the_mean_fails_is_refused_and_not_in_it(
+    folder: MachineFolder,
+    tapper: Tapper,
+    channels: Pair,
+    monkeypatch: pytest.MonkeyPatch,
+    simulated: Simulate,
+    session_of: OpenSession,
+) -> None:
+    module = "acquisition.estimation.running_mean.frf_of_spectra"
+    monkeypatch.setattr(module, failing_at({4}, frf_of_spectra))
+    tap = session_of(folder, lambda: simulated(tapper(), channels)).run()
+    assert [i for i, flags in enumerate(tap.flags, 1) if flags] == [4]
+    assert tap.flags[3] == HitFlags.NOT_JUDGED
+    assert np.array_equal(tap.frf.receptance, estimate_frf(tap.accepted).receptance)
+
+
+def test_curves_that_cannot_be_drawn_end_no_test(
+    folder: MachineFolder,
+    tapper: Tapper,
+    channels: Pair,
+    monkeypatch: pytest.MonkeyPatch,
+    simulated: Simulate,
+    session_of: OpenSession,
+) -> None:
+    monkeypatch.setattr("lobewatch.tap.hit_loop.plots_of", failing_at({2, 10}, plots_of))
+    session = session_of(folder, lambda: simulated(tapper(), channels))
+    assert len(session.run().hits) == 10
+    assert session.state.plots is None
+
+
+def test_a_test_on_a_coarse_converter_takes_its_hits_though_some_lines_have_no_force(
+    folder: MachineFolder, tapper: Tapper, simulated: Simulate, session_of: OpenSession
+) -> None:
+    coarse = Channel("force", 2.25e-3, 4.5, 12), Channel("acceleration", 1.02e-3, 5.0, 12)
+    tapping = tapper(force_range=(200.0, 200.0), force_noise=0.0)
+    tap = session_of(folder, lambda: simulated(tapping, coarse)).run()
+    powers = [cross_spectra([hit])[0] for hit in tap.hits]
+    assert any(power.min() < 1e-32 * power.max() for power in powers)
+    assert tap.flags == (HitFlags.OK,) * 10
 
 
 def test_no_scan_is_lost_to_a_slow_disk_and_slow_mathematics(

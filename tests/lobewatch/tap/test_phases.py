@@ -6,7 +6,9 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from acquisition import Channel, HammeredStructure, HitFlags
+import pytest
+
+from acquisition import Channel, HammeredStructure, Hit, HitFlags, check_hit, ring_down
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.state import TapState, TapStep
@@ -43,3 +45,49 @@ def test_a_refused_trial_hit_says_what_is_wrong_with_it(
     assert len(session.run().hits) == 10
     refused = next(state for state in states if state.word is TapStep.REFUSED)
     assert (refused.shown_word, refused.reason) == ("DOUBLE HIT, TRIAL HIT", HitFlags.DOUBLE_HIT.cure)
+
+
+@pytest.mark.parametrize("failing", ["check_hit", "ring_down"])
+def test_a_trial_hit_on_which_the_judging_fails_is_asked_for_again(
+    failing: str,
+    open_folder: MachineFolder,
+    tapper: Tapper,
+    channels: Pair,
+    monkeypatch: pytest.MonkeyPatch,
+    simulated: Simulate,
+    session_of: OpenSession,
+) -> None:
+    function = {"check_hit": check_hit, "ring_down": ring_down}[failing]
+    failures = iter([ZeroDivisionError("no lines")])
+
+    def once(hit: Hit) -> object:
+        for failure in failures:
+            raise failure
+        return function(hit)
+
+    monkeypatch.setattr(f"lobewatch.tap.trial.{failing}", once)
+    states: list[TapState] = []
+    session = session_of(open_folder, lambda: simulated(tapper(), channels), states.append)
+    assert len(session.run().hits) == 10
+    refused = next(state for state in states if state.word is TapStep.REFUSED)
+    assert refused.shown_word == "NOT JUDGED, TRIAL HIT"
+    assert refused.reason.startswith("Judging it failed (ZeroDivisionError: no lines): hit again;")
+
+
+def test_a_self_check_that_fails_warns_and_ends_no_test(
+    folder: MachineFolder,
+    tapper: Tapper,
+    channels: Pair,
+    monkeypatch: pytest.MonkeyPatch,
+    simulated: Simulate,
+    session_of: OpenSession,
+) -> None:
+    def failing(*_: object) -> None:
+        raise ZeroDivisionError("no lines")
+
+    monkeypatch.setattr("lobewatch.tap.phases.self_check", failing)
+    session = session_of(folder, lambda: simulated(tapper(), channels))
+    assert len(session.run().hits) == 10
+    check = session.state.checks[0]
+    assert (check.name, check.passed) == ("self-check", False)
+    assert check.text == "it failed (ZeroDivisionError: no lines); the test goes on without it"

@@ -11,7 +11,17 @@ from typing import Any
 
 import pytest
 
-from acquisition import Channel, Circumstances, HammeredStructure, HitFlags, read_tap, read_tap_hits
+from acquisition import (
+    Channel,
+    Circumstances,
+    HammeredStructure,
+    Hit,
+    HitFlags,
+    HitVerdict,
+    judge_hit,
+    read_tap,
+    read_tap_hits,
+)
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.in_progress import TapInProgress, begin_tap
@@ -152,6 +162,22 @@ def test_a_disk_that_cannot_be_read_is_no_damaged_hit(
     with pytest.raises(OSError, match="Input/output error"):
         begun_again(open_folder)
     assert (interrupted / "0000.h5").is_file()
+
+
+def test_a_spooled_hit_on_which_the_judging_fails_counts_no_more_and_the_others_do(
+    interrupted: Path, open_folder: MachineFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    failures = iter([ZeroDivisionError("no lines")])
+
+    def once(hit: Hit) -> HitVerdict:
+        for failure in failures:
+            raise failure
+        return judge_hit(hit)
+
+    monkeypatch.setattr("lobewatch.tap.in_progress.judge_hit", once)
+    tap = begun_again(open_folder)
+    assert tap.flags == [HitFlags.NOT_JUDGED, HitFlags.OK, HitFlags.OK, HitFlags.OK]
+    assert tap.reasons[0].startswith("Judging it failed (ZeroDivisionError: no lines): hit again;")
 
 
 def test_what_was_set_aside_is_never_written_over(interrupted: Path, open_folder: MachineFolder) -> None:

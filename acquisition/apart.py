@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import os
-import resource
 import subprocess
 import sys
 import time
 from pathlib import Path
+
+if os.name != "nt":
+    import resource
 
 PATIENCE = 60.0
 """Time that such a program may take (s)."""
@@ -26,11 +28,14 @@ def run_apart(module: str, *arguments: str, patience: float = PATIENCE) -> bytes
 
 def limit_this_program(seconds: float, memory: float) -> None:
     """From now on so much time of the processor (s), after which it is ended, and so much more memory (bytes), beyond
-    which MemoryError is raised; a crash leaves no image of the memory behind."""
+    which MemoryError is raised; a crash leaves no image of the memory behind. Windows knows none of these limits, macOS
+    not that of memory."""
+    if os.name == "nt":
+        return
     _lower(resource.RLIMIT_CORE, 0)
     _lower(resource.RLIMIT_CPU, time.process_time() + seconds)
     sizes = Path("/proc/self/statm")
-    if sizes.exists():  # macOS has neither this nor such a limit
+    if sizes.exists():
         taken = int(sizes.read_text("ascii").split()[0]) * resource.getpagesize()
         _lower(resource.RLIMIT_AS, taken + memory)
 

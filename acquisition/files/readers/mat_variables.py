@@ -23,8 +23,8 @@ from acquisition.files.readers.unpacked import HARMLESS, RATIO, check_unpacked
 
 SECONDS, SECONDS_PER_BYTE = 2.0, 0.2e-6
 """Processor time that reading may take (s), for any file and for each byte of it: 20 times what sound ones take."""
-STARVED = 100.0
-"""Time for which it is waited over that, for a computer that has other work."""
+STARVED = 30.0
+"""Time for which it is waited over that, on a computer that has other work or no such limit."""
 COPIES = 6
 """Memory that reading may take, over the size of what is read at most."""
 V73 = b"MATLAB 7.3 MAT-file"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib.metadata import EntryPoint
+from traceback import format_exception_only
 from typing import Protocol, TypeVar
 
 from acquisition.remark import Remark
@@ -18,6 +19,8 @@ class Named(Protocol):
 
 
 Plugin = TypeVar("Plugin", bound=Named)
+FAILURES = (Exception, SystemExit)
+"""All that a foreign package may raise while ours go on; Ctrl-C ends ours."""
 
 
 def load_plugin(point: EntryPoint, kind: type[Plugin]) -> Plugin | Remark:
@@ -25,18 +28,24 @@ def load_plugin(point: EntryPoint, kind: type[Plugin]) -> Plugin | Remark:
     package = package_of(point)
     try:
         loaded = point.load()
-    except Exception as error:  # noqa: BLE001  (a foreign package may fail in any way; ours go on)
-        return not_loaded(kind, point, f"the package {package} cannot be loaded ({type(error).__name__}: {error})")
+    except FAILURES as error:
+        return not_usable(kind, point.name, f"the package {package} cannot be loaded ({words_of(error)})")
     if not isinstance(loaded, kind):
-        return not_loaded(kind, point, f"{point.value} of the package {package} is no acquisition.{kind.__name__}")
+        text = f"{point.value} of the package {package} is no acquisition.{kind.__name__}"
+        return not_usable(kind, point.name, text)
     if loaded.name != point.name:
-        return not_loaded(kind, point, f"the package {package} calls it {loaded.name!r} elsewhere")
+        return not_usable(kind, point.name, f"the package {package} calls it {loaded.name!r} elsewhere")
     return loaded
 
 
-def not_loaded(kind: type, point: EntryPoint, text: str, cure: str = "update or remove that package") -> Remark:
+def not_usable(kind: type, name: str, text: str, cure: str = "update or remove that package") -> Remark:
     """The remark on one that cannot be used."""
-    return Remark("package-not-loaded", f"{kind.__name__.lower()} {point.name!r}", text, cure)
+    return Remark("package-not-loaded", f"{kind.__name__.lower()} {name!r}", text, cure)
+
+
+def words_of(error: BaseException) -> str:
+    """Kind and text of an error of a foreign package on one line, whatever its text is or does."""
+    return " ".join("".join(format_exception_only(error)).split())
 
 
 def package_of(point: EntryPoint) -> str:

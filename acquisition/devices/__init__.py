@@ -3,7 +3,7 @@
 from acquisition.devices.check_settings import check_settings
 from acquisition.devices.driver import DeviceSettings, Driver, SensorPlace
 from acquisition.devices.probe_port import Answer, probe_port
-from acquisition.devices.registry import driver_names, find_driver, load_drivers
+from acquisition.devices.registry import driver_names, find_driver, load_drivers, named_package
 from acquisition.devices.survey_ports import PortSurvey, SeenPort, survey_ports
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "driver_names",
     "find_driver",
     "load_drivers",
+    "named_package",
     "probe_port",
     "survey_ports",
 ]

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from acquisition.devices.driver import DeviceSettings, Driver
+from acquisition.devices.registry import named_package
+from acquisition.errors import DataError
 
 
 def check_settings(driver: Driver, settings: DeviceSettings) -> None:
@@ -14,7 +16,8 @@ def check_settings(driver: Driver, settings: DeviceSettings) -> None:
             f"channel: {driver.title} names its own sensors: leave [[daq.channel]] out, or name another driver "
             '("dataq" takes them)'
         )
-    driver.check(settings)
+    with named_package(driver.name, "checking [daq]", DataError):
+        driver.check(settings)
 
 
 def _check_sensors(driver: Driver, settings: DeviceSettings) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.metadata import entry_points
 
 from acquisition.devices.built_in import BUILT_IN
 from acquisition.devices.driver import Driver
-from acquisition.errors import DataError
-from acquisition.plugin import load_plugin, not_loaded, package_of
+from acquisition.errors import DataError, DeviceError
+from acquisition.plugin import FAILURES, load_plugin, not_usable, package_of, words_of
 from acquisition.remark import Remark
 
 GROUP = "lobewatch.drivers"
@@ -35,6 +37,27 @@ def load_drivers() -> tuple[tuple[Driver, ...], tuple[Remark, ...]]:
     return drivers, tuple(entry for entry in loaded if isinstance(entry, Remark))
 
 
+def not_answering(name: str, text: str) -> Remark:
+    """The remark on a driver whose package fails when it is asked."""
+    return not_usable(Driver, name, f"the package {_package(name)} {text}")
+
+
+@contextmanager
+def named_package(name: str, doing: str, kind: type[DeviceError | DataError] = DeviceError) -> Iterator[None]:
+    """Where a driver of another package is called: what it may not raise becomes such an error, with its name."""
+    try:
+        yield
+    except (OSError, ValueError):
+        raise
+    except FAILURES as error:
+        raise kind(str(not_answering(name, f"fails when {doing} ({words_of(error)})"))) from error
+
+
+def _package(name: str) -> str:
+    """The package that brings a driver."""
+    return " and ".join(map(package_of, entry_points(group=GROUP, name=name))) or "lobewatch"
+
+
 def _find(name: str) -> Driver | Remark:
     for driver in BUILT_IN:
         if driver.name == name:
@@ -45,5 +68,5 @@ def _find(name: str) -> Driver | Remark:
         return Remark("driver-not-known", "", text, "correct the name, or install the package that brings it")
     if len(points) > 1:
         packages = " and ".join(map(package_of, points))
-        return not_loaded(Driver, points[0], f"the packages {packages} both bring it", "remove one of them")
+        return not_usable(Driver, name, f"the packages {packages} both bring it", "remove one of them")
     return load_plugin(points[0], Driver)

@@ -34,23 +34,25 @@ class PortSurvey:
     seen: tuple[SeenPort, ...]
     """Ports, and what came of asking at each."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks on drivers that cannot be loaded."""
+    """Remarks on drivers that cannot be loaded, or fail when they are asked."""
 
 
 def survey_ports(only: str = "") -> PortSurvey:
     """Ask on every USB port, or only on this one, whatever it is, also where it is not listed."""
-    drivers, remarks = load_drivers()
+    drivers, not_loaded = load_drivers()
+    remarks = [*not_loaded]
     ports = list_ports()
     if only:
         ports = [port for port in ports if port.device == only] or [PortInfo(only)]
-    return PortSurvey(tuple(_ask(port, drivers, named=bool(only)) for port in ports), remarks)
+    seen = tuple(_ask(port, drivers, remarks, named=bool(only)) for port in ports)
+    return PortSurvey(seen, tuple(remarks))
 
 
-def _ask(port: PortInfo, drivers: Sequence[Driver], named: bool) -> SeenPort:
+def _ask(port: PortInfo, drivers: Sequence[Driver], remarks: list[Remark], named: bool) -> SeenPort:
     if port.vendor is None and not named:
         return SeenPort(port, text="not asked: no USB device")
     try:
-        answer = probe_port(port.device, drivers, port.vendor)
+        answer = probe_port(port.device, drivers, port.vendor, remarks)
     except DeviceError as error:
         return SeenPort(port, text="cannot be opened", problem=str(error))
     return SeenPort(port, answer, "" if answer else "no answer")

@@ -18,7 +18,7 @@ from acquisition.files.readers.read_tdms import TDMS
 from acquisition.files.readers.read_uff import UFF
 from acquisition.files.readers.read_wav import WAV
 from acquisition.files.tap_recording import TAP_FILE
-from acquisition.plugin import load_plugin, not_loaded, package_of
+from acquisition.plugin import FAILURES, load_plugin, not_usable, package_of, words_of
 from acquisition.regular_file import open_regular
 from acquisition.remark import Remark
 
@@ -58,8 +58,8 @@ def broken_formats() -> str:
 def _is_it(file_format: Format, head: bytes, path: Path) -> bool:
     try:
         return file_format.is_it(head, path)
-    except Exception as error:  # noqa: BLE001 - code of others may raise anything; the other formats are asked still
-        _log.warning("%r: format %r could not be asked (%r)", str(path), file_format.name, error)
+    except FAILURES as error:  # code of others may raise anything; the other formats are asked still
+        _log.warning("%r: format %r could not be asked (%s)", str(path), file_format.name, words_of(error))
         return False
 
 
@@ -74,7 +74,7 @@ def _of_others() -> tuple[tuple[Format, ...], tuple[Remark, ...]]:
         if isinstance(plugin, Format) and plugin.name not in taken | formats.keys():
             formats[plugin.name] = plugin
         elif isinstance(plugin, Format):
-            remarks.append(not_loaded(Format, point, f"{package_of(point)} is not the only one to bring it"))
+            remarks.append(not_usable(Format, point.name, f"{package_of(point)} is not the only one to bring it"))
         else:
             remarks.append(plugin)
     return tuple(formats.values()), tuple(remarks)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from acquisition import Device, DeviceError, FileSource, SensorPlace, find_driver, find_port, usb_identity
+from acquisition.devices import named_package
 from lobewatch.machine.settings.daq_tables import Daq
 
 REPLAY = "file:"
@@ -40,7 +41,8 @@ def open_source(daq: Daq, port: str) -> Device:
     """
     if port.startswith(REPLAY):
         return FileSource(port.removeprefix(REPLAY))
-    return find_driver(daq.driver).open(port, daq.settings)
+    with named_package(daq.driver, f"opening {port}"):
+        return find_driver(daq.driver).open(port, daq.settings)
 
 
 def sensor_place(daq: Daq, port: str) -> SensorPlace | None:

@@ -126,7 +126,7 @@ def test_a_format_that_fails_on_a_file_is_left_out_or_named(tmp_path: Path, beam
     site = plugin(tmp_path / "site", "bad_format", code)
     said = run(["modes", beam], site)
     assert said.returncode == 0
-    assert "format 'bad_format' could not be asked (KeyError('head'))" in said.stderr
+    assert "format 'bad_format' could not be asked (KeyError: 'head')" in said.stderr
     file = tmp_path / "file"
     file.write_bytes(b"bad")
     said = run(["modes", file], site)

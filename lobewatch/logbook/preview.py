@@ -10,7 +10,14 @@ from pathlib import Path
 from acquisition import DataError, Description, Recording, TapTest
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.replaying.store import HERE, KnownContents, Progress, digests_of
-from lobewatch.logbook.replaying.tap_draft import FileReading, FileRequest, read_file, read_requested_file, reason_of
+from lobewatch.logbook.replaying.tap_draft import (
+    FileReading,
+    FileRequest,
+    is_reading,
+    read_file,
+    read_requested_file,
+    reason_of,
+)
 from lobewatch.measuring.measurement import Measurement, TapFit, interpret_fit
 from lobewatch.measuring.workers.share_work import Workers, share_work
 from modal import Mode
@@ -95,7 +102,8 @@ def _all_understood(
     """Each file in turn, or why it cannot be used; DataError as `share_work`."""
     if workers.are_elsewhere:
         toml = logbook.folder.toml_text
-        yield from share_work(read_requested_file, (FileRequest.of(file, description, toml) for file in files), workers)
+        asked = (FileRequest.of(file, description, toml) for file in files)
+        yield from share_work(read_requested_file, asked, workers, is_reading)
         return
     for file in files:
         try:

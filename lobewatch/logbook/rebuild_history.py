@@ -7,17 +7,19 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from acquisition import DataError, read_tap
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
-from lobewatch.machine import Machine, TapEntry
+from lobewatch.machine import Machine, ProgramTable, TapEntry
 from lobewatch.machine.contents import fault_of
 from lobewatch.machine.settings.machine_file import parse_machine
 from lobewatch.measuring.measurement import TapFit, fit_tap
+from lobewatch.measuring.workers.is_fit import is_fit
 from lobewatch.measuring.workers.share_work import Workers, share_work
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.verdict import Verdict, judge
+from lobewatch.verdicts.verdict import Verdict, Word, judge
 
 Progress = Callable[[int, int], None]
 """Told how many tap tests are done, and of how many."""
@@ -27,6 +29,8 @@ Progress = Callable[[int, int], None]
 class TapBytes:
     """One tap file; empty where it is damaged."""
 
+    entry: TapEntry
+    """Its line of the journal."""
     content: bytes
     """All of it."""
     machine_toml: str
@@ -49,7 +53,8 @@ def rebuild_history(logbook: Logbook, workers: Workers, progress: Progress = lam
     toml = logbook.folder.toml_text
     if workers.are_elsewhere:
         entries = [place.entry for place in logbook.files.places]
-        fits = share_work(modes_of, (_content(logbook, entry, toml) for entry in entries), workers)
+        contents = (_content(logbook, entry, toml) for entry in entries)
+        fits = share_work(modes_of, contents, workers, _is_fit)
         logbook.fits |= {entry.id: fit for entry, fit in zip(entries, fits, strict=True) if fit is not None}
     tap_ids = [row.tap_id for row in logbook.history.rows]
     for number, (tap_id, verdicts) in enumerate(_all_judged(logbook, tap_ids, toml, workers), 1):
@@ -66,12 +71,12 @@ def _all_judged(
         yield from ((tap_id, {}) for tap_id in tap_ids)
         return
     questions = (_question(logbook, tap_id, toml) for tap_id in tap_ids)
-    yield from zip(tap_ids, share_work(verdicts_on, questions, workers), strict=True)
+    yield from zip(tap_ids, share_work(verdicts_on, questions, workers, _is_verdicts), strict=True)
 
 
 def _content(logbook: Logbook, entry: TapEntry, toml: str) -> TapBytes:
     sound = not fault_of(logbook.folder.path, entry)
-    return TapBytes((logbook.folder.path / entry.file).read_bytes() if sound else b"", toml)
+    return TapBytes(entry, (logbook.folder.path / entry.file).read_bytes() if sound else b"", toml)
 
 
 def _question(logbook: Logbook, tap_id: str, toml: str) -> Question:
@@ -94,6 +99,23 @@ def verdicts_on(question: Question) -> dict[str, Verdict]:
     """On all programs, by their names."""
     machine = _machine(question.machine_toml)
     return {table.name: judge(table, question.tools[table.tool], machine) for table in machine.program}
+
+
+def _is_fit(tap: TapBytes, answer: Any) -> bool:
+    return answer is None or is_fit(answer, tap.entry)
+
+
+def _is_verdicts(question: Question, answer: Any) -> bool:
+    programs = {table.name: table for table in _machine(question.machine_toml).program}
+    return answer.keys() == programs.keys() and all(_is_verdict(programs[name], answer[name]) for name in programs)
+
+
+def _is_verdict(program: ProgramTable, answer: Any) -> bool:
+    """An unknown limit is NaN, a known one is not."""
+    known = answer.word is not Word.UNKNOWN
+    return (isinstance(answer, Verdict) and isinstance(answer.word, Word) and answer.program == program) and known == (
+        answer.limit > 0
+    )
 
 
 @lru_cache(maxsize=4)

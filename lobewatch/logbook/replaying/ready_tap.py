@@ -13,7 +13,14 @@ from pathlib import Path
 
 from acquisition import DataError, Description
 from acquisition.atomic import make_folder
-from lobewatch.logbook.replaying.tap_draft import FileRequest, TapDraft, draft_requested_tap, draft_tap, reason_of
+from lobewatch.logbook.replaying.tap_draft import (
+    FileRequest,
+    TapDraft,
+    draft_requested_tap,
+    draft_tap,
+    is_draft,
+    reason_of,
+)
 from lobewatch.machine import MachineFolder, TapEntry
 from lobewatch.measuring.measurement import TapFit
 from lobewatch.measuring.workers.share_work import Workers, share_work
@@ -51,7 +58,7 @@ def make_all_ready(
         return
     toml = folder.toml_text
     asked = (FileRequest.of(file, description, toml) for file in files)
-    for draft in share_work(draft_requested_tap, asked, workers):
+    for draft in share_work(draft_requested_tap, asked, workers, is_draft):
         yield draft if isinstance(draft, str) else _write(folder, draft)
 
 

@@ -9,14 +9,15 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import lru_cache
 from pathlib import Path
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
-from acquisition import DataError, Description, Recording, TapTest
+from acquisition import DataError, Description, Recording, TapTest, read_tap
 from acquisition.files.tap_file import as_written, tap_content
 from lobewatch.logbook.replaying.read_tap_test import Setup, read_tap_test
 from lobewatch.machine import MachineFolder, TapEntry
 from lobewatch.machine.settings.machine_file import parse_machine
 from lobewatch.measuring.measurement import TapFit, fit_tap
+from lobewatch.measuring.workers.is_fit import is_fit
 
 Result = TypeVar("Result")
 
@@ -93,6 +94,32 @@ def read_file(folder: MachineFolder, file: Path, description: Description) -> Fi
 def read_requested_file(asked: FileRequest) -> FileReading | str:
     """As `draft_requested_tap`, and no tap file is made."""
     return _from_bytes(asked, _reading)
+
+
+def is_draft(asked: FileRequest, answer: Any) -> bool:
+    """Whether an answer can be that of `draft_requested_tap`: its tap file is read, and all else must be of it."""
+    if isinstance(answer, str):
+        return True
+    with tempfile.TemporaryDirectory(prefix="lobewatch-") as folder:
+        at = Path(folder) / "tap.h5"
+        at.write_bytes(answer.content)
+        tap = read_tap(at)
+    return (
+        isinstance(answer, TapDraft)
+        and answer.digest == hashlib.sha256(asked.content).hexdigest() == answer.entry.source_sha256
+        and answer.entry == TapEntry.of(tap, answer.content)
+        and answer.created == tap.circumstances.created
+        and is_fit(answer.fit, answer.entry)
+        and all(isinstance(fact, str) for fact in answer.taken)
+    )
+
+
+def is_reading(_asked: FileRequest, answer: Any) -> bool:
+    """Whether an answer can be that of `read_requested_file`."""
+    if isinstance(answer, str):
+        return True
+    kinds = isinstance(answer.tap, TapTest) and isinstance(answer.recording, Recording)
+    return isinstance(answer, FileReading) and kinds and is_fit(answer.fit, TapEntry.of(answer.tap, b""))
 
 
 def _from_bytes(asked: FileRequest, work: Callable[[Setup, Path, Description, bytes, Path], Result]) -> Result | str:

@@ -49,7 +49,7 @@ class _Root(HelpGroup):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read these options where no command comes first: what reads them takes a while to import."""
-        if args and not args[0].startswith("-"):
+        if args and args[0][:1].isalnum():
             self.resolve_command(ctx, args)
             self.params = []
         return super().parse_args(ctx, args)

@@ -306,6 +306,13 @@ def test_wrong_use(run: Run) -> None:
     assert run("--version").out == "lobewatch 0.1.0\n"
 
 
+@pytest.mark.parametrize("name", [".", "./mill", "/tmp", "_", "", "\u202estatus", "\U0001f642"])
+def test_what_is_no_command_is_said_to_be_none(run: Run, name: str) -> None:
+    said = run(name)
+    assert said.code == 2
+    assert "No such command" in said.err
+
+
 def test_debug_shows_the_traceback(run: Run) -> None:
     with pytest.raises(FileNotFoundError):
         run("--debug", "modes", "nowhere.h5")

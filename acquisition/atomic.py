@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 from pathlib import Path
+
+NOT_SYNCED = (errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS)
+"""Errors of file systems, network drives mostly, that have nothing to sync in a folder."""
 
 
 def atomic_write(path: Path, content: bytes, *, lasting: bool = True) -> None:
@@ -38,7 +42,7 @@ def make_folder(folder: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make a rename in this folder outlast a power cut (a no-op where folders cannot be opened, as on Windows).
+    """Make a rename in this folder outlast a power cut (a no-op where folders cannot be opened or synced).
 
     Raises OSError with the name of the folder.
     """
@@ -48,6 +52,7 @@ def sync_folder(folder: Path) -> None:
     try:
         os.fsync(handle)
     except OSError as error:
-        raise OSError(error.errno, error.strerror, str(folder)) from error
+        if error.errno not in NOT_SYNCED:
+            raise OSError(error.errno, error.strerror, str(folder)) from error
     finally:
         os.close(handle)

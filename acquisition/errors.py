@@ -19,6 +19,7 @@ CURES = {
     errno.EDQUOT: ROOM,
     errno.EMFILE: DESCRIPTORS,
     errno.ENFILE: DESCRIPTORS,
+    errno.ESTALE: "the network drive has lost it: mount it anew, then give the same command again",
     errno.EIO: "the disk fails: copy the folder to another one",
 }
 """What to do where the system cannot do what it is asked for, by error number."""

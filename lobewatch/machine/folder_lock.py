@@ -25,6 +25,9 @@ PATIENCE = 5.0
 POLL_TIME = 0.01
 """Time between two looks whether it is done (s)."""
 
+READ_ONLY = "it can be read, not written; copy it to where you may write"
+NO_LOCKS = "it can be read, but not locked for writing; mount that drive with locks, or copy the folder to another one"
+
 
 class BusyError(DataError):
     """Another program writes to the folder."""
@@ -58,13 +61,13 @@ class FolderLock:
 
     def __init__(self, folder: Path) -> None:
         """Not held yet."""
-        self._folder, self._lock = folder, FileLock(folder / LOCK)
+        self._folder, self._lock = folder, FileLock(folder / LOCK, fallback_to_soft=False)
 
     @contextlib.contextmanager
     def held(self, patience: float) -> Iterator[None]:
         """Keep other programs from writing here; BusyError where one does for longer than `patience` (s).
 
-        OSError where this folder can only be read.
+        OSError where this folder can only be read, or nothing can be locked there.
         """
         self._acquire(patience)
         try:
@@ -82,10 +85,8 @@ class FolderLock:
             holder = self._read_holder() or "another lobewatch"
             raise BusyError(f"{self._folder}: {holder} is writing here; wait until it is done") from error
         except OSError as error:
-            if error.errno not in NOT_ALLOWED:
-                raise
-            text = f"{error.strerror}: it can be read, not written; copy it to where you may write"
-            raise OSError(error.errno, text, str(self._folder)) from error
+            cure = READ_ONLY if error.errno in NOT_ALLOWED else NO_LOCKS
+            raise OSError(error.errno, f"{error.strerror}: {cure}", str(self._folder)) from error
         if self._lock.lock_counter == 1:
             with contextlib.suppress(OSError):  # the lock holds without it
                 atomic_write(self._holder, msgspec.json.encode(Holder.current()), lasting=False)

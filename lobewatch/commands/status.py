@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from lobewatch.machine.folder_path import named_folder
 from lobewatch.show.terminal.output import Json, emit, results
+
+if TYPE_CHECKING:
+    from lobewatch.machine.settings.notify_table import Broker
+    from lobewatch.plant.plant import MachineStanding
 
 FOR_THE_PAGE = ("points", "limits", "why")
 """What only the dashboard draws; lobewatch trend and lobewatch export tell it in full."""
@@ -23,6 +28,9 @@ def status(
         bool,
         typer.Option("--notify", help="Send all of it by MQTT to the brokers that [notify] of machine.toml names."),
     ] = False,
+    forget: Annotated[
+        str, typer.Option(help="With --notify: take the messages on a machine that is gone out of its broker.")
+    ] = "",
     prometheus: Annotated[
         Path | None, typer.Option(help="Write all of it into this file too, for the textfile collector of Prometheus.")
     ] = None,
@@ -31,7 +39,8 @@ def status(
 ) -> None:
     """How all machines of a folder stand, worst first: light, fall, why, what to do next, when to tap again.
 
-    Exit code 1 where one of them is on alarm, so that a scheduler can tell.
+    Exit code 1 where one of them is on alarm or cannot be judged, so that a scheduler can tell; else 2 where --notify
+    could not tell a broker.
 
     Examples:
 
@@ -45,7 +54,10 @@ def status(
 
     if as_csv and as_json:
         raise ValueError("--csv and --json: give one of them")
-    standings = Plant(find_machines(folder)).standings()
+    if forget and not to_notify:
+        raise ValueError(f"--forget {forget}: is for the broker; give --notify too")
+    machines = find_machines(folder)
+    standings = Plant(machines).standings()
     rows = plant_rows(standings)
     shown = [row for row in rows if not due or row["days_left"] is None or row["days_left"] < 0]
     if as_csv:
@@ -61,8 +73,18 @@ def status(
         from lobewatch.notify.prometheus import prometheus_text
 
         atomic_write(prometheus, prometheus_text(standings).encode())
-    if to_notify:
-        from lobewatch.notify.telling import notify
+    failures = _notify(folder, machines, standings, forget) if to_notify else {}
+    needs_care = any(row["light"] is Light.ALARM or not row["can_be_judged"] for row in rows)
+    raise typer.Exit(1 if needs_care else 2 * bool(failures))
 
-        notify(standings)
-    raise typer.Exit(int(any(row["light"] is Light.ALARM for row in rows)))
+
+def _notify(
+    folder: Path, machines: Mapping[str, Path], standings: Sequence[MachineStanding], gone: str
+) -> Mapping[Broker, str]:
+    """Why a broker was not told, by broker; gone: machine that is to be forgotten first."""
+    from lobewatch.notify.telling import forget, notify
+
+    plant = None if (folder / "machine.toml").exists() else folder
+    if gone:
+        forget(folder, gone, machines)
+    return notify(standings, plant=plant)

@@ -81,6 +81,35 @@ def _frequencies(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
     )
 
 
+def _up(_standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    yield Sample((), 1.0)
+
+
+def _judged(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    return (Sample(_machine(standing), standing.dated.time.timestamp()) for standing in standings)
+
+
+def _judgeable(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    return (Sample(_machine(standing), float(standing.dated.can_be_judged)) for standing in standings)
+
+
+def _alarms(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    return (Sample(_machine(standing), float(len(standing.summary.alarms))) for standing in standings)
+
+
+def _acknowledged(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    for standing in standings:
+        quiet = [alarm for alarm in standing.summary.alarms if alarm.is_quiet(standing.dated.time)]
+        yield Sample(_machine(standing), float(len(quiet)))
+
+
+def _open_alarms(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    for standing in standings:
+        for alarm in standing.summary.alarms:
+            labels = ("alarm", alarm.id), ("code", alarm.code), ("about", alarm.about)
+            yield Sample((*_machine(standing), *labels), alarm.raised.timestamp())
+
+
 def _taps(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
     for standing in standings:
         if standing.summary.time is not None:
@@ -107,8 +136,17 @@ def _programs(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
 
 
 FAMILIES = {
+    "lobewatch_up": ("1 as long as anybody answers.", _up),
+    "lobewatch_judged_timestamp_seconds": ("When the machine was judged last.", _judged),
+    "lobewatch_can_be_judged": (
+        "1 where the machine can be judged, 0 where its files do not let.",
+        _judgeable,
+    ),
     "lobewatch_light": ("1 for the light that the machine has, 0 for the others.", _lights),
     "lobewatch_reasons": ("How many reasons of a code the light has.", _reasons),
+    "lobewatch_alarms": ("How many alarms are open.", _alarms),
+    "lobewatch_alarms_acknowledged": ("How many of them a person has acknowledged.", _acknowledged),
+    "lobewatch_alarm_raised_timestamp_seconds": ("When each open alarm was raised.", _open_alarms),
     "lobewatch_frequency_fall_ratio": ("Fall of the followed frequency since the first tests, 0.05 for 5 %.", _falls),
     "lobewatch_frequency_hertz": ("Followed frequency at the newest point of its series.", _frequencies),
     "lobewatch_last_tap_timestamp_seconds": ("When the machine was tapped last.", _taps),

@@ -1,101 +1,131 @@
-"""After a command has altered a machine: its standing beside it, and a message to those whom machine.toml names."""
+"""How machines stand, told to those whom machine.toml names: after a command has altered one, and when asked to."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
 
-import msgspec
-
+from acquisition.errors import failure_text
 from lobewatch.logbook import Logbook
 from lobewatch.machine import Machine
 from lobewatch.machine.settings.machine_file import read_machine
 from lobewatch.machine.settings.notify_table import Broker
-from lobewatch.notify.unsent import deliver
+from lobewatch.notify.message import message_of
+from lobewatch.notify.mqtt import send
+from lobewatch.notify.told import (
+    Told,
+    keep_told_of_machine,
+    keep_told_of_plant,
+    told_of_machine,
+    told_of_plant,
+)
+from lobewatch.notify.unsent import UNSENT, deliver
 from lobewatch.plant.plant import MachineStanding
-from lobewatch.plant.standing_file import software
 from lobewatch.plant.summarise import summarise
-from lobewatch.show.plant.plant_rows import next_limit
+from lobewatch.plant.summary import Summary, unreadable_summary
 from lobewatch.show.terminal.output import notes
 
-NOT_IN_TOPICS = str.maketrans("+#/\0", "____")
-"""Characters that no level of a topic may hold, each replaced."""
+GONE = "its folder is gone; `lobewatch status {plant} --notify --forget {key}` takes it out of the broker"
+"""Reason for a machine that was told of and is not there any more."""
 
 
 def tell(logbook: Logbook) -> None:
     """Make the standing, keep it, send it; nothing is raised, for what was to be stored is stored already."""
-    now = datetime.now(UTC)
+    now, path, machines = datetime.now(UTC), logbook.folder.path, dict[Path, Machine]()
     try:
-        current = logbook if logbook.is_current else Logbook.open(logbook.folder.path)
-        summary, path = summarise(current, now), current.folder.path
-        if current.machine.notify.broker is not None:
-            notify(
-                [MachineStanding(path.resolve().name, path, summary, summary.at(now, path))],
-                {path: current.machine},
-                now,
-            )
-    except (ValueError, OSError, ArithmeticError, LookupError):
-        return  # whoever looks at the machine next is told why
+        current = logbook if logbook.is_current else Logbook.open(path)
+        summary = summarise(current, now)
+        machines[path] = current.machine
+    except Exception as error:  # noqa: BLE001 - a machine that cannot be judged is told as one
+        summary = unreadable_summary(path.resolve().name, failure_text(error))
+    notify([_standing(path.resolve().name, path, summary, now)], machines, now=now)
 
 
 def notify(
-    standings: Iterable[MachineStanding], machines: Mapping[Path, Machine] | None = None, now: datetime | None = None
-) -> None:
-    """Send the standings of machines whose machine.toml names a broker; a note says why where one is not told.
+    standings: Iterable[MachineStanding],
+    machines: Mapping[Path, Machine] | None = None,
+    plant: Path | None = None,
+    now: datetime | None = None,
+) -> dict[Broker, str]:
+    """Send the standings that have changed, or were sent a day ago, of machines whose machine.toml names a broker.
 
-    machines: those that are read already.
+    A machine whose machine.toml cannot be read goes to the broker that was told last, and so does one of the plant
+    folder that is gone. machines: those that are read already. Returns why not, by broker, which a note says too.
     """
-    now, machines = now or datetime.now(UTC), machines or {}
-    batches: dict[Broker, dict[Path, tuple[str, bytes]]] = {}
-    for standing in standings:
-        try:
-            machine: Machine = machines.get(standing.path) or read_machine(standing.path / "machine.toml")
-        except (ValueError, OSError):
-            continue  # who is to be told cannot be read
-        if (broker := machine.notify.broker) is not None:
-            message = topic_of(broker.prefix, standing.key), message_of(standing, now)
-            batches.setdefault(broker, {})[standing.path] = message
-    failures = deliver(batches)
-    for broker in batches:
+    now, before = now or datetime.now(UTC), told_of_plant(plant) if plant else {}
+    due: dict[Broker, dict[Path, tuple[str, bytes]]] = {}
+    words: dict[Path, tuple[str, Told]] = {}
+    standings = [*standings]
+    for standing in [*standings, *_gone(plant, before, standings, now)]:
+        told = told_of_machine(standing.path) or before.get(standing.key)
+        broker = _broker(standing.path, machines or {}, told)
+        if broker is None:
+            continue
+        word = Told.of(standing, broker, now)
+        if told is None or not told.stands_for(word) or (standing.path / UNSENT).exists():
+            due.setdefault(broker, {})[standing.path] = word.topic, message_of(standing, now)
+            words[standing.path] = standing.key, word
+    failures = deliver(due)
+    sent = {path: words[path] for broker in due.keys() - failures.keys() for path in due[broker]}
+    for path, (_, word) in sent.items():
+        keep_told_of_machine(path, word)
+    if plant and sent:
+        keep_told_of_plant(plant, before | dict(sent.values()))
+    _say(due, failures)
+    return failures
+
+
+def forget(plant: Path, key: str, known: Iterable[str]) -> None:
+    """Take the message on a machine that is gone out of its broker; known: names of the folders that are there.
+
+    ValueError where it is there, nobody was told of it, or the broker does not take it.
+    """
+    told = told_of_plant(plant)
+    if key in known:
+        raise ValueError(f"--forget {key}: is there; move its folder out of {plant} first")
+    if key not in told:
+        gone = ", ".join(sorted(told.keys() - set(known))) or "none"
+        raise ValueError(f"--forget {key}: nobody was told of it; gone and not forgotten: {gone}")
+    broker = told[key].to
+    failure = send({broker: {told[key].topic: b""}}).get(broker)
+    if failure:
+        raise ValueError(f"--forget {key}: {failure}")
+    keep_told_of_plant(plant, {name: word for name, word in told.items() if name != key})
+
+
+def _gone(
+    plant: Path | None, told: Mapping[str, Told], standings: Iterable[MachineStanding], now: datetime
+) -> Iterator[MachineStanding]:
+    """Machines of a plant folder that were told of and are not there any more."""
+    if plant is None:
+        return
+    for key in sorted(told.keys() - {standing.key for standing in standings}):
+        summary = unreadable_summary(key, GONE.format(plant=plant, key=key))
+        yield _standing(key, plant / key, summary, now)
+
+
+def _standing(key: str, path: Path, summary: Summary, now: datetime) -> MachineStanding:
+    return MachineStanding(key, path, summary, summary.at(now, path))
+
+
+def _broker(path: Path, machines: Mapping[Path, Machine], told: Told | None) -> Broker | None:
+    """Whom machine.toml names; where it cannot be read, who was told last."""
+    try:
+        machine: Machine = machines.get(path) or read_machine(path / "machine.toml")
+    except (ValueError, OSError):
+        return told.to if told else None
+    return machine.notify.broker
+
+
+def _say(brokers: Iterable[Broker], failures: Mapping[Broker, str]) -> None:
+    for broker in brokers:
         why = failures.get(broker, "")
         if why:
             notes.print(f"note: nobody was told by MQTT: {why}; it goes with the next command", markup=False)
         if broker.withheld and broker.withheld not in why:
             notes.print(f"note: {broker.address}: {broker.withheld}", markup=False)
-
-
-def topic_of(prefix: str, key: str) -> str:
-    """Topic of the message of a machine; key: name of its folder."""
-    return f"{prefix}/{key.translate(NOT_IN_TOPICS)}/standing"
-
-
-def message_of(standing: MachineStanding, now: datetime) -> bytes:
-    """Standing of a machine for other programs, as JSON; what is not known is null."""
-    summary, dated = standing.summary, standing.dated
-    worst = summary.series[0] if summary.series else None
-    due = None if summary.time is None else summary.time + timedelta(days=summary.interval_days)
-    return msgspec.json.encode(
-        {
-            "folder": standing.key,
-            "machine": summary.name,
-            "light": dated.light,
-            "reasons": [{"code": remark.code, "about": remark.about, "text": remark.text} for remark in dated.remarks],
-            "next_step": dated.next_step,
-            "fall_percent": worst.fall if worst else None,
-            "fall_percent_std": worst.fall_std if worst else None,
-            "series": worst.name if worst else None,
-            "frequency_hz": worst.frequency if worst else None,
-            "next_limit": next_limit(summary.series),
-            "programs": summary.programs,
-            "last_tap": summary.last_tap or None,
-            "due": due and due.isoformat(),
-            "is_overdue": dated.days_left is not None and dated.days_left < 0,
-            "time": now.isoformat(),
-            "software": f"lobewatch {software()}",
-        }
-    )
 
 
 @contextmanager

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import msgspec
 
+from acquisition import DataError
 from acquisition.atomic import atomic_write
 from acquisition.regular_file import SMALL, read_regular
-from lobewatch.machine import BusyError, MachineFolder
+from lobewatch.machine import MachineFolder
 from lobewatch.machine.settings.notify_table import Broker
 from lobewatch.notify.mqtt import send
 
@@ -53,7 +54,7 @@ def _left_over(broker: Broker, folders: Iterable[Path], fresh: Container[Path]) 
     for path in sorted(path for place in places for path in place.glob(f"*/{UNSENT}") if path.parent not in fresh):
         try:
             unsent = msgspec.json.decode(read_regular(path, SMALL), type=Unsent)
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             continue
         if tuple(unsent.broker) == tuple(broker[:3]):
             messages[path.parent] = unsent.topic, bytes(unsent.message)
@@ -61,5 +62,5 @@ def _left_over(broker: Broker, folders: Iterable[Path], fresh: Container[Path]) 
 
 
 def _keep(folder: Path, unsent: Unsent) -> None:
-    with contextlib.suppress(BusyError, OSError), MachineFolder(folder).locked(patience=0):
+    with contextlib.suppress(DataError, OSError), MachineFolder(folder).locked(patience=0):
         atomic_write(folder / UNSENT, msgspec.json.encode(unsent))

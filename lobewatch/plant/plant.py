@@ -19,6 +19,8 @@ from lobewatch.plant.summary import DatedStanding, Summary, unreadable_summary
 
 VERIFY_EVERY = 6 * 3600.0
 """Time between two looks at every byte (s); chosen."""
+KNOWN_BY = ("machine.toml", "journal.jsonl")
+"""Files that tell a machine folder: one without machine.toml is a machine that cannot be judged."""
 
 
 class MachineStanding(NamedTuple):
@@ -47,9 +49,9 @@ class _ReadSummary(NamedTuple):
 
 def find_machines(path: Path) -> dict[str, Path]:
     """The machine at this path, or all in this folder, by name of their folders; DataError where there is none."""
-    if (path / "machine.toml").is_file():
+    if any((path / name).exists() for name in KNOWN_BY):
         return {path.resolve().name: path}
-    machines = {toml.parent.name: toml.parent for toml in sorted(path.glob("*/machine.toml"))}
+    machines = {file.parent.name: file.parent for name in KNOWN_BY for file in sorted(path.glob(f"*/{name}"))}
     if not machines:
         raise DataError(f"{path}: neither a machine folder nor a folder of them; make one with: lobewatch init")
     return machines
@@ -71,12 +73,15 @@ class Plant:
         self._lock = threading.Lock()
 
     def standings(self, now: datetime | None = None) -> list[MachineStanding]:
-        """One a machine, worst first; who asks meanwhile waits."""
+        """One a machine, those that cannot be judged first, then worst first; who asks meanwhile waits."""
         now = now or datetime.now(UTC)
         with self._lock:
             standings = [self._standing(key, path, now) for key, path in self.machines.items()]
         lights = list(Light)
-        return sorted(standings, key=lambda m: (lights.index(m.dated.light), -_largest_fall(m.summary), m.key))
+        return sorted(
+            standings,
+            key=lambda m: (m.dated.can_be_judged, lights.index(m.dated.light), -_largest_fall(m.summary), m.key),
+        )
 
     def verify_until(self, end: threading.Event) -> None:
         """Look at every byte of all machines, now and every few hours until the end; what is damaged is said."""

@@ -41,6 +41,7 @@ OURS = (
     "history.rows",
     "daq.json",
     "standing.json",
+    "told.json",
     "unsent.json",
     "report.html",
     LOCK,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from typing import NamedTuple
-from urllib.parse import unquote, urlsplit
+from urllib.parse import quote, unquote, urlsplit
 
 from lobewatch.machine.settings.toml_table import Table
 
@@ -41,6 +41,12 @@ class Broker(NamedTuple):
     def place(self) -> str:
         """Host and port."""
         return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+
+    @property
+    def without_password(self) -> str:
+        """Address that can be kept: with user and prefix."""
+        user = f"{quote(self.user, safe='')}@" if self.user else ""
+        return f"{self.scheme}://{user}{self.place}/{self.prefix}"
 
     @property
     def withheld(self) -> str:

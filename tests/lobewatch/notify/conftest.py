@@ -44,8 +44,8 @@ def started(*arguments: object, before: str = "") -> subprocess.CompletedProcess
     return subprocess.run(command, capture_output=True, text=True, timeout=LONG, check=False)
 
 
-def received(broker: Mosquitto, topic: str, **how: Any) -> Any:
-    """The message that stands at a topic."""
+def received(broker: Mosquitto, topic: str | list[str], **how: Any) -> Any:
+    """The message that stands at a topic, or several of several."""
     ask: Any = subscribe.simple
     return ask(topic, qos=1, hostname="127.0.0.1", port=broker.port, **how)
 

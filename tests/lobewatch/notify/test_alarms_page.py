@@ -14,8 +14,8 @@ import typer
 from lobewatch.cli import app
 from lobewatch.decay.light import Light
 from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.notify.message import message_of
 from lobewatch.notify.prometheus import FAMILIES
-from lobewatch.notify.telling import message_of
 from lobewatch.plant.plant import MachineStanding
 from lobewatch.plant.summary import DatedStanding, Summary
 
@@ -47,7 +47,8 @@ def test_the_table_for_machine_toml_is_taken_with_the_password(monkeypatch: pyte
 
 def test_each_key_of_a_message_and_each_family_is_explained() -> None:
     summary = Summary("m", (), "tap")
-    one = MachineStanding("m", Path("m"), summary, DatedStanding(Light.GOOD, (), "tap", None))
-    keys = msgspec.json.decode(message_of(one, datetime(2026, 1, 1, tzinfo=UTC)))
+    now = datetime(2026, 1, 1, tzinfo=UTC)
+    one = MachineStanding("m", Path("m"), summary, DatedStanding(Light.GOOD, (), "tap", None, now))
+    keys = msgspec.json.decode(message_of(one, now))
     rows = [line.split("|")[1] for line in PAGE.splitlines() if line.startswith("| `")]
     assert {*keys, *FAMILIES} <= {name for row in rows for name in re.findall(r"`(\w+)`", row)}

@@ -85,6 +85,7 @@ HOSTILE: dict[str, Callable[[Path], None]] = {
     "unlisted sparse": lambda m: sparse(m / "taps" / "other.h5"),
     "daq.json a pipe": lambda m: pipe(m / "daq.json"),
     "unsent a pipe": lambda m: pipe(m / "unsent.json"),
+    "told a pipe": lambda m: pipe(m / "told.json"),
     "holder of the lock a pipe": lambda m: pipe(m / ".lock.holder"),
     "lock a folder": lambda m: folder_in_place(m / ".lock"),
     "spool": spooled,

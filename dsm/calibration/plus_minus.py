@@ -15,7 +15,7 @@ def plus_minus(value: float, std: float | None, scale: float = 1.0, unit: str = 
     """
     if not math.isfinite(value):
         return "-"
-    shown, behind = value / scale, f" {unit}" if unit else ""
+    shown, behind = value / scale + 0.0, f" {unit}" if unit else ""
     if std is None or not math.isfinite(std):
         return f"{shown:.6g}{behind}"
     if std <= SMALLEST * abs(value):
@@ -23,4 +23,4 @@ def plus_minus(value: float, std: float | None, scale: float = 1.0, unit: str = 
     error = std / scale
     decimals = max(1 - math.floor(math.log10(error)), 0)
     share = f" ({100 * std / abs(value):.2g} %)" if percent else ""
-    return f"{shown:.{decimals}f} ± {error:.{decimals}f}{behind}{share}"
+    return f"{round(shown, decimals) + 0.0:.{decimals}f} ± {error:.{decimals}f}{behind}{share}"

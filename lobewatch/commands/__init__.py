@@ -8,6 +8,7 @@ COMMANDS = {
     "tap": "The live tap test: hit until ten hits are good, then see what has changed.",
     "replay": "Recorded files through the same pipeline as a live test; each is stored once.",
     "event": "Write down what was done to a machine; after a repair the following of the mode may begin anew.",
+    "ack": "Acknowledge alarms: they are known. It quiets repeats, never the light.",
     "exclude": "Take a tap test out of the series: all results are as if it had never been taken.",
     "include": "Take a tap test back into the series that lobewatch exclude has taken out.",
     "history": "All tap tests of a machine with what they say, those excluded, and what was done to it, oldest first.",

@@ -6,7 +6,9 @@ Technology 35(4), with hinges beside the steps, one-sided.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -42,24 +44,6 @@ class Fall(NamedTuple):
     """Half the width of the 95 % interval of the size."""
 
 
-@dataclass(frozen=True, eq=False)
-class Watch:
-    """Judgement on the points of a series, one after the other."""
-
-    scores: Floats
-    """Score of each point: how ill a steady series fits up to it, as a quantile of the normal distribution, shape (n,);
-    NaN before the 9th."""
-    alarm_at: int | None
-    """Index of the point that raised the alarm, the second one running that is sure; None where there is none."""
-    fall: Fall | None
-    """Kind and beginning as they were when the alarm was raised, size as it is now; None without alarm."""
-
-    @property
-    def asks_again(self) -> bool:
-        """Whether the newest point is sure of a fall that the one before it was not."""
-        return self.alarm_at is None and self.scores.size > 0 and bool(self.scores[-1] >= SURE)
-
-
 class LikeliestChange(NamedTuple):
     """The likeliest change in the points up to each of some of them."""
 
@@ -71,13 +55,43 @@ class LikeliestChange(NamedTuple):
     """Index of its point as in Fall, shape (r,)."""
 
 
-def calls_for_another(y: Floats, temperature: Floats) -> bool:
-    """Whether the last point of a series (n,) is sure of a fall that the one before it was not."""
-    if y.size < FIRST_JUDGED:
-        return False
-    last = np.arange(max(y.size - 2, FIRST_JUDGED - 1), y.size)
-    sure = _likeliest_changes(base_of(y, temperature), last)[0].score >= SURE
-    return bool(sure[-1] and not (sure.size > 1 and sure[0]))
+NOTHING = (LikeliestChange(np.empty(0), np.empty(0, np.bool_), np.empty(0, np.intp)),) * 2
+"""Falls and rises where no point is judged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Watch:
+    """Judgement on the points of a series, one after the other."""
+
+    scores: Floats
+    """Score of each point: how ill a steady series fits up to it, as a quantile of the normal distribution, shape (n,);
+    NaN before the 9th."""
+    base: SeriesBase
+    """Base of the fits."""
+    change: LikeliestChange
+    """Likeliest change up to each point from the 9th on."""
+    sign: int
+    """1 where it looks for falls, -1 where for rises."""
+
+    @cached_property
+    def sure(self) -> NDArray[np.bool_]:
+        """Whether each point is sure of a change, shape (n,)."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.scores >= SURE)
+
+    @property
+    def alarm_at(self) -> int | None:
+        """Index of the first point that is sure of a change as the one before it was; None where there is none."""
+        return next(self.alarms_from(0), None)
+
+    def alarms_from(self, first: int) -> Iterator[int]:
+        """Points from one on that are sure of a change as the ones before them were."""
+        begin = max(first, 1)
+        return (begin + int(i) for i in np.flatnonzero(self.sure[begin:] & self.sure[begin - 1 : -1]))
+
+    def fall_at(self, alarm: int) -> Fall:
+        """The change that a point is sure of: kind and beginning as it sees them, size by all points."""
+        return _fall(self.base, self.change, alarm - FIRST_JUDGED + 1, self.sign)
 
 
 def newest_change(y: Floats) -> Fall | None:
@@ -102,25 +116,10 @@ def watch(y: Floats, temperature: Floats | None = None) -> Watch:
 
 def watch_both(y: Floats, temperature: Floats | None = None) -> tuple[Watch, Watch]:
     """Judge a series likewise, and its mirror image: whether it rises."""
-    base = base_of(y, temperature)
-    if y.size < FIRST_JUDGED:
-        unknown = Watch(np.full(y.size, np.nan), None, None)
-        return unknown, unknown
-    falls, rises = _likeliest_changes(base, np.arange(FIRST_JUDGED - 1, y.size))
-    return _watch(base, falls, 1), _watch(base, rises, -1)
-
-
-def _watch(base: SeriesBase, change: LikeliestChange, sign: int) -> Watch:
-    """The watch from the likeliest change up to each point that is judged; sign: 1 for falls, -1 for rises."""
-    scores = np.full(base.y.size, np.nan)
-    scores[FIRST_JUDGED - 1 :] = change.score
-    with np.errstate(invalid="ignore"):
-        sure = scores >= SURE
-    twice = np.flatnonzero(sure[1:] & sure[:-1]) + 1
-    if not twice.size:
-        return Watch(scores, None, None)
-    at = int(twice[0])
-    return Watch(scores, at, _fall(base, change, at - FIRST_JUDGED + 1, sign))
+    base, unjudged = base_of(y, temperature), np.full(min(y.size, FIRST_JUDGED - 1), np.nan)
+    falls, rises = _likeliest_changes(base, np.arange(unjudged.size, y.size)) if y.size >= FIRST_JUDGED else NOTHING
+    down, up = (np.concatenate([unjudged, change.score]) for change in (falls, rises))
+    return Watch(down, base, falls, 1), Watch(up, base, rises, -1)
 
 
 def _likeliest_changes(base: SeriesBase, last: NDArray[np.intp]) -> tuple[LikeliestChange, LikeliestChange]:

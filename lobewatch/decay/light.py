@@ -11,9 +11,14 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
+from typing import TypeVar
 
 from acquisition import Remark
+from lobewatch.decay.alarm import Alarm
 from lobewatch.measuring.clock import CLOCK_QUESTIONS, about_future
+
+Coded = TypeVar("Coded", Remark, Alarm)
+"""What has the code of a reason."""
 
 
 class Light(StrEnum):
@@ -65,8 +70,8 @@ def about_unreadable(reason: str) -> Remark:
     return Remark("unreadable", "", reason)
 
 
-def in_order(remarks: Iterable[Remark]) -> tuple[Remark, ...]:
-    """Reasons in order of harm."""
+def in_order(remarks: Iterable[Coded]) -> tuple[Coded, ...]:
+    """Reasons, or their alarms, in order of harm."""
     order = list(LIGHTS)
     return tuple(sorted(remarks, key=lambda remark: order.index(remark.code)))
 

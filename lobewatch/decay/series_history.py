@@ -48,7 +48,7 @@ class ValueHistory:
 
     @cached_property
     def trend(self) -> Trend | None:
-        """Trend of the sure rows as on the day of the newest, without events; None where none has a positive value.
+        """Trend of the sure rows as on the day of the newest; None where none has a positive value.
 
         The temperature counts for the frequency alone: of the others nothing is known beforehand.
         """
@@ -57,7 +57,8 @@ class ValueHistory:
         measured = [row.conditions.temperature_c if self.name == "frequency" else None for row in rows]
         temperatures = [math.nan if temperature is None else temperature for temperature in measured]
         times = [row.time for row in rows]
-        taps = [*map(TapValue, times, numbers[:, 0].tolist(), errors, temperatures)]
+        reclamped = [row.conditions.reclamped for row in rows]
+        taps = [*map(TapValue, times, numbers[:, 0].tolist(), errors, temperatures, reclamped)]
         return trend_of(taps, taps[-1].time) if taps else None
 
     @cached_property
@@ -90,7 +91,8 @@ class ValueHistory:
     def newest_change(self) -> tuple[datetime, Fall] | None:
         """The change that the newest points are sure of, whatever the temperature, and its time; None without one."""
         rows, numbers = self._positive
-        times, percents = newest_percents([row.time for row in rows], numbers[:, 0].tolist())
+        reclamped = [row.conditions.reclamped for row in rows]
+        times, percents = newest_percents([row.time for row in rows], numbers[:, 0].tolist(), reclamped)
         change = newest_change(np.array(percents))
         return None if change is None else (times[change.point], change)
 
@@ -99,6 +101,11 @@ class ValueHistory:
         """The sure rows whose value is one to take a logarithm of, with their numbers, shape (n, 2)."""
         counts = np.isfinite(self.numbers[:, 0]) & ~self.is_asked & (self.numbers[:, 0] > 0)
         return self._select(counts), self.numbers[counts]
+
+    @property
+    def watched(self) -> tuple[Row, ...]:
+        """The rows that the trend is of, oldest first."""
+        return self._positive[0]
 
     def _select(self, counts: NDArray[np.bool_]) -> tuple[Row, ...]:
         return self.rows if counts.all() else tuple(compress(self.rows, counts.tolist()))
@@ -124,6 +131,23 @@ class SeriesHistory:
         newest = [rows[-1] for rows in (self.frequency.known, self.frequency.sure) if rows]
         change = min(map(self.frequency.change_at, newest), key=lambda change: change.value, default=UNKNOWN)
         return Estimate(-change.value + 0.0, change.std)
+
+    def below_since(self, percent: float) -> Row | None:
+        """The first of the newest tap tests that all show a fall of so much (%); None where the newest does not."""
+        first = None
+        for row in reversed(self.frequency.known):
+            if -self.frequency.change_at(row).value < percent and (first is not None or not row.questions):
+                break
+            first = row if -self.frequency.change_at(row).value >= percent else first
+        return first
+
+    @property
+    def falling_since(self) -> Row | None:
+        """The tap test that raised the alarm of the watch over the frequency; None where none is open."""
+        trend = self.frequency.trend
+        if trend is None or trend.open_fall is None:
+            return None
+        return self.frequency.watched[trend.points[trend.open_fall.raised].taps[0]]
 
 
 def series_history(rows: Iterable[Row]) -> SeriesHistory:

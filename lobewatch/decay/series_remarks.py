@@ -29,7 +29,7 @@ def about_fall(name: str, fall: Estimate, limits: Limits) -> Iterator[Remark]:
     """Remark on a fall that has reached a limit of machine.toml."""
     text = f"frequency fallen by {fall.value:.1f} % since the first tests"
     if fall.value >= limits.frequency_alarm_percent:
-        cure = "Do not cut on: have the bearings, the tool and its clamping looked at, then tap again."
+        cure = "Before the next part have the bearings, the tool and its clamping looked at, then tap again."
         yield Remark("frequency-alarm", name, f"{text} (alarm at {limits.frequency_alarm_percent:g} %)", cure)
     elif fall.value >= limits.frequency_warn_percent:
         cure = "Tap again to be sure; if it stays, have the bearings and the tool's clamping looked at soon."
@@ -38,20 +38,22 @@ def about_fall(name: str, fall: Estimate, limits: Limits) -> Iterator[Remark]:
 
 def about_trend(name: str, trend: Trend, path: Path | str = "MACHINE") -> Iterator[Remark]:
     """Remarks on what the watch over the frequency sees: a fall, a doubt, a rise. path: of the folder, for commands."""
-    event = f'lobewatch event {shlex.quote(str(path))} "what was done"'
-    if trend.watch.fall is not None and trend.fallen_since is not None:
-        fall = trend.watch.fall
+    folder = shlex.quote(str(path))
+    event = f'lobewatch event {folder} "what was done" --new-baseline'
+    if trend.open_fall is not None:
+        fall = trend.open_fall.fall
         course = "fell at once before" if fall.kind == "step" else "has been falling since"
         text = f"frequency {course} {trend.fallen_since:%Y-%m-%d}, by {_relative(fall.size, fall.half_width)}"
-        cure = "Have the bearings, the tool and its clamping looked at"
-        yield Remark("decay", name, text, f"{cure}; {event} ends this alarm, --new-baseline with it after a repair.")
-    elif trend.watch.asks_again:
+        cure = f"Have the bearings, the tool and its clamping looked at; after a repair: {event}"
+        yield Remark("decay", name, text, f"{cure}. Known already: lobewatch ack {folder}")
+    elif trend.detection.asks_again:
         text = "the newest test is lower than those before it"
-        yield Remark("decay-doubtful", name, text, "Clamp the tool anew and tap again: that shows whether it fell.")
-    if trend.rise.fall is not None:
-        rise = trend.rise.fall
+        cure = f"Clamp the tool anew and tap again: lobewatch tap {folder} --reclamped shows whether it fell."
+        yield Remark("decay-doubtful", name, text, cure)
+    if trend.detection.rise is not None:
+        rise = trend.detection.rise
         text = f"frequency rose by {_relative(-rise.size, rise.half_width)}: assembly changed?"
-        yield Remark("frequency-rose", name, text, f"If so: {event} --new-baseline")
+        yield Remark("frequency-rose", name, text, f"If so: {event}")
 
 
 def about_others(name: str, series: SeriesHistory, trend: Trend | None) -> Iterator[Remark]:
@@ -59,7 +61,7 @@ def about_others(name: str, series: SeriesHistory, trend: Trend | None) -> Itera
 
     trend: of the frequency; where that has changed, the bearing stiffness that follows from it says nothing more.
     """
-    has_changed = trend is not None and (trend.watch.fall or trend.rise.fall)
+    has_changed = trend is not None and (trend.open_fall or trend.detection.rise)
     for field, word in BESIDE.items():
         if has_changed and field == "bearing_stiffness":
             continue

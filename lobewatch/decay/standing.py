@@ -12,6 +12,7 @@ from datetime import datetime
 from pathlib import Path
 
 from acquisition import Remark
+from lobewatch.decay.alarm import Alarm, Raised, with_acknowledgements
 from lobewatch.decay.light import (
     LIGHTS,
     UNREADABLE,
@@ -30,6 +31,7 @@ from lobewatch.decay.series_remarks import about_fall, about_loss, about_others,
 from lobewatch.decay.trend import Trend
 from lobewatch.history.history import History, Row
 from lobewatch.machine import Machine
+from lobewatch.machine.journal.acknowledgement import Acknowledgement
 from lobewatch.measuring.estimate import Estimate
 from lobewatch.measuring.questions import about_questions
 from lobewatch.verdicts.verdict import Word
@@ -53,6 +55,8 @@ class SeriesStanding:
     """Points, alarm and forecast; None where no test of it can be compared with."""
     remarks: tuple[Remark, ...]
     """Reasons that it gives."""
+    raised: tuple[Raised, ...]
+    """Those that ring."""
     history: SeriesHistory = field(compare=False, repr=False)
     """Rows that all this follows from, and the history of their values."""
 
@@ -71,10 +75,16 @@ class SeriesStanding:
 class Standing:
     """The standing of one machine."""
 
-    remarks: tuple[Remark, ...]
-    """Reasons, in order of harm."""
+    time: datetime
+    """Time that it is the standing at."""
+    reasons: tuple[Remark, ...]
+    """Reasons in order of harm, without what a person has said to them."""
     next_step: str
     """Next step, one sentence."""
+    remarks: tuple[Remark, ...]
+    """Reasons, those that are acknowledged with that in their text."""
+    alarms: tuple[Alarm, ...] = ()
+    """Alarms that are open, in the order of their reasons."""
     series: tuple[SeriesStanding, ...] = ()
     """Series, the one that fell most first."""
     last_tap: datetime | None = None
@@ -99,60 +109,73 @@ def stand(
     now: datetime,
     path: Path | str = "MACHINE",
     files: Sequence[Remark] = (),
-    events: Sequence[datetime] = (),
+    acknowledgements: Sequence[Acknowledgement] = (),
 ) -> Standing:
     """The standing at a time; the last row holds the word on every program.
 
-    path: of the folder, for commands; files: what is wrong with those in it; events: when something was done to it.
+    path: of the folder, for commands; files: what is wrong with those in it; acknowledgements: oldest first.
     """
     rows = history.current
     if not rows and files:
-        return _standing([about_unreadable("; ".join(map(str, files)))], UNREADABLE)
+        return _standing(now, [about_unreadable("; ".join(map(str, files)))], UNREADABLE)
     if not rows:
         cure = "Take the first tap test: all others are compared with it."
         since = "yet" if history.baseline is None else f"since the new baseline of {history.baseline:%Y-%m-%d}"
-        return _standing([Remark("never-tapped", "", f"no tap test {since}", cure)])
+        return _standing(now, [Remark("never-tapped", "", f"no tap test {since}", cure)])
     pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
-    series = [_stand_of(series_history(history.series(*pair)), machine, now, path, events) for pair in pairs]
+    series = [_stand_of(series_history(history.series(*pair)), machine, now, path) for pair in pairs]
     newest, interval = rows[-1], machine.machine.tap_interval_days
     remarks = [remark for standing in series for remark in standing.remarks]
+    raised = [alarm for standing in series for alarm in standing.raised]
     remarks += [of_files(remark) for remark in files if remark.code in LIGHTS]
     asked = [row for row in rows if row.questions]
     remarks += [remark for row in asked for remark in about_questions(row.tap_id, row.questions, path)]
+    programs = [*_about_programs(rows, machine)]
+    raised += [_raised_of_program(remark, rows) for remark in programs if LIGHTS[remark.code] is Light.ALARM]
     remarks += [
-        *_about_programs(rows, machine),
+        *programs,
         *about_dates(newest.tap_id, newest.time, interval, now, path),
         *_about_directions(rows),
     ]
     series.sort(key=lambda standing: -standing.fall.value if standing.fall.is_known else math.inf)
     left = days_left(newest.time, interval, now)
-    return _standing(remarks, all_well(newest.time, interval), series, newest.time, left)
+    alarms = [alarm.alarm(acknowledgements, history.baseline) for alarm in raised]
+    return _standing(now, remarks, all_well(newest.time, interval), series, newest.time, left, alarms)
 
 
 def _standing(
+    now: datetime,
     remarks: Sequence[Remark],
     well: str = "",
     series: Sequence[SeriesStanding] = (),
     last_tap: datetime | None = None,
     left: float | None = None,
+    alarms: Sequence[Alarm] = (),
 ) -> Standing:
     """The standing with these reasons; well: the next step where none says another."""
     ordered = in_order(remarks)
-    return Standing(ordered, next_step(ordered, well), tuple(series), last_tap, left)
+    said = with_acknowledgements(ordered, alarms, now)
+    return Standing(now, ordered, next_step(ordered, well), said, in_order(alarms), tuple(series), last_tap, left)
 
 
-def _stand_of(
-    series: SeriesHistory, machine: Machine, now: datetime, path: Path | str, events: Sequence[datetime]
-) -> SeriesStanding:
+def _stand_of(series: SeriesHistory, machine: Machine, now: datetime, path: Path | str) -> SeriesStanding:
     newest, frequency, fall = series.rows[-1], series.frequency, series.fall
     first = (frequency.sure or frequency.known or series.rows)[0]
-    trend = None if frequency.trend is None else frequency.trend.on(now, events)
+    trend = None if frequency.trend is None else frequency.trend.on(now)
     name = f"{newest.tool}, {newest.direction}"
-    remarks = [*about_loss(name, newest), *about_fall(name, fall, machine.limits)]
-    remarks += about_trend(name, trend, path) if trend else ()
-    remarks += about_others(name, series, trend)
+    of_limits, of_watch = [*about_fall(name, fall, machine.limits)], [*about_trend(name, trend, path)] if trend else []
+    remarks = [*about_loss(name, newest), *of_limits, *of_watch, *about_others(name, series, trend)]
+    raised = [
+        Raised(remark, row.tap_id, row.time)
+        for remarks, row in (
+            (of_limits, series.below_since(machine.limits.frequency_alarm_percent)),
+            (of_watch, series.falling_since),
+        )
+        for remark in remarks
+        if LIGHTS[remark.code] is Light.ALARM and row is not None
+    ]
     return SeriesStanding(
-        newest.tool, newest.direction, newest.time, first.time, fall, trend, tuple(remarks), history=series
+        newest.tool, newest.direction, newest.time, first.time, fall, trend, tuple(remarks), tuple(raised), series
     )
 
 
@@ -170,6 +193,17 @@ def _about_programs(rows: Sequence[Row], machine: Machine) -> Iterator[Remark]:
         elif ruling.word is Word.DOUBTFUL:
             cure = tap or "See with lobewatch check what would settle it, and where to go until then."
             yield Remark("program-doubtful", name, ruling.word.value, cure)
+
+
+def _raised_of_program(remark: Remark, rows: Sequence[Row]) -> Raised:
+    """The alarm of a program that is not stable: raised by the first of the newest tap tests that all say so."""
+    first = rows[-1]
+    for row in reversed(rows):
+        ruling = (row.rulings or {}).get(remark.about)
+        if ruling is None or ruling.word is not Word.NOT_STABLE:
+            break
+        first = row
+    return Raised(remark, first.tap_id, first.time)
 
 
 def _about_directions(rows: Sequence[Row]) -> Iterator[Remark]:

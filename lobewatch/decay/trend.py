@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.decay.change_point import Watch, watch_both
 from lobewatch.decay.day_points import PercentSeries, Span, divide_into_points
+from lobewatch.decay.detection import DetectedFall, Detection, detect
 from lobewatch.decay.forecast import ENOUGH, Forecast, PastFit, Rate, fit_past
 
 MOST = 1000
@@ -39,10 +39,12 @@ class TapValue(NamedTuple):
     """Standard error of the value (%)."""
     temperature: float = math.nan
     """Temperature of the spindle (degC)."""
+    reclamped: bool = False
+    """Whether the tool was clamped anew for it."""
 
 
 class DayPoint(NamedTuple):
-    """The tap tests of one day together."""
+    """The tap tests of one clamping together."""
 
     time: datetime
     """Time of the first of them."""
@@ -68,39 +70,15 @@ class Trend:
     """Shapes that it allows, over days since 1970; None below 8 points."""
     today: int
     """Day since 1970 that it is judged on."""
-    events: tuple[datetime, ...] = ()
-    """Times of events; one after an alarm ends that alarm."""
 
-    @property
-    def watched(self) -> int:
-        """Point from which on it is watched: the first after the event that ended the last alarm."""
-        return self._judged[0]
-
-    @property
-    def watch(self) -> Watch:
-        """Watch over the points from there on, for a fall."""
-        return self._judged[1]
-
-    @property
-    def rise(self) -> Watch:
-        """Watch over the points from there on, for a rise."""
-        return self._judged[2]
-
-    def on(self, now: datetime, events: Sequence[datetime]) -> Trend:
-        """This trend as judged on another day and with other events."""
-        return replace(self, today=int(day(now)), events=tuple(events))
+    def on(self, now: datetime) -> Trend:
+        """This trend as judged on another day."""
+        return replace(self, today=int(day(now)))
 
     @cached_property
-    def _judged(self) -> tuple[int, Watch, Watch]:
-        points, watched = self.points, 0
-        y, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
-        while True:
-            fall, rise = watch_both(y[watched:], warmth[watched:])
-            at = None if fall.alarm_at is None else points[watched + fall.alarm_at].time
-            ended = [] if at is None else [event for event in self.events if event > at]
-            if not ended:
-                return watched, fall, rise
-            watched = sum(point.time < ended[0] for point in points)
+    def detection(self) -> Detection:
+        """What the watch over its points has seen."""
+        return detect(*_values_of(self.points))
 
     @cached_property
     def forecast(self) -> Forecast | None:
@@ -134,25 +112,30 @@ class Trend:
         return None if self.past is None else Rate(*(MONTH * rate for rate in self.past.rate))
 
     @property
+    def open_fall(self) -> DetectedFall | None:
+        """The newest fall whose alarm is open; None without alarm."""
+        return next(reversed(self.detection.open_falls), None)
+
+    @property
     def fallen_since(self) -> datetime | None:
         """Time at which the fall began or happened that the alarm is about; None without alarm."""
-        return None if self.watch.fall is None else self.points[self.watched + self.watch.fall.point].time
+        return None if self.open_fall is None else self.points[self.open_fall.fall.point].time
 
 
-def trend_of(series: Sequence[TapValue], now: datetime, events: Sequence[datetime] = ()) -> Trend:
-    """Judge a series, oldest first, one value at least; an event after an alarm ends that alarm.
+def trend_of(series: Sequence[TapValue], now: datetime) -> Trend:
+    """Judge a series, oldest first, one value at least.
 
     now: the forecast begins with its day, and is the same for all of it.
     """
     points = _newest_points(series)
-    return Trend(points, series[0].value, _past(points), int(day(now)), tuple(events))
+    return Trend(points, series[0].value, _past(points), int(day(now)))
 
 
 def _newest_points(series: Sequence[TapValue]) -> tuple[DayPoint, ...]:
     """The newest points of a series, oldest first."""
-    times, values, errors, temperatures = zip(*series, strict=True)
-    percents = PercentSeries(times, _percents(values), temperatures)
-    return tuple(_point(percents, errors, span) for span in divide_into_points(percents, MOST)[-MOST:])
+    times, values, errors, temperatures, reclamped = zip(*series, strict=True)
+    percents = PercentSeries(times, _percents(values), temperatures, reclamped)
+    return tuple(_point(percents, errors, span) for span in [*divide_into_points(percents)][-MOST:])
 
 
 def _point(series: PercentSeries, errors: Sequence[float], span: Span) -> DayPoint:
@@ -164,10 +147,12 @@ def _point(series: PercentSeries, errors: Sequence[float], span: Span) -> DayPoi
     return DayPoint(time, series.percent(span), error, series.temperature(span), tuple(range(first, end)))
 
 
-def newest_percents(times: Sequence[datetime], values: Sequence[float]) -> tuple[list[datetime], list[float]]:
+def newest_percents(
+    times: Sequence[datetime], values: Sequence[float], reclamped: Sequence[bool]
+) -> tuple[list[datetime], list[float]]:
     """Time and percent of the newest points of a series whose temperatures do not count, oldest first."""
-    series = PercentSeries(tuple(times), _percents(values), (math.nan,) * len(times))
-    spans = divide_into_points(series, MOST)[-MOST:] if times else ()
+    series = PercentSeries(tuple(times), _percents(values), (math.nan,) * len(times), tuple(reclamped))
+    spans = [*divide_into_points(series)][-MOST:] if times else []
     return [times[first] for first, _ in spans], [series.percent(span) for span in spans]
 
 
@@ -180,8 +165,13 @@ def _percents(values: Sequence[float]) -> tuple[float, ...]:
 def _past(points: Sequence[DayPoint]) -> PastFit | None:
     if len(points) < ENOUGH:
         return None
-    y, warmth = (np.array([getattr(point, name) for point in points]) for name in ("percent", "temperature"))
-    return fit_past(days_of(points), y, warmth)
+    return fit_past(days_of(points), *_values_of(points))
+
+
+def _values_of(points: Sequence[DayPoint]) -> tuple[Floats, Floats]:
+    """Percents and temperatures of points, shape (n,) each."""
+    percents, temperatures = ([getattr(point, name) for point in points] for name in ("percent", "temperature"))
+    return np.array(percents), np.array(temperatures)
 
 
 def days_of(points: Sequence[DayPoint]) -> Floats:

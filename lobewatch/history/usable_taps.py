@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from acquisition import DataError, Remark
 from lobewatch.machine import DamagedTapError, MachineFolder, TapEntry
 from lobewatch.machine.contents import FolderContents
+from lobewatch.machine.journal.acknowledgement import Acknowledgement
 from lobewatch.machine.journal.event import MaintenanceEvent
 from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.machine.journal.journal import command
@@ -83,9 +84,9 @@ class UsableTaps:
         return self._all.cuts
 
     @property
-    def event_times(self) -> list[datetime]:
-        """When something was done to the machine, oldest first."""
-        return [event.time for event in self.events]
+    def acknowledgements(self) -> Sequence[Acknowledgement]:
+        """What a person has acknowledged, oldest first."""
+        return self._all.acknowledgements
 
     @property
     def excluded(self) -> Sequence[TapEntry]:

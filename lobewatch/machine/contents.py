@@ -12,6 +12,7 @@ from pathlib import Path
 
 from acquisition import Remark
 from acquisition.regular_file import open_regular, read_regular
+from lobewatch.machine.journal.acknowledgement import Acknowledgement, acknowledgements_of
 from lobewatch.machine.journal.doubtful import read_doubtful
 from lobewatch.machine.journal.event import MaintenanceEvent, events_of
 from lobewatch.machine.journal.exclusion import exclusion_reasons
@@ -40,6 +41,8 @@ class FolderContents:
     """Number of lines of the journal."""
     cuts: tuple[HeardCut, ...] = ()
     """Test cuts, oldest first, those that a person has taken out too."""
+    acknowledgements: tuple[Acknowledgement, ...] = ()
+    """What a person has acknowledged, oldest first."""
 
     def with_one_more(self, entry: TapEntry) -> FolderContents:
         """Contents with a tap test that was just committed, and nothing else since."""
@@ -79,7 +82,10 @@ def contents_of(folder: Path, reading: Reading) -> FolderContents:
         cure = f"{command('verify', folder)} says what it is and what to do"
         remarks += [unlisted_file(path, "not in the journal, does not count", cure) for path in extra]
     cuts = committed_cuts(reading)
-    return FolderContents(tuple(taps), _oldest_first(lost), tuple(remarks), events, len(reading.lines), cuts)
+    acknowledgements = acknowledgements_of(reading.others)
+    return FolderContents(
+        tuple(taps), _oldest_first(lost), tuple(remarks), events, len(reading.lines), cuts, acknowledgements
+    )
 
 
 def committed_cuts(reading: Reading) -> tuple[HeardCut, ...]:

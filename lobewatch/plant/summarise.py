@@ -60,7 +60,8 @@ def _summary(logbook: Logbook, standing: Standing) -> Summary:
     interval = machine.machine.tap_interval_days
     return Summary(
         name=machine.machine.name,
-        remarks=tuple(remark for remark in standing.remarks if remark.code not in OF_THE_DATE),
+        remarks=tuple(remark for remark in standing.reasons if remark.code not in OF_THE_DATE),
+        alarms=standing.alarms,
         otherwise=standing.next_step if last is None else all_well(last, interval),
         path=str(logbook.folder.path),
         interval_days=interval,
@@ -83,7 +84,7 @@ def _series_summary(series: SeriesStanding, limits: Limits) -> SeriesSummary:
         fall=fall.value if fall.is_known else None,
         fall_std=fall.std if fall.is_known and math.isfinite(fall.std) else None,
         frequency=None if trend is None else trend.first * math.exp(trend.points[-1].percent / 100),
-        alarm=trend.watch.fall.kind if trend is not None and trend.watch.fall is not None else "",
+        alarm=trend.open_fall.fall.kind if trend is not None and trend.open_fall is not None else "",
         points=() if trend is None else tuple(_thin_out(trend)),
         limits=() if trend is None else tuple(_ahead(trend, percent) for percent in percents),
     )

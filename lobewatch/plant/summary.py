@@ -11,6 +11,7 @@ from typing import NamedTuple
 import msgspec
 
 from acquisition import Remark
+from lobewatch.decay.alarm import Alarm, with_acknowledgements
 from lobewatch.decay.light import (
     UNREADABLE,
     Light,
@@ -73,6 +74,13 @@ class DatedStanding(NamedTuple):
     """Next step, one sentence."""
     days_left: float | None
     """Days until the next test is due; negative where it is overdue; None before the first."""
+    time: datetime
+    """Time that it is the standing at."""
+
+    @property
+    def can_be_judged(self) -> bool:
+        """Whether anything can be said of the machine, be it that it was never tapped."""
+        return all(remark.code != "unreadable" for remark in self.remarks)
 
 
 class Summary(msgspec.Struct, frozen=True, dict=True):
@@ -84,6 +92,8 @@ class Summary(msgspec.Struct, frozen=True, dict=True):
     """Reasons that hold at any time, in order of harm."""
     otherwise: str
     """Next step where no reason says one."""
+    alarms: tuple[Alarm, ...] = ()
+    """Alarms that are open, in the order of their reasons."""
     path: str = ""
     """Path of the folder as it was named, which commands in the reasons repeat."""
     interval_days: float = 0.0
@@ -119,7 +129,8 @@ class Summary(msgspec.Struct, frozen=True, dict=True):
             remarks = in_order([*remarks, *about_dates(self.newest, self.time, self.interval_days, now, path)])
         if damage:
             remarks = with_files(remarks, damage)
-        return DatedStanding(light_of(remarks), remarks, next_step(remarks, self.otherwise), left)
+        said = with_acknowledgements(remarks, self.alarms, now)
+        return DatedStanding(light_of(remarks), said, next_step(remarks, self.otherwise), left, now)
 
     def speaks_of(self, path: str) -> bool:
         """Whether a reason names the folder."""

@@ -14,6 +14,7 @@ from acquisition import Conditions
 from lobewatch.history import Row
 from lobewatch.logbook import Logbook
 from lobewatch.machine import TapEntry
+from lobewatch.machine.journal.acknowledgement import Acknowledgement
 from lobewatch.machine.journal.event import MaintenanceEvent
 from lobewatch.show.history.describe_cut import cut_json, cut_words
 from lobewatch.show.terminal.csv_text import csv_text
@@ -46,6 +47,12 @@ def event_json(event: MaintenanceEvent) -> dict[str, Any]:
     return {**named, "new_baseline": event.new_baseline}
 
 
+def acknowledgement_json(word: Acknowledgement) -> dict[str, Any]:
+    """One acknowledgement."""
+    until = word.until and _utc(word.until)
+    return {"id": word.alarm, "time": _utc(word.time), "operator": word.operator, "until": until, "note": word.note}
+
+
 def history_json(logbook: Logbook) -> dict[str, Any]:
     """The whole history; an excluded tap test has no values, those of one that is kept count for nothing."""
     return {
@@ -54,12 +61,13 @@ def history_json(logbook: Logbook) -> dict[str, Any]:
         "kept": [_tap_json(row, logbook) for row in logbook.history.kept],
         "excluded": [_excluded_json(tap) for tap in logbook.files.excluded],
         "events": [event_json(event) for event in logbook.files.events],
+        "acknowledged": [acknowledgement_json(word) for word in logbook.files.acknowledgements],
         "cuts": [cut_json(cut) | {"text": cut_words(cut)} for cut in logbook.files.cuts],
     }
 
 
 def history_csv(logbook: Logbook) -> str:
-    """A line for each tap test and cut, excluded or not, and for each event, oldest first; headings on top."""
+    """A line for each tap test, cut, event and acknowledgement, excluded or not, oldest first; headings on top."""
     names = [program.name for program in logbook.machine.program]
     values = [heading for name in VALUES for heading in (name, f"{name}_std")]
     verdicts = {name: f"verdict: {name}" for name in names}
@@ -87,13 +95,17 @@ def _cells(line: Mapping[str, Any]) -> list[str]:
 
 
 def _lines(logbook: Logbook) -> list[dict[str, Any]]:
-    """Tap tests, excluded ones, events and test cuts, oldest first."""
+    """Tap tests, excluded ones, events, acknowledgements and test cuts, oldest first."""
     history = history_json(logbook)
     events = [event | {"kind": "new baseline" if event["new_baseline"] else "event"} for event in history["events"]]
     excluded = [tap | {"kind": "excluded"} for tap in history["excluded"]]
     taps = [tap | {"kind": kind} for kind, name in (("tap", "taps"), ("kept", "kept")) for tap in history[name]]
     cuts = [_cut_line(cut) for cut in history["cuts"]]
-    return sorted([*events, *excluded, *taps, *cuts], key=lambda line: line["time"])
+    words = [
+        {"kind": "ack", "id": word.alarm, "time": _utc(word.time), "text": str(word)}
+        for word in logbook.files.acknowledgements
+    ]
+    return sorted([*events, *excluded, *taps, *cuts, *words], key=lambda line: line["time"])
 
 
 def _cut_line(cut: Mapping[str, Any]) -> dict[str, Any]:

@@ -50,10 +50,10 @@ def _changed(series: SeriesStanding) -> str:
     text = f"{series.name}: {short_text(series)}, {series.first:%Y-%m-%d}"
     if series.trend is None or series.trend.rate is None:
         return text
-    since, fall = series.trend.fallen_since, series.trend.watch.fall
-    if since is None or fall is None:
+    since, fallen = series.trend.fallen_since, series.trend.open_fall
+    if since is None or fallen is None:
         return f"{text}; {rate_text(series.trend)}"
-    course = "fell at once before" if fall.kind == "step" else "falling since"
+    course = "fell at once before" if fallen.fall.kind == "step" else "falling since"
     return f"{text}; {course} {since:%Y-%m-%d}; {rate_text(series.trend)}"
 
 

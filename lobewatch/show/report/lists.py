@@ -58,10 +58,11 @@ def _series_row(series: SeriesStanding) -> list[str | TableCell]:
 
 
 def events_and_exclusions(material: ReportMaterial) -> list[Section]:
-    """A line for each event of the machine and each test that does not count, oldest first."""
+    """A line for each event of the machine, each word on an alarm, each test that does not count, oldest first."""
     files = material.analysis.files
     reasons = {entry.id: entry.excluded for entry in files.excluded}
     lines = [(event.time, event_line(event)) for event in files.events]
+    lines += [(word.time, f"{word.time.astimezone():%Y-%m-%d}: {word.alarm} {word}") for word in files.acknowledgements]
     lines += [(row.time, _excluded_line(row, reasons[row.tap_id])) for row in material.excluded_rows]
     if not lines:
         return []

@@ -31,8 +31,9 @@ def trend_json(outlook: Outlook, series: SeriesStanding, preload: PreloadLeft | 
         "tool": series.tool,
         "direction": series.direction,
         "points": [] if trend is None else _points_json(trend),
-        "score": None if trend is None or not trend.watch.scores.size else float(trend.watch.scores[-1]),
+        "score": None if trend is None else float(trend.detection.scores[-1]),
         "alarm": None if trend is None else _alarm_json(trend),
+        "alarms": [alarm.row(outlook.standing.time) for alarm in outlook.standing.alarms],
         "light": outlook.standing.light.value,
         "fall_percent": series.fall.value,
         "fall_std_percent": series.fall.std,
@@ -107,7 +108,8 @@ def rate_text(trend: Trend) -> str:
     if rate is None:
         return ""
     digits = max(2, -math.floor(math.log10(max(rate.high - rate.low, 1e-4))))
-    value, low, high = (f"{percent:+.{digits}f}" for percent in rate)
+    inside = min(max(rate.value, rate.low), rate.high)
+    value, low, high = (f"{round(percent, digits) + 0.0:+.{digits}f}" for percent in (inside, rate.low, rate.high))
     return f"{value} % a month now ({low} to {high}, 95 %)"
 
 
@@ -131,7 +133,7 @@ def _score(trend: Trend) -> str:
 
 def _scores(trend: Trend) -> list[float]:
     """Scores, one a point; NaN where none is judged."""
-    return [*[math.nan] * trend.watched, *map(float, trend.watch.scores)]
+    return [float(score) for score in trend.detection.scores]
 
 
 def _points_json(trend: Trend) -> list[dict[str, Any]]:
@@ -139,9 +141,9 @@ def _points_json(trend: Trend) -> list[dict[str, Any]]:
 
 
 def _alarm_json(trend: Trend) -> dict[str, Any] | None:
-    fall, since = trend.watch.fall, trend.fallen_since
-    if fall is None or since is None:
+    if trend.open_fall is None or trend.fallen_since is None:
         return None
+    fall, since = trend.open_fall.fall, trend.fallen_since
     return {"kind": fall.kind, "since": since.isoformat(), "size_percent": fall.size}
 
 

@@ -20,6 +20,8 @@ from dsm import plus_minus
         (1722.0312, math.nan, 1.0, "1722.03"),
         (1722.0312, 1e-12, 1.0, "1722.0312"),
         (math.nan, math.nan, 1.0, "-"),
+        (-0.3, 47.1, 1.0, "0 ± 47"),
+        (-0.0, math.nan, 1.0, "0"),
     ],
 )
 def test_two_digits_of_the_standard_error_decide(value: float, std: float, scale: float, text: str) -> None:

@@ -1,4 +1,4 @@
-"""Points of a series, what an event ends, where a series started."""
+"""Points of a series, its falls, where it started."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
+from lobewatch.decay.change_point import Fall
 from lobewatch.decay.trend import TapValue, Trend, trend_of
 
 START = datetime(2024, 1, 15, 9, tzinfo=UTC)
@@ -19,8 +20,13 @@ def tapped(days: float, percent: float) -> TapValue:
     return TapValue(START + timedelta(days=days), 1700.0 * float(np.exp(percent / 100)), 0.01)
 
 
-def judged(series: list[TapValue], *events: float) -> Trend:
-    return trend_of(series, series[-1].time, [START + timedelta(days=days) for days in events])
+def judged(series: list[TapValue]) -> Trend:
+    return trend_of(series, series[-1].time)
+
+
+def open_fall(trend: Trend) -> Fall:
+    assert trend.open_fall is not None
+    return trend.open_fall.fall
 
 
 def monthly(percents: np.ndarray[tuple[int], np.dtype[np.float64]]) -> list[TapValue]:
@@ -35,34 +41,27 @@ def test_tests_of_a_day_are_one_point_the_mean_of_two_the_median_of_three() -> N
     assert found[1].error == pytest.approx(0.01 / np.sqrt(2))
 
 
-def test_a_test_that_was_asked_for_is_a_point_of_its_own() -> None:
+def test_a_test_confirms_another_of_the_same_day_where_the_tool_was_clamped_anew() -> None:
     asked = monthly(FALLING[:14])
-    found = judged([*asked, asked[-1]._replace(time=asked[-1].time + timedelta(hours=1))])
-    assert len(found.points) == 15
-    assert found.watch.alarm_at == 14
-    unasked = monthly(FALLING[:13])
-    again = judged([*unasked, unasked[-1]._replace(time=unasked[-1].time + timedelta(hours=1))])
-    assert len(again.points) == 13
+    again = asked[-1]._replace(time=asked[-1].time + timedelta(hours=1))
+    same_clamping, reclamped = judged([*asked, again]), judged([*asked, again._replace(reclamped=True)])
+    assert (len(same_clamping.points), same_clamping.open_fall) == (14, None)
+    assert same_clamping.detection.asks_again
+    assert len(reclamped.points) == 15
+    assert reclamped.open_fall is not None
+    assert reclamped.open_fall.raised == 14
+
+
+def test_tests_of_two_clampings_on_one_day_are_two_points() -> None:
+    first = [tapped(0, 0.0), tapped(0.1, 0.2)]
+    second = [one._replace(reclamped=clamped) for one, clamped in ((tapped(0.2, 1.0), True), (tapped(0.3, 1.2), False))]
+    assert [point.taps for point in judged([*first, *second]).points] == [(0, 1), (2, 3)]
 
 
 def test_the_alarm_is_dated_and_its_size_grows_with_the_fall() -> None:
     first, later = judged(monthly(FALLING[:15])), judged(monthly(FALLING))
     assert first.fallen_since == later.fallen_since == START + timedelta(days=300)
-    assert first.watch.fall is not None
-    assert later.watch.fall is not None
-    assert first.watch.fall.size < later.watch.fall.size == pytest.approx(1.62, abs=0.1)
-
-
-def test_an_event_after_the_alarm_ends_it_and_one_before_it_does_not() -> None:
-    steps = np.repeat([0.0, -1.0], [12, 12]) + np.tile([0.05, -0.05], 12)
-    assert judged(monthly(steps)).watch.alarm_at == 13
-    assert judged(monthly(steps), 100.0).watch.alarm_at == 13
-    ended = judged(monthly(steps), 400.0)
-    assert (ended.watch.alarm_at, ended.watched, ended.fallen_since) == (None, 14, None)
-    again = judged(monthly(np.append(steps, [-2.0, -2.05])), 400.0)
-    assert again.watch.fall is not None
-    assert again.watch.fall.size == pytest.approx(1.0, abs=0.1)
-    assert again.fallen_since == START + timedelta(days=720)
+    assert open_fall(first).size < open_fall(later).size == pytest.approx(1.62, abs=0.1)
 
 
 def test_a_low_first_test_hides_no_fall() -> None:
@@ -79,8 +78,9 @@ def test_a_spindle_that_falls_from_the_beginning_started_where_its_line_does() -
 
 def test_a_rise_is_told_apart() -> None:
     found = judged(monthly(-FALLING))
-    assert found.watch.alarm_at is None
-    assert found.rise.alarm_at == 14
+    assert found.open_fall is None
+    assert found.detection.rise is not None
+    assert found.detection.rise.size == pytest.approx(1.62, abs=0.1)
 
 
 @pytest.mark.parametrize("n", [1, 2, 7])
@@ -110,7 +110,7 @@ def test_of_a_very_long_series_the_newest_thousand_points_are_judged() -> None:
     steps = np.repeat([0.0, -1.0, -1.0], [12, 600, 600]) + np.tile([0.05, -0.05], 606)
     found = judged(monthly(steps))
     assert len(found.points) == 1000
-    assert found.watch.alarm_at is None
+    assert found.open_fall is None
 
 
 def test_a_gap_of_years_divides_nothing_and_the_fall_across_it_is_found() -> None:
@@ -118,9 +118,8 @@ def test_a_gap_of_years_divides_nothing_and_the_fall_across_it_is_found() -> Non
     series = [tapped(30.0 * i + 3000 * (i >= 12), noise[i] - 1.5 * (i >= 12)) for i in range(24)]
     found = judged(series)
     assert len(found.points) == 24
-    assert found.watch.fall is not None
-    assert found.watch.fall.kind == "step"
-    assert found.watch.fall.size == pytest.approx(1.5, abs=0.2)
+    assert open_fall(found).kind == "step"
+    assert open_fall(found).size == pytest.approx(1.5, abs=0.2)
     assert found.fallen_since is not None
     assert found.fallen_since - found.points[11].time > timedelta(days=3000)
     assert found.forecast is not None
@@ -132,8 +131,8 @@ def test_one_outlier_raises_no_alarm_wherever_it_is(at: int) -> None:
     percents = np.random.default_rng(0).normal(0, 0.1, 20)
     percents[at] = -3.0
     found = judged(monthly(percents))
-    assert found.watch.fall is None
-    assert found.watch.asks_again == (at == 19)
+    assert found.open_fall is None
+    assert found.detection.asks_again == (at == 19)
 
 
 def test_the_temperature_of_some_tests_is_enough_and_of_a_few_counts_for_nothing() -> None:

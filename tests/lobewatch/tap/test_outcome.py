@@ -75,7 +75,7 @@ def test_the_light_follows_the_fall_of_the_frequency(folder: MachineFolder) -> N
     assert lights == ["good", "warn", "alarm"]
     worn = tapped(folder, 120, 0.88 * 1720)
     assert "-12 % against the first test" in worn.texts[0]
-    assert worn.next_step.startswith("Do not cut on")
+    assert worn.next_step.startswith("Before the next part")
 
 
 def test_the_fall_has_the_standard_error_of_both_frequencies(folder: MachineFolder) -> None:
@@ -97,7 +97,7 @@ def test_a_worn_direction_is_not_forgotten_when_another_one_is_tapped(folder: Ma
     other = tapped(folder, 60.1, 1700.0, "y")
     assert other.light == "alarm"
     assert any("reference, x: frequency fallen by 12.0 %" in text for text in other.texts)
-    assert other.next_step.startswith("Do not cut on")
+    assert other.next_step.startswith("Before the next part")
 
 
 def test_a_program_that_chatters_is_named(folder: MachineFolder) -> None:

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from dsm import natural_frequencies
 from lobewatch.cli import app
+from lobewatch.decay.change_point import Fall
 from lobewatch.decay.trend import MONTH, TapValue, Trend, day, trend_of
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.stories.demo import PlannedTap, plan_taps
@@ -36,6 +37,11 @@ def judged(taps: list[PlannedTap]) -> Trend:
     return trend_of(series, taps[-1].date)
 
 
+def open_fall(trend: Trend) -> Fall:
+    assert trend.open_fall is not None
+    return trend.open_fall.fall
+
+
 def reached(trend: Trend, percent: float) -> tuple[float, float, float]:
     """Months after the last test at which it has fallen by so much more."""
     assert trend.forecast is not None
@@ -47,8 +53,7 @@ def reached(trend: Trend, percent: float) -> tuple[float, float, float]:
 
 def test_a_steady_fall_is_an_alarm_and_its_date_is_foretold(folder: MachineFolder) -> None:
     found = judged(planned(folder, Story.STEADY))
-    assert found.watch.fall is not None
-    assert found.watch.fall.kind == "slope"
+    assert open_fall(found).kind == "slope"
     assert found.forecast is not None
     now = found.first * math.exp(found.forecast.fitted[-1] / 100)
     true = Wear.of(folder, MONTHS, Story.STEADY).month_of(now * math.exp(-0.02))
@@ -58,16 +63,14 @@ def test_a_steady_fall_is_an_alarm_and_its_date_is_foretold(folder: MachineFolde
 
 def test_a_step_is_called_one_and_nothing_is_foretold(folder: MachineFolder) -> None:
     found = judged(planned(folder, Story.STEP))
-    assert found.watch.fall is not None
-    assert (found.watch.fall.kind, found.watch.fall.point) == ("step", 12)
-    assert found.watch.fall.size == pytest.approx(-100 * math.log(0.98), abs=0.15)
+    assert (open_fall(found).kind, open_fall(found).point) == ("step", 12)
+    assert open_fall(found).size == pytest.approx(-100 * math.log(0.98), abs=0.15)
     assert reached(found, 2.0) == (math.inf, math.inf, math.inf)
 
 
 def test_an_accelerating_fall_is_foretold_earlier_than_its_mean_rate_says(folder: MachineFolder) -> None:
     found = judged(planned(folder, Story.ACCELERATING))
-    assert found.watch.fall is not None
-    assert found.watch.fall.kind == "slope"
+    assert open_fall(found).kind == "slope"
     assert found.rate is not None
     mean = found.points[-1].percent / (MONTHS - 1)
     assert found.rate.high < 2 * mean < 0
@@ -84,14 +87,13 @@ def test_replaced_bearings_bring_the_frequency_back_and_wear_anew(folder: Machin
     before, after = judged(taps[:at]), judged(taps[at:])
     assert after.first / before.first == pytest.approx(1, abs=0.004)
     assert before.points[-1].percent < -5
-    assert before.watch.fall is not None
-    assert after.watch.asks_again  # of nine points the last one is the first that is judged
+    assert after.detection.asks_again  # of nine points the last one is the first that is judged
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_where_nothing_happens_nothing_is_said(folder: MachineFolder, seed: int) -> None:
     found = judged(planned(folder, Story.NONE, seed))
-    assert found.watch.fall is None
+    assert found.open_fall is None
     assert reached(found, 2.0) == (math.inf, math.inf, math.inf)
 
 
@@ -101,7 +103,7 @@ def test_a_swing_of_the_temperature_is_recorded_and_no_decay(folder: MachineFold
     warmth = np.array([tap.conditions.temperature_c for tap in taps], float)
     assert warmth[[0, 6]] == pytest.approx([12.0, 32.0])
     assert np.polyfit(warmth, 100 * np.log(frequencies), 1)[0] == pytest.approx(-0.015, abs=0.003)
-    assert judged(taps).watch.fall is None
+    assert judged(taps).open_fall is None
 
 
 def test_bad_clampings_are_lower_and_as_many_as_asked(folder: MachineFolder) -> None:

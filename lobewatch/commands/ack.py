@@ -1,0 +1,46 @@
+"""lobewatch ack."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lobewatch.machine.folder_path import named_folder
+from lobewatch.show.terminal.output import Json, emit
+
+
+def ack(
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
+    alarm: Annotated[
+        str, typer.Argument(help="The alarm, or a part of its name that no other has; all that ring where not given.")
+    ] = "",
+    until: Annotated[
+        datetime | None,
+        typer.Option(help="When it is to ring again, local time; never where not given."),
+    ] = None,
+    note: Annotated[str, typer.Option(help="What is being done, for those who come next.")] = "",
+    operator: Annotated[str, typer.Option(help="Who says so; the name of the login where not given.")] = "",
+    as_json: Json = False,
+) -> None:
+    """Acknowledge alarms: they are known. It quiets repeats, never the light.
+
+    An alarm is closed by the tap tests alone, or by a new baseline after a repair; one that is raised anew rings again.
+
+    Examples:
+
+      lobewatch ack mill-3
+      lobewatch ack mill-3 decay:reference:x --until 2026-12-01 --note "bearings ordered"
+    """
+    from lobewatch.logbook import Logbook
+    from lobewatch.logbook.acknowledge import acknowledge
+    from lobewatch.notify.telling import telling
+
+    logbook = Logbook.open(machine)
+    with telling(logbook):
+        alarms, now = acknowledge(logbook, alarm, until, note, operator), datetime.now(UTC)
+        texts = [f"{known.id}: {known.acknowledgement}" for known in alarms]
+        closing = "the light stays as it is: tap tests close an alarm, or a new baseline after a repair"
+        emit({"acknowledged": [known.row(now) for known in alarms]}, as_json, *texts, closing)

@@ -1,0 +1,24 @@
+"""The rate as people read it: within its interval, and no zero with a sign of a fall."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from lobewatch.decay.forecast import Rate
+from lobewatch.show.trends.describe_trend import rate_text
+
+
+@pytest.mark.parametrize(
+    ("rate", "text"),
+    [
+        (Rate(-0.1532, -0.1711, -0.1402), "-0.15 % a month now (-0.17 to -0.14, 95 %)"),
+        (Rate(-0.0005, 0.0, 0.0), "+0.0000 % a month now (+0.0000 to +0.0000, 95 %)"),
+        (Rate(-0.0001, -0.2, 0.3), "+0.00 % a month now (-0.20 to +0.30, 95 %)"),
+    ],
+)
+def test_a_rate_lies_within_its_interval(rate: Rate, text: str) -> None:
+    trend: Any = SimpleNamespace(rate=rate)
+    assert rate_text(trend) == text

@@ -94,13 +94,16 @@ def _acknowledged(remark: Remark, alarms: Sequence[Alarm], now: datetime) -> Rem
     return replace(remark, text=f"{remark.text} ({words[0]})") if words else remark
 
 
-def choose_alarms(alarms: Sequence[Alarm], name: str) -> list[Alarm]:
-    """All of them, or the one with this identity, or this part of one; ValueError where none or several fit."""
+def choose_alarms(alarms: Sequence[Alarm], name: str, now: datetime) -> list[Alarm]:
+    """All that ring, or the open one with this identity, or this part of one; ValueError where none or several fit."""
     if not alarms:
         raise ValueError("nothing rings on this machine: there is nothing to acknowledge")
     exact = [alarm for alarm in alarms if alarm.id == name]
-    fitting = exact or [alarm for alarm in alarms if name in alarm.id]
+    fitting = exact or [alarm for alarm in alarms if (name in alarm.id if name else not alarm.is_quiet(now))]
+    names = ", ".join(alarm.id for alarm in alarms)
+    if not fitting and not name:
+        raise ValueError(f"all is acknowledged already; name the alarm to say something else of it: {names}")
     if not fitting or (name and len(fitting) > 1):
         what = f"part of {len(fitting)} alarms" if fitting else "no such alarm"
-        raise ValueError(f"{name!r}: {what}; there ring {', '.join(alarm.id for alarm in alarms)}")
+        raise ValueError(f"{name!r}: {what}; open are {names}")
     return fitting

@@ -16,10 +16,10 @@ from lobewatch.machine.journal.acknowledgement import Acknowledgement
 def acknowledge(
     logbook: Logbook, name: str = "", until: datetime | None = None, note: str = "", operator: str = ""
 ) -> list[Alarm]:
-    """The alarm of this name, or all that are open, with the word that is now in the journal, for good.
+    """The alarm of this name, or all that ring, with the word that is now in the journal, for good.
 
-    until: without a zone local time; operator: the name of the login where empty. ValueError where nothing is open or
-    the name is of none, for an end that is past, and for a note that cannot be told again.
+    until: without a zone local time; operator: the name of the login where empty. ValueError where nothing rings or the
+    name is of none, for an end that is past, and for a note that cannot be told again.
     """
     now = datetime.now(UTC)
     end = None if until is None else until.astimezone(UTC)
@@ -36,7 +36,7 @@ def acknowledge(
                 alarm.code, alarm.about, alarm.raised_by, newest, baseline, now, by, end, note
             ),
         )
-        for alarm in choose_alarms(standing.alarms, name)
+        for alarm in choose_alarms(standing.alarms, name, now)
     ]
     with logbook.folder.locked():
         logbook.folder.journal.append(*(alarm.acknowledgement.line for alarm in alarms if alarm.acknowledgement))

@@ -157,6 +157,9 @@ def test_fixed_limits_and_programs_ring_too_each_with_the_test_that_raised_it(sh
 def test_bad_acknowledgements_are_refused(mill: Shop, run: Run) -> None:
     refused(run("ack", mill.path, "none-such"), "no such alarm", "decay:reference:x:")
     refused(run("ack", mill.path, "--until", "2020-01-01"), "is past")
+    assert run("ack", mill.path, "--note", "known").code == 0
+    refused(run("ack", mill.path), "acknowledged already", "decay:reference:x:")
+    assert "ordered" in run("ack", mill.path, "decay", "--note", "ordered").out
     refused(run("ack", mill.path, "--note", "a\x07b"), "note")
     exclude_all = [tap.id for tap in mill.logbook.taps[12:]]
     for tap_id in exclude_all:

@@ -21,6 +21,7 @@ from lobewatch.show.programs.describe_verdicts import (
     turning_text,
     verdict_text,
 )
+from lobewatch.show.report.for_the_record import for_the_record
 from lobewatch.show.report.lists import events_and_exclusions, tap_tests, test_cuts, tools_and_directions
 from lobewatch.show.report.material import ReportMaterial
 from lobewatch.show.report.picture_sections import lobes_over_time, pictures
@@ -167,5 +168,6 @@ SECTIONS: tuple[Callable[[ReportMaterial], Sequence[Section]], ...] = (
     newest_modes,
     test_cuts,
     tap_tests,
+    for_the_record,
 )
 """Functions that make the sections, in the order of the page; each gives none where there is nothing to show."""

@@ -107,7 +107,10 @@ def test_acknowledged_is_said_everywhere_and_the_light_stays(mill: Shop, run: Ru
     words = f"by Kim until {until}: bearings ordered)"
     assert words in row["note"]
     assert run("report", mill.path, "--out", "r.html").code == 0
-    assert words in Path("r.html").read_text("utf-8")
+    page = Path("r.html").read_text("utf-8")
+    assert words in page
+    assert "decay, raised" in page[page.index("For whoever signs") :]
+    assert words.strip("by )") in page[page.index("For whoever signs") :]
     assert "Kim" in run("history", mill.path).out
 
 

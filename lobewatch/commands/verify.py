@@ -25,11 +25,12 @@ def verify(
 
       lobewatch verify mill-3
     """
+    from lobewatch.machine.archive.verify import DAMAGE
     from lobewatch.machine.archive.verify import verify as verify_folder
     from lobewatch.show.terminal.output import remark_json
 
     verification = verify_folder(machine)
-    notes = [remark for remark in verification.remarks if remark not in verification.damage]
+    notes = [remark for remark in verification.remarks if remark.code not in DAMAGE]
     payload = {
         "damage": [remark_json(remark) for remark in verification.damage],
         "remarks": [remark_json(remark) for remark in notes],

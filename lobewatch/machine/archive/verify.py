@@ -215,7 +215,7 @@ def _verify_names(folder: Path) -> Iterator[Remark]:
             )
         elif path.name not in OURS:
             yield Remark("not-verified", path.name, "no file of lobewatch")
-    taps = folder / "taps"
+    taps, files = folder / "taps", {*tap_files(folder).values()}
     for path in sorted(taps.iterdir()) if taps.is_dir() else []:
-        if path.name not in {file.name for file in tap_files(folder).values()}:
+        if path not in files:
             yield Remark("not-verified", f"taps/{path.name}", "no tap file, does not count", "take it out of taps/")

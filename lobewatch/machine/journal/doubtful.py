@@ -18,6 +18,9 @@ from acquisition.files.seal import is_broken, is_sealed
 from acquisition.regular_file import IrregularFileError, read_regular
 from lobewatch.machine.journal.tap_entry import TapEntry
 
+HDF5 = b"\x89HDF\r\n\x1a\n"
+"""Begin of every HDF5 file that a tap test was ever written to; no program is started for others."""
+
 
 def read_doubtful(path: Path) -> TapEntry | None:
     """Entry of the tap test in a file; None where it is no whole one."""
@@ -25,7 +28,7 @@ def read_doubtful(path: Path) -> TapEntry | None:
         content = read_regular(path)
     except IrregularFileError:
         return None
-    if is_broken(content):
+    if is_broken(content) or not content.startswith(HDF5):
         return None
     return _read(path) if is_sealed(content) else _read_apart(path)
 

@@ -23,6 +23,8 @@ from lobewatch.machine.journal.tap_entry import TapEntry, tap_entries
 PROVED_BYTES, PROVED_FILES = 10_000_000, 50
 """Tap files whose SHA-256 is compared whenever a machine is looked at, the newest first, as long as they are neither
 more bytes nor more files; lobewatch verify takes all."""
+NAMED = 20
+"""Files without a line that are named one by one; chosen."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,10 @@ def contents_of(folder: Path, reading: Reading) -> FolderContents:
         taps = [*_oldest_first([*taps, *whole])]
     else:
         cure = f"{command('verify', folder)} says what it is and what to do"
-        remarks += [unlisted_file(path, "not in the journal, does not count", cure) for path in extra]
+        remarks += [unlisted_file(path, "not in the journal, does not count", cure) for path in extra[:NAMED]]
+        if extra[NAMED:]:
+            text = f"{len(extra) - NAMED} more files that are not in the journal, they do not count"
+            remarks.append(Remark("tap-unlisted", "taps", text, cure))
     cuts = committed_cuts(reading)
     acknowledgements = acknowledgements_of(reading.others)
     return FolderContents(

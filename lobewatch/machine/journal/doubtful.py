@@ -15,11 +15,9 @@ from typing import Any
 from acquisition import read_tap, read_tap_hits
 from acquisition.apart import run_apart
 from acquisition.files.seal import is_broken, is_sealed
+from acquisition.files.tap_recording import MAGIC
 from acquisition.regular_file import IrregularFileError, read_regular
 from lobewatch.machine.journal.tap_entry import TapEntry
-
-HDF5 = b"\x89HDF\r\n\x1a\n"
-"""Begin of every HDF5 file that a tap test was ever written to; no program is started for others."""
 
 
 def read_doubtful(path: Path) -> TapEntry | None:
@@ -28,7 +26,7 @@ def read_doubtful(path: Path) -> TapEntry | None:
         content = read_regular(path)
     except IrregularFileError:
         return None
-    if is_broken(content) or not content.startswith(HDF5):
+    if is_broken(content) or not content.startswith(MAGIC):
         return None
     return _read(path) if is_sealed(content) else _read_apart(path)
 

@@ -52,3 +52,6 @@ def test_every_file_is_named(shop: Shop) -> None:
     for name in names:
         Path(shop.path / name).write_bytes(b"no HDF5")
     assert sorted(remark.about for remark in verify(shop.path).damage) == sorted(names)
+    remarks = [remark for remark in shop.folder.contents().remarks if remark.code == "tap-unlisted"]
+    assert len(remarks) == 21
+    assert (remarks[-1].about, remarks[-1].text[:13]) == ("taps", "10 more files")

@@ -29,7 +29,8 @@ def open_regular(path: Path | str, largest: float = LARGEST) -> FileIO:
     try:
         status = os.fstat(handle)
         if not stat.S_ISREG(status.st_mode):
-            raise IrregularFileError(errno.EINVAL, "no file but a folder, a pipe or a device; take it away", str(path))
+            kind = "directory" if stat.S_ISDIR(status.st_mode) else "pipe or a device"
+            raise IrregularFileError(errno.EINVAL, f"is a {kind}, not a file", str(path))
         if status.st_size > largest:
             sizes = f"has {status.st_size / 1e6:.4g} MB, at most {largest / 1e6:g} MB are read"
             raise IrregularFileError(errno.EFBIG, f"{sizes}; put it back from a backup, or take it away", str(path))

@@ -41,24 +41,24 @@ def mills(shop: Shop, tmp_path: Path) -> Path:
     return tmp_path / "mills"
 
 
-def test_the_worst_is_first_and_an_alarm_ends_with_1(mills: Path) -> None:
+def test_what_cannot_be_judged_is_first_then_the_worst_and_an_alarm_ends_with_1(mills: Path) -> None:
     told = run(mills, "--json")
     found = json.loads(told.stdout)["machines"]
     assert told.exit_code == 1
     assert [(one["key"], one["light"]) for one in found] == [
-        ("worn", "alarm"),
         ("bad", "unknown"),
+        ("worn", "alarm"),
         ("new", "unknown"),
         ("good", "good"),
     ]
-    assert found[0]["fall"] == pytest.approx(12.0, abs=0.01)
+    assert found[1]["fall"] == pytest.approx(12.0, abs=0.01)
     text = run(mills).stdout
     assert "4 machines: 1 alarm, 2 unknown, 1 good" in text
-    assert text.index("worn") < text.index("bad") < text.index("new") < text.index("good ")
+    assert text.index("bad") < text.index("worn") < text.index("new") < text.index("good ")
 
 
-def test_without_an_alarm_it_ends_with_0(mills: Path) -> None:
-    assert run(mills / "good").exit_code == 0
+def test_without_an_alarm_it_ends_with_0_but_not_where_a_machine_cannot_be_judged(mills: Path) -> None:
+    assert [run(mills / name).exit_code for name in ("good", "new", "bad")] == [0, 0, 1]
 
 
 def test_due_shows_those_to_be_tapped_alone(mills: Path) -> None:

@@ -180,9 +180,9 @@ def test_another_machine_toml_is_analysed_anew(tmp_path: Path) -> None:
 def test_the_list_is_worst_first_and_nothing_is_listed_without_the_token(shop: Path) -> None:
     with DashboardServer(shop) as server:
         status, answer = ask(server, "GET", "/machines")
-        assert [one["key"] for one in answer["machines"]] == ["b-worn", "c-untapped", "d-broken", "a-new"]
-        assert [one["light"] for one in answer["machines"]] == ["alarm", "unknown", "unknown", "warn"]
-        assert "machine.toml" in answer["machines"][2]["note"]
+        assert [one["key"] for one in answer["machines"]] == ["d-broken", "b-worn", "c-untapped", "a-new"]
+        assert [one["light"] for one in answer["machines"]] == ["unknown", "alarm", "unknown", "warn"]
+        assert "machine.toml" in answer["machines"][0]["note"]
         assert status == 200
         assert ask(server, "GET", "/machines", token="wrong-token-wrong")[0] == 401
         for action in ("start", "report"):

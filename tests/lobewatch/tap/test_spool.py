@@ -155,10 +155,10 @@ def test_hits_spooled_before_there_were_checksums_are_read(interrupted: Path, op
 def test_a_disk_that_cannot_be_read_is_no_damaged_hit(
     interrupted: Path, open_folder: MachineFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fail(path: Path) -> bytes:
+    def fail(path: Path, *_: object) -> bytes:
         raise OSError(5, "Input/output error", str(path))
 
-    monkeypatch.setattr(Path, "read_bytes", fail)
+    monkeypatch.setattr("lobewatch.tap.spool.read_regular", fail)
     with pytest.raises(OSError, match="Input/output error"):
         begun_again(open_folder)
     assert (interrupted / "0000.h5").is_file()

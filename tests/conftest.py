@@ -84,6 +84,7 @@ class ScriptedSession:
 
     def __init__(self) -> None:
         self.state = TapState(1, TapStep.CHECKING, "mill-3, tool reference, direction x", device="DI-2108, 51200 Hz")
+        self.wakes: set[Callable[[], None]] = set()
         self.undone = threading.Event()
         self.stopped = threading.Event()
         self.refusal = ""
@@ -91,6 +92,8 @@ class ScriptedSession:
     def show(self, word: TapStep, **changes: object) -> TapState:
         """The next state."""
         self.state = replace(self.state, revision=self.state.revision + 1, word=word, **changes)  # type: ignore[arg-type]
+        for wake in tuple(self.wakes):
+            wake()
         return self.state
 
     def check(self) -> None:

@@ -23,12 +23,12 @@ from lobewatch.notify.prometheus import CONTENT_TYPE, prometheus_text
 from lobewatch.plant.plant import MachineStanding, Plant, find_machines
 from lobewatch.screen.guard import MAY_ALTER, OPEN, WATCH
 from lobewatch.screen.live_test import LiveTest
+from lobewatch.screen.return_memory import return_memory
 from lobewatch.screen.routes import add_pages, add_session
 from lobewatch.screen.web_thread import WebThread
 from lobewatch.show.plant.plant_rows import plant_row
 from lobewatch.show.report.page import script_sources
 from lobewatch.show.report.report import render_report
-from lobewatch.show.terminal.printer import RunningTest
 from lobewatch.tap.spool import interrupted_tests
 
 REPORT_POLICY = (
@@ -103,7 +103,7 @@ class DashboardServer(WebThread):
             raise web.HTTPNotFound(text="there is no such machine")
         return key, MachineFolder(self._machines[key])
 
-    def _find_test(self, request: web.Request) -> RunningTest:
+    def _find_test(self, request: web.Request) -> LiveTest:
         """Newest test of a machine: a page that has watched one to its end sees the next."""
         test = self._tests.get(request.match_info["machine"])
         if test is None:
@@ -134,6 +134,7 @@ class DashboardServer(WebThread):
     async def _write_report(self, request: web.Request) -> web.Response:
         key, folder = self._find_machine(request)
         html = await asyncio.to_thread(_render, folder)
+        await asyncio.to_thread(return_memory)
         self._reports[key] = (secrets.token_urlsafe(24), html)
         return web.json_response({"url": f"/report/{quote(key)}/{self._reports[key][0]}"})
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable
+import contextlib
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 from aiohttp import WSCloseCode, web
 
@@ -14,8 +15,6 @@ from lobewatch.tap.state import TapState
 
 PERIOD = 0.05
 """Time between two states, but for a new word (s)."""
-LOOK = 0.01
-"""Time between two looks for one (s)."""
 SIGN_OF_LIFE = 1.0
 """Time without a change until an empty message (s): the page takes 3 s of silence for a lost connection."""
 
@@ -24,6 +23,21 @@ ENDING = web.AppKey("ENDING", asyncio.Event)
 
 
 State = TypeVar("State", TapState, CutState)
+NewestState = TypeVar("NewestState", TapState, CutState, covariant=True)
+
+
+class PictureSource(Protocol[NewestState]):
+    """A live test, or a cut that is listened to."""
+
+    @property
+    def state(self) -> NewestState:
+        """The newest picture of it."""
+        ...
+
+    @property
+    def wakes(self) -> set[Callable[[], None]]:
+        """Functions that are called after every change, by the thread that has made it."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -36,24 +50,61 @@ class Messages(Generic[State]):
     """Message of the `plots` of a state."""
 
 
-async def feed(request: web.Request, newest: Callable[[], State], messages: Messages[State]) -> web.WebSocketResponse:
-    """Send what newest() gives until the page or the server closes; only here is waited for a slow page."""
+class _Following(Generic[State]):
+    """What one page follows, and the event of its changes."""
+
+    def __init__(self, find: Callable[[], PictureSource[State]]) -> None:
+        self._find: Callable[[], PictureSource[State]] = find
+        self._loop = asyncio.get_running_loop()
+        self._followed: PictureSource[State] | None = None
+        self.changed = asyncio.Event()
+
+    def look(self) -> State:
+        """The newest state, also of the test that has taken the place of the one before."""
+        followed = self._find()
+        if followed is not self._followed:
+            self.end()
+            followed.wakes.add(self._wake)
+            self._followed = followed
+        self.changed.clear()
+        return followed.state
+
+    def end(self) -> None:
+        """Be told of nothing more."""
+        if self._followed is not None:
+            self._followed.wakes.discard(self._wake)
+
+    def _wake(self) -> None:
+        with contextlib.suppress(RuntimeError):  # the server has closed
+            self._loop.call_soon_threadsafe(self.changed.set)
+
+
+async def feed(
+    request: web.Request, find: Callable[[], PictureSource[State]], messages: Messages[State]
+) -> web.WebSocketResponse:
+    """Send the states of what find() gives until the page or the server closes; only here is waited for a slow page."""
     socket = web.WebSocketResponse(protocols=("lobewatch",), heartbeat=10, max_msg_size=1024, compress=False)
     await socket.prepare(request)
-    ending = request.app[ENDING]
-    closed = asyncio.create_task(_until_closed(socket))
+    following = _Following(find)
+    # A page sends nothing: whatever comes ends the feed.
+    ends = [
+        asyncio.create_task(_set_after(end, following.changed))
+        for end in (socket.receive(), request.app[ENDING].wait())
+    ]
     try:
-        await _send_changes(socket, newest, messages, lambda: ending.is_set() or closed.done())
+        await _send_changes(socket, following, messages, lambda: any(end.done() for end in ends))
         await socket.close(code=WSCloseCode.GOING_AWAY)
     except ConnectionError:
         pass  # the page is gone
     finally:
-        closed.cancel()
+        following.end()
+        for end in ends:
+            end.cancel()
     return socket
 
 
 async def _send_changes(
-    socket: web.WebSocketResponse, newest: Callable[[], State], messages: Messages[State], over: Callable[[], bool]
+    socket: web.WebSocketResponse, following: _Following[State], messages: Messages[State], over: Callable[[], bool]
 ) -> None:
     clock = asyncio.get_running_loop().time
     sent: State | None = None
@@ -61,21 +112,25 @@ async def _send_changes(
     last = clock()
     while True:
         ended = over()
-        state = newest()
+        state = following.look()
         due = sent is None or state.word is not sent.word or clock() - last >= PERIOD or ended
         if state is not sent and due:
             if state.plots is not None and state.plots is not plots:
                 await socket.send_bytes(messages.plots(state.plots))
             await socket.send_str(messages.state(state))
             sent, plots, last = state, state.plots, clock()
-        elif clock() - last > SIGN_OF_LIFE:
+        elif clock() - last >= SIGN_OF_LIFE:
             await socket.send_str("{}")
             last = clock()
         if ended:
             return
-        await asyncio.sleep(LOOK)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout_at(last + (SIGN_OF_LIFE if state is sent else PERIOD)):
+                await following.changed.wait()
 
 
-async def _until_closed(socket: web.WebSocketResponse) -> None:
-    """Wait for the page to close: it sends nothing; whatever comes ends the feed."""
-    await socket.receive()
+async def _set_after(end: Awaitable[object], event: asyncio.Event) -> None:
+    try:
+        await end
+    finally:
+        event.set()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 
 from acquisition import DataError, TapDirection
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.notify.telling import tell
+from lobewatch.screen.return_memory import return_memory
 from lobewatch.tap.hit_loop import TapStopped
 from lobewatch.tap.session import plan_session
 from lobewatch.tap.state import TapState, TapStep
@@ -31,6 +33,11 @@ class LiveTest:
     def state(self) -> TapState:
         """Newest state of the test, also after its end."""
         return self._end or self._session.state
+
+    @property
+    def wakes(self) -> set[Callable[[], None]]:
+        """Functions that are called after every change but that of the end by `stop`."""
+        return self._session.wakes
 
     @property
     def running(self) -> bool:
@@ -59,3 +66,5 @@ class LiveTest:
             self._end = replace(state, word=TapStep.FAILED, reason=reason)
         except (OSError, RuntimeError, ValueError):
             pass  # the session shows its failure itself
+        finally:
+            return_memory()

@@ -5,16 +5,22 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from importlib import resources
+from typing import Protocol
 
 from aiohttp import web
 
-from lobewatch.screen.feed import Messages, State, feed
+from lobewatch.screen.feed import PictureSource, Messages, State, feed
 from lobewatch.screen.guard import MAY_ALTER, OPEN
 from lobewatch.screen.messages import plots_message, state_message
 from lobewatch.show.terminal.printer import RunningTest
+from lobewatch.tap.state import TapState
 
 TYPES = {"css": "text/css", "html": "text/html", "js": "text/javascript", "svg": "image/svg+xml"}
 """Content types of the files of pages, by the ending of their names."""
+
+
+class WatchedTest(RunningTest, PictureSource[TapState], Protocol):
+    """A live tap test that pages follow."""
 
 
 def add_pages(application: web.Application, pages: dict[str, str]) -> None:
@@ -41,23 +47,26 @@ def add_pages(application: web.Application, pages: dict[str, str]) -> None:
 
 
 def add_feed(
-    application: web.Application, prefix: str, newest: Callable[[web.Request], State], messages: Messages[State]
+    application: web.Application,
+    prefix: str,
+    find: Callable[[web.Request], PictureSource[State]],
+    messages: Messages[State],
 ) -> None:
-    """Serve what is only watched. `newest` raises HTTPNotFound where there is nothing."""
+    """Serve what is only watched. `find` raises HTTPNotFound where there is nothing."""
 
     async def follow(request: web.Request) -> web.StreamResponse:
-        newest(request)
-        return await feed(request, lambda: newest(request), messages)
+        find(request)
+        return await feed(request, lambda: find(request), messages)
 
     async def access(request: web.Request) -> web.Response:
-        newest(request)
+        find(request)
         return web.json_response({"may_alter": request[MAY_ALTER]})
 
     application.router.add_get(f"{prefix}feed", follow)
     application.router.add_get(f"{prefix}access", access)
 
 
-def add_session(application: web.Application, prefix: str, find: Callable[[web.Request], RunningTest]) -> None:
+def add_session(application: web.Application, prefix: str, find: Callable[[web.Request], WatchedTest]) -> None:
     """Serve the screen of a session: its feed, undo and stop. `find` raises HTTPNotFound where there is none."""
 
     async def undo(request: web.Request) -> web.Response:
@@ -68,7 +77,7 @@ def add_session(application: web.Application, prefix: str, find: Callable[[web.R
         await asyncio.to_thread(find(request).stop)
         return web.json_response({})
 
-    add_feed(application, prefix, lambda request: find(request).state, Messages(state_message, plots_message))
+    add_feed(application, prefix, find, Messages(state_message, plots_message))
     application.router.add_post(f"{prefix}undo", undo)
     application.router.add_post(f"{prefix}stop", stop)
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from lobewatch.screen.feed import Messages
 from lobewatch.screen.messages import curves_message, cut_message
-from lobewatch.screen.routes import add_feed, add_pages, add_session
+from lobewatch.screen.routes import WatchedTest, add_feed, add_pages, add_session
 from lobewatch.screen.web_thread import WebThread
-from lobewatch.show.terminal.printer import RunningTest
 from lobewatch.tap.listening.cut_state import CutState
 from lobewatch.tap.publisher import Pictures
 
@@ -20,7 +19,7 @@ class ScreenServer(WebThread):
 
     def __init__(
         self,
-        session: RunningTest,
+        session: WatchedTest,
         *,
         listen: str = "127.0.0.1",
         port: int = 0,
@@ -47,4 +46,4 @@ class CutScreenServer(WebThread):
         """At any free port. Token None: a new one. ValueError for a token that does not fit into an address."""
         super().__init__(listen, 0, token, watch_token)
         add_pages(self.application, {"/": "listen.html"})
-        add_feed(self.application, "/", lambda _: pictures.state, Messages(cut_message, curves_message))
+        add_feed(self.application, "/", lambda _: pictures, Messages(cut_message, curves_message))

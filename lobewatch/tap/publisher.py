@@ -30,6 +30,8 @@ class Pictures(Generic[State]):
         """clock: seconds that never go back."""
         self._state: State = first
         self._clock, self._shown_at = clock, clock()
+        self.wakes: set[Callable[[], None]] = set()
+        """Functions that are called after every change, by the thread that has made it; none may take time."""
 
     @property
     def state(self) -> State:
@@ -45,6 +47,8 @@ class Pictures(Generic[State]):
         """Replace the picture by one with these fields of it."""
         self._state = replace(self._state, revision=self._state.revision + 1, **changes)
         self._shown_at = self._clock()
+        for wake in tuple(self.wakes):
+            wake()
 
 
 class Publisher(Pictures[TapState]):

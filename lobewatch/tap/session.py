@@ -71,6 +71,11 @@ class TapSession:
         return self._publisher.state
 
     @property
+    def wakes(self) -> set[Callable[[], None]]:
+        """Functions that are called after every new picture, by the thread of the test; none may take time."""
+        return self._publisher.wakes
+
+    @property
     def measurement(self) -> Measurement:
         """Measurement that the finished test gives of the spindle; ValueError before the end."""
         if self._measurement is None:

@@ -25,7 +25,7 @@ from lobewatch.screen import ScreenServer
 from lobewatch.screen.web_thread import WebThread
 from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE
 from lobewatch.tap.session import TapSession
-from lobewatch.tap.state import Plots, TapStep
+from lobewatch.tap.state import Plots, TapState, TapStep
 
 TOKEN = "a-token-of-the-test"
 Session = Any
@@ -116,6 +116,42 @@ def test_without_the_token_nothing_is_altered_or_told(session: Session, given: s
             assert "address that lobewatch printed" in answer["error"]
     assert not session.undone.is_set()
     assert not session.stopped.is_set()
+
+
+class Watched:
+    """A session, and how often it is looked at."""
+
+    def __init__(self, session: Session) -> None:
+        self._session, self.wakes, self.looks = session, session.wakes, 0
+
+    @property
+    def state(self) -> TapState:
+        self.looks += 1
+        state: TapState = self._session.state
+        return state
+
+    def undo(self) -> None: ...
+
+    def stop(self) -> None: ...
+
+
+def test_nothing_is_looked_at_while_nothing_changes(session: Session) -> None:
+    """But once a second, for the sign of life; what has changed is sent at once, and a page that is gone not told."""
+    watched, kinds = Watched(session), []
+
+    async def talk(feed: aiohttp.ClientWebSocketResponse) -> None:
+        kinds.append((await next_state(feed))["kind"])
+        for _ in range(2):
+            assert await feed.receive_str(timeout=10) == "{}"
+        assert watched.looks <= 10
+        await asyncio.to_thread(session.show, TapStep.WAIT)
+        kinds.append((await next_state(feed))["kind"])
+        assert len(session.wakes) == 1
+
+    with ScreenServer(watched, token=TOKEN) as server:
+        follow(server, talk)
+    assert kinds == ["checking", "wait"]
+    assert session.wakes == set()
 
 
 def test_with_the_token_it_is(session: Session) -> None:

@@ -24,7 +24,7 @@ from lobewatch.machine.contents import (
     tap_files,
 )
 from lobewatch.machine.folder_lock import PATIENCE, FolderLock
-from lobewatch.machine.folder_path import mark_of, named_folder
+from lobewatch.machine.folder_path import mark_of, named_folder, path_text
 from lobewatch.machine.journal.journal import Journal, Reading, command
 from lobewatch.machine.journal.tap_entry import DamagedTapError, TapEntry
 from lobewatch.machine.settings.machine_file import Machine, read_machine
@@ -35,8 +35,10 @@ class MachineFolder:
     """The folder of one machine, and the one way to add to it."""
 
     def __init__(self, path: Path | str) -> None:
-        """DataError where this is no machine folder."""
+        """DataError where this is no machine folder, or one whose name no file or page could hold."""
         self.path = named_folder(path)
+        if path_text(path) != str(path):
+            raise DataError(f"{path_text(path)}: the name of the folder is no UTF-8; rename it")
         if not self.toml.exists() and tap_files(self.path):
             raise DataError(
                 f"{self.toml}: is missing beside tap tests; put it back from a backup; without one, "

@@ -19,6 +19,11 @@ def named_folder(name: Path | str) -> Path:
     return Path(name)
 
 
+def path_text(path: Path | str) -> str:
+    """Path as a text that every file and page can hold: what of it is no UTF-8 stands there as escaped."""
+    return str(path).encode("utf-8", "backslashreplace").decode()
+
+
 def mark_of(folder: Path, file: str = "") -> tuple[int, ...]:
     """Changes with machine.toml, the journal, the names in taps/, and a file in the folder where one is named."""
     stats = []

@@ -13,7 +13,7 @@ import lobewatch.plant as plant
 from acquisition import DataError, Remark
 from acquisition.errors import failure_text
 from lobewatch.decay.light import Light
-from lobewatch.machine.folder_path import mark_of
+from lobewatch.machine.folder_path import mark_of, path_text
 from lobewatch.plant.standing_file import LASTING, read_standing
 from lobewatch.plant.summary import DatedStanding, Summary, unreadable_summary
 
@@ -50,11 +50,11 @@ class _ReadSummary(NamedTuple):
 def find_machines(path: Path) -> dict[str, Path]:
     """The machine at this path, or all in this folder, by name of their folders; DataError where there is none."""
     if any((path / name).exists() for name in KNOWN_BY):
-        return {path.resolve().name: path}
-    machines = {file.parent.name: file.parent for name in KNOWN_BY for file in sorted(path.glob(f"*/{name}"))}
-    if not machines:
+        return {path_text(path.resolve().name): path}
+    folders = {file.parent for name in KNOWN_BY for file in path.glob(f"*/{name}")}
+    if not folders:
         raise DataError(f"{path}: neither a machine folder nor a folder of them; make one with: lobewatch init")
-    return machines
+    return {path_text(folder.name): folder for folder in sorted(folders)}
 
 
 class Plant:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import urllib.request
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,12 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from acquisition import DataError
 from lobewatch.cli import app
 from lobewatch.decay.light import Light
+from lobewatch.logbook import Logbook
 from lobewatch.plant.plant import Plant, find_machines
+from lobewatch.screen import DashboardServer
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -54,3 +58,21 @@ def test_one_damaged_machine_among_many_costs_its_own_line_alone(shop: Shop, tmp
     found = Plant(find_machines(tmp_path / "mills")).standings(shop.start + timedelta(days=1))
     assert [one.key for one in found if one.dated.light is not Light.GOOD] == ["017"]
     assert len(found) == 30
+
+
+def test_a_folder_whose_name_is_no_text_is_refused_and_costs_the_others_nothing(shop: Shop, tmp_path: Path) -> None:
+    shop.put("")
+    shop.tap_both()
+    for name in ("good", "b\udcff"):
+        shutil.copytree(shop.path, tmp_path / "mills" / name)
+    with pytest.raises(DataError, match=r"b\\udcff: the name of the folder is no UTF-8; rename it"):
+        Logbook.open(tmp_path / "mills" / "b\udcff")
+    with DashboardServer(tmp_path / "mills") as server:
+        for path in ("machines", "metrics"):
+            headers = {"Authorization": f"Bearer {server.token}"}
+            with urllib.request.urlopen(urllib.request.Request(f"{server.origin}/{path}", headers=headers)) as answer:
+                told = answer.read().decode()
+            assert "good" in told
+            assert r"b\\udcff" in told
+    found = Plant(find_machines(tmp_path / "mills")).standings()
+    assert [(one.key, one.dated.can_be_judged) for one in found] == [(r"b\udcff", False), ("good", True)]

@@ -144,8 +144,9 @@ def _restore_machine_file(folder: Path) -> Iterator[str]:
 
 
 def _mend_devices(folder: Path) -> Iterator[str]:
+    machine = MachineFolder(folder)
     try:
-        read_known_devices(MachineFolder(folder))
+        read_known_devices(machine)
     except DataError:
         aside = _put_aside(folder, folder / "daq.json")
         yield f"daq.json: put into {aside.relative_to(folder).as_posix()}; the rates of DAQs are measured anew"

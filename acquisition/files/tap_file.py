@@ -121,6 +121,9 @@ def _open(path: Path) -> h5py.File:
             versions = f"a tap file of version {newest}, this lobewatch reads up to {VERSION}"
             raise DataError(f"{path}: {versions}; update lobewatch")
         check_unpacked(file, len(content), path)
+    except (OSError, LookupError, RuntimeError) as error:
+        file.close()
+        raise DataError(f"{path}: no readable HDF5 file ({error}); is it cut short?") from error
     except BaseException:
         file.close()
         raise

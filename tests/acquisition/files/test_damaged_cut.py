@@ -18,7 +18,11 @@ CODES = np.random.default_rng(0).integers(-900, 900, 3000).astype(np.int32)
 
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
-    write_cut_signal(tmp_path / "c1.h5", CutSignal(CODES * CHANNEL.scale, 51200.0, CODES, CHANNEL), {"id": "c1"})
+    write_cut_signal(
+        tmp_path / "c1.h5",
+        CutSignal(np.asarray(CODES * CHANNEL.scale, np.float64), 51200.0, CODES, CHANNEL),
+        {"id": "c1"},
+    )
     return tmp_path / "c1.h5"
 
 

@@ -34,9 +34,9 @@ def heard(shop: Shop) -> Path:
     """A tapped machine with two cuts that were recorded."""
     shop.run(("A", 12000, 2.0))
     shop.tap_both()
-    for speed, word in ((12000.0, "chatter"), (11000.0, "stable")):
-        cut = observe_cut(cut_setting(shop.folder.machine, "A", speed, 2.0), word, None)
-        signal = CutSignal(CODES * CHANNEL.scale, 51200.0, CODES, CHANNEL)
+    for speed in (12000.0, 11000.0):
+        cut = observe_cut(cut_setting(shop.folder.machine, "A", speed, 2.0), "chatter", None)
+        signal = CutSignal(np.asarray(CODES * CHANNEL.scale, np.float64), 51200.0, CODES, CHANNEL)
         keep_cut(shop.folder, replace(cut, by="accelerometer"), signal)
     path: Path = shop.path
     return path

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from aiohttp import web
 
-from lobewatch.screen.feed import PictureSource, Messages, State, feed
+from lobewatch.screen.feed import Messages, PictureSource, State, feed
 from lobewatch.screen.guard import MAY_ALTER, OPEN
 from lobewatch.screen.messages import plots_message, state_message
 from lobewatch.show.terminal.printer import RunningTest

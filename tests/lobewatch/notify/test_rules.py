@@ -12,7 +12,7 @@ import pytest
 
 PAGE = (Path(__file__).parents[3] / "docs" / "alarms.md").read_text("utf-8")
 PROMTOOL = shutil.which("promtool", path=f"{os.environ['PATH']}:/usr/sbin:/usr/local/sbin")
-(RULES,) = (block for block in re.findall(r"^```yaml\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE) if "rules:" in block)
+(RULES,) = (block for block in re.findall(r"^```yaml\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE) if "groups:" in block)
 ALERTS = re.findall(r"alert: (\w+)", RULES)
 MILL = 'folder="m", machine="mill"'
 

@@ -45,7 +45,7 @@ class DateRange(NamedTuple):
     """Dates of the series between which a level is reached."""
 
     earliest: float
-    """Date at a probability of 10 %; -inf where it is reached already, inf where not before the horizon."""
+    """Date at a probability of 10 %; -inf where it is reached at the last point, inf where not before the horizon."""
     probable: float
     """Date at a probability of 50 %."""
     latest: float
@@ -76,7 +76,7 @@ class Forecast:
     fitted: Floats
     """Mean of the mixture at the points themselves, shape (n,)."""
     dates: Floats
-    """Dates from now to the horizon, shape (d,); where that has passed, all are the horizon."""
+    """Dates from the last point to the horizon, shape (d,)."""
     mean: Floats
     """Mean of each shape at these dates, shape (j, d)."""
     error: Floats
@@ -124,15 +124,12 @@ class Forecast:
         return np.asarray((low + high) / 2)
 
 
-def forecast(
-    dates: Floats, y: Floats, horizon: float, temperature: Floats | None = None, now: float = -np.inf
-) -> Forecast:
+def forecast(dates: Floats, y: Floats, horizon: float, temperature: Floats | None = None) -> Forecast:
     """Foretell a series y (n,) over its dates (n,), increasing, to a date, but never farther than twice its own span.
 
-    temperature: at each point (K or degC), NaN where it was not recorded; now: if that is later than the last point.
-    ValueError below 8 points and without a span.
+    temperature: at each point (K or degC), NaN where it was not recorded. ValueError below 8 points and without a span.
     """
-    return fit_past(dates, y, temperature).ahead(horizon, now)
+    return fit_past(dates, y, temperature).ahead(horizon)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,11 +151,10 @@ class PastFit:
     first: float
     """Value of the first point."""
 
-    def ahead(self, horizon: float, now: float = -np.inf) -> Forecast:
-        """Forecast until a date; now: if that is later than the last point."""
+    def ahead(self, horizon: float) -> Forecast:
+        """Forecast until a date."""
         begin, span = float(self.dates[0]), float(self.dates[-1] - self.dates[0])
-        start = min(max(span, now - begin), 3 * span)
-        at = np.linspace(start, max(min(horizon - begin, 3 * span), start), LOOKS)
+        at = np.linspace(span, min(max(horizon - begin, span), 3 * span), LOOKS)
         mean, error = self.fits.at(courses(self.shapes, at, span))
         moved = tuple(Shape(shape.kind, shape.start + begin, *shape[2:]) for shape in self.shapes)
         mean = mean + self.first

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from lobewatch.decay.day_points import PercentSeries, Span, divide_into_points
 from lobewatch.decay.detection import DetectedFall, Detection, detect
 from lobewatch.decay.forecast import ENOUGH, Forecast, PastFit, Rate, fit_past
+from lobewatch.decay.reach import NOBODY_KNOWS, Reach
 
 MOST = 1000
 """Number of newest points that alone are judged; chosen, as the work grows with its square."""
 MONTH = 30.44
 """Mean length of a month (days)."""
 HORIZON_DAYS = 36 * MONTH
-"""Time ahead (days) beyond which nothing is foretold; chosen."""
+"""Time after the last point (days) beyond which nothing is foretold; chosen."""
 STARTERS = 3
 """Points that the start of a series is looked for in while it has no fitted line; chosen."""
 
@@ -83,7 +84,7 @@ class Trend:
     @cached_property
     def forecast(self) -> Forecast | None:
         """Forecast over days since 1970; None below 8 points."""
-        return None if self.past is None else self.past.ahead(self.today + HORIZON_DAYS, self.today)
+        return None if self.past is None else self.past.ahead(float(self.past.dates[-1]) + HORIZON_DAYS)
 
     @property
     def start(self) -> float:
@@ -100,6 +101,20 @@ class Trend:
     def is_stale(self) -> bool:
         """Whether today is farther from its last point than anything is foretold."""
         return self.forecast is not None and self.today > self.forecast.dates[-1]
+
+    @property
+    def can_be_foretold(self) -> bool:
+        """Whether it is long enough, and young enough."""
+        return self.past is not None and not self.is_stale
+
+    def reach(self, percent: float, error: float = 0.0) -> Reach:
+        """When it falls to a level: 100 ln of the frequency there over that of its first test; error: of that."""
+        if self.forecast is None or self.is_stale:
+            return NOBODY_KNOWS
+        dates = self.forecast.reached(percent, error)
+        first, last = (float(day) for day in self.forecast.dates[[0, -1]])
+        earliest, probable, latest = (None if day == math.inf else max(day, first) for day in dates)
+        return Reach(False, earliest, probable, latest, last)
 
     @property
     def spread(self) -> float:
@@ -125,7 +140,7 @@ class Trend:
 def trend_of(series: Sequence[TapValue], now: datetime) -> Trend:
     """Judge a series, oldest first, one value at least.
 
-    now: the forecast begins with its day, and is the same for all of it.
+    now: its day tells whether that is too long ago to foretell anything.
     """
     points = _newest_points(series)
     return Trend(points, series[0].value, _past(points), int(day(now)))

@@ -3,33 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from acquisition import DataError
-from lobewatch.decay.forecast import DateRange
+from lobewatch.decay.reach import ALREADY, NOBODY_KNOWS, Fate, Limits, Reach, earliest_of
 from lobewatch.decay.standing import SeriesStanding, Standing
 from lobewatch.decay.trend import Trend
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
-from lobewatch.verdicts.critical import critical_fall
-from lobewatch.verdicts.verdict import CriticalFall
-
-ALREADY = DateRange(-math.inf, -math.inf, -math.inf)
-NEVER = DateRange(math.inf, math.inf, math.inf)
-
-
-@dataclass(frozen=True)
-class Fate:
-    """What becomes of one program; dates in days since 1970."""
-
-    critical: CriticalFall
-    """Falls that the frequency of its newest tap tests may take."""
-    doubtful: DateRange | None
-    """Date on which it becomes doubtful; None where nothing can be foretold."""
-    not_stable: DateRange | None
-    """Date from which it is not stable any more; None where nothing can be foretold."""
+from lobewatch.verdicts.verdict import CriticalFall, Ruling, Word
 
 
 @dataclass(frozen=True)
@@ -38,18 +22,12 @@ class Outlook:
 
     standing: Standing
     """Standing of the machine now."""
+    critical: Mapping[str, CriticalFall]
+    """Falls that the frequency of the newest tap tests may take, by program, where anything can be foretold."""
     programs: Mapping[str, Fate]
     """Fate of each program, by its name."""
-    limits: Mapping[float, DateRange | None]
-    """Dates when the worst of its series has fallen by each limit (%) of machine.toml; None where nobody can tell."""
-
-    @property
-    def horizon(self) -> float:
-        """Last day that is foretold of all its series, in days since 1970; NaN where nothing is foretold."""
-        foretold = (
-            series.trend.forecast for series in self.standing.series if series.trend and not series.trend.is_stale
-        )
-        return min((float(forecast.dates[-1]) for forecast in foretold if forecast), default=math.nan)
+    limits: Limits
+    """When the worst of its series has fallen by each limit of machine.toml."""
 
     def series(self, tool: str | None = None, direction: str | None = None) -> SeriesStanding:
         """The series of a tool and direction, the one that fell most where several fit; DataError where none does."""
@@ -71,63 +49,57 @@ def outlook(logbook: Logbook, now: datetime | None = None) -> Outlook:
 
 
 def outlook_of(analysis: Analysis, now: datetime) -> Outlook:
-    """The outlook of a machine that was tapped."""
+    """The outlook of a machine, be it that it was never tapped."""
     standing, machine = analysis.standing(now), analysis.machine
-    fixed = machine.limits
+    fixed, rulings = machine.limits, _rulings(analysis, standing)
     percents = (fixed.frequency_warn_percent, fixed.frequency_alarm_percent)
-    trends = [series.trend for series in standing.series if series.trend is not None]
-    falls = _critical_falls(analysis)
     return Outlook(
         standing,
-        {program.name: _fate(falls[program.name], program.tool, standing.series) for program in machine.program},
-        {percent: _first(of_limit(trend, percent) for trend in trends) for percent in percents},
+        {name: ruling.critical for name, ruling in rulings.items() if ruling.critical is not None},
+        {table.name: _fate(rulings[table.name], table.tool, standing) for table in machine.program if rulings},
+        tuple((percent, _limit(standing, percent)) for percent in percents if standing.series),
     )
 
 
-def _critical_falls(analysis: Analysis) -> Mapping[str, CriticalFall]:
-    """By program; kept in the history where there is a tap test to keep them with."""
-    history = analysis.history
-    if not history.current:
-        return {verdict.program.name: critical_fall(verdict) for verdict in analysis.verdicts()}
-    kept = analysis.rulings(history.rows[-1].tap_id, falls=True)
-    return {name: ruling.critical for name, ruling in kept.items() if ruling.critical is not None}
+def _rulings(analysis: Analysis, standing: Standing) -> Mapping[str, Ruling]:
+    """On every program after the newest tap test, with critical falls where anything can be foretold."""
+    if not standing.series:
+        return {}
+    can_foretell = any(series.trend is not None and series.trend.can_be_foretold for series in standing.series)
+    return analysis.rulings(analysis.history.rows[-1].tap_id, falls=can_foretell)
 
 
-def _fate(critical: CriticalFall, tool: str, series: Sequence[SeriesStanding]) -> Fate:
-    if math.isnan(critical.not_stable):
-        return Fate(critical, None, None)
-    of_tool = [standing for standing in series if standing.tool == tool] or series
-    trends = [standing.trend for standing in of_tool if standing.trend is not None]
-    doubtful = _first(_after(trend, critical.doubtful, 0.0) for trend in trends)
-    return Fate(critical, doubtful, _first(_after(trend, critical.not_stable, critical.error) for trend in trends))
+def _limit(standing: Standing, percent: float) -> Reach:
+    """When the worst series has fallen by a limit; those that nothing can be foretold of are left out."""
+    reaches = [_limit_of(series, percent) for series in standing.series]
+    return earliest_of([reach for reach in reaches if reach.is_known])
 
 
-def _after(trend: Trend, fall: float, error: float) -> DateRange | None:
-    """When the frequency of the last point, which the word rests on, has fallen by a share.
-
-    error: standard error of the share.
-    """
-    if fall == 0:
+def _limit_of(series: SeriesStanding, percent: float) -> Reach:
+    if series.fall.is_known and series.fall.value >= percent:
         return ALREADY
-    if trend.forecast is None or trend.is_stale:
-        return None
+    trend = series.trend
+    return NOBODY_KNOWS if trend is None else trend.reach(trend.start + 100 * math.log1p(-percent / 100))
+
+
+def _fate(ruling: Ruling, tool: str, standing: Standing) -> Fate:
+    if ruling.word is Word.UNKNOWN:
+        return Fate(NOBODY_KNOWS, NOBODY_KNOWS)
+    series = [series for series in standing.series if series.tool == tool] or standing.series
+    trends, critical = [series.trend for series in series], ruling.critical
+    not_stable = ALREADY if ruling.word is Word.NOT_STABLE else NOBODY_KNOWS
+    doubtful = NOBODY_KNOWS if ruling.word is Word.STABLE else ALREADY
+    if critical is not None and ruling.word is Word.STABLE:
+        doubtful = earliest_of([_after(trend, critical.doubtful) for trend in trends])
+    if critical is not None and ruling.word is not Word.NOT_STABLE:
+        not_stable = earliest_of([_after(trend, critical.not_stable, critical.error) for trend in trends])
+    return Fate(doubtful, not_stable)
+
+
+def _after(trend: Trend | None, fall: float, error: float = 0.0) -> Reach:
+    """When the frequency of the last point, which the word rests on, has fallen by a share (with its error)."""
+    if trend is None:
+        return NOBODY_KNOWS
     if math.isinf(fall):
-        return NEVER
-    level = trend.points[-1].percent + 100 * math.log1p(-fall)
-    return trend.forecast.reached(level, 100 * error / (1 - fall))
-
-
-def of_limit(trend: Trend, percent: float) -> DateRange | None:
-    """When a series has fallen by so much (%) from where it started; None where it cannot be told."""
-    if trend.forecast is None or trend.is_stale:
-        return None
-    return trend.forecast.reached(trend.start + 100 * math.log1p(-percent / 100))
-
-
-def _first(date_ranges: Iterator[DateRange | None]) -> DateRange | None:
-    """The earliest of several series; None where one of them cannot be foretold and none is past it."""
-    dates = [*date_ranges]
-    if ALREADY in dates:
-        return ALREADY
-    foreseen = [date for date in dates if date is not None]
-    return DateRange(*map(min, zip(*foreseen, strict=True))) if foreseen and len(foreseen) == len(dates) else None
+        return trend.reach(-math.inf)
+    return trend.reach(trend.points[-1].percent + 100 * math.log1p(-fall), 100 * error / (1 - fall))

@@ -7,9 +7,9 @@ from typing import Any
 
 import msgspec
 
+from lobewatch.decay.reach import forecast_rows, next_limit
 from lobewatch.plant.plant import MachineStanding
 from lobewatch.plant.standing_file import software
-from lobewatch.show.plant.plant_rows import next_limit
 
 NOT_IN_TOPICS = str.maketrans("+#/\0", "____")
 """Characters that no level of a topic may hold, each replaced."""
@@ -41,7 +41,8 @@ def content_of(standing: MachineStanding) -> dict[str, Any]:
         "fall_percent_std": worst.fall_std if worst else None,
         "series": worst.name if worst else None,
         "frequency_hz": worst.frequency if worst else None,
-        "next_limit": next_limit(summary.series),
+        "next_limit": next_limit(summary.limits),
+        "forecast": forecast_rows(summary.fates, summary.limits),
         "programs": summary.programs,
         "last_tap": summary.last_tap or None,
         "due": due and due.isoformat(),

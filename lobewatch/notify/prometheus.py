@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from lobewatch.decay.light import Light
+from lobewatch.decay.reach import Reach
 from lobewatch.plant.plant import MachineStanding
 from lobewatch.plant.summary import SeriesSummary
 
@@ -123,10 +124,25 @@ def _due(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
 
 
 def _limits(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
-    for labels, series in _labelled_series(standings):
-        for limit in series.limits:
-            if limit.probable is not None:
-                yield Sample((*labels, ("fall_percent", f"{limit.percent:g}")), DAY * limit.probable)
+    for standing in standings:
+        for percent, reach in standing.summary.limits:
+            yield from _reached(standing, (("fall_percent", f"{percent:g}"),), reach)
+
+
+def _fates(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
+    for standing in standings:
+        for program, fate in standing.summary.fates.items():
+            for word, reach in (("doubtful", fate.doubtful), ("not stable", fate.not_stable)):
+                yield from _reached(standing, (("program", program), ("becomes", word)), reach)
+
+
+def _reached(standing: MachineStanding, labels: Labels, reach: Reach) -> Iterator[Sample]:
+    """The probable date; the last tap test where that shows it already."""
+    last = standing.summary.time
+    if reach.is_measured and last is not None:
+        yield Sample((*_machine(standing), *labels), last.timestamp())
+    elif reach.probable is not None:
+        yield Sample((*_machine(standing), *labels), DAY * reach.probable)
 
 
 def _programs(standings: Iterable[MachineStanding]) -> Iterator[Sample]:
@@ -152,6 +168,10 @@ FAMILIES = {
     "lobewatch_last_tap_timestamp_seconds": ("When the machine was tapped last.", _taps),
     "lobewatch_tap_due_timestamp_seconds": ("When the next tap test is due.", _due),
     "lobewatch_limit_timestamp_seconds": ("When a fixed limit is probably reached; none where not in sight.", _limits),
+    "lobewatch_program_timestamp_seconds": (
+        "When a program probably becomes doubtful, or not stable; none where not in sight.",
+        _fates,
+    ),
     "lobewatch_program_word": ("1 for the word on each cutting program.", _programs),
 }
 """Families by name: meaning, and function that yields the samples."""

@@ -16,7 +16,7 @@ from lobewatch.machine.folder_path import mark_of
 from lobewatch.plant.summary import Summary
 
 STANDING = "standing.json"
-MAKE = 1
+MAKE = 2
 """Number of this form of the file; a file of another is made anew."""
 LASTING = timedelta(days=7)
 """Time that a summary and its forecast count; chosen."""

@@ -13,15 +13,15 @@ from pathlib import Path
 import numpy as np
 
 from lobewatch.decay.light import all_well
-from lobewatch.decay.standing import SeriesStanding, Standing
+from lobewatch.decay.standing import SeriesStanding
 from lobewatch.decay.trend import Trend, days_of
 from lobewatch.history.row_bytes import encode_row
 from lobewatch.logbook.logbook import Logbook
-from lobewatch.logbook.outlook import of_limit
-from lobewatch.machine import BusyError, Limits
+from lobewatch.logbook.outlook import Outlook, outlook_of
+from lobewatch.machine import BusyError
 from lobewatch.machine.folder_path import mark_of
 from lobewatch.plant.standing_file import write_standing
-from lobewatch.plant.summary import Ahead, SeriesSummary, Summary
+from lobewatch.plant.summary import SeriesSummary, Summary
 
 MOST = 60
 """Points kept of a series; chosen, more than its small picture can show."""
@@ -44,7 +44,7 @@ def summarise_with_rows(path: Path, now: datetime) -> tuple[Summary, list[bytes]
 def summarise(logbook: Logbook, now: datetime | None = None) -> Summary:
     """The summary of a machine, kept beside it where its lock can be had; what `Logbook.standing` raises."""
     now = now or datetime.now(UTC)
-    summary = _summary(logbook, logbook.standing(now))
+    summary = _summary(logbook, logbook.ask(outlook_of, now))
     mark = mark_of(logbook.folder.path, summary.newest_file)
     if logbook.is_current:
         try:
@@ -55,8 +55,9 @@ def summarise(logbook: Logbook, now: datetime | None = None) -> Summary:
     return summary
 
 
-def _summary(logbook: Logbook, standing: Standing) -> Summary:
-    machine, rows, last = logbook.machine, logbook.history.current, standing.last_tap
+def _summary(logbook: Logbook, outlook: Outlook) -> Summary:
+    machine, rows, standing = logbook.machine, logbook.history.current, outlook.standing
+    last = standing.last_tap
     interval = machine.machine.tap_interval_days
     return Summary(
         name=machine.machine.name,
@@ -70,13 +71,14 @@ def _summary(logbook: Logbook, standing: Standing) -> Summary:
         last_tap="" if last is None else last.isoformat(),
         tap_tests=len(logbook.history.rows),
         programs={name: ruling.word.value for name, ruling in (rows[-1].rulings or {}).items()} if rows else {},
-        series=tuple(_series_summary(series, machine.limits) for series in standing.series),
+        fates=dict(outlook.programs),
+        limits=outlook.limits,
+        series=tuple(map(_series_summary, standing.series)),
     )
 
 
-def _series_summary(series: SeriesStanding, limits: Limits) -> SeriesSummary:
+def _series_summary(series: SeriesStanding) -> SeriesSummary:
     trend, fall = series.trend, series.fall
-    percents = limits.frequency_warn_percent, limits.frequency_alarm_percent
     return SeriesSummary(
         name=series.name,
         tool=series.tool,
@@ -86,7 +88,6 @@ def _series_summary(series: SeriesStanding, limits: Limits) -> SeriesSummary:
         frequency=None if trend is None else trend.first * math.exp(trend.points[-1].percent / 100),
         alarm=trend.open_fall.fall.kind if trend is not None and trend.open_fall is not None else "",
         points=() if trend is None else tuple(_thin_out(trend)),
-        limits=() if trend is None else tuple(_ahead(trend, percent) for percent in percents),
     )
 
 
@@ -100,11 +101,3 @@ def _thin_out(trend: Trend) -> Iterator[tuple[float, float]]:
         points = np.add.reduceat(points, begins) / np.diff(begins, append=len(points))[:, np.newaxis]
     for at, percent in points.tolist():
         yield round(at, 1), round(percent, 3)
-
-
-def _ahead(trend: Trend, percent: float) -> Ahead:
-    dates = of_limit(trend, percent)
-    if dates is None or trend.forecast is None:
-        return Ahead(percent)
-    first, middle, last = (None if date == math.inf else round(max(date, float(trend.today)), 1) for date in dates)
-    return Ahead(percent, first, middle, last, round(float(trend.forecast.dates[-1]), 1))

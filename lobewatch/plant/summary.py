@@ -23,21 +23,7 @@ from lobewatch.decay.light import (
     next_step,
     with_files,
 )
-
-
-class Ahead(msgspec.Struct, frozen=True):
-    """Dates at which a series has fallen by one of the fixed limits."""
-
-    percent: float
-    """Fall of the frequency from where the series started (%)."""
-    earliest: float | None = None
-    """Days since 1970, at 10 %; the day it was foretold on where that is past; None where it is not foretold."""
-    probable: float | None = None
-    """Days since 1970, at 50 %; None likewise."""
-    latest: float | None = None
-    """Days since 1970, at 90 %; None likewise."""
-    foretold_to: float | None = None
-    """Last day that was looked at; None where nothing can be foretold."""
+from lobewatch.decay.reach import Fate, Limits
 
 
 class SeriesSummary(msgspec.Struct, frozen=True):
@@ -59,8 +45,6 @@ class SeriesSummary(msgspec.Struct, frozen=True):
     """"step" or "slope" where the watch over the series is on alarm."""
     points: tuple[tuple[float, float], ...] = ()
     """Day since 1970 and change from the start (%), thinned out."""
-    limits: tuple[Ahead, ...] = ()
-    """Dates at which it reaches the limits of machine.toml."""
 
 
 class DatedStanding(NamedTuple):
@@ -108,6 +92,10 @@ class Summary(msgspec.Struct, frozen=True, dict=True):
     """Number of rows of the history."""
     programs: dict[str, str] = {}
     """Word on each program, by its name."""
+    fates: dict[str, Fate] = {}
+    """What becomes of each program, by its name."""
+    limits: Limits = ()
+    """When the worst series has fallen by the limits of machine.toml."""
     series: tuple[SeriesSummary, ...] = ()
     """Series, the one that fell most first."""
 

@@ -44,7 +44,7 @@ class TrendCurve(NamedTuple):
     line: Floats
     """Values of the mixture, shape (n,)."""
     days_ahead: Floats
-    """Days since 1970, from today on, shape (m,)."""
+    """Days since 1970, from the last point on, shape (m,)."""
     low: Floats
     """Values that are undercut with a chance of 10 %, shape (m,)."""
     high: Floats

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from datetime import timedelta
+from datetime import datetime, timedelta
 from typing import Any
 
 from acquisition import joined
 from lobewatch.decay import Light, SeriesStanding, Standing
-from lobewatch.logbook.outlook import Fate, Outlook
+from lobewatch.decay.reach import NOBODY_KNOWS, Fate
+from lobewatch.logbook.outlook import Outlook
 from lobewatch.machine import Machine
 from lobewatch.show.programs.describe_advice import ProgramAdvice, rpm
 from lobewatch.show.programs.describe_verdicts import WORDS
-from lobewatch.show.trends.describe_trend import dates_text, rate_text, short_text
+from lobewatch.show.trends.describe_trend import rate_text, reach_text, short_text
 from lobewatch.verdicts import Word
 
 LIGHTS = {Light.ALARM: "✗ ALARM", Light.UNKNOWN: "? UNKNOWN", Light.WARN: "! WARNING", Light.GOOD: "✓ GOOD"}
 KINDS = {Light.GOOD: "ok", Light.ALARM: "bad"}
 """Class of a light in the style sheet; the others are doubtful."""
+UNTOLD = Fate(NOBODY_KNOWS, NOBODY_KNOWS)
 FEW = 3
 """Reasons on the first screen; the others stand below it."""
 
@@ -63,16 +65,16 @@ def _program(program: ProgramAdvice, outlook: Outlook) -> dict[str, str]:
         "name": name,
         "kind": WORDS[word].kind,
         "word": f"{WORDS[word].symbol} {word}",
-        "until": _until(word, outlook.programs[name], outlook.horizon),
+        "until": _until(word, outlook.programs.get(name, UNTOLD), outlook.standing.time),
         "instead": instead_text(program),
     }
 
 
-def _until(word: Word, fate: Fate, end: float) -> str:
+def _until(word: Word, fate: Fate, now: datetime) -> str:
     if word is Word.STABLE:
-        return f"doubtful {dates_text(fate.doubtful, end, tapped=False)}"
+        return f"doubtful {reach_text(fate.doubtful, now)}"
     if word is Word.DOUBTFUL:
-        return f"not stable {dates_text(fate.not_stable, end, tapped=False)}"
+        return f"not stable {reach_text(fate.not_stable, now)}"
     return "not stable already" if word is Word.NOT_STABLE else "not known"
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import astuple
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from rich.table import Table
 
 from lobewatch.decay.trend import date
 from lobewatch.show.terminal.output import table
-from lobewatch.show.trends.describe_trend import dates_json, dates_text
+from lobewatch.show.trends.describe_trend import reach_text
 from lobewatch.tap.stories.demo import DemoTap, SpindleState
 from lobewatch.tap.stories.level_forecast import LevelForecast
 
@@ -25,9 +26,7 @@ COLUMNS = (("f_1 Hz", 1.0, 2), ("zeta %", 0.01, 3), ("K N/um", 1e6, 3), ("k_b N/
 
 def demo_json(taps: Sequence[DemoTap], forecasts: Sequence[LevelForecast], report: Path) -> dict[str, Any]:
     """All tap tests, and the forecast beside the truth."""
-    levels = {
-        forecast.level: {**dates_json(forecast.reached), "truth": _date(forecast.truth)} for forecast in forecasts
-    }
+    levels = {forecast.level: {**forecast.reached.row(), "truth": _date(forecast.truth)} for forecast in forecasts}
     return {"taps": [_entry(tap) for tap in taps], "forecast": levels, "report": str(report)}
 
 
@@ -63,14 +62,14 @@ def demo_texts(
             if not forecasts
             else ["Foretold after the last test, and what the emulated spindle does if it goes on so:"]
         ),
-        *map(_forecast_line, forecasts),
+        *(_forecast_line(forecast, taps[-1].plan.date) for forecast in forecasts),
         f"report: {report}",
     ]
 
 
-def _forecast_line(forecast: LevelForecast) -> str:
-    dates = dates_text(forecast.reached, forecast.horizon, tapped=False)
-    return f"{forecast.level}: {dates}; true {_date(forecast.truth) or 'never, or not for years'}"
+def _forecast_line(forecast: LevelForecast, last: datetime) -> str:
+    true = _date(forecast.truth) or "never, or not for years"
+    return f"{forecast.level}: {reach_text(forecast.reached, last)}; true {true}"
 
 
 def _table(taps: Sequence[DemoTap]) -> Table:

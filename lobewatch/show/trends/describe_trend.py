@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,10 @@ from rich.table import Table
 
 from dsm import PreloadLeft, plus_minus
 from lobewatch.decay import SeriesStanding
-from lobewatch.decay.forecast import DateRange
+from lobewatch.decay.reach import Reach, forecast_rows
 from lobewatch.decay.shapes import Shape
-from lobewatch.decay.trend import Trend, date, days_of
-from lobewatch.logbook.outlook import Fate, Outlook
+from lobewatch.decay.trend import Trend, date, day, days_of
+from lobewatch.logbook.outlook import Outlook
 from lobewatch.show.terminal.csv_text import csv_text
 from lobewatch.show.terminal.output import table
 
@@ -39,10 +40,7 @@ def trend_json(outlook: Outlook, series: SeriesStanding, preload: PreloadLeft | 
         "fall_std_percent": series.fall.std,
         "preload_left": preload,
         "rate_percent_per_month": None if trend is None or trend.rate is None else trend.rate._asdict(),
-        "forecast": {
-            **{name: _fate_json(fate) for name, fate in outlook.programs.items()},
-            **{f"{percent:g} %": {"reached": dates_json(when)} for percent, when in outlook.limits.items()},
-        },
+        "forecast": forecast_rows(outlook.programs, outlook.limits),
     }
 
 
@@ -77,16 +75,13 @@ def preload_text(preload: PreloadLeft) -> str:
 
 def dates_rows(outlook: Outlook) -> list[tuple[str, str, str]]:
     """Name, when it becomes doubtful, when it is not stable: each program, and the fixed limits."""
-    end = outlook.horizon
-    rows = [(name, *_fate_texts(fate, end)) for name, fate in outlook.programs.items()]
-    for percent, when in outlook.limits.items():
-        rows.append((f"-{percent:g} % (fixed limit, as in the paper)", "", dates_text(when, end)))
-    return rows
-
-
-def _fate_texts(fate: Fate, end: float) -> tuple[str, str]:
-    tapped = fate.critical.doubtful == 0, fate.critical.not_stable == 0
-    return dates_text(fate.doubtful, end, tapped=tapped[0]), dates_text(fate.not_stable, end, tapped=tapped[1])
+    now = outlook.standing.time
+    fates = ((name, fate.doubtful, fate.not_stable) for name, fate in outlook.programs.items())
+    programs = [(name, reach_text(doubtful, now), reach_text(not_stable, now)) for name, doubtful, not_stable in fates]
+    return programs + [
+        (f"-{percent:g} % (fixed limit, as in the paper)", "", reach_text(reach, now))
+        for percent, reach in outlook.limits
+    ]
 
 
 def sentence(series: SeriesStanding) -> str:
@@ -147,41 +142,29 @@ def _alarm_json(trend: Trend) -> dict[str, Any] | None:
     return {"kind": fall.kind, "since": since.isoformat(), "size_percent": fall.size}
 
 
-def _fate_json(fate: Fate) -> dict[str, Any]:
-    return {"doubtful": dates_json(fate.doubtful), "not stable": dates_json(fate.not_stable)}
-
-
 def _cell(value: float) -> float | str:
     return value if math.isfinite(value) else ""
 
 
-def dates_text(dates: DateRange | None, horizon: float, *, tapped: bool = True) -> str:
-    """For people; horizon: days since 1970 up to which was looked; tapped: whether what is past was tapped, too."""
-    if dates is None:
+def reach_text(reach: Reach, now: datetime) -> str:
+    """When something is reached, for people."""
+    if reach.is_measured:
+        return "already"
+    if reach.foretold_to is None:
         return "history too short or too old"
-    if dates.probable == -math.inf:
-        return "already" if tapped else "by now, at this rate"
-    if dates.earliest == math.inf:
-        return f"not before {date(horizon):%Y-%m}"
-    if dates.latest == math.inf:
-        return f"not before {_day(dates.earliest)}"
-    return f"between {_day(dates.earliest)} and {_day(dates.latest)} (80 %), probably {_day(dates.probable)}"
+    if reach.earliest is None:
+        return f"not before {date(reach.foretold_to):%Y-%m}"
+    today = day(now)
+    if reach.latest is None:
+        return f"not before {_day(reach.earliest, today)}"
+    if reach.latest <= today:
+        return f"by now, at this rate (probably {date(reach.probable or today):%Y-%m-%d})"
+    earliest, probable, latest = (_day(days, today) for days in (reach.earliest, reach.probable or today, reach.latest))
+    return f"between {earliest} and {latest} (80 %), probably {probable}"
 
 
-def dates_json(dates: DateRange | None) -> dict[str, str | None]:
-    """Dates as "2026-03-01", null where none is known, "already"."""
-    named = zip(("p10", "p50", "p90"), dates or (math.inf,) * 3, strict=True)
-    return {name: _or_word(days) for name, days in named}
-
-
-def _day(days: float) -> str:
-    return "now" if days == -math.inf else f"{date(days):%Y-%m-%d}"
-
-
-def _or_word(days: float) -> str | None:
-    if math.isfinite(days):
-        return f"{date(days):%Y-%m-%d}"
-    return "already" if days < 0 else None
+def _day(days: float, today: float) -> str:
+    return f"{date(days):%Y-%m-%d}" if days > today else "now"
 
 
 def chart_lines(trend: Trend) -> list[str]:

@@ -6,7 +6,7 @@ import math
 from datetime import datetime, timedelta
 from typing import NamedTuple
 
-from lobewatch.decay.forecast import DateRange
+from lobewatch.decay.reach import Reach
 from lobewatch.decay.trend import MONTH, Trend, day
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.outlook import outlook
@@ -21,10 +21,8 @@ class LevelForecast(NamedTuple):
 
     level: str
     """Level for people."""
-    reached: DateRange | None
-    """Dates between which it is reached (days since 1970); None where nothing can be foretold."""
-    horizon: float
-    """Last date that was looked at (days since 1970); NaN where nothing can be foretold."""
+    reached: Reach
+    """When it is reached."""
     truth: float | None
     """Date at which the emulated spindle, without scatter, is there (days since 1970); None where it never is."""
 
@@ -39,12 +37,11 @@ def forecast_levels(logbook: Logbook, wear: Wear) -> list[LevelForecast]:
     percent = x.trend.points[-1].percent if x.trend.forecast is None else float(x.trend.forecast.fitted[-1])
     title = f"f_1 in x {100 * FARTHER:g} % lower than now"
     forecasts = [_forecast(title, x.trend, percent + 100 * math.log1p(-FARTHER), wear, last)]
-    for name, fate in prospect.programs.items():
-        fall = fate.critical.not_stable
-        if 0 < fall < math.inf and fate.not_stable is not None:
-            percent = x.trend.points[-1].percent + 100 * math.log1p(-fall)
-            forecast = _forecast(f"{name} not stable", x.trend, percent, wear, last)
-            forecasts.append(forecast._replace(reached=fate.not_stable))
+    for name, critical in prospect.critical.items():
+        reached = prospect.programs[name].not_stable
+        if 0 < critical.not_stable < math.inf and reached.is_known:
+            percent = x.trend.points[-1].percent + 100 * math.log1p(-critical.not_stable)
+            forecasts.append(_forecast(f"{name} not stable", x.trend, percent, wear, last)._replace(reached=reached))
     return forecasts
 
 
@@ -52,6 +49,4 @@ def _forecast(level: str, trend: Trend, percent: float, wear: Wear, last: dateti
     """Dates at which a series falls to a level, foretold and true; percent: 100 ln(f/f_first) there."""
     month = wear.month_of(trend.first * math.exp(percent / 100))
     truth = None if month is None else day(last + timedelta(days=MONTH * (month - wear.months + 1)))
-    if trend.forecast is None:
-        return LevelForecast(level, None, math.nan, truth)
-    return LevelForecast(level, trend.forecast.reached(percent), float(trend.forecast.dates[-1]), truth)
+    return LevelForecast(level, trend.reach(percent), truth)

@@ -16,6 +16,7 @@ from typer.testing import CliRunner, Result
 
 from dsm import calibrate
 from lobewatch.cli import app
+from lobewatch.decay.reach import NOBODY_KNOWS, Reach
 from lobewatch.decay.trend import date, day
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.outlook import outlook
@@ -29,6 +30,12 @@ Shop = Any
 
 def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, [*map(str, arguments)], catch_exceptions=False)
+
+
+def dates(reach: Reach) -> list[float]:
+    """Earliest, probable, latest, and the last day looked at; infinite where none is in sight."""
+    days = reach.earliest, reach.probable, reach.latest, reach.foretold_to
+    return [math.inf if one is None else one for one in days]
 
 
 @pytest.fixture
@@ -47,7 +54,7 @@ def words_after(shop: Shop, fall: float) -> dict[str, Word]:
 
 
 def test_a_program_holds_up_to_its_critical_fall_and_not_beyond(worn: Shop) -> None:
-    critical = outlook(worn.logbook).programs["A"].critical
+    critical = outlook(worn.logbook).critical["A"]
     assert 0.0 <= critical.doubtful < critical.not_stable < 0.1
     assert words_after(worn, critical.not_stable - 0.002)["A"] is Word.DOUBTFUL
     worn.tap_both(170.0, (1 - 0.03 + 0.0003) * (1 - critical.not_stable - 0.002))
@@ -59,19 +66,16 @@ def test_the_date_is_that_of_the_critical_fall_on_the_line(worn: Shop) -> None:
     now = logbook.history.rows[-1].time
     found = outlook(logbook, now)
     fate, (x,) = found.programs["A"], [one for one in found.standing.series if one.direction == "x"]
-    assert fate.not_stable is not None
     assert x.trend is not None
     last = x.trend.points[-1]
     a_day = -100 * math.log1p(-0.03) / 150
-    expected = last.time + timedelta(days=-100 * math.log1p(-fate.critical.not_stable) / a_day)
-    assert fate.not_stable.earliest < fate.not_stable.probable < fate.not_stable.latest
-    assert abs((date(fate.not_stable.probable) - expected).days) < 40
-    assert fate.doubtful is not None
-    assert fate.doubtful.probable < fate.not_stable.probable
-    paper = found.limits[5.0]
-    assert paper is not None
+    expected = last.time + timedelta(days=-100 * math.log1p(-found.critical["A"].not_stable) / a_day)
+    earliest, probable, latest, _ = dates(fate.not_stable)
+    assert earliest < probable < latest
+    assert abs((date(probable) - expected).days) < 40
+    assert dates(fate.doubtful)[1] < probable
     years_of_five_percent = (-100 * math.log1p(-0.05)) / a_day
-    assert paper.probable - day(worn.start) == pytest.approx(years_of_five_percent, rel=0.1)
+    assert dates(dict(found.limits)[5.0])[1] - day(worn.start) == pytest.approx(years_of_five_percent, rel=0.1)
 
 
 def test_critical_falls_are_worked_out_once_and_kept(worn: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -108,8 +112,8 @@ def test_a_short_history_foretells_nothing(shop: Shop) -> None:
     shop.tap_both()
     shop.run(("A", 12900, 1.5))
     found = outlook(shop.logbook)
-    assert found.programs["A"].not_stable is None
-    assert found.limits == {5.0: None, 10.0: None}
+    assert found.programs["A"].not_stable == NOBODY_KNOWS
+    assert found.limits == ((5.0, NOBODY_KNOWS), (10.0, NOBODY_KNOWS))
     told = run("trend", shop.path)
     assert "history too short" in told.stdout
     assert "after 1 point; from 8 points on there is a forecast" in told.stdout
@@ -178,7 +182,7 @@ def test_the_report_says_until_when_and_draws_the_line(worn: Shop) -> None:
 def test_a_tool_that_was_never_tapped_holds_as_far_as_is_looked(worn: Shop) -> None:
     worn.run(("shallow", 12900, 0.02), tool="long end mill")
     assert run("report", worn.path).exit_code == 0
-    last = f"not before {date(outlook(worn.logbook).horizon):%Y-%m}"
+    last = f"not before {date(dates(outlook(worn.logbook).programs['shallow'].doubtful)[3]):%Y-%m}"
     assert f"doubtful {last}" in (worn.path / "report.html").read_text("utf-8")
 
 
@@ -187,10 +191,11 @@ def test_a_program_holds_as_far_as_is_looked_beside_a_tool_that_foretells_nothin
     for days in (161.0, 171.0, 181.0):
         worn.tap(days, 1500.0, tool="other")
     found = outlook(worn.logbook)
-    assert date(found.horizon) > worn.logbook.history.rows[-1].time
+    last = dates(found.programs["shallow"].doubtful)[3]
+    assert date(last) > worn.logbook.history.rows[-1].time
     told = run("trend", worn.path, "--tool", "other").stdout
     (line,) = [line for line in told.splitlines() if line.startswith("shallow")]
-    assert line.count(f"not before {date(found.horizon):%Y-%m}") == 2
+    assert line.count(f"not before {date(last):%Y-%m}") == 2
 
 
 def preload_in_trend(shop: Shop) -> list[float] | None:

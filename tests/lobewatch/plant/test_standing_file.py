@@ -73,13 +73,13 @@ def test_it_says_at_any_time_what_the_standing_says(tapped: Shop) -> None:
     worst = summary.series[0]
     assert worst.fall == pytest.approx(6.0, abs=0.01)
     assert [percent for _, percent in worst.points] == pytest.approx([0.0, -3.046, -6.188], abs=0.01)
-    assert [limit.percent for limit in worst.limits] == [5.0, 10.0]
+    assert [(percent, reach.is_measured) for percent, reach in summary.limits] == [(5.0, True), (10.0, False)]
 
 
 @pytest.mark.parametrize(
     ("name", "old", "new"),
     [
-        ("standing.json", '"make":1', '"make":2'),
+        ("standing.json", '"make":2', '"make":3'),
         ("standing.json", '"fall":6', '"fall":0'),
         ("machine.toml", "steps = 200", "steps = 300"),
     ],

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from lobewatch.machine.settings.notify_table import Broker
     from lobewatch.plant.plant import MachineStanding
 
-FOR_THE_PAGE = ("points", "limits", "why")
+FOR_THE_PAGE = ("points", "limits", "limit", "word", "why")
 """What only the dashboard draws; lobewatch trend and lobewatch export tell it in full."""
 
 

@@ -61,6 +61,8 @@ LIGHTS = {
 }
 """Light of each reason by its code, in order of harm."""
 
+PAST_A_LIMIT = ("frequency-alarm", "frequency-warn", "program-not-stable")
+"""Reasons with which an alarm is not early."""
 UNREADABLE = "Put its files right: the sentence above says which."
 """Next step of a machine that cannot be read."""
 
@@ -79,6 +81,12 @@ def in_order(remarks: Iterable[Coded]) -> tuple[Coded, ...]:
 def light_of(ordered: Sequence[Remark]) -> Light:
     """Light of the worst reason."""
     return LIGHTS[ordered[0].code] if ordered else Light.GOOD
+
+
+def is_early(ordered: Sequence[Remark]) -> bool:
+    """Whether an alarm is of the watch alone: a fall that is sure, but short of every limit and of every program."""
+    codes = {remark.code for remark in ordered}
+    return light_of(ordered) is Light.ALARM and codes.isdisjoint(PAST_A_LIMIT)
 
 
 def next_step(ordered: Sequence[Remark], well: str) -> str:

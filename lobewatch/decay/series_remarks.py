@@ -14,8 +14,8 @@ from lobewatch.history.history import Row
 from lobewatch.machine import Limits
 from lobewatch.measuring.estimate import Estimate
 
-BESIDE = {"damping_ratio": "damping ratio", "stiffness": "stiffness K", "bearing_stiffness": "bearing stiffness"}
-"""Values that are watched beside the frequency, and what they are called."""
+BESIDE = {"damping_ratio": "damping ratio", "stiffness": "stiffness K"}
+"""Values that are watched beside the frequency, and what they are called; that of the bearings follows from it."""
 
 
 def about_loss(name: str, newest: Row) -> Iterator[Remark]:
@@ -56,21 +56,16 @@ def about_trend(name: str, trend: Trend, path: Path | str = "MACHINE") -> Iterat
         yield Remark("frequency-rose", name, text, f"If so: {event}")
 
 
-def about_others(name: str, series: SeriesHistory, trend: Trend | None) -> Iterator[Remark]:
-    """Remarks on changes of damping ratio, stiffness and bearing stiffness.
-
-    trend: of the frequency; where that has changed, the bearing stiffness that follows from it says nothing more.
-    """
-    has_changed = trend is not None and (trend.open_fall or trend.detection.rise)
+def about_others(name: str, series: SeriesHistory) -> Iterator[Remark]:
+    """Remarks on changes of damping ratio and stiffness."""
     for field, word in BESIDE.items():
-        if has_changed and field == "bearing_stiffness":
-            continue
         newest = series.values[field].newest_change()
         if newest is not None:
             time, change = newest
             verbs = ("fell", "falling") if change.size > 0 else ("rose", "rising")
             course = f"{verbs[0]} at once before" if change.kind == "step" else f"has been {verbs[1]} since"
-            text = f"{word} {course} {time:%Y-%m-%d}, by {_relative(change.size, change.half_width)}"
+            by = _relative(change.size, change.half_width)
+            text = f"{word} {course} {time:%Y-%m-%d}, by {by}; programs are judged with it, the light does not watch it"
             yield Remark("value-changed", name, text)
 
 

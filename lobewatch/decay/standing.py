@@ -22,6 +22,7 @@ from lobewatch.decay.light import (
     all_well,
     days_left,
     in_order,
+    is_early,
     light_of,
     next_step,
     of_files,
@@ -97,6 +98,11 @@ class Standing:
         """Light of the worst reason."""
         return light_of(self.remarks)
 
+    @property
+    def is_early(self) -> bool:
+        """Whether its alarm is that of a fall short of every limit."""
+        return is_early(self.remarks)
+
     def series_of(self, tool: str, direction: str) -> SeriesStanding | None:
         """The standing of one series; None where there is none."""
         fits = (series for series in self.series if (series.tool, series.direction) == (tool, direction))
@@ -128,8 +134,7 @@ def stand(
     remarks = [remark for standing in series for remark in standing.remarks]
     raised = [alarm for standing in series for alarm in standing.raised]
     remarks += [of_files(remark) for remark in files if remark.code in LIGHTS]
-    asked = [row for row in rows if row.questions]
-    remarks += [remark for row in asked for remark in about_questions(row.tap_id, row.questions, path)]
+    remarks += about_questions({row.tap_id: row.questions for row in rows}, path)
     programs = [*_about_programs(rows, machine)]
     raised += [_raised_of_program(remark, rows) for remark in programs if LIGHTS[remark.code] is Light.ALARM]
     remarks += [
@@ -164,7 +169,7 @@ def _stand_of(series: SeriesHistory, machine: Machine, now: datetime, path: Path
     trend = None if frequency.trend is None else frequency.trend.on(now)
     name = f"{newest.tool}, {newest.direction}"
     of_limits, of_watch = [*about_fall(name, fall, machine.limits)], [*about_trend(name, trend, path)] if trend else []
-    remarks = [*about_loss(name, newest), *of_limits, *of_watch, *about_others(name, series, trend)]
+    remarks = [*about_loss(name, newest), *of_limits, *of_watch, *about_others(name, series)]
     raised = [
         Raised(remark, row.tap_id, row.time)
         for remarks, row in (

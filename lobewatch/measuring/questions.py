@@ -131,14 +131,21 @@ def unasked_text(codes: Sequence[str], tap_ids: Sequence[str], asked: Mapping[st
     return f"{text}; open questions: {still_open or 'none'}"
 
 
-def about_questions(tap_id: str, questions: Sequence[Remark], path: Path | str) -> Iterator[Remark]:
-    """Remarks on what is asked of a tap test, with the command that answers; path: of the folder."""
-    file = Path(path) / "taps" / f"{tap_id}.h5"
-    for question in questions:
-        answer = shlex.join(["lobewatch", "replay", str(path), str(file), "--accept", question.code])
-        text = f"{question.text}; it sets no reference until you say that it is right: {answer}"
-        cure = f"Tap again; if this test is right, say so: {answer}"
-        yield Remark(question.code, f"tap test {tap_id}", text, cure)
+def about_questions(asked: Mapping[str, Sequence[Remark]], path: Path | str) -> Iterator[Remark]:
+    """Remarks on what is asked of tap tests, a remark for all that ask the same, with the command that answers.
+
+    asked: questions by tap test, oldest first; path: of the folder.
+    """
+    pairs = [(question.code, tap_id, question.text) for tap_id, questions in asked.items() for question in questions]
+    for code in dict.fromkeys(code for code, _, _ in pairs):
+        same = [(tap_id, text) for other, tap_id, text in pairs if other == code]
+        tap_id, text = same[-1]
+        is_one = len(same) == 1
+        file = Path(path) / "taps" / (f"{tap_id}.h5" if is_one else "")
+        answer = shlex.join(["lobewatch", "replay", str(path), str(file), "--accept", code])
+        right, about = ("it is", f"tap test {tap_id}") if is_one else ("they are", f"{len(same)} tap tests")
+        text = f"{text}; no reference is set until you say that {right} right: {answer}"
+        yield Remark(code, about, text, f"Tap again; if {right} right, say so: {answer}")
 
 
 def clock_questions(created: datetime, now: datetime | None, taps: Iterable[TapEntry]) -> tuple[str, ...]:

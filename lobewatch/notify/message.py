@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from lobewatch.decay.reach import forecast_rows, next_limit
+from lobewatch.decay.reach import forecast_rows, limit_row, next_limit
 from lobewatch.plant.plant import MachineStanding
 from lobewatch.plant.standing_file import software
 
@@ -34,6 +34,7 @@ def content_of(standing: MachineStanding) -> dict[str, Any]:
         "folder": standing.key,
         "machine": summary.name,
         "light": dated.light,
+        "is_early": dated.is_early,
         "reasons": [{"code": remark.code, "about": remark.about, "text": remark.text} for remark in dated.remarks],
         "alarms": [alarm.row(dated.time) for alarm in summary.alarms],
         "next_step": dated.next_step,
@@ -41,7 +42,7 @@ def content_of(standing: MachineStanding) -> dict[str, Any]:
         "fall_percent_std": worst.fall_std if worst else None,
         "series": worst.name if worst else None,
         "frequency_hz": worst.frequency if worst else None,
-        "next_limit": next_limit(summary.limits),
+        "next_limit": limit_row(next_limit(summary.limits)),
         "forecast": forecast_rows(summary.fates, summary.limits),
         "programs": summary.programs,
         "last_tap": summary.last_tap or None,

@@ -19,6 +19,7 @@ from lobewatch.decay.light import (
     about_unreadable,
     days_left,
     in_order,
+    is_early,
     light_of,
     next_step,
     with_files,
@@ -60,6 +61,11 @@ class DatedStanding(NamedTuple):
     """Days until the next test is due; negative where it is overdue; None before the first."""
     time: datetime
     """Time that it is the standing at."""
+
+    @property
+    def is_early(self) -> bool:
+        """Whether its alarm is that of a fall short of every limit."""
+        return is_early(self.remarks)
 
     @property
     def can_be_judged(self) -> bool:

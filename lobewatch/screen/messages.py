@@ -38,6 +38,7 @@ def state_message(state: TapState) -> str:
             "outcome": state.outcome
             and {
                 "light": state.outcome.light,
+                "is_early": state.outcome.is_early,
                 "texts": list(state.outcome.texts),
                 "next_step": state.outcome.next_step,
             },

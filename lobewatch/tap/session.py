@@ -173,7 +173,7 @@ def outcome_of(logbook: Logbook, measurement: Measurement) -> Outcome:
     remarks = [*(remark for remark in measurement.remarks if remark not in questions), *joined(standing.remarks)]
     remarks += [remark for remark in logbook.remarks if remark.code not in LIGHTS]
     texts = [*_values(measurement, series), *(f"{remark.finding}." for remark in remarks)]
-    return Outcome(standing.light, texts, standing.next_step)
+    return Outcome(standing.light, texts, standing.next_step, standing.is_early)
 
 
 def _values(measurement: Measurement, series: SeriesStanding | None) -> list[str]:

@@ -97,6 +97,8 @@ class Outcome:
     """Result in sentences."""
     next_step: str
     """Sentence on what to do now."""
+    is_early: bool = False
+    """Whether the alarm is that of a fall short of every limit."""
 
 
 @dataclass(frozen=True, eq=False)

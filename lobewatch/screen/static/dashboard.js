@@ -34,13 +34,6 @@ function dueText({ last_tap: last, days_left: left }) {
   return days ? `due in ${many}` : "due today";
 }
 
-function limitText({ next_limit: ahead }) {
-  if (!ahead) return "";
-  const months = (day) => Math.max(Math.round((new Date(day) - Date.now()) / 2.63e9), 0);
-  if (!ahead.p90) return `${ahead.percent} %: not within ${months(ahead.p10 ?? ahead.foretold_to)} months`;
-  return `${ahead.percent} % in ${months(ahead.p10)} to ${months(ahead.p90)} months`;
-}
-
 // The address that an action leads to is opened; what went wrong stands where the finger was.
 async function go(button, key, path, body) {
   const say = (text) => {
@@ -79,14 +72,15 @@ function row(machine) {
   const path = `/machines/${encodeURIComponent(key)}`;
   item.dataset.key = key;
   part("light").dataset.light = machine.light;
-  part("light").textContent = WORDS[machine.light];
+  part("light").classList.toggle("early", machine.is_early);
+  part("light").textContent = machine.word;
   part("name").textContent = machine.name;
   part("reason").textContent = machine.why || fallText(machine);
   part("fall").textContent = fallText(machine);
   part("note").textContent = machine.note;
   part("next").textContent = machine.next_step;
   part("port").textContent = machine.has_port || machine.light === "unknown" ? "" : "START needs the port of the DAQ: port in [daq] of machine.toml.";
-  part("limit").textContent = limitText(machine);
+  part("limit").textContent = machine.limit;
   part("due").textContent = dueText(machine);
   part("due").classList.toggle("overdue", isDue(machine));
   part("due").title = machine.last_tap ? `last tap test ${machine.last_tap.slice(0, 10)}` : "";

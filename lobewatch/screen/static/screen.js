@@ -96,6 +96,7 @@ function showOutcome() {
   at("outcome").hidden = !outcome;
   if (!outcome) return;
   for (const lamp of at("light").children) lamp.classList.toggle("on", lamp.dataset.light === outcome.light);
+  at("light").querySelector("[data-light=alarm]").textContent = outcome.is_early ? "✗ EARLY ALARM" : "✗ ALARM";
   at("light").hidden = !LIGHTS.includes(outcome.light);
   at("texts").replaceChildren(...outcome.texts.map((text) => element("li", text)));
   put("next", outcome.next_step && `Next: ${outcome.next_step}`);

@@ -33,20 +33,11 @@ def plant_csv(rows: Sequence[Mapping[str, Any]]) -> str:
     return csv_text([COLUMNS, *([row[name] for name in COLUMNS] for row in rows)])
 
 
-def limit_text(ahead: Mapping[str, Any] | None) -> str:
-    """The fixed limit that is reached next: "5 %: 2026-11 to 2027-02"; empty where nothing can be foretold."""
-    if ahead is None:
-        return ""
-    first, last = ahead["p10"], ahead["p90"]
-    when = f"not before {(first or ahead['foretold_to'])[:7]}" if last is None else f"{first[:7]} to {last[:7]}"
-    return f"{ahead['percent']:g} %: {when}"
-
-
 def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
     first, *further = row["reasons"] or [""]
     why = f"{first} (and {len(further)} more)" if further else first
-    ahead = limit_text(row["next_limit"])
-    cells = row["key"], row["name"], row["light"].value, _fallen(row), _due(row), ahead, why, row["next_step"]
+    light = f"{'early ' if row['is_early'] else ''}{row['light'].value}"
+    cells = row["key"], row["name"], light, _fallen(row), _due(row), row["limit"], why, row["next_step"]
     return tuple(printable(cell).replace("\n", " ").replace("\t", " ") for cell in cells)
 
 

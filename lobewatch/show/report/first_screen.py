@@ -8,18 +8,16 @@ from datetime import datetime, timedelta
 from typing import Any
 
 from acquisition import joined
-from lobewatch.decay import Light, SeriesStanding, Standing
+from lobewatch.decay import SeriesStanding, Standing
 from lobewatch.decay.reach import NOBODY_KNOWS, Fate
 from lobewatch.logbook.outlook import Outlook
 from lobewatch.machine import Machine
 from lobewatch.show.programs.describe_advice import ProgramAdvice, rpm
 from lobewatch.show.programs.describe_verdicts import WORDS
-from lobewatch.show.trends.describe_trend import rate_text, reach_text, short_text
+from lobewatch.show.terminal.light_words import light_kind, light_word
+from lobewatch.show.trends.describe_trend import course_text, rate_text, reach_text, short_text
 from lobewatch.verdicts import Word
 
-LIGHTS = {Light.ALARM: "✗ ALARM", Light.UNKNOWN: "? UNKNOWN", Light.WARN: "! WARNING", Light.GOOD: "✓ GOOD"}
-KINDS = {Light.GOOD: "ok", Light.ALARM: "bad"}
-"""Class of a light in the style sheet; the others are doubtful."""
 UNTOLD = Fate(NOBODY_KNOWS, NOBODY_KNOWS)
 FEW = 3
 """Reasons on the first screen; the others stand below it."""
@@ -38,10 +36,9 @@ def first_screen(outlook: Outlook, programs: Sequence[ProgramAdvice], machine: M
 def light_of(standing: Standing) -> dict[str, Any]:
     """The light in words, the reasons, the next step."""
     reasons = [remark.finding for remark in joined(standing.remarks)]
-    kind = KINDS.get(standing.light, "doubt")
     return {
-        "light": LIGHTS[standing.light],
-        "kind": kind,
+        "light": light_word(standing.light, standing.is_early),
+        "kind": light_kind(standing.light, standing.is_early),
         "reasons": reasons[:FEW],
         "others": reasons[FEW:],
         "next_step": standing.next_step,
@@ -52,11 +49,7 @@ def _changed(series: SeriesStanding) -> str:
     text = f"{series.name}: {short_text(series)}, {series.first:%Y-%m-%d}"
     if series.trend is None or series.trend.rate is None:
         return text
-    since, fallen = series.trend.fallen_since, series.trend.open_fall
-    if since is None or fallen is None:
-        return f"{text}; {rate_text(series.trend)}"
-    course = "fell at once before" if fallen.fall.kind == "step" else "falling since"
-    return f"{text}; {course} {since:%Y-%m-%d}; {rate_text(series.trend)}"
+    return f"{text}; {course_text(series.trend)}; {rate_text(series.trend)}"
 
 
 def _program(program: ProgramAdvice, outlook: Outlook) -> dict[str, str]:

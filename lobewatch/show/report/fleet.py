@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from lobewatch.decay.light import Light
-from lobewatch.show.plant.describe_plant import COLUMNS, limit_text
+from lobewatch.show.plant.describe_plant import COLUMNS
 from lobewatch.show.report.figure_data import Numbers
-from lobewatch.show.report.first_screen import KINDS, LIGHTS
 from lobewatch.show.report.page import page, write_page
+from lobewatch.show.terminal.light_words import light_kind
 
 WIDE, HIGH = 140, 32
 """Size of a small course, in its own units."""
@@ -49,14 +49,14 @@ def _machine(row: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "name": row["name"],
         "key": row["key"],
-        "light": LIGHTS[row["light"]],
-        "kind": KINDS.get(row["light"], "doubt"),
+        "light": row["word"],
+        "kind": light_kind(row["light"], row["is_early"]),
         "reasons": row["reasons"] or ["all is well"],
         "next_step": row["next_step"],
         "fallen": fallen,
         "series": row["series"],
         "spark": spark(row["points"]),
-        "until": limit_text(row["next_limit"]) or "not known",
+        "until": row["limit"] or "not known",
         "programs": row["programs"],
         "last": last.partition("T")[0],
         "due": due,

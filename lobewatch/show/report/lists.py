@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from lobewatch.decay import Light, SeriesStanding
-from lobewatch.decay.light import LIGHTS as HARM
+from lobewatch.decay import SeriesStanding
+from lobewatch.decay.light import in_order, is_early, light_of
 from lobewatch.history import Row
 from lobewatch.machine.journal.event import MaintenanceEvent
 from lobewatch.machine.settings.machine_file import REFERENCE_CUT
@@ -14,9 +14,9 @@ from lobewatch.measuring.estimate import Estimate
 from lobewatch.show.history.describe_cut import heard_text
 from lobewatch.show.programs.describe_verdicts import WORDS
 from lobewatch.show.report.figure_data import Numbers
-from lobewatch.show.report.first_screen import KINDS, LIGHTS
 from lobewatch.show.report.material import ReportMaterial
 from lobewatch.show.report.section import BulletList, DataTable, Paragraph, Section, TableCell
+from lobewatch.show.terminal.light_words import light_kind, light_word
 from lobewatch.show.trends.describe_trend import rate_text, short_text
 
 NUMBER_HEADS = (
@@ -44,12 +44,13 @@ def tools_and_directions(material: ReportMaterial) -> list[Section]:
 
 
 def _series_row(series: SeriesStanding) -> list[str | TableCell]:
-    worst = min((HARM[remark.code] for remark in series.remarks), key=list(Light).index, default=Light.GOOD)
+    ordered = in_order(series.remarks)
+    worst, early = light_of(ordered), is_early(ordered)
     trend = series.trend
     return [
         series.tool,
         series.direction,
-        TableCell(LIGHTS[worst], KINDS.get(worst, "doubt")),
+        TableCell(light_word(worst, early), light_kind(worst, early)),
         "0" if trend is None else str(len(trend.points)),
         f"{series.time:%Y-%m-%d}",
         short_text(series),

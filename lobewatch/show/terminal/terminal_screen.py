@@ -133,7 +133,8 @@ def _lines(state: TapState) -> Iterator[RenderableType]:
         yield Text.from_markup(f"{hit.number:3d}  {hit.peak_force:6.0f} N  {verdict_markup(hit)}")
     if state.outcome is not None:
         symbol, style = LIGHTS[state.outcome.light]
-        yield Text(f" {symbol} {state.outcome.light.upper()} ", style)
+        early = "EARLY " if state.outcome.is_early else ""
+        yield Text(f" {symbol} {early}{state.outcome.light.upper()} ", style)
         yield Text(" ".join([*state.outcome.texts, state.outcome.next_step]))
 
 

@@ -93,8 +93,7 @@ def sentence(series: SeriesStanding) -> str:
     text = f"{series.name}: {short_text(series)} after {n} point{'s' if n > 1 else ''}"
     if trend.forecast is None:
         return f"{text}; from 8 points on there is a forecast, from 9 on an alarm"
-    shape = _shape(trend.forecast.likeliest, falls=trend.forecast.fitted[-1] < trend.start)
-    return f"{text}; {shape}; scatter {trend.spread:.2f} %, score {_score(trend)}; {rate_text(trend)}"
+    return f"{text}; {course_text(trend)}; scatter {trend.spread:.2f} %, score {_score(trend)}; {rate_text(trend)}"
 
 
 def rate_text(trend: Trend) -> str:
@@ -112,6 +111,16 @@ def short_text(series: SeriesStanding) -> str:
     """How far it has fallen, with its standard error."""
     fall = series.fall
     return f"{plus_minus(-fall.value, fall.std)} % since it started" if fall.is_known else "unknown"
+
+
+def course_text(trend: Trend) -> str:
+    """Its course: since when it falls where that rings, else the shape that fits it best; empty below 8 points."""
+    fallen, since = trend.open_fall, trend.fallen_since
+    if fallen is not None and since is not None:
+        return f"{'fell at once before' if fallen.fall.kind == 'step' else 'falling since'} {since:%Y-%m-%d}"
+    if trend.forecast is None:
+        return ""
+    return _shape(trend.forecast.likeliest, falls=trend.forecast.fitted[-1] < trend.start)
 
 
 def _shape(shape: Shape, falls: bool) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from acquisition import Conditions
 from lobewatch.decay.alarm import Alarm
 from lobewatch.logbook.acknowledge import acknowledge
 from lobewatch.machine.additions.correct import add_event, exclude, include
@@ -109,7 +110,7 @@ def test_acknowledged_is_said_everywhere_and_the_light_stays(mill: Shop, run: Ru
     assert run("report", mill.path, "--out", "r.html").code == 0
     page = Path("r.html").read_text("utf-8")
     assert words in page
-    assert "decay, raised" in page[page.index("For whoever signs") :]
+    assert f"{row['alarms'][0]['id']}, raised" in page[page.index("For whoever signs") :]
     assert words.strip("by )") in page[page.index("For whoever signs") :]
     assert "Kim" in run("history", mill.path).out
 
@@ -177,3 +178,50 @@ def test_journal_lines_of_acknowledgements_outlast_a_rebuild(mill: Shop, run: Ru
     (known,) = alarms(mill, 18)
     assert known.acknowledgement is not None
     assert json.loads(run("verify", mill.path, "--json").out)["damage"] == []
+
+
+@pytest.mark.parametrize(("step", "is_early"), [(0.15, True), (0.9, False)])
+def test_a_small_alarm_reads_unlike_one_past_a_limit(shop: Shop, run: Run, step: float, is_early: bool) -> None:
+    shop.put("")
+    tap_months(shop, falling(18, step=step))
+    found = shop.logbook.standing(at(shop, 18))
+    assert (found.light, found.is_early) == ("alarm", is_early)
+    (row,) = run("status", shop.path, "--json").json["machines"]
+    assert row["is_early"] is is_early
+    assert ("early alarm" in run("status", shop.path).out) is is_early
+    assert run("report", shop.path, "--out", "r.html").code == 0
+    assert ("✗ EARLY ALARM" in Path("r.html").read_text("utf-8")) is is_early
+
+
+def test_two_alarms_at_once_are_named_and_acknowledged_apart(shop: Shop, run: Run) -> None:
+    shop.put("")
+    for i, fall in enumerate(falling(18, step=2.0)):
+        shop.tap(LONG_AGO + MONTH * i, 1713.0 * (1 - (fall + WIGGLE[i % 5]) / 100))
+        shop.tap(LONG_AGO + MONTH * i + 0.1, 1690.0 * (1 - (fall + WIGGLE[i % 5]) / 100), "y")
+    names = {alarm.id for alarm in alarms(shop, 18)}
+    assert {name.partition(":")[0] for name in names} == {"decay", "frequency-alarm"}
+    assert len(names) == 4
+    refused(run("ack", shop.path, "decay"), "part of 2 alarms")
+    one = next(name for name in names if name.startswith("decay:"))
+    assert run("ack", shop.path, one).code == 0
+    assert [alarm.id for alarm in alarms(shop, 18) if alarm.acknowledgement] == [one]
+    assert run("ack", shop.path).code == 0
+    assert {alarm.id for alarm in alarms(shop, 18) if alarm.acknowledgement} == names
+
+
+def test_two_clampings_of_one_day_are_two_points_where_that_is_said(shop: Shop) -> None:
+    shop.put("")
+    tap_months(shop, [0.0] * 12)
+    for hour, reclamped in ((0, False), (1, False), (2, True)):
+        conditions = Conditions(reclamped=reclamped)
+        shop.tap(LONG_AGO + MONTH * 12 + hour / 24, 1713.0 * 0.98, conditions=conditions)
+    (series,) = shop.logbook.standing(at(shop, 13)).series
+    assert len(series.trend.points) == 14
+    assert "decay" in codes(shop, 13)
+
+
+def test_a_clock_set_back_between_raises_and_closes_nothing(mill: Shop) -> None:
+    """A test that carries an older date stands where its date says; the alarm of the newest stays the same."""
+    before = alarms(mill, 18)
+    mill.tap(LONG_AGO + MONTH * 2.5, 1713.0)
+    assert alarms(mill, 18) == before

@@ -16,10 +16,11 @@ from typer.testing import CliRunner, Result
 
 from dsm import calibrate
 from lobewatch.cli import app
-from lobewatch.decay.reach import NOBODY_KNOWS, Reach
+from lobewatch.decay.reach import ALREADY, NOBODY_KNOWS, Reach
 from lobewatch.decay.trend import date, day
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.outlook import outlook
+from lobewatch.show.trends.describe_trend import reach_text
 from lobewatch.verdicts import Word
 from lobewatch.verdicts.aging import softening, tolerable_decay
 from lobewatch.verdicts.critical import critical_fall
@@ -119,6 +120,47 @@ def test_a_short_history_foretells_nothing(shop: Shop) -> None:
     assert "after 1 point; from 8 points on there is a forecast" in told.stdout
 
 
+def test_what_foretells_nothing_hides_no_date(worn: Shop) -> None:
+    """A tap test of another tool, and a direction that is too young."""
+    now = worn.logbook.history.rows[-1].time
+    before = outlook(worn.logbook, now)
+    assert dates(dict(before.limits)[5.0])[2] < math.inf
+    worn.tap(150.5, 1500.0, tool="other")
+    after = outlook(worn.logbook, now)
+    assert after.limits == before.limits
+    assert after.programs == before.programs
+
+
+def test_a_young_direction_hides_no_date_of_the_other(shop: Shop) -> None:
+    shop.run(("A", 12900, 1.5))
+    for i in range(11):
+        shop.tap(15.0 * i, 1713.0 * (1 - 0.003 * i + 0.0003 * (-1) ** i))
+    for i in range(3):
+        shop.tap(120.1 + 15.0 * i, 1690.0 * (1 - 0.003 * i), "y")
+    found = outlook(shop.logbook, shop.logbook.history.rows[-1].time)
+    assert dates(dict(found.limits)[5.0])[2] < math.inf
+    assert found.programs["A"].not_stable.latest is not None
+
+
+def test_overdue_is_said_as_overdue_and_never_as_measured(worn: Shop) -> None:
+    last = worn.logbook.history.rows[-1].time
+    found, later = (outlook(worn.logbook, last + timedelta(days=days)) for days in (0, 180))
+    assert later.limits == found.limits
+    limit = dict(later.limits)[5.0]
+    assert not limit.is_measured
+    probable = dates(limit)[1]
+    assert day(last) < probable < day(last) + 180
+    assert reach_text(limit, later.standing.time) == f"by now, at this rate (probably {date(probable):%Y-%m-%d})"
+    assert reach_text(limit, last).startswith("between 2026-")
+
+
+def test_already_is_what_tap_tests_show(worn: Shop) -> None:
+    worn.tap_both(160.0, 0.9)
+    found = outlook(worn.logbook, worn.logbook.history.rows[-1].time)
+    assert dict(found.limits)[5.0] == ALREADY
+    assert reach_text(ALREADY, found.standing.time) == "already"
+
+
 def test_trend_in_json(worn: Shop) -> None:
     told = run("trend", worn.path, "--direction", "x", "--json")
     found = json.loads(told.stdout)
@@ -142,7 +184,7 @@ def test_trend_as_text_and_csv(worn: Shop) -> None:
     lines = text.splitlines()
     assert sum(line.count("o") for line in lines[:12]) >= 9
     assert lines[0].startswith("   +0.0")
-    assert "falling steadily since 2026-01-15; scatter 0.03 %" in text
+    assert "falling since 2026-01-30; scatter 0.03 %" in text
     assert "-5 % (fixed limit" in text
     rows = [*csv.DictReader(io.StringIO(run("trend", worn.path, "--csv").stdout))]
     assert len(rows) == 11
@@ -174,7 +216,8 @@ def test_the_report_says_until_when_and_draws_the_line(worn: Shop) -> None:
     assert run("report", worn.path).exit_code == 0
     html = (worn.path / "report.html").read_text("utf-8")
     assert "<h2>Until when</h2>" in html
-    assert "falling steadily since 2026-01-15" in html
+    assert html.count("falling since 2026-01-30") > 1
+    assert "falling steadily since" not in html
     assert "-5 % (fixed limit, as in the paper)" in html
     assert "Line: fitted; band: where it goes, 80 %." in html
 

@@ -76,3 +76,16 @@ def test_a_folder_whose_name_is_no_text_is_refused_and_costs_the_others_nothing(
             assert r"b\\udcff" in told
     found = Plant(find_machines(tmp_path / "mills")).standings()
     assert [(one.key, one.dated.can_be_judged) for one in found] == [(r"b\udcff", False), ("good", True)]
+
+
+def test_a_plant_without_machines_is_refused_and_one_in_itself_stands_once(shop: Shop, tmp_path: Path) -> None:
+    mills = tmp_path / "mills"
+    mills.mkdir()
+    with pytest.raises(DataError, match="neither a machine folder nor a folder of them; make one with"):
+        find_machines(mills)
+    (mills / "again").symlink_to(mills)
+    with pytest.raises(DataError, match="neither a machine folder"):
+        find_machines(mills)
+    shutil.copytree(shop.path, mills / "m")
+    assert [*find_machines(mills)] == ["m"]
+    assert [*find_machines(mills / "again")] == ["m"]

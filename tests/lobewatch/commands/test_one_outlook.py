@@ -1,0 +1,174 @@
+"""Of a machine every channel says the same: light, fall, alarms, and the dates of what is to come."""
+
+from __future__ import annotations
+
+import html
+import json
+import math
+import re
+import urllib.request
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from lobewatch.cli import app
+from lobewatch.notify.message import content_of
+from lobewatch.plant.plant import Plant, find_machines
+from lobewatch.screen.dashboard_server import DashboardServer
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+Rows = dict[str, dict[str, Any]]
+"""What `status` says, by machine."""
+MACHINES = 50
+ISO = r"\d{4}-\d{2}-\d{2}"
+SLOTS = [("A", 12900, 1.5), ("B", 8700, 0.4), ("C", 6500, 1.0)]
+
+
+def run(*arguments: object) -> str:
+    """Stdout of a command, whatever it thinks of the machine."""
+    told = CliRunner().invoke(app, [*map(str, arguments)])
+    assert told.exception is None or isinstance(told.exception, SystemExit), told.exception
+    return told.stdout
+
+
+def furnish(shop: Shop, seed: int) -> None:
+    """Tap tests of one to three series, of any length, falling or not, with gaps, another tool, a word on an alarm."""
+    rng = np.random.default_rng(seed)
+    shop.run(*[SLOTS[i] for i in rng.permutation(3)[: int(rng.integers(0, 2)) + 1]])
+    count, step = int(rng.integers(1, 15)), float(rng.choice([2.0, 15.0, 30.0]))
+    rate = float(rng.choice([0.0, -0.01, -0.05, -0.15, -0.6]))
+    overdue = float(rng.choice([0.5, 20.0, 182.0, 900.0]))
+    first = (datetime.now(UTC) - shop.start).total_seconds() / 86400 - overdue - step * count
+    short = int(rng.integers(0, count + 1)) if rng.random() < 0.5 else 0
+    for i in range(count):
+        at, share = first + step * i, math.exp((rate * i + 0.1 * rng.normal()) / 100)
+        shop.tap(at, 1713.0 * share)
+        if i >= short and rng.random() < 0.9:
+            shop.tap(at + 0.02, 1690.0 * math.exp((rate * i + 0.1 * rng.normal()) / 100), "y")
+    if rng.random() < 0.4:
+        shop.tap(first + step * count, 1500.0, tool="other")
+    if rng.random() < 0.3:
+        CliRunner().invoke(app, ["ack", str(shop.path), "--note", "known"])
+
+
+def furnish_plant(new_shop: type[Any], folder: Path) -> None:
+    """Random machines, the same in each run but for the day they end on."""
+    for seed in range(MACHINES):
+        shop = new_shop(folder / f"m{seed:02}")
+        shop.edit("high_rpm = 24000", "high_rpm = 24000\nsteps = 60")
+        furnish(shop, seed)
+
+
+def get(server: DashboardServer, path: str) -> str:
+    request = urllib.request.Request(server.origin + path, headers={"Authorization": f"Bearer {server.token}"})
+    with urllib.request.urlopen(request, timeout=60) as answer:
+        text: str = answer.read().decode()
+    return text
+
+
+def dates_of(forecast: dict[str, Any]) -> Iterator[tuple[tuple[str, str], str]]:
+    """Probable dates by program and word, and by limit."""
+    for name, words in forecast.items():
+        for word, when in words.items():
+            if when["p50"] is not None:
+                yield (name, word), when["p50"]
+
+
+def check_trend(plant: Path, rows: Rows) -> None:
+    some = 0
+    for key, row in rows.items():
+        trend = json.loads(run("trend", plant / key, "--json"))
+        assert {name: trend[name] for name in ("light", "alarms", "forecast")} == {
+            name: row[name] for name in ("light", "alarms", "forecast")
+        }, key
+        assert trend["fall_percent"] == pytest.approx(row["fall"], nan_ok=True), key
+        some += any(True for _ in dates_of(trend["forecast"]))
+    assert some > MACHINES / 5
+
+
+def check_already(rows: Rows) -> None:
+    said = [0, 0]
+    for row in rows.values():
+        for percent in (5, 10):
+            is_reached = row["fall"] is not None and row["fall"] >= percent
+            assert (row["forecast"][f"{percent} %"]["reached"]["p50"] == "already") is is_reached
+            said[is_reached] += 1
+    assert min(said) > 0
+
+
+def check_messages_and_dashboard(plant: Path, rows: Rows) -> None:
+    messages = {m.key: content_of(m) for m in Plant(find_machines(plant)).standings()}
+    with DashboardServer(plant) as server:
+        shown = {row["key"]: row for row in json.loads(get(server, "/machines"))["machines"]}
+    for key, row in rows.items():
+        for name in ("light", "alarms", "forecast", "next_limit", "next_step"):
+            assert messages[key][name] == shown[key][name] == row[name], (key, name)
+        assert messages[key]["fall_percent"] == shown[key]["fall"] == row["fall"]
+
+
+def check_metrics(plant: Path, rows: Rows) -> None:
+    file = plant / "metrics.prom"
+    run("status", plant, "--prometheus", file)
+    text = file.read_text("utf-8")
+    labels = r'folder="(.*?)",.*?(?:fall_percent|program)="(.*?)"(?:,becomes="(.*?)")?'
+    pattern = rf"^lobewatch_(limit|program)_timestamp_seconds\{{{labels}\}} (.*)$"
+    found = {
+        (key, f"{name} %" if kind == "limit" else name, word or "reached"): float(value)
+        for kind, key, name, word, value in re.findall(pattern, text, re.MULTILINE)
+    }
+    file.unlink()
+    expected = {(key, *what): date for key, row in rows.items() for what, date in dates_of(row["forecast"])}
+    assert found.keys() == expected.keys()
+    for what, date in expected.items():
+        if date == "already":
+            assert found[what] == pytest.approx(datetime.fromisoformat(rows[what[0]]["last_tap"]).timestamp())
+        else:
+            assert f"{datetime.fromtimestamp(found[what], UTC):%Y-%m-%d}" == date
+    lights = dict(re.findall(r'^lobewatch_light\{folder="(.*?)",.*?light="(.*?)"\} 1.0$', text, re.MULTILINE))
+    assert lights == {key: row["light"] for key, row in rows.items()}
+    alarms = {
+        (key, name) for key, name in re.findall(r'raised_timestamp_seconds\{folder="(.*?)",.*?alarm="(.*?)"', text)
+    }
+    assert alarms == {(key, alarm["id"]) for key, row in rows.items() for alarm in row["alarms"]}
+
+
+def check_report(plant: Path, row: dict[str, Any]) -> None:
+    run("report", plant / row["key"])
+    page = (plant / row["key"] / "report.html").read_text("utf-8")
+    table = page.partition("<h2>Until when</h2>")[2].partition("</table>")[0]
+    cells = [
+        [html.unescape(re.sub("<.*?>", "", cell)) for cell in re.findall("<td.*?</td>", line, re.DOTALL)]
+        for line in table.split("<tr")
+    ]
+    texts = {line[0].removeprefix("-").split(" (")[0]: line[1:] for line in cells if len(line) == 3}
+    assert texts.keys() == row["forecast"].keys()
+    for name, words in row["forecast"].items():
+        for text, when in zip(texts[name][-len(words) :], words.values(), strict=True):
+            if when["p50"] == "already":
+                assert text == "already"
+            elif when["p90"] is not None:
+                assert set(re.findall(ISO, text)) <= set(when.values())
+                assert when["p50"] in text or "probably now" in text
+            else:
+                assert re.search(r"not before|history too short", text)
+    for alarm in row["alarms"]:
+        assert alarm["id"] in page
+
+
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("reports", [4, pytest.param(MACHINES, marks=pytest.mark.long)])
+def test_all_channels_of_random_machines_say_the_same(new_shop: type[Any], tmp_path: Path, reports: int) -> None:
+    furnish_plant(new_shop, tmp_path)
+    rows = {row["key"]: row for row in json.loads(run("status", tmp_path, "--json"))["machines"]}
+    check_trend(tmp_path, rows)
+    check_already(rows)
+    check_messages_and_dashboard(tmp_path, rows)
+    check_metrics(tmp_path, rows)
+    for key in sorted(rows)[:reports]:
+        check_report(tmp_path, rows[key])

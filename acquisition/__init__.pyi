@@ -31,27 +31,17 @@ from .estimation import (
     windowed_receptance,
 )
 from .event import Event, EventKind
-from .files import (
-    STANDARD_GRAVITY,
-    Contents,
-    Converted,
-    Description,
-    Fact,
-    FileSource,
-    Format,
-    Recording,
-    Signal,
-    convert,
-    known_formats,
-    look,
-    read_frf,
-    read_hits,
-    read_recording,
-    read_tap,
-    read_tap_hits,
-    write_hit,
-    write_tap,
-)
+from .files.contents.contents import Contents, Signal
+from .files.contents.description import Description
+from .files.contents.ledger import Fact
+from .files.contents.recording import Recording
+from .files.contents.units import STANDARD_GRAVITY
+from .files.convert import Converted, convert
+from .files.file_source import FileSource
+from .files.formats import known_formats
+from .files.read_recording import look, read_frf, read_hits, read_recording
+from .files.readers.format import Format
+from .files.tap_file import read_tap, read_tap_hits, write_hit, write_tap
 from .frf import Frf, from_accelerance
 from .hit import Hit, HitFlags
 from .hits import HitSearch, Trigger, capture_hits, ring_down

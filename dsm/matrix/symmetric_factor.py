@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dsytrf, dsytrs
 
 _Float = NDArray[np.float64]
 
@@ -28,10 +28,10 @@ class SymmetricFactor(NamedTuple):
 
     def solve(self, right: _Float) -> _Float:
         """Solutions of matrix times y = right, shape (n, m)."""
-        return np.asarray(dsytrs(self.values, self.pivots, right, lower=1)[0])
+        return np.asarray(scipy.linalg.lapack.dsytrs(self.values, self.pivots, right, lower=1)[0])
 
 
 def symmetric_factor(matrix: _Float) -> SymmetricFactor:
     """The factor of a matrix (n, n) in Fortran's order, its lower half alone looked at; the matrix is overwritten."""
-    values, pivots, _ = dsytrf(matrix, lower=1, overwrite_a=1)
+    values, pivots, _ = scipy.linalg.lapack.dsytrf(matrix, lower=1, overwrite_a=1)
     return SymmetricFactor(values, pivots)

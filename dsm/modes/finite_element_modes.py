@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 from dsm.matrix.dynamic_stiffness import DynamicStiffness
 from dsm.modes.newton_step import quadratic
@@ -28,7 +28,7 @@ def finite_element_modes(model: DynamicStiffness, count: int) -> tuple[_Float, _
     mass = -_reduced(model, basis, 1 if model.spin is None else 2)
     shift = 1e-3 * (2 * np.pi * model.top_frequency) ** 2
     shifted = _reduced(model, basis, 0) + springs + shift * mass
-    inverse, vectors = eigh(mass, shifted, subset_by_index=[size - count, size - 1])
+    inverse, vectors = scipy.linalg.eigh(mass, shifted, subset_by_index=[size - count, size - 1])
     shape = (basis @ (vectors / np.sqrt(inverse))).T[::-1]
     return np.maximum(1 / inverse[::-1] - shift, 0.0), shape
 

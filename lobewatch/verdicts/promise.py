@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import minimum_filter1d
 
 from lobes import lowest_of, zero_order
 from lobewatch.machine import Machine, ProgramTable, drive_limit
@@ -53,7 +53,7 @@ class Promise:
         cuts = [replace(machine.build_cut(program), feed_angle=angle) for angle in draws.angles.tolist()]
         limit = lowest_of([zero_order(assembly.x, assembly.y, cut, speeds) for cut in cuts]).depth * 1e3
         steps, ahead = math.ceil((draws.doubt.speed + BESIDE + fall / 2) / GRID), round(fall / 2 / GRID)
-        around = minimum_filter1d(np.minimum(limit, 1e6), 2 * steps + 1, origin=-ahead, mode="nearest")
+        around = scipy.ndimage.minimum_filter1d(np.minimum(limit, 1e6), 2 * steps + 1, origin=-ahead, mode="nearest")
         deepest = np.minimum(program.deepest_mm, 1e3 * drive_limit(machine, program, speeds))
         return cls(speeds, np.minimum(around / max(draws.doubt.tangential.high, 1 + spare), deepest))
 

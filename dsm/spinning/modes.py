@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
+from scipy.linalg import eig, eigh
 
 from dsm.elements.element_series import MAX_X
 from dsm.modes.newton_step import newton_step, quadratic
@@ -115,9 +115,9 @@ def _hermite_modes(chain: SpinningChain, count: int, spin: float, top: float) ->
     right = np.block([[carried, nothing], [nothing, mass]])
     left = np.block([[2 * spin * top * coupling, mass], [mass, nothing]])
     if np.linalg.eigvalsh(carried)[0] > 0:
-        ratio, vectors = scipy.linalg.eigh(left, right, subset_by_index=[len(left) - count, len(left) - 1])
+        ratio, vectors = eigh(left, right, subset_by_index=[len(left) - count, len(left) - 1])
         return top / ratio[::-1], (vectors[: scale.size, ::-1] * scale[:, np.newaxis]).T
-    ratio, vectors = scipy.linalg.eig(left, right)
+    ratio, vectors = eig(left, right)
     steady = np.flatnonzero((ratio.real > 0) & (np.abs(ratio.imag) <= 1e-6 * np.abs(ratio)))
     steady = steady[np.argsort(-ratio.real[steady])]
     w = top / ratio.real[steady]

@@ -56,7 +56,7 @@ def for_the_record(material: ReportMaterial) -> list[Section]:
 
 def _alarm_text(alarm: Alarm) -> str:
     word = alarm.acknowledgement or "not acknowledged"
-    return f"{alarm.id}, raised {alarm.raised.astimezone():%Y-%m-%d}, {word}"
+    return f"{alarm.about}: {alarm.code}, raised {alarm.raised.astimezone():%Y-%m-%d}, {word}; name: {alarm.id}"
 
 
 def _sensors(tap: TapTest) -> list[tuple[str, str]]:

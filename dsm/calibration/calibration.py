@@ -68,14 +68,19 @@ class Calibration:
 
     @property
     def preload_left(self) -> PreloadLeft | None:
-        """Range of the preload over that at the start (-) in the calibrated bearings; see preload_left."""
-        pairs = zip(self.given.bearings, self.spindle.bearings, strict=True)
-        return preload_left([new for old, new in pairs if old != new] or self.spindle.bearings, self.factor)
+        """Range of the preload over that as given (-) in the calibrated bearings; see preload_left. None where open."""
+        calibrated = [bearing for index, bearing in enumerate(self.given.bearings) if index in self.parts]
+        return None if self.is_open else preload_left(calibrated, self.factor)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the frequency leaves the stiffness open: the mode feels next to nothing of these bearings."""
+        return self.energy_share < LEAST_SHARE
 
     @property
     def remarks(self) -> tuple[FitRemark, ...]:
-        """What makes the stiffness doubtful: a mode that feels next to nothing of these bearings."""
-        if self.energy_share >= LEAST_SHARE:
+        """What makes the stiffness doubtful."""
+        if not self.is_open:
             return ()
         text = f"{100 * self.energy_share:.2g} % of the strain energy of mode {self.mode} is in them: they are open"
         return (
@@ -125,7 +130,5 @@ class Calibration:
             ("modal tip stiffness", f"{modal[0]:.3f} -> {modal[1]:.3f} N/um (start -> calibrated)"),
             ("theory", f"{self.spindle.theory}; an equivalent stiffness: compare it within one model only"),
         ]
-        if self.preload_left is not None:
-            lines.append(("preload left", str(self.preload_left)))
         lines += [("warning", str(remark)) for remark in self.remarks]
         return "\n".join(f"{name:<22}{text}" for name, text in lines)

@@ -15,7 +15,7 @@ from itertools import chain, compress
 import numpy as np
 from numpy.typing import NDArray
 
-from dsm import PreloadLeft, preload_left
+from dsm import PreloadLeft, calibrate, preload_left
 from lobewatch.decay.change_point import Fall, newest_change
 from lobewatch.decay.trend import TapValue, Trend, newest_percents, trend_of
 from lobewatch.history.history import WATCHED, Row
@@ -163,12 +163,24 @@ def series_history(rows: Iterable[Row]) -> SeriesHistory:
 def preload_of(series: SeriesHistory, machine: Machine) -> PreloadLeft | None:
     """The preload left in the bearings of a machine, from the change of their stiffness; see dsm.preload_left.
 
-    None where no two tests gave a bearing stiffness, or not the newest, or where one of the calibrated bearings has
-    rollers.
+    None where no two tests gave a bearing stiffness, or not the newest, where the first or the newest leaves it open,
+    or where one of the calibrated bearings has rollers.
     """
     stiffness = series.values["bearing_stiffness"]
     change = stiffness.change
     if machine.spindle is None or not change.is_known or len(stiffness.sure) < 2:
         return None
+    if any(_is_open(row, machine) for row in (stiffness.sure[0], series.rows[-1])):
+        return None
     calibrated = [bearing for bearing in machine.spindle.build().bearings if bearing.group]
     return preload_left(calibrated, 1 + change.value / 100)
+
+
+def _is_open(row: Row, machine: Machine) -> bool:
+    """Whether the frequency of a tap test leaves the bearings open, or belongs to another model."""
+    frequency, std = row.frequency
+    try:
+        model = machine.model(row.tool)
+        return calibrate(model, frequency, std if math.isfinite(std) else None, machine.mode.model_mode).is_open
+    except (ValueError, ArithmeticError):
+        return True

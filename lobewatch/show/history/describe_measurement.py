@@ -7,6 +7,8 @@ from typing import Any
 from rich.table import Table
 
 from acquisition import Conditions, Remark
+from dsm import PreloadLeft
+from lobewatch.decay.series_history import preload_of, series_history
 from lobewatch.logbook import Logbook
 from lobewatch.machine import REFERENCE_CUT
 from lobewatch.measuring import Measurement, remarks_on_all
@@ -31,6 +33,7 @@ def measurement_json(m: Measurement, logbook: Logbook) -> dict[str, Any]:
         "modes": [mode_json(mode) for mode in m.modes],
         "followed": mode_json(m.followed) if m.followed else None,
         "calibration": calibration_json(m.calibration) if m.calibration else None,
+        "preload_left": _preload_left(m, logbook),
         "lobes": [lobes_json(name, lobes) for name, lobes in lobes_of(assembly, logbook.machine).items()],
         "remarks": [remark_json(remark) for remark in assembly.remarks],
     }
@@ -46,7 +49,7 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
     if m.followed is not None:
         texts.append(f"followed: {m.followed.frequency:.2f} Hz")
     if m.calibration is not None:
-        texts.append(str(m.calibration))
+        texts += [str(part) for part in (m.calibration, _preload_left(m, logbook)) if part is not None]
     assembly = logbook.assembly(until=m.tap_id)
     lobes = lobes_of(assembly, logbook.machine).get(REFERENCE_CUT)
     if lobes is not None:
@@ -55,6 +58,12 @@ def measurement_texts(m: Measurement, logbook: Logbook) -> list[str | Table]:
     asked = [remark for remark in logbook.standing().remarks if remark.about == f"tap test {m.tap_id}"]
     further = [remark for remark in assembly.remarks if remark.code not in QUESTIONS]
     return [*texts, *remark_lines(further), *map(_asked, asked)]
+
+
+def _preload_left(m: Measurement, logbook: Logbook) -> PreloadLeft | None:
+    """Against the start of its series, as it was known then."""
+    rows = [row for row in logbook.history.series(m.tool, m.direction) if row.time <= m.time]
+    return preload_of(series_history(rows), logbook.machine) if rows and rows[-1].tap_id == m.tap_id else None
 
 
 def _conditions(m: Measurement, logbook: Logbook) -> Conditions:

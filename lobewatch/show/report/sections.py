@@ -26,7 +26,7 @@ from lobewatch.show.report.lists import events_and_exclusions, tap_tests, test_c
 from lobewatch.show.report.material import ReportMaterial
 from lobewatch.show.report.picture_sections import lobes_over_time, pictures
 from lobewatch.show.report.section import DataTable, Fragment, Paragraph, Section, TableCell
-from lobewatch.show.trends.describe_trend import ASSUMED, dates_rows, preload_text, sentence
+from lobewatch.show.trends.describe_trend import ASSUMED, dates_rows, sentence
 from lobewatch.tool import ABOUT_DIRECTIONS
 from lobewatch.verdicts import Word
 
@@ -113,7 +113,7 @@ def changes(material: ReportMaterial) -> list[Section]:
         "Gaber & Hashemi, 2015)."
     )
     left = preload_of(history, material.machine)
-    preload = f"{preload_text(left)}." if left else ""
+    preload = f"{left}." if left else ""
     table = DataTable(["value", f"at the start ({first})", last, "change"], rows)
     below = Paragraph(reading, is_small=True), Paragraph(preload[:1].upper() + preload[1:])
     return [Section("What has changed", [table, *below])]

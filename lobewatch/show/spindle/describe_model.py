@@ -24,7 +24,6 @@ def calibration_json(calibration: Calibration) -> dict[str, Any]:
         "residual_hz": calibration.residual,
         "factor": calibration.factor,
         "sensitivity": calibration.sensitivity,
-        "preload_left": calibration.preload_left,
         "remarks": [asdict(remark) for remark in calibration.remarks],
         "energy_share": calibration.energy_share,
         "static_tip_stiffness_n_per_m": calibration.static_stiffness_after,
@@ -64,16 +63,21 @@ def damping_json(calibration: DampingCalibration) -> dict[str, Any]:
 
 def model_calibration_json(calibration: ModelCalibration) -> dict[str, Any]:
     """What makes a model fit."""
-    stiffness = calibration.stiffness
-    payload = calibration_json(stiffness) if isinstance(stiffness, Calibration) else stiffness_fit_json(stiffness)
-    return payload if calibration.dampers is None else payload | damping_json(calibration.dampers)
+    dampers = {} if calibration.dampers is None else damping_json(calibration.dampers)
+    return _stiffness_json(calibration.stiffness) | dampers
+
+
+def _stiffness_json(stiffness: Calibration | StiffnessFit) -> dict[str, Any]:
+    if isinstance(stiffness, Calibration):
+        return calibration_json(stiffness) | {"preload_left": stiffness.preload_left}
+    return stiffness_fit_json(stiffness)
 
 
 def model_calibration_texts(calibration: ModelCalibration) -> list[str]:
     """What makes a model fit, for people."""
     label = [f"model: {calibration.label}"] if calibration.label else []
-    dampers = [] if calibration.dampers is None else [str(calibration.dampers)]
-    return [*label, str(calibration.stiffness), *dampers]
+    preload = calibration.stiffness.preload_left if isinstance(calibration.stiffness, Calibration) else None
+    return [*label, *(str(part) for part in (calibration.stiffness, preload, calibration.dampers) if part is not None)]
 
 
 def model_json(model: ModelSummary) -> dict[str, Any]:

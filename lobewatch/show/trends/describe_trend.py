@@ -64,13 +64,8 @@ def trend_texts(outlook: Outlook, series: SeriesStanding, preload: PreloadLeft |
     for line in dates_rows(outlook):
         dates.add_row(*line)
     further = [f"{side.name}: {short_text(side)}" for side in outlook.standing.series if side is not series]
-    left = [] if preload is None else [preload_text(preload)]
+    left = [] if preload is None else [str(preload)]
     return [*chart_lines(trend), sentence(series), *left, dates, ASSUMED, *further]
-
-
-def preload_text(preload: PreloadLeft) -> str:
-    """Preload that is left, in words."""
-    return f"preload left: {preload}"
 
 
 def dates_rows(outlook: Outlook) -> list[tuple[str, str, str]]:

@@ -20,6 +20,7 @@ from lobewatch.decay.reach import ALREADY, NOBODY_KNOWS, Reach
 from lobewatch.decay.trend import date, day
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.outlook import outlook
+from lobewatch.show.history.describe_measurement import measurement_json, measurement_texts
 from lobewatch.show.trends.describe_trend import reach_text
 from lobewatch.verdicts import Word
 from lobewatch.verdicts.aging import softening, tolerable_decay
@@ -252,11 +253,39 @@ def test_trend_and_report_state_the_preload_left(shop: Shop) -> None:
         shop.tap(days, 1713.0 * share)
     model = shop.folder.machine.model("reference")
     new, worn = (calibrate(model, 1713.0 * share).bearing_stiffness for share in (1.0, 0.98))
-    assert preload_in_trend(shop) == pytest.approx([(worn / new) ** 3, (worn / new) ** 2], rel=1e-3)
-    said = f"preload left: {(worn / new) ** 3:.2g} to {(worn / new) ** 2:.2g} of that at the start, if balls roll"
+    left = [(worn / new) ** (1 / exponent) for exponent in (0.27, 0.32)]
+    assert preload_in_trend(shop) == pytest.approx(left, rel=1e-3)
+    said = f"preload left: {left[0]:.2g} to {left[1]:.2g} of that at the start, if balls roll"
     assert said in " ".join(run("trend", shop.path).stdout.split())
     run("report", shop.path)
     assert f"P{said[1:]}" in (shop.path / "report.html").read_text("utf-8")
+
+
+def printed_of(shop: Shop, tap_id: str) -> str:
+    """What is printed of a tap test."""
+    return "\n".join(map(str, measurement_texts(shop.logbook.measurement(tap_id), shop.logbook)))
+
+
+def test_a_tap_test_compares_preload_with_the_first_one_as_trend_does(shop: Shop) -> None:
+    shop.edit("bearing_stiffness_n_per_um = 1280", "bearing_stiffness_n_per_um = 800")
+    first, *_, last = (shop.tap(days, 1713.0 * share) for days, share in ((0, 1.0), (15, 0.99), (30, 0.98)))
+    assert "preload" not in printed_of(shop, first)
+    low, high = preload_in_trend(shop) or (math.nan, math.nan)
+    assert high < 1
+    assert f"preload left: {low:.2g} to {high:.2g} of that at the start" in printed_of(shop, last)
+    logbook = shop.logbook
+    assert measurement_json(logbook.measurement(last), logbook)["preload_left"] == pytest.approx([low, high])
+    assert measurement_json(logbook.measurement(first), logbook)["preload_left"] is None
+
+
+def test_nothing_is_said_of_preload_where_the_bearings_are_not_felt(shop: Shop) -> None:
+    """They raise f_1 to 2301 Hz at most."""
+    shop.tap(0, 2297.0)
+    newest = shop.tap(30, 2290.0)
+    assert preload_in_trend(shop) is None
+    assert "preload" not in printed_of(shop, newest)
+    assert "bearings-not-felt" in run("calibrate", shop.path, "--frequency", 2297, "--json").stdout
+    assert "preload" not in run("calibrate", shop.path, "--frequency", 2297).stdout
 
 
 def test_nothing_is_said_of_the_preload_of_rollers_or_of_a_single_test(shop: Shop) -> None:

@@ -11,7 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from dsm.calibration.calibration import UnreachableFrequencyError
 from dsm.calibration.fit_remark import FitRemark
-from dsm.calibration.identifiability import CURE, FARTHEST, LEAST_SHARE, Allowed, identifiability, rival_solution
+from dsm.calibration.identifiability import (
+    CURE,
+    FARTHEST,
+    LEAST_SHARE,
+    Allowed,
+    Surroundings,
+    identifiability,
+    surroundings,
+)
 from dsm.calibration.least_squares import LIMIT, Iterate, Problem, minimize
 from dsm.calibration.measured import check_measured
 from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
@@ -57,7 +65,7 @@ def fit_stiffness(
     modes, and where two come close (veering) they exchange shapes while their numbers stay. Veering makes local minima:
     where the given stiffnesses lead to none that fits, a few starts around them are tried and the best is kept. Of
     several solutions that fit, such as the two of a symmetric shaft, it is the first that is found, unless another fits
-    better by more than 95 % intervals allow.
+    better by more than 95 % intervals allow; a remark has the others.
 
     The result has remarks where the frequencies leave a stiffness open (identifiability), where modes do not tell the
     groups apart, lie close together, or do not fit; where it has none, the 95 % intervals are to be believed.
@@ -78,11 +86,11 @@ def fit_stiffness(
         )
     problem = Problem(spindles, names, measured)
     state, found = _search(problem, None if start is None else np.log(start))
-    state, rival = _better(problem, state) if found else (state, None)
+    state, around = _better(problem, state) if found else (state, None)
     if not (found and problem.fits(state)):
         with suppress(ArithmeticError):  # factors so far apart may be beyond what can be computed
             _require_reachable(problem)
-    result = _result(problem, state, found, rival)
+    result = _result(problem, state, around)
     if not found:
         raise StiffnessFitError(_why(result), result)
     return result
@@ -121,20 +129,23 @@ def _without_unfelt(problem: Problem, state: Iterate) -> tuple[Iterate, bool]:
     return state, False
 
 
-def _better(problem: Problem, state: Iterate) -> tuple[Iterate, Iterate | None]:
-    """The solution, or a rival that fits better by more than 95 % intervals allow; with it what rival is left."""
+def _better(problem: Problem, state: Iterate) -> tuple[Iterate, Surroundings | None]:
+    """The solution, or another that fits better by more than 95 % intervals allow; with it what lies around."""
     for _ in range(OTHER_STARTS):
-        rival = rival_solution(problem, state, _covariance(problem, state))
-        if rival is None or rival.cost + Allowed.of(problem, rival).limit > state.cost:
+        covariance = _covariance(problem, state)
+        if covariance is None:
+            return state, None
+        around = surroundings(problem, state, covariance)
+        if not around.rivals or around.rivals[0].cost + Allowed.of(problem, around.rivals[0]).limit > state.cost:
             break
-        state = rival
-    return state, rival
+        state = around.rivals[0]
+    return state, around
 
 
-def _result(problem: Problem, state: Iterate, found: bool, rival: Iterate | None) -> StiffnessFit:
+def _result(problem: Problem, state: Iterate, around: Surroundings | None) -> StiffnessFit:
     measured = problem.measured
     covariance = _covariance(problem, state)
-    unsure = identifiability(problem, state, rival, covariance) if found else []
+    unsure = identifiability(problem, state, covariance, around)
     return StiffnessFit(
         groups=problem.names,
         mode=measured.mode,

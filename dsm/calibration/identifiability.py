@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +21,10 @@ CONFIDENCE = 0.95
 """Of the intervals that are compared."""
 FARTHEST = math.log(30.0)
 """An interval wider than this, in the logarithm of the factor, is none."""
-STEPS = 0.2, 0.5, 1.0, 1.7, 2.5, 3.4
-"""Distances beyond the interval of first order, in the logarithm of the factor, at which that is done."""
+STEPS = 0.2, 0.7, 1.7, 3.4
+"""Distances beyond the interval of first order, in the logarithm of the factor, at which S(v) is looked at."""
+NEARER = -2.4, -1.2, -0.5, 0.5, 1.2, 2.4
+"""Distances, in the logarithm of a factor, of starts along the direction that is known least."""
 LEAST_HELD = 1 - 2 * (1 - CONFIDENCE)
 """What an interval must hold by the likelihood."""
 NEARLY = 0.8
@@ -30,6 +33,8 @@ TOLERANCE = 0.1
 """Other factors are found anew until a step would change no frequency by more than this part of the least error."""
 SHARP = 1e-6
 """Intervals and distances smaller than this, as of computed frequencies, are not looked at."""
+FAR = 4.0
+"""Standard errors of a factor that another solution is away at least."""
 LITTLE_SHARE = 0.1
 """Below this part of the strain energy of every measured mode, stiffness far from what was found is tried."""
 LEAST_SHARE = 0.01
@@ -44,70 +49,69 @@ class Allowed(NamedTuple):
     """Variance of the scaled residuals: 1, or from their scatter where no standard errors were given."""
     rise: float
     """Student's t^2."""
+    spare: float
+    """Degrees of freedom of the variance: inf where it is known."""
 
     @classmethod
     def of(cls, problem: Problem, best: Iterate) -> Allowed:
         """For a fit with a covariance."""
         given = problem.measured.std is not None
-        variance = 1.0 if given else best.cost / problem.spare
-        return cls(variance, float(stdtrit(math.inf if given else problem.spare, (1 + CONFIDENCE) / 2)) ** 2)
+        variance, spare = (1.0, math.inf) if given else (best.cost / problem.spare, problem.spare)
+        return cls(variance, float(stdtrit(spare, (1 + CONFIDENCE) / 2)) ** 2, spare)
 
     @property
     def limit(self) -> float:
         """The excess."""
         return self.variance * self.rise
 
+    def log_density(self, excess: float) -> float:
+        """Logarithm of the likelihood of so much excess, over that of none: normal, or Student's."""
+        square = excess / self.variance
+        return -square / 2 if math.isinf(self.spare) else -(self.spare + 1) / 2 * math.log1p(square / self.spare)
 
-def identifiability(
-    problem: Problem, best: Iterate, rival: Iterate | None, log_covariance: _Float | None
-) -> list[FitRemark]:
-    """Remarks on groups whose factor the frequencies leave open.
 
-    For each group the least sum of squares over all other factors, S(v), belongs to the logarithm v of its own. The
-    interval of first order holds where S - S_min reaches Student's t^2 (times the variance of the residuals where no
-    standard errors were given) at its ends, and stays above beyond them (D. J. Venzon and S. H. Moolgavkar, A method
-    for computing profile-likelihood-based confidence intervals, Appl. Statist. 37, 1988). With the signed roots of
-    S - S_min as normal deviates, the rises at its ends say how often it holds the truth: not twice as often wrong as it
-    says is good enough. Beyond them S is followed, through the given stiffness (v = 0), half-way to it and up to a
-    factor of 30, where the group has little energy in all measured modes at what was found, at what was given, or
-    half-way. rival: another solution that fits as well (see rival_solution). Without a covariance there is nothing to
-    compare with, and the energy shares decide alone.
+class Profile(NamedTuple):
+    """The least sum of squares over all other factors, S(v), along the logarithm v of one factor."""
+
+    ends: tuple[Iterate, Iterate]
+    """The ends of its interval of first order, below and above; the best fit where that is none."""
+    beyond: tuple[tuple[Iterate, ...], tuple[Iterate, ...]]
+    """Further and further away, below and above; empty where that is not looked at."""
+
+    def sides(self) -> Iterator[tuple[Iterate, ...]]:
+        """Each end with what lies beyond."""
+        for end, further in zip(self.ends, self.beyond, strict=True):
+            yield end, *further
+
+
+class Surroundings(NamedTuple):
+    """What lies around a fit over the whole range of factors."""
+
+    ways: tuple[Profile | None, ...]
+    """Along each factor; None where its interval is too small to be looked at, or the model cannot be solved there."""
+    rivals: tuple[Iterate, ...]
+    """Other minima to which these ways lead, the lowest first; they may be lower than the fit."""
+
+
+def surroundings(problem: Problem, best: Iterate, log_covariance: _Float) -> Surroundings:
+    """Along each factor: its interval, and up to a factor of 30 beyond and through the given stiffness.
+
+    Beyond it is looked at of a group that has little energy in all measured modes at what was found, at what was given,
+    or half-way. Other minima, such as that of a nearly symmetric shaft, are looked for from wherever S(v) falls again
+    on the way, and nearer by along the direction that is known least.
     """
-    felt = _felt(problem, best)
-    remarks = []
-    for index, name in enumerate(problem.names):
-        share = float(np.max(best.share[:, index]))
-        if share < LEAST_SHARE:
-            text = f"at most {100 * share:.2g} % of the strain energy of the measured modes is in it"
-            remarks.append(FitRemark("group-not-felt", name, text, CURE))
-        elif log_covariance is not None:
-            text = _open(problem, best, log_covariance, index, felt[index] < LITTLE_SHARE)
-            remarks += [FitRemark("stiffness-ambiguous", name, text, CURE)] if text else []
-    if not remarks and rival is not None:
-        factors = ", ".join(f"{math.exp(value):.3g}" for value in rival.log_factor)
-        text = f"another solution fits as well: factors {factors}"
-        remarks = [FitRemark("stiffness-ambiguous", ", ".join(problem.names), text, CURE)]
-    return remarks
-
-
-def rival_solution(problem: Problem, best: Iterate, log_covariance: _Float | None) -> Iterate | None:
-    """The best other minimum, far outside the intervals of the factors found, whose sum of squares they do not exclude.
-
-    Such as that of a nearly symmetric shaft; it is looked for along the direction that is known least. It may fit
-    better than what was found.
-    """
-    if log_covariance is None or best.log_factor.size == 1:
-        return None
-    width, vectors = np.linalg.eigh(log_covariance)
-    direction = vectors[:, -1] / np.max(np.abs(vectors[:, -1]))
-    far, worst = max(4 * math.sqrt(width[-1]), SHARP), best.cost + Allowed.of(problem, best).limit
+    ways: list[Profile | None] = []
+    for index, felt in enumerate(_felt(problem, best).tolist()):
+        try:
+            ways.append(_profile(problem, best, log_covariance, index, felt < LITTLE_SHARE))
+        except ArithmeticError:
+            ways.append(None)
+    falling = [state.log_factor for way in ways if way is not None for side in way.sides() for state in _falling(side)]
     rivals = []
-    for step in (-1.2, -0.5, 0.5, 1.2):
+    for start in [*_along_least_known(best, log_covariance), *falling]:
         with suppress(ArithmeticError):
-            trial, _ = minimize(problem, best.log_factor + step * direction, (), _tolerance(problem, best))
-            if trial.cost < worst and np.max(np.abs(trial.log_factor - best.log_factor)) > far:
-                rivals.append(trial)
-    return min(rivals, key=lambda state: state.cost, default=None)
+            rivals.append(minimize(problem, start, (), _tolerance(problem, best))[0])
+    return Surroundings(tuple(ways), tuple(sorted(rivals, key=lambda rival: rival.cost)))
 
 
 def _felt(problem: Problem, best: Iterate) -> _Float:
@@ -119,26 +123,124 @@ def _felt(problem: Problem, best: Iterate) -> _Float:
     return np.asarray(np.min([np.max(state.share, axis=0) for state in states], axis=0))
 
 
-def _open(problem: Problem, best: Iterate, log_covariance: _Float, index: int, far: bool) -> str:
-    """What is wrong with the interval of one factor, in words; empty where nothing is."""
+def _along_least_known(best: Iterate, log_covariance: _Float) -> list[_Float]:
+    """Starts in the direction that is known least, where several factors are sought."""
+    direction = np.linalg.eigh(log_covariance)[1][:, -1]
+    direction /= np.max(np.abs(direction))
+    return [best.log_factor + step * direction for step in NEARER if direction.size > 1]
+
+
+def identifiability(
+    problem: Problem, best: Iterate, log_covariance: _Float | None, around: Surroundings | None
+) -> list[FitRemark]:
+    """Remarks on groups whose factor the frequencies leave open.
+
+    For each group the least sum of squares over all other factors, S(v), belongs to the logarithm v of its own. The
+    interval of first order holds where S - S_min reaches Student's t^2 (times the variance of the residuals where no
+    standard errors were given) at its ends (D. J. Venzon and S. H. Moolgavkar, A method for computing
+    profile-likelihood-based confidence intervals, Appl. Statist. 37, 1988). With the signed roots of S - S_min as
+    normal deviates, the rises at its ends say how often it holds the truth, and the likelihood beyond them, summed over
+    v, takes its part of that: not twice as often wrong as it says is good enough. Other minima that the 95 % intervals
+    do not exclude are all told. Without a covariance there is nothing to compare with, and the energy shares decide
+    alone.
+    """
+    felt = np.max(best.share, axis=0)
+    remarks = [
+        FitRemark(
+            "group-not-felt",
+            name,
+            f"at most {100 * share:.2g} % of the strain energy of the measured modes is in it",
+            CURE,
+        )
+        for name, share in zip(problem.names, felt.tolist(), strict=True)
+        if share < LEAST_SHARE
+    ]
+    if log_covariance is None or around is None:
+        return remarks
+    others = _others(problem, best, log_covariance, around.rivals)
+    if others:
+        text = f"another solution fits as well: factors {others}"
+        return [*remarks, FitRemark("stiffness-ambiguous", ", ".join(problem.names), text, CURE)]
+    for index in np.flatnonzero(felt >= LEAST_SHARE).tolist():
+        text = _open(problem, best, float(log_covariance[index, index]), index, around.ways[index])
+        remarks += [FitRemark("stiffness-ambiguous", problem.names[index], text, CURE)] if text else []
+    return remarks
+
+
+def _others(problem: Problem, best: Iterate, log_covariance: _Float, rivals: Sequence[Iterate]) -> str:
+    """Factors of all solutions that fit as well, far off in one that is not open."""
+    error, highest = np.sqrt(np.diag(log_covariance)), best.cost + Allowed.of(problem, best).limit
+    far = np.where(error < FARTHEST, FAR * error + SHARP, math.inf)
+    apart = [best.log_factor]
+    for rival in rivals:
+        if rival.cost < highest and all(np.max(np.abs(rival.log_factor - other) / far) > 1 for other in apart):
+            apart.append(rival.log_factor)
+    return " or ".join(", ".join(f"{math.exp(value):.3g}" for value in rival) for rival in apart[1:])
+
+
+def _profile(problem: Problem, best: Iterate, log_covariance: _Float, index: int, far: bool) -> Profile | None:
     allowed = Allowed.of(problem, best)
     half = math.sqrt(allowed.rise * float(log_covariance[index, index]))
+    if half < SHARP:
+        return None
+    fixed = [index, *np.flatnonzero(np.diag(log_covariance) >= FARTHEST**2).tolist()]
+    ends = best, best
+    if half < FARTHEST:
+        along = np.clip(half * log_covariance[:, index] / log_covariance[index, index], -FARTHEST, FARTHEST)
+        ends = problem.evaluate(best.log_factor - along), problem.evaluate(best.log_factor + along)
+        if not all(NEARLY < (end.cost - best.cost) / allowed.limit < 1 / NEARLY for end in ends):
+            low, high = (minimize(problem, end.log_factor, fixed, _tolerance(problem, best))[0] for end in ends)
+            ends = low, high
+    if not far:
+        return Profile(ends, ((), ()))
+    below, above = (tuple(_beyond(problem, best, end, fixed, side)) for side, end in zip((-1, 1), ends, strict=True))
+    return Profile(ends, (below, above))
+
+
+def _open(problem: Problem, best: Iterate, variance: float, index: int, way: Profile | None) -> str:
+    """What is wrong with the interval of one factor, in words; empty where nothing is."""
+    allowed = Allowed.of(problem, best)
+    half = math.sqrt(allowed.rise * variance)
     if not half < FARTHEST:
         return f"its standard error is a factor of {math.exp(min(half, 50.0)):.3g} either way"
     if half < SHARP:
         return ""
-    along = np.clip(half * log_covariance[:, index] / log_covariance[index, index], -FARTHEST, FARTHEST)
-    fixed = [index, *np.flatnonzero(np.diag(log_covariance) >= FARTHEST**2).tolist()]
-    try:
-        ends = [problem.evaluate(best.log_factor + side * along) for side in (-1, 1)]
-        if not all(NEARLY < (end.cost - best.cost) / allowed.limit < 1 / NEARLY for end in ends):
-            ends = [minimize(problem, end.log_factor, fixed, _tolerance(problem, best))[0] for end in ends]
-        held = _held([(end.cost - best.cost) / allowed.limit for end in ends])
-        if held < LEAST_HELD:
-            return f"its interval of first order, a factor of {math.exp(half):.4g} either way, holds {100 * held:.0f} %"
-        return _elsewhere(problem, best, fixed, ends, allowed.limit) if far else ""
-    except ArithmeticError:
+    if way is None:
         return "its interval reaches where the model cannot be solved"
+    near = _held([(end.cost - best.cost) / allowed.limit for end in way.ends])
+    beyond = [list(_masses(best, side, index, allowed)) for side in way.sides()]
+    mass = math.sqrt(2 * math.pi * variance)
+    total = mass + math.fsum(part for side in beyond for part, _ in side)
+    held = near * mass / total
+    if held >= LEAST_HELD:
+        return ""
+    low, high = (_reach(side, total * (1 - CONFIDENCE) / 2, half) for side in beyond)
+    reach = f"the frequencies fit {math.exp(-low):.3g} to {math.exp(high):.3g} times what was found"
+    return (
+        f"its interval of first order, a factor of {math.exp(half):.4g} either way, holds {100 * held:.0f} %: {reach}"
+    )
+
+
+def _masses(best: Iterate, side: Sequence[Iterate], index: int, allowed: Allowed) -> Iterator[tuple[float, float]]:
+    """Likelihood over that of the best fit, summed from each place to the next, and how far that is (logarithm).
+
+    In between its logarithm is taken for straight.
+    """
+    for near, far in pairwise(side):
+        distance = abs(float(far.log_factor[index] - near.log_factor[index]))
+        low, high = sorted(allowed.log_density(state.cost - best.cost) for state in (near, far))
+        mean = math.exp(high) * (-math.expm1(low - high) / (high - low) if high > low else 1.0)
+        yield distance * mean, abs(float(far.log_factor[index] - best.log_factor[index]))
+
+
+def _reach(side: Sequence[tuple[float, float]], least: float, half: float) -> float:
+    """How far the likelihood goes with no more than so little of it left out."""
+    left_out = 0.0
+    for part, place in reversed(side):
+        left_out += part
+        if left_out > least:
+            return place
+    return half
 
 
 def _held(rises: Sequence[float]) -> float:
@@ -148,13 +250,11 @@ def _held(rises: Sequence[float]) -> float:
     return float(1 - ndtr(-deviates[0]) - ndtr(-deviates[1]))
 
 
-def _elsewhere(problem: Problem, best: Iterate, fixed: Sequence[int], ends: Sequence[Iterate], limit: float) -> str:
-    """Where beyond its ends the first fixed factor fits as well, in words; empty where it does not."""
-    for side, end in zip((-1, 1), ends, strict=True):
-        for place, cost in _beyond(problem, best, end, fixed, side):
-            if cost - best.cost < limit:
-                return f"the frequencies fit {math.exp(side * place):.3g} times what was found as well"
-    return ""
+def _falling(side: Sequence[Iterate]) -> list[Iterate]:
+    """Places beyond the first that lie lower than the one before and not above the one behind."""
+    costs = [state.cost for state in side]
+    behind = [*costs[2:], math.inf]
+    return [state for state, last, next_ in zip(side[1:], costs, behind, strict=False) if last > state.cost <= next_]
 
 
 def _tolerance(problem: Problem, best: Iterate) -> float:
@@ -162,20 +262,22 @@ def _tolerance(problem: Problem, best: Iterate) -> float:
     return TOLERANCE * error * float(np.min(problem.measured.scale / problem.measured.frequency))
 
 
-def _beyond(
-    problem: Problem, best: Iterate, end: Iterate, fixed: Sequence[int], side: int
-) -> Iterator[tuple[float, float]]:
-    """Distances from the factor found (logarithm) beyond an end of its interval, and the least cost there."""
+def _beyond(problem: Problem, best: Iterate, end: Iterate, fixed: Sequence[int], side: int) -> Iterator[Iterate]:
+    """The least sum of squares further and further from the first fixed factor found, beyond an end of its interval.
+
+    Where it is large, as at the place before, it need not be known well.
+    """
     index = fixed[0]
     half = abs(float(end.log_factor[index] - best.log_factor[index]))
     to_start = -side * float(best.log_factor[index])
     places = {half + step for step in STEPS} | {share * to_start for share in (0.5, 1.0)}
-    state = end
+    state, tolerance, limit = end, _tolerance(problem, best), Allowed.of(problem, best).limit
     for place in sorted(place for place in places if place > half):
         start = state.log_factor.copy()
         start[index] = best.log_factor[index] + side * place
+        coarser = math.sqrt(max((state.cost - best.cost) / limit, 1.0))
         try:
-            state, _ = minimize(problem, start, fixed, _tolerance(problem, best))
+            state, _ = minimize(problem, start, fixed, tolerance * coarser)
         except ArithmeticError:
             return
-        yield place, state.cost
+        yield state

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,12 +14,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from dsm import Bearing, Joint, Segment, Spindle, UnreachableFrequencyError, calibrate, natural_frequencies
 from dsm.calibration.fit_stiffness import fit_stiffness
 from dsm.calibration.stiffness_fit import StiffnessFit, StiffnessFitError
 from dsm.calibration.stiffness_groups import scale_groups
 
+FloatArray = NDArray[np.float64]
 GEOMETRY = Path(__file__).parents[2] / "data" / "okada_vm500_surrogate.csv"
 BEARING_NODES = {"front": (8, 10, 12), "middle": (16, 17, 18), "rear": (21, 22, 23, 24)}
 TRUTH = {"front": 9e8, "middle": 6e8, "rear": 4e8, "holder": 3e8}
@@ -284,7 +287,7 @@ def coverage(number: int, modes: int, noise: float) -> tuple[float, int, int, in
 def test_intervals_without_a_remark_hold_the_truth(modes: int, noise: float) -> None:
     share, _, doubted, failed = coverage(300, modes, noise)
     assert 0.92 <= share <= 0.98
-    assert doubted + failed < 150
+    assert doubted + failed < {2: 210, 3: 90, 4: 45}[modes]
 
 
 def test_a_second_solution_is_told() -> None:
@@ -319,4 +322,42 @@ def test_an_interval_that_holds_too_little_is_told() -> None:
     start = scale_groups(truth, dict(zip(("front", "rear"), away.tolist(), strict=True)))
     found = fit_stiffness(start, exact * (1 + 3e-3 * noise), 3e-3 * exact)
     assert codes(found) == {"stiffness-ambiguous"}
-    assert "holds 49 %" in str(found.remarks[0])
+    (held,) = re.findall(r"holds (\d+) %", str(found.remarks[0]))
+    assert int(held) < 50
+
+
+def worn_six_and_four(front: float, rear: float) -> Spindle:
+    """The stand-in of the OKADA VM500 without shear, six bearings in front and four behind, of 1280 N/um at first."""
+    drawn = replace(surrogate(dict.fromkeys(TRUTH, 1.28e9)), joints=(), theory="euler-bernoulli")
+    bearings = [replace(b, group="rear" if b.group == "rear" else "front") for b in drawn.bearings]
+    return scale_groups(replace(drawn, bearings=bearings), {"front": front, "rear": rear})
+
+
+def three_modes(draws: int) -> list[FloatArray]:
+    """Of six bearings at 0.6 and four at 0.8 of 1280 N/um, with 0.3 %."""
+    draw, exact = np.random.default_rng(3), natural_frequencies(worn_six_and_four(0.6, 0.8), 3)
+    return [exact * (1 + 3e-3 * draw.normal(size=3)) for _ in range(draws)]
+
+
+@pytest.mark.parametrize("draws", [139, 239])
+def test_a_narrow_valley_beside_a_wide_range_that_fits_too_is_told(draws: int) -> None:
+    """The rear bearings are hardly felt at what they are, and were read as 0.285 ± 0.012 without a remark."""
+    measured = three_modes(draws)[-1]
+    found = fit_stiffness(worn_six_and_four(1.0, 1.0), measured, 3e-3 * measured)
+    assert found.factor == pytest.approx([0.61, 0.285], abs=0.01)
+    assert [(remark.code, remark.about) for remark in found.remarks] == [("stiffness-ambiguous", "rear")]
+    (times,) = re.findall(r"fit \S+ to (\S+) times what was found", str(found.remarks[0]))
+    assert 0.285 * float(times) > 0.8
+
+
+@pytest.mark.long
+@pytest.mark.timeout(900)
+def test_a_stiffness_that_is_hardly_felt_is_never_read_without_a_remark() -> None:
+    """Frequencies that exclude each other find nothing."""
+    remarked = 0
+    for measured in three_modes(400):
+        try:
+            remarked += bool(fit_stiffness(worn_six_and_four(1.0, 1.0), measured, 3e-3 * measured).remarks)
+        except StiffnessFitError:
+            remarked += 1
+    assert remarked == 400

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from dsm.calibration.bearing_eigenproblem import bearing_eigenproblem
+from dsm.calibration.bearing_eigenproblem import BearingEigenproblem, bearing_eigenproblem
 from dsm.calibration.calibration import Calibration, UnreachableFrequencyError
 from dsm.calibration.stiffness_groups import parts_stiffness, scale_parts
 from dsm.modes.find_modes import MOST_MODES
@@ -17,6 +18,8 @@ from dsm.spindle.spindle import Spindle
 
 LOOSE = 1e-9
 """Factor on the stiffness of a joint that stands for none."""
+IN_95_PERCENT = 1.96
+"""Standard errors either way that 95 % stay within."""
 
 
 def calibrate(
@@ -32,14 +35,15 @@ def calibrate(
     group: the bearings and joints that are scaled; None: all bearings that have a group, and no joint, whose wear one
     frequency cannot tell from theirs (fit_stiffness with several can, and takes all groups). The factor is exact, from
     an eigenvalue problem of the order of the number of bearings, and a count of modes says which eigenvalue it is; its
-    standard error follows from that of the frequency (`frequency_std`, Hz) by the chain rule. Stiffness of bearings
-    against tilting and of the housing stays as it is.
+    standard error follows from that of the frequency (`frequency_std`, Hz) by the chain rule. Near the limit of rigid
+    bearings the frequency is straight in 1/k, not in k: the 95 % interval of the stiffness is that of the frequency,
+    end by end. Stiffness of bearings against tilting and of the housing stays as it is.
 
     Raises UnreachableFrequencyError where the frequency lies outside what the springs can do, ValueError for a
     frequency not > 0, a shaft that is not held, and a group with no bearing or a rigid one.
     """
     _check(frequency, frequency_std, mode)
-    problem = bearing_eigenproblem(spindle, np.array([frequency]), group)
+    problem = bearing_eigenproblem(spindle, _with_ends(frequency, frequency_std), group)
     index = int(problem.pick(mode)[0])
     chosen = problem.springs.parts
     if index < 0:
@@ -52,6 +56,7 @@ def calibrate(
         mode=mode,
         bearing_stiffness=stiffness,
         bearing_stiffness_std=None if frequency_std is None else stiffness * frequency_std / frequency / sensitivity,
+        bearing_stiffness_interval=None if frequency_std is None else _interval(problem, mode, stiffness / factor),
         factor=factor,
         sensitivity=sensitivity,
         given=spindle,
@@ -66,6 +71,23 @@ def _check(frequency: float, frequency_std: float | None, mode: int) -> None:
         raise ValueError(f"frequency_std={frequency_std} Hz is not a finite number >= 0")
     if not 1 <= mode <= MOST_MODES:
         raise ValueError(f"mode={mode} is not a number from 1, the lowest, to {MOST_MODES}")
+
+
+def _with_ends(frequency: float, frequency_std: float | None) -> NDArray[np.float64]:
+    """The frequency, and the ends of its 95 % interval (Hz)."""
+    if frequency_std is None:
+        return np.array([frequency])
+    half = IN_95_PERCENT * frequency_std
+    return np.array([frequency, max(frequency - half, LOOSE * frequency), frequency + half])
+
+
+def _interval(problem: BearingEigenproblem, mode: int, start: float) -> tuple[float, float]:
+    """Stiffnesses (N/m) for the second and third frequency; 0 and inf where none is as soft or stiff as that."""
+    low, high = problem.pick(mode)[1:].tolist()
+    return (
+        0.0 if low < 0 else float(-start / problem.values[1, low]),
+        math.inf if high < 0 else float(-start / problem.values[2, high]),
+    )
 
 
 def _unreachable(spindle: Spindle, frequency: float, mode: int, chosen: Sequence[int]) -> UnreachableFrequencyError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -46,7 +47,12 @@ class Calibration:
     An equivalent number of this model: compare it only with others of the same geometry and beam theory.
     """
     bearing_stiffness_std: float | None
-    """Standard error of the bearing stiffness from that of the frequency (N/m); None where that was not given."""
+    """Standard error of the bearing stiffness from that of the frequency (N/m); None where that was not given.
+
+    Of first order: near the limit of rigid bearings the interval is much longer upwards.
+    """
+    bearing_stiffness_interval: tuple[float, float] | None
+    """Ends of its 95 % interval (N/m), from 0 to inf; None where the error of the frequency was not given."""
     factor: float
     """Bearing stiffness after over before, the same for all calibrated bearings (-)."""
     sensitivity: float
@@ -74,20 +80,23 @@ class Calibration:
 
     @property
     def is_open(self) -> bool:
-        """Whether the frequency leaves the stiffness open: the mode feels next to nothing of these bearings."""
-        return self.energy_share < LEAST_SHARE
+        """Whether the frequency leaves the stiffness open: next to nothing of it is felt, or it has no upper end."""
+        return self.energy_share < LEAST_SHARE or self._is_unbounded
+
+    @property
+    def _is_unbounded(self) -> bool:
+        return self.bearing_stiffness_interval is not None and math.isinf(self.bearing_stiffness_interval[1])
 
     @property
     def remarks(self) -> tuple[FitRemark, ...]:
         """What makes the stiffness doubtful."""
         if not self.is_open:
             return ()
-        text = f"{100 * self.energy_share:.2g} % of the strain energy of mode {self.mode} is in them: they are open"
-        return (
-            FitRemark(
-                "bearings-not-felt", "bearings", text, "measure another mode; the model may be too soft or too stiff"
-            ),
-        )
+        text = f"{100 * self.energy_share:.2g} % of the strain energy of mode {self.mode} is in them"
+        if self._is_unbounded:
+            text += ", and the frequency may as well be that of rigid ones"
+        cure = "measure another mode; the model may be too soft or too stiff"
+        return (FitRemark("bearings-not-felt", "bearings", f"{text}: they are open", cure),)
 
     @cached_property
     def residual(self) -> float:
@@ -123,6 +132,7 @@ class Calibration:
         lines = [
             ("bearing stiffness", f"{stiffness} each"),
             (f"from mode {self.mode}", plus_minus(self.frequency, self.frequency_std, unit="Hz", percent=True)),
+            *self._interval_lines(),
             ("start", f"{start:.5g} N/um each: factor {self.factor:.5f}"),
             ("energy share", f"{100 * self.energy_share:.1f} % of the mode's strain energy is in these bearings"),
             ("sensitivity", f"bearings 1 % softer lower the frequency by {self.sensitivity:.3f} %"),
@@ -132,3 +142,10 @@ class Calibration:
         ]
         lines += [("warning", str(remark)) for remark in self.remarks]
         return "\n".join(f"{name:<22}{text}" for name, text in lines)
+
+    def _interval_lines(self) -> list[tuple[str, str]]:
+        if self.bearing_stiffness_interval is None:
+            return []
+        low, high = (end / 1e6 for end in self.bearing_stiffness_interval)
+        end = "rigid" if math.isinf(high) else f"{high:.5g} N/um"
+        return [("95 % interval", f"{low:.5g} N/um to {end}")]

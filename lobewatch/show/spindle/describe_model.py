@@ -21,6 +21,7 @@ def calibration_json(calibration: Calibration) -> dict[str, Any]:
         "theory": calibration.spindle.theory,
         "bearing_stiffness_n_per_m": calibration.bearing_stiffness,
         "bearing_stiffness_n_per_m_std": calibration.bearing_stiffness_std,
+        "bearing_stiffness_n_per_m_interval": calibration.bearing_stiffness_interval,
         "residual_hz": calibration.residual,
         "factor": calibration.factor,
         "sensitivity": calibration.sensitivity,

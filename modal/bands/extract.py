@@ -19,12 +19,15 @@ from modal.bands.fit_peaks import fit_again, fit_peaks, fit_real
 from modal.bands.line_weights import line_weights
 from modal.bands.local_bands import local_bands
 from modal.bands.look_closer import look_closer
+from modal.bands.noise_by_height import weights_by_residual
 from modal.bands.usable_lines import usable_lines
 
 SWEEPS = 4
 """Most rounds over the bands, each with the tails of the other bands' modes as they are then."""
 SETTLED = 0.01
 """Change of those tails, as a share of what the fit leaves, that is not worth another fit."""
+SAME_WEIGHT = 0.2
+"""Relative change of weights that is not worth another fit."""
 STRAY = 8.0
 """A single line counts for nothing where it is this many times as far off as the median of the lines about it."""
 ROUNDING = 1e-8
@@ -58,7 +61,19 @@ def _extract(lines: tuple[Frf, ...]) -> Extraction:
     stray = _stray_lines(state)
     if np.any(stray):
         state = _settled(replace(state, weight=np.where(stray, 0.0, state.weight)), everything=True)
+    state = _reweighted(state)
     return replace(state, bands=tuple(fit_real(band) for band in state.bands))
+
+
+def _reweighted(state: Extraction) -> Extraction:
+    """All bands fitted with the weights that what they leave asks for, until those stay about as they are."""
+    given = state.weight
+    for _ in range(SWEEPS):
+        weight = weights_by_residual(state, given)
+        if np.all(np.abs(weight - state.weight) <= SAME_WEIGHT * state.weight):
+            break
+        state = _settled(replace(state, weight=weight), everything=True)
+    return state
 
 
 def _with_common_band(frfs: Sequence[Frf]) -> list[Frf]:

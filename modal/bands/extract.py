@@ -130,7 +130,7 @@ def _with(state: Extraction, old: FittedBand, new: FittedBand | None) -> Extract
 
 def _beside(state: Extraction, known: list[Resonance]) -> list[Resonance]:
     """Known resonances with those that stand out of what the fit of these leaves in any of the FRFs."""
-    for frf, fitted in zip(state.frfs, state.receptance(state.frf.frequency), strict=True):
+    for frf, fitted in zip(state.frfs, state.receptance, strict=True):
         known = resonances_beside(known, replace(frf, receptance=frf.receptance - fitted))
     return known
 

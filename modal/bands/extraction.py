@@ -26,12 +26,17 @@ class BandLines:
 
     lines: slice
     """Place on the frequency axis."""
-    frequency: Array
-    """Frequencies of the lines (Hz), shape (lines,)."""
+    axis: Array
+    """All frequencies of the FRFs (Hz), shape (n,)."""
     weight: Array
     """Weights of each FRF, shape (p, lines)."""
     own: ComplexArray
     """The receptances without the modes of all other bands (m/N), shape (p, lines)."""
+
+    @property
+    def frequency(self) -> Array:
+        """Frequencies of the lines (Hz), shape (lines,)."""
+        return self.axis[self.lines]
 
     @cached_property
     def chart(self) -> StabilisationChart:
@@ -61,6 +66,11 @@ class FittedBand:
         """Where on the frequency axis."""
         return self.data.lines
 
+    @cached_property
+    def receptance(self) -> ComplexArray:
+        """Of its modes alone on all lines of the FRFs (m/N), shape (p, n)."""
+        return self.fit.receptance(self.data.axis)
+
 
 @dataclass(frozen=True, eq=False)
 class Extraction:
@@ -78,17 +88,21 @@ class Extraction:
         """The driving point: the FRF that stiffnesses belong to."""
         return self.frfs[0]
 
-    def receptance(self, frequency: Array, without: FittedBand | None = None) -> ComplexArray:
-        """Of all modes found but those of one band (m/N) at these frequencies (Hz), shape (p, n)."""
-        parts = [band.fit.receptance(frequency) for band in self.bands if band is not without]
-        return np.asarray(sum(parts, np.zeros((len(self.frfs), frequency.size), complex)))
+    @property
+    def receptance(self) -> ComplexArray:
+        """Of all modes found on all lines (m/N), shape (p, n)."""
+        return self._tails(slice(None), None)
 
     def data(self, lines: slice, without: FittedBand | None = None) -> BandLines:
         """What is left on some lines when the modes of all bands but one are taken off."""
-        frequency = self.frf.frequency[lines]
         measured = np.array([frf.receptance[lines] for frf in self.frfs])
-        own = np.asarray(measured - self.receptance(frequency, without))
-        return BandLines(lines, frequency, self.weight[:, lines], own)
+        return BandLines(lines, self.frf.frequency, self.weight[:, lines], measured - self._tails(lines, without))
+
+    def _tails(self, lines: slice, without: FittedBand | None) -> ComplexArray:
+        """Of all modes but those of one band, on these lines (m/N), shape (p, lines)."""
+        parts = [band.receptance[:, lines] for band in self.bands if band is not without]
+        none = np.zeros((len(self.frfs), self.frf.frequency[lines].size), complex)
+        return np.asarray(sum(parts, none))
 
     def left(self, band: FittedBand) -> ComplexArray:
         """Measured receptances on the lines of a band less the fit with its residual terms (m/N), shape (p, lines).

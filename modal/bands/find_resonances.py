@@ -169,21 +169,25 @@ def _is_as_high(new: _Peak, old: _Peak) -> bool:
 
 
 def _peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.float64], least: float) -> list[_Peak]:
-    from scipy.signal import find_peaks, peak_prominences  # take longer to import than all of modal
-
     size = np.abs(mobility)
     faintest = 1e-12 * size.max()
     floor = np.maximum(NOISE_MULTIPLE * noise, max(least, faintest))
-    if not np.any(size >= floor):
-        return []
-    valley = [size.min()]
-    between_valleys = np.concatenate((valley, size, valley))
-    tops, _ = find_peaks(between_valleys, height=np.concatenate(([0.0], floor, [0.0])))
-    prominence, _, _ = peak_prominences(20 * np.log10(np.maximum(between_valleys, faintest)), tops)
-    tops, prominence = tops[prominence >= PROMINENCE_DB] - 1, prominence[prominence >= PROMINENCE_DB]
-    rise = size[tops] * (1 - 10 ** (-prominence / 20))
-    high = tops[(rise > NOISE_MULTIPLE * noise[tops]) & (tops > 0) & (tops < size.size - 1)]
+    tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:]) & (size[1:-1] >= floor[1:-1])) + 1
+    saddle = np.array([_higher_saddle(size, int(top)) for top in tops])
+    clear = saddle <= size[tops] * 10 ** (-PROMINENCE_DB / 20)
+    high = tops[clear & (size[tops] - saddle > NOISE_MULTIPLE * noise[tops])]
     return [_peak(frf, mobility, size, int(top), float(noise[top])) for top in high]
+
+
+def _higher_saddle(size: NDArray[np.float64], top: int) -> float:
+    """The higher of the lowest values between a peak and what is higher on either side, or the lowest of all."""
+    return max(_lowest_before_higher(side, size.min()) for side in (size[top::-1], size[top:]))
+
+
+def _lowest_before_higher(side: NDArray[np.float64], lowest: float) -> float:
+    """Lowest value between side[0] and the next higher one; the lowest of all where none is higher."""
+    higher = int(np.argmax(side > side[0]))
+    return float(side[:higher].min()) if higher else lowest
 
 
 def _peak(frf: Frf, mobility: NDArray[np.complex128], size: NDArray[np.float64], top: int, noise: float) -> _Peak:

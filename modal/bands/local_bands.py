@@ -13,6 +13,9 @@ from modal.bands.find_resonances import Resonance
 
 CLOSE = 4.0
 """Neighbours nearer than this many times the sum of their half-widths are fitted together."""
+MOST_TOGETHER = 6
+"""Most resonances that are fitted together: the time of a fit grows with their square, and more of them often do not
+settle."""
 REACH = 8.0
 """A local band ends this many half-widths beyond its outer resonances."""
 LEAST_LINES = 6
@@ -39,7 +42,7 @@ def local_bands(resonances: Sequence[Resonance], frequency: NDArray[np.float64])
 
     resonances come by rising frequency, frequency (Hz) has shape (n,).
     """
-    groups = list(_groups(resonances))
+    groups = [part for group in _groups(resonances) for part in _parts(group)]
     meetings = [_between(a[-1], b[0]) for a, b in pairwise(groups)]
     borders = zip(groups, [-np.inf, *meetings], [*meetings, np.inf], strict=False)
     return [LocalBand(group, _lines(group, below, above, frequency)) for group, below, above in borders]
@@ -54,6 +57,17 @@ def _groups(resonances: Sequence[Resonance]) -> Iterator[tuple[Resonance, ...]]:
         group = (*group, resonance)
     if group:
         yield group
+
+
+def _parts(group: tuple[Resonance, ...]) -> Iterator[tuple[Resonance, ...]]:
+    """The group, or what is left of it when it is cut at its widest gaps until no part is too large."""
+    if len(group) <= MOST_TOGETHER:
+        yield group
+        return
+    gaps = [(b.frequency - a.frequency) / (a.half_width + b.half_width) for a, b in pairwise(group)]
+    widest = int(np.argmax(gaps)) + 1
+    yield from _parts(group[:widest])
+    yield from _parts(group[widest:])
 
 
 def _are_close(a: Resonance, b: Resonance) -> bool:

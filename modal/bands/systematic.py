@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modal.bands.extraction import Array, BandLines, FittedBand
-from modal.fitting import LEAST_TERMS, MOST_TERMS, BandFit, fit_band, with_real_constants
+from modal.bands.extraction import Array, ComplexArray, FittedBand
+from modal.fitting import LEAST_TERMS, MOST_TERMS, BandFit, values_nearby
 
 SIGNIFICANT = 3.0
 """Times 1/sqrt(lines) that the share of independent values must be below 1; white noise is so in one of 700."""
@@ -46,7 +46,7 @@ def systematic(band: FittedBand) -> Systematic:
     is_white = independent > fit.freedom * (1 - SIGNIFICANT / np.sqrt(fit.residual.size / 2))
     if is_white or leaves_rounding(band):
         return none
-    moved = np.array([_moved(fit, other) for other in _others(band)]).reshape(-1, size)
+    moved = np.array([_moved(fit, *values) for values in _others(band)]).reshape(-1, size)
     most = np.max(np.abs(moved), axis=0, initial=0.0)
     return Systematic(max(fit.freedom / independent, 1.0), min(fit.freedom, independent), np.diag(most**2))
 
@@ -63,27 +63,19 @@ def _independent_values(fit: BandFit) -> float:
     return float(4 * power.sum() ** 2 / np.sum(power**2)) if power.any() else float(fit.residual.size)
 
 
-def _others(band: FittedBand) -> Iterator[BandFit]:
-    """Fits of the same modes with other residual terms, and on parts of the lines, where they converge."""
-    for terms in range(LEAST_TERMS - 2, MOST_TERMS + 1):
-        if terms != band.terms:
-            yield from _fitted(band, band.data, terms)
+def _others(band: FittedBand) -> Iterator[tuple[Array, ComplexArray]]:
+    """Poles and constants of the same modes with other residual terms, and on parts of the lines."""
     data, n = band.data, band.data.frequency.size
-    for low, high in PARTS:
-        part = slice(round(low * n), round(high * n))
-        lines = BandLines(part, data.frequency[part], data.weight[:, part], data.own[:, part])
-        yield from _fitted(band, lines, band.terms)
+    everything = slice(0, n)
+    tries = [(everything, terms) for terms in range(LEAST_TERMS - 2, MOST_TERMS + 1) if terms != band.terms]
+    for part, terms in [*tries, *((slice(round(low * n), round(high * n)), band.terms) for low, high in PARTS)]:
+        values = values_nearby(band.fit, data.frequency[part], data.own[:, part], data.weight[:, part], terms)
+        if values is not None:
+            yield values
 
 
-def _fitted(band: FittedBand, data: BandLines, terms: int) -> Iterator[BandFit]:
-    arguments = (data.frequency, data.own, data.weight)
-    fit = fit_band(*arguments, band.fit.poles, terms)
-    if fit is not None and np.all(fit.frequency > 0) and np.all(fit.damping_ratio > 0):
-        yield fit if np.any(band.fit.constant.imag) else with_real_constants(fit, *arguments, terms)
-
-
-def _moved(fit: BandFit, other: BandFit) -> Array:
-    """Change of the values in the order of `BandFit`."""
+def _moved(fit: BandFit, poles: Array, constant: ComplexArray) -> Array:
+    """Change to other values, in the order of `BandFit`."""
     turn = np.exp(-1j * np.angle(fit.constant))
-    off = (other.constant - fit.constant) * turn
-    return np.concatenate([(other.poles - fit.poles).ravel(), off.real.ravel(), off.imag.ravel()])
+    off = (constant - fit.constant) * turn
+    return np.concatenate([(poles - fit.poles).ravel(), off.real.ravel(), off.imag.ravel()])

@@ -1,7 +1,7 @@
 """Least squares of a few neighbouring modes at once, in one FRF or in several with the same poles."""
 
 from modal.fitting.band_fit import BandFit
-from modal.fitting.fit_band import fit_band, with_real_constants
+from modal.fitting.fit_band import fit_band, values_nearby, with_real_constants
 from modal.fitting.residual_terms import LEAST_TERMS, MOST_TERMS, gain_of_a_term
 
-__all__ = ["LEAST_TERMS", "MOST_TERMS", "BandFit", "fit_band", "gain_of_a_term", "with_real_constants"]
+__all__ = ["LEAST_TERMS", "MOST_TERMS", "BandFit", "fit_band", "gain_of_a_term", "values_nearby", "with_real_constants"]

@@ -17,8 +17,10 @@ MOST_TRIALS = 60
 """Evaluations of the model; a mode in its own band takes some five."""
 CONVERGED = 1e-13
 """Step (share of the half-power half-width) after which there is nothing left to gain."""
-GAINED = 1e-4
-"""Fall of the sum of squares, against that by chance of one unknown, not worth a step: a hundredth of an error."""
+NEAR_TRIALS = 5
+"""Evaluations of the model after which the values of much the same fit are taken as they are."""
+GAINED = 1e-3
+"""Fall of the sum of squares, against that by chance of one unknown, not worth a step: a thirtieth of an error."""
 LEAST_SINGULAR = 1e-10
 """Share of the largest singular value below which an unknown cannot be told from the others."""
 
@@ -67,6 +69,23 @@ def with_real_constants(fit: BandFit, frequency: Array, receptance: ComplexArray
     return fit
 
 
+def values_nearby(
+    fit: BandFit, frequency: Array, receptance: ComplexArray, weight: Array, terms: int
+) -> tuple[Array, ComplexArray] | None:
+    """Poles (2, m) and modal constants (p, m) of the same modes with other residual terms or on other lines, nearly.
+
+    After a few steps, with real constants where those of the fit are; None where nothing fits. Arguments as `fit_band`.
+    """
+    p, m = fit.constant.shape
+    if 2 * m + p * (2 * m + 2 * terms) >= 2 * receptance.size:
+        return None
+    with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
+        band = projected_band(frequency, receptance, weight, terms)
+        state, _ = _descended(band, fit.poles, bool(np.any(fit.constant.imag)), NEAR_TRIALS)
+        return (state.poles, state.constant) if np.isfinite(state.cost) else None
+    return None
+
+
 def _poles_of_real(fit: BandFit) -> Array:
     """Poles (2, m) that real constants would have, to first order in the phases taken off."""
     m, covariance = fit.frequency.size, fit.covariance
@@ -91,21 +110,27 @@ def _fit_of(state: FitAtPoles, influence: Array) -> BandFit:
 
 def _solved(band: ProjectedBand, starts: Array, is_complex: bool) -> FitAtPoles | None:
     """Levenberg-Marquardt; None where it does not converge."""
+    state, has_converged = _descended(band, starts, is_complex, MOST_TRIALS)
+    return state if has_converged else None
+
+
+def _descended(band: ProjectedBand, starts: Array, is_complex: bool, trials: int) -> tuple[FitAtPoles, bool]:
+    """Where so many evaluations lead, and whether there is nothing left to gain there."""
     state, damping = band.at(starts, is_complex), 1e-4
-    for _ in range(MOST_TRIALS):
+    for _ in range(trials):
         if not np.isfinite(state.cost):
-            return None
+            break
         step, gain = _step(state, damping)
         if gain < GAINED * state.cost / state.freedom or np.max(np.abs(step)) < CONVERGED:
-            return state
+            return state, True
         trial = band.at(state.poles + (step * state.scale).reshape(2, -1), is_complex)
         if trial.cost < state.cost:
             state, damping = trial, damping / 10
         elif damping > 1e8 or np.max(np.abs(step)) < 1e-6:
-            return state
+            return state, True
         else:
             damping = max(damping, 1e-6) * 10
-    return None
+    return state, False
 
 
 def _step(state: FitAtPoles, damping: float) -> tuple[Array, float]:

@@ -98,15 +98,15 @@ class ProjectedBand:
         return FitAtPoles(poles, list(self._projected(poles, is_complex)))
 
     def _projected(self, poles: Array, is_complex: bool) -> Iterator[Projected]:
-        columns, slopes = _columns(self.frequency, poles, is_complex)
-        m, n = poles.shape[1], self.frequency.size
+        curves = _curves(self.frequency, poles)
+        columns = np.concatenate([curves.curve, curves.turn * curves.curve]) if is_complex else curves.curve
+        m = poles.shape[1]
         for data, weight, base in zip(self.data, self.weight, self.bases, strict=True):
             q, triangle = np.linalg.qr(_without(base, split(weight * columns).T))
             part = q.T @ data
             inverse = np.linalg.inv(triangle)
             linear = inverse @ part
-            turned = linear.reshape(-1, 1, m, 1) * slopes
-            slope = split(weight * turned.sum(axis=0).reshape(2 * m, n)).T
+            slope = split(weight * _slope(curves, linear[:m, np.newaxis], linear[m:, np.newaxis])).T
             unknowns = linear.size + base.shape[1]
             yield Projected(q, inverse, linear, data - q @ part, unknowns, _without(base, slope))
 
@@ -126,19 +126,39 @@ def _of_both_parts(base: Array) -> Array:
     return both
 
 
-def _columns(frequency: Array, poles: Array, is_complex: bool) -> tuple[ComplexArray, ComplexArray]:
-    """Curves of constants 1 (and i), shape (c, n), and their slopes by scaled frequency and damping, (c/m, 2, m, n)."""
+@dataclass(frozen=True, eq=False)
+class _Curves:
+    """Shapes of m modes over n lines, each (m, n) or (m, 1)."""
+
+    r: Array
+    zeta: Array
+    root: Array
+    """sqrt(1 - zeta^2)."""
+    curve: ComplexArray
+    """Of a modal constant of 1."""
+    turn: ComplexArray
+    """Times curve: of a modal constant of i."""
+
+
+def _curves(frequency: Array, poles: Array) -> _Curves:
     fn, zeta = poles[:, :, np.newaxis]
     r = frequency / fn
-    curve = 1 / (1 - r**2 + 2j * zeta * r)
-    steps = zeta * curve**2
-    real = np.stack([(2j * zeta * r - 2 * r**2) * steps, -2j * r * steps])
-    if not is_complex:
-        return curve, real[np.newaxis]
     root = np.sqrt(1 - zeta**2)
     turn = (zeta + 1j * r) / root
-    turned = turn * real + np.stack([-1j * r, (1 + turn * zeta / root)]) * (zeta / root * curve)
-    return np.concatenate([curve, turn * curve]), np.stack([real, turned])
+    return _Curves(r, zeta, root, 1 / (1 - r**2 + 2j * zeta * r), turn)
+
+
+def _slope(c: _Curves, real: Array, imaginary: Array) -> ComplexArray:
+    """Of modes by scaled frequency and damping, (2 m, n), for the parts of their constants, (m, 1), maybe no imaginary
+    ones, (0, 1)."""
+    steps = c.zeta * c.curve**2 * (real + imaginary * c.turn if imaginary.size else real)
+    by_damping = -2j * c.r * steps
+    by_frequency = -c.zeta * by_damping - 2 * c.r**2 * steps
+    if imaginary.size:
+        off = imaginary * (c.zeta / c.root) * c.curve
+        by_frequency -= 1j * c.r * off
+        by_damping += (1 + c.turn * c.zeta / c.root) * off
+    return np.concatenate([by_frequency, by_damping])
 
 
 def _without(base: Array, values: Array) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
 
 from acquisition import Frf
-from modal.bands.line_weights import measuring_factor
+from modal.bands.line_weights import incoherent, measuring_factor
 from modal.bands.without_drift import without_drift
 
 FEWEST_LINES = 8
@@ -23,6 +23,8 @@ PROMINENCE_DB = 1.0
 """A peak stands this far above its saddles (dB of mobility) ..."""
 NOISE_MULTIPLE = 8.0
 """... and this many rms of the noise, which no ripple among a million lines reaches."""
+SEEN_OVER = 65
+"""Lines that the noise of each is told from, by their median."""
 NOISE_LOSS = 4.0
 """Height of a peak that may be the luck of its highest line (rms of the noise)."""
 LEAST_TURN = 0.5
@@ -225,8 +227,12 @@ def _lines_down(size: NDArray[np.float64]) -> float:
 
 
 def mobility_noise(frf: Frf) -> NDArray[np.float64]:
-    """rms of the noise on each line of the mobility, from third differences of what was measured, shape (n,)."""
+    """rms of the noise on each line of the mobility, shape (n,): what is larger, its third differences or coherence.
+
+    Third differences do not see noise that is alike on neighbouring lines, as that of an overloaded sensor is.
+    """
     factor = measuring_factor(frf)
     rough = np.abs(np.diff(frf.receptance * factor, 3)) / np.sqrt(20)
-    rms = median_filter(rough, size=65) / np.sqrt(np.log(2))
-    return np.asarray(np.pad(rms, (1, 2), mode="edge") * 2 * np.pi * frf.frequency / factor)
+    scatter = np.pad(median_filter(rough, size=SEEN_OVER) / np.sqrt(np.log(2)), (1, 2), mode="edge")
+    noise = np.maximum(scatter, median_filter(incoherent(frf), size=SEEN_OVER))
+    return np.asarray(noise * 2 * np.pi * frf.frequency / factor)

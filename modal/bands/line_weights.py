@@ -12,6 +12,8 @@ SMOOTHED_OVER = 25
 """Lines over which the variance is averaged, so that a line that is small by chance does not count for more."""
 OUTSTANDING = 8.0
 """Times the median about it that the variance of an undisturbed line never reaches."""
+MOST_AVERAGES = 10
+"""Hits that few people average more of."""
 LEAST_VARIANCE = 1e-6
 """Share of the mean variance below which no line is believed."""
 
@@ -29,6 +31,19 @@ def line_weights(frf: Frf) -> NDArray[np.float64]:
     variance = _smoothed((error * np.abs(frf.receptance) * factor) ** 2)
     mean = np.mean(variance)
     return factor if mean == 0 else factor / np.sqrt(np.maximum(variance, LEAST_VARIANCE * mean) / mean)
+
+
+def incoherent(frf: Frf) -> NDArray[np.float64]:
+    """rms of the noise of what was measured that its coherence tells, shape (n,); 0 where it tells nothing.
+
+    A coherence below 1 is that of several hits: of ten, where nobody said how many.
+    """
+    if frf.coherence is None:
+        return np.zeros(frf.frequency.size)
+    averages = frf.n_averages if frf.n_averages > 1 else MOST_AVERAGES
+    g2 = np.clip(frf.coherence, 1e-12, 1.0)
+    size = np.abs(frf.receptance) * measuring_factor(frf)
+    return np.asarray(size * np.sqrt((1 - g2) / (2 * averages * g2)))
 
 
 def _smoothed(variance: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -44,7 +44,7 @@ def look_closer(band: FittedBand) -> FittedBand:
             refitted = _with_terms(replace(band, fit=fit, height=height))
             if _is_sure(refitted):
                 return refitted
-        if np.all(are_modes(fit, band.data.frequency, height, np.inf)):
+        if _is_white(fit) and np.all(are_modes(fit, band.data.frequency, height, np.inf)):
             bent = replace(bent, suspects=tuple(sorted(fit.frequency.tolist())))
     return bent
 

@@ -8,10 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from modal.bands.extraction import Array, ComplexArray, FittedBand
+from modal.bands.left_about import left_about
 from modal.fitting import LEAST_TERMS, MOST_TERMS, BandFit, values_nearby
 
 SIGNIFICANT = 3.0
 """Times 1/sqrt(lines) that the share of independent values must be below 1; white noise is so in one of 700."""
+HIDDEN = 2.0
+"""Standard error that may hide in what is left about a mode, over what is left as a share of its peak ..."""
+MORE_THAN_NOISE = 2.0
+"""... where that is so many times the noise."""
 ROUNDING = 1e-7
 """Share of what was measured below which a residual means nothing."""
 PARTS = ((0.1, 1.0), (0.0, 0.9), (0.1, 0.9), (0.2, 0.8))
@@ -38,17 +43,29 @@ def systematic(band: FittedBand) -> Systematic:
     Structure that the model lacks leaves a residual that is alike over many lines. As many of its values are
     independent as its power fills bins of their transform, (sum P)^2 / sum P^2; white noise fills half of them.
     What such structure shifts in the modes the residual does not show: each band is fitted again with fewer and more
-    residual terms and on parts of its lines, and each value may be off by as much as the fit that moves it most.
+    residual terms and on parts of its lines, and each value may be off by as much as the fit that moves it most. What
+    is left about a mode beyond noise, as a share of its peak, may hide an error of twice that share of its half-width,
+    its damping ratio and its size, whatever its colour: by that the same hits differ on several sensors.
     """
-    fit, size = band.fit, len(band.fit.influence)
-    none = Systematic(1.0, fit.freedom, np.zeros((size, size)))
+    fit = band.fit
+    hidden = _hidden(band)
     independent = _independent_values(fit)
     is_white = independent > fit.freedom * (1 - SIGNIFICANT / np.sqrt(fit.residual.size / 2))
     if is_white or leaves_rounding(band):
-        return none
-    moved = np.array([_moved(fit, *values) for values in _others(band)]).reshape(-1, size)
+        return Systematic(1.0, fit.freedom, np.diag(hidden**2))
+    moved = np.array([_moved(fit, *values) for values in _others(band)]).reshape(-1, hidden.size)
     most = np.max(np.abs(moved), axis=0, initial=0.0)
-    return Systematic(max(fit.freedom / independent, 1.0), min(fit.freedom, independent), np.diag(most**2))
+    return Systematic(max(fit.freedom / independent, 1.0), min(fit.freedom, independent), np.diag(most**2 + hidden**2))
+
+
+def _hidden(band: FittedBand) -> Array:
+    """Errors that may hide in what the fit leaves about each mode, where it is more than noise, in the order of
+    `BandFit`: as shares of half-width, damping ratio and size."""
+    fit, left = band.fit, [left_about(band, i) for i in range(band.fit.frequency.size)]
+    share = np.array([HIDDEN * of_peak if of_noise > MORE_THAN_NOISE else 0.0 for of_peak, of_noise in left])
+    share = np.zeros(share.size) if leaves_rounding(band) else share
+    sizes = (share * np.abs(fit.constant)).ravel()
+    return np.concatenate([share * np.prod(fit.poles, axis=0), share * fit.damping_ratio, sizes, sizes])
 
 
 def leaves_rounding(band: FittedBand) -> bool:

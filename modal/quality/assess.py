@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from acquisition import Remark
 from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.fit_peaks import LARGEST_ERROR
+from modal.bands.left_about import left_about
 from modal.fitting import LEAST_TERMS
 from modal.modes.common_delay import common_delay
 from modal.modes.mode import Mode
-from modal.quality.trust import MISFIT, MISFIT_SHARE, relative_error, trust_rules
+from modal.quality.trust import MISFIT, MISFIT_SHARE, most_left, relative_error, trust_rules
 
 LEAST_COHERENCE = 0.9
 """Mean coherence between the half-power points; below it the averaged hits disagree."""
@@ -23,17 +24,19 @@ LARGEST_PHASE = 20.0
 """Of the modal constant, beyond what a delay between the channels gives all modes (degrees)."""
 BENT = 0.005
 """Relative standard error of K above which a strong mode beside the band may have bent the fit by more than that."""
+FAR_STRONGER = 20.0
+"""Height of a mode over that of one on its flank that may be no more than what makes the strong one no linear mode."""
 MOST_LEFT = 0.02
 """Share of a mode's decay that may be left when the record ends."""
 LARGEST_SCATTER = 3.0
 """Standard error over hits over that of the fit."""
-LARGEST_DIFFERENCE = 0.25
-"""Share that the damping ratio from the half-power width may differ by."""
+LARGEST_DIFFERENCE, FEWEST_LINES = 0.25, 4
+"""Share that the damping ratio from the half-power width may differ by, where so many lines lie between its points."""
 
 
 def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
     """Mode i of a band with its figures of quality and the remarks that follow from them."""
-    share, misfit = _misfit(state, band, i)
+    share, misfit = left_about(band, i)
     judged = replace(
         mode,
         coherence=_coherence(state, mode),
@@ -58,16 +61,6 @@ def _coherence(state: Extraction, mode: Mode) -> float | None:
     return float(np.mean(frf.coherence[near]))
 
 
-def _misfit(state: Extraction, band: FittedBand, i: int) -> tuple[float, float]:
-    """rms of the residual as a share of the peak of the mode, and over that of the noise (from third differences)."""
-    fit, weight = band.fit, state.weight
-    rms = np.sqrt(fit.sum_of_squares / fit.freedom * 2)
-    noise = np.median(np.abs(np.diff(fit.complex_residual, 3))) / np.sqrt(20 * np.log(2))
-    nearest = np.argmin(np.abs(state.frf.frequency - fit.frequency[i]) + 1e9 * (weight == 0), axis=1)
-    peaks = weight[np.arange(nearest.size), nearest] * np.abs(fit.constant[:, i] / (2 * fit.damping_ratio[i]))
-    return float(rms / np.max(peaks)), float(rms / noise) if noise > 0 else 1.0
-
-
 def _edge_distance(state: Extraction, mode: Mode) -> float:
     """Of a mode from the nearer end of the lines, in its half-power half-widths."""
     f = state.frf.frequency
@@ -86,19 +79,32 @@ def _on_its_place(state: Extraction, band: FittedBand, i: int, mode: Mode) -> It
     if mode.edge_distance is not None and mode.edge_distance < 1:
         text = f"its peak is cut by the edge of the lines, {f[0]:.0f}..{f[-1]:.0f} Hz"
         yield Remark("cut-by-edge", at, text, "widen the band")
-    if mode.left_ringing is not None and mode.left_ringing > MOST_LEFT:
+    if mode.left_ringing is not None and mode.left_ringing > min(most_left(mode), MOST_LEFT):
         text = f"{100 * mode.left_ringing:.0f} % of it still rings when the record ends"
         yield Remark("still-ringing", at, text, "record longer")
     for other in np.delete(band.fit.frequency, np.argmin(np.abs(band.fit.frequency - mode.frequency))):
         if abs(other - mode.frequency) < 2 * half_width:
             yield Remark("overlaps", at, f"overlaps with the mode at {other:.1f} Hz")
-    if band.terms > LEAST_TERMS and band.fit.size_error[0, i] > BENT:
-        text = "a far stronger mode beside the band bends the fit: zeta and K may be off by more than their errors"
+    if _is_bent(state, band, i):
+        text = "a far stronger mode beside it bends the fit: zeta and K may be off by more than their errors"
         yield Remark("bent-by-neighbour", at, text)
     if any(abs(suspect - mode.frequency) < half_width for suspect in band.suspects):
         where = " and ".join(f"{suspect:.0f}" for suspect in band.suspects)
         text = f"may be several modes, near {where} Hz: too noisy to tell"
         yield Remark("several-modes", at, text, "average more hits")
+
+
+def _is_bent(state: Extraction, band: FittedBand, i: int) -> bool:
+    """Whether what bends mode i is not fitted: a mode beyond the lines, or that by which a strong one is not linear."""
+    at_edge = band.lines.start == 0 or band.lines.stop >= state.frf.frequency.size
+    if at_edge and band.terms > LEAST_TERMS and band.fit.size_error[0, i] > BENT:
+        return True
+    own, frequency = band.fit.mobility_peak[i], band.fit.frequency[i]
+    fits = [other.fit for other in state.bands]
+    peak = np.concatenate([fit.mobility_peak for fit in fits])
+    distance = np.abs(np.concatenate([fit.frequency for fit in fits]) - frequency)
+    reach = np.concatenate([np.prod(fit.poles, axis=0) for fit in fits])
+    return bool(np.any((peak > FAR_STRONGER * own) & (peak * reach > own * distance)))
 
 
 def _name(mode: Mode) -> str:
@@ -126,7 +132,9 @@ def _on_its_values(band: FittedBand, i: int, mode: Mode, share: float) -> Iterat
         yield Remark("uncertain", at, text, "average more hits")
     if mode.misfit is not None and mode.misfit > MISFIT and share > MISFIT_SHARE:
         yield Remark("misfit", at, f"the fit leaves {mode.misfit:.1f} times the noise, {100 * share:.0f} % of its peak")
-    if width is not None and band.height.size == 1 and abs(width / mode.damping_ratio - 1) > LARGEST_DIFFERENCE:
+    is_wide = np.sum(np.abs(band.data.frequency - mode.frequency) < mode.damping_ratio * mode.frequency) >= FEWEST_LINES
+    differs = width is not None and abs(width / mode.damping_ratio - 1) > LARGEST_DIFFERENCE
+    if width is not None and differs and is_wide and band.height.size == 1:
         yield Remark("half-power-width", at, f"zeta from its half-power width is {100 * width:.2g} %")
 
 

@@ -17,8 +17,9 @@ HEAVY_DAMPING = 0.3
 """Damping ratio that no peak makes a mode."""
 LEAST_COHERENCE = 0.5
 """Mean coherence at the peak below which most of what was measured is not the hammer's."""
-MOST_LEFT = 0.05
-"""Share of the decay left when the record ends: K is off by about as much."""
+LEAST_LEFT, MOST_LEFT = 0.005, 0.05
+"""Share of the decay left when the record ends: K is off by about as much, which bears on it where its interval is
+narrower (two standard errors, between these)."""
 MISFIT = 2.0
 """rms of what the fit leaves over rms of the noise that is more than noise; it matters ..."""
 MISFIT_SHARE = 0.01
@@ -69,7 +70,13 @@ def _limits(mode: Mode) -> Iterator[tuple[str, float, float, float]]:
         yield "low-coherence", 1 - mode.coherence, 1 - LEAST_COHERENCE, never
     if mode.edge_distance is not None:
         yield "cut-by-edge", 1 - mode.edge_distance, 0.0, 1.0
-    yield "still-ringing", mode.left_ringing or 0.0, MOST_LEFT, never
+    yield "still-ringing", mode.left_ringing or 0.0, most_left(mode), never
+
+
+def most_left(mode: Mode) -> float:
+    """Share of its decay that may be left when the record ends before K is off by more than its interval says."""
+    error = 0.0 if mode.best_covariance is None else float(mode.standard_error[2] / abs(mode.stiffness))
+    return min(max(2 * error, LEAST_LEFT), MOST_LEFT)
 
 
 def relative_error(mode: Mode) -> float:

@@ -47,7 +47,7 @@ def test_a_mode_with_nothing_against_it_is_trusted_and_so_is_one_without_figures
         ({"jackknife": UNCERTAIN / 2, "n_hits": 5}, "uncertain", Trust.DOUBTFUL),
         ({"coherence": 0.49}, "low-coherence", Trust.DOUBTFUL),
         ({"edge_distance": 0.9}, "cut-by-edge", Trust.DOUBTFUL),
-        ({"left_ringing": 0.06}, "still-ringing", Trust.DOUBTFUL),
+        ({"left_ringing": 0.006}, "still-ringing", Trust.DOUBTFUL),
         ({"remarks": (Remark("several-modes", "", "a text"),)}, "several-modes", Trust.DOUBTFUL),
     ],
 )
@@ -65,7 +65,8 @@ def test_each_rule_alone(change: dict[str, Any], code: str, verdict: Trust) -> N
         {"damping_ratio": 0.07, "half_power_damping": None},
         {"coherence": 0.51},
         {"edge_distance": 1.1},
-        {"left_ringing": 0.04},
+        {"left_ringing": 0.0055},
+        {"left_ringing": 0.04, "covariance": np.diag([0.2, 1e-4, 8e5]) ** 2},
     ],
 )
 def test_less_than_a_limit_is_no_reason(change: dict[str, Any]) -> None:

@@ -11,7 +11,13 @@ import numpy as np
 from acquisition import Description, Fact, Frf, Remark, windowed_receptance
 from dsm import plus_minus
 from lobewatch.measuring.one_file.file_frf import read_file_frf
-from lobewatch.measuring.one_file.windows import Window, refit_ringing_modes, remove_own_window, window_to_correct
+from lobewatch.measuring.one_file.windows import (
+    Window,
+    refit_ringing_modes,
+    remove_given_window,
+    remove_own_window,
+    window_to_correct,
+)
 from modal import (
     Extraction,
     Mode,
@@ -21,8 +27,6 @@ from modal import (
     modes_of,
     peaks_beyond,
     pick_peaks,
-    remove_window,
-    with_windowed_noise,
 )
 
 MOST_NAMED = 6
@@ -83,8 +87,7 @@ def modes_of_file(
     windowed: tuple[Remark, ...] = ()
     if window is not None and delay is not None:
         record = 1 / float(np.mean(np.diff(frf.frequency)))
-        wider = (with_windowed_noise(mode, window.time_constant, record) for mode in modes)
-        fitted = tuple(remove_window(mode, window.time_constant, delay) for mode in wider)
+        fitted, windowed = remove_given_window(modes, window.time_constant, delay, record)
     elif file_frf.time_constant is not None:
         fitted = tuple(remove_own_window(modes, file_frf.time_constant))
     elif not accept:

@@ -107,6 +107,26 @@ def remove_own_window(modes: Sequence[Mode], time_constant: float) -> Iterator[M
             yield remove_window(wider, time_constant)
 
 
+def remove_given_window(
+    modes: Sequence[Mode], time_constant: float, delay: float, record: float
+) -> tuple[tuple[Mode, ...], tuple[Remark, ...]]:
+    """Modes of a record (s) without the window that it was recorded with, and a remark on each that has no mode then.
+
+    What decays no faster than the window is no mode behind it. Raises ValueError where that holds for all of them:
+    then the time constant is wrong.
+    """
+    rings = [2 * np.pi * mode.damping_ratio * mode.frequency > 1 / time_constant for mode in modes]
+    kept = [mode for mode, is_mode in zip(modes, rings, strict=True) if is_mode or not any(rings)]
+    wider = (with_windowed_noise(mode, time_constant, record) for mode in kept)
+    remarks = tuple(_about_slow(mode, time_constant) for mode, is_mode in zip(modes, rings, strict=True) if not is_mode)
+    return tuple(remove_window(mode, time_constant, delay) for mode in wider), remarks
+
+
+def _about_slow(mode: Mode, time_constant: float) -> Remark:
+    text = f"decays no faster than the window of {time_constant:.3g} s: no mode behind it, left out"
+    return Remark("slower-than-window", f"{mode.frequency:.0f} Hz", text, "a wrong --window does that to all modes")
+
+
 def refit_ringing_modes(
     modes: Sequence[Mode], hits: Sequence[Hit], band: tuple[float, float] | None
 ) -> tuple[tuple[Mode, ...], tuple[Remark, ...]]:

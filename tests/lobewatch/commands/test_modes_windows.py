@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from acquisition import Structure, infer_averages
 from lobewatch.cli import main
 from lobewatch.measuring import Window, modes_of_file
-from modal import Mode, Trust, trust_of
+from modal import Mode, Trust, synthesize, trust_of
 from tests.modal.test_remarks import MODE, noisy
 
 FREQUENCY, DAMPING, STIFFNESS = 500.0, 0.005, 3e7
@@ -179,3 +179,23 @@ def test_rejected_modes_are_counted_and_shown_with_all(
     assert "heavy-damping" not in brief
     assert "rejected: " in everything
     assert "heavy-damping" in everything
+
+
+def test_a_mode_that_outlasts_the_window_is_left_out_and_said(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """A line of hum or a clock looks like a mode of hardly any damping; the others have their answer all the same."""
+    sharp = Mode(600.0, 0.0002, 3e9)
+    lines = np.arange(400.0, 3000.0, 0.25)
+    receptance = synthesize([sharp, MODE], lines).receptance
+    file = tmp_path / "frf.csv"
+    table = np.stack([lines, receptance.real, receptance.imag], axis=1)
+    np.savetxt(file, table, header="Freq(Hz) Real(m/N) Imag(m/N)", comments="")
+    code, said = run(monkeypatch, capsys, str(file), "--window", "0.5", "--hit-at", "0", "--json")
+    assert code == 0
+    (mode,) = json.loads(said)["modes"]
+    assert mode["frequency_hz"] == pytest.approx(MODE.frequency, rel=1e-3)
+    assert ("slower-than-window", "600 Hz") in [(r["code"], r["about"]) for r in json.loads(said)["remarks"]]
+    code, said = run(monkeypatch, capsys, str(file), "--window", "0.5", "--hit-at", "0", "--band", "500", "700")
+    assert code == 2
+    assert "600.0 Hz decays" in said

@@ -22,8 +22,6 @@ LEAST_COHERENCE = 0.9
 """Mean coherence between the half-power points; below it the averaged hits disagree."""
 LARGEST_PHASE = 20.0
 """Of the modal constant, beyond what a delay between the channels gives all modes (degrees)."""
-BENT = 0.005
-"""Relative standard error of K above which a strong mode beside the band may have bent the fit by more than that."""
 FAR_STRONGER = 20.0
 """Height of a mode over that of one on its flank that may be no more than what makes the strong one no linear mode."""
 MOST_LEFT = 0.02
@@ -97,7 +95,7 @@ def _on_its_place(state: Extraction, band: FittedBand, i: int, mode: Mode) -> It
 def _is_bent(state: Extraction, band: FittedBand, i: int) -> bool:
     """Whether what bends mode i is not fitted: a mode beyond the lines, or that by which a strong one is not linear."""
     at_edge = band.lines.start == 0 or band.lines.stop >= state.frf.frequency.size
-    if at_edge and band.terms > LEAST_TERMS and band.fit.size_error[0, i] > BENT:
+    if at_edge and band.terms > LEAST_TERMS:
         return True
     own, frequency = band.fit.mobility_peak[i], band.fit.frequency[i]
     fits = [other.fit for other in state.bands]

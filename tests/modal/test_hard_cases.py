@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquisition import Frf, from_accelerance
 from acquisition.frf import Quantity
-from modal import Mode, cut_edges, fit_modes, synthesize
+from modal import Mode, Trust, cut_edges, fit_modes, synthesize, trust_of
 
 LINES = np.arange(5.0, 4000.0, 5.0)
 SPINDLE = [Mode(900.0, 0.03, 4e7), Mode(1722.0, 0.03, 3.5e7), Mode(2900.0, 0.03, 3e7)]
@@ -170,6 +170,17 @@ def test_a_strong_mode_beside_the_band_does_not_bend_a_weak_one_in_it_unsaid() -
             if mode.frequency > 3000:
                 off = abs(mode.stiffness - weak.stiffness) > 4 * mode.standard_error[2]
                 assert not off or any(remark.code == "bent-by-neighbour" for remark in mode.remarks)
+
+
+@pytest.mark.parametrize("inside", [3400.0, 3700.0, 3850.0])
+def test_a_mode_beyond_the_last_line_makes_that_before_it_doubtful(inside: float) -> None:
+    """10 half-widths beyond it shifts zeta and K by more than the interval, and what the fit leaves is white."""
+    for seed in range(8):
+        with_it = [Mode(1500.0, 0.03, 3e7), Mode(inside, 0.03, 6e7), Mode(4300.0, 0.03, 6e7)]
+        *_, last = fit_modes(measured(with_it, LINES, seed=seed))
+        assert trust_of(last) is not Trust.TRUSTED
+        *_, last = fit_modes(measured(with_it[:2], LINES, seed=seed))
+        assert trust_of(last) is Trust.TRUSTED
 
 
 def test_accelerance_mobility_and_receptance_of_one_structure_have_the_same_modes() -> None:

@@ -1,29 +1,35 @@
 """Speed and errors of modal extraction beside sdypy-EMA, in one process with one BLAS thread each.
 
     python -m pip install -e .[bench]      (in an environment of its own)
-    python bench/bench_modal.py
+    python bench/bench_modal.py [FOLDER]
 
 One accelerance of 8193 lines (that at 0 Hz is left out) with five modes and noise. Ours: `fit_modes`, which finds,
 selects and fits the modes and gives their standard errors. Theirs: get_poles at order 60, select_closest_poles at the
 true frequencies, get_constants.
+
+FOLDER holds measured FRFs, as SignalCalc writes them (MAT files with H1_2, H1_3, ... in g/N): some of its files are
+timed the same way, theirs told the frequencies that ours found; then five of the FRFs with common poles.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
+import sys
 import time
 import warnings
 from collections.abc import Callable
 from importlib.metadata import version
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.io import loadmat
 from sdypy import EMA
 from threadpoolctl import threadpool_limits
 
 from acquisition import Frf, from_accelerance
-from modal import Mode, fit_modes, synthesize
+from modal import Mode, fit_modes, fit_points, synthesize
 
 TRUE = [
     Mode(420.0, 0.020, 6.0e7),
@@ -36,6 +42,9 @@ LINES = np.linspace(0.0, 4096.0, 8193)[1:]
 NOISE = 1e-5
 """rms over the largest accelerance."""
 ROUNDS = 7
+MEASURED_FILES, POINTS = 10, 5
+"""Files of a folder that are timed, and FRFs that are fitted with common poles."""
+STANDARD_GRAVITY = 9.80665
 Values = NDArray[np.float64]
 
 
@@ -49,23 +58,58 @@ def ours(frf: Frf) -> Values:
     return np.array([(m.frequency, m.damping_ratio, m.stiffness) for m in fit_modes(frf)])
 
 
-def theirs(frf: Frf) -> Values:
+def theirs(frf: Frf, frequencies: list[float]) -> Values:
     model = EMA.Model(
         frf.accelerance[None],
         frf.frequency,
-        lower=50,
-        upper=4096,
+        lower=0.01 * frf.frequency[-1],
+        upper=frf.frequency[-1],
         pol_order_high=60,
         frf_form="accelerance",
     )
     with contextlib.redirect_stderr(io.StringIO()), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         model.get_poles(show_progress=False)
-        model.select_closest_poles([mode.frequency for mode in TRUE])
+        model.select_closest_poles(frequencies)
         model.get_constants()
     w, zeta = 2 * np.pi * np.array(model.nat_freq), np.array(model.nat_xi)
     stiffness = w / (2 * np.abs(model.A[0]) * np.sqrt(1 - zeta**2))
     return np.stack([w / (2 * np.pi), zeta, stiffness], axis=1)
+
+
+def measured_frfs(file: Path) -> list[Frf]:
+    """Accelerances of a SignalCalc file, the frequency in the real part of the first column, with their coherence."""
+    table = loadmat(file)
+    sensors = [name[3:] for name in table if name.startswith("H1_")]
+    return [
+        from_accelerance(
+            table[f"H1_{sensor}"][:, 0].real,
+            STANDARD_GRAVITY * table[f"H1_{sensor}"][:, 1],
+            np.clip(table[f"C1_{sensor}"][:, 1].real, 0, 1),
+        )
+        for sensor in sensors
+    ]
+
+
+def time_measured(folder: Path) -> None:
+    files = sorted(folder.glob("*.mat"))
+    frfs = [frf for file in files[:: -(-len(files) // MEASURED_FILES)] for frf in measured_frfs(file)]
+    mine, other = [], []
+    for frf in frfs:
+        start = time.process_time()
+        modes = fit_modes(frf)
+        mine.append(time.process_time() - start)
+        with contextlib.suppress(np.linalg.LinAlgError, ValueError):
+            start = time.process_time()
+            theirs(frf, [mode.frequency for mode in modes])
+            other.append(time.process_time() - start)
+    start = time.process_time()
+    fit_points(frfs[:POINTS])
+    together = time.process_time() - start
+    print(f"{len(frfs)} measured FRFs of {frfs[0].frequency.size} lines: CPU time (s), median and largest")
+    print(f"{'lobewatch fit_modes':32}{np.median(mine):10.3f}{max(mine):10.3f}")
+    print(f"{'sdypy-EMA, order 60':32}{np.median(other):10.3f}{max(other):10.3f}   of the {len(other)} that it can fit")
+    print(f"{f'lobewatch fit_points, {POINTS} FRFs':32}{together:10.3f}")
 
 
 def cpu(extract: Callable[[Frf], Values], frf: Frf) -> tuple[float, Values]:
@@ -76,7 +120,11 @@ def cpu(extract: Callable[[Frf], Values], frf: Frf) -> tuple[float, Values]:
 
 def main() -> None:
     true = np.array([(m.frequency, m.damping_ratio, m.stiffness) for m in TRUE])
-    methods = {"lobewatch fit_modes": ours, f"sdypy-EMA {version('sdypy-EMA')}, order 60": theirs}
+    frequencies = [mode.frequency for mode in TRUE]
+    methods = {
+        "lobewatch fit_modes": ours,
+        f"sdypy-EMA {version('sdypy-EMA')}, order 60": lambda frf: theirs(frf, frequencies),
+    }
     times: dict[str, list[float]] = {name: [] for name in methods}
     errors: dict[str, list[Values]] = {name: [] for name in methods}
     for round_ in range(ROUNDS):
@@ -97,3 +145,5 @@ def main() -> None:
 if __name__ == "__main__":
     with threadpool_limits(limits=1):
         main()
+        for folder in sys.argv[1:2]:
+            time_measured(Path(folder))

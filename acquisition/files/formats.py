@@ -10,8 +10,10 @@ from pathlib import Path
 
 from acquisition.errors import DataError
 from acquisition.files.readers.format import Format
+from acquisition.files.readers.read_arrays import FOREIGN_HDF5, NUMPY
 from acquisition.files.readers.read_lvm import LVM
 from acquisition.files.readers.read_mat import MAT
+from acquisition.files.readers.read_pulse import PULSE
 from acquisition.files.readers.read_sep005 import SEP005
 from acquisition.files.readers.read_table import TEXT_TABLE
 from acquisition.files.readers.read_tdms import TDMS
@@ -24,7 +26,7 @@ from acquisition.remark import Remark
 
 GROUP = "lobewatch.formats"
 """Entry points that each name one Format."""
-BUILT_IN = (TAP_FILE, UFF, MAT, LVM, TDMS, WAV, SEP005, TEXT_TABLE)
+BUILT_IN = (TAP_FILE, UFF, MAT, LVM, TDMS, WAV, SEP005, NUMPY, FOREIGN_HDF5, PULSE, TEXT_TABLE)
 """The table last: it takes any text."""
 HEAD = 4096
 """Bytes at the start of a file that a format is asked with."""

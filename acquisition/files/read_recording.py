@@ -10,6 +10,7 @@ from typing import TypeVar
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents
 from acquisition.files.contents.description import Description
+from acquisition.files.contents.joined import joined
 from acquisition.files.contents.ledger import Fact
 from acquisition.files.contents.recording import Recording, understood
 from acquisition.files.formats import broken_formats, format_of
@@ -31,9 +32,9 @@ def look(path: Path | str, said: Description = NOTHING) -> Recording:
     """
     path = Path(path)
     file_format = format_of(path)
-    held = _guarded(file_format, path, lambda: file_format.read(path))
+    held = _held(file_format, path, said.skip)
     if isinstance(held, Contents):
-        contents = held
+        contents = held if said.force is None else joined(held, _force_contents(said.force, said.skip), said.force)
         return _guarded(file_format, path, lambda: understood(path, file_format.title, contents, said))
     about = file_format.recorded_as(path)
     hits, frf = ((), held) if isinstance(held, Frf) else (tuple(held), None)
@@ -41,6 +42,23 @@ def look(path: Path | str, said: Description = NOTHING) -> Recording:
     complaint = f"a {file_format.title} says itself what it holds; leave out {', '.join(options)}" if options else ""
     recording = Recording(path, file_format.title, hits, frf, tuple(_facts(hits, frf)), complaint)
     return recording if about is None else _labelled(recording, about)
+
+
+def _held(file_format: Format, path: Path, skip: int | None) -> Contents | list[Hit] | Frf:
+    read_from = file_format.read_from
+    if not skip:
+        return _guarded(file_format, path, lambda: file_format.read(path))
+    if read_from is None:
+        raise DataError(f"{path}: --skip {skip}: a {file_format.title} has no lines to pass over; leave the option out")
+    return _guarded(file_format, path, lambda: read_from(path, skip))
+
+
+def _force_contents(path: Path, skip: int | None) -> Contents:
+    file_format = format_of(path)
+    held = _held(file_format, path, skip if file_format.read_from else None)
+    if not isinstance(held, Contents):
+        raise DataError(f"--force {path}: a {file_format.title}; it needs no other file")
+    return held
 
 
 def read_hits(path: Path | str, said: Description = NOTHING) -> list[Hit]:

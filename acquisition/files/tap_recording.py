@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from acquisition.files.readers.format import Format
+from acquisition.files.readers.mat_variables import HDF5
 from acquisition.files.tap_file import read_tap, read_tap_hits
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
 from acquisition.regular_file import read_regular
 from acquisition.tap import Circumstances
 
-MAGIC = b"\x89HDF\r\n\x1a\n"
 _BEYOND_THE_SIGNALS = HitFlags.UNDONE | HitFlags.INCONSISTENT | HitFlags.NARROW_BAND | HitFlags.NOT_JUDGED
 
 
@@ -28,14 +28,15 @@ def read_tap_recording(path: Path) -> list[Hit] | Frf:
 def is_all_in(path: Path, hits: Sequence[Hit]) -> bool:
     """Whether a file is a live tap test of ours, and hits read from it are all of its hits: no signal is lost without
     the file."""
-    if not hits or not read_regular(path).startswith(MAGIC):
+    if not hits or not read_regular(path).startswith(HDF5):
         return False
     tap = read_tap(path)
     return tap.source is None and len(tap.hits) == len(hits)
 
 
-def _is_hdf5(head: bytes, _path: Path) -> bool:
-    return head.startswith(MAGIC)
+def _is_ours(head: bytes, path: Path) -> bool:
+    """Whether an HDF5 file is one of lobewatch, though perhaps not a tap file: told from its bytes, as damage is."""
+    return head.startswith(HDF5) and b"lobewatch" in read_regular(path)
 
 
 def _circumstances(path: Path) -> Circumstances:
@@ -47,5 +48,5 @@ def _frf(path: Path) -> Frf:
 
 
 TAP_FILE = Format(
-    "tap-file", "tap file of lobewatch", (".h5",), _is_hdf5, read_tap_recording, _circumstances, read_frf=_frf
+    "tap-file", "tap file of lobewatch", (".h5",), _is_ours, read_tap_recording, _circumstances, read_frf=_frf
 )

@@ -6,6 +6,7 @@ import functools
 import inspect
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -32,6 +33,18 @@ class FileOptions:
     """Unit of the response or of the FRF."""
     force_unit: Annotated[str, typer.Option(help="Of the force (N, lbf).")] = ""
     """Unit of the force."""
+    skip: Annotated[int | None, typer.Option(min=1, help="Lines of a text that are passed over above its rows.")] = None
+    """Number of lines above the rows."""
+    spacing: Annotated[
+        float | None, typer.Option(help="Hz from line to line of an FRF that the file holds without its frequencies.")
+    ] = None
+    """Spacing of the lines (Hz)."""
+    start: Annotated[float | None, typer.Option(help="Hz of the first of these lines; 0 where not given.")] = None
+    """Frequency of the first line (Hz)."""
+    force: Annotated[
+        Path | None, typer.Option(help="File that holds the force, where FILE holds only the response.")
+    ] = None
+    """File of the force."""
     rate: Annotated[float | None, typer.Option(help="Samples a second (Hz).")] = None
     """Sample rate (Hz)."""
     averages: Annotated[

@@ -37,6 +37,8 @@ class Signal:
     """Number of the record: signals that were recorded together have the same."""
     per_full_scale: bool = False
     """Whether the values are shares of a full scale that the file does not name."""
+    is_before_window: bool = False
+    """Whether it was recorded before the window that the file names."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from datetime import datetime
+from pathlib import Path
 
 from acquisition.tap import UNSAID, Conditions
 
@@ -25,6 +26,14 @@ class Description:
     """Unit of the response (m/s^2, g, um), or of the FRF (m/N, g/N)."""
     force_unit: str = ""
     """Unit of the force (N, lbf)."""
+    skip: int | None = None
+    """Number of lines above the rows of a text that are passed over."""
+    spacing: float | None = None
+    """Spacing of the lines of an FRF that the file holds without its frequencies (Hz)."""
+    start: float | None = None
+    """Frequency of its first line (Hz); 0 where nobody says."""
+    force: Path | None = None
+    """File that holds the force, where it stands in another: its columns follow those of the response."""
     rate: float | None = None
     """Samples a second (Hz)."""
     averages: int | None = None

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from acquisition.files.contents.contents import Signal
 from acquisition.files.contents.heading import ROLES, name_and_unit
 from acquisition.files.contents.ledger import Ledger
+from acquisition.files.contents.units import unit_of
 
 
 def named_columns(signals: Sequence[Signal], columns: Sequence[str], ledger: Ledger) -> tuple[Signal, ...]:
     """The signals with the roles and units that `columns` gives them, in its order; what it leaves out is left out.
 
-    "time [s]" names the next column, "frf [m/N]=H1" a signal of this name, "frf=H:2" the second column of H.
+    "time [s]" names the next column, "frf [m/N]=H1" the signal of this name, heading, unit or number, "frf=H:2" the
+    second column of H.
     """
     named = list[Signal]()
+    in_order = not any("=" in text for text in columns)
+    if in_order and len(columns) < len(signals):
+        ledger.faults.append(
+            f"--columns names {len(columns)} of its {len(signals)} columns, which are {names_of(signals)}; name all in "
+            'their order, "-" for what is left out, or each as in "real=2"'
+        )
     for number, text in enumerate(columns):
         heading, _, name = text.partition("=")
         signal = _signal(signals, name.strip(), number, ledger)
@@ -33,20 +41,42 @@ def named_columns(signals: Sequence[Signal], columns: Sequence[str], ledger: Led
 def _signal(signals: Sequence[Signal], name: str, number: int, ledger: Ledger) -> Signal | None:
     if not name and number < len(signals):
         return signals[number]
-    same = [signal for signal in signals if signal.name == name or (name and signal.name == f"{name}:1")]
-    if same:
-        return same[0]
+    meant = _called(signals, name)
+    if len(meant) == 1:
+        return meant[0]
     names = names_of(signals)
     wanted = f"nothing called {name!r}" if name else f"no column {number + 1}"
-    ledger.faults.append(f"--columns: {wanted} in the file, which holds {names}")
+    if meant:
+        numbers = ", ".join(f"{i}" for i, signal in enumerate(signals, 1) if signal in meant)
+        ledger.faults.append(f"--columns: {len(meant)} columns are called {name!r}; say which by its number, {numbers}")
+    else:
+        ledger.faults.append(f"--columns: {wanted} in the file, which holds {names}")
     return None
+
+
+def _called(signals: Sequence[Signal], name: str) -> Sequence[Signal]:
+    """Those of a name, else shown so, of this number, of this unit."""
+    unit = unit_of(name)
+    tests: tuple[Callable[[int, Signal], bool], ...] = (
+        lambda _, signal: signal.name == name,
+        lambda _, signal: signal.name == f"{name}:1" or _shown(signal) == name,
+        lambda number, _: name == str(number),
+        lambda _, signal: (
+            bool(signal.unit) and (signal.unit == name or (unit is not None and unit_of(signal.unit) == unit))
+        ),
+    )
+    for test in tests:
+        if meant := [signal for number, signal in enumerate(signals, 1) if test(number, signal)]:
+            return meant
+    return []
 
 
 def names_of(signals: Sequence[Signal], most: int = 12) -> str:
     """What a file holds, for a sentence: names with units, or with how long they are."""
-    plain = [
-        f"{signal.name} [{signal.unit}]" if signal.unit else f"{signal.name} ({signal.values.size})"
-        for signal in signals
-    ]
-    whole = [re.sub(r"\s+", " ", text) for text in plain]
+    whole = [_shown(signal) for signal in signals]
     return ", ".join(whole[:most]) + (f" and {len(whole) - most} more" if len(whole) > most else "")
+
+
+def _shown(signal: Signal) -> str:
+    text = f"{signal.name} [{signal.unit}]" if signal.unit else f"{signal.name} ({signal.values.size})"
+    return re.sub(r"\s+", " ", text)

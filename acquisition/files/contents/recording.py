@@ -19,6 +19,12 @@ from acquisition.frf import Frf
 from acquisition.hit import Hit
 from acquisition.tap import Conditions
 
+COLUMNS_ANY = (
+    f"{COLUMNS_HIT}, those of --force FILE where the force stands in another file behind them; or {COLUMNS_FRF}, "
+    "without frequency where --spacing says it"
+)
+"""How any of both is named."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -64,22 +70,12 @@ def understood(path: Path, title: str, contents: Contents, description: Descript
     ledger = Ledger()
     signals = named_columns(contents.signals, description.columns, ledger) if description.columns else contents.signals
     contents = replace(contents, signals=signals)
-    frf, hits = None, list[Hit]()
-    if not ledger.faults:
-        if candidates(signals) and any(signal.role == "frequency" for signal in signals):
-            frf = settle_frf(contents, description, ledger)
-            _useless(description, ("rate", "full_scale", "sensitivity"), "an FRF", ledger)
-        elif not signals or any(signal.role == "frequency" for signal in signals):
-            ledger.ask(f"what its columns are ({names_of(signals)})", COLUMNS_FRF)
-        elif not _is_over_time(signals):
-            ledger.ask(f"what its columns are ({names_of(signals)})", f"{COLUMNS_HIT}; or {COLUMNS_FRF}")
-        else:
-            hits = settle_hits(contents, description, ledger)
-            _useless(description, ("averages",), "hits, and they are counted", ledger)
+    frf, hits = (None, []) if ledger.faults else _frf_or_hits(contents, description, ledger)
     if len(contents.machines) > 1:
         ledger.faults.append(f"it holds {', '.join(contents.machines)}, not one machine; export each by itself")
-    if contents.window:
-        ledger.know("window", contents.window)
+    window = "" if hits and all(signal.is_before_window for signal in signals) else contents.window
+    if window:
+        ledger.know("window", window)
     for note in contents.notes:
         ledger.know("note", note)
     return Recording(
@@ -92,8 +88,26 @@ def understood(path: Path, title: str, contents: Contents, description: Descript
         contents.created,
         contents.tool,
         contents.direction,
-        window=time_constant_of(contents.window),
+        window=time_constant_of(window),
     )
+
+
+def _frf_or_hits(contents: Contents, description: Description, ledger: Ledger) -> tuple[Frf | None, list[Hit]]:
+    """Neither where something is missing or wrong, which the ledger then says."""
+    signals = contents.signals
+    over_frequency = any(signal.role == "frequency" for signal in signals)
+    if candidates(signals) and (over_frequency or not _is_over_time(signals)):
+        _useless(description, ("rate", "full_scale"), "an FRF", ledger)
+        return settle_frf(contents, description, ledger), []
+    if not signals:
+        ledger.faults.append("it holds no columns of numbers")
+    elif over_frequency or not _is_over_time(signals):
+        ledger.ask(f"what its columns are ({names_of(signals)})", COLUMNS_FRF if over_frequency else COLUMNS_ANY)
+    else:
+        _useless(description, ("averages",), "hits, and they are counted", ledger)
+        _useless(description, ("spacing", "start"), "signals over time", ledger)
+        return None, settle_hits(contents, description, ledger)
+    return None, []
 
 
 def _is_over_time(signals: Sequence[Signal]) -> bool:

@@ -13,6 +13,7 @@ from acquisition.files.contents.named_columns import names_of
 from acquisition.files.contents.units import VOLTS, unit_of
 
 _SENSITIVITY = re.compile(r"\s*([+-]?\d+\.?\d*(?:[eE][+-]?\d+)?)\s*([a-zA-Zµ]+)\s*(?:/|per)\s*(.+?)\s*")
+_OF_VOLTS = re.compile(r"\s*\(?([a-zA-Zµ]+)\)?\s*/\s*\(?([a-zA-Zµ]+)\)?\s*")
 _EXAMPLE = '--sensitivity "2.25 mV/N,10.2 mV/g"'
 
 
@@ -34,6 +35,38 @@ def in_sensor_units(signals: Sequence[Signal], description: Description, ledger:
         return None
     measured = {id(channel): _measured(channel, volts[id(channel)], sensor_of[id(channel)]) for channel in wired}
     return [measured.get(id(signal), signal) for signal in signals]
+
+
+def sensed_frf(unit: str, description: Description, ledger: Ledger) -> tuple[str, float] | None:
+    """The unit of an FRF and a factor to it; of one in volts, `V/N` or `V/V`, by the sensitivities of its sensors.
+
+    None where one of these is missing or wrong.
+    """
+    ratio = _OF_VOLTS.fullmatch(unit)
+    if ratio is None or ratio[1].lower() not in VOLTS:
+        if description.sensitivity:
+            ledger.faults.append("--sensitivity: its FRF is not in volts; leave it out")
+        return unit, 1.0
+    over_volts = ratio[2].lower() in VOLTS
+    whose, example = ("hammer and sensor", _EXAMPLE) if over_volts else ("the sensor", '--sensitivity "10.2 mV/g"')
+    if len(description.sensitivity) != 1 + over_volts:
+        ledger.ask(f"the sensitivity of {whose}, as its FRF is in {unit}", example)
+        return None
+    sensors = [sensor for text in description.sensitivity if (sensor := _parsed(text, ledger)) is not None]
+    sensors.sort(key=lambda sensor: _is_force(sensor[1]))
+    if [_is_force(sensor[1]) for sensor in sensors] != [False, True][: 1 + over_volts]:
+        ledger.faults.append(f"--sensitivity {', '.join(description.sensitivity)}: give that of {whose}: {example}")
+        return None
+    ledger.know("sensitivity", ", ".join(description.sensitivity), "option")
+    (volts, motion), factor = sensors[0], VOLTS[ratio[1].lower()]
+    if not over_volts:
+        return f"({motion})/({ratio[2]})", factor / volts
+    return f"({motion})/({sensors[1][1]})", factor / volts * sensors[1][0] / VOLTS[ratio[2].lower()]
+
+
+def _is_force(unit: str) -> bool:
+    known = unit_of(unit)
+    return known is not None and known.quantity == "force"
 
 
 def _measured(signal: Signal, volts: float, sensor: tuple[float, str]) -> Signal:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from acquisition.files.contents.angular import is_angular
 from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.contents.description import Description
 from acquisition.files.contents.heading import ANGLES, is_level
@@ -48,13 +49,10 @@ def settle_frf(contents: Contents, description: Description, ledger: Ledger) -> 
         return None
     signal = chosen([candidate.signal for candidate in listed], description.response, "FRFs", ledger)
     n_averages = _averages(contents, description, ledger)
-    if signal is None:
-        frf_unit(listed[0].signal, description, ledger)
-        return None
-    candidate = next(candidate for candidate in listed if candidate.signal is signal)
+    candidate = next((candidate for candidate in listed if candidate.signal is signal), listed[0])
     values = _values(candidate, ledger)
-    unit = frf_unit(signal, description, ledger)
-    frequency = _frequency(contents, signal, ledger)
+    unit = frf_unit(candidate.signal, description, ledger)
+    frequency = _frequency(contents, candidate.signal, description, ledger)
     coherence = _coherence(contents, listed.index(candidate), candidate.signal, ledger)
     if frequency is None or values is None or unit is None or not ledger.is_clean:
         return None
@@ -92,7 +90,7 @@ def _values(candidate: Candidate, ledger: Ledger) -> NDArray[np.complex128] | No
         partner = "imaginary part" if first.role == "real" else "phase"
         ledger.ask(f"the {partner} of {first.name}", '--columns "frequency,real,imag" or "frequency,magnitude,phase"')
         return None
-    if first.role == "real" and second.unit and unit_of(second.unit) != unit_of(first.unit or second.unit):
+    if first.role == "real" and second.unit and not _is_same_unit(first.unit or second.unit, second.unit):
         ledger.faults.append(
             f"{first.name} is in {first.unit!r}, {second.name} in {second.unit!r}; they must be the same"
         )
@@ -108,12 +106,45 @@ def _values(candidate: Candidate, ledger: Ledger) -> NDArray[np.complex128] | No
     return np.asarray(size * np.exp(1j * phase))
 
 
-def _frequency(contents: Contents, frf: Signal, ledger: Ledger) -> NDArray[np.float64] | None:
+def _is_same_unit(one: str, other: str) -> bool:
+    known = unit_of(one)
+    return one == other if known is None else known == unit_of(other)
+
+
+def _by_spacing(
+    signals: Sequence[Signal], frf: Signal, description: Description, ledger: Ledger
+) -> NDArray[np.float64] | None:
+    """Frequencies of the lines of an FRF (Hz), as a person says."""
+    n, step, start = frf.values.size, description.spacing, description.start or 0.0
+    if step is None:
+        axis = next((signal.name for signal in signals if signal.role == "" and _may_be_axis(signal, n)), None)
+        by_name = f'--columns "frequency [Hz]={axis},frf={frf.name}", or [rad/s]; or ' if axis else ""
+        ledger.ask(f"the frequencies of its {n} lines", f"{by_name}--spacing 0.5 --start 0 in Hz")
+        return None
+    if not (np.isfinite(step) and step > 0 and np.isfinite(start) and start >= 0):
+        ledger.faults.append(f"--spacing {step:g}, --start {start:g}: give a spacing > 0 Hz and a start >= 0 Hz")
+        return None
+    ledger.know("lines", f"{n}, {start:.4g} to {start + step * (n - 1):.6g} Hz", "option")
+    return np.asarray(start + step * np.arange(n), dtype=np.float64)
+
+
+def _may_be_axis(signal: Signal, n: int) -> bool:
+    return (
+        signal.values.shape == (n,) and not np.iscomplexobj(signal.values) and bool(np.all(np.diff(signal.values) > 0))
+    )
+
+
+def _frequency(contents: Contents, frf: Signal, description: Description, ledger: Ledger) -> NDArray[np.float64] | None:
     """Of an FRF (Hz)."""
     axes = [signal for signal in contents.signals if signal.role == "frequency" and signal.record == frf.record]
     axis = next((signal for signal in axes if signal.values.size == frf.values.size), None)
     if axis is None:
-        ledger.ask(f"the frequency of each of the {frf.values.size} lines of {frf.name}", '--columns "frequency,..."')
+        return _by_spacing(contents.signals, frf, description, ledger)
+    if description.spacing is not None or description.start is not None:
+        ledger.faults.append(f"--spacing, --start: the file holds its frequencies, {axis.name}; leave them out")
+        return None
+    if not axis.unit and is_angular(axis):
+        ledger.ask(f"the unit of {axis.name}, Hz or rad/s", f'--columns "frequency [rad/s]={axis.name},frf={frf.name}"')
         return None
     unit = unit_of(axis.unit) if axis.unit else None
     if axis.unit and (unit is None or unit.quantity != "frequency"):

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from acquisition.files.contents.axis import step_of
+from acquisition.files.contents.axis import EVEN, printed_step, step_of
 from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.contents.description import Description
 from acquisition.files.contents.ledger import Ledger
@@ -113,21 +114,37 @@ def rate_of(signals: Sequence[Signal], used: Sequence[Signal], description: Desc
 
 
 def _rate_of_axis(signals: Sequence[Signal], size: int, ledger: Ledger) -> float | None:
-    """That of the time column; None where there is none whose unit is known."""
-    time = next((signal for signal in signals if signal.role == "time" and signal.values.size == size), None)
-    if time is None:
+    """That of the time columns, which must agree; None where there is none whose unit is known."""
+    times = [signal for signal in signals if signal.role == "time" and signal.values.size == size]
+    if not times:
         return None
     if size < 8:
         ledger.faults.append(f"{size} samples; at least 8 are needed")
         return None
-    step, fault = step_of(np.asarray(time.values, dtype=np.float64))
-    if fault:
-        ledger.faults.append(fault)
+    steps = [_step(np.asarray(time.values, dtype=np.float64), ledger) for time in times]
+    if not all(steps):
         return None
-    unit = unit_of(time.unit)
+    starts = [time.values[0] for time in times]
+    if np.ptp(starts) > EVEN * steps[0] or np.ptp(steps) * size > steps[0]:
+        ledger.faults.append(f"its time axes differ: they begin at {starts} with steps of {steps}")
+        return None
+    unit = unit_of(times[0].unit)
     if unit is None or unit.quantity != "time":
         return None
-    return 1 / (step * unit.factor)
+    return 1 / (steps[0] * unit.factor)
+
+
+def _step(time: NDArray[np.float64], ledger: Ledger) -> float:
+    """Of an even axis; 0 where it is none, which the ledger then says."""
+    step, fault = step_of(time)
+    if not fault:
+        return step
+    printed = printed_step(time) if step > 0 else None
+    if printed is None:
+        ledger.faults.append(f"{fault}; where the time alone is wrong leave it out of --columns and give --rate")
+        return 0.0
+    ledger.know("note", "its time is printed with few digits: whether samples are missing cannot be seen")
+    return printed
 
 
 def _agreed(in_file: float | None, given: float | None, ledger: Ledger) -> float:

@@ -9,6 +9,7 @@ from acquisition.files.contents.contents import Signal
 from acquisition.files.contents.description import Description
 from acquisition.files.contents.heading import is_level
 from acquisition.files.contents.ledger import Ledger, Origin
+from acquisition.files.contents.sensitivity import sensed_frf
 from acquisition.files.contents.units import Unit, motion_of, unit_of
 
 MOTIONS = ("displacement", "velocity", "acceleration")
@@ -33,8 +34,12 @@ def chosen(signals: Sequence[Signal], response: int | None, noun: str, ledger: L
 def frf_unit(signal: Signal, description: Description, ledger: Ledger) -> tuple[str, float] | None:
     """Quantity of the response, and the factor to SI, of an FRF."""
     in_file = "" if is_level(signal.unit) else signal.unit
-    wanted = ("receptance", "mobility", "accelerance", *MOTIONS)
-    agreed = _either(in_file, description.unit, wanted, ("--unit", "m/N, um/N, g/N", signal.name), ledger)
+    sensed = sensed_frf(in_file or description.unit, description, ledger)
+    if sensed is None:
+        return None
+    (text, scale), wanted = sensed, ("receptance", "mobility", "accelerance", *MOTIONS)
+    unit_in_file, given = (text, description.unit) if in_file else ("", text)
+    agreed = _either(unit_in_file, given, wanted, ("--unit", "m/N, um/N, g/N", signal.name), ledger)
     if agreed is None:
         return None
     (unit, origin), force = agreed, _force_of_frf(description, agreed[0], ledger)
@@ -42,7 +47,7 @@ def frf_unit(signal: Signal, description: Description, ledger: Ledger) -> tuple[
     if force is None or not quantity:
         return None
     ledger.know("unit", f"{in_file or description.unit} ({quantity})", origin)
-    return quantity, unit.factor / force
+    return quantity, scale * unit.factor / force
 
 
 def response_unit(signal: Signal, description: Description, ledger: Ledger) -> tuple[str, float] | None:

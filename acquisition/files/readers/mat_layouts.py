@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.files.contents.contents import Contents, Signal
+from acquisition.files.contents.contents import Contents, Role, Signal
 from acquisition.files.contents.heading import role_of
 from acquisition.files.readers.mat_window import window_of
 
@@ -60,12 +60,17 @@ def _ours(v: Mapping[str, Any]) -> Contents | None:
 
 
 def _signal_calc(v: Mapping[str, Any]) -> Contents | None:
-    """SignalCalc: the abscissa stands in the real part of the first column, channel 1 is the hammer."""
-    frfs = [(name, match[1]) for name in v if (match := re.fullmatch(r"H1_(\d+)", name)) and _is_pairs(v[name])]
-    if not frfs:
-        return None
-    signals = [Signal("frequency", np.real(v[frfs[0][0]][:, 0]), "frequency", "Hz")]
+    """SignalCalc: the abscissa stands in the first column, channel 1 is the hammer.
+
+    Beside its FRFs stand the signals of the last hit, before the window, for `--columns`; alone they are that hit.
+    """
     units, names = _texts(v.get("Unit")), _texts(v.get("ChanName"))
+    frfs = [(name, match[1]) for name in v if (match := re.fullmatch(r"H1_(\d+)", name)) and _is_pairs(v[name])]
+    hit = [(name, match[1]) for name in v if (match := re.fullmatch(r"X(\d+)", name)) and _is_pairs(v[name])]
+    over_time = list(_recorded(v, hit, units, alone=not frfs))
+    if not frfs:
+        return Contents(tuple(over_time)) if len(hit) > 1 else None
+    signals = [Signal("frequency", np.real(v[frfs[0][0]][:, 0]), "frequency", "Hz")]
     for name, channel in frfs:
         label = f"{name} {_at(names, channel)}".strip()
         unit = f"({_at(units, channel)})/({_at(units, '1')})" if _at(units, channel) and _at(units, "1") else ""
@@ -74,7 +79,22 @@ def _signal_calc(v: Mapping[str, Any]) -> Contents | None:
         if coherence is not None and _is_pairs(coherence):
             signals.append(Signal(f"C1_{channel}", np.real(coherence[:, 1]), "coherence"))
     averages = re.search(r"(?:averages|num.?avg|navg)\D{0,4}(\d+)", " ".join(_texts(v.get("DP_Info"))), re.IGNORECASE)
-    return Contents(tuple(signals), averages=int(averages[1]) if averages else None)
+    return Contents((*signals, *over_time), averages=int(averages[1]) if averages else None)
+
+
+def _recorded(
+    v: Mapping[str, Any], hit: Sequence[tuple[str, str]], units: Sequence[str], *, alone: bool
+) -> Iterator[Signal]:
+    """Time and channels of a hit; alone: they are what the file is about, so they have their roles."""
+    for number, (name, channel) in enumerate(hit):
+        role: Role = "force" if channel == "1" else "response"
+        record = 0 if alone else 1
+        if number == 0 or not alone:
+            time = np.real(v[name][:, 0])
+            yield Signal(f"{name}:1", time, "time" if alone else "", "s", record=record, is_before_window=True)
+        values = np.real(v[name][:, 1])
+        unit = _at(units, channel)
+        yield Signal(f"{name}:2", values, role if alone else "", unit, record=record, is_before_window=True)
 
 
 def _is_pairs(value: Any) -> bool:

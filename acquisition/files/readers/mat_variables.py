@@ -1,4 +1,4 @@
-"""The variables of a MATLAB file, read by a program of its own: scipy and HDF5 crash or hang on some damaged ones.
+"""The variables of a MATLAB or HDF5 file, read by a program of its own: scipy and HDF5 crash or hang on damaged ones.
 
 That program hands them over as MessagePack: structs as maps, cells as lists, arrays as `numpy.save` writes them, what
 no layout reads as nil; a text in their place says why the file cannot be read.
@@ -29,6 +29,8 @@ COPIES = 6
 """Memory that reading may take, over the size of what is read at most."""
 V73 = b"MATLAB 7.3 MAT-file"
 """First bytes of a file that is HDF5."""
+HDF5 = b"\x89HDF\r\n\x1a\n"
+"""First bytes of one that MATLAB has not written."""
 ARRAY = 1
 """Number of the MessagePack extension that holds an array."""
 
@@ -59,7 +61,7 @@ def _answer(path: Path) -> bytes:
     encode = msgspec.msgpack.Encoder(enc_hook=_packed).encode
     try:
         with path.open("rb") as file:
-            is_hdf5 = file.read(len(V73)) == V73
+            is_hdf5 = file.read(len(V73)).startswith((V73, HDF5))
         return encode(_of_hdf5(path) if is_hdf5 else _of_matrices(path))
     except DataError as error:
         return encode(str(error))
@@ -102,13 +104,15 @@ def _plain(node: Any) -> Any:
     if isinstance(node, h5py.Group):
         return {name: _plain(child) for name, child in node.items()}
     values = node[()]
+    if isinstance(values, bytes | h5py.Empty):
+        return None
     kind = node.attrs.get("MATLAB_class", b"")
     if node.attrs.get("MATLAB_empty", 0):
         return np.empty(0)
     if values.dtype.names == ("real", "imag"):
         values = values["real"] + 1j * values["imag"]
     if values.dtype.kind == "O":
-        cells = [_plain(node.file[reference]) for reference in values.ravel()]
+        cells = [_plain(node.file[cell]) for cell in values.ravel() if isinstance(cell, h5py.Reference)]
         return cells[0] if len(cells) == 1 else cells
     if kind == b"char":
         return "".join(map(chr, values.T.ravel()))

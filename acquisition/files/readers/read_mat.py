@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from acquisition.files.contents.contents import Contents, Signal
+from acquisition.files.contents.contents import Contents
+from acquisition.files.readers.array_columns import columns_of
 from acquisition.files.readers.format import Format
 from acquisition.files.readers.mat_layouts import recognised
 from acquisition.files.readers.mat_variables import V73, mat_variables
@@ -19,8 +16,6 @@ from acquisition.files.readers.mat_window import window_of
 _V5 = b"MATLAB 5.0 MAT-file"
 _V4_KINDS = range(53)
 _V4_NAME = re.compile(rb"[A-Za-z]\w*\0")
-MOST_COLUMNS = 64
-"""Columns of a matrix that are told one by one."""
 
 
 def read_mat(path: Path) -> Contents:
@@ -29,25 +24,7 @@ def read_mat(path: Path) -> Contents:
     contents = recognised(variables)
     if contents is not None:
         return contents
-    return Contents(tuple(_columns(variables)), window=window_of(variables))
-
-
-def _columns(variables: Mapping[str, Any], prefix: str = "") -> Iterator[Signal]:
-    """Every row of two or more numbers; those of a matrix as name:1, name:2, ..."""
-    for name, value in variables.items():
-        if isinstance(value, Mapping):
-            yield from _columns(value, f"{prefix}{name}.")
-        elif isinstance(value, np.ndarray) and value.dtype.kind in "fiuc":
-            yield from _of_array(f"{prefix}{name}", value)
-
-
-def _of_array(name: str, value: np.ndarray[Any, Any]) -> Iterator[Signal]:
-    if value.ndim == 1 and value.size > 1:
-        yield Signal(name, value)
-    elif value.ndim == 2:
-        tall = value if value.shape[0] >= value.shape[1] else value.T
-        for i, column in enumerate(tall.T[:MOST_COLUMNS], 1):
-            yield Signal(f"{name}:{i}", column)
+    return Contents(tuple(columns_of(variables)), window=window_of(variables))
 
 
 def _is_mat(head: bytes, _path: Path) -> bool:

@@ -14,8 +14,8 @@ from typing import Any
 
 from acquisition import read_tap, read_tap_hits
 from acquisition.apart import run_apart
+from acquisition.files.readers.mat_variables import HDF5
 from acquisition.files.seal import is_broken, is_sealed
-from acquisition.files.tap_recording import MAGIC
 from acquisition.regular_file import IrregularFileError, read_regular
 from lobewatch.machine.journal.tap_entry import TapEntry
 
@@ -26,7 +26,7 @@ def read_doubtful(path: Path) -> TapEntry | None:
         content = read_regular(path)
     except IrregularFileError:
         return None
-    if is_broken(content) or not content.startswith(MAGIC):
+    if is_broken(content) or not content.startswith(HDF5):
         return None
     return _read(path) if is_sealed(content) else _read_apart(path)
 

@@ -20,7 +20,7 @@ from acquisition import (
     look,
     read_frf,
 )
-from lobewatch.measuring.one_file.windows import about_own_window, window_ringing_hits
+from lobewatch.measuring.one_file.windows import Window, about_own_window, also_asked, window_ringing_hits
 
 ACCEPTABLE = (
     HitFlags.NOT_DECAYED | HitFlags.TOO_SOFT | HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
@@ -46,10 +46,17 @@ class FileFrf:
     """Time constant (s) of the window over the response that the file names; NaN where it does not say how it falls."""
 
 
-def read_file_frf(path: Path, accept: Collection[str], description: Description) -> FileFrf:
-    """The FRF of a file with its hits, and how many it was averaged from where nobody says: see `modes_of_file`."""
+def read_file_frf(
+    path: Path, accept: Collection[str], description: Description, window: Window | None = None
+) -> FileFrf:
+    """The FRF of a file with its hits, and how many it was averaged from where nobody says: see `modes_of_file`.
+
+    window: as it is said, so that what is missing of it is asked for with all else.
+    """
     accepted, averages, description = _accepted(accept), description.averages, replace(description, averages=None)
-    recording = look(path, description).checked()
+    recording = look(path, description)
+    if recording.complaint:
+        raise DataError(f"{path}: {recording.complaint}{also_asked(recording.window, window)}")
     if recording.frf is not None:
         facts = tuple(fact for fact in recording.facts if fact.name != "averages")
         return replace(_with_averages(path, recording.frf, averages), facts=facts, named_window=recording.window)

@@ -75,7 +75,7 @@ def modes_of_file(
     Raises ValueError for a window whose hit is not known or comes before it, averages that no coherence belongs to, and
     verdicts that cannot be accepted.
     """
-    file_frf = read_file_frf(path, accept, description or Description())
+    file_frf = read_file_frf(path, accept, description or Description(), window)
     frf = file_frf.frf
     frf = replace(frf, receptance=frf.receptance.conj()) if conjugate else frf
     hits = () if conjugate else file_frf.hits

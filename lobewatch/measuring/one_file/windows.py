@@ -83,6 +83,14 @@ def window_to_correct(named: float | None, given: Window | None) -> Window | Non
     return window
 
 
+def also_asked(named: float | None, given: Window | None) -> str:
+    """What is going to be asked of the window over a file that lacks other things, too; empty where nothing is."""
+    if (named is None and given is None) or (given is not None and given.hit_at is not None):
+        return ""
+    form = "--window with its time constant and " if given is None and named is not None and np.isnan(named) else ""
+    return f"; its response lies under a window: an FRF needs {form}--hit-at, too, with the s from the record's start"
+
+
 def window_ringing_hits(hits: Sequence[Hit]) -> tuple[Frf, tuple[Hit, ...], float]:
     """FRF of hits under a window that lets next to nothing of their ringing through, the hits, its time constant (s).
 

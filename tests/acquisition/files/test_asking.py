@@ -178,7 +178,7 @@ def test_mixed_units_and_damaged_numbers_are_refused(tmp_path: Path) -> None:
     mixed = put(tmp_path / "a.csv", "Freq (Hz),Real (um/N),Imag (m/N)\n" + rows(F, H.real, H.imag, separator=","))
     assert "Real is in 'um/N', Imag in 'm/N'; they must be the same" in complaint(mixed)
     volts = put(tmp_path / "b.csv", "Freq (Hz),Real (V/N),Imag (V/N)\n" + rows(F, H.real, H.imag, separator=","))
-    assert "Real is in 'V/N', which is not known here as its unit" in complaint(volts)
+    assert "the sensitivity of the sensor, as its FRF is in V/N" in complaint(volts)
     for spoilt in (F[::-1], np.where(F == 9, F - 1, F), np.where(F == 9, np.nan, F)):
         path = put(tmp_path / "c.csv", "Freq (Hz),Real (m/N),Imag\n" + rows(spoilt, H.real, H.imag, separator=","))
         assert "frequency must be finite, >= 0 Hz and strictly rising" in complaint(path)

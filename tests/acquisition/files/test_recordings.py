@@ -111,7 +111,7 @@ def write(path: Path, text: str) -> Path:
         ("", "the file is empty"),
         ("time_s,force_N,acc_g\n", "a heading and rows of numbers are needed"),
         ("time_s,force_N,acc_g\n0,1,x\n", "line 2: '0,1,x' is no row of numbers"),
-        ("time_s,force_N,acc_g\n0,1,2\n0.1,3\n", "line 3: 2 numbers under 3 headings"),
+        ("time_s,force_N,acc_g\n0,1,2\n0.1,3\n", "line 3: 2 numbers where other rows have 3"),
         ("time_s,force_N,acc_furlong\n" + "".join(f"{i},1,2\n" for i in range(9)), "acc_furlong"),
         ("time_s,force_N,acc_g\n0,1,2\n1,2,3\n", "2 samples; at least 8 are needed"),
         ("Freq Real(m/N) Imag\n1 2 nan\n2 3 4\n", "not finite"),

@@ -172,6 +172,20 @@ def test_the_window_of_signal_calc_is_seen_before_and_behind_it(tmp_path: Path) 
     assert np.isnan(look(tmp_path / "b.mat").window or 0.0)
 
 
+@pytest.mark.parametrize("with_frf", [True, False])
+def test_the_last_hit_of_signal_calc_is_taken_before_the_window(tmp_path: Path, with_frf: bool) -> None:
+    time, force, response = tapped([0.0], 0.5)
+    variables = {"H1_2": np.stack([F + 0j, H], axis=1)} if with_frf else {}
+    variables |= {"X1": np.stack([time, force], axis=1), "X2": np.stack([time, response], axis=1)}
+    variables["W2"] = np.stack([time, response * np.exp(-time / 0.08)], axis=1)
+    scipy.io.savemat(tmp_path / "a.mat", variables | {"Unit": np.array(["N", "m/s^2"], dtype=object)})
+    said = Description(columns=("time=X1:1", "force=X1:2", "acceleration=X2:2") if with_frf else ())
+    recording = look(tmp_path / "a.mat", said).checked()
+    assert recording.hits[0].acceleration == pytest.approx(response)
+    assert recording.hits[0].force == pytest.approx(force)
+    assert recording.window is None
+
+
 def test_two_machines_in_one_file_are_refused(tmp_path: Path) -> None:
     path = windowed_table(tmp_path / "a.csv", "none")
     convert(path, tmp_path / "a.uff", Description())

@@ -193,10 +193,12 @@ def test_a_small_file_that_unpacks_to_much_is_refused_unread(tap: TapTest, tmp_p
             read(tmp_path / "bomb.h5")
 
 
-def test_foreign_hdf5_is_refused(tmp_path: Path) -> None:
+def test_foreign_hdf5_is_no_tap_test(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["x"] = 1
     with pytest.raises(DataError, match="no tap test of lobewatch"):
+        read_tap(tmp_path / "other.h5")
+    with pytest.raises(DataError, match="holds no columns of numbers"):
         read_frf(tmp_path / "other.h5")
 
 

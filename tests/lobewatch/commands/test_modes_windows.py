@@ -118,6 +118,26 @@ def test_the_time_of_the_hit_is_asked_for_where_only_an_frf_is_there(
     assert stiffness[1] / stiffness[0] == pytest.approx(np.exp(-0.01 / 0.05), rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("named", "options"), [("", ["--window", "0.05"]), ("exponential 0.05 s", []), ("flat top", [])]
+)
+def test_the_time_of_the_hit_is_asked_for_with_all_else(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path, named: str, options: list[str]
+) -> None:
+    frf = noisy([MODE])
+    file = tmp_path / "frf.csv"
+    table = np.stack([frf.frequency, frf.receptance.real, frf.receptance.imag], axis=1)
+    np.savetxt(file, table, header=f"# window: {named}\nFreq(Hz) Real Imag", comments="")
+    code, said = run(monkeypatch, capsys, str(file), *options)
+    assert code == 2
+    assert "--unit" in said
+    assert "--hit-at" in said
+    assert ("--window with its time constant" in said) is (named == "flat top")
+    more = ["--window", "0.05"] if named == "flat top" else options
+    code, said = run(monkeypatch, capsys, str(file), "--unit", "m/N", "--hit-at", "0", *more)
+    assert code == 0, said
+
+
 @pytest.mark.parametrize("hits", [3, 10, 30])
 def test_averages_are_inferred_from_scatter_and_coherence(hits: int) -> None:
     assert infer_averages(noisy([MODE], level=0.01, hits=hits)) == pytest.approx(hits, rel=0.25)

@@ -1,0 +1,142 @@
+"""Arrays as Python users and MATLAB keep them: .npy, .npz, HDF5 of any paths, matrices without an axis."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+
+from acquisition import DataError, Description, Frf, look, read_frf, read_hits
+
+F = np.arange(1.0, 60.0)
+H = 1e-6 / (1 + 0.1j * F)
+
+
+def is_h(frf: Frf, of: np.ndarray[Any, Any] = H) -> bool:
+    return np.allclose(frf.receptance, of, rtol=1e-9, atol=0) and np.allclose(frf.frequency, F)
+
+
+def complaint(path: Path, **said: object) -> str:
+    return look(path, Description(**said)).complaint  # type: ignore[arg-type]
+
+
+def hdf5(path: Path, **arrays: Any) -> Path:
+    with h5py.File(path, "w") as file:
+        for name, values in arrays.items():
+            file[name.replace("__", "/")] = values
+    return path
+
+
+def npz(path: Path, **arrays: Any) -> Path:
+    np.savez(path, **arrays)
+    return path
+
+
+def test_one_complex_array_asks_for_unit_and_spacing_at_once(tmp_path: Path) -> None:
+    np.save(tmp_path / "H.npy", H)
+    said = complaint(tmp_path / "H.npy")
+    assert said == (
+        "it does not say: the unit of array (--unit, such as m/N, um/N, g/N), the frequencies of its 59 lines "
+        "(--spacing 0.5 --start 0 in Hz)"
+    )
+    assert is_h(read_frf(tmp_path / "H.npy", Description(unit="m/N", spacing=1.0, start=1.0)))
+
+
+@pytest.mark.parametrize("shape", [(3, 59), (59, 3), (1, 3, 59)])
+def test_of_several_frfs_one_is_chosen(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    rows = np.array([H, 2 * H, 3 * H])
+    np.save(tmp_path / "H.npy", rows.T if shape[0] == 59 else rows.reshape(shape))
+    assert "which of its 3 FRFs is meant: 1 array:1, 2 array:2, 3 array:3 (--response 1)" in complaint(
+        tmp_path / "H.npy"
+    )
+    said = Description(unit="m/N", spacing=1.0, start=1.0, response=2)
+    assert is_h(read_frf(tmp_path / "H.npy", said), 2 * H)
+
+
+def test_fields_and_hits(tmp_path: Path) -> None:
+    time = np.arange(400) / 4000
+    hit = np.zeros(400, [("t", "f8"), ("force", "f4"), ("acc", "f4")])
+    hit["t"], hit["force"][20:24], hit["acc"][22:] = time, 50.0, np.sin(np.arange(378))
+    np.save(tmp_path / "hit.npy", hit)
+    assert "what its columns are (t (400), force (400), acc (400))" in complaint(tmp_path / "hit.npy")
+    said = Description(columns=("time [s]", "force [N]", "acceleration [g]"))
+    assert read_hits(tmp_path / "hit.npy", said)[0].sample_rate == pytest.approx(4000)
+    np.save(tmp_path / "rows.npy", np.stack([hit["force"], hit["acc"]]))
+    said = Description(columns=("force [N]", "acceleration [g]"), rate=4000.0)
+    assert read_hits(tmp_path / "rows.npy", said)[0].force == pytest.approx(hit["force"])
+
+
+@pytest.mark.parametrize("make", [npz, hdf5])
+def test_names_that_are_known_need_a_unit_alone(tmp_path: Path, make: Any) -> None:
+    path = make(tmp_path / ("a.npz" if make is npz else "a.h5"), freq=F, H=H, coherence=np.full(59, 0.9))
+    assert complaint(path) == "it does not say: the unit of H (--unit, such as m/N, um/N, g/N)"
+    frf = read_frf(path, Description(unit="m/N"))
+    assert is_h(frf)
+    assert frf.coherence == pytest.approx(0.9)
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".hdf5"])
+def test_data_sets_of_hdf5_by_path(tmp_path: Path, suffix: str) -> None:
+    path = hdf5(
+        tmp_path / f"a{suffix}",
+        test__lines=F,
+        test__points__p1=H,
+        test__points__p2=2 * H,
+        test__who="me",
+        when=[b"now"],
+    )
+    said = complaint(path)
+    assert "which of its 2 FRFs is meant: 1 test/points/p1, 2 test/points/p2" in said
+    assert '--columns "frequency [Hz]=test/lines,frf=test/points/p1", or [rad/s]; or --spacing' in said
+    columns = ("frequency [Hz]=test/lines", "frf [m/N]=test/points/p2")
+    assert is_h(read_frf(path, Description(columns=columns)), 2 * H)
+    content = path.read_bytes()
+    for end in (9, 100, len(content) // 2):
+        path.write_bytes(content[:end])
+        with pytest.raises(DataError, match=f"a{suffix}: damaged"):
+            look(path)
+
+
+def test_a_matrix_of_matlab_without_an_axis(tmp_path: Path) -> None:
+    path = tmp_path / "a.mat"
+    scipy.io.savemat(path, {"H21": np.stack([H.real, H.imag], axis=1), "df": 1.0})
+    said = complaint(path)
+    assert "what its columns are (H21:1 (59), H21:2 (59))" in said
+    assert "--spacing" in said
+    columns = ("real [m/N]=H21:1", "imag=H21:2")
+    assert is_h(read_frf(path, Description(columns=columns, spacing=1.0, start=1.0)))
+    scipy.io.savemat(path, {"FRF": np.stack([2 * np.pi * F, H], axis=1)})  # an axis of complex type
+    said = complaint(path)
+    assert "the unit of FRF:2" in said
+    assert '--columns "frequency [Hz]=FRF:1,frf=FRF:2", or [rad/s]' in said
+    assert is_h(read_frf(path, Description(columns=("frequency [rad/s]=FRF:1", "frf [m/N]=FRF:2"))))
+
+
+def test_what_is_no_array_of_numbers_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.npy"
+    np.save(path, np.array([{"f": F}], dtype=object), allow_pickle=True)
+    with pytest.raises(DataError, match=r"a\.npy: cannot be read \(Object arrays .*\); save its numbers alone"):
+        look(path)
+    np.save(path, H)
+    path.write_bytes(path.read_bytes()[:-9])
+    with pytest.raises(DataError, match=r"a\.npy: cannot be read"):
+        look(path)
+    bomb = tmp_path / "b.npz"
+    with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as archive, archive.open("H.npy", "w") as member:
+        for _ in range(11):
+            member.write(bytes(10_000_000))
+    with pytest.raises(DataError, match=r"b\.npz: .* MB that unpack to 110 MB; no tap test does"):
+        look(bomb)
+
+
+def test_a_file_of_ours_stays_ours(tmp_path: Path) -> None:
+    path = hdf5(tmp_path / "a.h5", x=F)
+    with h5py.File(path, "r+") as file:
+        file.attrs["format"] = "lobewatch-cut"
+    with pytest.raises(DataError, match="no tap test of lobewatch"):
+        look(path)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -131,21 +132,39 @@ def unasked_text(codes: Sequence[str], tap_ids: Sequence[str], asked: Mapping[st
     return f"{text}; open questions: {still_open or 'none'}"
 
 
-def about_questions(asked: Mapping[str, Sequence[Remark]], path: Path | str) -> Iterator[Remark]:
-    """Remarks on what is asked of tap tests, a remark for all that ask the same, with the command that answers.
+def about_questions(
+    asked: Mapping[str, Sequence[Remark]], path: Path | str, of: Collection[str] | None = None
+) -> Iterator[Remark]:
+    """Remarks on what is asked of tap tests, one for all that ask the same, with the command that answers it.
 
-    asked: questions by tap test, oldest first; path: of the folder.
+    asked: open questions by tap test, of the whole machine; path: of its folder; of: tap tests that are told of, not
+    all.
     """
-    pairs = [(question.code, tap_id, question.text) for tap_id, questions in asked.items() for question in questions]
-    for code in dict.fromkeys(code for code, _, _ in pairs):
-        same = [(tap_id, text) for other, tap_id, text in pairs if other == code]
-        tap_id, text = same[-1]
-        is_one = len(same) == 1
-        file = Path(path) / "taps" / (f"{tap_id}.h5" if is_one else "")
-        answer = shlex.join(["lobewatch", "replay", str(path), str(file), "--accept", code])
-        right, about = ("it is", f"tap test {tap_id}") if is_one else ("they are", f"{len(same)} tap tests")
-        text = f"{text}; no reference is set until you say that {right} right: {answer}"
-        yield Remark(code, about, text, f"Tap again; if {right} right, say so: {answer}")
+    alike: dict[Remark, list[str]] = {}
+    for tap_id in asked if of is None else of:
+        for question in asked[tap_id]:
+            alike.setdefault(replace(question, about=""), []).append(tap_id)
+    codes = Counter(question.code for questions in asked.values() for question in questions)
+    for question, tap_ids in alike.items():
+        answer = answer_command(path, tap_ids, question.code, all_of_them=len(tap_ids) == codes[question.code])
+        if len(tap_ids) == 1:
+            about, rest, test = (
+                f"tap test {tap_ids[0]}",
+                "it sets no reference until you say that it is right",
+                "this test is",
+            )
+        else:
+            about = f"{len(tap_ids)} tap tests, {tap_ids[0]} to {tap_ids[-1]}"
+            rest, test = "they set no reference until you say that they are right", "these tests are"
+        cure = f"Tap again; if {test} right, say so: {answer}"
+        yield Remark(question.code, about, f"{question.text}; {rest}: {answer}", cure)
+
+
+def answer_command(path: Path | str, tap_ids: Sequence[str], code: str, *, all_of_them: bool) -> str:
+    """The command that accepts what is asked of these tap tests; all_of_them: no other one of the machine asks it."""
+    taps = Path(path) / "taps"
+    files = [taps] if all_of_them and len(tap_ids) > 1 else [taps / f"{tap_id}.h5" for tap_id in tap_ids]
+    return shlex.join(["lobewatch", "replay", str(path), *map(str, files), "--accept", code])
 
 
 def clock_questions(created: datetime, now: datetime | None, taps: Iterable[TapEntry]) -> tuple[str, ...]:

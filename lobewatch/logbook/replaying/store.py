@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from acquisition import DataError, Description, TapTest
+from lobewatch.logbook.replaying.of_files import of_files
 from lobewatch.logbook.replaying.ready_tap import ReadyTap, make_all_ready, make_ready, remove_leftovers
 from lobewatch.logbook.replaying.tap_draft import reason_of
 from lobewatch.machine import MachineFolder, TapEntry
@@ -147,10 +148,10 @@ def _make_ready(
 
 def refusal(refused: Mapping[Path, str], n: int, *, stored: bool = False) -> str:
     """All files that cannot be used, and what can be done; stored: the others are."""
-    lines = [f"{file}: {why}" for file, why in refused.items()]
+    lines = of_files((str(file), why) for file, why in refused.items())
     if len(refused) == n:
         return "\n".join([f"none of the {n} files can be used; nothing is stored", *lines])
     rest_text = "the others are stored" if stored else "nothing is stored; --keep-going stores the others"
-    if len(lines) == 1:
+    if len(refused) == 1:
         return f"{lines[0]} (1 of {n} files; {rest_text})"
     return "\n".join([f"{len(refused)} of {n} files cannot be used; {rest_text}", *lines])

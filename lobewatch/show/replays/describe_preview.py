@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
+from acquisition import Fact
+from acquisition.files.contents.ledger import Origin
 from lobewatch.logbook.preview import Preview
+from lobewatch.logbook.replaying.of_files import NAMED, of_files
 from lobewatch.measuring.questions import open_questions
 from lobewatch.show.spindle.describe_modes import NOT_IN_FILE, fact_lines, in_order, mode_json
 from lobewatch.show.terminal.output import emit, table
@@ -120,9 +123,21 @@ def _row(preview: Preview) -> list[str]:
 def _below(previews: Sequence[Preview]) -> list[str]:
     """Lines on what was taken for want of a word, asked and refused; each once."""
     facts = dict.fromkeys(fact for preview in previews if preview.recording for fact in preview.recording.facts)
-    lines = fact_lines(facts, NOT_IN_FILE)
-    for preview in previews:
-        asked = open_questions(preview.measurement.remarks) if preview.measurement else ()
-        lines += [f"{preview.file.name}: question ({question.code}): {question.text}" for question in asked]
-        lines += [f"{preview.file}: cannot be used: {preview.refused}"] if preview.refused else []
-    return lines
+    asked = (
+        (preview.file.name, f"question ({question.code}): {question.text}")
+        for preview in previews
+        if preview.measurement is not None
+        for question in open_questions(preview.measurement.remarks)
+    )
+    refused = ((str(preview.file), f"cannot be used: {preview.refused}") for preview in previews if preview.refused)
+    return [*fact_lines(_ranges(facts), NOT_IN_FILE), *of_files(asked), *of_files(refused)]
+
+
+def _ranges(facts: Iterable[Fact]) -> Iterator[Fact]:
+    """Facts, those that are another for each of many files as the first and the last."""
+    values: dict[tuple[str, Origin], list[str]] = {}
+    for fact in facts:
+        values.setdefault((fact.name, fact.origin), []).append(fact.value)
+    for (name, origin), texts in values.items():
+        shown = texts if len(texts) <= NAMED else [f"{texts[0]} to {texts[-1]}"]
+        yield from (Fact(name, text, origin) for text in shown)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from rich.table import Table
 from lobewatch.history import Row
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.replaying.store import ReplayOutcome
+from lobewatch.measuring.questions import about_questions
 from lobewatch.show.history.describe_measurement import measurement_json, measurement_texts
 from lobewatch.show.programs.describe_verdicts import program_texts, programs_json
 from lobewatch.show.terminal.output import emit, notes, table
@@ -71,14 +71,18 @@ def replay_texts(stored: ReplayOutcome, logbook: Logbook) -> list[str | Table]:
     if len(fresh) <= IN_FULL:
         texts = [text for tap_id in stored.fresh for text in measurement_texts(logbook.measurement(tap_id), logbook)]
     else:
-        texts = _summed_up([row for row in logbook.history.rows if row.tap_id in fresh])
+        rows = logbook.history.rows
+        asked = {row.tap_id: row.questions for row in rows}
+        questions = about_questions(asked, logbook.folder.path, [tap_id for tap_id in stored.fresh if tap_id in asked])
+        texts = [_summed_up([row for row in rows if row.tap_id in fresh])]
+        texts += [f"asked of {question.finding}" for question in questions]
     if stored.taken:
         texts.append(f"taken where the files do not say: {', '.join(stored.taken)}")
     return [*texts, *(program_texts(logbook) if fresh else [])]
 
 
-def _summed_up(shown: Sequence[Row]) -> list[str | Table]:
-    """A line for each tool and direction, and how many were asked what."""
+def _summed_up(shown: Sequence[Row]) -> Table:
+    """A line for each tool and direction."""
     series: dict[tuple[str, str], list[Row]] = {}
     for row in shown:
         series.setdefault((row.tool, row.direction), []).append(row)
@@ -96,6 +100,4 @@ def _summed_up(shown: Sequence[Row]) -> list[str | Table]:
         ]
         days = f"{tests[0].time:%Y-%m-%d}", f"{tests[-1].time:%Y-%m-%d}"
         rows.add_row(tool, direction, str(len(tests)), *days, *values)
-    asked = Counter(question.code for row in shown for question in row.questions)
-    lines = [f"asked of {count} tests: {code} (lobewatch history says which)" for code, count in asked.items()]
-    return [rows, *lines]
+    return rows

@@ -271,3 +271,62 @@ def test_convert_writes_what_modes_reads(tmp_path: Path) -> None:
     found = [json.loads(run("modes", path, "--json").stdout)["modes"][0] for path in (source, tmp_path / "x.uff")]
     assert found[0]["frequency_hz"] == pytest.approx(found[1]["frequency_hz"], rel=1e-8)
     assert found[0]["stiffness_n_per_m"] == pytest.approx(found[1]["stiffness_n_per_m"], rel=1e-6)
+
+
+@pytest.fixture
+def narrow(shop: Shop, tmp_path: Path) -> Path:
+    """Twenty tests of a band that does not cover that of the machine, in files that say neither unit nor date."""
+    shop.edit("band_hz = [1200, 2200]", "band_hz = [1000, 2400]")
+    (tmp_path / "narrow").mkdir()
+    lines = np.arange(1600.0, 1800.0, 4.0)
+    for number in range(20):
+        values = 1e6 / (3.5e7 * (1 - (lines / (1713 - 0.1 * number)) ** 2 + 0.06j * lines / 1713))
+        rows = "".join(f"{f:g},{v.real:.9e},{v.imag:.9e}\n" for f, v in zip(lines, values, strict=True))
+        (tmp_path / "narrow" / f"202401{number + 1:02d}.csv").write_text(f"Freq,Real,Imag\n{rows}")
+    return tmp_path / "narrow"
+
+
+SAID = ("--unit", "um/N", "--date-pattern", "%Y%m%d")
+
+
+def test_what_many_files_lack_is_asked_for_once_and_answered_once(shop: Shop, narrow: Path) -> None:
+    with pytest.raises(DataError) as refused:
+        run("replay", shop.path, narrow)
+    _, line = str(refused.value).splitlines()
+    assert line.endswith("for a date in its name)")
+    assert "20240101.csv, " in line
+    assert "20240103.csv and 17 more: it does not say: the unit of Real (--unit" in line
+    preview = CliRunner().invoke(app, ["replay", str(shop.path), str(narrow), "--dry-run"])
+    assert preview.stdout.count("cannot be used: it does not say") == 1
+    (narrow / "20240104.csv").write_text("Freq,Real,Imag\n1,2,3\n2,x,3\n3,4,5\n")
+    with pytest.raises(DataError) as refused:
+        run("replay", shop.path, narrow)
+    assert len(str(refused.value).splitlines()) == 3
+
+
+def test_what_is_asked_of_many_tests_is_one_sentence_and_takes_one_answer(shop: Shop, narrow: Path) -> None:
+    preview = run("replay", shop.path, narrow, *SAID, "--dry-run").stdout
+    assert preview.count("question (other-band)") == 1
+    assert "date 2024-01-01 00:00 to 2024-01-20 00:00" in preview
+    said = run("replay", shop.path, narrow, *SAID).stdout
+    assert said.count("do not cover [mode] band_hz") == 1
+    (remark,) = (remark for remark in shop.logbook.standing().remarks if remark.code == "other-band")
+    first, *_, last = [entry.id for entry in shop.folder.taps()]
+    assert remark.about == f"20 tap tests, {first} to {last}"
+    answer = f"lobewatch replay {shop.path} {shop.path / 'taps'} --accept other-band"
+    assert remark.cure.endswith(f"if these tests are right, say so: {answer}")
+    assert answer in said
+    run(*answer.split()[1:])
+    assert shop.logbook.questions == {}
+
+
+def test_one_answer_is_for_those_that_ask_the_same(shop: Shop, narrow: Path) -> None:
+    wider = frf(narrow.parent / "wider 20240201.csv", heading="Freq,Real,Imag")
+    shop.edit("band_hz = [1000, 2400]", "band_hz = [1000, 9000]")
+    run("replay", shop.path, *sorted(narrow.iterdir())[:2], wider, *SAID)
+    one, other = (remark for remark in shop.logbook.standing().remarks if remark.code == "other-band")
+    assert one.about.startswith("2 tap tests, ")
+    assert other.about.startswith("tap test ")
+    run(*one.cure.partition("lobewatch ")[2].split())
+    (left,) = shop.logbook.questions
+    assert left in other.about

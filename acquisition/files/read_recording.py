@@ -32,7 +32,7 @@ def look(path: Path | str, said: Description = NOTHING) -> Recording:
     """
     path = Path(path)
     file_format = format_of(path)
-    held = _held(file_format, path, said.skip)
+    held = contents_of(file_format, path, said.skip)
     if isinstance(held, Contents):
         contents = held if said.force is None else joined(held, _force_contents(said.force, said.skip), said.force)
         return _guarded(file_format, path, lambda: understood(path, file_format.title, contents, said))
@@ -44,7 +44,8 @@ def look(path: Path | str, said: Description = NOTHING) -> Recording:
     return recording if about is None else _labelled(recording, about)
 
 
-def _held(file_format: Format, path: Path, skip: int | None) -> Contents | list[Hit] | Frf:
+def contents_of(file_format: Format, path: Path, skip: int | None) -> Contents | list[Hit] | Frf:
+    """What a file of this format holds behind its first lines; DataError for one that has none to pass over."""
     read_from = file_format.read_from
     if not skip:
         return _guarded(file_format, path, lambda: file_format.read(path))
@@ -55,7 +56,7 @@ def _held(file_format: Format, path: Path, skip: int | None) -> Contents | list[
 
 def _force_contents(path: Path, skip: int | None) -> Contents:
     file_format = format_of(path)
-    held = _held(file_format, path, skip if file_format.read_from else None)
+    held = contents_of(file_format, path, skip if file_format.read_from else None)
     if not isinstance(held, Contents):
         raise DataError(f"--force {path}: a {file_format.title}; it needs no other file")
     return held

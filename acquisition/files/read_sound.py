@@ -13,7 +13,7 @@ from acquisition.files.contents.ledger import Ledger
 from acquisition.files.contents.settle_sound import settle_sound
 from acquisition.files.cut_file import CutSignal, is_cut_file, read_cut_signal
 from acquisition.files.formats import format_of
-from acquisition.files.read_recording import NOTHING
+from acquisition.files.read_recording import NOTHING, contents_of
 
 
 def read_sound(path: Path | str, said: Description = NOTHING) -> CutSignal:
@@ -24,7 +24,7 @@ def read_sound(path: Path | str, said: Description = NOTHING) -> CutSignal:
     if is_cut_file(path):
         return read_cut_signal(path)[0]
     file_format = format_of(path)
-    contents = file_format.read(path)
+    contents = contents_of(file_format, path, said.skip)
     if not isinstance(contents, Contents):
         raise DataError(f"{path}: a {file_format.title}, not the recording of a cut")
     ledger = Ledger()

@@ -15,7 +15,7 @@ from lobewatch.show.terminal.output import Json, emit, note_remarks, notes
 from lobewatch.show.terminal.show_address import Listen, Token, WatchToken, serving
 
 
-@takes_file_options(without=["quantity", "force_unit", "averages"])
+@takes_file_options(without=["quantity", "force_unit", "averages", "spacing", "start", "force"])
 def listen(
     machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
     program: Annotated[str, typer.Option(help="Cutting program that is cut.")] = "",

@@ -17,7 +17,7 @@ from acquisition.files.contents.settle_unit import chosen, frf_unit
 from acquisition.files.contents.units import unit_of
 from acquisition.frf import Frf, Quantity, from_accelerance
 
-COLUMNS_FRF = '--columns "frequency,real,imag", in their order, or each with =NAME'
+COLUMNS_FRF = '--columns "frequency [Hz],real [m/N],imag", in their order, or each with =NAME'
 """How an FRF is named."""
 FORMS: dict[str, Quantity] = {"displacement": "receptance", "velocity": "mobility", "acceleration": "accelerance"}
 
@@ -56,8 +56,10 @@ def settle_frf(contents: Contents, description: Description, ledger: Ledger) -> 
     coherence = _coherence(contents, listed.index(candidate), candidate.signal, ledger)
     if frequency is None or values is None or unit is None or not ledger.is_clean:
         return None
+    first = int(frequency[0] == 0 and not np.isfinite(values[0]))  # as analysers integrate an accelerance
+    coherence = None if coherence is None else coherence[first:]
     try:
-        return _frf(frequency, values * unit[1], coherence, n_averages, FORMS[unit[0]])
+        return _frf(frequency[first:], values[first:] * unit[1], coherence, n_averages, FORMS[unit[0]])
     except ValueError as error:
         ledger.faults.append(str(error))
         return None
@@ -144,7 +146,7 @@ def _frequency(contents: Contents, frf: Signal, description: Description, ledger
         ledger.faults.append(f"--spacing, --start: the file holds its frequencies, {axis.name}; leave them out")
         return None
     if not axis.unit and is_angular(axis):
-        ledger.ask(f"the unit of {axis.name}, Hz or rad/s", f'--columns "frequency [rad/s]={axis.name},frf={frf.name}"')
+        ledger.ask(f"the unit of {axis.name}, Hz or rad/s", f'--columns "frequency [rad/s]={axis.name},..."')
         return None
     unit = unit_of(axis.unit) if axis.unit else None
     if axis.unit and (unit is None or unit.quantity != "frequency"):

@@ -77,10 +77,12 @@ def _by_kind(signals: Sequence[Signal], ledger: Ledger) -> tuple[list[Signal], l
     channels = [channel for channel in signals if channel.role != "time"]
     names = names_of(channels)
     if len(channels) < 2:
-        ledger.faults.append(f"it holds {names or 'nothing'} over time; a hit needs a force and a response")
+        ledger.faults.append(
+            f"it holds {names or 'nothing'} over time; a hit needs a force and a response (--force FILE)"
+        )
         return [], []
     if unclear and (not forces or not responses):
-        ledger.ask(f"what its columns are ({names})", COLUMNS_HIT)
+        ledger.ask(f"what its columns are ({names_of(signals)})", COLUMNS_HIT)
         return forces, responses
     if len(forces) != 1:
         count = "no force channel" if not forces else f"{len(forces)} force channels"

@@ -34,6 +34,7 @@ from acquisition.files.readers.row_form import (
 from acquisition.files.readers.table_heading import Heading, heading_above, heading_behind, is_unit_line
 from acquisition.files.readers.text import is_text, text_of
 
+_MAY_BE_ROW = re.compile(r"\d|nan|inf", re.IGNORECASE)
 BEGIN = 3
 """Lines in a row that begin with a number where the rows of a table begin."""
 
@@ -42,12 +43,19 @@ def read_table(path: Path, skip: int = 0) -> Contents:
     """The columns of a text file behind its first `skip` lines; DataError with the line where it is no table."""
     text = text_of(path)
     lines, comments = numbered_lines(text, skip)
-    rows, form, heading = _rows(path, lines)
+    lines, footer = _without_footer(lines)
+    rows, form, heading = _rows(path, lines, comments)
     pairs = [(key.strip().lower(), value.strip()) for key, _, value in (comment.partition(":") for comment in comments)]
     keys, machines = dict(pairs), tuple(dict.fromkeys(value for key, value in pairs if key == "machine" and value))
     _check_whole(path, keys, rows, text)
     contents = _contents(path, signals_of(numbers_of(rows, form, str(path)), heading), keys)
-    return replace(contents, machines=machines)
+    return replace(contents, machines=machines, notes=tuple(f"below its rows stands {line!r}" for line in footer))
+
+
+def _without_footer(lines: NumberedLines) -> tuple[NumberedLines, Sequence[str]]:
+    """Lines up to the last that may be a row, and words behind it."""
+    last = next((i for i in range(len(lines.texts), 0, -1) if _MAY_BE_ROW.search(lines.texts[i - 1])), 0)
+    return (lines[:last], lines.texts[last:]) if last else (lines, [])
 
 
 def signals_of(values: Sequence[NDArray[Any]], heading: Heading) -> tuple[Signal, ...]:
@@ -64,17 +72,19 @@ def _signal(name: str, unit: str, column: NDArray[Any]) -> Signal:
     return Signal(name, column, "frf" if np.iscomplexobj(column) else role_of(name, unit), unit)
 
 
-def _rows(path: Path, lines: NumberedLines) -> tuple[NumberedLines, RowForm, Heading]:
-    """The rows, how they are written, and the heading above them or behind the first."""
+def _rows(path: Path, lines: NumberedLines, comments: Sequence[str]) -> tuple[NumberedLines, RowForm, Heading]:
+    """The rows, how they are written, and the heading above them, behind the first or among comments."""
     first = _first_row(path, lines)
     form = row_form([plain_complex(line) for line in lines.texts[first:]])
+    width = len(form.words(plain_complex(lines.texts[first:][:2][-1])))
+    if not form.is_row(plain_complex(lines.texts[first])) and is_unit_line(lines.texts[:first], form, width):
+        first += 1  # it holds ranges
     behind = next(((at, named) for at in (first, first - 1) if (named := _behind(lines, at, form))), None)
     at, heading = behind or (first, [])
     rows = NumberedLines([plain_complex(line) for line in lines.texts[at:]], lines.numbers[at:])
     if behind is None:
-        width = len(form.words(rows.texts[0]))
         _refuse_broken_row(path, lines[:first], form, width)
-        heading = heading_above(lines.texts[:first], form, width)
+        heading = heading_above([*comments, *lines.texts[:first]], form, width)
     return rows, form, heading
 
 

@@ -22,6 +22,7 @@ _POSITIVE = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _PAIR = re.compile(rf"\(\s*([+-]?{_POSITIVE})\s*,\s*([+-]?{_POSITIVE})\s*\)")
 _SUM = re.compile(rf"({_POSITIVE})\s*([+-])\s*({_POSITIVE})\s*[ij]\b")
 _IMAGINARY = re.compile(r"\(?[^a-df-zA-DF-Z]*[\d.]j\)?")
+_TIMESTAMP = re.compile(r"\d{1,4}([-/.:])\d{1,2}\1\d{1,4}")
 _NOT_FINITE = {"nan", "inf", "-inf", "+inf"}
 
 
@@ -49,6 +50,11 @@ class RowForm:
         except ValueError:
             return complex(plain) if _IMAGINARY.fullmatch(plain) else float(re.sub("[dD]", "e", plain))
 
+    def is_row(self, line: str) -> bool:
+        """Whether a line has a number in each column."""
+        words = self.words(line)
+        return self.columns[-1] < len(words) and all(self.is_number(words[i]) for i in self.columns)
+
     def is_number(self, word: str) -> bool:
         """Whether a word is one."""
         try:
@@ -69,7 +75,9 @@ def begins_with_number(line: str) -> bool:
     """Whether a line may be a row, by itself."""
     line = plain_complex(line)
     form = dialect([line])
-    word = next(filter(None, form.words(line)), "")
+    word, *others = [*filter(None, form.words(line)), ""]
+    if _TIMESTAMP.match(word):
+        return any(map(form.is_number, others))
     return form.is_number(word) and word.lower() not in _NOT_FINITE
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 from acquisition.files.contents.heading import is_unit, name_and_unit, role_of
 from acquisition.files.contents.units import unit_of
@@ -15,6 +16,8 @@ Heading = list[tuple[str, str]]
 _RATIO = "Units: Ratio"
 _PRODUCT = re.compile(r"(\(.+\))(\(.+\))")
 _LETTER = re.compile(r"[^\W\d_]")
+_MARK = re.compile(r"^\s*[#%!*/]+\s*")
+"""Of a comment."""
 _UNTIL_BRACKET = re.compile(r"\s+(?=[\[(])")
 
 
@@ -24,11 +27,15 @@ def heading_above(lines: Sequence[str], form: RowForm, width: int) -> Heading:
 
     width: words of a row.
     """
+    lines = [_MARK.sub("", line) for line in lines]
     by_line = [words for line in reversed(lines) if (words := _words(line, form, width))]
     units = next((words for words in by_line if _are_units(words)), [])
     named = [words for words in by_line if any(map(_LETTER.search, words)) and not any(map(form.is_number, words))]
     names = [words for words in named if words is not units] or [[""] * len(units)]
     known = (words for words in names if any(role_of(*name_and_unit(word)) for word in words))
+    in_turn = _words(lines[-1], replace(form, columns=tuple(range(2 * len(form.columns)))), 0) if lines else []
+    if in_turn and is_unit(in_turn[1]):
+        return _alternating(in_turn)
     return _paired(next(known, names[0]), units, is_ratio=_RATIO in lines)
 
 
@@ -44,9 +51,13 @@ def heading_behind(row: str, form: RowForm) -> Heading:
         return []
     names = [word for word in re.split(r"\s*\t\s*|\s*;\s*|\s+", words[width].strip()) if word]
     if len(names) == 2 * width:
-        pairs = zip(names[::2], names[1::2], strict=True)
-        return [(name, unit if is_unit(unit) else "") for name, unit in pairs]
+        return _alternating(names)
     return [name_and_unit(name) for name in names] if len(names) == width else []
+
+
+def _alternating(words: Sequence[str]) -> Heading:
+    """Of a name and a unit for each column in turn."""
+    return [(name, unit if is_unit(unit) else "") for name, unit in zip(words[::2], words[1::2], strict=True)]
 
 
 def is_unit_line(lines: Sequence[str], form: RowForm, width: int) -> bool:

@@ -70,10 +70,11 @@ class FileRequest:
     @classmethod
     def of(cls, file: Path, description: Description, machine_toml: str) -> Self:
         """Read now."""
+        said = replace(description, force=description.force and description.force.absolute())
         try:
-            return cls(file.absolute(), file.read_bytes(), description, machine_toml)
+            return cls(file.absolute(), file.read_bytes(), said, machine_toml)
         except OSError as error:
-            return cls(file.absolute(), b"", description, machine_toml, reason_of(file, error))
+            return cls(file.absolute(), b"", said, machine_toml, reason_of(file, error))
 
 
 def draft_tap(folder: MachineFolder, file: Path, description: Description) -> TapDraft:

@@ -56,7 +56,7 @@ def test_headings_and_options_in_any_unit_give_the_same_receptance(
 
 def test_all_that_is_missing_is_said_in_one_message(tmp_path: Path) -> None:
     path = put(tmp_path / "frf.txt", rows(F, H.real, H.imag))
-    with pytest.raises(DataError, match=r'what its columns are .*--columns "frequency,real,imag"'):
+    with pytest.raises(DataError, match=r'what its columns are .*--columns "frequency \[Hz\],real \[m/N\],imag"'):
         read_recording(path)
     said = complaint(path, columns=("frequency", "real", "imag"))
     assert "--unit, such as m/N" in said

@@ -103,9 +103,53 @@ def test_units_below_the_names_though_not_all_are_known(tmp_path: Path) -> None:
     (hit,) = read_hits(path)
     assert hit.acceleration == pytest.approx(9.80665 * RESPONSE, abs=1e-9)
     assert hit.sample_rate == pytest.approx(4000)
-    ranges = head + "Range;500;50;100\n"
-    path = put(tmp_path / "b.csv", ranges + rows(TIME, FORCE, RESPONSE, TIME, separator=";"))
-    assert read_hits(path)[0].force == pytest.approx(FORCE, abs=1e-9)
+    for ranges in ("Range;500;50;100\n", ";500;50;100\n"):
+        path = put(tmp_path / "b.csv", head + ranges + rows(TIME, FORCE, RESPONSE, TIME, separator=";"))
+        assert read_hits(path)[0].force == pytest.approx(FORCE, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "heading",
+    [
+        "# Freq (Hz)\tReal (m/N)\tImag (m/N)\n",
+        "% Freq Real Imag\n% Hz m/N m/N\n",
+        "# made by a script\n# lines: 59\n# Freq[Hz] Real[m/N] Imag[m/N]\n",
+        "Freq\tHz\tReal\tm/N\tImag\tm/N\n",
+    ],
+)
+def test_headings_that_are_comments_or_names_and_units_in_turn(tmp_path: Path, heading: str) -> None:
+    assert is_h(read_frf(put(tmp_path / "a.txt", heading + rows(F, H.real, H.imag))))
+
+
+def test_words_below_the_rows_are_told_and_a_broken_last_row_is_refused(tmp_path: Path) -> None:
+    text = "Freq (Hz)\tReal (m/N)\tImag (m/N)\n" + rows(F, H.real, H.imag)
+    found = look(put(tmp_path / "a.txt", f"{text}End of file\n")).checked()
+    assert found.frf is not None
+    assert is_h(found.frf)
+    assert "below its rows stands 'End of file'" in [fact.value for fact in found.facts]
+    for last in ("60\toverflow\tx\n", "nan\tnan\tnan\n", "x\t2\t3\n"):
+        with pytest.raises(DataError, match=r"line 61|not finite|rising"):
+            look(put(tmp_path / "a.txt", text + last)).checked()
+
+
+def test_a_column_of_clock_times_and_empty_columns_are_left_out(tmp_path: Path) -> None:
+    stamped = "".join(f"2024-05-01 12:00:{int(f) % 60:02d},{f},,{h.real},{h.imag}\n" for f, h in zip(F, H, strict=True))
+    assert is_h(read_frf(put(tmp_path / "a.csv", "Clock,Freq (Hz),,Real (m/N),Imag (m/N)\n" + stamped)))
+    assert is_h(
+        read_frf(
+            put(
+                tmp_path / "b.txt",
+                "\tFreq (Hz)\tReal (m/N)\tImag (m/N)\n" + rows(F, H.real, H.imag, form="\t%.12g", separator=""),
+            )
+        )
+    )
+
+
+def test_a_line_at_0_hz_that_is_no_number_is_left_out(tmp_path: Path) -> None:
+    text = "Freq (Hz)\tReal (m/N)\tImag (m/N)\tCoherence\n0\tnan\tnan\tnan\n" + rows(F, H.real, H.imag, 0.9 + 0 * F)
+    frf = read_frf(put(tmp_path / "a.txt", text))
+    assert is_h(frf)
+    assert frf.coherence == pytest.approx(0.9)
 
 
 def test_notes_to_the_right_in_a_few_rows(tmp_path: Path) -> None:
@@ -204,7 +248,7 @@ def test_columns_that_are_not_all_named_or_called_the_same_are_refused(tmp_path:
     twice = put(tmp_path / "b.txt", "No.\tx\tx\tx\n" + text)
     said = complaint(twice, columns=("frequency=x", "real [m/N]=3", "imag=4"))
     assert "3 columns are called 'x'; say which by its number, 2, 3, 4" in said
-    assert is_h(read_frf(twice, Description(columns=("frequency=2", "real [m/N]=3", "imag=4"))))
+    assert is_h(read_frf(twice, Description(columns=("frequency [Hz]=2", "real [m/N]=3", "imag=4"))))
 
 
 @pytest.mark.parametrize("step", [0.1, 0.5, 1.0, 0.3125, 2.5])

@@ -93,7 +93,7 @@ def mat_73(path: Path, variables: dict[str, Any]) -> Path:
 LAYOUTS: list[tuple[dict[str, Any], tuple[str, ...]]] = [
     ({"freq": F, "frf": H}, ()),
     ({"f": F, "H": np.stack([H, H], axis=1)}, ("frequency=f", "frf=H:1")),
-    ({"abc": F, "re": H.real, "im": H.imag}, ("frequency=abc", "real=re", "imag=im")),
+    ({"abc": F, "re": H.real, "im": H.imag}, ("frequency [Hz]=abc", "real=re", "imag=im")),
 ]
 
 

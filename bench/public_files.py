@@ -1,0 +1,129 @@
+"""Public files of other programs: which two commands read each, and what is found in it.
+
+    python bench/public_files.py FOLDER
+
+Nothing is fetched: FOLDER holds copies of the public repositories, each as FOLDER/OWNER/NAME; what is not there is
+skipped. Prints the table of docs/formats.md. The first command names the file alone, the second has the answers.
+"""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+import textwrap
+from dataclasses import dataclass
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from lobewatch.cli import app
+
+MOST_FOUND = 3
+"""Frequencies that are told of a file."""
+MOST_SAID = 110
+"""Characters of a message."""
+
+
+@dataclass(frozen=True)
+class PublicFile:
+    """One file, or several that were written alike."""
+
+    pattern: str
+    """Path in FOLDER, or a pattern."""
+    answers: str = ""
+    """Options that answer what the file does not say; a word that begins with @ is a path in FOLDER."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a command has made of a file."""
+
+    frequencies: tuple[float, ...]
+    """Modes that are trusted (Hz)."""
+    refusal: str
+    """Message where it was not read; else empty."""
+
+
+DYNAMICS = "leekunhwee/Dynamics/Cutting/Stability"
+SIGNALS = "leekunhwee/Vibration-Signal-Processing"
+WING = "Renkinios/MECA0062-1_vibration_testing/data"
+PLATE = "kobyhuazai/Vibration"
+TESTING = "Vibration-Testing/vibrationtesting/vibrationtesting/data"
+CHANNELS = '--columns "time [s],acceleration [g],time [s],force [N]"'
+FILES = (
+    PublicFile(f"{DYNAMICS}/FrequencyDomain/Milling/General/FRF[XY].frf"),
+    PublicFile(f"{DYNAMICS}/TimeDomain/SemiDis/Milling/[XY].frf"),
+    PublicFile(f"{DYNAMICS}/FrequencyDomain/Milling/FRF.mat", "--response 1 --unit m/N --spacing 1"),
+    PublicFile(
+        f"{DYNAMICS}/FrequencyDomain/Turning/Two DOF Example/FRF.mat",
+        '--columns "frequency [rad/s]=w,frf=FRF" --unit m/N',
+    ),
+    PublicFile(f"{SIGNALS}/FRFGeneration/H00.mat", '--columns "real=H00:1,imag=H00:2" --unit m/N --spacing 0.5'),
+    PublicFile(f"{SIGNALS}/FRFGeneration/H2.mat", '--columns "real=H21:1,imag=H21:2" --unit m/N --spacing 1'),
+    PublicFile(f"{SIGNALS}/ExperimentalModalAnalysis/Point_*.txt", '--columns "frequency,real [m/N],imag"'),
+    PublicFile(f"{SIGNALS}/ImpactTesting/*.txt", '--columns "time [s],force [N],acceleration [m/s^2]"'),
+    PublicFile("alxhslm/ModeLAB/Example/SignalCalc/ASCII*/Hxysv*.txt"),
+    PublicFile(
+        "alxhslm/ModeLAB/Peak fitting/RFP Method/FRF.mat",
+        '--columns "frequency [rad/s]=FRF:1,frf=FRF:2" --unit m/N',
+    ),
+    PublicFile(
+        "alxhslm/ModeLAB/Peak fitting/RFP Method/FRF_noise.mat",
+        '--columns "frequency [rad/s]=FRF_noise:1,frf=FRF_noise:2" --unit m/N',
+    ),
+    PublicFile(f"{PLATE}/accel-pt8.txt", f"{CHANNELS} --force @{PLATE}/impact_pt8.txt"),
+    PublicFile(f"{PLATE}/accel-pt18.txt", f"{CHANNELS} --force @{PLATE}/impact_pt18.txt"),
+    PublicFile(f"{WING}/first_lab/DPsv0000*.mat", "--response 1 --hit-at 0"),
+    PublicFile(f"{WING}/sec_lab/DPsv0000*.mat", "--response 1 --hit-at 0"),
+    PublicFile(f"{TESTING}/case[12].mat", "--unit m/s^2/N"),
+    PublicFile(f"{TESTING}/mckiddat.mat", "--response 1 --unit m/N"),
+    PublicFile(f"{TESTING}/testdata.mat", '--columns "time [s]=t,force [N]=xn,acceleration [g]=yn"'),
+    PublicFile("TimVrtac/Impact-testing-DS/test_DS/F?.npy", '--columns "force [N]=1,acceleration [g]=2" --rate 20000'),
+    PublicFile("JiaxinZhong/PulseLabshop/matlab/data/pls?.txt"),
+    PublicFile("Collins-Ogbodo/Experimental-Modal-Analysis/Test/H_simulated.npy"),
+)
+
+
+def read(file: Path, answers: list[str]) -> Reading:
+    """One command."""
+    result = CliRunner().invoke(app, ["modes", str(file), *answers, "--json"])
+    if result.exit_code:
+        return Reading((), str(result.exception).replace(f"{file}: ", ""))
+    modes = json.loads(result.stdout)["modes"]
+    return Reading(tuple(mode["frequency_hz"] for mode in modes if mode["trust"] == "trusted"), "")
+
+
+def row(folder: Path, entry: PublicFile) -> str:
+    """Of the table; empty where no such file is there."""
+    files = sorted(folder.glob(entry.pattern))
+    if not files:
+        return ""
+    words = [str(folder / word[1:]) if word.startswith("@") else word for word in shlex.split(entry.answers)]
+    at_once = [read(file, []) for file in files]
+    answered = [read(file, words) for file in files] if words else at_once
+    first = answered[0]
+    found = f"refused: {textwrap.shorten(first.refusal, MOST_SAID)}" if first.refusal else found_text(first)
+    n_read = f"{sum(not reading.refusal for reading in answered)} of {len(files)}"
+    asked = "nothing" if not at_once[0].refusal else f"`{entry.answers}`" if words else "-"
+    return f"| `{entry.pattern}` | {asked.replace('@', '')} | {n_read} | {found} |"
+
+
+def found_text(reading: Reading) -> str:
+    """The modes in a file that was read."""
+    first = ", ".join(f"{frequency:.5g}" for frequency in reading.frequencies[:MOST_FOUND])
+    return f"{len(reading.frequencies)} trusted: {first} Hz" if first else "no mode trusted"
+
+
+def main() -> None:
+    """Print the table."""
+    if len(sys.argv) != 2 or not Path(sys.argv[1]).is_dir():
+        sys.exit("give the folder of the public files: python bench/public_files.py FOLDER")
+    print("| files | answered | read | found in the first |\n|---|---|---|---|")
+    for entry in FILES:
+        if line := row(Path(sys.argv[1]), entry):
+            print(line, flush=True)
+
+
+if __name__ == "__main__":
+    main()

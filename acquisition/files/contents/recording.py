@@ -97,7 +97,7 @@ def _frf_or_hits(contents: Contents, description: Description, ledger: Ledger) -
     signals = contents.signals
     over_frequency = any(signal.role == "frequency" for signal in signals)
     if candidates(signals) and (over_frequency or not _is_over_time(signals)):
-        _useless(description, ("rate", "full_scale"), "an FRF", ledger)
+        _useless(description, ("rate", "full_scale", "force"), "an FRF", ledger)
         return settle_frf(contents, description, ledger), []
     if not signals:
         ledger.faults.append("it holds no columns of numbers")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from acquisition.files.contents.axis import EVEN, printed_step, step_of
 from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.contents.description import Description
-from acquisition.files.contents.ledger import Ledger
+from acquisition.files.contents.ledger import Fact, Ledger
 from acquisition.files.contents.motion import hit_of_motion
 from acquisition.files.contents.named_columns import names_of
 from acquisition.files.contents.sensitivity import in_sensor_units
@@ -22,6 +22,7 @@ from acquisition.hits.hits_in_record import hits_in_record
 
 COLUMNS_HIT = '--columns "time [s],force [N],acceleration [g]", in their order, or each with =NAME'
 """How hits are named."""
+FEW_DIGITS = Fact("note", "its time is printed with few digits: whether samples are missing cannot be seen", "file")
 SAME_RATE = 1e-4
 """Relative difference of two sample rates that are taken for one: that of a rate with five digits."""
 
@@ -145,7 +146,8 @@ def _step(time: NDArray[np.float64], ledger: Ledger) -> float:
     if printed is None:
         ledger.faults.append(f"{fault}; where the time alone is wrong leave it out of --columns and give --rate")
         return 0.0
-    ledger.know("note", "its time is printed with few digits: whether samples are missing cannot be seen")
+    if FEW_DIGITS not in ledger.facts:
+        ledger.facts.append(FEW_DIGITS)
     return printed
 
 

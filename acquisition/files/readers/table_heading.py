@@ -22,8 +22,8 @@ _UNTIL_BRACKET = re.compile(r"\s+(?=[\[(])")
 
 
 def heading_above(lines: Sequence[str], form: RowForm, width: int) -> Heading:
-    """From the nearest line with a word for each column one of which is known, else the nearest with such words; its
-    units from a line below it, where there is one. Empty where no line has so many words.
+    """From the line with a word for each column of which most are known, the nearest of several; its units from a line
+    of units. Empty where no line has so many words.
 
     width: words of a row.
     """
@@ -32,11 +32,15 @@ def heading_above(lines: Sequence[str], form: RowForm, width: int) -> Heading:
     units = next((words for words in by_line if _are_units(words)), [])
     named = [words for words in by_line if any(map(_LETTER.search, words)) and not any(map(form.is_number, words))]
     names = [words for words in named if words is not units] or [[""] * len(units)]
-    known = (words for words in names if any(role_of(*name_and_unit(word)) for word in words))
     in_turn = _words(lines[-1], replace(form, columns=tuple(range(2 * len(form.columns)))), 0) if lines else []
     if in_turn and is_unit(in_turn[1]):
         return _alternating(in_turn)
-    return _paired(next(known, names[0]), units, is_ratio=_RATIO in lines)
+    return _paired(max(names, key=_known), units, is_ratio=_RATIO in lines)
+
+
+def _known(words: Sequence[str]) -> int:
+    """How many tell what their column is."""
+    return sum(bool(role_of(*name_and_unit(word))) for word in words)
 
 
 def heading_behind(row: str, form: RowForm) -> Heading:

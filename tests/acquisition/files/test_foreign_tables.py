@@ -289,6 +289,25 @@ def test_volts_over_newton_with_a_sensitivity(tmp_path: Path) -> None:
     assert "they must be the same" in complaint(mixed, sensitivity=("10.2 mV/g",))
 
 
+def test_the_heading_is_the_line_of_which_most_is_known(tmp_path: Path) -> None:
+    near = "Name,of,the machine\nTime,of day,noon\n"
+    for text in ("Freq (Hz),Real (m/N),Imag\n" + near, near + "Freq (Hz),Real (m/N),Imag\n"):
+        assert is_h(read_frf(put(tmp_path / "a.csv", text + rows(F, H.real, H.imag, separator=","))))
+
+
+def test_a_file_of_the_force_is_refused_beside_an_frf(tmp_path: Path) -> None:
+    path = put(tmp_path / "a.txt", "Freq (Hz)\tReal (m/N)\tImag (m/N)\n" + rows(F, H.real, H.imag))
+    force = put(tmp_path / "b.txt", rows(TIME, FORCE))
+    assert "--force: the file holds an FRF; leave the option out" in complaint(path, force=force)
+
+
+def test_two_files_with_headings_need_no_word(tmp_path: Path) -> None:
+    force = put(tmp_path / "impact.txt", "time_s\tforce_N\n" + rows(TIME, FORCE))
+    response = put(tmp_path / "accel.txt", "time_s\tacc_g\n" + rows(TIME, RESPONSE))
+    (hit,) = read_hits(response, Description(force=force))
+    assert hit.force == pytest.approx(FORCE, abs=1e-9)
+
+
 def test_a_file_a_channel(tmp_path: Path) -> None:
     force = put(tmp_path / "impact.txt", rows(TIME, FORCE, end="\r\n"))
     response = put(tmp_path / "accel.txt", rows(TIME, RESPONSE, end="\r\n"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -24,16 +24,21 @@ NPY, ZIP = b"\x93NUMPY", b"PK\x03\x04"
 def read_numpy(path: Path) -> Contents:
     """The arrays of a .npy or .npz file; DataError where they are no numbers, damaged, or unpack out of proportion."""
     try:
-        if zipfile.is_zipfile(path):
-            _check_unpacked(path)
-        loaded = np.load(path, allow_pickle=False)
-        if isinstance(loaded, np.ndarray):
-            return Contents(tuple(columns_of(_fields(loaded))))
-        with loaded:
-            return _contents({name: loaded[name] for name in loaded.files})
-    except (ValueError, EOFError, zipfile.BadZipFile) as error:
-        cure = "save its numbers alone, without Python objects"
-        raise DataError(f"{path}: cannot be read ({error}); {cure}") from error
+        with path.open("rb") as file:
+            return _read(file, path)
+    except (ValueError, EOFError, OSError, zipfile.BadZipFile) as error:
+        raise DataError(f"{path}: cannot be read ({error}); save its numbers alone, without Python objects") from error
+
+
+def _read(file: BinaryIO, path: Path) -> Contents:
+    if zipfile.is_zipfile(file):
+        _check_unpacked(file, path)
+    file.seek(0)
+    loaded = np.load(file, allow_pickle=False)
+    if isinstance(loaded, np.ndarray):
+        return Contents(tuple(columns_of(_fields(loaded))))
+    with loaded:
+        return _contents({name: loaded[name] for name in loaded.files})
 
 
 def _fields(array: np.ndarray[Any, Any]) -> dict[str, Any]:
@@ -42,9 +47,9 @@ def _fields(array: np.ndarray[Any, Any]) -> dict[str, Any]:
     return {"array": array} if names is None else {name: array[name] for name in names}
 
 
-def _check_unpacked(path: Path) -> None:
+def _check_unpacked(file: BinaryIO, path: Path) -> None:
     packed = path.stat().st_size
-    with zipfile.ZipFile(path) as archive:
+    with zipfile.ZipFile(file) as archive:
         unpacked = sum(member.file_size for member in archive.infolist())
     if unpacked > max(HARMLESS, RATIO * packed):
         raise DataError(f"{path}: {packed / 1e6:.3g} MB that unpack to {unpacked / 1e6:.4g} MB; no tap test does")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,8 @@ import h5py
 import numpy as np
 import pytest
 import scipy.io
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from acquisition import DataError, Description, Frf, look, read_frf, read_hits
 
@@ -132,6 +135,27 @@ def test_what_is_no_array_of_numbers_is_refused(tmp_path: Path) -> None:
             member.write(bytes(10_000_000))
     with pytest.raises(DataError, match=r"b\.npz: .* MB that unpack to 110 MB; no tap test does"):
         look(bomb)
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+@given(
+    st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), max_size=4), st.integers(1, 10**6), st.booleans()
+)
+def test_damaged_arrays_are_read_or_refused(
+    tmp_path: Path, changes: list[tuple[int, int]], end: int, packed: bool
+) -> None:
+    path = tmp_path / "a.npz"
+    if packed:
+        npz(path, freq=F, H=H)
+    else:
+        with path.open("wb") as file:
+            np.save(file, H)
+    content = bytearray(path.read_bytes())
+    for place, byte in changes:
+        content[place % len(content)] = byte
+    path.write_bytes(content[: end % len(content) + 1] if not changes else content)
+    with contextlib.suppress(DataError):
+        look(path, Description(unit="m/N", spacing=None if packed else 1.0))
 
 
 def test_a_file_of_ours_stays_ours(tmp_path: Path) -> None:

@@ -49,7 +49,10 @@ def read_table(path: Path, skip: int = 0) -> Contents:
     keys, machines = dict(pairs), tuple(dict.fromkeys(value for key, value in pairs if key == "machine" and value))
     _check_whole(path, keys, rows, text)
     contents = _contents(path, signals_of(numbers_of(rows, form, str(path)), heading), keys)
-    return replace(contents, machines=machines, notes=tuple(f"below its rows stands {line!r}" for line in footer))
+    beside = [word for i, word in enumerate(form.words(rows.texts[-1])) if word and i not in form.columns]
+    notes = [f"beside its columns stands {word!r} in the last row" for word in beside]
+    notes += [f"below its rows stands {line!r}" for line in footer]
+    return replace(contents, machines=machines, notes=tuple(notes))
 
 
 def _without_footer(lines: NumberedLines) -> tuple[NumberedLines, Sequence[str]]:
@@ -76,6 +79,9 @@ def _rows(path: Path, lines: NumberedLines, comments: Sequence[str]) -> tuple[Nu
     """The rows, how they are written, and the heading above them, behind the first or among comments."""
     first = _first_row(path, lines)
     form = row_form([plain_complex(line) for line in lines.texts[first:]])
+    if not form.columns:
+        cure = "pass over what stands above them with --skip"
+        raise DataError(f"{path}: line {lines.numbers[first]}: no rows of numbers begin here; {cure}")
     width = len(form.words(plain_complex(lines.texts[first:][:2][-1])))
     if not form.is_row(plain_complex(lines.texts[first])) and is_unit_line(lines.texts[:first], form, width):
         first += 1  # it holds ranges

@@ -145,6 +145,18 @@ def test_a_column_of_clock_times_and_empty_columns_are_left_out(tmp_path: Path) 
     )
 
 
+def test_a_column_of_words_is_told(tmp_path: Path) -> None:
+    lines = rows(F, H.real, H.imag).replace("\n", "\tok\n")
+    found = look(put(tmp_path / "a.txt", "Freq (Hz)\tReal (m/N)\tImag (m/N)\tCoherence\n" + lines)).checked()
+    assert "beside its columns stands 'ok' in the last row" in [fact.value for fact in found.facts]
+
+
+def test_numbers_above_a_text_are_no_table(tmp_path: Path) -> None:
+    path = put(tmp_path / "a.txt", "1 a\n2 b\n3 c\n" + "words alone\n" * 20 + "4 words\n")
+    with pytest.raises(DataError, match=r"a\.txt: line 1: no rows of numbers begin here; pass over .* --skip"):
+        look(path)
+
+
 def test_a_line_at_0_hz_that_is_no_number_is_left_out(tmp_path: Path) -> None:
     text = "Freq (Hz)\tReal (m/N)\tImag (m/N)\tCoherence\n0\tnan\tnan\tnan\n" + rows(F, H.real, H.imag, 0.9 + 0 * F)
     frf = read_frf(put(tmp_path / "a.txt", text))

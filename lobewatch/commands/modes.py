@@ -14,7 +14,8 @@ from lobewatch.show.terminal.output import Json, emit
 @takes_file_options(without=["averages"])
 def modes(
     file: Annotated[
-        Path, typer.Argument(help="Recorded hits or an FRF: tap file, UFF, MAT, LVM, CSV, TDMS, WAV, SEP005.")
+        Path,
+        typer.Argument(help="Recorded hits or an FRF: tap file, UFF, MAT, LVM, text, NumPy, HDF5, TDMS, WAV, SEP005."),
     ],
     band: Annotated[tuple[float, float] | None, typer.Option(help="Only between these frequencies (Hz).")] = None,
     figure: Annotated[

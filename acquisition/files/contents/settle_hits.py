@@ -48,6 +48,8 @@ def settle_hits(contents: Contents, description: Description, ledger: Ledger) ->
 def _hit(signals: Sequence[Signal], description: Description, ledger: Ledger) -> Hit | None:
     scaled = in_sensor_units(in_their_unit(signals, description, ledger), description, ledger)
     if scaled is None:
+        if sum(signal.role != "time" for signal in signals) > 2 and description.response is None:
+            ledger.ask("which of its responses is meant", "--response 1")
         rate_of(signals, (), description, ledger)
         return None
     signals = scaled

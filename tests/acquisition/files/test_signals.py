@@ -98,6 +98,11 @@ def test_channels_in_volts_are_asked_for_their_sensitivity(tmp_path: Path) -> No
     for wrong in ("2.25", "2.25 N/mV", "0 mV/N", "2.25 mV/furlong"):
         text = look(path, Description(sensitivity=(wrong, "10 mV/g"))).complaint
         assert f"--sensitivity {wrong!r}: give volts a unit" in text
+    three = put(tmp_path / "c.txt", "time\tx_V\ty_V\tz_V", time, force, response, response)
+    asked = look(three).complaint
+    assert [word in asked for word in ("--sensitivity", "--response", "--rate")] == [True] * 3
+    said = Description(sensitivity=("2.25 mV/N", "10 mV/g", "10 mV/g"), response=2, rate=RATE)
+    assert look(three, said).complaint == ""
     named = put(tmp_path / "b.txt", "time_s\tforce_N\tacc_g", time, force, response)
     assert "it has no channel in volts" in look(named, said).complaint
 

@@ -59,7 +59,8 @@ def _called(signals: Sequence[Signal], name: str) -> Sequence[Signal]:
     unit = unit_of(name)
     tests: tuple[Callable[[int, Signal], bool], ...] = (
         lambda _, signal: signal.name == name,
-        lambda _, signal: signal.name == f"{name}:1" or _shown(signal) == name,
+        lambda _, signal: name in (_shown(signal), f"{_shown(signal)} ({signal.values.size})"),
+        lambda _, signal: re.fullmatch(rf"{re.escape(name)}:\d+", signal.name) is not None,
         lambda number, _: name == str(number),
         lambda _, signal: (
             bool(signal.unit) and (signal.unit == name or (unit is not None and unit_of(signal.unit) == unit))
@@ -72,11 +73,12 @@ def _called(signals: Sequence[Signal], name: str) -> Sequence[Signal]:
 
 
 def names_of(signals: Sequence[Signal], most: int = 12) -> str:
-    """What a file holds, for a sentence: names with units, or with how long they are."""
-    whole = [_shown(signal) for signal in signals]
+    """What a file holds, for a sentence: names with units, and with how long they are where they differ in that."""
+    with_size = len({signal.values.size for signal in signals}) > 1
+    whole = [f"{_shown(signal)} ({signal.values.size})" if with_size else _shown(signal) for signal in signals]
     return ", ".join(whole[:most]) + (f" and {len(whole) - most} more" if len(whole) > most else "")
 
 
 def _shown(signal: Signal) -> str:
-    text = f"{signal.name} [{signal.unit}]" if signal.unit else f"{signal.name} ({signal.values.size})"
+    text = f"{signal.name} [{signal.unit}]" if signal.unit else signal.name
     return re.sub(r"\s+", " ", text)

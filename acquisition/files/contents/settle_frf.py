@@ -121,7 +121,7 @@ def _by_spacing(
     if step is None:
         axis = next((signal.name for signal in signals if signal.role == "" and _may_be_axis(signal, n)), None)
         by_name = f'--columns "frequency [Hz]={axis},frf={frf.name}", or [rad/s]; or ' if axis else ""
-        ledger.ask(f"the frequencies of its {n} lines", f"{by_name}--spacing 0.5 --start 0 in Hz")
+        ledger.ask("the frequencies of its lines", f"{by_name}--spacing 0.5 --start 0 in Hz")
         return None
     if not (np.isfinite(step) and step > 0 and np.isfinite(start) and start >= 0):
         ledger.faults.append(f"--spacing {step:g}, --start {start:g}: give a spacing > 0 Hz and a start >= 0 Hz")

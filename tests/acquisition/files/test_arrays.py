@@ -44,7 +44,7 @@ def test_one_complex_array_asks_for_unit_and_spacing_at_once(tmp_path: Path) -> 
     np.save(tmp_path / "H.npy", H)
     said = complaint(tmp_path / "H.npy")
     assert said == (
-        "it does not say: the unit of array (--unit, such as m/N, um/N, g/N), the frequencies of its 59 lines "
+        "it does not say: the unit of array (--unit, such as m/N, um/N, g/N), the frequencies of its lines "
         "(--spacing 0.5 --start 0 in Hz)"
     )
     assert is_h(read_frf(tmp_path / "H.npy", Description(unit="m/N", spacing=1.0, start=1.0)))
@@ -66,7 +66,7 @@ def test_fields_and_hits(tmp_path: Path) -> None:
     hit = np.zeros(400, [("t", "f8"), ("force", "f4"), ("acc", "f4")])
     hit["t"], hit["force"][20:24], hit["acc"][22:] = time, 50.0, np.sin(np.arange(378))
     np.save(tmp_path / "hit.npy", hit)
-    assert "what its columns are (t (400), force (400), acc (400))" in complaint(tmp_path / "hit.npy")
+    assert "what its columns are (t, force, acc)" in complaint(tmp_path / "hit.npy")
     said = Description(columns=("time [s]", "force [N]", "acceleration [g]"))
     assert read_hits(tmp_path / "hit.npy", said)[0].sample_rate == pytest.approx(4000)
     np.save(tmp_path / "rows.npy", np.stack([hit["force"], hit["acc"]]))
@@ -109,7 +109,7 @@ def test_a_matrix_of_matlab_without_an_axis(tmp_path: Path) -> None:
     path = tmp_path / "a.mat"
     scipy.io.savemat(path, {"H21": np.stack([H.real, H.imag], axis=1), "df": 1.0})
     said = complaint(path)
-    assert "what its columns are (H21:1 (59), H21:2 (59))" in said
+    assert "what its columns are (H21:1, H21:2)" in said
     assert "--spacing" in said
     columns = ("real [m/N]=H21:1", "imag=H21:2")
     assert is_h(read_frf(path, Description(columns=columns, spacing=1.0, start=1.0)))

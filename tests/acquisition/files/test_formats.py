@@ -69,7 +69,7 @@ def test_a_format_of_another_package_is_read_by_modes_and_replay(hit: Path, tmp_
 def test_without_the_package_its_files_are_refused(hit: Path) -> None:
     said = run(["modes", hit])
     assert said.returncode == 2
-    assert "what its columns are (column 1 (" in said.stderr
+    assert "what its columns are (column 1, " in said.stderr
     assert "broken" not in said.stderr
 
 

@@ -189,6 +189,8 @@ def test_the_last_hit_of_signal_calc_is_taken_before_the_window(tmp_path: Path, 
     assert recording.hits[0].acceleration == pytest.approx(response)
     assert recording.hits[0].force == pytest.approx(force)
     assert recording.window is None
+    whole = look(tmp_path / "a.mat", Description(columns=("force=X1", "acceleration=X2:2"), rate=RATE)).complaint
+    assert "2 columns are called 'X1'" in whole
 
 
 def test_two_machines_in_one_file_are_refused(tmp_path: Path) -> None:

@@ -304,6 +304,14 @@ def test_what_many_files_lack_is_asked_for_once_and_answered_once(shop: Shop, na
     assert len(str(refused.value).splitlines()) == 3
 
 
+def test_files_of_other_lengths_lack_the_same(shop: Shop, tmp_path: Path) -> None:
+    for number in range(5):
+        (tmp_path / f"{number}.txt").write_text("".join(f"{f}\t1e-6\t-2e-7\n" for f in range(50 + number)))
+    with pytest.raises(DataError) as refused:
+        run("replay", shop.path, *sorted(tmp_path.glob("*.txt")))
+    assert len(str(refused.value).splitlines()) == 2
+
+
 def test_what_is_asked_of_many_tests_is_one_sentence_and_takes_one_answer(shop: Shop, narrow: Path) -> None:
     preview = run("replay", shop.path, narrow, *SAID, "--dry-run").stdout
     assert preview.count("question (other-band)") == 1

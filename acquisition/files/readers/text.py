@@ -8,7 +8,10 @@ from pathlib import Path
 
 _WIDE = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 _NUMBER = r"[+-]?(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eEdD][+-]?\d+)?"
-_TWO_NUMBERS = re.compile(rf"^[\W_]*?{_NUMBER}[ \t;,]+{_NUMBER}(?![.\w])", re.MULTILINE)
+_TWO_NUMBERS = re.compile(
+    rf"^[\W_]*?{_NUMBER}(?:[ \t;,]+{_NUMBER}(?![.\w])|[ \t]*[+-][ \t]*{_NUMBER}[ij])", re.MULTILINE
+)
+"""In a row, or as the two parts of a complex one."""
 HEAD = 65536
 """Bytes of a file that tell whether it has numbers."""
 

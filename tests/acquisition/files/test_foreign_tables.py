@@ -440,3 +440,41 @@ def test_of_altered_bytes_nothing_else_than_a_message_comes(
     path.write_bytes(content)
     with contextlib.suppress(DataError):
         look(path)
+
+
+LINES = ("Analyser 7", "Point;5;up", "a, b", "Date\t2024-05-01", "-----", "Channels 3", "Range: 500 N", "")
+SEPARATORS = ("\t", ";", ",", " ", " \t ", "   ")
+
+
+@st.composite
+def layouts(draw: st.DrawFn) -> tuple[str, bool, bool]:
+    """A table of frequency, real and imaginary part as somebody may write it; whether it says what they are, and
+    whether an index stands before them."""
+    separator = draw(st.sampled_from(SEPARATORS))
+    comma = separator != "," and draw(st.booleans())
+    form = draw(st.sampled_from(["%.9e", "%16.8e", "%.12g", "%+.9E"]))
+    index, end = draw(st.booleans()), draw(st.sampled_from(["\n", "\r\n"]))
+    behind = separator if draw(st.booleans()) and separator.strip(" ") else ""
+    columns = [F, H.real, H.imag]
+    text = rows(*([np.arange(59.0)] if index else []), *columns, form=form, separator=separator, end=behind + end)
+    text = text.replace(".", ",") if comma else text
+    above = end.join(draw(st.lists(st.sampled_from(LINES), max_size=4)))
+    names, units = ["Freq", "Real", "Imag"], ["Hz", "m/N", "m/N"]
+    style = draw(st.sampled_from(["none", "names [units]", "line of units"]))
+    words = [f"{name}[{unit}]" for name, unit in zip(names, units, strict=True)] if style.startswith("names") else names
+    lines = [["No", *words], ["-", *units]] if index else [words, units]
+    heading = "".join(separator.join(line) + end for line in lines[: 1 + (style == "line of units")])
+    return above + (end if above else "") + (heading if style != "none" else "") + text, style != "none", index
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+@given(layouts())
+def test_whatever_the_layout_two_commands_read_it(tmp_path: Path, layout: tuple[str, bool, bool]) -> None:
+    text, is_said, with_index = layout
+    path = put(tmp_path / "a.txt", text)
+    found = look(path)
+    assert bool(found.complaint) is not is_said
+    columns = ("-",) * with_index + ("frequency [Hz]", "real [m/N]", "imag")
+    found = found if is_said else look(path, Description(columns=columns))
+    assert found.checked().frf is not None
+    assert is_h(found.frf)  # type: ignore[arg-type]

@@ -164,6 +164,14 @@ def test_notes_beside_recordings_are_passed_over_and_refused_by_name(shop: Shop,
         run("replay", shop.path, notes, "--date", "2024-05-24")
 
 
+def test_a_column_of_complex_numbers_is_no_notes(shop: Shop, tmp_path: Path) -> None:
+    (tmp_path / "taps").mkdir()
+    for name, text in (("a.txt", "({:.3e}-{:.3e}j)\n"), ("b.txt", "{:.3e} - {:.3e}i\n")):
+        (tmp_path / "taps" / name).write_text("".join(text.format(1e-6 * n, 2e-7 * n) for n in range(1, 60)))
+    with pytest.raises(DataError, match=r"a\.txt, .*b\.txt: it does not say: the unit of column 1 .*--spacing 0\.5"):
+        run("replay", shop.path, tmp_path / "taps")
+
+
 def test_a_directory_that_is_called_like_a_file_is_a_folder(shop: Shop, folder: Path) -> None:
     (folder / "d 20240101.csv").mkdir()
     assert "3 of 3 file(s) stored" in run("replay", shop.path, folder, "--date-pattern", "%Y%m%d").stdout

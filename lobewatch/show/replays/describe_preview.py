@@ -52,7 +52,10 @@ def preview_json(preview: Preview) -> dict[str, Any]:
 def preview_texts(previews: Sequence[Preview]) -> list[str | Table]:
     """All files: in full where there are few, else in a line each, with what is asked and refused below."""
     if len(previews) <= ONE_BY_ONE:
-        return [line for preview in previews for line in _in_full(preview)]
+        return [
+            *(line for preview in previews if not preview.refused for line in _in_full(preview)),
+            *_refused(previews),
+        ]
     rows = table("<date", "<series", "hits", "f_n (Hz)", "<", "~file")
     for preview in previews:
         rows.add_row(*_row(preview))
@@ -80,7 +83,7 @@ def _in_full(preview: Preview) -> list[str]:
         return [f"{preview.file}: stored already as {preview.known}"]
     measurement, tap, recording = preview.measurement, preview.tap, preview.recording
     if measurement is None or tap is None or recording is None:
-        return [f"{preview.file}: cannot be used: {preview.refused}"]
+        return []
     lines = [
         f"{preview.file}: {recording.title}, {_hits_text(preview)}",
         *(f"  {line}" for line in fact_lines(recording.facts)),
@@ -129,8 +132,13 @@ def _below(previews: Sequence[Preview]) -> list[str]:
         if preview.measurement is not None
         for question in open_questions(preview.measurement.remarks)
     )
-    refused = ((str(preview.file), f"cannot be used: {preview.refused}") for preview in previews if preview.refused)
-    return [*fact_lines(_ranges(facts), NOT_IN_FILE), *of_files(asked), *of_files(refused)]
+    return [*fact_lines(_ranges(facts), NOT_IN_FILE), *of_files(asked), *_refused(previews)]
+
+
+def _refused(previews: Sequence[Preview]) -> list[str]:
+    return of_files(
+        (str(preview.file), f"cannot be used: {preview.refused}") for preview in previews if preview.refused
+    )
 
 
 def _ranges(facts: Iterable[Fact]) -> Iterator[Fact]:

@@ -306,6 +306,9 @@ def test_what_many_files_lack_is_asked_for_once_and_answered_once(shop: Shop, na
     assert "20240103.csv and 17 more: it does not say: the unit of Real (--unit" in line
     preview = CliRunner().invoke(app, ["replay", str(shop.path), str(narrow), "--dry-run"])
     assert preview.stdout.count("cannot be used: it does not say") == 1
+    few = CliRunner().invoke(app, ["replay", str(shop.path), *map(str, sorted(narrow.iterdir())[:4]), "--dry-run"])
+    assert few.stdout.count("cannot be used: it does not say") == 1
+    assert "0 of 4 file(s) would be stored" in few.stdout
     (narrow / "20240104.csv").write_text("Freq,Real,Imag\n1,2,3\n2,x,3\n3,4,5\n")
     with pytest.raises(DataError) as refused:
         run("replay", shop.path, narrow)

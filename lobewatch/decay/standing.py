@@ -134,7 +134,8 @@ def stand(
     remarks = [remark for standing in series for remark in standing.remarks]
     raised = [alarm for standing in series for alarm in standing.raised]
     remarks += [of_files(remark) for remark in files if remark.code in LIGHTS]
-    remarks += about_questions({row.tap_id: row.questions for row in rows}, path)
+    asked = {row.tap_id: row.questions for row in history.rows}
+    remarks += about_questions(asked, path, [row.tap_id for row in rows])
     programs = [*_about_programs(rows, machine)]
     raised += [_raised_of_program(remark, rows) for remark in programs if LIGHTS[remark.code] is Light.ALARM]
     remarks += [

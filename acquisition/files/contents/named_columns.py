@@ -34,6 +34,8 @@ def named_columns(signals: Sequence[Signal], columns: Sequence[str], ledger: Led
             ledger.faults.append(f"--columns {text!r}: {word!r} is none of {', '.join(ROLES)}")
         elif signal is not None and role[0] != "ignored":
             unit = unit or ("dB" if word.lower() == "db" else "") or signal.unit
+            if any(signal.values is other.values for other in named):
+                ledger.faults.append(f"--columns {text!r}: {signal.name} is named twice; name each column once")
             named.append(replace(signal, role=role[0], quantity=role[1] or signal.quantity, unit=unit, record=0))
     return tuple(named)
 

@@ -264,6 +264,12 @@ def test_columns_that_are_not_all_named_or_called_the_same_are_refused(tmp_path:
     assert is_h(read_frf(twice, Description(columns=("frequency [Hz]=2", "real [m/N]=3", "imag=4"))))
 
 
+def test_a_column_is_named_once(tmp_path: Path) -> None:
+    path = put(tmp_path / "a.txt", rows(np.arange(59.0), F, H.real, H.imag))
+    said = complaint(path, columns=("frequency [Hz]=2", "real [m/N]", "imag=4"))
+    assert "--columns 'real [m/N]': column 2 is named twice; name each column once" in said
+
+
 @pytest.mark.parametrize("step", [0.1, 0.5, 1.0, 0.3125, 2.5])
 def test_a_frequency_in_rad_per_s_is_asked_about_and_never_taken_as_hz(tmp_path: Path, step: float) -> None:
     frequency = step * np.arange(2000)

@@ -47,6 +47,7 @@ def fit_stiffness(
     groups: Sequence[str] | None = None,
     shaft: Sequence[int] | None = None,
     start: Sequence[float] | None = None,
+    tolerance: float = 0.0,
 ) -> StiffnessFit:
     """Scale each group of bearings and joints by a factor of its own, so that modes have their measured frequencies.
 
@@ -55,7 +56,8 @@ def fit_stiffness(
     count by their relative error. mode: their numbers (n,), 1 is the lowest; None: 1 to n. groups: names of bearing and
     joint groups, no more than n; None: all. shaft: which of the spindles each was measured on (n,), 0 is the first;
     None: the first. start: factors to begin the search with (g,), and no others; None: 1, and others where
-    that leads to none that fits.
+    that leads to none that fits. tolerance: relative standard error of each diameter of the drawing (-), which counts
+    where frequency_std is given.
 
     A bearing keeps its stiffness against tilting and that of its housing; a joint has both of its stiffnesses scaled,
     or each by itself (`Joint.rotational_group`). One group and one mode are what `calibrate` solves without iteration.
@@ -86,11 +88,14 @@ def fit_stiffness(
         )
     problem = Problem(spindles, names, measured)
     state, found = _search(problem, None if start is None else np.log(start))
+    if tolerance > 0 and measured.std is not None:
+        problem = problem.with_drawing(state, tolerance)
+        state, found = _search(problem, state.log_factor)
     state, around = _better(problem, state) if found else (state, None)
     if not (found and problem.fits(state)):
         with suppress(ArithmeticError):  # factors so far apart may be beyond what can be computed
             _require_reachable(problem)
-    result = _result(problem, state, around)
+    result = _result(problem, state, around, tolerance)
     if not found:
         raise StiffnessFitError(_why(result), result)
     return result
@@ -142,7 +147,7 @@ def _better(problem: Problem, state: Iterate) -> tuple[Iterate, Surroundings | N
     return state, around
 
 
-def _result(problem: Problem, state: Iterate, around: Surroundings | None) -> StiffnessFit:
+def _result(problem: Problem, state: Iterate, around: Surroundings | None, tolerance: float) -> StiffnessFit:
     measured = problem.measured
     covariance = _covariance(problem, state)
     unsure = identifiability(problem, state, covariance, around)
@@ -159,6 +164,8 @@ def _result(problem: Problem, state: Iterate, around: Surroundings | None) -> St
         shaft=measured.shaft,
         given=problem.spindles,
         spindles=state.spindles,
+        chi_square=None if measured.std is None else state.cost,
+        tolerance=tolerance,
     )
 
 
@@ -227,7 +234,7 @@ def _misfit(problem: Problem, state: Iterate) -> list[FitRemark]:
     if problem.fits(state):
         return []
     measured = problem.measured
-    worst = float(np.max(np.abs(state.residual * measured.scale / measured.frequency)))
+    worst = float(np.max(np.abs(state.fitted / measured.frequency - 1)))
     text = f"the frequencies do not fit, by up to {100 * worst:.2g} %; standard errors leave a wrong model out"
     return [FitRemark("frequencies-misfit", "", text, "check geometry, mode numbers and standard errors")]
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from dsm.calibration.drawing import diameters, frequency_effects
 from dsm.calibration.measured import Measured
 from dsm.calibration.stiffness_groups import group_shares, scale_groups
 from dsm.modes.find_modes import find_modes
@@ -45,7 +46,7 @@ class Iterate(NamedTuple):
     share: _Float
     """Energy shares (n, g) of the measured modes."""
     residual: _Float
-    """Fitted less measured frequency, scaled, (n,)."""
+    """Fitted less measured frequency, scaled and weighted, (n,)."""
     slope: _Float
     """Derivative of the residual by log_factor, (n, g)."""
 
@@ -64,6 +65,16 @@ class Problem(NamedTuple):
     """Groups, each with a factor."""
     measured: Measured
     """The frequencies."""
+    weight: _Float | None = None
+    """What scaled residuals are multiplied by (n, n), where their errors depend on each other."""
+
+    def with_drawing(self, state: Iterate, tolerance: float) -> Problem:
+        """The same with all diameters of the drawing off by this standard error (-), as they act on this state."""
+        measured = self.measured
+        effect = frequency_effects(state.spindles, measured.mode, measured.shaft, diameters(state.spindles))
+        scaled = tolerance * effect * (measured.frequency / measured.scale)[:, np.newaxis]
+        covariance = np.eye(measured.mode.size) + scaled @ scaled.T
+        return self._replace(weight=np.linalg.inv(np.linalg.cholesky(covariance)))
 
     @property
     def spare(self) -> int:
@@ -82,14 +93,17 @@ class Problem(NamedTuple):
             modes = find_modes(spindle, int(np.max(wanted)) + 2)
             frequencies.append(modes.frequency)
             fitted[on_shaft], share[on_shaft] = modes.frequency[wanted], group_shares(modes, self.names)[wanted]
-        residual, slope = (fitted - measured.frequency) / measured.scale, fitted / measured.scale / 2
-        return Iterate(log_factor, scaled, tuple(frequencies), fitted, share, residual, slope[:, np.newaxis] * share)
+        residual = (fitted - measured.frequency) / measured.scale
+        slope = (fitted / measured.scale / 2)[:, np.newaxis] * share
+        if self.weight is not None:
+            residual, slope = self.weight @ residual, self.weight @ slope
+        return Iterate(log_factor, scaled, tuple(frequencies), fitted, share, residual, slope)
 
     def fits(self, state: Iterate) -> bool:
         """Whether the residuals are of the size that is to be expected."""
         measured = self.measured
         if measured.std is None:
-            return float(np.max(np.abs(state.residual * measured.scale / measured.frequency))) < UNLIKELY
+            return float(np.max(np.abs(state.fitted / measured.frequency - 1))) < UNLIKELY
         return float(chdtrc(max(self.spare, 1), state.cost)) > UNLIKELY
 
 

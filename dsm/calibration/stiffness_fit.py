@@ -54,6 +54,10 @@ class StiffnessFit:
     """The spindles as given."""
     spindles: tuple[Spindle, ...]
     """The fitted spindles."""
+    chi_square: float | None
+    """Sum of squares of the residuals over their errors, those of the drawing included (-); None: no errors given."""
+    tolerance: float
+    """Relative standard error of each diameter of the drawing (-)."""
 
     @property
     def spindle(self) -> Spindle:
@@ -123,9 +127,7 @@ class StiffnessFit:
         None where no standard errors were given or there is no mode to spare.
         """
         spare = self.frequency.size - self.factor.size
-        if self.frequency_std is None or spare == 0:
-            return None
-        return float(np.sum((self.residual / self.frequency_std) ** 2) / spare)
+        return None if self.chi_square is None or spare == 0 else self.chi_square / spare
 
     def __str__(self) -> str:
         """The report."""

@@ -41,7 +41,8 @@ def calibrate_model(
         std, name = frequency_std[0] if frequency_std else None, group[0] if group else None
         stiffness = calibrate(spindle, frequency[0], std, number, name)
     else:
-        stiffness = fit_stiffness(spindle, frequency, frequency_std or None, mode or None, group or None)
+        named = frequency_std or None, mode or None, group or None
+        stiffness = fit_stiffness(spindle, frequency, *named, tolerance=machine.drawing_tolerance)
         number = int(stiffness.mode[0])
     dampers = None
     if damping_ratio is not None:

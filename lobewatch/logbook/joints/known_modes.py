@@ -149,5 +149,6 @@ def _fitted(taps: Sequence[TappedTool], start: Start) -> KnownModes:
         [number for _, number, _ in numbered],
         shaft=[tap for tap, _, _ in numbered],
         start=start_factors(spindles[0], start.bearings, start.radial, start.tilting),
+        tolerance=taps[0].tolerance,
     )
     return KnownModes(taps, start.matches, grouping, fit)

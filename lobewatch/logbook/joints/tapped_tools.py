@@ -39,6 +39,8 @@ class TappedTool:
     """All other modes that are believed."""
     scatter: float
     """Standard deviation of a frequency from one mounting of the tool to the next, relative (-)."""
+    tolerance: float
+    """Standard error of each diameter of the drawing, relative (-)."""
 
     def std(self, mode: Mode) -> float:
         """Standard error of a frequency of this tap test (Hz), that of mounting the tool included."""
@@ -105,4 +107,5 @@ def _tapped(logbook: Logbook, row: Row, number: int) -> TappedTool:
         measurement.followed,
         tuple(mode for mode in believed(in_band).modes if mode is not measurement.followed),
         scatter.frequency / IN_95_PERCENT,
+        machine.drawing_tolerance,
     )

@@ -125,6 +125,11 @@ class Machine(Table, frozen=True):
             return spindle
         return self.tool_named(tool).put_into(spindle, self.spindle.tool_length_mm or 0.0)
 
+    @property
+    def drawing_tolerance(self) -> float:
+        """Standard error of each diameter of the model, relative (-); 0 without a model."""
+        return self.spindle.tolerance if self.spindle else 0.0
+
     def tool_named(self, name: str) -> ToolTable:
         """A [[tool]]; DataError where there is none of this name."""
         for tool in self.tool:

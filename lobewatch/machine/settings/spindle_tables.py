@@ -118,6 +118,7 @@ class SpindleTable(Table, frozen=True):
     density_kg_per_m3: Positive = 7850.0
     damping_ratio: Annotated[float, Meta(gt=0, lt=1)] = 0.03
     tool_length_mm: Positive | None = None
+    tolerance: Annotated[float, Meta(ge=0, le=0.1)] = 0.01
     label: str = ""
 
     def __post_init__(self) -> None:

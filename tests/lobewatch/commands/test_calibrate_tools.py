@@ -89,7 +89,7 @@ def test_two_tools_find_joint_and_bearings_and_predict_a_third(folder: MachineFo
     third = found["predicted"]["short"]
     assert third["frequency"] == pytest.approx(frequency, rel=1e-3)
     assert third["stiffness"] == pytest.approx(stiffness, rel=5e-3)
-    assert 0 < third["frequency_std"] < 0.01 * frequency
+    assert 0 < third["frequency_std"] < 0.03 * frequency
     assert found["fits_one_spindle"]
     assert any("stiffness_n_per_um = 500" in line for line in found["machine_toml"])
 

@@ -175,15 +175,16 @@ def _peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.float64
     faintest = 1e-12 * size.max()
     floor = np.maximum(NOISE_MULTIPLE * noise, max(least, faintest))
     tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:]) & (size[1:-1] >= floor[1:-1])) + 1
-    saddle = np.array([_higher_saddle(size, int(top)) for top in tops])
+    lowest = float(size.min())
+    saddle = np.array([_higher_saddle(size, int(top), lowest) for top in tops])
     clear = saddle <= size[tops] * 10 ** (-PROMINENCE_DB / 20)
     high = tops[clear & (size[tops] - saddle > NOISE_MULTIPLE * noise[tops])]
     return [_peak(frf, mobility, size, int(top), float(noise[top])) for top in high]
 
 
-def _higher_saddle(size: NDArray[np.float64], top: int) -> float:
+def _higher_saddle(size: NDArray[np.float64], top: int, lowest: float) -> float:
     """The higher of the lowest values between a peak and what is higher on either side, or the lowest of all."""
-    return max(_lowest_before_higher(side, size.min()) for side in (size[top::-1], size[top:]))
+    return max(_lowest_before_higher(side, lowest) for side in (size[top::-1], size[top:]))
 
 
 def _lowest_before_higher(side: NDArray[np.float64], lowest: float) -> float:

@@ -37,7 +37,7 @@ def _rises(left: ComplexArray, band: FittedBand, given: Array) -> Array:
     height = np.abs((band.data.own - left) * given) ** 2
     rows = zip(np.abs(left * given) ** 2, height, given > 0, strict=True)
     variance = np.array([_variance(*row) for row in rows])
-    return np.asarray(np.sqrt(variance / np.mean(variance)))
+    return np.asarray(np.sqrt(np.maximum(variance / np.mean(variance), LEAST_SHARE**2)))
 
 
 def _variance(left: Array, height: Array, counts: NDArray[np.bool_]) -> Array:
@@ -47,10 +47,12 @@ def _variance(left: Array, height: Array, counts: NDArray[np.bool_]) -> Array:
     """
     columns = np.stack([np.ones(left.size), height / np.mean(height)])
     known, squares = columns[:, counts], left[counts]
+    if not np.any(squares):
+        return np.zeros(left.size)
     equal = share = np.array([np.mean(squares), 0.0])
     for _ in range(STEPS):
         scaled = known / (share @ known)
-        share = np.maximum(np.linalg.solve(scaled @ scaled.T, scaled @ (squares / (share @ known))), 0.0)
+        share = np.maximum(np.linalg.pinv(scaled @ scaled.T) @ scaled @ (squares / (share @ known)), 0.0)
         share[0] = max(share[0], LEAST_SHARE * share[1])
     gain = 2 * (_log_likelihood(squares, share @ known) - _log_likelihood(squares, equal @ known))
     return np.asarray((share if gain > EVIDENCE else equal) @ columns)

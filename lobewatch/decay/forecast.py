@@ -7,7 +7,7 @@ numbers.
 
 from __future__ import annotations
 
-from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
-from lobewatch.decay.shapes import KINDS, Shape, courses, shapes_of
-from lobewatch.decay.temperature import ColumnFits, base_of
+from lobewatch.decay.regressions import Regressions, pair_regressions, single_regressions, triple_regressions
+from lobewatch.decay.shapes import KINDS, Shape
+from lobewatch.decay.temperature import base_of
+from lobewatch.decay.wandering import Wandering, wandering
 
 ENOUGH = 8
 """Number of points from which on anything is foretold; chosen."""
@@ -25,12 +27,12 @@ QUANTILES = (0.1, 0.5, 0.9)
 LOOKS = 241
 """Number of dates looked at up to the horizon; between them the probability is interpolated."""
 
-LIGHTEST = 1e-7
-"""Weight beside the heaviest below which a shape is left out."""
+LIGHTEST = 1e-3
+"""Weight that all shapes that are left out have together."""
+MOST = 120
+"""Points that are fitted at most; of more the means of neighbours; chosen."""
 SURELY_NOT = 1e-12
 """Probability that is as good as none."""
-STEP = 1e-6
-"""Part of the span over which a rate is taken."""
 SURELY = (0.025, 0.975)
 """Probabilities of the interval of a rate."""
 HALVINGS = 40
@@ -39,6 +41,8 @@ REACH = 50
 """Standard errors around the means within which any level of a fan lies."""
 
 Floats = NDArray[np.float64]
+Family = Regressions | Wandering
+"""Shapes of one sort, fitted to a series."""
 
 
 class DateRange(NamedTuple):
@@ -81,8 +85,8 @@ class Forecast:
     """Mean of each shape at these dates, shape (j, d)."""
     error: Floats
     """Standard error of these means, shape (j, d)."""
-    freedom: int
-    """Degrees of freedom of the errors."""
+    freedom: Floats
+    """Degrees of freedom of the errors of each shape, shape (j,)."""
 
     @property
     def line(self) -> Floats:
@@ -136,37 +140,35 @@ def forecast(dates: Floats, y: Floats, horizon: float, temperature: Floats | Non
 class PastFit:
     """A series with all shapes that it allows fitted to it: what of a forecast does not hang on the day it is made."""
 
-    shapes: tuple[Shape, ...]
-    """Shapes that were fitted, j of them, their dates counted from the first point on."""
+    families: tuple[Family, ...]
+    """Shapes that were fitted, their dates counted from the first point on."""
     weight: Floats
     """Weight of each shape, shape (j,), their sum 1."""
-    spread: float
-    """Standard deviation of the points around the shapes, in the unit of the series."""
     fitted: Floats
     """Mean of the mixture at the points, shape (n,)."""
-    fits: ColumnFits
-    """Fits of the shapes."""
     dates: Floats
     """Dates of the points, shape (n,)."""
     first: float
     """Value of the first point."""
+    spread: float
+    """Standard deviation of the points around the shapes that do not wander, in the unit of the series."""
 
     def ahead(self, horizon: float) -> Forecast:
         """Forecast until a date."""
         begin, span = float(self.dates[0]), float(self.dates[-1] - self.dates[0])
         at = np.linspace(span, min(max(horizon - begin, span), 3 * span), LOOKS)
-        mean, error = self.fits.at(courses(self.shapes, at, span))
-        moved = tuple(Shape(shape.kind, shape.start + begin, *shape[2:]) for shape in self.shapes)
-        mean = mean + self.first
-        return Forecast(moved, self.weight, self.spread, self.fitted, begin + at, mean, error, self.fits.freedom)
+        mean, error = (np.concatenate(blocks) for blocks in zip(*(f.at(at) for f in self.families), strict=True))
+        shapes = [shape for family in self.families for shape in family.shapes]
+        moved = tuple(shape._replace(start=shape.start + begin) for shape in shapes)
+        freedom = np.concatenate([family.freedom for family in self.families])
+        return Forecast(moved, self.weight, self.spread, self.fitted, begin + at, mean + self.first, error, freedom)
 
     @property
     def rate(self) -> Rate:
         """Rate of change at its last point."""
-        span = float(self.dates[-1] - self.dates[0])
-        near = courses(self.shapes, np.array([span - STEP * span, span]), span)
-        rate, error = self.fits.rate(np.diff(near)[:, 0] / (STEP * span))
-        low, high = (_quantile(self.weight, rate, error, self.fits.freedom, p) for p in SURELY)
+        rate, error = (np.concatenate(rates) for rates in zip(*(f.rate() for f in self.families), strict=True))
+        freedom = np.concatenate([family.freedom for family in self.families])
+        low, high = (_quantile(self.weight, rate, error, freedom, p) for p in SURELY)
         return Rate(float(self.weight @ rate), low, high)
 
 
@@ -175,30 +177,50 @@ def fit_past(dates: Floats, y: Floats, temperature: Floats | None = None) -> Pas
     at = dates - dates[:1].sum()
     if y.size < ENOUGH or at[-1] <= 0:
         raise ValueError(f"{y.size} points on {np.unique(at).size} dates: a forecast needs {ENOUGH}")
-    shapes = [*shapes_of(at)]
-    columns = courses(shapes, at, float(at[-1]))
-    fits = base_of(y, temperature).fit_columns(columns)
-    counts = Counter(shape.kind for shape in shapes)
-    share = [np.log(count) + np.log(y.size) / 2 * (kind != "none") for kind, count in counts.items()]
-    log = -fits.freedom / 2 * np.log(fits.rss) - np.repeat(share, [*counts.values()])
+    places, means = _averaged(at), _averaged(y)
+    base = base_of(means, None if temperature is None else _averaged(temperature))
+    families = [fit(base, places) for fit in (single_regressions, pair_regressions, triple_regressions)]
+    kept, weight = _heaviest([*families, wandering(base, places, "wander"), wandering(base, places, "bend")])
+    fitted = weight @ np.concatenate([family.at(at)[0] for family in kept]) + means[0]
+    return PastFit(kept, weight, fitted, dates, float(means[0]), _spread(families) * np.sqrt(at.size / places.size))
+
+
+def _spread(families: Sequence[Regressions]) -> float:
+    evidence, variance = (
+        np.concatenate([getattr(family, name) for family in families]) for name in ("evidence", "variance")
+    )
+    weight = np.exp(evidence - evidence.max())
+    return float(np.sqrt(weight @ variance / weight.sum()))
+
+
+def _averaged(values: Floats) -> Floats:
+    """Means of neighbours where there are many."""
+    return np.array([part.mean() for part in np.array_split(values, min(values.size, MOST))])
+
+
+def _heaviest(families: Sequence[Family]) -> tuple[tuple[Family, ...], Floats]:
+    """The families without those of their shapes that together weigh next to nothing, and the weights of the others."""
+    log = np.concatenate([family.evidence for family in families])
     weight = np.exp(log - log.max())
-    kept = np.flatnonzero(weight > LIGHTEST)
-    weight, fits = weight[kept] / weight[kept].sum(), fits.select(kept)
-    spread = float(np.sqrt(weight @ fits.rss / fits.freedom))
-    fitted = fits.mixed(weight, columns[kept]) + y[0]
-    return PastFit(tuple(shapes[j] for j in kept), weight, spread, fitted, fits, dates, float(y[0]))
+    order = np.argsort(weight)
+    light = np.zeros(weight.size, dtype=bool)
+    light[order] = np.cumsum(weight[order]) < LIGHTEST * weight.sum()
+    parts = np.split(~light, np.cumsum([len(family.shapes) for family in families])[:-1])
+    kept = [family.select(np.flatnonzero(part)) for family, part in zip(families, parts, strict=True) if part.any()]
+    return tuple(kept), weight[~light] / weight[~light].sum()
 
 
-def _below(freedom: int, t: Floats) -> Floats:
-    """Distribution of Student's t: 0 and 1 where it is nearer to them than anybody asks."""
-    share, near = (t > 0).astype(np.float64), ~(np.abs(t) > stdtrit(freedom, 1 - SURELY_NOT))
-    share[near] = stdtr(freedom, t[near])
+def _below(freedom: Floats, t: Floats) -> Floats:
+    """Distribution of Student's t (j, d) of degrees of freedom (j,): 0 and 1 where nobody asks for more."""
+    freedom = np.broadcast_to(freedom[:, np.newaxis], t.shape)
+    share, near = (t > 0).astype(np.float64), ~(np.abs(t) > stdtrit(freedom[:, :1], 1 - SURELY_NOT))
+    share[near] = stdtr(freedom[near], t[near])
     return np.asarray(share)
 
 
-def _quantile(weight: Floats, middle: Floats, error: Floats, freedom: int, p: float) -> float:
+def _quantile(weight: Floats, middle: Floats, error: Floats, freedom: Floats, p: float) -> float:
     """Quantile of a mixture of Student's t, where an error of 0 is a value that is certain."""
-    reach = stdtrit(freedom, 1 - LIGHTEST) * error
+    reach = stdtrit(freedom, 1 - SURELY_NOT) * error
     low, high = float((middle - reach).min()), float((middle + reach).max())
     for _ in range(HALVINGS):
         value = (low + high) / 2

@@ -18,6 +18,8 @@ STEEL = -0.015
 
 TINY = 1e-12
 """Least variance of a point (%^2): below it is rounding."""
+LEAST_SQUARE = 1e-12
+"""Share of the largest below which a direction of some columns is none: they are alike."""
 LEAST = 1e-20
 """Least share of the sum of squares that is taken as left: less is rounding."""
 
@@ -128,69 +130,65 @@ class SeriesBase:
     def _outer(self) -> Floats:
         return _summed(np.einsum("ni,nj->nij", self._values, self._values))
 
+    @cached_property
+    def gram(self) -> Floats:
+        """Inverse of the normal matrix of the base, shape (p, p), the variance of a point being 1."""
+        return np.asarray(np.linalg.inv(self.columns.T @ self.columns + self.precision(np.array([self.y.size]))[0]))
+
     @property
-    def freedom(self) -> int:
-        """Degrees of freedom once a shape is fitted: the temperature costs none, its influence is known beforehand."""
-        return self.y.size - 2
+    def total(self) -> float:
+        """Sum of squares that the base leaves of all points."""
+        return float(self.y @ (self.y - self.columns @ (self.gram @ self.columns.T @ self.y)))
 
     def fit_columns(self, columns: Floats) -> ColumnFits:
-        """Each of some columns (j, n) fitted beside the base, one at a time."""
-        gram = np.linalg.inv(self.columns.T @ self.columns + self.precision(np.array([self.y.size]))[0])
-        level = gram @ self.columns.T @ self.y
+        """Each of some sets of k columns (j, k, n) fitted beside the base, one set at a time."""
+        level = self.gram @ self.columns.T @ self.y
         crossed = columns @ self.columns
-        leaning = crossed @ gram
+        leaning = crossed @ self.gram
         product = columns @ (self.y - self.columns @ level)
-        square = np.einsum("jn,jn->j", columns, columns) - (leaning * crossed).sum(axis=1)
-        square = np.where(square > 0, square, np.inf)
-        total = self.y @ (self.y - self.columns @ level)
-        size = product / square
-        rss = np.maximum(total - size * product, LEAST * total + np.finfo(float).tiny)
-        return ColumnFits(rss, size, square, leaning[:, 0], float(level[0]), float(gram[0, 0]), self.freedom)
+        square = columns @ columns.transpose(0, 2, 1) - leaning @ crossed.transpose(0, 2, 1)
+        inverse = np.asarray(np.linalg.pinv(square, rcond=LEAST_SQUARE, hermitian=True), dtype=np.float64)
+        size = (inverse @ product[..., np.newaxis])[..., 0]
+        total = self.total
+        rss = np.maximum(total - (size * product).sum(axis=1), LEAST * total + np.finfo(float).tiny)
+        freedom = self.y.size - 1 - columns.shape[1]
+        return ColumnFits(rss, size, inverse, leaning[..., 0], float(level[0]), float(self.gram[0, 0]), freedom)
 
 
 class ColumnFits(NamedTuple):
-    """Columns fitted one at a time."""
+    """Sets of k columns fitted, one set at a time."""
 
     rss: Floats
     """Sum of squares that each leaves, shape (j,)."""
     size: Floats
-    """Size of each column, shape (j,)."""
-    square: Floats
-    """Square of each column, what the base leaves of it, shape (j,)."""
+    """Sizes of the columns, shape (j, k)."""
+    inverse: Floats
+    """Inverse of the products of the columns, what the base leaves of them, shape (j, k, k)."""
     leaning: Floats
-    """Leaning of each column on the level of the base, shape (j,)."""
+    """Leanings of the columns on the level of the base, shape (j, k)."""
     level: float
     """Level of the base, at the mean temperature."""
     flat: float
     """Variance of the level, that of a point being 1."""
     freedom: int
-    """Degrees of freedom."""
+    """Degrees of freedom; the temperature costs none, its influence is known beforehand."""
 
     def select(self, numbers: NDArray[np.intp]) -> ColumnFits:
-        """The fits of some of the columns."""
-        rss, size, square, leaning = (values[numbers] for values in self[:4])
-        return ColumnFits(rss, size, square, leaning, self.level, self.flat, self.freedom)
+        """The fits of some of the sets."""
+        rss, size, inverse, leaning = (values[numbers] for values in self[:4])
+        return ColumnFits(rss, size, inverse, leaning, self.level, self.flat, self.freedom)
 
     def at(self, columns: Floats) -> tuple[Floats, Floats]:
-        """Mean and standard error of the series where the columns have other values (j, d), shape (j, d) each."""
-        away = columns - self.leaning[:, np.newaxis]
-        error = away**2
-        error /= self.square[:, np.newaxis]
-        error += self.flat
-        error *= (self.rss / self.freedom)[:, np.newaxis]
-        np.sqrt(error, out=error)
-        away *= self.size[:, np.newaxis]
-        away += self.level
-        return away, error
-
-    def mixed(self, weight: Floats, columns: Floats) -> Floats:
-        """The means alone, each with its weight (j,), shape (d,)."""
-        sizes = weight * self.size
-        return np.asarray(self.level * weight.sum() - sizes @ self.leaning + sizes @ columns)
+        """Mean and standard error of the series where the columns have other values (j, k, d), shape (j, d) each."""
+        away = columns - self.leaning[..., np.newaxis]
+        mean = self.level + (self.size[:, np.newaxis] @ away)[:, 0]
+        variance = self.flat + np.einsum("jkd,jkd->jd", self.inverse @ away, away)
+        return mean, np.sqrt(variance * (self.rss / self.freedom)[:, np.newaxis])
 
     def rate(self, slopes: Floats) -> tuple[Floats, Floats]:
-        """Rate of change of the series, and its standard error, where the columns change so (j,)."""
-        return self.size * slopes, np.abs(slopes) * np.sqrt(self.rss / self.freedom / self.square)
+        """Rate of change of the series, and its standard error, where the columns change so (j, k)."""
+        variance = np.einsum("jk,jkl,jl->j", slopes, self.inverse, slopes)
+        return (self.size * slopes).sum(axis=1), np.sqrt(variance * self.rss / self.freedom)
 
 
 def _square(kind: str, length: NDArray[np.intp]) -> Floats:

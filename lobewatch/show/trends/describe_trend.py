@@ -121,7 +121,17 @@ def course_text(trend: Trend) -> str:
 def _shape(shape: Shape, falls: bool) -> str:
     since, goes, went = f"{date(shape.start):%Y-%m-%d}", *(("falling", "fell") if falls else ("rising", "rose"))
     steadily = f"{goes} steadily since {since}"
-    words = {"none": "steady", "line": steadily, "slope": steadily, "step": f"{went} once before {since}, steady since"}
+    words = {
+        "none": "steady",
+        "line": steadily,
+        "slope": steadily,
+        "step": f"{went} once before {since}, steady since",
+        "slopes": f"{goes} at another rate since {since}",
+        "breaks": f"{goes} at another rate since {since}",
+        "crash": f"{went} at once before {since}, {goes} beside that",
+        "wander": f"{goes} by fits and starts",
+        "bend": f"{goes} at a rate that changes",
+    }
     return words.get(shape.kind, f"{goes}, {'faster and faster' if shape.accelerates else 'ever more slowly'}")
 
 

@@ -40,8 +40,8 @@ class Shape(NamedTuple):
 
     kind: Kind
     """Kind: "none", steady; "slope", a line from a point on; "step", fallen once; "curve", accelerating or slowing;
-    "runaway", to a finite date; "slopes", two, one from each of two dates on; "breaks", a line before them, too; "crash", a step and a line;
-    "wander", a line whose level wanders (a Wiener process); "bend", one whose rate does."""
+    "runaway", to a finite date; "slopes", two, one from each of two dates on; "breaks", a line before them, too;
+    "crash", a step and a line; "wander", a line whose level wanders (a Wiener process); "bend", one whose rate does."""
     start: float
     """Date from which on it falls, or on which it fell; the later one of two slopes; the step of a crash."""
     accelerates: bool = False

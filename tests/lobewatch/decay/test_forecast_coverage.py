@@ -73,7 +73,7 @@ def fall_of(course: str, r: Random, span: float, end: float) -> Callable[[Floats
         "exponential": scaled(lambda t: np.asarray(np.expm1(rate * t))),
         "saturating": scaled(lambda t: np.asarray(-np.expm1(-rate * t))),
         "none": lambda t: 0 * t,
-        "step": lambda t: 1.0 * (t > bend),
+        "step": lambda t: (t > bend).astype(np.float64),
         "settled": lambda t: np.asarray(-0.5 * np.expm1(-t / 3)),
     }
     return courses[course]

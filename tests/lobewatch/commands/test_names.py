@@ -166,7 +166,8 @@ def test_nothing_of_a_foreign_file_steers_the_terminal(run: Run, tmp_path: Path)
     file.write_text(f"time_s,acc{CLEAR}\x07_g,other\n" + "".join(f"{i},1,2\n" for i in range(9)), encoding="utf-8")
     said = run("modes", file)
     assert said.code == 2
-    assert "hit\ufffd[2J.csv: it does not say: what its columns are (acc\ufffd[2J [g], other (9))" in said.err
+    assert "hit\ufffd[2J.csv: it does not say: what its columns are" in said.err
+    assert "acc\ufffd[2J [g], other" in said.err
     assert not any(character in said.err for character in "\x1b\x07")
 
 

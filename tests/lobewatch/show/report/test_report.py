@@ -53,7 +53,7 @@ def test_a_report_says_first_what_matters_and_holds_its_numbers(worn: Shop) -> N
     html = render_report(logbook, "reference", "x", now)
     first = html[html.index('<div class="first">') : html.index("<h2")]
     standing = logbook.standing(now)
-    light = {"alarm": "✗ ALARM", "warn": "! WARNING"}[standing.light]
+    light = {"alarm": "✗ EARLY ALARM" if standing.is_early else "✗ ALARM", "warn": "! WARNING"}[standing.light]
     for words in (light, "falling since 2026-01-", " % a month now (", "A &lt;1&gt;", "Tap next by 2026-07-14"):
         assert words in first, words
     assert standing.next_step in unescape(first)

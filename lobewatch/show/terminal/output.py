@@ -72,8 +72,11 @@ def emit(payload: dict[str, Any], as_json: bool, *texts: str | Table) -> None:
             results.out(exact, highlight=False)
         return
     for text in texts:
+        if isinstance(text, str):
+            results.file.write(f"{printable(text)}\n")
+            continue
         least = text.least_width if isinstance(text, Cells) else 0
-        results.print(text, markup=not isinstance(text, str), width=max(Console().width, least) if least else None)
+        results.print(text, width=max(Console().width, least) if least else None)
 
 
 def table(*headings: str) -> Table:

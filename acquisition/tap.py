@@ -15,8 +15,13 @@ from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
 from acquisition.names import check_name
 
-RANGES = {"temperature_c": (-40.0, 150.0), "stick_out_mm": (0.1, 5000.0), "drawbar_kn": (0.1, 1000.0)}
-"""What a spindle can have: temperature (degC), stick-out of the tool (mm), drawbar force (kN)."""
+RANGES = {
+    "temperature_c": (-40.0, 150.0),
+    "stick_out_mm": (0.1, 5000.0),
+    "drawbar_kn": (0.1, 1000.0),
+    "hours": (0.0, 1e6),
+}
+"""What a spindle can have: temperature (degC), stick-out of the tool (mm), drawbar force (kN), running hours (h)."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +40,8 @@ class Conditions:
     """Whether the tool was clamped anew for it; False: nobody said so."""
     note: str = ""
     """Anything else that is to be remembered."""
+    hours: float | None = None
+    """Running hours of the spindle (h)."""
 
     def __post_init__(self) -> None:
         """Refuse values that no spindle has, and control characters."""
@@ -54,7 +61,7 @@ class Conditions:
     def known(self) -> dict[str, Any]:
         """What somebody said, by name."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {name: value for name, value in values.items() if value not in (None, "", False)}
+        return {name: value for name, value in values.items() if value not in (None, "") and value is not False}
 
     def over(self, other: Self) -> Self:
         """The same, with what the other one knows where this one does not."""

@@ -50,6 +50,7 @@ def replay(
         typer.Option(help="Take these recordings though they raise this question, by its code; as often as needed."),
     ] = None,
     temperature: Annotated[float | None, typer.Option(help="Of the spindle then, degC.")] = None,
+    hours: Annotated[float | None, typer.Option(help="Running hours of the spindle then, h.")] = None,
     note: Annotated[str, typer.Option(help="What else is to be remembered of these tests.")] = "",
     reclamped: Annotated[bool, typer.Option("--reclamped", help="The tool was clamped anew for these tests.")] = False,
     as_json: Json = False,
@@ -84,7 +85,7 @@ def replay(
         date_pattern=date_pattern,
         tool=tool,
         direction=direction,
-        conditions=Conditions(temperature_c=temperature, note=note, reclamped=reclamped),
+        conditions=Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped),
     )
     workers = Workers(jobs, scheduler)
     note_remarks(workers.remarks)

@@ -25,6 +25,7 @@ def tap(
         typer.Option(help="Take the recording though it raises this question, by its code; as often as needed."),
     ] = None,
     temperature: Annotated[float | None, typer.Option(help="Of the spindle, degC.")] = None,
+    hours: Annotated[float | None, typer.Option(help="Running hours of the spindle, h.")] = None,
     note: Annotated[str, typer.Option(help="What else is to be remembered of this test.")] = "",
     reclamped: Annotated[bool, typer.Option("--reclamped", help="The tool was clamped anew for this test.")] = False,
     screen: Annotated[bool, typer.Option("--screen", help="Show the test in a browser too.")] = False,
@@ -60,7 +61,7 @@ def tap(
     from lobewatch.tap.session import plan_session
 
     folder = MachineFolder(machine)
-    conditions = Conditions(temperature_c=temperature, note=note, reclamped=reclamped)
+    conditions = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
     named = {"port": port, "tool": tool, "direction": direction, "operator": operator}
     session = plan_session(folder, **named, resume=not new, accept=accept or (), conditions=conditions)
     try:

@@ -9,18 +9,23 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtri, stdtr, stdtrit
+from scipy.special import ndtr, ndtri, stdtr, stdtrit
 
-from lobewatch.decay.temperature import SeriesBase, base_of
+from lobewatch.decay.readings import Readings
+from lobewatch.decay.series_base import SeriesBase, base_of
 
 FIRST_JUDGED = 9
 """Number of points before which nothing is judged; chosen."""
+FIRST_OF_KNOWN = 5
+"""The same where something is known of the scatter beforehand; chosen."""
 SURE = 3.3
 """Score from which a change is taken for real: a chance of 1 in 2000 where only the last point is looked at."""
+ALIKE = 0.5
+"""Least share of what two series did on the mean that one of them did, where that counts for it; chosen."""
 ROWS = 64
 """Number of points that are judged at once, to bound the memory."""
 
@@ -54,24 +59,28 @@ class LikeliestChange(NamedTuple):
     point: NDArray[np.intp]
     """Index of its point as in Fall, shape (r,)."""
 
-
-NOTHING = (LikeliestChange(np.empty(0), np.empty(0, np.bool_), np.empty(0, np.intp)),) * 2
-"""Falls and rises where no point is judged."""
+    @classmethod
+    def of_none(cls, n: int) -> Self:
+        """Where no point is judged."""
+        return cls(np.full(n, np.nan), np.zeros(n, np.bool_), np.zeros(n, np.intp))
 
 
 @dataclass(frozen=True, eq=False)
 class Watch:
     """Judgement on the points of a series, one after the other."""
 
-    scores: Floats
-    """Score of each point: how ill a steady series fits up to it, as a quantile of the normal distribution, shape (n,);
-    NaN before the 9th."""
     base: SeriesBase
     """Base of the fits."""
     change: LikeliestChange
-    """Likeliest change up to each point from the 9th on."""
+    """Likeliest change up to each point; the score of the first ones, which are not judged, is NaN."""
     sign: int
     """1 where it looks for falls, -1 where for rises."""
+
+    @property
+    def scores(self) -> Floats:
+        """Score of each point: how ill a steady series fits up to it, as a quantile of the normal distribution, shape
+        (n,); NaN before the 9th, before the 5th where something is known of the scatter beforehand."""
+        return self.change.score
 
     @cached_property
     def sure(self) -> NDArray[np.bool_]:
@@ -91,14 +100,14 @@ class Watch:
 
     def fall_at(self, alarm: int) -> Fall:
         """The change that a point is sure of: kind and beginning as it sees them, size by all points."""
-        return _fall(self.base, self.change, alarm - FIRST_JUDGED + 1, self.sign)
+        return _fall(self.base, self.change, alarm, self.sign)
 
 
 def newest_change(y: Floats) -> Fall | None:
     """The fall, or with a negative size the rise, that the last two points (n,) are both sure of; None without one."""
     if y.size <= FIRST_JUDGED:
         return None
-    base = base_of(y)
+    base = base_of(Readings(y))
     for sign, change in zip((1, -1), _likeliest_changes(base, np.arange(y.size - 2, y.size)), strict=True):
         if (change.score >= SURE).all():
             fall = _fall(base, change, -1, sign)
@@ -106,20 +115,55 @@ def newest_change(y: Floats) -> Fall | None:
     return None
 
 
-def watch(y: Floats, temperature: Floats | None = None) -> Watch:
-    """Judge a series (n,) point after point: whether it falls.
+def watch(readings: Readings) -> Watch:
+    """Judge a series point after point: whether it falls."""
+    return watch_both(readings)[0]
 
-    temperature: of the spindle (K or degC) at each point, NaN where it was not recorded; its influence is fitted along.
+
+def watch_both(readings: Readings) -> tuple[Watch, Watch]:
+    """Judge a series likewise, and its mirror image: whether it rises.
+
+    What the mean of both directions did is looked at beside what the one did alone.
     """
-    return watch_both(y, temperature)[0]
+    base, common, shared = base_of(readings), base_of(readings.common), readings.shared
+    pairs = zip(_judge_points(base), _judge_points(common), strict=True)
+    falls, rises = (_surer(base, alone, common, together, shared) for alone, together in pairs)
+    return Watch(base, falls, 1), Watch(base, rises, -1)
 
 
-def watch_both(y: Floats, temperature: Floats | None = None) -> tuple[Watch, Watch]:
-    """Judge a series likewise, and its mirror image: whether it rises."""
-    base, unjudged = base_of(y, temperature), np.full(min(y.size, FIRST_JUDGED - 1), np.nan)
-    falls, rises = _likeliest_changes(base, np.arange(unjudged.size, y.size)) if y.size >= FIRST_JUDGED else NOTHING
-    down, up = (np.concatenate([unjudged, change.score]) for change in (falls, rises))
-    return Watch(down, base, falls, 1), Watch(up, base, rises, -1)
+def _judge_points(base: SeriesBase) -> tuple[LikeliestChange, LikeliestChange]:
+    """The likeliest fall, and the likeliest rise, up to each point."""
+    first = FIRST_OF_KNOWN if base.scatter.freedom else FIRST_JUDGED
+    last = np.arange(first - 1, base.y.size)
+    falls, rises = (LikeliestChange.of_none(base.y.size) for _ in range(2))
+    if last.size:
+        for every, judged in zip((falls, rises), _likeliest_changes(base, last), strict=True):
+            for values, part in zip(every, judged, strict=True):
+                values[last] = part
+    return falls, rises
+
+
+def _surer(
+    base: SeriesBase,
+    alone: LikeliestChange,
+    common: SeriesBase,
+    together: LikeliestChange,
+    shared: NDArray[np.intp],
+) -> LikeliestChange:
+    """The surer of what a series did alone and what the mean of both directions did, where the series did that too.
+
+    shared: points of the series that the mean has. Who looks twice is told of chance twice as often.
+    """
+    n = np.flatnonzero(np.isfinite(together.score)) + 1
+    last, fell, middle = shared[n - 1], together.fell[n - 1], together.point[n - 1]
+    own, mean = base.size_of(fell, last + 1, shared[middle]), common.size_of(fell, n, middle)
+    shares = own * mean >= ALIKE * mean**2
+    counts = shares & ~(together.score[n - 1] <= alone.score[last])
+    merged = LikeliestChange(alone.score.copy(), alone.fell.copy(), alone.point.copy())
+    for values, part in zip(merged, (together.score[n - 1], fell, shared[middle]), strict=True):
+        values[last[counts]] = part[counts]
+    merged.score[last] = -ndtri(np.minimum(2 * ndtr(-merged.score[last]), 1.0))
+    return merged
 
 
 def _likeliest_changes(base: SeriesBase, last: NDArray[np.intp]) -> tuple[LikeliestChange, LikeliestChange]:
@@ -148,7 +192,7 @@ def _farthest(base: SeriesBase, n: NDArray[np.intp]) -> tuple[NDArray[np.intp], 
 def _likeliest(base: SeriesBase, n: NDArray[np.intp], points: NDArray[np.intp], leans: Floats) -> LikeliestChange:
     """The likelier of two changes in the first n (r,), one of each kind at a point (2, r), that explain so much."""
     t = [base.t_of(lean, n) for lean in leans]
-    scores = -ndtri(stdtr(n - 2, -np.maximum(*t)))
+    scores = -ndtri(stdtr(base.freedom(n), -np.maximum(*t)))
     fell = t[0] >= t[1]
     return LikeliestChange(scores, fell, np.where(fell, points[0], points[1]))
 
@@ -159,4 +203,5 @@ def _fall(base: SeriesBase, change: LikeliestChange, at: int, sign: int) -> Fall
     n, point = base.y.size, int(change.point[at])
     beta, error = base.fit_change(kind, n, point)
     length = n - 1 - point if kind == "slope" else 1
-    return Fall(kind, point, -sign * beta * length, error * length * float(stdtrit(n - 2, 0.975)))
+    student = float(stdtrit(base.freedom(np.array([n]))[0], 0.975))
+    return Fall(kind, point, -sign * beta * length, error * length * student)

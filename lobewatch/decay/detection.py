@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lobewatch.decay.change_point import SURE, Fall, Floats, Watch, watch_both
+from lobewatch.decay.readings import Readings
 
 CALM = 4
 """Points running, none of them sure of the fall, that close an alarm; chosen."""
@@ -55,17 +56,14 @@ class Detection:
         return not self.open_falls and self.scores.size > 0 and bool(self.scores[-1] >= SURE)
 
 
-def detect(y: Floats, temperature: Floats | None = None) -> Detection:
-    """What is to be seen of a series (n,).
-
-    temperature: of the spindle (K or degC) at each point, NaN where it was not recorded; its influence is fitted along.
-    """
-    warmth = np.full(y.size, np.nan) if temperature is None else temperature
-    scores, falls, rise = np.full(y.size, np.nan), list[DetectedFall](), None
+def detect(readings: Readings) -> Detection:
+    """What is to be seen of a series."""
+    count = readings.y.size
+    scores, falls, rise = np.full(count, np.nan), list[DetectedFall](), None
     begin = judged = 0
-    while judged < y.size:
-        down, up = watch_both(y[begin:], warmth[begin:])
-        end = y.size if up.alarm_at is None else begin + up.alarm_at + 1
+    while judged < count:
+        down, up = watch_both(readings.since(begin))
+        end = count if up.alarm_at is None else begin + up.alarm_at + 1
         scores[judged:end] = down.scores[judged - begin : end - begin]
         falls += _falls(down, begin, judged, end)
         judged = end

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr, stdtrit
 
+from lobewatch.decay.readings import Readings
 from lobewatch.decay.regressions import Regressions, pair_regressions, single_regressions, triple_regressions
+from lobewatch.decay.series_base import base_of
 from lobewatch.decay.shapes import KINDS, Shape
-from lobewatch.decay.temperature import base_of
 from lobewatch.decay.wandering import Wandering, wandering
 
 ENOUGH = 8
@@ -133,7 +134,7 @@ def forecast(dates: Floats, y: Floats, horizon: float, temperature: Floats | Non
 
     temperature: at each point (K or degC), NaN where it was not recorded. ValueError below 8 points and without a span.
     """
-    return fit_past(dates, y, temperature).ahead(horizon)
+    return fit_past(dates, Readings(y, temperature)).ahead(horizon)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,17 +173,18 @@ class PastFit:
         return Rate(float(self.weight @ rate), low, high)
 
 
-def fit_past(dates: Floats, y: Floats, temperature: Floats | None = None) -> PastFit:
-    """Fit all shapes to a series; arguments and errors as those of `forecast`."""
-    at = dates - dates[:1].sum()
+def fit_past(dates: Floats, readings: Readings) -> PastFit:
+    """Fit all shapes to a series over its dates (n,), increasing; ValueError as that of `forecast`."""
+    at, y = dates - dates[:1].sum(), readings.y
     if y.size < ENOUGH or at[-1] <= 0:
         raise ValueError(f"{y.size} points on {np.unique(at).size} dates: a forecast needs {ENOUGH}")
-    places, means = _averaged(at), _averaged(y)
-    base = base_of(means, None if temperature is None else _averaged(temperature))
+    places = _averaged(at)
+    base = base_of(_averaged_readings(readings))
     families = [fit(base, places) for fit in (single_regressions, pair_regressions, triple_regressions)]
     kept, weight = _heaviest([*families, wandering(base, places, "wander"), wandering(base, places, "bend")])
-    fitted = weight @ np.concatenate([family.at(at)[0] for family in kept]) + means[0]
-    return PastFit(kept, weight, fitted, dates, float(means[0]), _spread(families) * np.sqrt(at.size / places.size))
+    first = _averaged(y)[0]
+    fitted = weight @ np.concatenate([family.at(at)[0] for family in kept]) + first
+    return PastFit(kept, weight, fitted, dates, float(first), _spread(families) * np.sqrt(at.size / places.size))
 
 
 def _spread(families: Sequence[Regressions]) -> float:
@@ -196,6 +198,14 @@ def _spread(families: Sequence[Regressions]) -> float:
 def _averaged(values: Floats) -> Floats:
     """Means of neighbours where there are many."""
     return np.array([part.mean() for part in np.array_split(values, min(values.size, MOST))])
+
+
+def _averaged_readings(readings: Readings) -> Readings:
+    """The same of the means; who held the hammer counts where each is one point."""
+    if readings.y.size <= MOST:
+        return readings
+    temperature = None if readings.temperature is None else _averaged(readings.temperature)
+    return Readings(_averaged(readings.y), temperature)
 
 
 def _heaviest(families: Sequence[Family]) -> tuple[tuple[Family, ...], Floats]:

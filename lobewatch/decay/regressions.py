@@ -10,8 +10,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from lobewatch.decay.series_base import ColumnFits, SeriesBase
 from lobewatch.decay.shapes import Shape, courses, pair_courses, pairs_of, shapes_of, triple_courses, triples_of
-from lobewatch.decay.temperature import ColumnFits, SeriesBase
 
 STEP = 1e-6
 """Part of the span over which a rate is taken."""

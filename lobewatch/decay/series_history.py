@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from functools import cached_property
 from itertools import chain, compress
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from dsm import PreloadLeft, calibrate, preload_left
 from lobewatch.decay.change_point import Fall, newest_change
+from lobewatch.decay.readings import NOTHING_KNOWN, SeriesScatter
 from lobewatch.decay.trend import TapValue, Trend, newest_percents, trend_of
 from lobewatch.history.history import WATCHED, Row
 from lobewatch.machine import Machine
@@ -35,6 +36,10 @@ class ValueHistory:
     """Value of each row and its standard error, shape (n, 2)."""
     is_asked: NDArray[np.bool_]
     """Whether anything is asked about a row that nobody has answered, shape (n,)."""
+    beside: ValueHistory | None = None
+    """The same value in the other direction; None where nothing is known of it, or where it does not count."""
+    scatter: SeriesScatter = NOTHING_KNOWN
+    """What is known of its scatter beforehand."""
 
     @cached_property
     def known(self) -> tuple[Row, ...]:
@@ -48,18 +53,27 @@ class ValueHistory:
 
     @cached_property
     def trend(self) -> Trend | None:
-        """Trend of the sure rows as on the day of the newest; None where none has a positive value.
+        """Trend of the sure rows as on the day of the newest; None where none has a positive value."""
+        taps = self.taps
+        beside = [] if self.beside is None else self.beside.taps
+        return trend_of(taps, taps[-1].time, beside, self.scatter) if taps else None
 
-        The temperature counts for the frequency alone: of the others nothing is known beforehand.
+    @property
+    def taps(self) -> list[TapValue]:
+        """The sure rows as points of a trend.
+
+        Temperature and operator count for the frequency alone: of the others nothing is known beforehand.
         """
         rows, numbers = self._positive
         errors = np.where(np.isfinite(numbers[:, 1]), 100 * numbers[:, 1] / numbers[:, 0], math.nan).tolist()
-        measured = [row.conditions.temperature_c if self.name == "frequency" else None for row in rows]
-        temperatures = [math.nan if temperature is None else temperature for temperature in measured]
-        times = [row.time for row in rows]
-        reclamped = [row.conditions.reclamped for row in rows]
-        taps = [*map(TapValue, times, numbers[:, 0].tolist(), errors, temperatures, reclamped)]
-        return trend_of(taps, taps[-1].time) if taps else None
+        under, times = [row.conditions for row in rows], [row.time for row in rows]
+        hours = [_number(conditions.hours) for conditions in under]
+        reclamped = [conditions.reclamped for conditions in under]
+        if self.name == "frequency":
+            temperatures, operators = [_number(it.temperature_c) for it in under], [row.operator for row in rows]
+        else:
+            temperatures, operators = [math.nan] * len(rows), [""] * len(rows)
+        return [*map(TapValue, times, numbers[:, 0].tolist(), errors, temperatures, hours, operators, reclamped)]
 
     @cached_property
     def start(self) -> Estimate:
@@ -150,14 +164,28 @@ class SeriesHistory:
         return self.frequency.watched[trend.points[trend.open_fall.raised].taps[0]]
 
 
-def series_history(rows: Iterable[Row]) -> SeriesHistory:
-    """The history of a series from its rows, oldest first, one at least."""
-    rows = tuple(rows)
+def series_history(
+    rows: Iterable[Row], beside: Iterable[Row] = (), scatter: SeriesScatter = NOTHING_KNOWN
+) -> SeriesHistory:
+    """The history of a series from its rows, oldest first, one at least.
+
+    beside: rows of the same tool in the other direction; scatter: what is known of that of the frequency beforehand.
+    """
+    values = _value_histories(tuple(rows))
+    others = _value_histories(tuple(beside))
+    values["frequency"] = replace(values["frequency"], beside=others["frequency"], scatter=scatter)
+    return SeriesHistory(values["frequency"].rows, values)
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _value_histories(rows: tuple[Row, ...]) -> dict[str, ValueHistory]:
     flat = chain.from_iterable(chain.from_iterable([row.watched for row in rows]))
     numbers = np.fromiter(flat, np.float64, 2 * len(WATCHED) * len(rows)).reshape(-1, len(WATCHED), 2)
-    is_asked = np.array([bool(row.questions) for row in rows])
-    values = {name: ValueHistory(name, rows, numbers[:, k], is_asked) for k, name in enumerate(WATCHED)}
-    return SeriesHistory(rows, values)
+    is_asked = np.array([bool(row.questions) for row in rows], dtype=np.bool_)
+    return {name: ValueHistory(name, rows, numbers[:, k], is_asked) for k, name in enumerate(WATCHED)}
 
 
 def preload_of(series: SeriesHistory, machine: Machine) -> PreloadLeft | None:

@@ -17,6 +17,9 @@ from lobewatch.measuring.estimate import Estimate
 BESIDE = {"damping_ratio": "damping ratio", "stiffness": "stiffness K"}
 """Values that are watched beside the frequency, and what they are called; that of the bearings follows from it."""
 
+SETTLING = "; it fell among its first tests and has slowed since: settling (run-in)?"
+"""What is said of a fall as that of bearings that run in; it rings like any other."""
+
 
 def about_loss(name: str, newest: Row) -> Iterator[Remark]:
     """Remark on a newest test that does not show the mode followed."""
@@ -44,6 +47,7 @@ def about_trend(name: str, trend: Trend, path: Path | str = "MACHINE") -> Iterat
         fall = trend.open_fall.fall
         course = "fell at once before" if fall.kind == "step" else "has been falling since"
         text = f"frequency {course} {trend.fallen_since:%Y-%m-%d}, by {_relative(fall.size, fall.half_width)}"
+        text += SETTLING if trend.is_settling else ""
         cure = f"Have the bearings, the tool and its clamping looked at; after a repair: {event}"
         yield Remark("decay", name, text, f"{cure}. Known already: lobewatch ack {folder}")
     elif trend.detection.asks_again:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from acquisition import Remark
 from lobewatch.decay.alarm import Alarm, Raised, with_acknowledgements
+from lobewatch.decay.change_point import FIRST_JUDGED
 from lobewatch.decay.light import (
     LIGHTS,
     UNREADABLE,
@@ -27,12 +28,14 @@ from lobewatch.decay.light import (
     next_step,
     of_files,
 )
+from lobewatch.decay.readings import NOTHING_KNOWN, Scatter, SeriesScatter
 from lobewatch.decay.series_history import SeriesHistory, series_history
 from lobewatch.decay.series_remarks import about_fall, about_loss, about_others, about_trend
 from lobewatch.decay.trend import Trend
 from lobewatch.history.history import History, Row
 from lobewatch.machine import Machine
 from lobewatch.machine.journal.acknowledgement import Acknowledgement
+from lobewatch.machine.journal.known_scatter import KnownScatter
 from lobewatch.measuring.estimate import Estimate
 from lobewatch.measuring.questions import about_questions
 from lobewatch.verdicts.verdict import Word
@@ -116,10 +119,12 @@ def stand(
     path: Path | str = "MACHINE",
     files: Sequence[Remark] = (),
     acknowledgements: Sequence[Acknowledgement] = (),
+    scatter: KnownScatter | None = None,
 ) -> Standing:
     """The standing at a time; the last row holds the word on every program.
 
-    path: of the folder, for commands; files: what is wrong with those in it; acknowledgements: oldest first.
+    path: of the folder, for commands; files: what is wrong with those in it; acknowledgements: oldest first; scatter:
+    what other machines told of it.
     """
     rows = history.current
     if not rows and files:
@@ -129,7 +134,7 @@ def stand(
         since = "yet" if history.baseline is None else f"since the new baseline of {history.baseline:%Y-%m-%d}"
         return _standing(now, [Remark("never-tapped", "", f"no tap test {since}", cure)])
     pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
-    series = [_stand_of(series_history(history.series(*pair)), machine, now, path) for pair in pairs]
+    series = [_stand_of(_series_of(history, *pair, scatter), machine, now, path) for pair in pairs]
     newest, interval = rows[-1], machine.machine.tap_interval_days
     remarks = [remark for standing in series for remark in standing.remarks]
     raised = [alarm for standing in series for alarm in standing.raised]
@@ -162,6 +167,13 @@ def _standing(
     ordered = in_order(remarks)
     said = with_acknowledgements(ordered, alarms, now)
     return Standing(now, ordered, next_step(ordered, well), said, in_order(alarms), tuple(series), last_tap, left)
+
+
+def _series_of(history: History, tool: str, direction: str, scatter: KnownScatter | None) -> SeriesHistory:
+    rows, beside = (history.series(tool, one) for one in (direction, "y" if direction == "x" else "x"))
+    is_young = scatter is not None and sum(row.time <= scatter.time for row in rows) < FIRST_JUDGED
+    known = SeriesScatter(Scatter(*scatter.alone), Scatter(*scatter.common)) if scatter and is_young else NOTHING_KNOWN
+    return series_history(rows, beside, known)
 
 
 def _stand_of(series: SeriesHistory, machine: Machine, now: datetime, path: Path | str) -> SeriesStanding:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from bisect import bisect
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import cached_property
@@ -12,10 +13,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.decay.day_points import PercentSeries, Span, divide_into_points
+from lobewatch.decay.day_points import DAY, PercentSeries, Span, divide_into_points
 from lobewatch.decay.detection import DetectedFall, Detection, detect
 from lobewatch.decay.forecast import ENOUGH, Forecast, PastFit, Rate, fit_past
 from lobewatch.decay.reach import NOBODY_KNOWS, Reach
+from lobewatch.decay.readings import NOTHING_KNOWN, Readings, SeriesScatter
+from lobewatch.decay.shapes import Shape
+from lobewatch.decay.use import days_of_use
 
 MOST = 1000
 """Number of newest points that alone are judged; chosen, as the work grows with its square."""
@@ -23,6 +27,8 @@ MONTH = 30.44
 """Mean length of a month (days)."""
 HORIZON_DAYS = 36 * MONTH
 """Time after the last point (days) beyond which nothing is foretold; chosen."""
+SETTLED = 0.4
+"""Rate of a fall over its mean rate so far below which it has slowed down; chosen."""
 STARTERS = 3
 """Points that the start of a series is looked for in while it has no fitted line; chosen."""
 
@@ -40,6 +46,10 @@ class TapValue(NamedTuple):
     """Standard error of the value (%)."""
     temperature: float = math.nan
     """Temperature of the spindle (degC)."""
+    hours: float = math.nan
+    """Running hours of the spindle (h)."""
+    operator: str = ""
+    """Who held the hammer."""
     reclamped: bool = False
     """Whether the tool was clamped anew for it."""
 
@@ -55,6 +65,10 @@ class DayPoint(NamedTuple):
     """Standard error by the tap tests alone (%)."""
     temperature: float
     """Mean of the temperatures recorded (degC)."""
+    hours: float
+    """Running hours of the spindle at the first of them (h)."""
+    operator: str
+    """Who held the hammer for the first of them."""
     taps: tuple[int, ...]
     """Numbers of the tap tests in the series."""
 
@@ -67,8 +81,11 @@ class Trend:
     """Points, oldest first; one at least."""
     first: float
     """Value that the percents are of: that of the first tap test."""
+    readings: Readings
+    """Percents of the points, and what is known of them."""
     past: PastFit | None
-    """Shapes that it allows, over days since 1970; None below 8 points."""
+    """Shapes that it allows, over days of use, those behind the last point being days since 1970; None below 8
+    points."""
     today: int
     """Day since 1970 that it is judged on."""
 
@@ -79,12 +96,20 @@ class Trend:
     @cached_property
     def detection(self) -> Detection:
         """What the watch over its points has seen."""
-        return detect(*_values_of(self.points))
+        return detect(self.readings)
 
     @cached_property
     def forecast(self) -> Forecast | None:
         """Forecast over days since 1970; None below 8 points."""
         return None if self.past is None else self.past.ahead(float(self.past.dates[-1]) + HORIZON_DAYS)
+
+    @cached_property
+    def course(self) -> Shape | None:
+        """The shape that fits it best, its start in days since 1970; None below 8 points."""
+        if self.past is None or self.forecast is None:
+            return None
+        shape = self.forecast.likeliest
+        return shape._replace(start=float(np.interp(shape.start, self.past.dates, days_of(self.points))))
 
     @property
     def start(self) -> float:
@@ -132,34 +157,49 @@ class Trend:
         return next(reversed(self.detection.open_falls), None)
 
     @property
+    def is_settling(self) -> bool:
+        """Whether the open fall began among the first points and has slowed down since, as new bearings run in."""
+        if self.past is None or self.open_fall is None or self.open_fall.fall.point >= ENOUGH:
+            return False
+        fallen = self.start - float(self.past.fitted[-1])
+        mean = fallen / float(self.past.dates[-1] - self.past.dates[0])
+        return -self.past.rate.value < SETTLED * mean
+
+    @property
     def fallen_since(self) -> datetime | None:
         """Time at which the fall began or happened that the alarm is about; None without alarm."""
         return None if self.open_fall is None else self.points[self.open_fall.fall.point].time
 
 
-def trend_of(series: Sequence[TapValue], now: datetime) -> Trend:
+def trend_of(
+    series: Sequence[TapValue],
+    now: datetime,
+    other: Sequence[TapValue] = (),
+    known: SeriesScatter = NOTHING_KNOWN,
+) -> Trend:
     """Judge a series, oldest first, one value at least.
 
-    now: its day tells whether that is too long ago to foretell anything.
+    now: its day tells whether that is too long ago to foretell anything; other: of the other direction, likewise;
+    known: what is known of its scatter beforehand.
     """
     points = _newest_points(series)
-    return Trend(points, series[0].value, _past(points), int(day(now)))
+    readings = _readings(points, _newest_points(other) if other else (), known)
+    return Trend(points, series[0].value, readings, _past(points, readings), int(day(now)))
 
 
 def _newest_points(series: Sequence[TapValue]) -> tuple[DayPoint, ...]:
     """The newest points of a series, oldest first."""
-    times, values, errors, temperatures, reclamped = zip(*series, strict=True)
+    times, values, _, temperatures, _, _, reclamped = zip(*series, strict=True)
     percents = PercentSeries(times, _percents(values), temperatures, reclamped)
-    return tuple(_point(percents, errors, span) for span in [*divide_into_points(percents)][-MOST:])
+    return tuple(_point(percents, series, span) for span in [*divide_into_points(percents)][-MOST:])
 
 
-def _point(series: PercentSeries, errors: Sequence[float], span: Span) -> DayPoint:
+def _point(percents: PercentSeries, series: Sequence[TapValue], span: Span) -> DayPoint:
     first, end = span
-    time = series.times[first]
-    if end - first == 1:
-        return DayPoint(time, series.percents[first], errors[first], series.temperatures[first], (first,))
-    error = math.sqrt(sum(error**2 for error in errors[first:end])) / (end - first)
-    return DayPoint(time, series.percent(span), error, series.temperature(span), tuple(range(first, end)))
+    error = math.sqrt(sum(tap.error**2 for tap in series[first:end])) / (end - first)
+    changed, warm = percents.percent(span), percents.temperature(span)
+    begun = series[first]
+    return DayPoint(begun.time, changed, error, warm, begun.hours, begun.operator, tuple(range(first, end)))
 
 
 def newest_percents(
@@ -177,16 +217,25 @@ def _percents(values: Sequence[float]) -> tuple[float, ...]:
     return tuple([100 * log(value / first) for value in values])
 
 
-def _past(points: Sequence[DayPoint]) -> PastFit | None:
+def _past(points: Sequence[DayPoint], readings: Readings) -> PastFit | None:
     if len(points) < ENOUGH:
         return None
-    return fit_past(days_of(points), *_values_of(points))
+    return fit_past(days_of_use(days_of(points), np.array([point.hours for point in points])), readings)
 
 
-def _values_of(points: Sequence[DayPoint]) -> tuple[Floats, Floats]:
-    """Percents and temperatures of points, shape (n,) each."""
+def _readings(points: Sequence[DayPoint], others: Sequence[DayPoint], known: SeriesScatter) -> Readings:
     percents, temperatures = ([getattr(point, name) for point in points] for name in ("percent", "temperature"))
-    return np.array(percents), np.array(temperatures)
+    operators, other = tuple(point.operator for point in points), np.array([*_beside(points, others)])
+    return Readings(np.array(percents), np.array(temperatures), operators, other, known)
+
+
+def _beside(points: Sequence[DayPoint], others: Sequence[DayPoint]) -> Iterator[float]:
+    """Percent of the other direction nearest in time to each point, NaN where there is none within a day."""
+    times = [other.time for other in others]
+    for point in points:
+        at = bisect(times, point.time)
+        near = min(others[max(at - 1, 0) : at + 1], key=lambda other: abs(other.time - point.time), default=None)
+        yield near.percent if near is not None and abs(near.time - point.time) < DAY else math.nan
 
 
 def days_of(points: Sequence[DayPoint]) -> Floats:

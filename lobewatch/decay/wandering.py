@@ -12,8 +12,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from lobewatch.decay.series_base import LEAST, SeriesBase
 from lobewatch.decay.shapes import Kind, Shape
-from lobewatch.decay.temperature import LEAST, SeriesBase
 
 LEVELS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Variances that the level gathers over the span, in that of a point; chosen."""

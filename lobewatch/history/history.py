@@ -77,6 +77,8 @@ class Row:
     """The first tap test of those that it is compared with: of one tool with one stick-out in one state."""
     conditions: Conditions = UNSAID
     """Conditions that it was taken under."""
+    operator: str = ""
+    """Who held the hammer; empty where nobody said so."""
     software: str = ""
     """Name and version of the program that made the row."""
 
@@ -175,6 +177,7 @@ def row_of(m: Measurement, assembly: Assembly, place: Place) -> Row:
         baseline=place.baseline,
         series=place.series,
         conditions=place.entry.conditions,
+        operator=place.entry.operator,
         frequency=frequency,
         damping_ratio=damping_ratio,
         stiffness=stiffness,

@@ -18,9 +18,9 @@ from lobewatch.tool.assembly import speed_grid, tip_lobes
 from lobewatch.verdicts.verdict import Ruling
 from modal import Mode
 
-TEXTS = ("tap_id", "tool", "direction", "series")
+TEXTS = ("tap_id", "tool", "direction", "series", "operator")
 MODE_COLUMNS = {"mode_frequency": "Hz", "mode_damping_ratio": "", "mode_stiffness": "N/m", "mode_phase_deg": "deg"}
-CONDITIONS = {"temperature_c": "degC", "stick_out_mm": "mm", "drawbar_kn": "kN"}
+CONDITIONS = {"temperature_c": "degC", "stick_out_mm": "mm", "drawbar_kn": "kN", "hours": "h"}
 """Numbers among the conditions, with their units; NaN where nobody said."""
 CONDITION_TEXTS = ("state", "note")
 

@@ -38,6 +38,7 @@ class RowRecord(msgspec.Struct, array_like=True, gc=False):
     remarks: tuple[Remark, ...]
     rulings: dict[str, tuple[str, Ruling]]
     software: str = ""
+    operator: str = ""
 
 
 CONVERTED = ("number", "time", "baseline", "conditions", "rulings", "software")
@@ -89,6 +90,7 @@ def decode_row(content: bytes, hashes: Mapping[str, str], software: str = "") ->
         baseline=datetime.fromisoformat(record.baseline) if record.baseline else None,
         series=record.series,
         conditions=Conditions.of(record.conditions) if record.conditions else UNSAID,
+        operator=record.operator,
         software=record.software or software,
     )
     return record.number, row

@@ -12,6 +12,7 @@ from lobewatch.machine.journal.acknowledgement import Acknowledgement
 from lobewatch.machine.journal.event import MaintenanceEvent
 from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.machine.journal.journal import command
+from lobewatch.machine.journal.known_scatter import KnownScatter
 from lobewatch.tool.order import Order, Place
 
 BEFORE_ALL = datetime.min.replace(tzinfo=UTC)
@@ -87,6 +88,12 @@ class UsableTaps:
     def acknowledgements(self) -> Sequence[Acknowledgement]:
         """What a person has acknowledged, oldest first."""
         return self._all.acknowledgements
+
+    @property
+    def known_scatter(self) -> KnownScatter | None:
+        """What the other machines told first since the baseline of its scatter; None where they have told nothing."""
+        since = (told for told in self._all.scatters if self.baseline is None or told.time >= self.baseline)
+        return next(since, None)
 
     @property
     def excluded(self) -> Sequence[TapEntry]:

@@ -171,4 +171,5 @@ class Analysis:
     def standing(self, now: datetime | None = None) -> Standing:
         """The light of the machine, the reasons, and one next step."""
         now, files = now or datetime.now(UTC), self.files
-        return stand(self.machine, self.history, now, self.folder.path, files.remarks, files.acknowledgements)
+        words = files.acknowledgements, files.known_scatter
+        return stand(self.machine, self.history, now, self.folder.path, files.remarks, *words)

@@ -18,6 +18,7 @@ from lobewatch.machine.journal.event import MaintenanceEvent, events_of
 from lobewatch.machine.journal.exclusion import exclusion_reasons
 from lobewatch.machine.journal.heard_cut import HeardCut, RecordingFile, cuts_of
 from lobewatch.machine.journal.journal import JOURNAL, Reading, command, journal_damage
+from lobewatch.machine.journal.known_scatter import KnownScatter, known_scatters_of
 from lobewatch.machine.journal.tap_entry import TapEntry, tap_entries
 
 PROVED_BYTES, PROVED_FILES = 10_000_000, 50
@@ -45,6 +46,8 @@ class FolderContents:
     """Test cuts, oldest first, those that a person has taken out too."""
     acknowledgements: tuple[Acknowledgement, ...] = ()
     """What a person has acknowledged, oldest first."""
+    scatters: tuple[KnownScatter, ...] = ()
+    """What the other machines told of its scatter, oldest first."""
 
     def with_one_more(self, entry: TapEntry) -> FolderContents:
         """Contents with a tap test that was just committed, and nothing else since."""
@@ -87,10 +90,8 @@ def contents_of(folder: Path, reading: Reading) -> FolderContents:
             text = f"{len(extra) - NAMED} more files that are not in the journal, they do not count"
             remarks.append(Remark("tap-unlisted", "taps", text, cure))
     cuts = committed_cuts(reading)
-    acknowledgements = acknowledgements_of(reading.others)
-    return FolderContents(
-        tuple(taps), _oldest_first(lost), tuple(remarks), events, len(reading.lines), cuts, acknowledgements
-    )
+    words = acknowledgements_of(reading.others), known_scatters_of(reading.others)
+    return FolderContents(tuple(taps), _oldest_first(lost), tuple(remarks), events, len(reading.lines), cuts, *words)
 
 
 def committed_cuts(reading: Reading) -> tuple[HeardCut, ...]:

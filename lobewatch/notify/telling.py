@@ -22,6 +22,7 @@ from lobewatch.notify.told import (
     told_of_plant,
 )
 from lobewatch.notify.unsent import UNSENT, deliver
+from lobewatch.plant.learn_scatter import learn_scatter
 from lobewatch.plant.plant import MachineStanding
 from lobewatch.plant.summarise import summarise
 from lobewatch.plant.summary import Summary, unreadable_summary
@@ -32,9 +33,11 @@ GONE = "its folder is gone; `lobewatch status {plant} --notify --forget {key}` t
 
 
 def tell(logbook: Logbook) -> None:
-    """Make the standing, keep it, send it; nothing is raised, for what was to be stored is stored already."""
+    """Make the standing with what other machines tell of this one, keep it, send it; nothing is raised, for what was to
+    be stored is stored already."""
     now, path, machines = datetime.now(UTC), logbook.folder.path, dict[Path, Machine]()
     try:
+        learn_scatter(logbook if logbook.is_current else Logbook.open(path))
         current = logbook if logbook.is_current else Logbook.open(path)
         summary = summarise(current, now)
         machines[path] = current.machine

@@ -16,7 +16,7 @@ from lobewatch.machine.folder_path import mark_of
 from lobewatch.plant.summary import Summary
 
 STANDING = "standing.json"
-MAKE = 2
+MAKE = 3
 """Number of this form of the file; a file of another is made anew."""
 LASTING = timedelta(days=7)
 """Time that a summary and its forecast count; chosen."""
@@ -33,8 +33,8 @@ class _StandingFile(msgspec.Struct, frozen=True):
     """Version of the program that made it."""
     mark: tuple[int, ...]
     """Mark of the files that it was made of."""
-    made: str
-    """Time of its making (ISO 8601)."""
+    made: datetime
+    """Time of its making."""
     summary: Summary
     """Summary of the machine."""
 
@@ -45,21 +45,30 @@ _encode, _decode = msgspec.json.Encoder().encode, msgspec.json.Decoder(_Standing
 def read_standing(folder: Path, now: datetime) -> Summary | None:
     """The summary beside a machine, where it fits its files; None for none, torn, altered, old, of another version,
     or of another folder."""
-    try:
-        content = read_regular(folder / STANDING, SMALL)
-        body = b"{" + content[HEAD:]
-        if content[:HEAD] != _head(body):
-            return None
-        file = _decode(body)
-        age = now - datetime.fromisoformat(file.made)
-    except (OSError, ValueError, TypeError):
+    file = _read(folder)
+    if file is None or (file.software, file.mark) != (software(), mark_of(folder, file.summary.newest_file)):
         return None
-    if (file.make, file.software, file.mark) != (MAKE, software(), mark_of(folder, file.summary.newest_file)):
-        return None
+    age = now - file.made
     named = file.summary.path
     if not timedelta(0) <= age < LASTING or (named != str(folder) and file.summary.speaks_of(named)):
         return None
     return file.summary
+
+
+def read_kept(folder: Path) -> Summary | None:
+    """The summary beside a machine as it was kept last, whatever has become of its files; None for none and torn."""
+    file = _read(folder)
+    return None if file is None else file.summary
+
+
+def _read(folder: Path) -> _StandingFile | None:
+    try:
+        content = read_regular(folder / STANDING, SMALL)
+        body = b"{" + content[HEAD:]
+        file = _decode(body) if content[:HEAD] == _head(body) else None
+        return file if file is not None and file.make == MAKE else None
+    except (OSError, ValueError, TypeError):
+        return None
 
 
 def write_standing(folder: Path, summary: Summary, mark: tuple[int, ...], now: datetime) -> None:
@@ -67,7 +76,7 @@ def write_standing(folder: Path, summary: Summary, mark: tuple[int, ...], now: d
 
     mark: of the files it was made of. OSError where it cannot be written.
     """
-    body = _encode(_StandingFile(MAKE, software(), mark, now.isoformat(), summary))
+    body = _encode(_StandingFile(MAKE, software(), mark, now, summary))
     atomic_write(folder / STANDING, _head(body) + body[1:], lasting=False)
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lobewatch.decay.known_scatter import scatter_of
 from lobewatch.decay.light import all_well
 from lobewatch.decay.standing import SeriesStanding
 from lobewatch.decay.trend import Trend, days_of
@@ -87,6 +88,8 @@ def _series_summary(series: SeriesStanding) -> SeriesSummary:
         fall_std=fall.std if fall.is_known and math.isfinite(fall.std) else None,
         frequency=None if trend is None else trend.first * math.exp(trend.points[-1].percent / 100),
         alarm=trend.open_fall.fall.kind if trend is not None and trend.open_fall is not None else "",
+        scatter=(0.0, 0.0) if trend is None else scatter_of(trend.readings.y),
+        common_scatter=(0.0, 0.0) if trend is None else scatter_of(trend.readings.common.y),
         points=() if trend is None else tuple(_thin_out(trend)),
     )
 

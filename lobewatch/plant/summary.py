@@ -44,6 +44,10 @@ class SeriesSummary(msgspec.Struct, frozen=True):
     """Natural frequency of the newest point (Hz); None where no test can be compared with."""
     alarm: str = ""
     """"step" or "slope" where the watch over the series is on alarm."""
+    scatter: tuple[float, float] = (0.0, 0.0)
+    """Scatter of its points (%), and the degrees of freedom that it is known with; 0: not known."""
+    common_scatter: tuple[float, float] = (0.0, 0.0)
+    """The same of the mean of both directions, where the other one was tapped in the same clampings."""
     points: tuple[tuple[float, float], ...] = ()
     """Day since 1970 and change from the start (%), thinned out."""
 

@@ -31,13 +31,14 @@ class MountedTools:
         self._mountings: dict[str, list[MountedTool]] = {}
         """By tool, the current one last."""
         self._drawbar: dict[str, float] = {}
+        self._hours: float | None = None
 
     def place(self, tap: TapEntry) -> tuple[str, tuple[Remark, ...]]:
         """Identity of the first test of the series of a test, and what is to be said of it."""
         mountings = self._mountings.setdefault(tap.tool, [])
         if mountings and tap.conditions is UNSAID:
             return mountings[-1].first.id, ()
-        remarks = [*self._about_drawbar(tap)]
+        remarks = [*self._about_drawbar(tap), *self._about_hours(tap)]
         current = mountings[-1] if mountings else None
         conditions = tap.conditions.over(current.conditions) if current else tap.conditions
         fitting = next(
@@ -60,6 +61,15 @@ class MountedTools:
         if before not in (None, now):
             text = f"drawbar force {now:g} kN, {before:g} kN before: f_n may have changed with it"
             yield Remark("drawbar-changed", tap.tool, text, "where it was not meant, have the drawbar looked at")
+
+    def _about_hours(self, tap: TapEntry) -> Iterator[Remark]:
+        now, before = tap.conditions.hours, self._hours
+        if now is None:
+            return
+        self._hours = now
+        if before is not None and now < before:
+            text = f"running hours {now:g} h, {before:g} h before: forecasts of a series that it is in count in days"
+            yield Remark("hours-went-back", tap.tool, text, "exclude it and replay its file with the right --hours")
 
 
 def _is_like(first: Conditions, second: Conditions) -> bool:

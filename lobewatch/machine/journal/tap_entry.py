@@ -47,6 +47,8 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     """Conditions that it was taken under; unknown in lines of older versions."""
     asked: tuple[str, ...] = ()
     """Questions about its time when it was committed, by code; lines of older versions have none."""
+    operator: str = ""
+    """Who held the hammer; empty where nobody said so, and in lines of older versions."""
     accepted: tuple[str, ...] = ()
     """Questions about it that a person has accepted, by code; lines of their own."""
     excluded: str = ""
@@ -59,7 +61,7 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
         source = tap.source.sha256 if tap.source else ""
         digest = hashlib.sha256(content).hexdigest()
         labels = about.created.isoformat(), about.tool, about.direction
-        return cls(tap.id, digest, len(content), *labels, source, about.conditions)
+        return cls(tap.id, digest, len(content), *labels, source, about.conditions, operator=about.operator)
 
     @classmethod
     def from_line(cls, line: dict[str, Any], accepted: tuple[str, ...] = (), excluded: str = "") -> Self:
@@ -91,6 +93,7 @@ class _Line(msgspec.Struct, gc=False):
     source_sha256: str
     conditions: dict[str, Any] = {}
     asked: tuple[str, ...] = ()
+    operator: str = ""
 
 
 _decode = msgspec.json.Decoder(list[_Line]).decode
@@ -107,4 +110,4 @@ def tap_entries(
         conditions = msgspec.convert(line.conditions, Conditions) if line.conditions else UNSAID
         file, labels = (line.id, line.sha256, line.size), (line.time, line.tool, line.direction)
         later = accepted.get(line.id, ()), excluded.get(line.id, "")
-        yield TapEntry(*file, *labels, line.source_sha256, conditions, line.asked, *later)
+        yield TapEntry(*file, *labels, line.source_sha256, conditions, line.asked, line.operator, *later)

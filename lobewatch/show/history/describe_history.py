@@ -28,6 +28,7 @@ CONDITION_WORDS = {
     "temperature_c": "{:g} °C",
     "stick_out_mm": "stick-out {:g} mm",
     "drawbar_kn": "drawbar {:g} kN",
+    "hours": "{:g} h",
     "state": "state {}",
     "reclamped": "clamped anew",
     "note": "note: {}",

@@ -87,7 +87,9 @@ def sentence(series: SeriesStanding) -> str:
     n = len(trend.points)
     text = f"{series.name}: {short_text(series)} after {n} point{'s' if n > 1 else ''}"
     if trend.forecast is None:
-        return f"{text}; from 8 points on there is a forecast, from 9 on an alarm"
+        known = trend.readings.known.alone
+        then = f"5 on an alarm (scatter of other series: {known.percent:.2f} %)" if known.freedom else "9 on an alarm"
+        return f"{text}; from 8 points on there is a forecast, from {then}"
     return f"{text}; {course_text(trend)}; scatter {trend.spread:.2f} %, score {_score(trend)}; {rate_text(trend)}"
 
 
@@ -112,10 +114,11 @@ def course_text(trend: Trend) -> str:
     """Its course: since when it falls where that rings, else the shape that fits it best; empty below 8 points."""
     fallen, since = trend.open_fall, trend.fallen_since
     if fallen is not None and since is not None:
-        return f"{'fell at once before' if fallen.fall.kind == 'step' else 'falling since'} {since:%Y-%m-%d}"
-    if trend.forecast is None:
+        course = f"{'fell at once before' if fallen.fall.kind == 'step' else 'falling since'} {since:%Y-%m-%d}"
+        return f"{course}, settling" if trend.is_settling else course
+    if trend.course is None or trend.forecast is None:
         return ""
-    return _shape(trend.forecast.likeliest, falls=trend.forecast.fitted[-1] < trend.start)
+    return _shape(trend.course, falls=trend.forecast.fitted[-1] < trend.start)
 
 
 def _shape(shape: Shape, falls: bool) -> str:

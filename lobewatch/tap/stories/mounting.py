@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dsm import Spindle, calibrate, natural_frequencies
-from lobewatch.decay.temperature import STEEL
+from lobewatch.decay.series_base import STEEL
 from lobewatch.machine import MachineFolder
 from lobewatch.tap.stories.story import Story, Wear
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as students
 
 from lobewatch.decay.forecast import DateRange, fit_past, forecast
+from lobewatch.decay.readings import Readings
 
 Floats = NDArray[np.float64]
 
@@ -66,7 +67,7 @@ def test_the_rate_of_a_straight_line_is_its_slope_with_the_textbook_interval() -
     y = -0.5 * dates + np.random.default_rng(5).normal(0, 0.2, 60)
     (slope, _), rest, *_ = np.polyfit(dates, y, 1, full=True)
     reach = students.ppf(0.975, 58) * np.sqrt(rest[0] / 58 / np.sum((dates - dates.mean()) ** 2))
-    found = fit_past(dates, y).rate
+    found = fit_past(dates, Readings(y)).rate
     assert found.value == pytest.approx(slope, abs=2 * reach)  # hinges and curves have some of the weight
     assert found.low < slope - 0.9 * reach < slope + 0.9 * reach < found.high
     assert found.high - found.low < 20 * reach  # a rate that wanders has some, too
@@ -75,14 +76,14 @@ def test_the_rate_of_a_straight_line_is_its_slope_with_the_textbook_interval() -
 def test_what_is_steady_or_fell_once_has_no_rate() -> None:
     scatter = np.tile([0.05, -0.05], 15)
     for y in (scatter, scatter - np.repeat([0.0, 2.0], 15)):
-        found = fit_past(np.arange(30.0), y).rate
+        found = fit_past(np.arange(30.0), Readings(y)).rate
         assert found.low <= 1e-12
         assert found.high >= -1e-12
         assert abs(found.value) < 0.005
 
 
 def test_the_rate_is_that_of_the_last_points() -> None:
-    found = fit_past(MONTHS, FALLING).rate
+    found = fit_past(MONTHS, Readings(FALLING)).rate
     assert found.low < -0.17 < found.high < -0.1
     assert found.value == pytest.approx(np.polyfit(MONTHS[10:], FALLING[10:], 1)[0], rel=0.1)
 

@@ -79,7 +79,7 @@ def test_it_says_at_any_time_what_the_standing_says(tapped: Shop) -> None:
 @pytest.mark.parametrize(
     ("name", "old", "new"),
     [
-        ("standing.json", '"make":2', '"make":3'),
+        ("standing.json", '"make":3', '"make":2'),
         ("standing.json", '"fall":6', '"fall":0'),
         ("machine.toml", "steps = 200", "steps = 300"),
     ],

@@ -1,4 +1,4 @@
-"""The base of every fit of a series: its level, and the influence of the temperature where that is known."""
+"""The base of every fit of a series: its level, the influence of the temperature where that is known, the operators."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from lobewatch.decay.lone_points import drawn_in
+from lobewatch.decay.readings import UNKNOWN_SCATTER, Readings, Scatter
+
 ENOUGH = 12
 """Number of points with a temperature from which on its influence is fitted; chosen."""
 SPAN = 5.0
@@ -18,6 +21,8 @@ STEEL = -0.015
 
 TINY = 1e-12
 """Least variance of a point (%^2): below it is rounding."""
+OPERATORS = 1.0
+"""How far apart the clampings of operators may lie, in scatters from one point to the next; chosen."""
 LEAST_SQUARE = 1e-12
 """Share of the largest below which a direction of some columns is none: they are alike."""
 LEAST = 1e-20
@@ -32,14 +37,22 @@ class SeriesBase:
 
     y: Floats
     """Values without the expected influence of the temperature, from the first point on, shape (n,)."""
+    newest: Floats
+    """What each of them is while it is the last, shape (n,)."""
     columns: Floats
-    """Columns: 1, and the temperature where it counts, shape (n, p)."""
+    """Columns: 1, the temperature where it counts, and one for each operator, shape (n, p)."""
+    warm: int = 0
+    """Number of columns of the temperature."""
+    scatter: Scatter = UNKNOWN_SCATTER
+    """What is known of the scatter from point to point beforehand."""
 
     def precision(self, n: NDArray[np.intp]) -> Floats:
         """Precision of the coefficients as known beforehand, times the variance of n (r,) points, shape (r, p, p)."""
         p = self.columns.shape[1]
         precision = np.zeros((n.size, p, p))
-        if p > 1:
+        for i in range(1 + self.warm, p):
+            precision[:, i, i] = OPERATORS**-2
+        if self.warm:
             squares = np.concatenate([[0.0, 0.0], np.cumsum(np.diff(self.y) ** 2)])
             precision[:, 1, 1] = np.maximum(squares[n] / (2 * (n - 1)), TINY) / STEEL**2
         return precision
@@ -65,7 +78,16 @@ class SeriesBase:
         """Student's t of changes that explain so much in the first n, shape (r,) each."""
         total = self._total[n]
         left = np.maximum(total - lean**2, LEAST * total + np.finfo(float).tiny)
-        return np.asarray(lean / np.sqrt(left / (n - 2)))
+        return np.asarray(lean / np.sqrt((left + self._known) / self.freedom(n)))
+
+    def freedom(self, n: NDArray[np.intp]) -> Floats:
+        """Degrees of freedom of a change in the first n, shape (r,) each."""
+        return np.asarray(n - 2 + self.scatter.freedom, dtype=np.float64)
+
+    @property
+    def _known(self) -> float:
+        """Sum of squares that is known beforehand."""
+        return self.scatter.freedom * self.scatter.percent**2
 
     def fit_change(self, kind: str, n: int, k: int) -> tuple[float, float]:
         """Size and standard error of a "step" or "slope" (a point) from a point k on in the first n."""
@@ -75,7 +97,16 @@ class SeriesBase:
         )
         size, total = product / square, float(self._total[n])
         left = max(total - size * product, LEAST * total + np.finfo(float).tiny)
-        return size, float(np.sqrt(left / (n - 2) / square))
+        return size, float(np.sqrt((left + self._known) / float(self.freedom(until)[0]) / square))
+
+    def size_of(self, fell: NDArray[np.bool_], n: NDArray[np.intp], k: NDArray[np.intp]) -> Floats:
+        """Sizes of changes from points k (r,) on in the first n (r,), shape (r,): steps, or slopes a point."""
+        sizes = np.empty(n.size)
+        for kind, rows in (("step", np.flatnonzero(fell)), ("slope", np.flatnonzero(~fell))):
+            if rows.size:
+                product, square = self._change(kind, n[rows, np.newaxis], k[rows, np.newaxis])
+                sizes[rows] = (product / square)[:, 0]
+        return sizes
 
     def _change(self, kind: str, n: NDArray[np.intp], k: NDArray[np.intp]) -> tuple[Floats, Floats]:
         """Products of the column of a change with the series and with itself, what the base leaves of both."""
@@ -93,10 +124,19 @@ class SeriesBase:
         """Product of the column of a change with the series (0) or one of the columns (from 1 on)."""
         sums, moments = self._sums[i], self._moments[i]
         tail: Floats = sums[n] - sums[k]
+        if i == 0:
+            tail += self._late[n]
         if kind == "slope":
             tail *= k
             np.subtract(moments[n] - moments[k], tail, out=tail)
+            if i == 0:
+                tail += self._late[n] * (n - 1)
         return tail
+
+    @cached_property
+    def _late(self) -> Floats:
+        """What the last point is above what it will be, by the number of the first points, shape (n + 1,)."""
+        return np.concatenate([[0.0], self.newest - self.y])
 
     @cached_property
     def _levels(self) -> tuple[Floats, Floats]:
@@ -128,7 +168,11 @@ class SeriesBase:
 
     @cached_property
     def _outer(self) -> Floats:
-        return _summed(np.einsum("ni,nj->nij", self._values, self._values))
+        newest = np.column_stack([self.newest, self.columns])
+        past, last = (np.einsum("ni,nj->nij", values, values) for values in (self._values, newest))
+        sums = _summed(past)
+        sums[1:] += last - past
+        return sums
 
     @cached_property
     def gram(self) -> Floats:
@@ -216,12 +260,15 @@ def may_count(temperature: Floats) -> bool:
     return recorded.size >= ENOUGH and bool(np.ptp(recorded) >= SPAN)
 
 
-def base_of(y: Floats, temperature: Floats | None = None) -> SeriesBase:
-    """The base of a series (n,), the temperature in it only where enough of it is known over a wide enough span."""
-    columns = np.ones((y.size, 1))
-    start = y[:1].sum()
-    recorded = np.isfinite(temperature) if temperature is not None else np.zeros(y.size, dtype=bool)
-    if temperature is None or recorded.sum() < ENOUGH or np.ptp(temperature[recorded]) < SPAN:
-        return SeriesBase(y - start, columns)
-    warmer = np.where(recorded, temperature - temperature[recorded].mean(), 0.0)
-    return SeriesBase(y - start - STEEL * warmer, np.column_stack([columns, warmer]))
+def base_of(readings: Readings) -> SeriesBase:
+    """The base of a series, the temperature in it only where enough of it is known over a wide enough span."""
+    rest, columns = readings.y - readings.y[:1].sum(), [np.ones(readings.y.size)]
+    temperature = np.full(rest.size, np.nan) if readings.temperature is None else readings.temperature
+    is_warm = may_count(temperature)
+    if is_warm:
+        warmer = temperature - temperature[np.isfinite(temperature)].mean()
+        columns.append(np.where(np.isfinite(warmer), warmer, 0.0))
+        rest -= STEEL * columns[-1]
+    names = dict.fromkeys(filter(None, readings.operators))
+    columns += [np.array([held == name for held in readings.operators], dtype=np.float64) for name in names]
+    return SeriesBase(drawn_in(rest), rest, np.column_stack(columns), int(is_warm), readings.known.alone)

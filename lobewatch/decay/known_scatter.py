@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from scipy.special import digamma, polygamma
 
 from lobewatch.decay.lone_points import MAD
-from lobewatch.decay.readings import UNKNOWN_SCATTER, Scatter
+from lobewatch.decay.readings import UNKNOWN_SCATTER, KnownSpread
 
 ENOUGH = 8
 """Points of a series from which on its scatter tells anything; chosen."""
@@ -27,14 +27,14 @@ ALMOST_ALIKE = float(polygamma(1, MOST / 2))
 Floats = NDArray[np.float64]
 
 
-def scatter_of(y: Floats) -> Scatter:
+def scatter_of(y: Floats) -> KnownSpread:
     """Scatter from point to point of a series (n,), by the median of its steps: what it fell counts little."""
     if y.size < ENOUGH:
         return UNKNOWN_SCATTER
-    return Scatter(MAD * float(np.median(np.abs(np.diff(y)))) / 2**0.5, WORTH * (y.size - 1))
+    return KnownSpread(MAD * float(np.median(np.abs(np.diff(y)))) / 2**0.5, WORTH * (y.size - 1))
 
 
-def scatter_of_others(series: Sequence[Scatter]) -> Scatter:
+def scatter_of_others(series: Sequence[KnownSpread]) -> KnownSpread:
     """What the scatters of some series, each known with its own degrees of freedom, say of another one.
 
     Empirical Bayes: variances scattered as scaled inverse chi squares; its two parameters by the moments of their
@@ -51,4 +51,4 @@ def scatter_of_others(series: Sequence[Scatter]) -> Scatter:
     if spread > ALMOST_ALIKE:
         freedom = 2 * brentq(lambda x: polygamma(1, x) - spread, 1e-3, MOST / 2)
     variance = np.exp(logs.mean() + digamma(freedom / 2) - np.log(freedom / 2))
-    return Scatter(float(np.sqrt(variance)), float(freedom))
+    return KnownSpread(float(np.sqrt(variance)), float(freedom))

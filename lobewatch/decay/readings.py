@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
-class Scatter(NamedTuple):
+class KnownSpread(NamedTuple):
     """What is known of the scatter from point to point before any is measured."""
 
     percent: float = 0.0
@@ -20,16 +20,16 @@ class Scatter(NamedTuple):
     """Degrees of freedom that it is worth; 0: nothing is known."""
 
 
-UNKNOWN_SCATTER = Scatter()
+UNKNOWN_SCATTER = KnownSpread()
 """Nothing is known of it."""
 
 
 class SeriesScatter(NamedTuple):
     """What is known of the scatter of a series beforehand."""
 
-    alone: Scatter = UNKNOWN_SCATTER
+    alone: KnownSpread = UNKNOWN_SCATTER
     """That of one direction."""
-    common: Scatter = UNKNOWN_SCATTER
+    common: KnownSpread = UNKNOWN_SCATTER
     """That of the mean of both."""
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobewatch.decay.lone_points import drawn_in
-from lobewatch.decay.readings import UNKNOWN_SCATTER, Readings, Scatter
+from lobewatch.decay.readings import UNKNOWN_SCATTER, KnownSpread, Readings
 
 ENOUGH = 12
 """Number of points with a temperature from which on its influence is fitted; chosen."""
@@ -43,7 +43,7 @@ class SeriesBase:
     """Columns: 1, the temperature where it counts, and one for each operator, shape (n, p)."""
     warm: int = 0
     """Number of columns of the temperature."""
-    scatter: Scatter = UNKNOWN_SCATTER
+    scatter: KnownSpread = UNKNOWN_SCATTER
     """What is known of the scatter from point to point beforehand."""
 
     def precision(self, n: NDArray[np.intp]) -> Floats:

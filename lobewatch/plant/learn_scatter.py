@@ -8,12 +8,13 @@ from itertools import islice
 from pathlib import Path
 
 from lobewatch.decay.change_point import FIRST_JUDGED
-from lobewatch.decay.known_scatter import scatter_of_others
-from lobewatch.decay.readings import Scatter
+from lobewatch.decay.known_scatter import scatter_of, scatter_of_others
+from lobewatch.decay.readings import NOTHING_KNOWN, UNKNOWN_SCATTER, KnownSpread, SeriesScatter
+from lobewatch.decay.series_history import series_history
+from lobewatch.history.history import History
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine.journal.known_scatter import KnownScatter
 from lobewatch.plant.standing_file import STANDING, read_kept
-from lobewatch.plant.summary import SeriesSummary
 
 MOST = 500
 """Machines that are asked at most; chosen."""
@@ -30,16 +31,30 @@ def learn_scatter(logbook: Logbook) -> None:
     counts = Counter((row.tool, row.direction) for row in rows)
     if not counts or logbook.files.known_scatter is not None or all(count >= FIRST_JUDGED for count in counts.values()):
         return
-    series = [*_series_beside(logbook.folder.path)]
-    alone = scatter_of_others([Scatter(*one.scatter) for one in series])
-    common = scatter_of_others([Scatter(*one.common_scatter) for one in series if one.direction == "x"])
+    known = [*_scatters_beside(logbook.folder.path), *_scatters_before(history)]
+    alone, common = (scatter_of_others(scatters) for scatters in zip(*known, strict=True)) if known else NOTHING_KNOWN
     if alone.freedom:
+        number = sum(scatter.freedom > 0 for scatter, _ in known)
         with logbook.folder.locked():
-            logbook.folder.journal.append(KnownScatter(rows[-1].time, alone, common, len(series)).line)
+            logbook.folder.journal.append(KnownScatter(rows[-1].time, alone, common, number).line)
 
 
-def _series_beside(folder: Path) -> Iterator[SeriesSummary]:
-    """The series of all machines in the folder that a machine stands in, its own ones among them."""
+def _scatters_beside(folder: Path) -> Iterator[SeriesScatter]:
+    """Those of the series of all machines in the folder that a machine stands in."""
     for path in islice(sorted(folder.resolve().parent.glob(f"*/{STANDING}")), MOST):
         summary = read_kept(path.parent)
-        yield from () if summary is None else summary.series
+        for series in () if summary is None else summary.series:
+            common = series.common_scatter if series.direction == "x" else UNKNOWN_SCATTER
+            yield SeriesScatter(KnownSpread(*series.scatter), KnownSpread(*common))
+
+
+def _scatters_before(history: History) -> Iterator[SeriesScatter]:
+    """Those of the series that ended with a new baseline."""
+    before = [row for row in history.rows if row.baseline != history.baseline]
+    for baseline, series in dict.fromkeys((row.baseline, row.series) for row in before):
+        alike = [row for row in before if (row.baseline, row.series) == (baseline, series)]
+        x, y = ([row for row in alike if row.direction == direction] for direction in ("x", "y"))
+        for rows, beside in ((x, y), (y, ())):
+            trend = series_history(rows, beside).frequency.trend if rows else None
+            if trend is not None:
+                yield SeriesScatter(scatter_of(trend.readings.y), scatter_of(trend.readings.common.y))

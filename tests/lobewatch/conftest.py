@@ -84,11 +84,12 @@ class Shop:
         stiffness: float = 3.5e7,
         damping_ratio: float = 0.029136,
         conditions: Conditions = UNSAID,
+        operator: str = "",
     ) -> str:
         """A tap test without noise, so many days after the start; its identity."""
         when = START + timedelta(days=days)
         text = (self.path / "machine.toml").read_text("utf-8")
-        about = Circumstances("m", when, tool, direction, "", text, conditions=conditions)
+        about = Circumstances("m", when, tool, direction, operator, text, conditions=conditions)
         frf = synthesize([Mode(frequency, damping_ratio, stiffness)], LINES)
         tap = TapTest(new_tap_id(about), about, from_accelerance(LINES, frf.accelerance))
         self.folder.commit(tap)

@@ -1,0 +1,171 @@
+"""What is said with a tap test, and what other machines tell, in the standing of a machine."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from acquisition import Conditions
+from lobewatch.decay.trend import MONTH, Trend
+from lobewatch.plant.learn_scatter import learn_scatter
+from lobewatch.plant.summarise import summarise
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+Run = Callable[..., Any]
+FREQUENCY = 1713.0
+
+
+def tap_series(shop: Shop, percents: NDArray[np.float64], first: int = 0, **said: Any) -> None:
+    """Monthly tests in both directions, alike but for a little; said: a value a test."""
+    for month, percent in enumerate(percents, first):
+        about = {name: values[month - first] for name, values in said.items()}
+        shop.tap(MONTH * month, FREQUENCY * math.exp(percent / 100), **about)
+
+
+def trend_of(shop: Shop) -> Trend:
+    trend = shop.logbook.standing().series[0].trend
+    assert isinstance(trend, Trend)
+    return trend
+
+
+def test_who_held_the_hammer_counts_in_the_watch(new_shop: type[Shop], tmp_path: Path) -> None:
+    y = 0.1 * np.random.default_rng(1).normal(size=24) - np.where(np.arange(24) < 12, 0, 0.25)
+    names = ["Kim"] * 12 + ["Bo"] * 12
+    unsaid, said = new_shop(tmp_path / "unsaid"), new_shop(tmp_path / "said")
+    for shop in (unsaid, said):
+        shop.put("")
+    tap_series(unsaid, y)
+    tap_series(said, y, operator=names)
+    assert trend_of(unsaid).open_fall is not None
+    assert trend_of(said).open_fall is None
+    assert [point.operator for point in trend_of(said).points] == names
+
+
+def shop_with_hours(shop: Shop, hours: list[float | None]) -> Trend:
+    shop.put("")
+    use = np.concatenate([[0.0], np.cumsum(np.repeat([100.0, 400.0], [12, 12]))])
+    y = -use / 4000 + 0.02 * np.random.default_rng(2).normal(size=25)
+    tap_series(shop, y, conditions=[Conditions(hours=spent) for spent in hours])
+    return trend_of(shop)
+
+
+USED: list[float | None] = [0.0, *np.cumsum(np.repeat([100.0, 400.0], [12, 12])).tolist()]
+
+
+def test_running_hours_are_the_time_of_a_forecast(new_shop: type[Shop], tmp_path: Path) -> None:
+    by_hours = shop_with_hours(new_shop(tmp_path / "hours"), USED)
+    by_days = shop_with_hours(new_shop(tmp_path / "days"), [None] * 25)
+    last = by_hours.points[-1].time.timestamp() / 86400
+    truth = last + MONTH * (3.0 - 1.5) / 0.1  # 0.1 % a month at 400 h a month
+    reached = by_hours.reach(-3.0)
+    assert reached.earliest is not None
+    assert reached.latest is not None
+    assert reached.earliest <= truth <= reached.latest
+    assert by_hours.course is not None
+    assert by_days.course is not None
+    assert by_hours.course.kind == "line"
+    assert by_days.course.kind != "line"
+    assert by_hours.rate is not None
+    assert by_hours.rate.value == pytest.approx(-0.1, abs=0.005)
+    assert by_hours.course.start == pytest.approx(by_hours.points[0].time.timestamp() / 86400, abs=1)
+
+
+def test_hours_that_go_back_are_said_and_do_not_count(new_shop: type[Shop], tmp_path: Path) -> None:
+    wrong = [*USED[:20], USED[2], *USED[21:]]
+    back = new_shop(tmp_path / "back")
+    by_wrong, by_days = shop_with_hours(back, wrong), shop_with_hours(new_shop(tmp_path / "days"), [None] * 25)
+    assert by_wrong.reach(-3.0) == by_days.reach(-3.0)
+    remarks = [remark for row in back.logbook.history.rows for remark in row.remarks]
+    assert [str(remark.text)[:32] for remark in remarks if remark.code == "hours-went-back"] == [
+        "running hours 200 h, 4000 h befo"
+    ]
+
+
+def test_a_spindle_that_stood_still_has_decayed_in_no_time(new_shop: type[Shop], tmp_path: Path) -> None:
+    hours: list[float | None] = [0.0, 100.0, 100.0, 100.0, *(100.0 * i for i in range(2, 23))]
+    trend = shop_with_hours(new_shop(tmp_path / "m"), hours)
+    assert trend.past is not None
+    steps = np.diff(trend.past.dates)
+    assert np.all(steps > 0)
+    assert steps[1:3] == pytest.approx([1e-6, 1e-6])
+
+
+def test_hours_are_taken_at_the_command_and_listed(run: Run, shop: Shop, tmp_path: Path) -> None:
+    beam = Path(__file__).parents[2] / "data" / "ladisk_beam" / "acceleration.lvm"
+    said = run("replay", shop.path, beam, "--hours", "1234.5", "--accept", "no-mode-in-band")
+    assert said.code in (0, 2), said.err
+    (tap,) = json.loads(run("history", shop.path, "--json").out)["taps"]
+    assert tap["conditions"]["hours"] == 1234.5
+    assert "1234.5 h" in run("history", shop.path).out
+    wrong = run("replay", shop.path, beam, "--hours", "-1")
+    assert wrong.code == 2
+    assert "hours=-1 is outside 0 to 1e+06" in wrong.err
+
+
+def test_a_young_machine_learns_the_scatter_of_the_others(new_shop: type[Shop], tmp_path: Path) -> None:
+    random = np.random.default_rng(3)
+    for number in range(5):
+        other = new_shop(tmp_path / f"other{number}")
+        other.put("")
+        tap_series(other, 0.2 * random.normal(size=16))
+        summarise(other.logbook, other.start + timedelta(days=600))
+    fallen = np.array([0.1, -0.1, 0.05, -1.2, -1.0, -1.1])
+    young, alone = new_shop(tmp_path / "young"), new_shop(tmp_path / "far" / "alone")
+    for shop in (young, alone):
+        shop.put("")
+        tap_series(shop, fallen[:1])
+        learn_scatter(shop.logbook)
+        learn_scatter(shop.logbook)
+        tap_series(shop, fallen[1:], 1)
+    lines = [json.loads(line) for line in (young.path / "journal.jsonl").read_text("utf-8").splitlines()]
+    (line,) = [line for line in lines if line["kind"] == "scatter"]
+    assert line["alone"][0] == pytest.approx(0.2, rel=0.4)
+    assert line["series"] == 5
+    assert trend_of(young).open_fall is not None
+    assert trend_of(alone).open_fall is None
+    assert "scatter" not in (alone.path / "journal.jsonl").read_text("utf-8")
+    before = trend_of(young).detection.scores
+    for number in range(5):
+        (tmp_path / f"other{number}" / "standing.json").unlink()
+    learn_scatter(young.logbook)
+    np.testing.assert_array_equal(trend_of(young).detection.scores, before)
+
+
+def test_after_a_repair_the_scatter_of_before_is_known(run: Run, new_shop: type[Shop], tmp_path: Path) -> None:
+    random = np.random.default_rng(5)
+    shop = new_shop(tmp_path / "mill")
+    shop.put("")
+    for week, percent in enumerate(0.2 * random.normal(size=16)):
+        for tool in ("reference", "long"):
+            shop.tap(7 * week, FREQUENCY * math.exp(percent / 100), tool=tool)
+            shop.tap(7 * week + 0.1, 0.98 * FREQUENCY * math.exp(percent / 100), "y", tool=tool)
+    repaired = shop.start + timedelta(days=110)
+    assert run("event", shop.path, "new bearings", "--date", f"{repaired:%Y-%m-%d}", "--new-baseline").code == 0
+    assert shop.logbook.files.known_scatter is None
+    shop.tap(112, FREQUENCY)
+    assert run("event", shop.path, "coolant pump replaced").code == 0  # whatever tells of the machine
+    known = shop.logbook.files.known_scatter
+    assert known is not None
+    assert known.series == 4
+    assert known.alone[0] == pytest.approx(0.2, rel=0.4)
+
+
+def test_a_fall_that_has_slowed_down_is_said_to_settle(new_shop: type[Shop], tmp_path: Path) -> None:
+    random = np.random.default_rng(6)
+    run_in, worn = new_shop(tmp_path / "run-in"), new_shop(tmp_path / "worn")
+    months = np.arange(24.0)
+    for shop, fall in ((run_in, -1.0 * (1 - np.exp(-months / 3))), (worn, -0.05 * months)):
+        shop.put("")
+        tap_series(shop, fall + 0.05 * random.normal(size=24))
+    said = [next(r for r in shop.logbook.standing().reasons if r.code == "decay").text for shop in (run_in, worn)]
+    assert "settling" in said[0]
+    assert "settling" not in said[1]

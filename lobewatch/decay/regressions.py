@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobewatch.decay.series_base import ColumnFits, SeriesBase
-from lobewatch.decay.shapes import Shape, courses, pair_courses, pairs_of, shapes_of, triple_courses, triples_of
+from lobewatch.decay.shapes import ODDS, Shape, courses, pair_courses, pairs_of, shapes_of, triple_courses, triples_of
 
 STEP = 1e-6
 """Part of the span over which a rate is taken."""
@@ -78,11 +78,11 @@ def triple_regressions(base: SeriesBase, at: Floats) -> Regressions:
 
 
 def _regressions(base: SeriesBase, at: Floats, shapes: Sequence[Shape], drawn: Drawn) -> Regressions:
-    """Equal weight beforehand for each kind, and within it for each of its shapes."""
+    """Within a kind equal weight beforehand for each of its shapes."""
     fits = base.fit_columns(drawn(shapes, at))
     counts = Counter(shape.kind for shape in shapes)
     columns = np.array([0 if shape.kind == "none" else fits.size.shape[1] for shape in shapes])
-    many = np.log([counts[shape.kind] for shape in shapes])
+    many = np.log([counts[shape.kind] / ODDS.get(shape.kind, 1.0) for shape in shapes])
     left = np.log(fits.rss / (base.total + np.finfo(float).tiny))
     evidence = -fits.freedom / 2 * left - many - columns / 2 * np.log(at.size)
     return Regressions(tuple(shapes), evidence, fits, drawn, float(at[-1]))

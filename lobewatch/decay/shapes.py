@@ -35,6 +35,10 @@ KINDS: tuple[Kind, ...] = (
 )
 
 
+ODDS: dict[Kind, float] = {"slopes": 4.0, "breaks": 4.0, "wander": 0.75, "bend": 0.75}
+"""How likely kinds are beforehand, all others 1: as much as the ranges of other courses allow; chosen."""
+
+
 class Shape(NamedTuple):
     """One shape that the course of a series may have."""
 

@@ -28,7 +28,7 @@ from lobewatch.decay.light import (
     next_step,
     of_files,
 )
-from lobewatch.decay.readings import NOTHING_KNOWN, KnownSpread, SeriesScatter
+from lobewatch.decay.readings import KnownSpread, SeriesScatter
 from lobewatch.decay.series_history import SeriesHistory, series_history
 from lobewatch.decay.series_remarks import about_fall, about_loss, about_others, about_trend
 from lobewatch.decay.trend import Trend
@@ -171,13 +171,9 @@ def _standing(
 
 def _series_of(history: History, tool: str, direction: str, scatter: KnownScatter | None) -> SeriesHistory:
     rows, beside = (history.series(tool, one) for one in (direction, "y" if direction == "x" else "x"))
-    is_young = scatter is not None and sum(row.time <= scatter.time for row in rows) < FIRST_JUDGED
-    known = (
-        SeriesScatter(KnownSpread(*scatter.alone), KnownSpread(*scatter.common))
-        if scatter and is_young
-        else NOTHING_KNOWN
-    )
-    return series_history(rows, beside, known)
+    if scatter is None or sum(row.time <= scatter.time for row in rows) >= FIRST_JUDGED:
+        return series_history(rows, beside)
+    return series_history(rows, beside, SeriesScatter(KnownSpread(*scatter.alone), KnownSpread(*scatter.common)))
 
 
 def _stand_of(series: SeriesHistory, machine: Machine, now: datetime, path: Path | str) -> SeriesStanding:

@@ -13,14 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobewatch.decay.series_base import LEAST, SeriesBase
-from lobewatch.decay.shapes import Kind, Shape
+from lobewatch.decay.shapes import ODDS, Kind, Shape
 
 LEVELS = (0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 """Variances that the level gathers over the span, in that of a point; chosen."""
 RATES = (1.0, 10.0, 100.0, 1e3, 1e4)
 """Variances that the rate, in levels a span, gathers over the span, likewise; chosen."""
-KINDS_OF_IT = 2
-"""Kinds that share the weight of one beforehand: the range of a straight line would be 1.7 times as wide; chosen."""
 
 Floats = NDArray[np.float64]
 
@@ -129,7 +127,7 @@ def wandering(base: SeriesBase, at: Floats, kind: Kind) -> Wandering:
         unsure = (np.log(weight).sum() + np.linalg.slogdet(gram)[1] - np.linalg.slogdet(still)[1]) / 2
         evidence[j] = unsure - points.freedom / 2 * np.log(rss / (base.total + tiny))
         variance[j] = rss / points.freedom
-    evidence -= np.log(len(amounts)) + np.log(at.size) / 2 + np.log(KINDS_OF_IT)
+    evidence += np.log(ODDS[kind]) - np.log(len(amounts)) - np.log(at.size) / 2
     return Wandering(tuple(Shape(kind, 0.0, rate=amount) for amount in amounts), evidence, variance, points)
 
 

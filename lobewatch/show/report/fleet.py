@@ -45,7 +45,7 @@ def _machine(row: Mapping[str, Any]) -> dict[str, Any]:
         "never tapped" if left is None else f"in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue"
     )
     fall, std = row["fall"], row["fall_std"]
-    fallen = "-" if fall is None else f"{-fall:+.2f} %" + ("" if std is None else f" ± {std:.2f}")
+    fallen = "-" if fall is None else f"{-fall:+z.2f} %" + ("" if std is None else f" ± {std:.2f}")
     return {
         "name": row["name"],
         "key": row["key"],

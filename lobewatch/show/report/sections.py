@@ -126,7 +126,7 @@ def _measured_changes(history: SeriesHistory) -> list[list[str]]:
         if values.change.is_known:
             newest = getattr(values.known[-1], name)
             now, start = (plus_minus(estimate.value, estimate.std, scale) for estimate in (newest, values.start))
-            rows.append([label, start, now, f"{values.change.value:+.2f} %"])
+            rows.append([label, start, now, f"{values.change.value:+z.2f} %"])
     return rows
 
 
@@ -136,7 +136,7 @@ def _model_changes(history: SeriesHistory) -> list[list[str]]:
         values = [float(getattr(row, name)) for row in history.rows if np.isfinite(getattr(row, name))]
         if values and np.isfinite(getattr(history.rows[-1], name)):
             start, now = (f"{value / 1e6:.6g}" for value in (values[0], values[-1]))
-            change = f"{100 * (values[-1] / values[0] - 1):+.2f} %"
+            change = f"{100 * (values[-1] / values[0] - 1):+z.2f} %"
             rows.append([f"{label} tip stiffness, model (N/µm)", start, now, change])
     return rows
 

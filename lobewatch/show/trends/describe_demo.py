@@ -56,7 +56,7 @@ def demo_texts(
         f"k_b stiffness of each bearing); before each test the tool is remounted: f_1 scatters by {100 * scatter:g} %.",
         _table(taps),
         "worst error: " + ", ".join(_worst(taps)),
-        f"K over the whole demo, in x: {100 * measured:+.2f} % found, {100 * true:+.2f} % true",
+        f"K over the whole demo, in x: {100 * measured:+z.2f} % found, {100 * true:+z.2f} % true",
         *(
             []
             if not forecasts

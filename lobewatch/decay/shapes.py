@@ -35,7 +35,7 @@ KINDS: tuple[Kind, ...] = (
 )
 
 
-ODDS: dict[Kind, float] = {"slopes": 4.0, "breaks": 4.0, "wander": 0.75, "bend": 0.75}
+ODDS: dict[Kind, float] = {"slopes": 4.0, "breaks": 4.0, "wander": 0.5, "bend": 0.5}
 """How likely kinds are beforehand, all others 1: as much as the ranges of other courses allow; chosen."""
 
 

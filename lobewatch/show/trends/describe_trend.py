@@ -20,8 +20,8 @@ from lobewatch.show.terminal.csv_text import csv_text
 from lobewatch.show.terminal.output import table
 
 ASSUMED = (
-    "Dates hold if the machine is used as before. Not foreseen: a crash to come, an acceleration that is not yet visible,"
-    " and one time in three or four a fall that slows down or grows exponentially."
+    "Dates hold if the machine is used as before. Not foreseen: a crash to come, an acceleration that is not yet"
+    " visible, and one time in three or four a fall that slows down or grows exponentially."
 )
 """What stands below every table of dates."""
 WIDE, HIGH = 60, 12

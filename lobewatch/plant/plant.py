@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Mapping
 from datetime import UTC, datetime
@@ -51,10 +52,18 @@ def find_machines(path: Path) -> dict[str, Path]:
     """The machine at this path, or all in this folder, by name of their folders; DataError where there is none."""
     if any((path / name).exists() for name in KNOWN_BY):
         return {path_text(path.resolve().name): path}
-    folders = {file.parent for name in KNOWN_BY for file in path.glob(f"*/{name}")}
-    if not folders:
+    try:
+        names = sorted(name for name in os.listdir(path) if _is_machine(f"{path}/{name}"))  # noqa: PTH208
+    except OSError:
+        names = []
+    if not names:
         raise DataError(f"{path}: neither a machine folder nor a folder of them; make one with: lobewatch init")
-    return {path_text(folder.name): folder for folder in sorted(folders)}
+    return {path_text(name): path / name for name in names}
+
+
+def _is_machine(folder: str) -> bool:
+    """Whether it is a machine folder; of thousands at every look of a server."""
+    return any(os.path.exists(f"{folder}/{name}") for name in KNOWN_BY)  # noqa: PTH110
 
 
 class Plant:
@@ -71,6 +80,16 @@ class Plant:
         self._damage: dict[str, tuple[Remark, ...]] = {}
         self._outdated: set[str] = set()
         self._lock = threading.Lock()
+
+    def know(self, machines: Mapping[str, Path]) -> None:
+        """Take these machines for those known so far."""
+        if machines == self.machines:
+            return
+        with self._lock:
+            for key in self.machines.keys() - machines.keys():
+                self._summaries.pop(key, None)
+                self._damage.pop(key, None)
+            self.machines = machines
 
     def standings(self, now: datetime | None = None) -> list[MachineStanding]:
         """One a machine, those that cannot be judged first, then worst first; who asks meanwhile waits."""
@@ -113,7 +132,6 @@ class Plant:
         try:
             summary = (None if key in self._outdated else read_standing(path, now)) or plant.summarise_folder(path, now)
         except Exception as error:  # noqa: BLE001 - whatever is wrong with it must not cost the others their standing
-            self._summaries.pop(key, None)
             return unreadable_summary(last.summary.name if last else key, failure_text(error))
         self._outdated.discard(key)
         if mark == mark_of(path):  # else somebody has written meanwhile

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
-import math
+import gzip
 import secrets
 import threading
-from collections.abc import Collection
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Self
 from urllib.parse import quote
 
 import msgspec
@@ -20,22 +18,22 @@ from acquisition import DataError, TapDirection
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.notify.prometheus import CONTENT_TYPE, prometheus_text
-from lobewatch.plant.plant import MachineStanding, Plant, find_machines
+from lobewatch.screen.board import Board
 from lobewatch.screen.guard import MAY_ALTER, OPEN, WATCH
 from lobewatch.screen.live_test import LiveTest
 from lobewatch.screen.return_memory import return_memory
 from lobewatch.screen.routes import add_pages, add_session
 from lobewatch.screen.web_thread import WebThread
-from lobewatch.show.plant.plant_rows import plant_row
 from lobewatch.show.report.page import script_sources
 from lobewatch.show.report.report import render_report
-from lobewatch.tap.spool import interrupted_tests
 
 REPORT_POLICY = (
     f"default-src 'none'; style-src 'unsafe-inline'; script-src {script_sources()}; img-src data:; "
     "frame-ancestors 'none'; sandbox allow-scripts allow-downloads"
 )
 """A report has its style in it, and runs the scripts of reports alone."""
+ZIPPED = 1_000_000
+"""Bytes from which on a list of machines is sent packed, which is worth its time; chosen."""
 
 
 class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -63,13 +61,11 @@ class DashboardServer(WebThread):
         DataError where there is no machine, ValueError for a token that does not fit into an address.
         """
         super().__init__(listen, port, token, watch_token)
-        self._machines = find_machines(Path(path))
+        self._board = Board(Path(path))
         self._tests: dict[str, LiveTest] = {}
         self._reports: dict[str, tuple[str, str]] = {}
-        self._plant = Plant(self._machines)
-        self._plant.standings()
         self._end = threading.Event()
-        self._verifier = threading.Thread(target=self._plant.verify_until, args=(self._end,), daemon=True)
+        self._verifier = threading.Thread(target=self._board.plant.verify_until, args=(self._end,), daemon=True)
         add_pages(self.application, {"/": "dashboard.html", "/tap/{machine}/": "screen.html"})
         add_session(self.application, "/tap/{machine}/", self._find_test)
         router = self.application.router
@@ -99,9 +95,10 @@ class DashboardServer(WebThread):
 
     def _find_machine(self, request: web.Request) -> tuple[str, MachineFolder]:
         key = request.match_info["machine"]
-        if key not in self._machines:
+        path = self._board.plant.machines.get(key)
+        if path is None:
             raise web.HTTPNotFound(text="there is no such machine")
-        return key, MachineFolder(self._machines[key])
+        return key, MachineFolder(path)
 
     def _find_test(self, request: web.Request) -> LiveTest:
         """Newest test of a machine: a page that has watched one to its end sees the next."""
@@ -112,12 +109,15 @@ class DashboardServer(WebThread):
 
     async def _list(self, request: web.Request) -> web.Response:
         running = {key for key, test in self._tests.items() if test.running}
-        version_shown = request.query.get("known", "")
-        body = await asyncio.to_thread(_machine_list, self._plant, running, request[MAY_ALTER], version_shown)
-        return web.Response(body=body, content_type="application/json")
+        answer = await asyncio.to_thread(self._board.answer, request.query.get("known", ""), running)
+        body = msgspec.json.encode(answer | {"may_alter": request[MAY_ALTER]})
+        if len(body) < ZIPPED or "gzip" not in request.headers.get("Accept-Encoding", ""):
+            return web.Response(body=body, content_type="application/json")
+        zipped = await asyncio.to_thread(gzip.compress, body, 1)
+        return web.Response(body=zipped, content_type="application/json", headers={"Content-Encoding": "gzip"})
 
     async def _metrics(self, _: web.Request) -> web.Response:
-        text = prometheus_text(await asyncio.to_thread(self._plant.standings))
+        text = prometheus_text(await asyncio.to_thread(self._board.standings))
         return web.Response(body=text.encode(), headers={"Content-Type": CONTENT_TYPE})
 
     async def _start(self, request: web.Request) -> web.Response:
@@ -153,34 +153,3 @@ def _render(folder: MachineFolder) -> str:
         raise DataError("no tap test yet: press START")
     newest = logbook.newest()
     return render_report(logbook, newest.tool, newest.direction)
-
-
-def _machine_list(plant: Plant, running: Collection[str], may_alter: bool, version_shown: str) -> bytes:
-    """All machines as JSON, or that nothing has changed, which is asked every few seconds.
-
-    running: machines that a test runs on; version_shown: that the page shows already.
-    """
-    machines = [_row(standing) | {"running": standing.key in running} for standing in plant.standings()]
-    body = msgspec.json.encode({"machines": machines, "may_alter": may_alter})
-    version = hashlib.sha256(body).hexdigest()[:16]
-    if version == version_shown:
-        return msgspec.json.encode({"version": version})
-    return msgspec.json.encode({"version": version, "machines": machines, "may_alter": may_alter})
-
-
-def _row(standing: MachineStanding) -> dict[str, Any]:
-    """Row of a machine, days to a tenth, rounded down: what changes with every look would be sent with every look."""
-    row = plant_row(standing)
-    left = row["days_left"]
-    row["days_left"] = left if left is None else math.floor(10 * left) / 10
-    return row | {"interrupted": _interrupted_hits(standing.path)}
-
-
-def _interrupted_hits(folder: Path) -> dict[str, int]:
-    """Hits of the interrupted tests of a machine, by direction."""
-    try:
-        spool = folder / "spool"
-        is_empty = not spool.is_dir() or not any(path.is_dir() for path in spool.iterdir())
-        return {} if is_empty else interrupted_tests(MachineFolder(folder))
-    except (OSError, ValueError):
-        return {}  # the row says what is wrong

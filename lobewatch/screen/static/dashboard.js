@@ -8,7 +8,7 @@ const at = (id) => document.getElementById(id);
 const isDue = ({ days_left: left }) => left === null || left < 0;
 const made = (tag, settings) => Object.assign(document.createElement(tag), settings);
 
-const shown = new Map(); // by machine: what stands on the page as text, its element
+const shown = new Map(); // by machine: what stands on the page, its element
 const failed = new Map(); // by machine: what went wrong with its buttons
 let list = { version: "", machines: [], may_alter: false };
 let filter = sessionStorage.getItem("filter") in FILTERS ? sessionStorage.getItem("filter") : "all";
@@ -93,21 +93,36 @@ function row(machine) {
   return item;
 }
 
+// An answer holds all machines, or those that have changed, each with its place in the new list, in order of these.
+function take({ version, may_alter, machines, changed, gone }) {
+  if (!machines) {
+    const others = new Set([...gone, ...changed.map(([, { key }]) => key)]);
+    machines = list.machines.filter(({ key }) => !others.has(key));
+    for (const [place, machine] of changed) machines.splice(place, 0, machine);
+  }
+  const keys = new Set(machines.map(({ key }) => key));
+  for (const key of shown.keys()) if (!keys.has(key)) shown.delete(key);
+  list = { version, may_alter, machines };
+}
+
 // Only what has changed is made anew: a line that is open, or has the focus, stays.
 function show() {
   for (const machine of list.machines) {
-    const text = JSON.stringify([machine, list.may_alter]);
     const old = shown.get(machine.key);
-    if (old?.text === text) continue;
+    if (old?.machine === machine) continue;
     const element = row(machine);
     element.querySelector("details").open = old?.element.querySelector("details").open ?? false;
-    shown.set(machine.key, { text, element });
+    shown.set(machine.key, { machine, element });
   }
   const wanted = list.machines.filter((one) => filter === "all" || one.light === filter || (filter === "due" && isDue(one)));
-  const elements = wanted.map(({ key }) => shown.get(key).element);
-  const present = [...at("machines").children];
-  if (elements.length !== present.length || elements.some((one, i) => one !== present[i])) at("machines").replaceChildren(...elements);
-  at("none").hidden = !list.machines.length || elements.length > 0;
+  const elements = new Set(wanted.map(({ key }) => shown.get(key).element));
+  for (const element of [...at("machines").children]) if (!elements.has(element)) element.remove();
+  let next = at("machines").firstElementChild;
+  for (const element of elements) {
+    if (element === next) next = next.nextElementSibling;
+    else at("machines").insertBefore(element, next);
+  }
+  at("none").hidden = !list.machines.length || elements.size > 0;
   showFilter();
 }
 
@@ -132,7 +147,7 @@ function showFilter() {
 async function refresh() {
   try {
     const answer = await ask(`machines?known=${list.version}`);
-    if (answer.machines) list = answer;
+    take(answer);
     show();
     if (at("error").dataset.lost) fail("");
     delete at("error").dataset.lost;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -13,7 +14,7 @@ from selenium.webdriver.common.by import By
 from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
-from lobewatch.screen import DashboardServer
+from lobewatch.screen import DashboardServer, board
 from modal import Mode, synthesize
 
 Browser = Any
@@ -58,7 +59,7 @@ def dashboard(mills: Path) -> Iterator[DashboardServer]:
 
 
 def keys(browser: Browser) -> list[str]:
-    return [row.get_attribute("data-key") for row in browser.driver.find_elements(By.CSS_SELECTOR, "#machines li")]
+    return list(browser.ask("[...document.querySelectorAll('#machines li')].map((line) => line.dataset.key)"))
 
 
 def row(browser: Browser, key: str) -> Any:
@@ -139,3 +140,39 @@ def test_a_line_opens_with_all_reasons_and_stays_open(browser: Browser, dashboar
     browser.part("filter-warn").click()
     browser.wait(lambda: len(keys(browser)) == 2)
     assert "Tap again to be sure" in row(browser, "worn").text
+
+
+def test_lines_change_go_and_come_and_the_others_stay_as_they_are(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(board, "LOOK_EVERY", 0.0)
+    for name in ("a", "b", "c"):
+        machine(tmp_path / name)
+    with DashboardServer(tmp_path) as server:
+        browser.open(server.url, (1280, 657))
+        browser.wait(lambda: keys(browser) == ["a", "b", "c"])
+        row(browser, "b").find_element(By.TAG_NAME, "summary").click()
+        before = row(browser, "b")
+        browser.ask("document.querySelector('li[data-key=b] summary').focus()")
+        tap(tmp_path / "a", 40, 1713.0)
+        shutil.rmtree(tmp_path / "c")
+        machine(tmp_path / "d")
+        browser.wait(lambda: keys(browser) == ["b", "d", "a"])
+        assert "overdue by 11 days" in row(browser, "a").text
+        assert row(browser, "b") == before
+        assert browser.ask("document.activeElement.closest('li').dataset.key") == "b"
+        assert browser.ask("document.querySelector('li[data-key=b] details').open")
+        browser.see("filter", "All 3")
+
+
+def test_a_page_that_outlives_its_server_takes_all_anew(browser: Browser, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        machine(tmp_path / name)
+    with DashboardServer(tmp_path, token="a-token-of-a-test") as server:
+        browser.open(server.url, (1280, 657))
+        browser.wait(lambda: keys(browser) == ["a", "b"])
+        port = int(server.origin.rpartition(":")[2])
+    shutil.rmtree(tmp_path / "a")
+    machine(tmp_path / "c")
+    with DashboardServer(tmp_path, port=port, token="a-token-of-a-test"):
+        browser.wait(lambda: keys(browser) == ["b", "c"])

@@ -26,7 +26,7 @@ COMMANDS = {
     "report": "One HTML file with everything in it: what has changed, which programs still hold, lobes then and now.",
     "trend": "How the frequency has fallen, whether that is more than scatter, and until when each program holds.",
     "status": "How all machines of a folder stand, worst first: light, fall, why, what to do next, when to tap again.",
-    "export": "All tap tests of all machines as one table, a line each, for other programs: SQLite, CSV, Parquet.",
+    "export": "All tap tests of all machines as one table for other programs: SQLite, CSV, Parquet, PostgreSQL.",
     "verify": "Every byte of a machine folder against what was written; exit code 1 where something is damaged.",
     "rebuild": "The history anew from the tap tests, and the journal where that is damaged; nothing is deleted.",
     "serve": "Machines in a browser, worst first; START begins a tap test on the port that machine.toml names. "

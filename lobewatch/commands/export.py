@@ -15,27 +15,53 @@ def export(
     folder: Annotated[
         Path, typer.Argument(parser=named_folder, help="Machine folder, or a folder of machine folders.")
     ],
-    file: Annotated[Path, typer.Argument(help="What to write: its ending is .sqlite, .csv, .csv.gz or .parquet.")],
+    file: Annotated[
+        Path | None, typer.Argument(help="What to write: its ending is .sqlite, .csv, .csv.gz or .parquet.")
+    ] = None,
+    append: Annotated[
+        Path | None,
+        typer.Option(help="In place of FILE: a folder of Parquet files by month, to which is added what is not there."),
+    ] = None,
+    to: Annotated[
+        str | None,
+        typer.Option(
+            help="In place of FILE: a database, postgresql://HOST/NAME, whose table is kept as the tap tests are."
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """All tap tests of all machines as one table, a line each, for other programs: SQLite, CSV, Parquet.
+    """All tap tests of all machines as one table for other programs: SQLite, CSV, Parquet, PostgreSQL.
 
     The same again gives the same bytes. Excluded tap tests are left out. One that cannot be read is named, and the
-    exit code is 2. Parquet is written by DuckDB (pip install "lobewatch[fleet]").
+    exit code is 2. Parquet is written by DuckDB (pip install "lobewatch[fleet]"), PostgreSQL by psycopg (pip install
+    "lobewatch[postgres]"), with its password from PGPASSWORD or ~/.pgpass.
 
     Examples:
 
       lobewatch export mills fleet.sqlite
-      lobewatch export mills fleet.csv
+      lobewatch export mills --append fleet
+      lobewatch export mills --to postgresql://mills@db.example/plant
     """
     from lobewatch.plant.plant import find_machines
     from lobewatch.plant.tap_table import all_tables
     from lobewatch.show.plant.table_files import write_table
+    from lobewatch.show.plant.table_months import append_months
+    from lobewatch.show.plant.table_postgres import upsert_table
 
+    if [file, append, to].count(None) != 2:
+        raise ValueError("give one of FILE, --append FOLDER and --to ADDRESS")
     machines, damaged = find_machines(folder), dict[str, str]()
-    count = write_table(all_tables(machines, damaged), file)
+    tables = all_tables(machines, damaged)
+    if file is not None:
+        outcome = write_table(tables, file)
+    elif append is not None:
+        outcome = append_months(tables, append)
+    else:
+        outcome = upsert_table(tables, str(to))
     for key, reason in damaged.items():
         notes.print(f"left out {key}: {reason}", markup=False)
-    payload = {"file": str(file), "machines": len(machines) - len(damaged), "tap_tests": count, "left_out": damaged}
-    emit(payload, as_json, f"{count} tap tests of {len(machines) - len(damaged)} machines in {file}")
+    n_machines, (place, *_) = len(machines) - len(damaged), outcome.fields.values()
+    payload = {"machines": n_machines, "tap_tests": outcome.tap_tests, "left_out": damaged}
+    text = f"{outcome.tap_tests} tap tests of {n_machines} machines in {place}"
+    emit({**outcome.fields, **payload}, as_json, text, *outcome.sentences)
     raise typer.Exit(2 if damaged else 0)

@@ -8,7 +8,7 @@ import sqlite3
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import msgspec
 import numpy as np
@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from acquisition import DataError
 from lobewatch.plant.tap_table import NUMBERS, TapTable
+from lobewatch.show.plant.export_outcome import ExportOutcome
+from lobewatch.show.plant.table_columns import COLUMNS, table_lines, write_lines
 from lobewatch.show.terminal.csv_text import csv_cell
 
-COLUMNS = ("folder", "machine", "tap_id", "time", "tool", "direction", "series", *NUMBERS, "remarks")
 DIGITS, DIGITS_OF_ERRORS = 7, 3
 """Significant digits of a number in CSV: a part in ten million, finer than any of them is known, and of its error."""
 TABLES = """
@@ -34,13 +35,12 @@ CREATE VIEW taps AS SELECT folder, machine, tap_id, strftime('%Y-%m-%dT%H:%M:%SZ
 """One line a tap test is the view `taps`; what repeats stands once."""
 _TENS = 10.0 ** np.arange(23)
 """Powers of ten that are numbers of the computer."""
-NOTHING = TapTable("", "", (), (), (), (), (), np.empty((0, len(NUMBERS))))
 
 Floats = NDArray[np.float64]
 
 
-def write_table(tables: Iterable[TapTable], path: Path) -> int:
-    """Write a file by the ending of its name, whole or not at all; the number of tap tests.
+def write_table(tables: Iterable[TapTable], path: Path) -> ExportOutcome:
+    """Write a file by the ending of its name, whole or not at all.
 
     DataError for an ending that is not known, and for Parquet without DuckDB.
     """
@@ -55,7 +55,7 @@ def write_table(tables: Iterable[TapTable], path: Path) -> int:
         raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
         temporary.unlink(missing_ok=True)
-    return count
+    return ExportOutcome(count, {"file": str(path)})
 
 
 def _write_sqlite(tables: Iterable[TapTable], path: Path) -> int:
@@ -130,34 +130,8 @@ def rounded(values: Floats, digits: NDArray[np.intp]) -> Floats:
 
 
 def _write_parquet(tables: Iterable[TapTable], path: Path) -> int:
-    try:
-        import duckdb
-    except ImportError as error:
-        raise DataError('.parquet needs DuckDB; install it with: pip install "lobewatch[fleet]"') from error
-    parts = [_columns(table) for table in tables] or [_columns(NOTHING)]
-    whole = {name: np.concatenate([part[name] for part in parts]) for name in COLUMNS}
-    with closing(duckdb.connect(config={"threads": 1})) as base:
-        base.register("lines", whole)
-        named = ", ".join("to_timestamp(time)::TIMESTAMP AS time" if n == "time" else n for n in COLUMNS)
-        base.execute(f"COPY (SELECT {named} FROM lines) TO '{path.as_posix()}' (FORMAT parquet, COMPRESSION zstd)")
-    return len(whole["time"])
-
-
-def _columns(table: TapTable) -> dict[str, NDArray[Any]]:
-    """Columns of a table as arrays, by name."""
-    n, of_series = len(table.tap_id), np.array(table.of_series, np.int64)
-    tools, directions = (np.array([place[part] for place in table.series], object) for part in (0, 1))
-    return {
-        "folder": np.full(n, table.folder, object),
-        "machine": np.full(n, table.machine, object),
-        "tap_id": np.array(table.tap_id, object),
-        "time": np.array(table.time, np.float64),
-        "tool": tools[of_series - 1],
-        "direction": directions[of_series - 1],
-        "series": of_series,
-        "remarks": np.array(table.remarks, object),
-        **dict(zip(NUMBERS, table.numbers.T, strict=True)),
-    }
+    with table_lines(tables, ".parquet") as base:
+        return write_lines(base, "SELECT * FROM lines", path)
 
 
 WRITERS: dict[str, Callable[[Iterable[TapTable], Path], int]] = {

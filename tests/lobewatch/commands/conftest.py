@@ -1,13 +1,21 @@
-"""A command as a person types it, in an empty folder."""
+"""A command as a person types it, in an empty folder; a real PostgreSQL."""
 
 from __future__ import annotations
 
 import json
+import os
+import shutil
+import signal
+import socket
+import subprocess
 import sys
-from collections.abc import Callable
+import tempfile
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import psycopg
 import pytest
 
 from lobewatch.cli import main
@@ -62,3 +70,97 @@ def refused(said: Said, *words: str) -> None:
     assert said.out == ""
     for word in words:
         assert word in said.err
+
+
+SECRET = "quite-secret"
+PATHS = os.pathsep.join(
+    [os.environ["PATH"], *map(str, sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True))]
+)
+INITDB, POSTGRES = (shutil.which(name, path=PATHS) or "" for name in ("initdb", "postgres"))
+
+
+class Server:
+    """PostgreSQL in a folder of its own, with a password; of a user that may nothing else where we are root."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.user: dict[str, Any] = (
+            {"user": "nobody", "group": "nogroup", "extra_groups": []} if not os.geteuid() else {}
+        )
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            self.port = int(free.getsockname()[1])
+        password = folder / "password"
+        password.write_text(SECRET)
+        if self.user:
+            for path in (folder, password):
+                shutil.chown(path, "nobody", "nogroup")
+        command: list[str | Path] = [
+            INITDB,
+            "-D",
+            folder / "data",
+            "-U",
+            "lobewatch",
+            "-A",
+            "scram-sha-256",
+            "--pwfile",
+            password,
+            "-N",
+        ]
+        subprocess.run(command, check=True, capture_output=True, cwd=folder, **self.user)
+        self.start()
+
+    def start(self) -> None:
+        command: list[str | Path] = [
+            POSTGRES,
+            "-D",
+            self.folder / "data",
+            "-k",
+            self.folder,
+            "-p",
+            str(self.port),
+            "-F",
+        ]
+        with (self.folder / "log").open("ab") as log:
+            self.process = subprocess.Popen([*command, "-h", "127.0.0.1"], stderr=log, cwd=self.folder, **self.user)
+        deadline = time.monotonic() + 60
+        while True:
+            try:
+                self.ask("SELECT 1")
+            except psycopg.OperationalError:
+                assert time.monotonic() < deadline, (self.folder / "log").read_text()
+                time.sleep(0.05)
+            else:
+                return
+
+    def stop(self) -> None:
+        """At once, as after a power cut."""
+        self.process.send_signal(signal.SIGQUIT)
+        self.process.wait()
+
+    def address(self, database: str = "postgres", port: int = 0) -> str:
+        return f"postgresql://lobewatch:{SECRET}@127.0.0.1:{port or self.port}/{database}"
+
+    def ask(self, query: str, database: str = "postgres") -> list[tuple[Any, ...]]:
+        with psycopg.connect(self.address(database), autocommit=True) as connection:
+            cursor = connection.execute(query)
+            return cursor.fetchall() if cursor.description else []
+
+
+@pytest.fixture(scope="session")
+def server() -> Iterator[Server]:
+    """A server; skips where there is none, but not in continuous integration."""
+    if not (INITDB and POSTGRES) and "CI" not in os.environ:
+        pytest.skip("PostgreSQL is not installed")
+    with tempfile.TemporaryDirectory() as folder:
+        running = Server(Path(folder))
+        yield running
+        running.stop()
+
+
+@pytest.fixture
+def plant(server: Server) -> str:
+    """An empty database by its name."""
+    name = f"plant_{time.monotonic_ns()}"
+    server.ask(f"CREATE DATABASE {name}")
+    return name

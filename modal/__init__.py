@@ -2,7 +2,9 @@
 
 from modal.bands.extract import extract
 from modal.bands.extraction import Extraction, FittedBand
+from modal.bands.survey import candidates, survey
 from modal.cut_edges import cut_edges
+from modal.edit_modes import edit_modes
 from modal.fit_modes import fit_modes, modes_of
 from modal.fit_points import fit_points
 from modal.mode_indicator import mode_indicator
@@ -10,6 +12,7 @@ from modal.modes.common_delay import CommonDelay, common_delay
 from modal.modes.follow import Followed, follow
 from modal.modes.mac import mac
 from modal.modes.mode import Mode
+from modal.modes.mode_edits import ModeEdits, parse_edits
 from modal.modes.predominant import predominant
 from modal.modes.synthesize import synthesize
 from modal.pick_peaks import pick_peaks
@@ -26,12 +29,15 @@ __all__ = [
     "FittedBand",
     "Followed",
     "Mode",
+    "ModeEdits",
     "PhysicalPoles",
     "StabilisationChart",
     "Trust",
     "believed",
+    "candidates",
     "common_delay",
     "cut_edges",
+    "edit_modes",
     "extract",
     "fit_modes",
     "fit_points",
@@ -39,12 +45,14 @@ __all__ = [
     "mac",
     "mode_indicator",
     "modes_of",
+    "parse_edits",
     "peaks_beyond",
     "physical_poles",
     "pick_peaks",
     "predominant",
     "remove_window",
     "stabilise",
+    "survey",
     "synthesize",
     "trust_of",
     "trust_rules",

@@ -15,7 +15,7 @@ from modal.bands.systematic import systematic
 from modal.fitting import BandFit
 from modal.hammer_covariance import hammer_covariance
 from modal.jackknife import jackknife, left_out
-from modal.modes.mode import Mode
+from modal.modes.mode import Mode, ratio_or_zero
 from modal.quality.assess import assess, with_phase_remarks
 
 UNKNOWN_PHASE = 90.0
@@ -89,7 +89,7 @@ def _mode(fit: BandFit, i: int, covariance: Array, freedom: float, scatter: Arra
         n_hits=n_hits,
         phase_deg=float(np.degrees(np.angle(sign * constant))),
         phase_deg_std=min(float(error[3]), UNKNOWN_PHASE),
-        phase_correlation=best[3, :3] / (error[3] * error[:3]),
+        phase_correlation=ratio_or_zero(best[3, :3], error[3] * error[:3]),
         shape=_shape(fit.constant[:, i]),
     )
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from modal.modes.mode import Mode
+from modal.modes.mode import Mode, ratio_or_zero
 
 
 def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:
@@ -83,7 +83,7 @@ def _phase_correlation(mode: Mode, slope: NDArray[np.float64]) -> NDArray[np.flo
     if mode.phase_correlation is None or mode.best_covariance is None:
         return mode.phase_correlation
     error = np.sqrt(np.diag(slope @ mode.best_covariance @ slope.T))
-    return np.asarray(slope @ (mode.phase_correlation * mode.standard_error) / error)
+    return ratio_or_zero(slope @ (mode.phase_correlation * mode.standard_error), error)
 
 
 def _slope(mode: Mode, tau: float, size: float, decay: float, w: float) -> NDArray[np.float64]:

@@ -4,28 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cache
 from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
-from threadpoolctl import ThreadpoolController
 
 from acquisition import Frf
-from modal.bands.extraction import Extraction, FittedBand
+from modal.bands.extraction import Extraction
 from modal.bands.find_resonances import Resonance, find_resonances, resonances_beside
-from modal.bands.fit_peaks import fit_again, fit_peaks, fit_real
+from modal.bands.fit_peaks import fit_peaks, fit_real
 from modal.bands.line_weights import line_weights
 from modal.bands.local_bands import local_bands
 from modal.bands.look_closer import look_closer
 from modal.bands.noise_by_height import weights_by_residual
+from modal.bands.one_thread import one_thread
+from modal.bands.settle import settle
 from modal.bands.usable_lines import usable_lines
 
-SWEEPS = 4
-"""Most rounds over the bands, each with the tails of the other bands' modes as they are then."""
-SETTLED = 0.01
-"""Change of those tails, as a share of what the fit leaves, that is not worth another fit."""
+ROUNDS = 4
+"""Most rounds in which weights follow what the fits leave."""
 SAME_WEIGHT = 0.2
 """Relative change of weights that is not worth another fit."""
 STRAY = 8.0
@@ -39,28 +37,22 @@ def extract(frfs: Sequence[Frf], band: tuple[float, float] | None = None) -> Ext
 
     One FRF, or several on the same lines, the driving point first. Raises ValueError as `fit_points`.
     """
-    with _blas().limit(limits=1):
+    with one_thread():
         return _extract(tuple(usable_lines(frf, band) for frf in _with_common_band(frfs)))
-
-
-@cache
-def _blas() -> ThreadpoolController:
-    """Found once: looking for the libraries of this process takes as long as a fit."""
-    return ThreadpoolController()
 
 
 def _extract(lines: tuple[Frf, ...]) -> Extraction:
     empty = Extraction(lines, np.array([line_weights(frf) for frf in lines]), ())
     peaks = _common([find_resonances(frf) for frf in lines])
-    state = _settled(_fitted(empty, peaks))
+    state = settle(_fitted(empty, peaks))
     beside = _beside(state, peaks)
-    state = state if len(beside) == len(peaks) else _settled(_fitted(empty, beside))
+    state = state if len(beside) == len(peaks) else settle(_fitted(empty, beside))
     closer = tuple(look_closer(band) for band in state.bands)
     if any(new is not old for new, old in zip(closer, state.bands, strict=True)):
-        state = _settled(replace(state, bands=closer))
+        state = settle(replace(state, bands=closer))
     stray = _stray_lines(state)
     if np.any(stray):
-        state = _settled(replace(state, weight=np.where(stray, 0.0, state.weight)), everything=True)
+        state = settle(replace(state, weight=np.where(stray, 0.0, state.weight)), everything=True)
     state = _reweighted(state)
     return replace(state, bands=tuple(fit_real(band) for band in state.bands))
 
@@ -68,11 +60,11 @@ def _extract(lines: tuple[Frf, ...]) -> Extraction:
 def _reweighted(state: Extraction) -> Extraction:
     """All bands fitted with the weights that what they leave asks for, until those stay about as they are."""
     given = state.weight
-    for _ in range(SWEEPS):
+    for _ in range(ROUNDS):
         weight = weights_by_residual(state, given)
         if np.all(np.abs(weight - state.weight) <= SAME_WEIGHT * state.weight):
             break
-        state = _settled(replace(state, weight=weight), everything=True)
+        state = settle(replace(state, weight=weight), everything=True)
     return state
 
 
@@ -103,29 +95,6 @@ def _fitted(empty: Extraction, resonances: list[Resonance]) -> Extraction:
         band = fit_peaks(state.data(local.lines), local.resonances)
         state = state if band is None else replace(state, bands=(*state.bands, band))
     return replace(state, bands=tuple(sorted(state.bands, key=lambda band: band.lines.start)))
-
-
-def _settled(state: Extraction, everything: bool = False) -> Extraction:
-    """Bands fitted again until the tails of the others' modes stay as they are; everything: each one at least once."""
-    for sweep in range(SWEEPS):
-        before = state.bands
-        for band in before:
-            state = _with(state, band, _again(state, band, everything and sweep == 0))
-        if all(new is old for new, old in zip(state.bands, before, strict=False)):
-            break
-    return state
-
-
-def _again(state: Extraction, band: FittedBand, anyway: bool) -> FittedBand | None:
-    """A band fitted to what the modes of all others leave now; the same where that has not changed."""
-    data = state.data(band.lines, without=band)
-    change = np.linalg.norm((data.own - band.data.own) * data.weight)
-    return fit_again(band, data) if anyway or change**2 >= SETTLED**2 * band.fit.sum_of_squares else band
-
-
-def _with(state: Extraction, old: FittedBand, new: FittedBand | None) -> Extraction:
-    bands = (new if band is old else band for band in state.bands)
-    return state if new is old else replace(state, bands=tuple(band for band in bands if band is not None))
 
 
 def _beside(state: Extraction, known: list[Resonance]) -> list[Resonance]:

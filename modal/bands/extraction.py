@@ -16,6 +16,8 @@ from modal.poles import StabilisationChart, stabilise
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 
+HELD = "held"
+"""Word for a mode whose frequency and damping ratio a person gave."""
 ORDERS = 10
 """Highest order of the LSCF models of a band, several times the modes that one holds."""
 
@@ -60,6 +62,8 @@ class FittedBand:
     """Complex residual terms in each FRF."""
     suspects: tuple[float, ...] = ()
     """Frequencies of modes that may stand here instead of those fitted, but are too uncertain (Hz)."""
+    by_hand: tuple[str, ...] = ()
+    """Word for what a person did to each mode, "" for nothing; empty where nobody chose modes of this band."""
 
     @property
     def lines(self) -> slice:

@@ -37,7 +37,11 @@ def fit_peaks(data: BandLines, resonances: Sequence[Resonance]) -> FittedBand | 
 
 
 def fit_again(band: FittedBand, data: BandLines) -> FittedBand | None:
-    """The modes of a band fitted to other data; None where none of them is left."""
+    """The modes of a band fitted to other data; None where none of them is left. Those that a person chose all stay."""
+    if band.by_hand:
+        poles, held = band.fit.poles, band.fit.held
+        fit = fit_band(data.frequency, data.own, data.weight, poles, band.terms, held)
+        return band if fit is None else replace(band, data=data, fit=fit)
     fitted = _fitted(data, band.fit.poles, band.height, band.terms)
     return None if fitted is None else replace(band, data=data, fit=fitted[0], height=fitted[1])
 

@@ -65,7 +65,8 @@ def _hidden(band: FittedBand) -> Array:
     share = np.array([HIDDEN * of_peak if of_noise > MORE_THAN_NOISE else 0.0 for of_peak, of_noise in left])
     share = np.zeros(share.size) if leaves_rounding(band) else share
     sizes = (share * np.abs(fit.constant)).ravel()
-    return np.concatenate([share * np.prod(fit.poles, axis=0), share * fit.damping_ratio, sizes, sizes])
+    free = np.where(fit.held, 0.0, share)
+    return np.concatenate([free * np.prod(fit.poles, axis=0), free * fit.damping_ratio, sizes, sizes])
 
 
 def leaves_rounding(band: FittedBand) -> bool:

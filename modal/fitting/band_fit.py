@@ -34,6 +34,8 @@ class BandFit:
     """Residuals of the weighted FRFs, each its real and then its imaginary part, shape (2 n p,)."""
     unasked: Array
     """Phases (rad) that complex constants would have where they were not asked for, shape (p, m); else 0."""
+    held: NDArray[np.bool_]
+    """Modes whose frequency and damping ratio were given and have no error, shape (m,)."""
 
     @cached_property
     def covariance(self) -> Array:

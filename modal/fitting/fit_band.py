@@ -6,6 +6,7 @@ import contextlib
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modal.fitting.band_fit import Array, BandFit, ComplexArray
 from modal.fitting.projected_band import FitAtPoles, ProjectedBand, projected_band
@@ -26,7 +27,12 @@ LEAST_SINGULAR = 1e-10
 
 
 def fit_band(
-    frequency: Array, receptance: ComplexArray, weight: Array, starts: Array, terms: int = LEAST_TERMS
+    frequency: Array,
+    receptance: ComplexArray,
+    weight: Array,
+    starts: Array,
+    terms: int = LEAST_TERMS,
+    held: NDArray[np.bool_] | None = None,
 ) -> BandFit | None:
     """Fit modes with complex constants (`Mode.receptance`) and L/f^2 + U + ... to FRFs; None where nothing fits.
 
@@ -36,7 +42,7 @@ def fit_band(
     f^4, ..., follow the tails of strong modes just outside the band.
 
     The linear unknowns are eliminated, f and zeta found by Levenberg-Marquardt. frequency (Hz) has shape (n,),
-    receptance (m/N) and weight (p, n), starts (Hz; damping ratios) (2, m).
+    receptance (m/N) and weight (p, n), starts (Hz; damping ratios) (2, m). held, (m,): modes that stay at their starts.
 
     Source: Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, 413; Kaufman (1975), BIT 15, 49 (Jacobian).
     """
@@ -44,7 +50,8 @@ def fit_band(
     if 2 * m + p * (2 * m + 2 * terms) >= 2 * receptance.size or m == 0:
         return None
     with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
-        state = _solved(projected_band(frequency, receptance, weight, terms), starts, is_complex=True)
+        fixed = np.zeros(m, bool) if held is None else held
+        state = _solved(projected_band(frequency, receptance, weight, terms, fixed), starts, is_complex=True)
         influence = None if state is None else _influence(state)
         return None if state is None or influence is None else _fit_of(state, influence)
     return None
@@ -61,7 +68,7 @@ def with_real_constants(fit: BandFit, frequency: Array, receptance: ComplexArray
     """
     allowed = AKAIKE * fit.constant.size * fit.sum_of_squares / fit.freedom
     with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
-        band = projected_band(frequency, receptance, weight, terms)
+        band = projected_band(frequency, receptance, weight, terms, fit.held)
         state = _solved(band, _poles_of_real(fit), is_complex=False)
         if state is not None and state.cost - fit.sum_of_squares <= allowed:
             across = fit.constant / state.constant
@@ -80,7 +87,7 @@ def values_nearby(
     if 2 * m + p * (2 * m + 2 * terms) >= 2 * receptance.size:
         return None
     with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
-        band = projected_band(frequency, receptance, weight, terms)
+        band = projected_band(frequency, receptance, weight, terms, fit.held)
         state, _ = _descended(band, fit.poles, bool(np.any(fit.constant.imag)), NEAR_TRIALS)
         return (state.poles, state.constant) if np.isfinite(state.cost) else None
     return None
@@ -105,6 +112,7 @@ def _fit_of(state: FitAtPoles, influence: Array) -> BandFit:
         influence,
         state.residual,
         np.zeros(state.constant.shape),
+        np.array(~state.free[: state.poles.shape[1]]),
     )
 
 
@@ -121,9 +129,9 @@ def _descended(band: ProjectedBand, starts: Array, is_complex: bool, trials: int
         if not np.isfinite(state.cost):
             break
         step, gain = _step(state, damping)
-        if gain < GAINED * state.cost / state.freedom or np.max(np.abs(step)) < CONVERGED:
+        if gain < GAINED * state.cost / state.freedom or np.max(np.abs(step), initial=0.0) < CONVERGED:
             return state, True
-        trial = band.at(state.poles + (step * state.scale).reshape(2, -1), is_complex)
+        trial = band.at(state.poles + state.spread(step * state.scale).reshape(2, -1), is_complex)
         if trial.cost < state.cost:
             state, damping = trial, damping / 10
         elif damping > 1e8 or np.max(np.abs(step)) < 1e-6:
@@ -134,7 +142,7 @@ def _descended(band: ProjectedBand, starts: Array, is_complex: bool, trials: int
 
 
 def _step(state: FitAtPoles, damping: float) -> tuple[Array, float]:
-    """Damped Gauss-Newton step in units of the scale, shape (2 m,), and the fall of the cost that it promises."""
+    """Damped Gauss-Newton step in units of the scale, shape (k,), and the fall of the cost that it promises."""
     jacobian = state.jacobian
     gram = jacobian.T @ jacobian
     norm = np.sqrt(np.diagonal(gram))
@@ -149,9 +157,10 @@ def _influence(state: FitAtPoles) -> Array | None:
     jacobian = state.jacobian
     norm = np.linalg.norm(jacobian, axis=0)
     left, singular, right = np.linalg.svd(jacobian / norm, full_matrices=False)
-    if not singular[-1] > LEAST_SINGULAR * singular[0]:
+    if not np.min(singular, initial=np.inf) > LEAST_SINGULAR * np.max(singular, initial=0.0):
         return None
-    on_poles = -(right.T / singular) @ left.T / norm[:, None]
+    steps = -(right.T / singular) @ left.T / norm[:, None]
+    on_poles = state.spread(steps)
     n = jacobian.shape[0] // len(state.frfs)
     on_constants = np.zeros((len(state.frfs), state.poles.size, jacobian.shape[0]))
     for i, frf in enumerate(state.frfs):
@@ -161,4 +170,5 @@ def _influence(state: FitAtPoles) -> Array | None:
     turn = np.exp(-1j * np.angle(state.constant))[:, :, np.newaxis]
     off = turn * (real + 1j * imaginary)
     width = jacobian.shape[0]
-    return np.concatenate([on_poles * state.scale[:, None], off.real.reshape(-1, width), off.imag.reshape(-1, width)])
+    errors = state.spread(steps * state.scale[:, None])
+    return np.concatenate([errors, off.real.reshape(-1, width), off.imag.reshape(-1, width)])

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modal.fitting.band_fit import Array, ComplexArray, split
 from modal.fitting.residual_terms import residual_powers
@@ -44,6 +45,8 @@ class FitAtPoles:
 
     poles: Array
     """Frequencies (Hz) and damping ratios, (2, m)."""
+    free: NDArray[np.bool_]
+    """Whether each of them may move, (2 m,)."""
     frfs: list[Projected]
 
     @cached_property
@@ -56,17 +59,17 @@ class FitAtPoles:
     @property
     def freedom(self) -> int:
         """Real values less unknowns."""
-        return int(self.residual.size - self.poles.size - sum(frf.unknowns for frf in self.frfs))
+        return int(self.residual.size - np.sum(self.free) - sum(frf.unknowns for frf in self.frfs))
 
     @property
     def scale(self) -> Array:
-        """What a step of one means: zeta f and zeta, (2 m,)."""
-        return np.concatenate([self.poles[0] * self.poles[1], self.poles[1]])
+        """What a step of one means: zeta f and zeta of those that may move, (k,)."""
+        return np.concatenate([self.poles[0] * self.poles[1], self.poles[1]])[self.free]
 
     @cached_property
     def jacobian(self) -> Array:
-        """Of all residuals by the scaled poles, (2 n p, 2 m)."""
-        return np.concatenate([frf.jacobian for frf in self.frfs])
+        """Of all residuals by the scaled poles that may move, (2 n p, k)."""
+        return np.concatenate([frf.jacobian[:, self.free] for frf in self.frfs])
 
     @cached_property
     def residual(self) -> Array:
@@ -80,6 +83,12 @@ class FitAtPoles:
         linear = np.array([frf.linear for frf in self.frfs])
         return np.asarray(linear + 0j if linear.shape[1] == m else linear[:, :m] + 1j * linear[:, m:])
 
+    def spread(self, values: Array) -> Array:
+        """Values (k, ...) of what may move, with 0 for all that may not, (2 m, ...)."""
+        everything = np.zeros((self.free.size, *values.shape[1:]))
+        everything[self.free] = values
+        return everything
+
 
 @dataclass(frozen=True, eq=False)
 class ProjectedBand:
@@ -92,10 +101,12 @@ class ProjectedBand:
     """Orthonormal basis of the residual terms of each FRF, (2 n, 2 terms)."""
     data: list[Array]
     """Values that they leave of each weighted FRF, (2 n,)."""
+    held: NDArray[np.bool_]
+    """Modes whose poles stay where they are, (m,)."""
 
     def at(self, poles: Array, is_complex: bool) -> FitAtPoles:
         """The best modal constants at these poles, (2, m)."""
-        return FitAtPoles(poles, list(self._projected(poles, is_complex)))
+        return FitAtPoles(poles, np.tile(~self.held, 2), list(self._projected(poles, is_complex)))
 
     def _projected(self, poles: Array, is_complex: bool) -> Iterator[Projected]:
         curves = _curves(self.frequency, poles)
@@ -111,12 +122,14 @@ class ProjectedBand:
             yield Projected(q, inverse, linear, data - q @ part, unknowns, _without(base, slope))
 
 
-def projected_band(frequency: Array, receptance: ComplexArray, weight: Array, terms: int) -> ProjectedBand:
-    """frequency (Hz) has shape (n,), receptance (m/N) and weight (p, n)."""
+def projected_band(
+    frequency: Array, receptance: ComplexArray, weight: Array, terms: int, held: NDArray[np.bool_]
+) -> ProjectedBand:
+    """frequency (Hz) has shape (n,), receptance (m/N) and weight (p, n), held (m,)."""
     columns = residual_powers(frequency, terms)
     bases = [_of_both_parts(np.linalg.qr((w * columns).T)[0]) for w in weight]
     data = [_without(base, values) for base, values in zip(bases, split(weight * receptance), strict=True)]
-    return ProjectedBand(frequency, weight, bases, data)
+    return ProjectedBand(frequency, weight, bases, data, held)
 
 
 def _of_both_parts(base: Array) -> Array:

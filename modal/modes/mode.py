@@ -134,10 +134,12 @@ class Mode:
 
     @property
     def correlation(self) -> NDArray[np.float64]:
-        """Correlations of the errors, shape (3, 3); NaN where not estimated."""
+        """Correlations of the errors, shape (3, 3); NaN where not estimated, 0 with a value that has no error."""
         if self.best_covariance is None:
             return np.full((3, 3), np.nan)
-        return np.asarray(self.best_covariance / np.outer(self.standard_error, self.standard_error))
+        correlation = ratio_or_zero(self.best_covariance, np.outer(self.standard_error, self.standard_error))
+        np.fill_diagonal(correlation, 1.0)
+        return correlation
 
     def quantile(self, level: float = 0.95) -> float:
         """Standard errors to either side of a value that hold the truth with this probability (-); see interval."""
@@ -172,6 +174,11 @@ class Mode:
         r, zeta, constant = np.asarray(frequency) / self.frequency, self.damping_ratio, self.constant
         turned = constant.imag * (zeta + 1j * r) / np.sqrt(1 - zeta**2) if constant.imag else 0.0
         return np.asarray((constant.real + turned) / (1 - r**2 + 2j * zeta * r))
+
+
+def ratio_or_zero(value: NDArray[np.float64], error: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Values over errors; 0 where a value has none."""
+    return np.divide(value, error, out=np.zeros(value.shape), where=error != 0)
 
 
 def _root_of_diagonal(covariance: NDArray[np.float64] | None) -> NDArray[np.float64]:

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Remark
-from modal.bands.extraction import Extraction, FittedBand
+from modal.bands.extraction import HELD, Extraction, FittedBand
 from modal.bands.fit_peaks import LARGEST_ERROR
 from modal.bands.left_about import left_about
 from modal.fitting import LEAST_TERMS
 from modal.modes.common_delay import common_delay
-from modal.modes.mode import Mode
+from modal.modes.mode import Mode, ratio_or_zero
 from modal.quality.trust import MISFIT, MISFIT_SHARE, most_left, relative_error, trust_rules
 
 LEAST_COHERENCE = 0.9
@@ -45,9 +45,19 @@ def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
         half_power_damping=_half_power_damping(band, mode),
     )
     remarks = chain(
-        _on_its_place(state, band, i, judged), _on_its_values(band, i, judged, share), _on_its_errors(judged)
+        _by_hand(band, i, judged),
+        _on_its_place(state, band, i, judged),
+        _on_its_values(band, i, judged, share),
+        _on_its_errors(judged),
     )
     return replace(judged, remarks=tuple(remarks))
+
+
+def _by_hand(band: FittedBand, i: int, mode: Mode) -> Iterator[Remark]:
+    word = band.by_hand[i] if band.by_hand else ""
+    if word:
+        text = "f_n and zeta held by hand, known without error" if word == HELD else f"{word} by hand"
+        yield Remark("by-hand", _name(mode), text)
 
 
 def _coherence(state: Extraction, mode: Mode) -> float | None:
@@ -145,8 +155,9 @@ def _on_its_errors(mode: Mode) -> Iterator[Remark]:
     if mode.coherence is not None and mode.coherence < LEAST_COHERENCE:
         text = f"coherence {mode.coherence:.2f} at its peak, below {LEAST_COHERENCE:g}: the hits disagree"
         yield Remark("low-coherence", at, text, "hit one point in one direction")
-    if mode.jackknife is not None and np.max(mode.standard_error / mode.fit_error) > LARGEST_SCATTER:
-        text = f"scatters {np.max(mode.standard_error / mode.fit_error):.1f} times more from hit to hit than in the fit"
+    scatter = 0.0 if mode.jackknife is None else np.max(ratio_or_zero(mode.standard_error, mode.fit_error))
+    if scatter > LARGEST_SCATTER:
+        text = f"scatters {scatter:.1f} times more from hit to hit than in the fit"
         yield Remark("scatter", at, text, "hit one point in one direction, equally hard")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from dsm import plus_minus
 from lobewatch.show.figures.style import ALARM, NOW, STYLE, THEN
-from modal import Extraction, FittedBand, Mode, Trust, trust_of
+from modal import Extraction, FittedBand, Mode, Trust, candidates, survey, trust_of
 
 COLUMNS = 4
 """Circles in a row."""
@@ -25,6 +24,8 @@ LEAST_APART = 0.014
 """Between labels of modes that are close (share of the axis)."""
 LEGEND = 0.08
 """Room for it below all lines (share of the axis)."""
+HIGHEST = 10.5
+"""Just above the poles of the highest order."""
 REACH = 3.0
 """A circle is drawn over this many half-power half-widths on either side."""
 
@@ -34,7 +35,8 @@ MARKS = {Trust.TRUSTED: "", Trust.DOUBTFUL: " ?", Trust.REJECTED: " -"}
 
 
 def modes_figure(state: Extraction, modes: Sequence[Mode], title: str) -> Figure:
-    """|Accelerance| measured, fitted and what is left; LSCF poles of every order; circle and phase of each mode."""
+    """|Accelerance| measured, fitted and what is left; LSCF poles of every order, with those named that are stable but
+    no modes; circle and phase of each mode."""
     circles = sorted(modes, key=_rank)[:MOST_CIRCLES]
     rows = -(-len(circles) // COLUMNS)
     with mpl.rc_context(STYLE):
@@ -100,20 +102,23 @@ def _apart(places: Sequence[float], least: float) -> list[float]:
 
 
 def _draw_chart(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
-    for i, band in enumerate(state.bands):
-        chart, ends = band.data.chart, state.frf.frequency[band.lines][[0, -1]]
-        axes.axvspan(*ends, color=THEN, alpha=0.10, lw=0)
-        for stable, mark, colour, label in ((False, "x", THEN, "pole"), (True, "o", NOW, "stable pole")):
-            at = chart.stable == stable
-            style: dict[str, Any] = {"color": colour, "ms": 3, "ls": "", "label": label if i == 0 else None}
-            axes.plot(chart.frequency[at], chart.order[at], mark, **style)
+    for band in state.bands:
+        axes.axvspan(*state.frf.frequency[band.lines][[0, -1]], color=THEN, alpha=0.10, lw=0)
+        chart = band.data.chart
+        axes.plot(chart.frequency[~chart.stable], chart.order[~chart.stable], "x", color=THEN, ms=3)
+    for chart in survey(state):
+        axes.plot(chart.frequency[chart.stable], chart.order[chart.stable], "o", color=NOW, ms=3)
+    axes.plot([], [], "x", color=THEN, ms=3, label="pole (in the bands)")
+    axes.plot([], [], "o", color=NOW, ms=3, label="stable pole")
     for mode in modes:
         axes.axvline(mode.frequency, color=NOW, lw=0.6)
-    axes.set(xlabel="frequency (Hz); grey: the bands fitted; ?: doubtful, -: rejected", ylabel="order")
-    axes.set_ylim(0, 13)
+    others = candidates(state)
+    for frequency, place in zip(others, _apart(others.tolist(), LEAST_APART * np.ptp(axes.get_xlim())), strict=True):
+        axes.annotate(_hertz(frequency), (place, HIGHEST), rotation=90, ha="center", va="bottom", fontsize=7, color=NOW)
+    axes.set(xlabel="frequency (Hz); grey: the bands fitted; ?: doubtful, -: rejected; blue: no mode yet")
+    axes.set(ylabel="order", ylim=(0, HIGHEST + 3))
     axes.yaxis.set_major_locator(MultipleLocator(2))
-    if state.bands:
-        axes.legend(loc="upper right", ncols=2)
+    axes.legend(loc="lower right", ncols=2, frameon=True, framealpha=0.9, edgecolor="none")
 
 
 def _draw_circles(figure: Figure, grid: GridSpec, state: Extraction, modes: Sequence[Mode]) -> None:

@@ -17,7 +17,7 @@ from lobewatch.measuring import remarks_on_all
 from lobewatch.show.figures.mode_figures import modes_figure
 from lobewatch.show.spindle.describe_modes import mode_lines, mode_table, picked_table, remark_lines
 from lobewatch.show.terminal.output import results
-from modal import Mode, extract, fit_modes, pick_peaks, synthesize
+from modal import Mode, candidates, edit_modes, extract, fit_modes, modes_of, parse_edits, pick_peaks, synthesize
 
 LINES = np.arange(5.0, 4000.0, 5.0)
 MODES = [Mode(900.0, 0.02, 4e7), Mode(1722.0, 0.03, -3.5e7)]
@@ -75,7 +75,7 @@ def test_figure_draws_fit_residual_poles_and_circles() -> None:
     assert measured == pytest.approx(np.abs(frf.accelerance))
     assert fitted == pytest.approx(np.abs(frf.accelerance[part]), abs=6e-3 * np.max(measured))
     assert np.sqrt(np.mean(left**2)) == pytest.approx(np.sqrt(2) * 1e-3 * np.max(measured), rel=0.2)
-    stable = np.asarray(chart.lines[1].get_xdata())
+    stable = np.concatenate([line.get_xdata() for line in chart.lines if line.get_marker() == "o"])
     assert np.any(np.abs(stable - 900) < 1)
     points, circle, phase = (
         np.asarray(line.get_xydata()) for line in circles[0].lines if line.get_label() in ("measured", "fit", "phase")
@@ -157,3 +157,11 @@ def test_a_delay_between_the_channels_is_offered_as_skew(skew: float) -> None:
     found = re.search(r"sampled (-?[\d.]+) ± ([\d.]+) us late", said.text)
     assert found is not None
     assert float(found[1]) == pytest.approx(1e6 * skew, abs=float(found[2]))
+
+
+def test_figure_names_stable_poles_that_are_no_modes() -> None:
+    modes = [*MODES, Mode(2800.0, 0.005, 1e8)]
+    state = edit_modes(extract([synthesize(modes, LINES)]), parse_edits(drop=["2800"]))
+    chart = modes_figure(state, modes_of(state), "x").axes[1]
+    assert "2800" in [text.get_text() for text in chart.texts]
+    assert candidates(state) == pytest.approx([2800.0], rel=1e-3)

@@ -1,0 +1,88 @@
+"""What a person says of the modes of an FRF."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class ModeEdits:
+    """Modes that are added, left out, or held by hand; ValueError for values that no mode has, or that stand twice."""
+
+    add: tuple[float, ...] = ()
+    """Frequencies near which a further mode is fitted (Hz)."""
+    drop: tuple[float, ...] = ()
+    """Frequencies of modes that are left out (Hz)."""
+    fix: tuple[tuple[float, float], ...] = ()
+    """Natural frequencies (Hz) and damping ratios that modes are held at; their modal constants are fitted."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no frequency or damping ratio, and what stands twice."""
+        for name, frequency in self._frequencies():
+            if not (isfinite(frequency) and frequency > 0):
+                raise ValueError(f"{name} {frequency:g}: is no frequency > 0; give it in Hz")
+        for frequency, zeta in self.fix:
+            if not 0 < zeta < 1:
+                raise ValueError(f"fix {frequency:g}:{zeta:g}: the damping ratio is not between 0 and 1; 3 % is 0.03")
+        named: dict[float, str] = {}
+        for name, frequency in self._frequencies():
+            if frequency in named:
+                both = f"{name} twice" if named[frequency] == name else f"{named[frequency]} and {name}"
+                raise ValueError(f"{frequency:g} Hz: {both}; say one thing of one mode")
+            named[frequency] = name
+
+    def _frequencies(self) -> Iterator[tuple[str, float]]:
+        yield from (("add", frequency) for frequency in self.add)
+        yield from (("drop", frequency) for frequency in self.drop)
+        yield from (("fix", frequency) for frequency, _ in self.fix)
+
+    def __bool__(self) -> bool:
+        """Whether anything is said."""
+        return bool(self.add or self.drop or self.fix)
+
+    def __str__(self) -> str:
+        """As options say it, without their dashes: "add 298, drop 412, fix 1500:0.03"."""
+        words = [f"{name} {frequency:.10g}" for name, frequency in self._frequencies()]
+        dampings = ["" for _ in (*self.add, *self.drop)] + [f":{zeta:.10g}" for _, zeta in self.fix]
+        return ", ".join(map("".join, zip(words, dampings, strict=True)))
+
+    def under_window(self, time_constant: float) -> ModeEdits:
+        """The same of an FRF whose response is under exp(-t/time_constant) (s), which adds to the damping held."""
+        return ModeEdits(self.add, self.drop, tuple(_under_window(*held, time_constant) for held in self.fix))
+
+
+def _under_window(frequency: float, zeta: float, time_constant: float) -> tuple[float, float]:
+    """Its damped frequency stays."""
+    size = 2 * np.pi * frequency
+    decay = zeta * size + 1 / time_constant
+    w = float(np.hypot(decay, size * np.sqrt(1 - zeta**2)))
+    return w / (2 * np.pi), decay / w
+
+
+def parse_edits(
+    add: Sequence[str] | None = None, drop: Sequence[str] | None = None, fix: Sequence[str] | None = None
+) -> ModeEdits:
+    """Edits from "298" (Hz) and "1500:0.03" (Hz and damping ratio); ValueError for any other text."""
+    pairs = [
+        _numbers("fix", text, "the frequency in Hz and the damping ratio, as in 1500:0.03", 2) for text in fix or ()
+    ]
+    return ModeEdits(
+        tuple(_numbers("add", text, "the frequency in Hz, as in 298.5", 1)[0] for text in add or ()),
+        tuple(_numbers("drop", text, "the frequency in Hz, as in 412", 1)[0] for text in drop or ()),
+        tuple((frequency, zeta) for frequency, zeta in pairs),
+    )
+
+
+def _numbers(name: str, text: str, wanted: str, count: int) -> list[float]:
+    try:
+        numbers = [float(word) for word in text.split(":")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count:
+        point = "; write decimals with a point" if "," in text else ""
+        raise ValueError(f"--{name} {text}: give {wanted}{point}")
+    return numbers

@@ -14,6 +14,9 @@ import typer
 import acquisition
 
 Command = Callable[..., None]
+Add = Annotated[list[str] | None, typer.Option(help="Fit a further mode near this frequency (Hz); may be repeated.")]
+Drop = Annotated[list[str] | None, typer.Option(help="Leave out the mode at this frequency (Hz); may be repeated.")]
+Fix = Annotated[list[str] | None, typer.Option(help="Hold a mode at Hz:zeta, as in 1500:0.03, and fit its K alone.")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,6 +91,13 @@ def takes_file_options(*, without: Iterable[str] = ()) -> Callable[[Command], Co
         return run
 
     return decorate
+
+
+def refuse_file_options(options: FileOptions, **others: Any) -> None:
+    """ValueError where one of these options is given though nothing has to be said of a file."""
+    for name, value in (vars(options) | others).items():
+        if value is not None and value not in ("", False):
+            raise ValueError(f"--{name.replace('_', '-')}: says how a file is read; a stored tap test says it itself")
 
 
 def _words(text: str) -> tuple[str, ...]:

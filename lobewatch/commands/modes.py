@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from lobewatch.commands.file_options import FileOptions, takes_file_options
+from lobewatch.commands.file_options import Add, Drop, FileOptions, Fix, refuse_file_options, takes_file_options
 from lobewatch.show.terminal.output import Json, emit
 
 
@@ -17,6 +18,12 @@ def modes(
         Path,
         typer.Argument(help="Recorded hits or an FRF: tap file, UFF, MAT, LVM, text, NumPy, HDF5, TDMS, WAV, SEP005."),
     ],
+    tap: Annotated[
+        str,
+        typer.Argument(
+            help="Where FILE is a machine folder: its tap test, by its identity or a part that no other has."
+        ),
+    ] = "",
     band: Annotated[tuple[float, float] | None, typer.Option(help="Only between these frequencies (Hz).")] = None,
     figure: Annotated[
         Path | None, typer.Option(help="Draw FRF, fit and poles to this file (.svg, .png, .pdf).")
@@ -42,6 +49,12 @@ def modes(
     conjugate: Annotated[
         bool, typer.Option("--conjugate", help="The file holds the complex conjugate of response over force.")
     ] = False,
+    add: Add = None,
+    drop: Drop = None,
+    fix: Fix = None,
+    by_fit: Annotated[
+        bool, typer.Option("--by-fit", help="Take back what --add, --drop and --fix have said of TAP.")
+    ] = False,
     everything: Annotated[
         bool, typer.Option("--all", help="Show the rejected modes, too, and every remark on each mode.")
     ] = False,
@@ -52,7 +65,9 @@ def modes(
     Each by a least-squares fit with standard errors, over the hits where the file holds three or more, and beside it
     by the peak picking of Gaber & Hashemi (2015). Trusted modes come first, then doubtful ones with the reason; the
     rejected ones are counted. Hits that still ring when their record ends get an exponential window, and its damping
-    is taken off again.
+    is taken off again. Modes can be added, left out and held; the picture names poles that may be modes. What is said
+    so of a file is only shown; of a tap test of a machine it is kept, in place of what was said of it before, and all
+    that follows from it is worked out anew.
 
     Examples:
 
@@ -60,16 +75,33 @@ def modes(
       lobewatch modes tap.h5 --band 1200 2200 --figure modes.png
       lobewatch modes frf.csv --window 0.05 --hit-at 0.01
       lobewatch modes h.mat --response 2 --unit g/N
+      lobewatch modes frf.csv --add 298 --fix 1500:0.03 --figure stable.png
+      lobewatch modes mill-3 20261102T0914 --drop 412
     """
+    from lobewatch.logbook import Logbook
+    from lobewatch.logbook.chosen_modes import choice_of, modes_of_tap
     from lobewatch.measuring import Window, modes_of_file
+    from lobewatch.notify.telling import telling
     from lobewatch.show.spindle.describe_modes import file_modes_json, file_modes_texts
+    from modal import parse_edits
 
-    of_window = window is not None or hit_at is not None or window_start != 0
-    taken_off = Window(float("nan") if window is None else window, window_start, hit_at) if of_window else None
-    description = file_options.description(averages=averages)
-    file_modes = modes_of_file(
-        file, band, window=taken_off, conjugate=conjugate, accept=accept or (), description=description
-    )
+    edits = parse_edits(add, drop, fix)
+    taken_off = Window.said(window, window_start, hit_at)
+    if tap:
+        refuse_file_options(
+            file_options, band=band, window=taken_off, averages=averages, accept=accept, conjugate=conjugate
+        )
+        logbook, choice = Logbook.open(file), choice_of(edits, by_fit)
+        with nullcontext() if choice is None else telling(logbook):
+            file_modes = modes_of_tap(logbook, tap, choice)
+    elif by_fit or file.is_dir():
+        text = "--by-fit takes back what is kept of a tap test" if by_fit else f"{file} is a folder"
+        raise ValueError(f"{text}; name a tap test: lobewatch modes MACHINE TAP (lobewatch history lists them)")
+    else:
+        said, accepted = file_options.description(averages=averages), accept or ()
+        file_modes = modes_of_file(
+            file, band, window=taken_off, conjugate=conjugate, accept=accepted, description=said, by_hand=edits
+        )
     if figure is not None:
         from lobewatch.show.figures.mode_figures import modes_figure
         from lobewatch.show.figures.style import save_figure

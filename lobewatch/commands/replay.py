@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from lobewatch.commands.file_options import FileOptions, takes_file_options
+from lobewatch.commands.file_options import Add, Drop, FileOptions, Fix, takes_file_options
 from lobewatch.machine.folder_path import named_folder
 from lobewatch.show.terminal.output import Json, note_remarks
 
@@ -49,6 +49,9 @@ def replay(
         list[str] | None,
         typer.Option(help="Take these recordings though they raise this question, by its code; as often as needed."),
     ] = None,
+    add: Add = None,
+    drop: Drop = None,
+    fix: Fix = None,
     temperature: Annotated[float | None, typer.Option(help="Of the spindle then, degC.")] = None,
     hours: Annotated[float | None, typer.Option(help="Running hours of the spindle then, h.")] = None,
     note: Annotated[str, typer.Option(help="What else is to be remembered of these tests.")] = "",
@@ -59,7 +62,8 @@ def replay(
 
     All files are read and judged before the first one is stored, in order of their dates. What a file does not say is
     asked for by the name of an option, never guessed. A recording that is implausible for the machine is stored too,
-    and asked about; --accept answers, at once or later: then with the file of the tap test.
+    and asked about; --accept answers, at once or later: then with the file of the tap test. --add, --drop and --fix
+    are kept with each test (lobewatch modes MACHINE TAP shows and changes them).
 
     Examples:
 
@@ -70,15 +74,17 @@ def replay(
     """
     from acquisition import Conditions, DataError
     from lobewatch.logbook import Logbook
+    from lobewatch.logbook.chosen_modes import keep_edits, refuse_edits
     from lobewatch.logbook.preview import preview_recordings
     from lobewatch.logbook.replaying.find_files import find_files
     from lobewatch.logbook.replaying.store import refusal
     from lobewatch.measuring.questions import check_codes, unasked_text
     from lobewatch.measuring.workers.share_work import Workers
     from lobewatch.notify.telling import telling
-    from lobewatch.show.replays.describe_preview import preview_refusal, show_preview
+    from lobewatch.show.replays.describe_preview import show_preview
     from lobewatch.show.replays.describe_replay import show_replay
     from lobewatch.show.replays.progress import ReplayProgress
+    from modal import parse_edits
 
     description = file_options.description(
         date=date,
@@ -87,24 +93,22 @@ def replay(
         direction=direction,
         conditions=Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped),
     )
-    workers = Workers(jobs, scheduler)
-    note_remarks(workers.remarks)
+    note_remarks((workers := Workers(jobs, scheduler)).remarks)
     logbook, (recordings, passed) = Logbook.open(machine), find_files(files)
+    codes, edits = check_codes(accept or ()), parse_edits(add, drop, fix)
     if dry_run:
+        refuse_edits(edits)
         with ReplayProgress() as bar:
             previews = preview_recordings(logbook, recordings, description, bar, workers)
         show_preview(previews, passed, as_json=as_json)
-        if any(preview.refused for preview in previews):
-            raise DataError(preview_refusal(previews))
         return
-    codes = check_codes(accept or ())
     with telling(logbook):
         with ReplayProgress() as bar:
             outcome = logbook.replay_all(recordings, description, workers=workers, keep_going=keep_going, progress=bar)
+        not_chosen = keep_edits(logbook, outcome.tap_ids, edits)
         unasked = logbook.accept(outcome.tap_ids, codes)
         accepted = [code for code in codes if code not in unasked]
         show_replay(outcome, logbook, len(recordings), passed, accepted, as_json=as_json)
-        if outcome.refused:
-            raise DataError(refusal(outcome.refused, len(recordings), stored=True))
-        if unasked:
-            raise ValueError(unasked_text(unasked, outcome.tap_ids, logbook.questions))
+        wrong = outcome.refused and refusal(outcome.refused, len(recordings), stored=True)
+        if wrong or not_chosen or unasked:
+            raise DataError(wrong or not_chosen or unasked_text(unasked, outcome.tap_ids, logbook.questions))

@@ -13,7 +13,7 @@ from acquisition import UNSAID, Conditions, Remark
 from dsm import Calibration
 from lobewatch.machine import Machine
 from lobewatch.measuring.estimate import UNKNOWN, Estimate
-from lobewatch.measuring.measurement import Measurement
+from lobewatch.measuring.measurement import BY_HAND, Measurement
 from lobewatch.measuring.questions import accepted_codes, open_questions
 from lobewatch.measuring.workers.software import SOFTWARE
 from lobewatch.tool.assembly import Assembly
@@ -91,6 +91,11 @@ class Row:
     def accepted(self) -> frozenset[str]:
         """Codes of the questions that were answered."""
         return accepted_codes(self.remarks)
+
+    @cached_property
+    def by_hand(self) -> str:
+        """What a person said of its modes, in the words of `ModeEdits`; empty where nobody did."""
+        return next((remark.about for remark in self.remarks if remark.code in BY_HAND), "")
 
     @property
     def followed(self) -> Values:

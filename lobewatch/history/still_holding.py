@@ -25,10 +25,10 @@ from lobewatch.tool.series import FollowedMode
 
 
 def is_of(row: Row, place: Place) -> bool:
-    """Whether a row was made of this tap test, with all that was accepted of it, since the same baseline."""
+    """Whether a row was made of this tap test, with all that a person said of it, since the same baseline."""
     tap = place.entry
-    ground_of_row = row.tap_id, row.baseline, row.series, row.accepted
-    return ground_of_row == (tap.id, place.baseline, place.series, frozenset(tap.accepted))
+    ground_of_row = row.tap_id, row.baseline, row.series, row.accepted, row.by_hand
+    return ground_of_row == (tap.id, place.baseline, place.series, frozenset(tap.accepted), str(tap.by_hand))
 
 
 class _Ground(NamedTuple):

@@ -54,7 +54,7 @@ class TapMeasurements:
         fit = self._fits.get(place.entry.id)
         if fit is not None:
             return interpret_fit(fit, self._folder.machine, last)
-        return measure(self._folder.read(place.entry), self._folder.machine, last)
+        return measure(self._folder.read(place.entry), self._folder.machine, last, place.entry.by_hand)
 
     def assembly_after(self, place: Place, rows: Sequence[Row]) -> Assembly:
         """The tool of one tap test as it was known then."""

@@ -17,13 +17,15 @@ from lobewatch.history.usable_taps import UsableTaps
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.replaying.store import ReplayOutcome, store_recordings
 from lobewatch.machine import DamagedTapError, Machine, MachineFolder, TapEntry
+from lobewatch.machine.additions.keep_modes import keep_modes
 from lobewatch.machine.archive.verify import enter_explained
 from lobewatch.machine.journal.heard_cut import HeardCut
-from lobewatch.measuring.measurement import Measurement, TapFit
+from lobewatch.measuring.measurement import NOT_APPLIED, Measurement, TapFit, fit_tap
 from lobewatch.measuring.questions import accept, clock_questions
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.advice import Advice
 from lobewatch.verdicts.verdict import Ruling, Verdict
+from modal import ModeEdits
 
 P = ParamSpec("P")
 Answer = TypeVar("Answer")
@@ -188,6 +190,19 @@ class Logbook:
         if len(unasked) < len(codes):
             self._forget()
         return unasked
+
+    def choose_modes(self, tap_ids: Sequence[str], edits: ModeEdits) -> dict[str, str]:
+        """Keep what a person says of the modes of these tap tests, for good; the reasons why it cannot be of some.
+
+        Edits that say nothing take back what was said before.
+        """
+        entries = {tap_id: self.files.by_id[tap_id] for tap_id in tap_ids}
+        fits = {tap_id: fit_tap(self.folder.read(entry), self.machine, edits) for tap_id, entry in entries.items()}
+        reasons = {name: said.text for name, fit in fits.items() for said in fit.remarks if said.code == NOT_APPLIED}
+        keep_modes(self.folder, [tap_id for tap_id in fits if tap_id not in reasons], edits)
+        self.fits |= {tap_id: fit for tap_id, fit in fits.items() if tap_id not in reasons}
+        self._forget()
+        return reasons
 
     def _forget(self) -> None:
         """What is on the disk has changed."""

@@ -90,7 +90,7 @@ def modes_of(tap: TapBytes) -> TapFit | None:
         path = Path(work) / "tap.h5"
         path.write_bytes(tap.content)
         try:
-            return fit_tap(read_tap(path), _machine(tap.machine_toml))
+            return fit_tap(read_tap(path), _machine(tap.machine_toml), tap.entry.by_hand)
         except DataError:
             return None
 

@@ -3,7 +3,7 @@
 from .archive.verify import verify
 from .folder import MachineFolder
 from .folder_lock import BusyError
-from .journal.tap_entry import DamagedTapError, TapEntry
+from .journal.tap_entry import BY_FIT, DamagedTapError, TapEntry
 from .known_devices import checked_rate, has_clock, known_rate, use_rate
 from .new_folder import make_machine_folder
 from .settings.cut_tables import CutTable, ProgramTable
@@ -14,6 +14,7 @@ from .settings.machine_file import REFERENCE_CUT, Machine
 from .settings.setup_tables import Limits, SpeedRange, TapSetup
 
 __all__ = [
+    "BY_FIT",
     "REFERENCE_CUT",
     "BusyError",
     "CutTable",

@@ -19,7 +19,8 @@ from lobewatch.machine.journal.exclusion import exclusion_reasons
 from lobewatch.machine.journal.heard_cut import HeardCut, RecordingFile, cuts_of
 from lobewatch.machine.journal.journal import JOURNAL, Reading, command, journal_damage
 from lobewatch.machine.journal.known_scatter import KnownScatter, known_scatters_of
-from lobewatch.machine.journal.tap_entry import TapEntry, tap_entries
+from lobewatch.machine.journal.mode_choice import mode_choices
+from lobewatch.machine.journal.tap_entry import BY_FIT, TapEntry, tap_entries
 
 PROVED_BYTES, PROVED_FILES = 10_000_000, 50
 """Tap files whose SHA-256 is compared whenever a machine is looked at, the newest first, as long as they are neither
@@ -102,14 +103,16 @@ def committed_cuts(reading: Reading) -> tuple[HeardCut, ...]:
 def committed_taps(reading: Reading) -> dict[str, TapEntry]:
     """Tap tests of the journal by identity."""
     accepted: dict[str, tuple[str, ...]] = {}
-    excluded = exclusion_reasons(reading.others)
     for line in reading.others:
         if line["kind"] == "accept":
             accepted[line["tap"]] = (*accepted.get(line["tap"], ()), line["code"])
-    entries = {entry.id: entry for entry in tap_entries(reading.taps, accepted, excluded)}
+    excluded, by_hand = exclusion_reasons(reading.others), mode_choices(reading.others)
+    entries = {entry.id: entry for entry in tap_entries(reading.taps, accepted, excluded, by_hand)}
     for line in reading.others:
         if line["kind"] == "tap":
-            entries[line["id"]] = TapEntry.from_line(line, accepted.get(line["id"], ()), excluded.get(line["id"], ""))
+            name = line["id"]
+            later = accepted.get(name, ()), excluded.get(name, ""), by_hand.get(name, BY_FIT)
+            entries[name] = TapEntry.from_line(line, *later)
     return entries
 
 

@@ -13,10 +13,13 @@ from threadpoolctl import ThreadpoolController
 
 from acquisition import Remark, TapTest
 from dsm import Calibration, calibrate, modal_stiffness
-from lobewatch.machine import Machine
+from lobewatch.machine import BY_FIT, Machine
 from lobewatch.measuring.questions import frequency_jump, no_mode_in_band, other_band, stiffness_off_model
-from modal import Believed, Mode, believed, fit_modes, follow, predominant
+from modal import Believed, Extraction, Mode, ModeEdits, believed, edit_modes, extract, follow, modes_of, predominant
 
+NOT_APPLIED = "hand-not-applied"
+BY_HAND = ("modes-by-hand", NOT_APPLIED)
+"""Codes of the remarks on what a person said of the modes of a tap test, which they are about."""
 BEARING_STIFFNESSES = (1e5, 1e11)
 """Range that is believed of a calibrated model (N/m): from a plain bearing on a soft seat to a rigid seat."""
 LARGEST_RATIO = 2.0
@@ -75,22 +78,44 @@ def _threads() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def measure(tap: TapTest, machine: Machine, last: Mode | None = None) -> Measurement:
-    """Measurement of one tap test; last: the mode that was followed in the test before."""
-    return interpret_fit(fit_tap(tap, machine), machine, last)
+def measure(tap: TapTest, machine: Machine, last: Mode | None = None, by_hand: ModeEdits = BY_FIT) -> Measurement:
+    """Measurement of one tap test; last: the mode that was followed in the test before; by_hand: as `fit_tap`."""
+    return interpret_fit(fit_tap(tap, machine, by_hand), machine, last)
 
 
-def fit_tap(tap: TapTest, machine: Machine) -> TapFit:
-    """The modes of one tap test: most of the work, and the part that needs no other tap test."""
+def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = BY_FIT) -> TapFit:
+    """The modes of one tap test: most of the work, and the part that needs no other tap test.
+
+    by_hand: what a person said of its modes; where that cannot be done the modes are those of the fit, and a remark
+    says so.
+    """
     about, band = tap.circumstances, other_band(tap.frf, machine)
     remarks = () if band is None else (band,)
     named = (tap.id, about.created, about.tool, about.direction)
     with _threads().limit(limits=1):
         try:
-            return TapFit(*named, fit_modes(tap.frf, hits=tap.accepted), remarks)
+            state = extract([tap.frf])
+            state, said = _edited(state, by_hand)
+            return TapFit(*named, modes_of(state, [tap.accepted]), (*remarks, *said))
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")
             return TapFit(*named, (), (*remarks, failure, no_mode_in_band((), machine)), failed=True)
+
+
+def _edited(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tuple[Remark, ...]]:
+    """An extraction as a person says, or as it is where that cannot be done, with a remark."""
+    if not by_hand:
+        return state, ()
+    try:
+        return edit_modes(state, by_hand), (about_hand(by_hand),)
+    except ValueError as error:
+        cure = "say it anew with lobewatch modes MACHINE TAP, or --by-fit to take it back"
+        return state, (Remark("hand-not-applied", str(by_hand), str(error), cure),)
+
+
+def about_hand(by_hand: ModeEdits) -> Remark:
+    """Remark on modes that a person chose."""
+    return Remark("modes-by-hand", str(by_hand), "modes chosen by hand")
 
 
 def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:

@@ -10,8 +10,11 @@ from typing import Any, Self
 import msgspec
 
 from acquisition import UNSAID, Conditions, DataError, Remark, TapTest
+from modal import ModeEdits
 
-LATER = ("accepted", "excluded")
+BY_FIT = ModeEdits()
+"""Nobody chose modes."""
+LATER = ("accepted", "excluded", "by_hand")
 """Fields of a tap test that other lines of the journal say."""
 TAP_LINE = b'{"kind": "tap", '
 """Beginning of the line of a tap test."""
@@ -53,6 +56,8 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
     """Questions about it that a person has accepted, by code; lines of their own."""
     excluded: str = ""
     """Reason why a person has taken it out of the series; empty where it counts; lines of their own."""
+    by_hand: ModeEdits = BY_FIT
+    """Modes of it that a person chose; lines of their own."""
 
     @classmethod
     def of(cls, tap: TapTest, content: bytes) -> Self:
@@ -64,10 +69,13 @@ class TapEntry(msgspec.Struct, frozen=True, gc=False):
         return cls(tap.id, digest, len(content), *labels, source, about.conditions, operator=about.operator)
 
     @classmethod
-    def from_line(cls, line: dict[str, Any], accepted: tuple[str, ...] = (), excluded: str = "") -> Self:
+    def from_line(
+        cls, line: dict[str, Any], accepted: tuple[str, ...] = (), excluded: str = "", by_hand: ModeEdits = BY_FIT
+    ) -> Self:
         """Entry of the line of the journal that `line` has made."""
         fields = line if line.get("conditions") else {key: line[key] for key in line if key != "conditions"}
-        return msgspec.convert({**fields, "accepted": accepted, "excluded": excluded}, cls)
+        entry = msgspec.convert({**fields, "accepted": accepted, "excluded": excluded}, cls)
+        return msgspec.structs.replace(entry, by_hand=by_hand)
 
     @property
     def line(self) -> dict[str, Any]:
@@ -100,7 +108,10 @@ _decode = msgspec.json.Decoder(list[_Line]).decode
 
 
 def tap_entries(
-    lines: Iterable[bytes], accepted: Mapping[str, tuple[str, ...]], excluded: Mapping[str, str]
+    lines: Iterable[bytes],
+    accepted: Mapping[str, tuple[str, ...]],
+    excluded: Mapping[str, str],
+    by_hand: Mapping[str, ModeEdits],
 ) -> Iterator[TapEntry]:
     """Entries of lines of the journal that begin with `TAP_LINE`, and what others say of them, by identity.
 
@@ -109,5 +120,5 @@ def tap_entries(
     for line in _decode(b"[" + b",".join(lines) + b"]"):
         conditions = msgspec.convert(line.conditions, Conditions) if line.conditions else UNSAID
         file, labels = (line.id, line.sha256, line.size), (line.time, line.tool, line.direction)
-        later = accepted.get(line.id, ()), excluded.get(line.id, "")
+        later = accepted.get(line.id, ()), excluded.get(line.id, ""), by_hand.get(line.id, BY_FIT)
         yield TapEntry(*file, *labels, line.source_sha256, conditions, line.asked, line.operator, *later)

@@ -10,6 +10,8 @@ import numpy as np
 
 from acquisition import Description, Fact, Frf, Remark, windowed_receptance
 from dsm import plus_minus
+from lobewatch.machine import BY_FIT
+from lobewatch.measuring.measurement import about_hand
 from lobewatch.measuring.one_file.file_frf import read_file_frf
 from lobewatch.measuring.one_file.windows import (
     Window,
@@ -21,8 +23,10 @@ from lobewatch.measuring.one_file.windows import (
 from modal import (
     Extraction,
     Mode,
+    ModeEdits,
     common_delay,
     cut_edges,
+    edit_modes,
     extract,
     modes_of,
     peaks_beyond,
@@ -53,6 +57,8 @@ class FileModes:
     """Remarks on all modes together, and on those that are missing."""
     facts: tuple[Fact, ...] = ()
     """Facts known of the file, and where each is from."""
+    by_hand: ModeEdits = BY_FIT
+    """What a person said of its modes."""
 
 
 def modes_of_file(
@@ -63,6 +69,7 @@ def modes_of_file(
     conjugate: bool = False,
     accept: Collection[str] = (),
     description: Description | None = None,
+    by_hand: ModeEdits = BY_FIT,
 ) -> FileModes:
     """Modes between two frequencies (Hz), with standard errors over the hits where the file holds three or more.
 
@@ -70,10 +77,11 @@ def modes_of_file(
     holds the complex conjugate of response over force. accept: verdicts on hits ("not-decayed") that do not count.
     description: what the file does not say; the hits that an FRF was averaged from are inferred where nobody says. What
     still rings when the record ends gets an exponential window, which is corrected: all hits where none is good
-    otherwise, else the modes that do.
+    otherwise, else the modes that do. by_hand: modes that a person adds, leaves out, or holds at what they are without
+    any window.
 
-    Raises ValueError for a window whose hit is not known or comes before it, averages that no coherence belongs to, and
-    verdicts that cannot be accepted.
+    Raises ValueError for a window whose hit is not known or comes before it, averages that no coherence belongs to,
+    verdicts that cannot be accepted, and what `edit_modes` refuses.
     """
     file_frf = read_file_frf(path, accept, description or Description(), window)
     frf = file_frf.frf
@@ -82,7 +90,8 @@ def modes_of_file(
     window = window_to_correct(file_frf.named_window, window)
     delay = None if window is None else window.delay(file_frf.hits)
     frf = frf if window is None else windowed_receptance(frf, window.time_constant)
-    extraction = extract([frf], band)
+    tau = file_frf.time_constant if window is None else window.time_constant
+    extraction = edit_modes(extract([frf], band), by_hand if tau is None else by_hand.under_window(tau))
     modes = fitted = tuple(modes_of(extraction, [hits]))
     windowed: tuple[Remark, ...] = ()
     if window is not None and delay is not None:
@@ -99,8 +108,14 @@ def modes_of_file(
         as_recorded=modes,
         fitted=fitted,
         picked=tuple(pick_peaks(frf, band)),
-        remarks=(*file_frf.remarks, *windowed, *_remarks(modes, frf, band)),
+        remarks=(
+            *file_frf.remarks,
+            *([about_hand(by_hand)] if by_hand else []),
+            *windowed,
+            *_remarks(modes, frf, band),
+        ),
         facts=file_frf.facts,
+        by_hand=by_hand,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -43,6 +44,13 @@ class Window:
         """Refuse what is no window."""
         if not np.isnan(self.time_constant) and not (np.isfinite(self.time_constant) and self.time_constant > 0):
             raise ValueError(f"--window: time_constant={self.time_constant} s is not a finite number > 0")
+
+    @classmethod
+    def said(cls, time_constant: float | None, start: float, hit_at: float | None) -> Self | None:
+        """The window that a person names, without a time constant as the file names it; None where nothing is said."""
+        if time_constant is None and hit_at is None and start == 0:
+            return None
+        return cls(float("nan") if time_constant is None else time_constant, start, hit_at)
 
     def delay(self, hits: Sequence[Hit]) -> float:
         """Time from its start to the hit (s); ValueError where the hit is not known or comes before it."""
@@ -138,7 +146,10 @@ def _about_slow(mode: Mode, time_constant: float) -> Remark:
 def refit_ringing_modes(
     modes: Sequence[Mode], hits: Sequence[Hit], band: tuple[float, float] | None
 ) -> tuple[tuple[Mode, ...], tuple[Remark, ...]]:
-    """Modes, those that still ring when the record ends taken from the hits under a window, and a remark on each."""
+    """Modes, those that still ring when the record ends taken from the hits under a window, and a remark on each.
+
+    Those that a person chose stay as they are.
+    """
     if not hits or not any(_rings(mode) for mode in modes):
         return tuple(modes), ()
     frf, windowed, tau = window_ringing_hits(hits)
@@ -153,7 +164,8 @@ def refit_ringing_modes(
 
 
 def _rings(mode: Mode) -> bool:
-    return mode.left_ringing is not None and mode.left_ringing > MOST_LEFT
+    chosen = any(remark.code == "by-hand" for remark in mode.remarks)
+    return mode.left_ringing is not None and mode.left_ringing > MOST_LEFT and not chosen
 
 
 def _same_mode(mode: Mode, candidates: Sequence[Mode]) -> Mode | None:

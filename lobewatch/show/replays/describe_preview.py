@@ -9,7 +9,7 @@ from typing import Any
 
 from rich.table import Table
 
-from acquisition import Fact
+from acquisition import DataError, Fact
 from acquisition.files.contents.ledger import Origin
 from lobewatch.logbook.preview import Preview
 from lobewatch.logbook.replaying.of_files import NAMED, of_files
@@ -22,10 +22,12 @@ ONE_BY_ONE = 6
 
 
 def show_preview(previews: Sequence[Preview], passed: Sequence[Path], *, as_json: bool) -> None:
-    """Print what would become of files; passed: other files of the folders."""
+    """Print what would become of files; passed: other files of the folders. DataError where some cannot be used."""
     files = [preview_json(preview) for preview in previews]
     payload = {"dry_run": True, "files": files, "passed_over": list(map(str, passed))}
     emit(payload, as_json, *preview_texts(previews), preview_summary(previews, len(passed)))
+    if any(preview.refused for preview in previews):
+        raise DataError(_refusal(previews))
 
 
 def preview_json(preview: Preview) -> dict[str, Any]:
@@ -72,7 +74,7 @@ def preview_summary(previews: Sequence[Preview], n_passed: int) -> str:
     return f"{count}{passed}; nothing is stored (--dry-run)"
 
 
-def preview_refusal(previews: Sequence[Preview]) -> str:
+def _refusal(previews: Sequence[Preview]) -> str:
     """How many files cannot be used."""
     refused = sum(bool(preview.refused) for preview in previews)
     return f"{refused} of {len(previews)} file(s) cannot be used as they are; the reasons stand above"

@@ -58,10 +58,14 @@ def mode_json(mode: Mode) -> dict[str, Any]:
 
 
 def in_order(modes: Iterable[Mode], *, rejected: bool = True) -> list[Mode]:
-    """Trusted modes by rising frequency, then doubtful ones, then rejected ones where they are wanted."""
-    wanted = ORDER if rejected else ORDER[:-1]
-    kept = [(wanted.index(trust), mode) for mode in modes if (trust := trust_of(mode)) in wanted]
-    return [mode for _, mode in sorted(kept, key=lambda placed: (placed[0], placed[1].frequency))]
+    """Trusted modes by rising frequency, then doubtful ones, then rejected ones where they are wanted, those that a
+    person chose always."""
+    kept = [mode for mode in modes if rejected or trust_of(mode) is not Trust.REJECTED or _is_by_hand(mode)]
+    return sorted(kept, key=lambda mode: (ORDER.index(trust_of(mode)), mode.frequency))
+
+
+def _is_by_hand(mode: Mode) -> bool:
+    return any(remark.code == "by-hand" for remark in mode.remarks)
 
 
 def mode_table(modes: Sequence[Mode]) -> Table:
@@ -168,6 +172,7 @@ def file_modes_json(file_modes: FileModes) -> dict[str, Any]:
         "n_averages": file_modes.frf.n_averages,
         "usable_band_hz": file_modes.frf.usable_band,
         "facts": [asdict(fact) for fact in file_modes.facts],
+        "by_hand": asdict(file_modes.by_hand),
         "modes": [mode_json(mode) for mode in file_modes.fitted],
         "peak_picking": [mode_json(mode) for mode in file_modes.picked],
         "remarks": [asdict(remark) for remark in file_modes.remarks],

@@ -29,6 +29,7 @@ from .estimation import (
     time_after_hit,
     time_of_hit,
     windowed_receptance,
+    without_mass,
 )
 from .event import Event, EventKind
 from .files.contents.contents import Contents, Signal
@@ -170,6 +171,7 @@ __all__ = [
     "unit_mistake",
     "usb_identity",
     "windowed_receptance",
+    "without_mass",
     "write_hit",
     "write_tap",
 ]

@@ -32,6 +32,8 @@ class Frf:
     """The quantity that the sensors gave: it says in which form the noise is flat."""
     usable_band: tuple[float, float] | None = None
     """Contiguous band where the force spectrum is within 20 dB of its largest value (Hz)."""
+    mass_removed: float = 0.0
+    """Mass of the sensor that was taken off its values (kg)."""
 
     def __post_init__(self) -> None:
         """Convert to arrays and check shapes and values."""
@@ -112,6 +114,7 @@ class Frf:
             self.n_averages,
             self.measured_as,
             self.usable_band,
+            self.mass_removed,
         )
 
 

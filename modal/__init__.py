@@ -7,6 +7,7 @@ from modal.cut_edges import cut_edges
 from modal.edit_modes import edit_modes
 from modal.fit_modes import fit_modes, modes_of
 from modal.fit_points import fit_points
+from modal.mass_loading import MassLoading, mass_loading, with_mass_doubt
 from modal.mode_indicator import mode_indicator
 from modal.modes.common_delay import CommonDelay, common_delay
 from modal.modes.follow import Followed, follow
@@ -28,6 +29,7 @@ __all__ = [
     "Extraction",
     "FittedBand",
     "Followed",
+    "MassLoading",
     "Mode",
     "ModeEdits",
     "PhysicalPoles",
@@ -43,6 +45,7 @@ __all__ = [
     "fit_points",
     "follow",
     "mac",
+    "mass_loading",
     "mode_indicator",
     "modes_of",
     "parse_edits",
@@ -56,5 +59,6 @@ __all__ = [
     "synthesize",
     "trust_of",
     "trust_rules",
+    "with_mass_doubt",
     "with_windowed_noise",
 ]

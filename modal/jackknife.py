@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Frf, Hit
+from acquisition import Frf, Hit, without_mass
 from acquisition.estimation import cross_spectra
 from modal.bands.extraction import Extraction, FittedBand
 
@@ -29,7 +29,8 @@ def left_out(hits: Sequence[Hit], frf: Frf) -> list[Frf]:
     spectra = [(s_ff[1:][lines], s_fx[1:][lines]) for s_ff, _, s_fx in (cross_spectra([hit]) for hit in hits)]
     s_ff, s_fx = (np.sum(column, axis=0) for column in zip(*spectra, strict=True))
     per_line = -1 / (2 * np.pi * frf.frequency) ** 2
-    return [Frf(frf.frequency, (s_fx - fx) / (s_ff - ff) * per_line) for ff, fx in spectra]
+    fewer = (Frf(frf.frequency, (s_fx - fx) / (s_ff - ff) * per_line) for ff, fx in spectra)
+    return [without_mass(one_less, frf.mass_removed) for one_less in fewer]
 
 
 def _lines(hit: Hit, frf: Frf) -> slice:

@@ -10,6 +10,7 @@ from acquisition.estimation.exponential_window import (
 from acquisition.estimation.force_noise import force_noise, force_noise_through
 from acquisition.estimation.infer_averages import infer_averages
 from acquisition.estimation.running_mean import RunningMean
+from acquisition.estimation.without_mass import without_mass
 
 __all__ = [
     "RunningMean",
@@ -23,4 +24,5 @@ __all__ = [
     "time_after_hit",
     "time_of_hit",
     "windowed_receptance",
+    "without_mass",
 ]

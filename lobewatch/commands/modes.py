@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -49,6 +50,9 @@ def modes(
     conjugate: Annotated[
         bool, typer.Option("--conjugate", help="The file holds the complex conjugate of response over force.")
     ] = False,
+    sensor_mass: Annotated[
+        float | None, typer.Option(help="Of the accelerometer (g), where it rides on the point that is hit: taken off.")
+    ] = None,
     add: Add = None,
     drop: Drop = None,
     fix: Fix = None,
@@ -80,6 +84,7 @@ def modes(
     """
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.chosen_modes import choice_of, modes_of_tap
+    from lobewatch.machine.settings.sensor_loading import SensorLoading
     from lobewatch.measuring import Window, modes_of_file
     from lobewatch.notify.telling import telling
     from lobewatch.show.spindle.describe_modes import file_modes_json, file_modes_texts
@@ -88,9 +93,8 @@ def modes(
     edits = parse_edits(add, drop, fix)
     taken_off = Window.said(window, window_start, hit_at)
     if tap:
-        refuse_file_options(
-            file_options, band=band, window=taken_off, averages=averages, accept=accept, conjugate=conjugate
-        )
+        others = {"band": band, "window": taken_off, "averages": averages, "accept": accept, "conjugate": conjugate}
+        refuse_file_options(file_options, sensor_mass=sensor_mass, **others)
         logbook, choice = Logbook.open(file), choice_of(edits, by_fit)
         with nullcontext() if choice is None else telling(logbook):
             file_modes = modes_of_tap(logbook, tap, choice)
@@ -98,10 +102,9 @@ def modes(
         text = "--by-fit takes back what is kept of a tap test" if by_fit else f"{file} is a folder"
         raise ValueError(f"{text}; name a tap test: lobewatch modes MACHINE TAP (lobewatch history lists them)")
     else:
-        said, accepted = file_options.description(averages=averages), accept or ()
-        file_modes = modes_of_file(
-            file, band, window=taken_off, conjugate=conjugate, accept=accepted, description=said, by_hand=edits
-        )
+        said, sensor = file_options.description(averages=averages), SensorLoading.of(sensor_mass)
+        how = partial(modes_of_file, window=taken_off, conjugate=conjugate, accept=accept or (), sensor=sensor)
+        file_modes = how(file, band, description=said, by_hand=edits)
     if figure is not None:
         from lobewatch.show.figures.mode_figures import modes_figure
         from lobewatch.show.figures.style import save_figure

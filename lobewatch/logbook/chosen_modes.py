@@ -25,7 +25,7 @@ def modes_of_tap(logbook: Logbook, name: str, edits: ModeEdits | None = None) ->
             raise ValueError(f"{reasons[tap.id]}; nothing is kept")
     now = logbook.files.by_id[tap.id]
     logbook.folder.read(now)
-    return modes_of_file(logbook.folder.path / now.file, by_hand=now.by_hand)
+    return modes_of_file(logbook.folder.path / now.file, by_hand=now.by_hand, sensor=logbook.machine.tap.sensor)
 
 
 def choice_of(edits: ModeEdits, by_fit: bool) -> ModeEdits | None:

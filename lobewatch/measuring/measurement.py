@@ -11,10 +11,11 @@ from functools import cache
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from acquisition import Remark, TapTest
+from acquisition import Frf, Remark, TapTest
 from dsm import Calibration, calibrate, modal_stiffness
 from lobewatch.machine import BY_FIT, Machine
 from lobewatch.measuring.questions import frequency_jump, no_mode_in_band, other_band, stiffness_off_model
+from lobewatch.measuring.sensor_remarks import Fitted, fit_without_sensor
 from modal import Believed, Extraction, Mode, ModeEdits, believed, edit_modes, extract, follow, modes_of, predominant
 
 NOT_APPLIED = "hand-not-applied"
@@ -94,12 +95,16 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = BY_FIT) -> TapF
     named = (tap.id, about.created, about.tool, about.direction)
     with _threads().limit(limits=1):
         try:
-            state = extract([tap.frf])
-            state, said = _edited(state, by_hand)
-            return TapFit(*named, modes_of(state, [tap.accepted]), (*remarks, *said))
+            fitted = fit_without_sensor(tap.frf, machine.tap.sensor, lambda frf: _fitted(frf, tap, by_hand))
+            return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks))
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")
             return TapFit(*named, (), (*remarks, failure, no_mode_in_band((), machine)), failed=True)
+
+
+def _fitted(frf: Frf, tap: TapTest, by_hand: ModeEdits) -> Fitted:
+    state, remarks = _edited(extract([frf]), by_hand)
+    return Fitted(state, tuple(modes_of(state, [tap.accepted])), remarks)
 
 
 def _edited(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tuple[Remark, ...]]:

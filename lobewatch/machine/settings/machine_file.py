@@ -156,7 +156,13 @@ class Machine(Table, frozen=True):
     def settings_hash(self) -> str:
         """SHA-256 of all that decides what follows from a tap test but for the words on programs."""
         return _hash(
-            "questions, K against the model", self.mode, self.spindle, self.tool, self.tap.tool, self.tap.position_mm
+            "questions, K against the model",
+            self.mode,
+            self.spindle,
+            self.tool,
+            self.tap.tool,
+            self.tap.position_mm,
+            self.tap.sensor,
         )
 
     @property

@@ -7,6 +7,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from acquisition import Conditions
+from lobewatch.machine.settings.sensor_loading import MOST_GRAMS, Mounting, SensorLoading
 from lobewatch.machine.settings.toml_table import NotNegative, Positive, Table
 
 
@@ -29,10 +30,20 @@ class TapSetup(Table, frozen=True):
     stick_out_mm: float | None = None
     drawbar_kn: float | None = None
     state: str = ""
+    sensor_mass_g: Annotated[float, Meta(ge=0, le=MOST_GRAMS)] | None = None
+    cable_mass_g: NotNegative = 0.0
+    mounting: Mounting | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no spindle has."""
         self.conditions(self.tool)
+        if self.cable_mass_g and self.sensor_mass_g is None:
+            raise ValueError(f"cable_mass_g={self.cable_mass_g:g} without sensor_mass_g; give both")
+
+    @property
+    def sensor(self) -> SensorLoading:
+        """The accelerometer."""
+        return SensorLoading.of(self.sensor_mass_g, self.cable_mass_g, self.mounting or "")
 
     def conditions(self, tool: str) -> Conditions:
         """Conditions of a tap test with a tool; the stick-out of `tool` alone."""

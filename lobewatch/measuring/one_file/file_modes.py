@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import Description, Fact, Frf, Remark, windowed_receptance
+from acquisition import Description, Fact, Frf, Remark, windowed_receptance, without_mass
 from dsm import plus_minus
 from lobewatch.machine import BY_FIT
+from lobewatch.machine.settings.sensor_loading import SensorLoading
 from lobewatch.measuring.measurement import about_hand
 from lobewatch.measuring.one_file.file_frf import read_file_frf
 from lobewatch.measuring.one_file.windows import (
@@ -20,6 +21,7 @@ from lobewatch.measuring.one_file.windows import (
     remove_own_window,
     window_to_correct,
 )
+from lobewatch.measuring.sensor_remarks import Fitted, fit_without_sensor
 from modal import (
     Extraction,
     Mode,
@@ -33,6 +35,8 @@ from modal import (
     pick_peaks,
 )
 
+UNNAMED = SensorLoading()
+"""An accelerometer that nobody says anything of."""
 MOST_NAMED = 6
 """Peaks beyond the usable band that are named one by one."""
 
@@ -70,6 +74,7 @@ def modes_of_file(
     accept: Collection[str] = (),
     description: Description | None = None,
     by_hand: ModeEdits = BY_FIT,
+    sensor: SensorLoading = UNNAMED,
 ) -> FileModes:
     """Modes between two frequencies (Hz), with standard errors over the hits where the file holds three or more.
 
@@ -78,7 +83,7 @@ def modes_of_file(
     description: what the file does not say; the hits that an FRF was averaged from are inferred where nobody says. What
     still rings when the record ends gets an exponential window, which is corrected: all hits where none is good
     otherwise, else the modes that do. by_hand: modes that a person adds, leaves out, or holds at what they are without
-    any window.
+    any window. sensor: accelerometer whose mass is taken off.
 
     Raises ValueError for a window whose hit is not known or comes before it, averages that no coherence belongs to,
     verdicts that cannot be accepted, and what `edit_modes` refuses.
@@ -91,8 +96,15 @@ def modes_of_file(
     delay = None if window is None else window.delay(file_frf.hits)
     frf = frf if window is None else windowed_receptance(frf, window.time_constant)
     tau = file_frf.time_constant if window is None else window.time_constant
-    extraction = edit_modes(extract([frf], band), by_hand if tau is None else by_hand.under_window(tau))
-    modes = fitted = tuple(modes_of(extraction, [hits]))
+    edits = by_hand if tau is None else by_hand.under_window(tau)
+
+    def fit(bare: Frf) -> Fitted:
+        state = edit_modes(extract([bare], band), edits)
+        return Fitted(state, tuple(modes_of(state, [hits])), (about_hand(by_hand),) if by_hand else ())
+
+    extraction, modes, said = fit_without_sensor(frf, sensor, fit)
+    mass, fitted = extraction.frf.mass_removed, modes
+    frf = without_mass(frf, mass)
     windowed: tuple[Remark, ...] = ()
     if window is not None and delay is not None:
         record = 1 / float(np.mean(np.diff(frf.frequency)))
@@ -100,7 +112,7 @@ def modes_of_file(
     elif file_frf.time_constant is not None:
         fitted = tuple(remove_own_window(modes, file_frf.time_constant))
     elif not accept:
-        fitted, windowed = refit_ringing_modes(modes, hits, band)
+        fitted, windowed = refit_ringing_modes(modes, hits, band, mass)
     return FileModes(
         path=path,
         frf=frf,
@@ -108,12 +120,7 @@ def modes_of_file(
         as_recorded=modes,
         fitted=fitted,
         picked=tuple(pick_peaks(frf, band)),
-        remarks=(
-            *file_frf.remarks,
-            *([about_hand(by_hand)] if by_hand else []),
-            *windowed,
-            *_remarks(modes, frf, band),
-        ),
+        remarks=(*file_frf.remarks, *said, *windowed, *_remarks(modes, frf, band)),
         facts=file_frf.facts,
         by_hand=by_hand,
     )

@@ -18,6 +18,7 @@ from acquisition import (
     time_after_hit,
     time_of_hit,
     windowed_receptance,
+    without_mass,
 )
 from modal import Mode, fit_modes, remove_window, with_windowed_noise
 
@@ -144,16 +145,16 @@ def _about_slow(mode: Mode, time_constant: float) -> Remark:
 
 
 def refit_ringing_modes(
-    modes: Sequence[Mode], hits: Sequence[Hit], band: tuple[float, float] | None
+    modes: Sequence[Mode], hits: Sequence[Hit], band: tuple[float, float] | None, mass: float
 ) -> tuple[tuple[Mode, ...], tuple[Remark, ...]]:
     """Modes, those that still ring when the record ends taken from the hits under a window, and a remark on each.
 
-    Those that a person chose stay as they are.
+    mass: of the sensor, which is taken off (kg). Modes that a person chose stay as they are.
     """
     if not hits or not any(_rings(mode) for mode in modes):
         return tuple(modes), ()
     frf, windowed, tau = window_ringing_hits(hits)
-    refitted = list(remove_own_window(fit_modes(frf, band, windowed), tau))
+    refitted = list(remove_own_window(fit_modes(without_mass(frf, mass), band, windowed), tau))
     best, remarks = list[Mode](), list[Remark]()
     for mode in modes:
         same = _same_mode(mode, refitted) if _rings(mode) else None

@@ -11,6 +11,7 @@ from acquisition.hit import Hit, HitFlags
 from acquisition.hits.pulse import Pulse, baseline, find_pulse, samples_before
 from acquisition.verdicts.distance_from_mean import distance_from_mean
 from acquisition.verdicts.find_overload import Overload, find_overload
+from acquisition.verdicts.mains_hum import mains_hum, sounds_like_hum
 from acquisition.verdicts.second_touch import find_second_touch
 from acquisition.verdicts.verdict import HitVerdict
 
@@ -106,13 +107,25 @@ def _second(hit: Hit, pulse: Pulse) -> dict[HitFlags, str]:
 
 
 def _cut_off(hit: Hit) -> dict[HitFlags, str]:
-    levels = [float(np.std(tenth)) for tenth in np.array_split(hit.acceleration, 10)]
-    quiet = hit.acceleration[: int(0.8 * samples_before(hit))]
-    noise = float(np.std(quiet)) if quiet.size >= 8 else 0.0
-    if levels[-1] <= max(DECAYED_SHARE * max(levels), 2 * noise):
+    before = int(0.8 * samples_before(hit))
+    share = _left(hit.acceleration, before)
+    if share == 0:
         return {}
-    share = levels[-1] / max(levels)
-    return {HitFlags.NOT_DECAYED: f"The last tenth of the record still rings with {share:.1%} of the loudest"}
+    hum = mains_hum(hit, before)
+    if hum is not None:
+        share = _left(hit.acceleration - hum, before)
+    text = f"The last tenth of the record still rings with {share:.1%} of the loudest"
+    if hum is None and sounds_like_hum(hit):
+        text += "; it sounds like mains hum, which 20 ms before the hit would prove"
+    return {HitFlags.NOT_DECAYED: text} if share else {}
+
+
+def _left(response: NDArray[np.float64], before: int) -> float:
+    """rms of the last tenth over that of the loudest; 0 where it is small, or noise as before the hit."""
+    levels = [float(np.std(tenth)) for tenth in np.array_split(response, 10)]
+    quiet = response[:before]
+    noise = float(np.std(quiet)) if quiet.size >= 8 else 0.0
+    return 0.0 if levels[-1] <= max(DECAYED_SHARE * max(levels), 2 * noise) else levels[-1] / max(levels)
 
 
 def _in_frequency(hit: Hit, mean: Frf | None, band: tuple[float, float] | None) -> dict[HitFlags, str]:

@@ -26,7 +26,8 @@ from acquisition import Description
 from acquisition.files.read_recording import NOTHING
 from acquisition.files.read_sound import read_sound
 from lobewatch.cuts.listening.fold_frequency import fold_frequency
-from lobewatch.cuts.listening.listen_to import CutRecording, HeardSound, listen_to
+from lobewatch.cuts.listening.judge_cut import HeardSound
+from lobewatch.cuts.listening.listen_to import CutRecording, listen_to
 from lobewatch.cuts.listening.spectrum import Spectrum, spectrum_of
 
 Floats = NDArray[np.float64]
@@ -47,7 +48,7 @@ SAME_SPEED = 1e-3
 """Relative difference up to which two speeds are one."""
 ON_HARMONIC = 0.02
 """Orders from a multiple of a clear comb within which chatter is false."""
-NOT_FOUND = ("no-cut", "no-air", "two-cuts", "too-short")
+NOT_FOUND = ("no-cut", "no-air", "too-short")
 """Reasons that say that no one cut was found."""
 
 
@@ -103,7 +104,7 @@ class Axis:
     rpm: float
     source: Source
 
-    def heard(self, signal: Floats) -> HeardSound:
+    def heard(self, signal: Floats) -> list[HeardSound]:
         """What is told of it, or of a part."""
         return listen_to(CutRecording(signal, self.rate, self.source.teeth, self.source.immersion, self.rpm))
 
@@ -198,10 +199,11 @@ def judge_file(axes: list[Axis], tally: Tally) -> None:
     """All that is to be counted of the axes of a file."""
     speeds = []
     for axis in axes:
-        heard = axis.heard(axis.signal)
+        cuts = axis.heard(axis.signal)
+        heard = max(cuts, key=lambda cut: cut.parts.end - cut.parts.begin)
         comb = comb_of(axis, heard)
         tally.cuts += 1
-        tally.found += heard.reason not in NOT_FOUND
+        tally.found += len(cuts) == 1 and heard.reason not in NOT_FOUND
         tally.words[heard.word if heard.word != "cannot tell" else heard.reason] += 1
         tally.speeds[_speed_word(heard, comb)] += 1
         tally.on_harmonic += comb.is_clear and _is_on_harmonic(heard, comb.frequency)
@@ -236,6 +238,12 @@ def air_windows(axis: Axis, only_air: bool) -> Iterator[Floats]:
             yield axis.signal[place : place + size]
 
 
+def words_on_air(axes: list[Axis], only_air: bool) -> Iterator[str]:
+    """The words on each window without a cut, on the first axis."""
+    for window in air_windows(axes[0], only_air):
+        yield from (heard.word for heard in axes[0].heard(window))
+
+
 def row(source: Source, tally: Tally) -> str:
     """Of the table."""
     speeds, words = tally.speeds, tally.words
@@ -258,12 +266,12 @@ def main() -> None:
         tally = Tally()
         for axes in axes_of(folder, source):
             judge_file(axes, tally)
-            air.update(axis.heard(window).word for axis in axes[:1] for window in air_windows(axis, only_air=False))
+            air.update(words_on_air(axes, only_air=False))
         if tally.cuts:
             print(row(source, tally), flush=True)
     for source in AIR:
         for axes in axes_of(folder, source):
-            air.update(axis.heard(window).word for axis in axes[:1] for window in air_windows(axis, only_air=True))
+            air.update(words_on_air(axes, only_air=True))
     print(f"\nwindows of air: {dict(air)}; {time.process_time() - began:.0f} s of CPU")
 
 

@@ -53,11 +53,10 @@ def listen(
     """
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.cut_comparison import keep_listened
-    from lobewatch.machine.additions.observe_cut import contradicting_cuts
     from lobewatch.machine.settings.cut_setting import choose_cut
     from lobewatch.notify.telling import telling
-    from lobewatch.show.cuts.describe_listened import listened_json, listened_texts
-    from lobewatch.show.history.describe_cut import contradiction_remark, untapped_remarks
+    from lobewatch.show.cuts.describe_listened import cuts_json, cuts_texts
+    from lobewatch.show.history.describe_cut import kept_cut_remarks
     from lobewatch.tap.listening.hear_cut import cut_pictures, hear_cut, judge_live
 
     logbook = Logbook.open(machine)
@@ -74,20 +73,20 @@ def listen(
             server = CutScreenServer(pictures, listen=listen, token=token, watch_token=watch_token)
             screens.enter_context(serving(server))
         signal = hear_cut(logbook.folder, setting, file, port, seconds, description, notes.print, pictures.show)
-        comparison = judge_live(logbook, setting, signal, pictures)
+        comparisons = judge_live(logbook, setting, signal, pictures)
         if out is not None:
             from lobewatch.show.cuts.figure_listened import save_listened  # brings matplotlib
 
-            save_listened(comparison, out)
-        payload = listened_json(comparison)
+            save_listened(comparisons, out)
         if dry_run:
-            emit(payload, as_json, *listened_texts(comparison))
+            emit(cuts_json(comparisons), as_json, *cuts_texts(comparisons))
             return
         with telling(logbook):
-            earlier, stored = logbook.cuts, keep_listened(logbook.folder, comparison, signal, date)
-            pictures.show(saved=stored.id)
-            contrary = contradicting_cuts(stored, earlier) if stored.counts else ()
-            remarks = [*untapped_remarks(logbook, stored), *map(contradiction_remark, contrary)]
-            payload |= {"id": stored.id, "remarks": [remark.code for remark in remarks]}
-            emit(payload, as_json, *listened_texts(comparison), f"saved {stored.id}")
-    note_remarks(remarks)
+            earlier, kept = logbook.cuts, keep_listened(logbook.folder, comparisons, signal, date)
+            pictures.show(saved=kept[-1].id)
+            remarks = [kept_cut_remarks(logbook, cut, [*earlier, *kept[:number]]) for number, cut in enumerate(kept)]
+            stored_as = [
+                {"id": cut.id, "remarks": [r.code for r in said]} for cut, said in zip(kept, remarks, strict=True)
+            ]
+            emit(cuts_json(comparisons, stored_as), as_json, *cuts_texts(comparisons, [cut.id for cut in kept]))
+    note_remarks(remark for said in remarks for remark in said)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
@@ -11,7 +12,8 @@ from acquisition import DataError
 from acquisition.files.cut_file import CutSignal
 from lobewatch.cuts.listening.expected_sound import ExpectedSound, expected_sound
 from lobewatch.cuts.listening.fold_frequency import family_distance
-from lobewatch.cuts.listening.listen_to import CutRecording, HeardSound, listen_to
+from lobewatch.cuts.listening.judge_cut import HeardSound
+from lobewatch.cuts.listening.listen_to import CutRecording, listen_to
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine.additions.keep_cut import keep_cut, software
@@ -75,8 +77,8 @@ class CutComparison:
         )
 
 
-def compare_cut(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> CutComparison:
-    """Listen to a recording."""
+def compare_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> list[CutComparison]:
+    """Listen to a recording; each cut in it by itself, one at least."""
     cut = setting.cut
     recording = CutRecording(
         signal.acceleration,
@@ -87,14 +89,28 @@ def compare_cut(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> Cut
         signal.clipped,
         signal.lost_scans,
     )
-    heard = listen_to(recording)
     tool = logbook.ask(Analysis.assembly_or_reason, setting.tool)
     assembly = None if isinstance(tool, DataError) or not tool.directions else tool
+    return [_compared(setting, heard, assembly) for heard in listen_to(recording)]
+
+
+def _compared(setting: CutSetting, heard: HeardSound, assembly: Assembly | None) -> CutComparison:
     speed = heard.speed_rpm if np.isfinite(heard.speed_rpm) else setting.speed_rpm
     expected = None if assembly is None else expected_sound(setting, assembly, speed)
     return CutComparison(setting, heard, assembly, expected)
 
 
-def keep_listened(folder: MachineFolder, comparison: CutComparison, signal: CutSignal, at: datetime | None) -> HeardCut:
-    """Write down what was heard, with its recording; at: when it was cut, None for now. Saved when this returns."""
-    return keep_cut(folder, comparison.as_heard(cutting_time(at, datetime.now(UTC))), signal)
+def keep_listened(
+    folder: MachineFolder, comparisons: Sequence[CutComparison], signal: CutSignal, at: datetime | None
+) -> list[HeardCut]:
+    """Write down what was heard, each cut with what was recorded between those beside it. Saved when this returns.
+
+    at: when it was cut, None for now.
+    """
+    time = cutting_time(at, datetime.now(UTC))
+    begins, ends = [[getattr(one.heard.parts, name) for one in comparisons] for name in ("begin", "end")]
+    sounds = zip([0.0, *ends[:-1]], [*begins[1:], signal.seconds], strict=True)
+    return [
+        keep_cut(folder, comparison.as_heard(time), signal.part(*sound))
+        for comparison, sound in zip(comparisons, sounds, strict=True)
+    ]

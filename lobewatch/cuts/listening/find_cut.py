@@ -1,4 +1,4 @@
-"""Which part of a recording is the cut, and which the spindle turning in air."""
+"""Which parts of a recording are cuts, and which the spindle turning in air."""
 
 from __future__ import annotations
 
@@ -25,6 +25,12 @@ LOWEST = 100.0
 """Frequency above which it is compared how loud pieces are (Hz): below it floors and pumps sound; chosen."""
 SMOOTHED = 3
 """Pieces over which the power in air is smoothed; chosen."""
+STEPS = 50
+"""Steps after which the threshold stands."""
+ENDS = 0.3
+"""Entry and exit are so much louder or quieter than most of a cut, in log10 of the power: twice."""
+BURST = 1 / 6
+"""What has so much of the length of the longest cut beside it is none; chosen."""
 JOINED = 0.1
 """Pauses up to this belong to a cut (s)."""
 KNOCK = 0.15
@@ -46,60 +52,126 @@ AMONG = 0.75
 
 
 class CutParts(NamedTuple):
-    """Where the cut is; or why it cannot be said, a code."""
+    """Where a cut is; or why it cannot be said, a code."""
 
     reason: str
     """Code of what is wrong; empty where all is well."""
     air: slice = slice(0, 0)
     """Samples of the spindle turning in air."""
     cut: slice = slice(0, 0)
-    """Samples of the cut, its beginning and its end left out."""
+    """Samples that are listened to: the end of its steady part."""
     begin: float = np.nan
     """Time at which the cut begins (s)."""
     end: float = np.nan
     """Time at which it ends (s)."""
+    steady_begin: float = np.nan
+    """Time at which its entry is over (s)."""
+    steady_end: float = np.nan
+    """Time at which its exit begins (s)."""
 
 
-def find_cut(signal: Floats, sample_rate: float, turn: float) -> CutParts:
-    """The one cut in a recording; signal in m/s^2, shape (n,); turn: of the spindle (s).
+UNPLACED = CutParts("")
+"""Of a cut that is given by itself, not found in a recording."""
 
-    Reasons: "too-short", "no-cut", "no-air", "two-cuts", "knock".
+
+def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]:
+    """The cuts in a recording, one at least: without a cut it stands for why there is none.
+
+    signal: in any unit, shape (n,) or (axes, n); sample_rate in Hz; turn: of the spindle (s).
+
+    A cut is louder than halfway, in log, between what is quiet and what is loud. What is too short to be told, or a
+    sixth of the longest, is none of its own: a chip, an edge that rubs on its way out. Reasons: "too-short", "no-cut",
+    "no-air", "knock".
+
+    Example: a second of noise that gets 20 times as loud for a second.
+
+    >>> noise = np.random.default_rng(0).normal(size=30_000)
+    >>> noise[10_000:20_000] *= 20
+    >>> [(round(parts.begin, 1), round(parts.end, 1)) for parts in find_cuts(noise, 10e3, 0.005)]
+    [(1.0, 2.0)]
     """
-    size = round(max(BLOCK, 2 * turn) * sample_rate)
+    axes = np.atleast_2d(signal)
+    count, size = axes.shape[1], round(max(BLOCK, 2 * turn) * sample_rate)
     step = size // 2
-    if signal.size < (LEAST_AIR + SETTLED + LEAST_CUT) * sample_rate or signal.size < 4 * size:
-        return CutParts("too-short")
-    level = _loudness(signal, size, step, sample_rate)
-    air = float(np.min(np.convolve(level, np.full(QUIET_PIECES, 1 / QUIET_PIECES), "valid")))
-    loud = _stretches(level > air + LOUDER)
+    if count < (LEAST_AIR + SETTLED + LEAST_CUT) * sample_rate or count < 4 * size:
+        return [CutParts("too-short")]
+    sounds = np.any(np.ptp(_pieces(axes, size, step), axis=2) > 0, axis=0)
+    if np.count_nonzero(sounds) < 2 * QUIET_PIECES:
+        return [CutParts("no-cut")]
+    level = np.zeros(sounds.size)
+    level[sounds] = np.max([_loudness(axis[sounds], sample_rate) for axis in _pieces(axes, size, step)], axis=0)
+    is_loud = level > _threshold(level[sounds])
+    loud = _stretches(is_loud)
     joined = _join(loud, JOINED * sample_rate / step)
-    cuts = [(first, last) for first, last in joined if (last - first) * step > KNOCK * sample_rate]
-    if not cuts:
-        return CutParts("no-cut")
-    if len(cuts) > 1:
-        return CutParts("two-cuts")
-    begin, end = (cuts[0][0] + 1) * step, cuts[0][1] * step
-    first, last = begin + step + round(SETTLED * sample_rate), end - size
-    settled = slice(max(first, last - round(MOST_CUT * sample_rate)), last)
-    parts = CutParts("", _longest_air(loud, level.size, step), settled, begin / sample_rate, end / sample_rate)
-    return parts._replace(reason=_fault(signal, parts, sample_rate, step))
+    stretches = [(first, last) for first, last in joined if (last - first) * step > KNOCK * sample_rate]
+    if not stretches:
+        return [CutParts("no-cut")]
+    air = _longest_air(_stretches(is_loud | ~sounds), level.size, step)
+    cuts = [_parts(axes, level, stretch, air, sample_rate, step) for stretch in stretches]
+    longest = max(cuts, key=lambda parts: parts.end - parts.begin)
+    least = BURST * (longest.end - longest.begin)
+    kept = [parts for parts in cuts if parts.reason != "too-short" and parts.end - parts.begin > least]
+    return kept or [longest]
 
 
-def _fault(signal: Floats, parts: CutParts, sample_rate: float, step: int) -> str:
+def _threshold(level: Floats) -> float:
+    """Halfway between the means of what is below and what is above it, the lowest such (Ridler & Calvard 1978)."""
+    smooth = uniform_filter1d(level, QUIET_PIECES)
+    beside = QUIET_PIECES // 2
+    least = threshold = float(np.min(smooth[beside:-beside])) + LOUDER
+    for _ in range(STEPS):
+        above = smooth > threshold
+        if np.all(above) or not np.any(above):
+            break
+        threshold = max(least, float(np.mean(smooth[above]) + np.mean(smooth[~above])) / 2)
+    return threshold
+
+
+def _parts(
+    axes: Floats, level: Floats, stretch: tuple[int, int], air: slice, sample_rate: float, step: int
+) -> CutParts:
+    """Entry, steady part and exit of a stretch of pieces, and what is wrong with it."""
+    begin, end = (stretch[0] + 1) * step, stretch[1] * step
+    entry, leaving = _ends(level[slice(*stretch)])
+    first = begin + step + max(round(SETTLED * sample_rate), entry * step)
+    last = end - 2 * step - leaving * step
+    settled = slice(max(first, last - round(MOST_CUT * sample_rate)), max(first, last))
+    times = (place / sample_rate for place in (begin, end, first, last))
+    parts = CutParts("", air, settled, *times)
+    return parts._replace(reason=_fault(axes, parts, sample_rate, step))
+
+
+def _ends(level: Floats) -> tuple[int, int]:
+    """How many pieces at the beginning and at the end of a cut are not as loud as most of it.
+
+    Where that is more than a quarter it is no entry and no exit: the cut itself changes.
+    """
+    smooth = uniform_filter1d(level, QUIET_PIECES)
+    usual = np.flatnonzero(np.abs(smooth - np.median(smooth)) < ENDS)
+    entry, leaving = int(usual[0]), int(level.size - 1 - usual[-1])
+    return tuple(pieces if pieces <= level.size / 4 else 0 for pieces in (entry, leaving))  # type: ignore[return-value]
+
+
+def _fault(axes: Floats, parts: CutParts, sample_rate: float, step: int) -> str:
     """Why parts cannot be listened to, a code; empty where they can."""
-    if parts.air.stop - parts.air.start < LEAST_AIR * sample_rate:
-        return "no-air"
     if parts.cut.stop - parts.cut.start < LEAST_CUT * sample_rate:
         return "too-short"
-    return "knock" if _has_knock(signal[parts.cut], step) else ""
+    if parts.air.stop - parts.air.start < LEAST_AIR * sample_rate:
+        return "no-air"
+    return "knock" if any(_has_knock(axis[parts.cut], step) for axis in axes) else ""
 
 
-def _loudness(signal: Floats, size: int, step: int, sample_rate: float) -> Floats:
+def _pieces(axes: Floats, size: int, step: int) -> Floats:
+    """Pieces of each axis, shape (axes, pieces, size)."""
+    return np.lib.stride_tricks.sliding_window_view(axes, size, axis=1)[:, ::step]
+
+
+def _loudness(pieces: Floats, sample_rate: float) -> Floats:
     """log10 of the power of each piece over that of the quietest part, in the mean over the frequencies above `LOWEST`.
 
-    Mean over frequency, not of logarithms: a light cut is heard in few lines.
+    Mean over frequency, not of logarithms: a light cut is heard in few lines. pieces: shape (pieces, size).
     """
-    pieces = np.lib.stride_tricks.sliding_window_view(signal, size)[::step]
+    size = pieces.shape[1]
     pieces = (pieces - np.mean(pieces, axis=1, keepdims=True)) * np.hanning(size)
     power = np.abs(np.fft.rfft(pieces, axis=1)[:, int(LOWEST * size / sample_rate) + 1 :]) ** 2
     power += np.finfo(np.float64).tiny

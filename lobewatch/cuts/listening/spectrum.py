@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,6 +94,11 @@ def spectrum_of(signal: Floats, sample_rate: float) -> Spectrum:
     return Spectrum(np.arange(power.size) * step, power, _noise(power), sample_rate / signal.size, sample_rate)
 
 
+def spectra_of(signal: Floats, sample_rate: float) -> list[Spectrum]:
+    """The spectrum of each axis; signal of shape (n,) or (axes, n)."""
+    return [spectrum_of(axis, sample_rate) for axis in np.atleast_2d(signal)]
+
+
 def _noise(power: Floats) -> Floats:
     """Mean power of noise whose power is distributed exponentially, from the quiet bins of each neighbourhood."""
     count = max(power.size // (PADDED * NEIGHBOURHOOD), 2)
@@ -101,6 +107,13 @@ def _noise(power: Floats) -> Floats:
     middle = np.cumsum([block.size for block in blocks]) - np.array([block.size for block in blocks]) / 2
     least = np.finfo(np.float64).tiny
     return np.asarray(np.maximum(np.interp(np.arange(power.size), middle, level), least))
+
+
+def joined_lines(axes: Sequence[SpectralLines]) -> SpectralLines:
+    """The lines of several axes."""
+    return SpectralLines(
+        *(np.concatenate([getattr(lines, name) for lines in axes]) for name in ("frequency", "amplitude", "clearness"))
+    )
 
 
 def lines_of(spectrum: Spectrum) -> SpectralLines:

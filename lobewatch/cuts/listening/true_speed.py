@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from lobewatch.cuts.listening.lattice import SpindleSpeed, refine_speed
-from lobewatch.cuts.listening.spectrum import Floats, SpectralLines, Spectrum
+from lobewatch.cuts.listening.sorted_lines import is_foreign
+from lobewatch.cuts.listening.spectrum import Floats, SpectralLines, Spectrum, joined_lines, lines_of, spectra_of
 
 AROUND = 0.021
 """Relative distance from the speed that was set up to which it is looked for."""
@@ -35,6 +38,32 @@ LEAST_SHARE = 0.5
 """Share of the lines that must belong to the lattice, and must have a neighbour one or two turns or teeth away ..."""
 LEAST_AGREEING = 3
 """... and number of them that must agree: a pump that is switched on has lines of its own."""
+
+
+def find_speed(cut: Floats, air: Floats, sample_rate: float, teeth: int, commanded_rpm: float) -> SpindleSpeed | None:
+    """Turns a second in the steady part of a cut, near the speed that was set (rpm); None where too few lines agree.
+
+    cut and air in any unit, shape (n,) or (axes, n); air: the same spindle without a cut; sample_rate in Hz.
+
+    Example: tooth passing of four teeth at 6000 rpm, its multiples and a little noise.
+
+    >>> time, random = np.arange(10_000) / 10e3, np.random.default_rng(0)
+    >>> comb = sum(np.sin(2 * np.pi * 400 * k * time) / k for k in range(1, 9))
+    >>> air, cut = 0.01 * random.normal(size=(2, time.size)) + [[0.0], [1.0]] * comb
+    >>> speed = find_speed(cut, air, 10e3, 4, 6020.0)
+    >>> round(60 * speed.frequency)
+    6000
+    """
+    return speed_of_spectra(spectra_of(cut, sample_rate), spectra_of(air, sample_rate), teeth, commanded_rpm / 60)
+
+
+def speed_of_spectra(
+    spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
+) -> SpindleSpeed | None:
+    """`find_speed` of the spectra of all axes; commanded in turns a second (Hz)."""
+    lines = [lines_of(spectrum) for spectrum in spectra]
+    heard = [axis[~is_foreign(axis, quiet)] for axis, quiet in zip(lines, air, strict=True)]
+    return true_speed(joined_lines(heard), joined_lines(lines), spectra[0], teeth, commanded)
 
 
 def true_speed(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lobewatch.logbook.cut_comparison import CutComparison
@@ -12,7 +12,6 @@ WHY: Mapping[str, str] = {
     "too-short": "less than 0.3 s of cut to listen to; record a second or longer, with air before it",
     "no-cut": "nothing in it gets louder: record from the spindle turning in air into the cut",
     "no-air": "no 0.15 s of the spindle turning in air beside the cut, to know what is there without it",
-    "two-cuts": "more than one cut in it; give each a recording of its own",
     "knock": "a knock in the cut, as of a hammer; cut again without it",
     "overload": "the accelerometer or its input was overloaded; choose a larger range or another place",
     "lost-scans": "scans were lost in it; lower the sample rate or use another cable or port",
@@ -77,6 +76,17 @@ def listened_texts(comparison: CutComparison) -> list[str]:
     return texts + _expected(comparison)
 
 
+def cuts_texts(comparisons: Sequence[CutComparison], saved: Sequence[str] = ()) -> list[str]:
+    """What was heard of each cut in a recording; saved: names under which they are kept."""
+    texts = list[str]()
+    for number, comparison in enumerate(comparisons):
+        parts = comparison.heard.parts
+        head = [f"cut {number + 1} of {len(comparisons)}, {parts.begin:.2f} to {parts.end:.2f} s:"]
+        texts += head if len(comparisons) > 1 else []
+        texts += [*listened_texts(comparison), *(f"saved {name}" for name in saved[number : number + 1])]
+    return texts
+
+
 def _expected(comparison: CutComparison) -> list[str]:
     if comparison.predicted is None:
         return []
@@ -113,4 +123,14 @@ def listened_json(comparison: CutComparison) -> dict[str, Any]:
         "predicted_apart_hz": comparison.apart,
         "begin_s": heard.parts.begin,
         "end_s": heard.parts.end,
+        "steady_begin_s": heard.parts.steady_begin,
+        "steady_end_s": heard.parts.steady_end,
     }
+
+
+def cuts_json(comparisons: Sequence[CutComparison], beside: Sequence[Mapping[str, Any]] = ()) -> dict[str, Any]:
+    """The cut in a recording; several stand in `cuts`. beside: more of each."""
+    each = [listened_json(comparison) for comparison in comparisons]
+    for cut, more in zip(each, beside, strict=False):
+        cut.update(more)
+    return each[0] if len(each) == 1 else {"cuts": each}

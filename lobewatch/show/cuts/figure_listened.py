@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from lobewatch.cuts.listening.listen_to import line_kinds
+from lobewatch.cuts.listening.judge_cut import line_kinds
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.show.cuts.describe_listened import listened_text
 from lobewatch.show.figures.style import ALARM, EVENT, GOOD, NOW, THEN, new_axes, save_figure
@@ -26,22 +27,29 @@ SHOWN = 1e-4
 """Share of the loudest amplitude down to which is drawn."""
 
 
-def save_listened(comparison: CutComparison, path: Path) -> None:
-    """Write the picture of a cut to a file."""
-    save_figure(listened_figure(comparison), path)
+def save_listened(comparisons: Sequence[CutComparison], path: Path) -> None:
+    """Write the picture of the cuts in a recording to a file."""
+    save_figure(listened_figure(comparisons), path)
 
 
-def listened_figure(comparison: CutComparison) -> Figure:
-    """Amplitude over frequency; without a spectrum, where it did not get so far, the word alone."""
-    figure, axes = new_axes(1, (10.0, 4.5))
-    axis, spectrum = axes[0], comparison.heard.spectrum
+def listened_figure(comparisons: Sequence[CutComparison]) -> Figure:
+    """Amplitude over frequency, a panel for each cut; the word alone where it did not get as far as a spectrum."""
+    figure, axes = new_axes(len(comparisons), (10.0, 4.5 * len(comparisons)))
+    for axis, comparison in zip(axes, comparisons, strict=True):
+        _draw(axis, comparison)
+    return figure
+
+
+def _draw(axis: Axes, comparison: CutComparison) -> None:
+    """One cut."""
+    spectrum = comparison.heard.spectrum
     setting = comparison.setting
     named = f"{setting.program or 'reference cut'}, {comparison.speed_rpm:.0f} rpm, {1e3 * setting.depth:.3g} mm"
     word = listened_text(comparison).partition(":")[0]
     axis.set_title(f"{named}: {word}", loc="left", fontsize=11, fontweight="bold")
     axis.set(xlabel="frequency (Hz)", ylabel="amplitude (m/s²)")
     if spectrum is None:
-        return figure
+        return
     inside = spectrum.frequency <= min(HIGHEST, spectrum.sample_rate / 2)
     amplitude = np.sqrt(spectrum.power[inside])
     axis.semilogy(spectrum.frequency[inside], amplitude, color="#bbbbbb", lw=0.6)
@@ -53,7 +61,6 @@ def listened_figure(comparison: CutComparison) -> Figure:
     top = float(np.max(amplitude))
     axis.set(xlim=(0, spectrum.frequency[inside][-1]), ylim=(SHOWN * top, 3 * top))
     axis.legend(loc="upper right", ncols=3, fontsize=8)
-    return figure
 
 
 def _modes(axis: Axes, assembly: Assembly) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import UTC
 from typing import Any
 
 from acquisition import Remark
 from lobewatch.logbook import Logbook
+from lobewatch.machine.additions.observe_cut import contradicting_cuts
 from lobewatch.machine.journal.heard_cut import HeardCut
 
 
@@ -49,6 +51,12 @@ def cut_json(cut: HeardCut) -> dict[str, Any]:
         "recording": None if cut.recording is None else cut.recording.file,
         "excluded": cut.excluded,
     }
+
+
+def kept_cut_remarks(logbook: Logbook, cut: HeardCut, earlier: Sequence[HeardCut]) -> list[Remark]:
+    """What is to be said of a cut that was heard and kept; earlier: those kept before."""
+    contrary = contradicting_cuts(cut, earlier) if cut.counts else ()
+    return [*untapped_remarks(logbook, cut), *map(contradiction_remark, contrary)]
 
 
 def untapped_remarks(logbook: Logbook, cut: HeardCut) -> list[Remark]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.cuts.listening.listen_to import line_kinds
+from lobewatch.cuts.listening.judge_cut import line_kinds
 from lobewatch.logbook.cut_comparison import CutComparison
 from lobewatch.tap.plots import extremes
 

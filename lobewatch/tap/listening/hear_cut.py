@@ -12,7 +12,7 @@ from acquisition.errors import failure_text
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_sound import read_sound
 from lobewatch.logbook import Logbook
-from lobewatch.logbook.cut_comparison import CutComparison, compare_cut
+from lobewatch.logbook.cut_comparison import CutComparison, compare_cuts
 from lobewatch.machine import MachineFolder, checked_rate
 from lobewatch.machine.settings.cut_setting import CutSetting
 from lobewatch.tap.listening.cut_state import CutState, CutStep, cut_curves, word_of
@@ -70,9 +70,12 @@ def cut_pictures(logbook: Logbook, setting: CutSetting) -> Iterator[Pictures[Cut
         raise
 
 
-def judge_live(logbook: Logbook, setting: CutSetting, signal: CutSignal, pictures: Pictures[CutState]) -> CutComparison:
-    """Listen to a recording, and show the word."""
+def judge_live(
+    logbook: Logbook, setting: CutSetting, signal: CutSignal, pictures: Pictures[CutState]
+) -> list[CutComparison]:
+    """Listen to a recording, and show the word on its last cut."""
     pictures.show(word=CutStep.JUDGING, reason="The cut is over.", level=None, left=None, cut_seconds=None)
-    comparison = compare_cut(logbook, setting, signal)
-    pictures.show(word=word_of(comparison), reason="", comparison=comparison, plots=cut_curves(comparison))
-    return comparison
+    comparisons = compare_cuts(logbook, setting, signal)
+    last = comparisons[-1]
+    pictures.show(word=word_of(last), reason="", comparison=last, plots=cut_curves(last))
+    return comparisons

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from acquisition import Block, Channel, DataError, Device, DeviceError
 from acquisition.files.cut_file import CutSignal
-from lobewatch.cuts.listening.find_cut import CutParts, find_cut
+from lobewatch.cuts.listening.find_cut import CutParts, find_cuts
 from lobewatch.tap.listening.cut_state import CutStep
 from lobewatch.tap.live_signal import LEVEL_TIME
 
@@ -103,8 +103,8 @@ def record_cut(
     ear, waiting = _ear(device), {"word": CutStep.LISTENING, "reason": ON_HOUSING}
     show(BEGIN)
     for signal in _looks(device, ear, patience, picture):
-        parts = find_cut(signal.acceleration, signal.sample_rate, turn)
-        if parts.reason == "two-cuts" or (_has_ended(parts, signal) and parts.reason):
+        parts = find_cuts(signal.acceleration, signal.sample_rate, turn)[-1]
+        if _has_ended(parts, signal) and parts.reason:
             ear.forget()
             show(TOO_SHORT)
             waiting = {"word": CutStep.AGAIN, "reason": f"{TOO_SHORT.capitalize()}."}

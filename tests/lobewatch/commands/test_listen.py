@@ -13,7 +13,7 @@ from typer.testing import CliRunner, Result
 from acquisition.files.read_sound import read_sound
 from lobewatch.cli import app
 from lobewatch.logbook import Logbook
-from lobewatch.logbook.cut_comparison import compare_cut
+from lobewatch.logbook.cut_comparison import compare_cuts
 from lobewatch.machine.archive.verify import verify
 from lobewatch.machine.settings.cut_setting import cut_setting
 
@@ -75,6 +75,28 @@ def test_a_recording_that_is_kept_says_the_same_again(shop: Shop, tmp_path: Path
     assert other["chatter_frequency_hz"] == one["chatter_frequency_hz"]
 
 
+def test_several_cuts_in_a_file_are_told_and_kept_each_with_its_own_air(shop: Shop, tmp_path: Path) -> None:
+    parts = [recording(tmp_path / f"{n}.csv", chatter, seconds=1.0) for n, chatter in enumerate((None, 1712.3))]
+    values = [line.split(",")[1] for part in parts for line in part.read_text().splitlines()[1:]]
+    rows = "\n".join(f"{n / RATE:.8f},{value}" for n, value in enumerate(values))
+    file, picture = tmp_path / "both.csv", tmp_path / "both.svg"
+    file.write_text(f"time [s],acceleration [m/s^2]\n{rows}\n")
+    arguments = ("--program", "A", "--speed", 12000, "--depth", 3, "--file", file)
+    cuts = json.loads(run(shop, *arguments, "--out", picture, "--json").stdout)["cuts"]
+    assert [(cut["word"], cut["id"]) for cut in cuts] == [("stable", "c1"), ("chatter", "c2")]
+    assert [cut["begin_s"] for cut in cuts] == pytest.approx([0.5, 2.3], abs=0.03)
+    assert cuts[1]["remarks"] == ["tool-not-tapped", "cuts-contradict"]
+    assert len(shop.logbook.cuts) == 2
+    for name, word in (("c1", "stable"), ("c2", "chatter")):
+        kept = shop.path / "cuts" / f"{name}.h5"
+        again = run(shop, *arguments[:6], "--file", kept, "--json", "--dry-run")
+        assert json.loads(again.stdout)["word"] == word
+    text = run(shop, *arguments, "--dry-run").stdout
+    assert "cut 1 of 2, 0.5" in text
+    assert "cut 2 of 2, 2.3" in text
+    assert "chatter at 1712" in picture.read_text("utf-8")
+
+
 def test_what_cannot_be_told_says_why_and_is_kept_without_counting(shop: Shop, tmp_path: Path) -> None:
     file = recording(tmp_path / "cut.csv", seconds=0.05)
     told = json.loads(run(shop, "--program", "A", "--speed", 12000, "--file", file, "--json").stdout)
@@ -119,7 +141,7 @@ def test_what_the_tap_tests_predict_at_this_depth_stands_beside_it(shop: Shop, t
     logbook = Logbook.open(shop.path)
     (verdict,), sound = logbook.verdicts(), read_sound(recording(tmp_path / "cut.csv", 1712.3))
     below, above = (
-        compare_cut(logbook, cut_setting(logbook.machine, "A", None, 1e3 * share * verdict.limit), sound)
+        compare_cuts(logbook, cut_setting(logbook.machine, "A", None, 1e3 * share * verdict.limit), sound)[0]
         for share in (0.99, 1.01)
     )
     assert below.predicted is not None

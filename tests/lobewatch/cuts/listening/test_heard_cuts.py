@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from acquisition.emulation import MillingCut, Passage, Structure, TipMotion, hear, random_housing, simulate_cuts
 from lobes import Cut, stability_boundary
 from lobewatch.cuts.listening.fold_frequency import family_distance
-from lobewatch.cuts.listening.listen_to import CutRecording, HeardSound, listen_to
+from lobewatch.cuts.listening.judge_cut import HeardSound
+from lobewatch.cuts.listening.listen_to import CutRecording, listen_to
 from modal import Mode
 
 PASSAGE = Passage(before=0.4, ramp=0.05, steady=1.05, after=0.2)
@@ -136,7 +137,8 @@ def tip_record(motion: TipMotion, turn: float, depth: float) -> TipRecord:
 
 def listen(signal: NDArray[Any], case: Case, rate: float, random: Random) -> HeardSound:
     commanded = case.speed_rpm * (1 + random.uniform(-0.015, 0.015))
-    return listen_to(CutRecording(signal, rate, case.cut.teeth, case.cut.immersion, commanded))
+    (heard,) = listen_to(CutRecording(signal, rate, case.cut.teeth, case.cut.immersion, commanded))
+    return heard
 
 
 @dataclass
@@ -231,7 +233,8 @@ def test_idle_runs_and_pumps_are_never_chatter() -> None:
                 pump, loud = random.uniform(100, 6000), 10 ** random.uniform(-1, 0.8)
                 signal[inside] += loud * np.sin(2 * np.pi * pump * time + random.uniform(0, 6.28))
         commanded = speed * (1 + random.uniform(-0.015, 0.015))
-        heard = listen_to(CutRecording(signal, rate, int(random.integers(1, 7)), 1.0, commanded))
-        words[f"{heard.word} {heard.reason}"] += 1
+        teeth = int(random.integers(1, 7))
+        heard = listen_to(CutRecording(signal, rate, teeth, 1.0, commanded))
+        words.update(f"{sound.word} {sound.reason}" for sound in heard)
     print(dict(words))  # noqa: T201
     assert not [word for word in words if not word.startswith("cannot tell")]

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from lobewatch.cuts.listening.listen_to import CutRecording, HeardSound, line_kinds, listen_to
+from lobewatch.cuts.listening.judge_cut import HeardSound, line_kinds
+from lobewatch.cuts.listening.listen_to import CutRecording, listen_to
 
 Floats = NDArray[np.float64]
 RATE = 25600.0
@@ -61,7 +62,8 @@ def a_cut(teeth: int = 4, chatter: float | None = None, loud: float = 20.0, **op
 
 
 def listen(signal: Floats, teeth: int = 4, **options: Any) -> HeardSound:
-    return listen_to(CutRecording(signal, RATE, teeth, 0.5, SET, **options))
+    (heard,) = listen_to(CutRecording(signal, RATE, teeth, 0.5, SET, **options))
+    return heard
 
 
 def test_a_quiet_cut_is_stable_and_its_speed_is_found() -> None:
@@ -76,7 +78,7 @@ def test_a_quiet_cut_is_stable_and_its_speed_is_found() -> None:
 
 @pytest.mark.parametrize("off", [-0.019, 0.019])
 def test_a_speed_two_percent_beside_the_one_that_was_set_is_found(off: float) -> None:
-    heard = listen_to(CutRecording(recorded(a_cut()), RATE, 4, 0.5, SPEED / (1 + off)))
+    (heard,) = listen_to(CutRecording(recorded(a_cut()), RATE, 4, 0.5, SPEED / (1 + off)))
     assert heard.speed_rpm == pytest.approx(SPEED, rel=2e-5)
 
 
@@ -156,7 +158,7 @@ def test_a_pump_that_is_switched_on_is_no_chatter(count: int) -> None:
 
 
 def test_a_speed_far_from_the_one_that_was_set_is_not_found() -> None:
-    heard = listen_to(CutRecording(recorded(a_cut()), RATE, 4, 0.5, SPEED * 1.045))
+    (heard,) = listen_to(CutRecording(recorded(a_cut()), RATE, 4, 0.5, SPEED * 1.045))
     assert (heard.word, heard.reason) == ("cannot tell", "speed-not-found")
 
 
@@ -165,8 +167,20 @@ def test_a_tenth_of_a_second_is_too_short() -> None:
     assert listen(recorded(a_cut()[: round(0.35 * RATE)])).reason == "too-short"
 
 
-def test_two_cuts_in_one_recording_are_refused() -> None:
-    assert listen(np.concatenate([recorded(a_cut()), recorded(a_cut())])).reason == "two-cuts"
+def test_several_cuts_in_one_recording_are_told_each() -> None:
+    signal = np.concatenate([recorded(a_cut()), recorded(a_cut(chatter=1712.3))])
+    first, second = listen_to(CutRecording(signal, RATE, 4, 0.5, SET))
+    assert (first.word, second.word) == ("stable", "chatter")
+    assert first.parts.begin == pytest.approx(AIR, abs=0.03)
+    assert second.parts.begin == pytest.approx(AIR + CUT + AFTER + AIR, abs=0.03)
+
+
+@pytest.mark.parametrize("chatters", [0, 1, 2])
+def test_several_axes_have_one_speed_and_the_word_of_the_one_that_hears_chatter(chatters: int) -> None:
+    axes = [recorded(0.3 * a_cut(chatter=1712.3 if axis == chatters else None), seed=axis) for axis in range(3)]
+    (heard,) = listen_to(CutRecording(np.stack(axes), RATE, 4, 0.5, SET))
+    assert (heard.word, heard.axis) == ("chatter", chatters)
+    assert heard.speed_rpm == pytest.approx(SPEED, rel=2e-5)
 
 
 def test_a_cut_without_air_is_refused() -> None:
@@ -240,7 +254,7 @@ def without_chatter(teeth: int, immersion: float, *pairs: tuple[int, float]) -> 
     """Word on orders of the spindle with these energies."""
     lines = [(order * TURN, 10 * np.sqrt(energy)) for order, energy in pairs]
     signal = recorded(sines(lines, round(CUT * RATE), np.random.default_rng(9)))
-    heard = listen_to(CutRecording(signal, RATE, teeth, immersion, SET))
+    (heard,) = listen_to(CutRecording(signal, RATE, teeth, immersion, SET))
     return heard.word, heard.reason
 
 

@@ -15,7 +15,7 @@ from acquisition import Block, Channel, DataError, DeviceError, DeviceIdentity, 
 from acquisition.devices import find_driver
 from acquisition.emulation import Passage
 from lobewatch.logbook import Logbook
-from lobewatch.logbook.cut_comparison import compare_cut
+from lobewatch.logbook.cut_comparison import compare_cuts
 from lobewatch.machine import MachineFolder, make_machine_folder
 from lobewatch.machine.settings.cut_setting import cut_setting
 from lobewatch.tap.emulated_cut import emulate_cut
@@ -116,7 +116,7 @@ def test_a_cut_that_comes_through_the_port_is_told_with_its_true_speed(tmp_path:
         source.start()
         signal = record_cut(source, 60 / setting.speed_rpm, 30.0, lambda _text: None)
         source.stop()
-    found = compare_cut(Logbook.open(folder.path), setting, signal)
+    (found,) = compare_cuts(Logbook.open(folder.path), setting, signal)
     assert found.heard.word == "stable"
     assert found.speed_rpm == pytest.approx(emulated.speed_rpm, rel=5e-5)
     assert found.speed_rpm != pytest.approx(setting.speed_rpm, rel=5e-4)

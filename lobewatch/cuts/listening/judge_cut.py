@@ -1,0 +1,165 @@
+"""The word on one cut, of arrays: stable, chatter, period two, or why that cannot be told.
+
+The thresholds here and beside were chosen on simulated cuts, with other random numbers than those of the long tests
+(docs/cuts.md, How often it is right).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lobewatch.cuts.listening.chatter_lines import ChatterLines, chatter_lines
+from lobewatch.cuts.listening.find_cut import UNPLACED, CutParts
+from lobewatch.cuts.listening.lattice import SpindleSpeed
+from lobewatch.cuts.listening.sorted_lines import SortedLines, sort_lines
+from lobewatch.cuts.listening.spectrum import Floats, SpectralLines, Spectrum, lines_of, spectra_of, spectrum_of
+from lobewatch.cuts.listening.steadiness import unsteadiness
+from lobewatch.cuts.listening.true_speed import speed_of_spectra
+from lobewatch.machine.journal.heard_cut import CutWord
+
+CHATTERS = 5e-4
+"""Energy of what is left over that of the comb: above it, with side bands, a cut chatters ..."""
+ALONE = 1e-2
+"""... without side bands above this ..."""
+QUIET = 2e-4
+"""... and below this it is stable."""
+LEAST_COMB = 1e-9
+"""Least energy that the comb is taken to have, over that of what is left."""
+SIDE_BANDS = 3
+"""Number of lines of a family that is chatter for sure."""
+FLIP = 0.003
+"""Distance from half of tooth passing, relative to that, within which chatter has a period of two teeth."""
+OTHER_TEETH = 5.0
+"""Energy of the orders that run-out hardly has (modulo the teeth neither 0 nor +-1) over those it has ..."""
+RUN_OUT = 8.0
+"""... and of all orders that are no tooth passing over tooth passing, in less than a slot."""
+SLOT = 0.95
+"""Immersion from which on tooth passing nearly vanishes."""
+NEAR = 1.0
+"""Distance of a line at the end of a cut up to which it is that of the whole cut (bins)."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeardSound:
+    """What was heard in a recording, and what it rests on; None and NaN where it did not get so far."""
+
+    word: CutWord
+    """Word for what the cut sounded like."""
+    reason: str
+    """Code of why it cannot be told; empty where it can."""
+    parts: CutParts = UNPLACED
+    """Parts of the recording that are the cut, and air."""
+    turning: SpindleSpeed | None = None
+    """True speed of the spindle."""
+    ratio: float = np.nan
+    """Energy of what is left, at the end of the cut, over that of the multiples of the spindle."""
+    chatter: ChatterLines | None = None
+    """Lines of chatter."""
+    lines: SortedLines | None = None
+    """All lines, by where they come from."""
+    spectrum: Spectrum | None = None
+    """Spectrum of the cut."""
+    axis: int = 0
+    """Which of several axes the word rests on, from 0."""
+
+    @property
+    def speed_rpm(self) -> float:
+        """True spindle speed (rpm); NaN where it was not found."""
+        return np.nan if self.turning is None else 60 * self.turning.frequency
+
+
+def judge_cut(
+    cut: Floats, air: Floats, sample_rate: float, teeth: int, immersion: float, commanded_rpm: float
+) -> HeardSound:
+    """The word on the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
+
+    air: the same spindle turning without a cut; immersion: radial depth over diameter; commanded_rpm as it was set. All
+    axes have one speed, and the word is that of the loudest evidence: of the axis with the loudest chatter, else of
+    that with the loudest cut. Reasons why it cannot be told: "speed-not-found", "on-spindle-lines" (period two of an
+    even number of teeth, or chatter locked to the spindle), "faint".
+
+    Example: tooth passing of four teeth at 6000 rpm, its multiples and a little noise.
+
+    >>> time, random = np.arange(10_000) / 10e3, np.random.default_rng(0)
+    >>> comb = sum(np.sin(2 * np.pi * 400 * k * time) / k for k in range(1, 9))
+    >>> air, cut = 0.01 * random.normal(size=(2, time.size)) + [[0.0], [1.0]] * comb
+    >>> heard = judge_cut(cut, air, 10e3, 4, 0.5, 6020.0)
+    >>> heard.word, round(heard.speed_rpm)
+    ('stable', 6000)
+    """
+    spectra, quiet = spectra_of(cut, sample_rate), spectra_of(air, sample_rate)
+    turning = speed_of_spectra(spectra, quiet, teeth, commanded_rpm / 60)
+    if turning is None:
+        return HeardSound("cannot tell", "speed-not-found", spectrum=spectra[0])
+    sounds = []
+    for number, axis in enumerate(np.atleast_2d(cut)):
+        lines = lines_of(spectra[number])
+        unsteady = unsteadiness(axis, sample_rate, lines, turning, spectra[number].bin)
+        by_origin = sort_lines(lines, spectra[number], quiet[number], turning, teeth, unsteady)
+        sound = HeardSound(
+            "stable", "", turning=turning, ratio=0.0, lines=by_origin, spectrum=spectra[number], axis=number
+        )
+        sounds.append(_judge_lines(sound, axis, teeth, immersion))
+    return max(sounds, key=_evidence)
+
+
+def _evidence(sound: HeardSound) -> tuple[bool, float]:
+    """What the word rests on: chatter before anything else, then how loud it is."""
+    if sound.lines is None:
+        return False, 0.0
+    if sound.chatter is not None:
+        return True, sound.chatter.lines.energy
+    return False, sound.lines.comb.energy
+
+
+def _judge_lines(sound: HeardSound, signal: Floats, teeth: int, immersion: float) -> HeardSound:
+    """The word on an axis whose lines are known."""
+    lines, turning, spectrum = sound.lines, sound.turning, sound.spectrum
+    if lines is None or turning is None or spectrum is None:
+        raise ValueError("a cut whose lines are not known cannot be judged")
+    if not len(lines.left):
+        return _judge_without_chatter(sound, teeth, immersion)
+    tooth = turning.frequency * teeth
+    chatter = chatter_lines(lines.left, tooth, spectrum.bin)
+    end = spectrum_of(signal[signal.size // 2 :], spectrum.sample_rate)
+    still = min(float(end.loudest_near(np.array([chatter.frequency]), NEAR)[0]) / _power(chatter), 1.0)
+    ratio = still * lines.left.energy / max(lines.comb.energy, LEAST_COMB * lines.left.energy)
+    sound = replace(sound, ratio=ratio)
+    if ratio < QUIET:
+        return _judge_without_chatter(sound, teeth, immersion)
+    if ratio < (CHATTERS if len(chatter.lines) >= SIDE_BANDS else ALONE):
+        return replace(sound, word="cannot tell", reason="faint")
+    half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP
+    return replace(sound, word="flip" if half else "chatter", chatter=chatter)
+
+
+def _power(chatter: ChatterLines) -> float:
+    """Power of the line that names it."""
+    at = int(np.argmin(np.abs(chatter.lines.frequency - chatter.frequency)))
+    return float(chatter.lines.amplitude[at] ** 2)
+
+
+def _judge_without_chatter(sound: HeardSound, teeth: int, immersion: float) -> HeardSound:
+    """Stable, unless multiples of the spindle are louder than run-out and teeth make them."""
+    if sound.lines is None:
+        return sound
+    power, order = sound.lines.comb.amplitude**2, sound.lines.tooth
+    tooth, run_out = order == 0, (order == 1) | (order == teeth - 1)
+    uneven = float(np.sum(power[~run_out & ~tooth]))
+    is_odd = uneven > OTHER_TEETH * float(np.sum(power[run_out & ~tooth])) and uneven > QUIET * float(np.sum(power))
+    is_loud = immersion < SLOT and float(np.sum(power[~tooth])) > RUN_OUT * float(np.sum(power[tooth]))
+    return replace(sound, word="cannot tell", reason="on-spindle-lines") if is_odd or is_loud else sound
+
+
+def line_kinds(sound: HeardSound) -> dict[str, SpectralLines]:
+    """Lines that are there, under "turns" of the spindle, "tooth" passing, "air" (there without a cut), "chatter"."""
+    lines, chatter = sound.lines, sound.chatter
+    named: dict[str, SpectralLines] = {}
+    if lines is not None:
+        tooth = lines.tooth == 0
+        named = {"turns": lines.comb[~tooth], "tooth": lines.comb[tooth], "air": lines.foreign}
+    if chatter is not None:
+        named["chatter"] = chatter.lines
+    return {name: kind for name, kind in named.items() if len(kind)}

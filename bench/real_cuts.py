@@ -104,10 +104,6 @@ class Axis:
     rpm: float
     source: Source
 
-    def heard(self, signal: Floats) -> list[HeardSound]:
-        """What is told of it, or of a part."""
-        return listen_to(CutRecording(signal, self.rate, self.source.teeth, self.source.immersion, self.rpm))
-
 
 @dataclass(frozen=True)
 class Comb:
@@ -132,9 +128,36 @@ class Tally:
     found: int = 0
     speeds: Counter[str] = field(default_factory=Counter)
     words: Counter[str] = field(default_factory=Counter)
+    on_harmonic: int = 0
     pairs: int = 0
     apart: int = 0
-    on_harmonic: int = 0
+
+    def add(self, cuts: list[HeardSound], comb: Comb) -> None:
+        """One more recording."""
+        heard = longest(cuts)
+        self.cuts += 1
+        self.found += len(cuts) == 1 and heard.reason not in NOT_FOUND
+        self.words[heard.word if heard.word != "cannot tell" else heard.reason] += 1
+        self.speeds[_speed_word(heard, comb)] += 1
+        self.on_harmonic += comb.is_clear and _is_on_harmonic(heard, comb.frequency)
+
+    @property
+    def speed_text(self) -> str:
+        """Speeds right, wrong and silent, of those that are clear."""
+        right, wrong, silent = (self.speeds[word] for word in ("right", "wrong", "silent"))
+        return f"{right}, {wrong}, {silent} of {right + wrong + silent}"
+
+
+def listened(file: list[Axis], part: slice = slice(None)) -> list[HeardSound]:
+    """What is told of some axes together, or of a part of them."""
+    first, size = file[0], min(axis.signal.size for axis in file)
+    signals = np.stack([axis.signal[:size][part] for axis in file])
+    return listen_to(CutRecording(signals, first.rate, first.source.teeth, first.source.immersion, first.rpm))
+
+
+def longest(cuts: list[HeardSound]) -> HeardSound:
+    """That of the longest cut."""
+    return max(cuts, key=lambda heard: np.nan_to_num(heard.parts.end - heard.parts.begin))
 
 
 def axes_of(folder: Path, source: Source) -> Iterator[list[Axis]]:
@@ -172,45 +195,49 @@ def loud_part(signal: Floats, rate: float) -> tuple[int, int]:
     return int(begin[longest]) * size, int(end[longest]) * size
 
 
-def comb_in(spectrum: Spectrum, frequency: float) -> Comb:
-    """The best comb near a frequency (Hz)."""
-    power = np.log10(spectrum.power + np.finfo(np.float64).tiny)
-    above = power - median_filter(power, NEIGHBOURS)
-    highest = int(min(HARMONICS, spectrum.frequency[-1] / frequency / (1 + AROUND)))
-    grid = np.arange(1 - AROUND, 1 + AROUND, spectrum.bin / (4 * HARMONICS * frequency)) * frequency
-    score = np.mean([np.interp(k * grid, spectrum.frequency, above) for k in range(1, highest + 1)], axis=0)
-    best = int(np.argmax(score))
+def comb_of(file: list[Axis], part: slice) -> list[Comb]:
+    """The comb of a part of a file: the frequency is that of all axes, how clear it is is told of each."""
+    first = file[0]
+    above = [_above_noise(spectrum_of(axis.signal[part], axis.rate)) for axis in file]
+    turn, frequency, bin_ = first.rpm / 60, above[0][0], first.rate / (part.stop - part.start)
+    highest = int(min(HARMONICS, first.rate / 2 / turn / (1 + AROUND)))
+    grid = np.arange(1 - AROUND, 1 + AROUND, bin_ / (4 * HARMONICS * turn)) * turn
+    scores = [
+        np.mean([np.interp(k * grid, frequency, axis) for k in range(1, highest + 1)], axis=0) for _, axis in above
+    ]
+    best = int(np.argmax(np.mean(scores, axis=0)))
+    is_same = np.abs(grid / grid[best] - 1) < SAME_SPEED
     is_inside = 0 < best < grid.size - 1
-    limit = SIGMAS * SCATTER / np.sqrt(highest)
-    return Comb(float(grid[best]), float(score[best]) if is_inside else 0.0, float(limit))
+    limit = float(SIGMAS * SCATTER / np.sqrt(highest))
+    return [Comb(float(grid[best]), float(np.max(score[is_same])) if is_inside else 0.0, limit) for score in scores]
 
 
-def comb_of(axis: Axis, heard: HeardSound) -> Comb:
-    """Of the part that was listened to, else of the middle of what is loud."""
-    part = heard.parts.cut
-    if part.stop == part.start:
-        begin, end = loud_part(axis.signal, axis.rate)
-        half = min(round(WINDOW * axis.rate), end - begin) // 2
-        part = slice((begin + end) // 2 - half, (begin + end) // 2 + half)
-    return comb_in(spectrum_of(axis.signal[part], axis.rate), axis.rpm / 60)
+def _above_noise(spectrum: Spectrum) -> tuple[Floats, Floats]:
+    """Frequencies (Hz), and log10 of the power over its local median."""
+    power = np.log10(spectrum.power + np.finfo(np.float64).tiny)
+    return spectrum.frequency, power - median_filter(power, NEIGHBOURS)
 
 
-def judge_file(axes: list[Axis], tally: Tally) -> None:
-    """All that is to be counted of the axes of a file."""
-    speeds = []
-    for axis in axes:
-        cuts = axis.heard(axis.signal)
-        heard = max(cuts, key=lambda cut: cut.parts.end - cut.parts.begin)
-        comb = comb_of(axis, heard)
-        tally.cuts += 1
-        tally.found += len(cuts) == 1 and heard.reason not in NOT_FOUND
-        tally.words[heard.word if heard.word != "cannot tell" else heard.reason] += 1
-        tally.speeds[_speed_word(heard, comb)] += 1
-        tally.on_harmonic += comb.is_clear and _is_on_harmonic(heard, comb.frequency)
-        speeds.append(heard.speed_rpm)
+def steady_part(file: list[Axis], heard: HeardSound) -> slice:
+    """What was listened to, else the middle of what is loud."""
+    if heard.parts.cut.stop > heard.parts.cut.start:
+        return heard.parts.cut
+    begin, end = loud_part(file[0].signal, file[0].rate)
+    half = min(round(WINDOW * file[0].rate), end - begin) // 2
+    return slice((begin + end) // 2 - half, (begin + end) // 2 + half)
+
+
+def judge_file(file: list[Axis], each: Tally, together: Tally) -> None:
+    """All that is to be counted of a file, its axes each by itself, and heard together."""
+    combs, speeds = comb_of(file, steady_part(file, longest(listened(file)))), []
+    for axis, comb in zip(file, combs, strict=True):
+        cuts = listened([axis])
+        each.add(cuts, comb)
+        speeds.append(longest(cuts).speed_rpm)
+    together.add(listened(file), max(combs, key=lambda comb: comb.score))
     pairs = [pair for pair in combinations(speeds, 2) if np.all(np.isfinite(pair))]
-    tally.pairs += len(pairs)
-    tally.apart += sum(abs(one / other - 1) > SAME_SPEED for one, other in pairs)
+    each.pairs += len(pairs)
+    each.apart += sum(abs(one / other - 1) > SAME_SPEED for one, other in pairs)
 
 
 def _speed_word(heard: HeardSound, comb: Comb) -> str:
@@ -228,50 +255,42 @@ def _is_on_harmonic(heard: HeardSound, turn: float) -> bool:
     return bool(fold_frequency(heard.chatter.frequency, turn) < ON_HARMONIC * turn)
 
 
-def air_windows(axis: Axis, only_air: bool) -> Iterator[Floats]:
-    """Windows without a cut: of a recording of air, else of what stands before and after what is loud."""
-    size = round(WINDOW * axis.rate)
-    begin, end = (axis.signal.size, axis.signal.size) if only_air else loud_part(axis.signal, axis.rate)
+def words_on_air(file: list[Axis], only_air: bool) -> Iterator[str]:
+    """Words on windows without a cut: of a recording of air, else of what stands before and after what is loud."""
+    axis, size = file[0], round(WINDOW * file[0].rate)
+    begin, end = loud_part(axis.signal, axis.rate)
     spare = round(2 * PIECE * axis.rate)
-    for first, last in ((0, begin - spare * (not only_air)), (end + spare, axis.signal.size)):
+    outside = ((0, axis.signal.size),) if only_air else ((0, begin - spare), (end + spare, axis.signal.size))
+    for first, last in outside:
         for place in range(first, last - size + 1, size):
-            yield axis.signal[place : place + size]
+            yield from (heard.word for heard in listened(file, slice(place, place + size)))
 
 
-def words_on_air(axes: list[Axis], only_air: bool) -> Iterator[str]:
-    """The words on each window without a cut, on the first axis."""
-    for window in air_windows(axes[0], only_air):
-        yield from (heard.word for heard in axes[0].heard(window))
-
-
-def row(source: Source, tally: Tally) -> str:
+def row(source: Source, each: Tally, together: Tally) -> str:
     """Of the table."""
-    speeds, words = tally.speeds, tally.words
-    clear = speeds["right"] + speeds["wrong"] + speeds["silent"]
-    told = ", ".join(f"{count} {word}" for word, count in words.most_common())
+    words = ", ".join(f"{count} {word}" for word, count in together.words.most_common())
+    false = each.on_harmonic + together.on_harmonic
     return (
-        f"| {source.title} | {tally.found} of {tally.cuts} | {speeds['right']}, {speeds['wrong']}, {speeds['silent']} "
-        f"of {clear} | {tally.apart} of {tally.pairs} | {told} | {tally.on_harmonic} | "
+        f"| {source.title} | {each.found} of {each.cuts} | {each.speed_text} | {each.apart} of {each.pairs} | "
+        f"{together.speed_text} | {words} | {false} |"
     )
 
 
 def main() -> None:
-    """Print the tables."""
+    """Print the table."""
     if len(sys.argv) != 2 or not Path(sys.argv[1]).is_dir():
         sys.exit("give the folder of the public recordings: python bench/real_cuts.py FOLDER")
     folder, began, air = Path(sys.argv[1]), time.process_time(), Counter[str]()
-    print("| recordings | cut found | speed right, wrong, silent | axes apart | words and reasons | false words |")
-    print("|---|---|---|---|---|---|")
-    for source in SOURCES:
-        tally = Tally()
-        for axes in axes_of(folder, source):
-            judge_file(axes, tally)
-            air.update(words_on_air(axes, only_air=False))
-        if tally.cuts:
-            print(row(source, tally), flush=True)
-    for source in AIR:
-        for axes in axes_of(folder, source):
-            air.update(words_on_air(axes, only_air=True))
+    print("| recordings | cut found | speed of one axis | axes apart | of all | words on all axes | on harmonics |")
+    print("|---|---|---|---|---|---|---|")
+    for source in (*SOURCES, *AIR):
+        each, together = Tally(), Tally()
+        for file in axes_of(folder, source):
+            if source in SOURCES:
+                judge_file(file, each, together)
+            air.update(words_on_air(file, only_air=source in AIR))
+        if each.cuts:
+            print(row(source, each, together), flush=True)
     print(f"\nwindows of air: {dict(air)}; {time.process_time() - began:.0f} s of CPU")
 
 

@@ -31,6 +31,8 @@ ENDS = 0.3
 """Entry and exit are so much louder or quieter than most of a cut, in log10 of the power: twice."""
 BURST = 1 / 6
 """What has so much of the length of the longest cut beside it is none; chosen."""
+MOST_ENDS = 2.0
+"""Longest entry or exit (s)."""
 JOINED = 0.1
 """Pauses up to this belong to a cut (s)."""
 KNOCK = 0.15
@@ -95,11 +97,12 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
     step = size // 2
     if count < (LEAST_AIR + SETTLED + LEAST_CUT) * sample_rate or count < 4 * size:
         return [CutParts("too-short")]
-    sounds = np.any(np.ptp(_pieces(axes, size, step), axis=2) > 0, axis=0)
+    pieces = np.lib.stride_tricks.sliding_window_view(axes, size, axis=1)[:, ::step]
+    sounds = np.any(np.ptp(pieces, axis=2) > 0, axis=0)
     if np.count_nonzero(sounds) < 2 * QUIET_PIECES:
         return [CutParts("no-cut")]
     level = np.zeros(sounds.size)
-    level[sounds] = np.max([_loudness(axis[sounds], sample_rate) for axis in _pieces(axes, size, step)], axis=0)
+    level[sounds] = np.max([_loudness(axis[sounds], sample_rate) for axis in pieces], axis=0)
     is_loud = level > _threshold(level[sounds])
     loud = _stretches(is_loud)
     joined = _join(loud, JOINED * sample_rate / step)
@@ -107,7 +110,8 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
     if not stretches:
         return [CutParts("no-cut")]
     air = _longest_air(_stretches(is_loud | ~sounds), level.size, step)
-    cuts = [_parts(axes, level, stretch, air, sample_rate, step) for stretch in stretches]
+    power = np.log10(np.sum(np.var(pieces, axis=2), axis=0) + np.finfo(np.float64).tiny)
+    cuts = [_parts(axes, power, stretch, air, sample_rate, step) for stretch in stretches]
     longest = max(cuts, key=lambda parts: parts.end - parts.begin)
     least = BURST * (longest.end - longest.begin)
     kept = [parts for parts in cuts if parts.reason != "too-short" and parts.end - parts.begin > least]
@@ -128,11 +132,11 @@ def _threshold(level: Floats) -> float:
 
 
 def _parts(
-    axes: Floats, level: Floats, stretch: tuple[int, int], air: slice, sample_rate: float, step: int
+    axes: Floats, power: Floats, stretch: tuple[int, int], air: slice, sample_rate: float, step: int
 ) -> CutParts:
     """Entry, steady part and exit of a stretch of pieces, and what is wrong with it."""
     begin, end = (stretch[0] + 1) * step, stretch[1] * step
-    entry, leaving = _ends(level[slice(*stretch)])
+    entry, leaving = _ends(power[slice(*stretch)], JOINED * sample_rate / step, MOST_ENDS * sample_rate / step)
     first = begin + step + max(round(SETTLED * sample_rate), entry * step)
     last = end - 2 * step - leaving * step
     settled = slice(max(first, last - round(MOST_CUT * sample_rate)), max(first, last))
@@ -141,15 +145,16 @@ def _parts(
     return parts._replace(reason=_fault(axes, parts, sample_rate, step))
 
 
-def _ends(level: Floats) -> tuple[int, int]:
-    """How many pieces at the beginning and at the end of a cut are not as loud as most of it.
+def _ends(power: Floats, join: float, most: float) -> tuple[int, int]:
+    """How many pieces at the beginning and at the end of a cut stand beside its longest part of one loudness.
 
-    Where that is more than a quarter it is no entry and no exit: the cut itself changes.
+    Where those are more than a quarter of the cut, or than `most`, it is no entry and no exit: the cut itself changes.
     """
-    smooth = uniform_filter1d(level, QUIET_PIECES)
-    usual = np.flatnonzero(np.abs(smooth - np.median(smooth)) < ENDS)
-    entry, leaving = int(usual[0]), int(level.size - 1 - usual[-1])
-    return tuple(pieces if pieces <= level.size / 4 else 0 for pieces in (entry, leaving))  # type: ignore[return-value]
+    smooth = uniform_filter1d(power, QUIET_PIECES)
+    usual = _join(_stretches(np.abs(smooth - np.median(smooth)) < ENDS), join)
+    first, last = max(usual, key=lambda stretch: stretch[1] - stretch[0])
+    entry, leaving = (n if n <= min(power.size / 4, most) else 0 for n in (first, power.size - last))
+    return entry, leaving
 
 
 def _fault(axes: Floats, parts: CutParts, sample_rate: float, step: int) -> str:
@@ -159,11 +164,6 @@ def _fault(axes: Floats, parts: CutParts, sample_rate: float, step: int) -> str:
     if parts.air.stop - parts.air.start < LEAST_AIR * sample_rate:
         return "no-air"
     return "knock" if any(_has_knock(axis[parts.cut], step) for axis in axes) else ""
-
-
-def _pieces(axes: Floats, size: int, step: int) -> Floats:
-    """Pieces of each axis, shape (axes, pieces, size)."""
-    return np.lib.stride_tricks.sliding_window_view(axes, size, axis=1)[:, ::step]
 
 
 def _loudness(pieces: Floats, sample_rate: float) -> Floats:

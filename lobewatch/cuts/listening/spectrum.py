@@ -24,6 +24,10 @@ CLEAR = 25.0
 """A line has so many times the power of the noise: noise reaches it once in 1e11 bins."""
 APART = 1.5
 """Least distance of two lines that are told apart (bins)."""
+SKIRT = 10.0
+"""Distance up to which a line has a skirt (bins): 5 of the window's own width ..."""
+SLOPE = 3.0
+"""... of lines so many times fainter: a tenth of its power."""
 ERROR = 0.3
 """Standard error of the frequency of a line, over the root of its clearness (bins) ..."""
 LEAST_ERROR = 0.03
@@ -107,6 +111,15 @@ def _noise(power: Floats) -> Floats:
     middle = np.cumsum([block.size for block in blocks]) - np.array([block.size for block in blocks]) / 2
     least = np.finfo(np.float64).tiny
     return np.asarray(np.maximum(np.interp(np.arange(power.size), middle, level), least))
+
+
+def without_skirts(lines: SpectralLines, bin_: float) -> SpectralLines:
+    """Lines but for those beside a far louder one: a speed that wavers makes a line wide, and its slope a row of peaks.
+
+    bin_: of the spectrum (Hz).
+    """
+    apart = np.abs(lines.frequency[:, np.newaxis] - lines.frequency) < SKIRT * bin_
+    return lines[~np.any(apart & (lines.amplitude > SLOPE * lines.amplitude[:, np.newaxis]), axis=1)]
 
 
 def joined_lines(axes: Sequence[SpectralLines]) -> SpectralLines:

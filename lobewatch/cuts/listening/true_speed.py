@@ -9,11 +9,27 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from lobewatch.cuts.listening.lattice import SpindleSpeed, refine_speed
+from lobewatch.cuts.listening.plain_comb import plain_comb
 from lobewatch.cuts.listening.sorted_lines import is_foreign
-from lobewatch.cuts.listening.spectrum import Floats, SpectralLines, Spectrum, joined_lines, lines_of, spectra_of
+from lobewatch.cuts.listening.spectrum import (
+    Floats,
+    SpectralLines,
+    Spectrum,
+    joined_lines,
+    lines_of,
+    spectra_of,
+    without_skirts,
+)
 
+COMB_AROUND = 0.05
+"""Relative distance from the speed that was set up to which a plain comb is looked for ..."""
+SAME = 1e-3
+"""... and up to which it is the same as that of the votes, which know of side bands; it is taken where it explains as
+many lines: it has one unknown, they have one more for each family of side bands."""
+SURE = 6
+"""Lines that must agree on a speed by votes that has no plain comb, and that does not fit (`FITS`) all of them."""
 AROUND = 0.021
-"""Relative distance from the speed that was set up to which it is looked for."""
+"""Relative distance from the speed that was set up to which votes are counted."""
 LOUDEST = 40
 """Lines that are looked at."""
 HIGHEST = 60
@@ -61,9 +77,17 @@ def speed_of_spectra(
     spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
 ) -> SpindleSpeed | None:
     """`find_speed` of the spectra of all axes; commanded in turns a second (Hz)."""
-    lines = [lines_of(spectrum) for spectrum in spectra]
+    lines = [without_skirts(lines_of(spectrum), spectrum.bin) for spectrum in spectra]
     heard = [axis[~is_foreign(axis, quiet)] for axis, quiet in zip(lines, air, strict=True)]
-    return true_speed(joined_lines(heard), joined_lines(lines), spectra[0], teeth, commanded)
+    of_cut, first = joined_lines(heard), spectra[0]
+    voted = true_speed(of_cut, joined_lines(lines), first, teeth, commanded)
+    comb = plain_comb(of_cut, first.bin, first.sample_rate, teeth, commanded, COMB_AROUND)
+    if comb is None:
+        return voted if voted is not None and (voted.misfit < FITS or voted.agreeing >= SURE) else None
+    if voted is None or comb.agreeing >= voted.agreeing:
+        is_same = voted is not None and abs(comb.frequency / voted.frequency - 1) < SAME
+        return voted if is_same else comb if comb.share >= LEAST_SHARE else None
+    return voted
 
 
 def true_speed(

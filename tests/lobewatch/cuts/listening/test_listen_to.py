@@ -76,8 +76,8 @@ def test_a_quiet_cut_is_stable_and_its_speed_is_found() -> None:
     assert abs(heard.speed_rpm - SPEED) / 60 < 5 * heard.turning.error
 
 
-@pytest.mark.parametrize("off", [-0.019, 0.019])
-def test_a_speed_two_percent_beside_the_one_that_was_set_is_found(off: float) -> None:
+@pytest.mark.parametrize("off", [-0.045, -0.019, 0.019, 0.045])
+def test_a_speed_up_to_five_percent_beside_the_one_that_was_set_is_found(off: float) -> None:
     (heard,) = listen_to(CutRecording(recorded(a_cut()), RATE, 4, 0.5, SPEED / (1 + off)))
     assert heard.speed_rpm == pytest.approx(SPEED, rel=2e-5)
 
@@ -158,7 +158,7 @@ def test_a_pump_that_is_switched_on_is_no_chatter(count: int) -> None:
 
 
 def test_a_speed_far_from_the_one_that_was_set_is_not_found() -> None:
-    (heard,) = listen_to(CutRecording(recorded(a_cut()), RATE, 4, 0.5, SPEED * 1.045))
+    (heard,) = listen_to(CutRecording(recorded(a_cut()), RATE, 4, 0.5, SPEED * 1.08))
     assert (heard.word, heard.reason) == ("cannot tell", "speed-not-found")
 
 

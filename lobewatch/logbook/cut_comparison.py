@@ -60,6 +60,11 @@ class CutComparison:
             return None
         return float(family_distance(self.predicted.frequency, self.heard.chatter.frequency, self.tooth_frequency))
 
+    def nearest_mode(self, frequency: float) -> float | None:
+        """Frequency of the mode as tapped that is nearest to one (Hz); None where none was tapped."""
+        tapped = () if self.assembly is None else (*(self.assembly.x or ()), *(self.assembly.y or ()))
+        return min((mode.frequency for mode in tapped), key=lambda mode: abs(mode - frequency), default=None)
+
     def as_heard(self, at: datetime) -> HeardCut:
         """To be written down; at: when it was cut (UTC)."""
         chatter = self.heard.chatter

@@ -58,6 +58,12 @@ def chatter_lines(left: SpectralLines, tooth_frequency: float, bin_: float) -> C
     return ChatterLines(float(left.frequency[top]), error, left[best & part])
 
 
+def has_side_bands(left: SpectralLines, chatter: ChatterLines, turn: float, bin_: float) -> bool:
+    """Whether it has another line k tooth passings away, or one turn: a cut makes them, a pump has none. In Hz."""
+    apart = np.abs(np.abs(left.frequency - chatter.frequency) - turn)
+    return len(chatter.lines) > 1 or bool(np.any(apart < WIDE * bin_))
+
+
 def _explained(left: SpectralLines, frequency: float, tooth_frequency: float, bin_: float) -> Floats:
     """Which lines are multiples of a frequency or side bands of those, 0 or 1, shape (n,)."""
     explained = np.zeros(len(left))

@@ -10,11 +10,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lobewatch.cuts.listening.chatter_lines import ChatterLines, chatter_lines
+from lobewatch.cuts.listening.chatter_lines import ChatterLines, chatter_lines, has_side_bands
 from lobewatch.cuts.listening.find_cut import UNPLACED, CutParts
 from lobewatch.cuts.listening.lattice import SpindleSpeed
-from lobewatch.cuts.listening.sorted_lines import SortedLines, sort_lines
-from lobewatch.cuts.listening.spectrum import Floats, SpectralLines, Spectrum, lines_of, spectra_of, spectrum_of
+from lobewatch.cuts.listening.sorted_lines import TOOTH_HARMONICS, SortedLines, is_slow, sort_lines
+from lobewatch.cuts.listening.spectrum import (
+    Floats,
+    SpectralLines,
+    Spectrum,
+    lines_of,
+    spectra_of,
+    spectrum_of,
+    without_skirts,
+)
 from lobewatch.cuts.listening.steadiness import unsteadiness
 from lobewatch.cuts.listening.true_speed import speed_of_spectra
 from lobewatch.machine.journal.heard_cut import CutWord
@@ -61,6 +69,8 @@ class HeardSound:
     """All lines, by where they come from."""
     spectrum: Spectrum | None = None
     """Spectrum of the cut."""
+    tone: float = np.nan
+    """Frequency of a tone that nothing explains (Hz); NaN where that is not the reason."""
     axis: int = 0
     """Which of several axes the word rests on, from 0."""
 
@@ -78,7 +88,8 @@ def judge_cut(
     air: the same spindle turning without a cut; immersion: radial depth over diameter; commanded_rpm as it was set. All
     axes have one speed, and the word is that of the loudest evidence: of the axis with the loudest chatter, else of
     that with the loudest cut. Reasons why it cannot be told: "speed-not-found", "on-spindle-lines" (period two of an
-    even number of teeth, or chatter locked to the spindle), "faint".
+    even number of teeth, or chatter locked to the spindle), "faint", "unexplained-tone" (a line without side
+    bands), "slow-sampling" (fewer than three multiples of tooth passing are heard, folded ones too).
 
     Example: tooth passing of four teeth at 6000 rpm, its multiples and a little noise.
 
@@ -95,7 +106,7 @@ def judge_cut(
         return HeardSound("cannot tell", "speed-not-found", spectrum=spectra[0])
     sounds = []
     for number, axis in enumerate(np.atleast_2d(cut)):
-        lines = lines_of(spectra[number])
+        lines = without_skirts(lines_of(spectra[number]), spectra[number].bin)
         unsteady = unsteadiness(axis, sample_rate, lines, turning, spectra[number].bin)
         by_origin = sort_lines(lines, spectra[number], quiet[number], turning, teeth, unsteady)
         sound = HeardSound(
@@ -119,6 +130,8 @@ def _judge_lines(sound: HeardSound, signal: Floats, teeth: int, immersion: float
     lines, turning, spectrum = sound.lines, sound.turning, sound.spectrum
     if lines is None or turning is None or spectrum is None:
         raise ValueError("a cut whose lines are not known cannot be judged")
+    if is_slow(spectrum, turning, teeth) and np.count_nonzero(lines.tooth == 0) + len(lines.folded) < TOOTH_HARMONICS:
+        return replace(sound, word="cannot tell", reason="slow-sampling")
     if not len(lines.left):
         return _judge_without_chatter(sound, teeth, immersion)
     tooth = turning.frequency * teeth
@@ -131,6 +144,8 @@ def _judge_lines(sound: HeardSound, signal: Floats, teeth: int, immersion: float
         return _judge_without_chatter(sound, teeth, immersion)
     if ratio < (CHATTERS if len(chatter.lines) >= SIDE_BANDS else ALONE):
         return replace(sound, word="cannot tell", reason="faint")
+    if not has_side_bands(lines.left, chatter, turning.frequency, spectrum.bin):
+        return replace(sound, word="cannot tell", reason="unexplained-tone", tone=chatter.frequency)
     half = abs(chatter.frequency / tooth % 1 - 0.5) < FLIP
     return replace(sound, word="flip" if half else "chatter", chatter=chatter)
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.stats import binom
 
 from lobewatch.cuts.listening.lattice import STRAY, SpindleSpeed
+from lobewatch.cuts.listening.sorted_lines import MULTIPLES
 from lobewatch.cuts.listening.spectrum import Floats, SpectralLines
 
 TOLERANCE = 1.2
@@ -27,8 +28,6 @@ CAP = 3.0
 """Most that one line counts, in log10 of its clearness: a loud one is no more than a line; chosen."""
 LEAST = 3
 """Multiples that a comb has at least: any two lines have one."""
-MULTIPLES = 16
-"""Where fewer multiples than this are below half the sample rate, those that are folded back count too; chosen."""
 
 
 class Comb(NamedTuple):
@@ -53,7 +52,7 @@ def plain_comb(
     multiple of; those of the loudest are compared, after least squares, by the lines that they explain.
     """
     lines = lines.loudest(LOUDEST)
-    few = sample_rate / 2 < MULTIPLES * frequency
+    few = sample_rate / 2 < MULTIPLES * frequency  # those that are folded back count too
     for images in (_images(lines, sample_rate)[:1], *([_images(lines, sample_rate)] if few else [])):
         best = _best_comb(lines, images, bin_, frequency, around)
         if best is not None and _chance(best, lines, images, bin_, teeth, around) < CHANCE:

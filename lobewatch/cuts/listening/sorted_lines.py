@@ -20,7 +20,13 @@ AIR_WIDE = 2.0
 HIGHEST = 2.0
 """Multiples are looked for up to this many sample rates: a device without a filter folds them back ..."""
 UPPER = 0.7
-"""... and is hardly louder there (`LOUDER`) than the loudest multiple above this share of half the sample rate."""
+"""... and is hardly louder there (`LOUDER`) than the loudest multiple above this share of half the sample rate ..."""
+MULTIPLES = 16
+"""... or than any, where fewer than this are below half the sample rate; chosen."""
+TOOTH_HARMONICS = 3
+"""Multiples of tooth passing that are below half the sample rate, or folded ones are of any loudness ..."""
+SLACK = 1e-3
+"""... and so much further off, relative: from few lines the speed is no better known."""
 LOUDER = 1.5
 """Amplitude of a folded multiple over that of the loudest multiple, at most."""
 SURE = 3.0
@@ -37,6 +43,8 @@ class SortedLines:
     """Order of each of these, modulo the number of teeth; 0 is tooth passing."""
     foreign: SpectralLines
     """Lines that are there in air."""
+    folded: SpectralLines
+    """Lines where multiples above half the sample rate are folded to."""
     left: SpectralLines
     """Lines that are left: chatter, where there is any."""
 
@@ -44,6 +52,11 @@ class SortedLines:
 def is_foreign(lines: SpectralLines, air: Spectrum) -> NDArray[np.bool_]:
     """Whether lines are there in air too."""
     return np.asarray(lines.amplitude**2 <= FOREIGN * air.loudest_near(lines.frequency, AIR_WIDE))
+
+
+def is_slow(spectrum: Spectrum, turning: SpindleSpeed, teeth: int) -> bool:
+    """Whether fewer than three multiples of tooth passing are below half the sample rate."""
+    return spectrum.sample_rate / 2 < TOOTH_HARMONICS * teeth * turning.frequency
 
 
 def sort_lines(
@@ -58,21 +71,27 @@ def sort_lines(
     unsure = order * (SURE * turning.error + unsteady * turning.frequency)
     comb = (away < WIDE * spectrum.bin + unsure) & (order > 0)
     foreign = ~comb & is_foreign(lines, air)
-    upper = comb & (lines.frequency > UPPER * spectrum.sample_rate / 2)
+    half = spectrum.sample_rate / 2
+    upper = comb & (lines.frequency > (UPPER * half if half > MULTIPLES * turning.frequency else 0.0))
     loudest = float(np.max(lines.amplitude[upper], initial=0.0))
-    back = _near_folded(lines, spectrum, turning) & (lines.amplitude <= LOUDER * loudest)
+    is_bounded = lines.amplitude <= LOUDER * loudest
+    back = _near_folded(lines, spectrum, turning, teeth, unsteady) & (is_bounded | is_slow(spectrum, turning, teeth))
+    back &= ~(comb | foreign)
     kept = comb & (order > 1)
     tooth = (order[kept] % teeth).astype(np.int64)
-    return SortedLines(lines[kept], tooth, lines[foreign], lines[~(comb | foreign | back)])
+    return SortedLines(lines[kept], tooth, lines[foreign], lines[back], lines[~(comb | foreign | back)])
 
 
-def _near_folded(lines: SpectralLines, spectrum: Spectrum, turning: SpindleSpeed) -> NDArray[np.bool_]:
+def _near_folded(
+    lines: SpectralLines, spectrum: Spectrum, turning: SpindleSpeed, teeth: int, unsteady: float
+) -> NDArray[np.bool_]:
     """Whether lines lie where multiples of the spindle above half the sample rate are folded to."""
     rate = spectrum.sample_rate
     orders = np.arange(int(rate / 2 / turning.frequency) + 1, int(HIGHEST * rate / turning.frequency) + 1)
     if not orders.size:
         return np.zeros(len(lines), dtype=np.bool_)
-    folded = np.sort(fold_frequency(np.asarray(orders * turning.frequency), rate))
-    after = np.clip(np.searchsorted(folded, lines.frequency), 1, max(folded.size - 1, 1)) % folded.size
-    nearest = np.minimum(np.abs(lines.frequency - folded[after]), np.abs(lines.frequency - folded[after - 1]))
-    return np.asarray(nearest < WIDE * spectrum.bin)
+    folded = fold_frequency(np.asarray(orders * turning.frequency), rate)
+    slack = np.where(is_slow(spectrum, turning, teeth) & (orders % teeth == 0), SLACK, 0.0)
+    unsure = orders * (SURE * turning.error + (unsteady + slack) * turning.frequency)
+    away = np.abs(lines.frequency[:, np.newaxis] - folded) - unsure
+    return np.asarray(np.min(away, axis=1, initial=np.inf) < WIDE * spectrum.bin)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from lobewatch.cuts.listening.sorted_lines import TOOTH_HARMONICS
 from lobewatch.logbook.cut_comparison import CutComparison
 
 WHY: Mapping[str, str] = {
@@ -19,8 +20,15 @@ WHY: Mapping[str, str] = {
     "on-spindle-lines": "the lines of run-out are louder than tooth passing: chatter of two tooth periods of an even "
     "number of teeth, or chatter that has locked to the spindle, sounds alike; cut at a speed 3 % away",
     "faint": "lines beside those of the spindle, too faint to be called chatter; cut longer or a little deeper",
+    "unexplained-tone": "a tone that neither the spindle, nor its teeth, nor air explains, without the side bands that "
+    "a cut gives to chatter; cut a little deeper, and listen for it without the cut",
+    "slow-sampling": "fewer than three multiples of tooth passing are heard at this sample rate; take a higher one",
 }
 """Fault and cure by the reason why it cannot be told."""
+
+
+SLOWEST = 2 * TOOTH_HARMONICS
+"""Sample rate over tooth passing from which on enough multiples are below half of it."""
 
 
 NEXT: Mapping[str, str] = {
@@ -40,7 +48,19 @@ def next_step(comparison: CutComparison) -> str:
 def reason_text(comparison: CutComparison) -> str:
     """What the word rests on, or why it cannot be told, in a line."""
     heard = comparison.heard
-    return WHY[heard.reason] if heard.word == "cannot tell" else _energy(heard.ratio)
+    return _why(comparison) if heard.word == "cannot tell" else _energy(heard.ratio)
+
+
+def _why(comparison: CutComparison) -> str:
+    """Fault and cure, with the numbers of this cut."""
+    reason, tone = comparison.heard.reason, comparison.heard.tone
+    if reason == "slow-sampling":
+        return f"{WHY[reason]}: {SLOWEST * comparison.tooth_frequency:.0f} Hz or more"
+    if reason == "unexplained-tone":
+        mode = comparison.nearest_mode(tone)
+        away = "" if mode is None else f", {abs(mode - tone):.1f} Hz from the mode at {mode:.1f} Hz"
+        return f"at {tone:.1f} Hz{away}: {WHY[reason]}"
+    return WHY[reason]
 
 
 def _energy(ratio: float) -> str:
@@ -52,7 +72,7 @@ def listened_text(comparison: CutComparison) -> str:
     """The word, in a line."""
     heard, chatter = comparison.heard, comparison.heard.chatter
     if heard.word == "cannot tell":
-        return f"cannot tell ({heard.reason}): {WHY[heard.reason]}"
+        return f"cannot tell ({heard.reason}): {_why(comparison)}"
     if chatter is None:
         return "stable"
     named = "period-two chatter" if heard.word == "flip" else "chatter"
@@ -110,6 +130,7 @@ def listened_json(comparison: CutComparison) -> dict[str, Any]:
         "reason": heard.reason,
         "chatter_frequency_hz": None if chatter is None else chatter.frequency,
         "chatter_frequency_hz_std": None if chatter is None else chatter.error,
+        "unexplained_tone_hz": heard.tone,
         "speed_rpm": heard.speed_rpm,
         "speed_rpm_std": None if heard.turning is None else 60 * heard.turning.error,
         "commanded_rpm": comparison.setting.speed_rpm,

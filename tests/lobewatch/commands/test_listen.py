@@ -13,6 +13,7 @@ from typer.testing import CliRunner, Result
 from acquisition.files.read_sound import read_sound
 from lobewatch.cli import app
 from lobewatch.logbook import Logbook
+from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.cut_comparison import compare_cuts
 from lobewatch.machine.archive.verify import verify
 from lobewatch.machine.settings.cut_setting import cut_setting
@@ -95,6 +96,27 @@ def test_several_cuts_in_a_file_are_told_and_kept_each_with_its_own_air(shop: Sh
     assert "cut 1 of 2, 0.5" in text
     assert "cut 2 of 2, 2.3" in text
     assert "chatter at 1712" in picture.read_text("utf-8")
+
+
+def test_a_tone_that_nothing_explains_is_told_with_its_distance_from_the_modes(shop: Shop, tmp_path: Path) -> None:
+    shop.tap_both()
+    time = np.arange(round(2.0 * RATE)) / RATE
+    inside = (time > 0.5) & (time < 1.7)
+    lines = [(4 * k * TURN, 20.0 / k) for k in range(1, 12)] + [(1712.3, 5.0)]
+    signal = np.random.default_rng(0).normal(scale=0.05, size=time.size)
+    signal += inside * sum(loud * np.sin(2 * np.pi * frequency * time + frequency) for frequency, loud in lines)
+    file = tmp_path / "tone.csv"
+    rows = "\n".join(f"{t:.8f},{a:.5f}" for t, a in zip(time, signal, strict=True))
+    file.write_text(f"time [s],acceleration [m/s^2]\n{rows}\n")
+    arguments = ("--program", "A", "--speed", 12000, "--file", file, "--dry-run")
+    told = json.loads(run(shop, *arguments, "--json").stdout)
+    assert (told["word"], told["reason"]) == ("cannot tell", "unexplained-tone")
+    assert told["unexplained_tone_hz"] == pytest.approx(1712.3, abs=0.1)
+    assembly = shop.logbook.ask(Analysis.assembly_or_reason, "reference")
+    modes = [mode.frequency for mode in (*assembly.x, *assembly.y)]
+    nearest = min(modes, key=lambda mode: abs(mode - 1712.3))
+    said = run(shop, *arguments).stdout.splitlines()[0]
+    assert f"at 1712.3 Hz, {abs(nearest - 1712.3):.1f} Hz from the mode at {nearest:.1f} Hz" in said
 
 
 def test_what_cannot_be_told_says_why_and_is_kept_without_counting(shop: Shop, tmp_path: Path) -> None:

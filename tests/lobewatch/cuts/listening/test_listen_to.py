@@ -224,7 +224,7 @@ def test_a_line_alone_is_faint_between_2e_4_and_1e_2_of_the_comb(share: float, w
 
 
 @pytest.mark.parametrize(("shares", "word"), [
-    ((0.011,), "chatter"), ((0.0045, 0.0045), "cannot tell"), ((0.0015, 0.0015, 0.0015), "chatter"),
+    ((0.004, 0.007), "chatter"), ((0.0045, 0.0045), "cannot tell"), ((0.0015, 0.0015, 0.0015), "chatter"),
     ((2e-4, 1.2e-4, 1.2e-4), "cannot tell"), ((2.5e-4, 1.5e-4, 1.5e-4), "chatter"),
 ])  # fmt: skip
 def test_chatter_is_a_hundredth_of_the_comb_or_with_side_bands_a_twentieth_of_that(
@@ -233,6 +233,46 @@ def test_chatter_is_a_hundredth_of_the_comb_or_with_side_bands_a_twentieth_of_th
     heard = heard_beside(*shares)
     assert heard.word == word
     assert heard.ratio == pytest.approx(sum(shares), rel=0.05)
+
+
+def test_a_tone_without_side_bands_is_unexplained_and_one_with_a_side_band_a_turn_away_is_chatter() -> None:
+    alone = heard_beside(0.02)
+    assert (alone.word, alone.reason) == ("cannot tell", "unexplained-tone")
+    assert alone.tone == pytest.approx(1712.3, abs=0.1)
+    beside = [(1712.3, 8.0), (1712.3 + TURN, 2.0)]
+    assert listen(recorded(sines((*COMB, *beside), round(CUT * RATE), np.random.default_rng(8)))).word == "chatter"
+
+
+def test_what_stands_on_the_slope_of_tooth_passing_is_no_chatter() -> None:
+    """5 and 7 bins away, a hundredth of its power, side bands of tooth passing apart, as where the load swells."""
+    slopes = [(place * TURN + away, 3.0) for place in (4, 8, 12) for away in (-4.4, 6.3)]
+    heard = listen(
+        recorded(sines((*COMB[:2], (12 * TURN, 20.0), *slopes), round(CUT * RATE), np.random.default_rng(8)))
+    )
+    assert heard.word == "stable"
+
+
+def slow(orders: Any, rate: float = 1650.0) -> HeardSound:
+    """A cut of three teeth at 12 077 rpm as a slow sensor without a filter hears it."""
+    random, size = np.random.default_rng(4), round(5.0 * rate)
+    time = np.arange(size) / rate
+    signal = random.normal(scale=0.02, size=size)
+    for order, loud in orders:
+        signal += np.where((time > 1.0) & (time < 4.0), loud * np.sin(2 * np.pi * order * TURN * time + order), 0.0)
+    (heard,) = listen_to(CutRecording(signal, rate, 3, 1.0, SET))
+    return heard
+
+
+def test_tooth_passing_that_a_slow_sensor_folds_back_is_no_chatter() -> None:
+    """604 Hz stands, 1208, 1812 and 2415 Hz are heard at 442, 162 and 765 Hz."""
+    heard = slow([(3, 5.0), (6, 2.0), (9, 12.0), (12, 0.5), (1, 0.1), (2, 0.3)])
+    assert heard.word == "stable"
+    assert heard.speed_rpm == pytest.approx(SPEED, rel=1e-3)
+
+
+def test_with_fewer_than_three_harmonics_of_the_teeth_a_slow_sensor_tells_nothing() -> None:
+    heard = slow([(3, 5.0), (1, 0.2), (2, 0.5), (4, 0.3)])
+    assert (heard.word, heard.reason) == ("cannot tell", "slow-sampling")
 
 
 def test_chatter_that_falls_counts_as_at_the_end_of_the_cut() -> None:

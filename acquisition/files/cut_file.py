@@ -27,10 +27,10 @@ PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletch
 
 @dataclass(frozen=True, eq=False)
 class CutSignal:
-    """The accelerometer during a cut."""
+    """The accelerometer or the microphone during a cut."""
 
     acceleration: NDArray[np.float64]
-    """Acceleration (m/s^2), shape (n,)."""
+    """Acceleration (m/s^2; of a microphone Pa or shares of its full scale), shape (n,) or (responses, n)."""
     sample_rate: float
     """Samples a second (Hz)."""
     codes: NDArray[np.int32] | None = None
@@ -41,33 +41,40 @@ class CutSignal:
     """Number of scans that are missing in it."""
     overload: bool = False
     """Whether the device has told that its input was overloaded."""
+    sensor: str = "accelerometer"
+    """Kind of sensor: accelerometer or microphone."""
 
     @property
     def seconds(self) -> float:
         """How long it is."""
-        return self.acceleration.size / self.sample_rate
+        return float(self.acceleration.shape[-1] / self.sample_rate)
 
     @property
     def clipped(self) -> NDArray[np.bool_]:
         """Where it stands at a rail of its converter, or without codes three times in a row at its extreme value.
 
-        Everywhere where the device has told of an overload. Shape (n,).
+        Everywhere where the device has told of an overload; of several responses in any of them. Shape (n,).
         """
         if self.overload or not self.acceleration.size:
-            return np.full(self.acceleration.shape, self.overload)
+            return np.full(self.acceleration.shape[-1], self.overload)
         if self.codes is not None and self.channel is not None:
             low, high = self.channel.rails_in(self.codes)
             return np.asarray((self.codes <= low) | (self.codes >= high))
-        top, bottom = np.max(self.acceleration), np.min(self.acceleration)
-        if top == bottom:
-            return np.zeros(self.acceleration.shape, dtype=np.bool_)
-        return _in_a_row(self.acceleration == top) | _in_a_row(self.acceleration == bottom)
+        return np.asarray(np.any([_at_extremes(axis) for axis in np.atleast_2d(self.acceleration)], axis=0))
 
     def part(self, begin: float, end: float) -> CutSignal:
         """From one time to another (s)."""
         inside = slice(max(round(begin * self.sample_rate), 0), max(round(end * self.sample_rate), 0))
         codes = None if self.codes is None else self.codes[inside]
-        return replace(self, acceleration=self.acceleration[inside], codes=codes)
+        return replace(self, acceleration=self.acceleration[..., inside], codes=codes)
+
+
+def _at_extremes(values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Where one response stands three times in a row at its extreme value; nowhere where it has one value only."""
+    top, bottom = np.max(values), np.min(values)
+    if top == bottom:
+        return np.zeros(values.size, dtype=np.bool_)
+    return _in_a_row(values == top) | _in_a_row(values == bottom)
 
 
 def _in_a_row(extreme: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -88,7 +95,7 @@ def write_cut_signal(path: Path, signal: CutSignal, about: Mapping[str, Any]) ->
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         file.attrs.update(format=FORMAT, version=VERSION, sample_rate_hz=signal.sample_rate)
-        file.attrs.update(lost_scans=signal.lost_scans, overload=signal.overload)
+        file.attrs.update(lost_scans=signal.lost_scans, overload=signal.overload, sensor=signal.sensor)
         file["about"] = json.dumps(about)
         if signal.codes is not None and signal.channel is not None:
             word = np.int16 if signal.channel.adc_bits <= 16 else np.int32
@@ -121,7 +128,8 @@ def _read(file: h5py.File) -> CutSignal:
     rate, lost = float(file.attrs["sample_rate_hz"]), int(file.attrs["lost_scans"])
     overload = bool(file.attrs["overload"])
     if "acceleration" in file:
-        return CutSignal(file["acceleration"][()], rate, lost_scans=lost, overload=overload)
+        sensor = str(file.attrs.get("sensor", "accelerometer"))
+        return CutSignal(file["acceleration"][()], rate, lost_scans=lost, overload=overload, sensor=sensor)
     codes = file["codes"]
     settings = {name: codes.attrs[name] for name in (field.name for field in fields(Channel))}
     channel = Channel(

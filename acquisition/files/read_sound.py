@@ -1,4 +1,4 @@
-"""The recording of an accelerometer in a file of any known format."""
+"""The recording of a cut, by accelerometers or a microphone, in a file of any known format."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from acquisition.files.read_recording import NOTHING, contents_of
 
 
 def read_sound(path: Path | str, said: Description = NOTHING) -> CutSignal:
-    """What an accelerometer has recorded; DataError for a file without one, or that does not say enough."""
+    """What accelerometers or a microphone have recorded; DataError for a file without, or that says not enough."""
     path = Path(path)
     if not path.is_file():
         raise DataError(f"{path}: no such file")
@@ -33,4 +33,4 @@ def read_sound(path: Path | str, said: Description = NOTHING) -> CutSignal:
         raise DataError(f"{path}: {ledger.complaint()}")
     if not np.all(np.isfinite(sound[0])):
         raise DataError(f"{path}: holds values that are no numbers; export it again")
-    return CutSignal(*sound)
+    return CutSignal(*sound, sensor=said.sensor)

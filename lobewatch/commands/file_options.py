@@ -57,7 +57,7 @@ class FileOptions:
     """Number of hits that an FRF was averaged from."""
     response: Annotated[int | None, typer.Option(help="Which of several responses, from 1.")] = None
     """Number of the response, from 1."""
-    full_scale: Annotated[str, typer.Option(help='Of each channel of a WAV file, in its unit: "500,50".')] = ""
+    full_scale: Annotated[str, typer.Option(help='Of each channel of a sound file, in its unit: "500,50".')] = ""
     """Full scales of the channels, separated by commas."""
     sensitivity: Annotated[str, typer.Option(help='Of each channel in volts: "2.25 mV/N,10.2 mV/g".')] = ""
     """Sensitivities of the channels, separated by commas."""

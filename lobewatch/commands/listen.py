@@ -26,6 +26,9 @@ def listen(
     depth: Annotated[float | None, typer.Option(help="Axial depth, mm; that of the program where not given.")] = None,
     file: Annotated[Path | None, typer.Option(help="A recording of the cut in place of the device.")] = None,
     date: Annotated[datetime | None, typer.Option(help="When it was cut, local time; now where not given.")] = None,
+    sensor: Annotated[str, typer.Option(help="Of a --file: accelerometer, or microphone, which needs no unit.")] = (
+        "accelerometer"
+    ),
     port: Annotated[str, typer.Option(help="Serial port of the DAQ; [daq] port where not given.")] = "",
     seconds: Annotated[float, typer.Option(min=2, help="How long a cut is waited for.")] = 120.0,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what is heard; store nothing.")] = False,
@@ -50,6 +53,7 @@ def listen(
       lobewatch listen mill-3 --program A --screen --listen 0.0.0.0
       lobewatch listen mill-3 --program A --speed 12000 --depth 2 --file cut.wav --full-scale 500 --unit m/s^2
       lobewatch listen mill-3 --cut "reference cut" --speed 12000 --depth 2
+      lobewatch listen mill-3 --program A --file cut.flac --sensor microphone
     """
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.cut_comparison import keep_listened
@@ -57,7 +61,7 @@ def listen(
     from lobewatch.notify.telling import telling
     from lobewatch.show.cuts.describe_listened import cuts_json, cuts_texts
     from lobewatch.show.history.describe_cut import kept_cut_remarks
-    from lobewatch.tap.listening.hear_cut import cut_pictures, hear_cut, judge_live
+    from lobewatch.tap.listening.hear_cut import checked_sensor, cut_pictures, hear_cut, judge_live
 
     logbook = Logbook.open(machine)
     setting = choose_cut(logbook.machine, program, cut, speed, depth)
@@ -65,7 +69,7 @@ def listen(
         logbook.folder.refuse_damage()
     if screen and file is not None:
         raise ValueError("--screen follows a device; what a --file says stands here")
-    description = file_options.description()
+    description = file_options.description(sensor=checked_sensor(sensor, file))
     with contextlib.ExitStack() as screens, cut_pictures(logbook, setting) as pictures:
         if screen:
             from lobewatch.screen import CutScreenServer  # brings aiohttp, which nobody needs without a screen

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import Literal
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.machine.settings.cut_setting import CutSetting
 from lobewatch.tool.assembly import Assembly
 
+Sensor = Literal["accelerometer", "microphone"]
+"""What hears cuts."""
+
 
 @dataclass(frozen=True, eq=False)
 class CutComparison:
@@ -34,6 +38,8 @@ class CutComparison:
     """Sound of the cut."""
     assembly: Assembly | None
     """The tool as it was tapped; None where it was not and cannot be predicted."""
+    sensor: Sensor
+    """What heard it."""
     predicted: ExpectedSound | None
     """Sound by its modes, at the speed that was heard (that was set where none was); None without them."""
 
@@ -76,7 +82,7 @@ class CutComparison:
             word=self.heard.word,
             chatter_frequency_hz=None if chatter is None else chatter.frequency,
             chatter_frequency_std_hz=None if chatter is None else chatter.error,
-            by="accelerometer",
+            by=self.sensor,
             software=software(),
             reason=self.heard.reason,
         )
@@ -96,13 +102,14 @@ def compare_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> li
     )
     tool = logbook.ask(Analysis.assembly_or_reason, setting.tool)
     assembly = None if isinstance(tool, DataError) or not tool.directions else tool
-    return [_compared(setting, heard, assembly) for heard in listen_to(recording)]
+    sensor: Sensor = "microphone" if signal.sensor == "microphone" else "accelerometer"
+    return [_compared(setting, heard, assembly, sensor) for heard in listen_to(recording)]
 
 
-def _compared(setting: CutSetting, heard: HeardSound, assembly: Assembly | None) -> CutComparison:
+def _compared(setting: CutSetting, heard: HeardSound, assembly: Assembly | None, sensor: Sensor) -> CutComparison:
     speed = heard.speed_rpm if np.isfinite(heard.speed_rpm) else setting.speed_rpm
     expected = None if assembly is None else expected_sound(setting, assembly, speed)
-    return CutComparison(setting, heard, assembly, expected)
+    return CutComparison(setting, heard, assembly, sensor, expected)
 
 
 def keep_listened(

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from acquisition.tap import UNSAID, Conditions
 
-_LABELS = ("date", "date_pattern", "tool", "direction", "conditions")
+_LABELS = ("date", "date_pattern", "tool", "direction", "conditions", "sensor")
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,8 @@ class Description:
     """Full scale of each channel in its unit, where values are shares of it."""
     sensitivity: tuple[str, ...] = ()
     """Sensitivity of each channel in volts: "2.25 mV/N", "10.2 mV/g"."""
+    sensor: str = "accelerometer"
+    """Kind of sensor that a cut was heard by: accelerometer or microphone."""
     date: datetime | None = None
     """Time of recording; local time where it has no zone."""
     date_pattern: str = ""

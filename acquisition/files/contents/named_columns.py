@@ -62,6 +62,7 @@ def _called(signals: Sequence[Signal], name: str) -> Sequence[Signal]:
     tests: tuple[Callable[[int, Signal], bool], ...] = (
         lambda _, signal: signal.name == name,
         lambda _, signal: name in (_shown(signal), f"{_shown(signal)} ({signal.values.size})"),
+        lambda _, signal: bool(signal.unit) and name_and_unit(name) == (signal.name, signal.unit),
         lambda _, signal: re.fullmatch(rf"{re.escape(name)}:\d+", signal.name) is not None,
         lambda number, _: name == str(number),
         lambda _, signal: (

@@ -1,11 +1,11 @@
-"""The one acceleration over time in what a file holds and what a person adds."""
+"""What heard a cut in what a file holds and what a person adds: accelerations over time, or a microphone."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.files.contents.contents import Contents
+from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.contents.description import Description
 from acquisition.files.contents.ledger import Ledger
 from acquisition.files.contents.named_columns import named_columns, names_of
@@ -15,28 +15,47 @@ from acquisition.files.contents.settle_unit import chosen, response_unit
 
 COLUMNS_SOUND = '--columns "time [s],acceleration [m/s^2]", in their order, or each with =NAME'
 """How an acceleration is named."""
+MICROPHONE = "microphone"
+"""Sensor whose values need no unit: what is told rests on how loud one is beside another."""
 
 
 def settle_sound(
     contents: Contents, description: Description, ledger: Ledger
 ) -> tuple[NDArray[np.float64], float] | None:
-    """Acceleration (m/s^2), shape (n,), and sample rate (Hz); None where the ledger says what is missing or wrong."""
+    """What heard a cut, and its sample rate (Hz); None where the ledger says what is missing or wrong.
+
+    Acceleration in m/s^2, a microphone in what the file holds: shape (n,), or (responses, n) where there are several
+    and nobody says which is meant.
+    """
     signals = named_columns(contents.signals, description.columns, ledger) if description.columns else contents.signals
-    scaled = in_sensor_units(in_their_unit(signals, description, ledger), description, ledger)
+    by_ear = description.sensor == MICROPHONE
+    in_units = list(signals) if by_ear and not description.full_scale else in_their_unit(signals, description, ledger)
+    scaled = in_sensor_units(in_units, description, ledger)
     if scaled is None or not ledger.is_clean:
         return None
     over_time = [signal for signal in scaled if signal.role not in ("time", "frequency", "ignored", "frf", "coherence")]
-    heard = [signal for signal in over_time if kind_of(signal) == "response"]
-    heard = heard or [signal for signal in over_time if not kind_of(signal)]
+    responses = [signal for signal in over_time if kind_of(signal) == "response"]
+    heard = responses or [signal for signal in over_time if not kind_of(signal)]
     if not heard:
         ledger.ask(f"which of its columns is the acceleration ({names_of(signals)})", COLUMNS_SOUND)
         return None
-    signal = chosen(heard, description.response, "responses", ledger)
-    unit = response_unit(signal, description, ledger) if signal is not None else None
-    rate = rate_of(scaled, [signal] if signal is not None else (), description, ledger)
-    if signal is None or unit is None or not ledger.is_clean:
+    meant = [chosen(heard, description.response, "responses", ledger)] if description.response is not None else heard
+    settled = [signal for signal in meant if signal is not None]
+    factors = [1.0 if by_ear else _factor(signal, description, ledger) for signal in settled]
+    rate = rate_of(scaled, settled, description, ledger)
+    if by_ear and responses:
+        ledger.faults.append(f"{responses[0].name} moves; leave --sensor microphone out")
+    if not settled or not ledger.is_clean:
         return None
+    values = np.stack([signal.values * factor for signal, factor in zip(settled, factors, strict=True)])
+    return np.asarray(values if len(settled) > 1 else values[0], dtype=np.float64), rate
+
+
+def _factor(signal: Signal, description: Description, ledger: Ledger) -> float:
+    """Of an acceleration, to m/s^2; 0 where it is none, or its unit is not known."""
+    unit = response_unit(signal, description, ledger)
+    if unit is None:
+        return 0.0
     if unit[0] != "acceleration":
         ledger.faults.append(f"{signal.name} is a {unit[0]}; a cut is heard by an accelerometer")
-        return None
-    return np.asarray(signal.values * unit[1], dtype=np.float64), rate
+    return unit[1]

@@ -1,4 +1,7 @@
-"""WAV files: a channel each for force and response; their full scale is said by option."""
+"""Sound files: a channel each for force and response; their full scale is said by option.
+
+WAV by scipy, FLAC and MP3 by soundfile where that is installed (`pip install "lobewatch[sound]"`).
+"""
 
 from __future__ import annotations
 
@@ -7,14 +10,32 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.errors import DataError
 from acquisition.files.contents.contents import Contents, Signal
 from acquisition.files.readers.format import Format
 
+MPEG_SYNC = 0xFFE0
+"""First bits of a frame of an MP3 file."""
+
 
 def read_wav(path: Path) -> Contents:
-    """Its channels as shares of the full scale, -1 to 1; DataError where it is damaged or cut short."""
+    """Its channels as shares of the full scale, -1 to 1.
+
+    DataError where it is damaged or cut short, or soundfile is not installed.
+    """
+    with path.open("rb") as file:
+        is_wav = _is_wav(file.read(12))
+    rate, columns = _read_riff(path) if is_wav else _read_packed(path)
+    signals = (
+        Signal(f"channel {i}", column, rate=float(rate), per_full_scale=True) for i, column in enumerate(columns, 1)
+    )
+    return Contents(tuple(signals))
+
+
+def _read_riff(path: Path) -> tuple[int, NDArray[np.float64]]:
+    """Sample rate and channels of a WAV file."""
     import scipy.io.wavfile  # it takes a while, and few files need it
 
     content = path.read_bytes()
@@ -29,15 +50,31 @@ def read_wav(path: Path) -> Contents:
     if values.dtype.kind == "u":
         columns = columns.astype(np.float64) - 128
     scale = {"i": 2.0 ** (8 * values.dtype.itemsize - 1), "u": 128.0}.get(values.dtype.kind, 1.0)
-    signals = [
-        Signal(f"channel {i}", column / scale, rate=float(rate), per_full_scale=True)
-        for i, column in enumerate(columns, 1)
-    ]
-    return Contents(tuple(signals))
+    return rate, columns / scale
 
 
-def _is_wav(head: bytes, _path: Path) -> bool:
+def _read_packed(path: Path) -> tuple[int, NDArray[np.float64]]:
+    """Sample rate and channels of a FLAC or MP3 file."""
+    try:
+        import soundfile
+    except ImportError as error:
+        raise DataError(
+            f'{path}: FLAC and MP3 are read by soundfile; install it: pip install "lobewatch[sound]", or export WAV'
+        ) from error
+    try:
+        values, rate = soundfile.read(io.BytesIO(path.read_bytes()), dtype="float64", always_2d=True)
+    except Exception as error:
+        raise DataError(f"{path}: damaged, cut short or of a kind that is not read ({error})") from error
+    return rate, values.T
+
+
+def _is_wav(head: bytes) -> bool:
     return head[:4] in (b"RIFF", b"RIFX", b"RF64") and head[8:12] == b"WAVE"
 
 
-WAV = Format("wav", "WAV file", (".wav",), _is_wav, read_wav)
+def _is_sound(head: bytes, _path: Path) -> bool:
+    is_frame = int.from_bytes(head[:2], "big") & MPEG_SYNC == MPEG_SYNC and head[1] & 0x06 == 0x02
+    return _is_wav(head) or head[:4] == b"fLaC" or head[:3] == b"ID3" or is_frame
+
+
+WAV = Format("wav", "WAV, FLAC or MP3 file", (".wav", ".flac", ".mp3"), _is_sound, read_wav)

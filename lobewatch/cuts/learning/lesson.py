@@ -111,7 +111,7 @@ def _evidence(cut: HeardCut, material: int, assembly: Assembly) -> CutEvidence:
         frequency=float("nan") if cut.chatter_frequency_hz is None else cut.chatter_frequency_hz,
         feed_angles=tuple(FEED_ANGLES[feed] for feed in feeds),
         material=material,
-        speed_found=cut.by == "accelerometer",
+        speed_found=cut.by != "ear",
         moved=_moved(cut, assembly),
         id=cut.id,
     )

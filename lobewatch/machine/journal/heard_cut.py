@@ -62,7 +62,7 @@ class HeardCut:
     """Word on its sound."""
     chatter_frequency_hz: float | None
     """Chatter frequency (Hz); None where it was none, or nobody knows."""
-    by: Literal["ear", "accelerometer"]
+    by: Literal["ear", "accelerometer", "microphone"]
     """Ear or instrument that heard it."""
     software: str
     """Version of lobewatch that wrote it down."""

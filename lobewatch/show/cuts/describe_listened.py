@@ -27,6 +27,11 @@ WHY: Mapping[str, str] = {
 """Fault and cure by the reason why it cannot be told."""
 
 
+DEAF = (
+    "by microphone: it hears the shop too, so that a tone of another machine that runs in the cut alone is not known "
+    "from one of the cut, and it does not tell how far the tool moves"
+)
+"""What a microphone cannot tell."""
 SLOWEST = 2 * TOOTH_HARMONICS
 """Sample rate over tooth passing from which on enough multiples are below half of it."""
 
@@ -93,6 +98,8 @@ def listened_texts(comparison: CutComparison) -> list[str]:
     if chatter is not None:
         lobe = comparison.lobe
         texts.append(f"lobe {lobe} ({lobe} whole waves between two teeth), {len(chatter.lines)} side bands")
+    if comparison.sensor == "microphone":
+        texts.append(DEAF)
     return texts + _expected(comparison)
 
 
@@ -131,6 +138,7 @@ def listened_json(comparison: CutComparison) -> dict[str, Any]:
         "chatter_frequency_hz": None if chatter is None else chatter.frequency,
         "chatter_frequency_hz_std": None if chatter is None else chatter.error,
         "unexplained_tone_hz": heard.tone,
+        "sensor": comparison.sensor,
         "speed_rpm": heard.speed_rpm,
         "speed_rpm_std": None if heard.turning is None else 60 * heard.turning.error,
         "commanded_rpm": comparison.setting.speed_rpm,

@@ -6,13 +6,14 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import get_args
 
 from acquisition import Description
 from acquisition.errors import failure_text
 from acquisition.files.cut_file import CutSignal
 from acquisition.files.read_sound import read_sound
 from lobewatch.logbook import Logbook
-from lobewatch.logbook.cut_comparison import CutComparison, compare_cuts
+from lobewatch.logbook.cut_comparison import CutComparison, Sensor, compare_cuts
 from lobewatch.machine import MachineFolder, checked_rate
 from lobewatch.machine.settings.cut_setting import CutSetting
 from lobewatch.tap.listening.cut_state import CutState, CutStep, cut_curves, word_of
@@ -52,6 +53,15 @@ def hear_cut(
         picture(device=f"{device.identity.model}, {device.sample_rate:g} Hz")
         device.start()
         return record_cut(device, 60 / setting.speed_rpm, patience, show, picture)
+
+
+def checked_sensor(sensor: str, file: Path | None) -> str:
+    """A kind of sensor; ValueError for one that is not known, and for a microphone at a device."""
+    if sensor not in get_args(Sensor):
+        raise ValueError(f"--sensor {sensor}: none of {', '.join(get_args(Sensor))}")
+    if sensor == "microphone" and file is None:
+        raise ValueError("--sensor microphone is for a --file; a device hears by its accelerometer")
+    return sensor
 
 
 @contextlib.contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,68 @@ def test_a_wav_file_needs_its_full_scale_and_unit(tmp_path: Path) -> None:
     sound = read_sound(path, Description(full_scale=(500.0,), unit="m/s^2"))
     assert sound.sample_rate == 48000.0
     assert np.allclose(sound.acceleration, WAVE * 500 * 32000 / 32768, atol=0.02)
+
+
+def axes_table(path: Path) -> Path:
+    """As a sensor of three axes writes it, with a column beside it that is no response."""
+    rows = (f"{i / 1650:.9f},{a:.6f},{2 * a:.6f},{-a:.6f},0.7" for i, a in enumerate(WAVE))
+    path.write_text("\n".join(["Time (s),Accel X (m/s^2),Accel Y (m/s^2),Accel Z (g),CI Value", *rows]) + "\n")
+    return path
+
+
+def test_several_accelerations_are_all_heard_and_one_is_where_it_is_named(tmp_path: Path) -> None:
+    path = axes_table(tmp_path / "cut.csv")
+    sound = read_sound(path)
+    assert np.allclose(sound.acceleration, [WAVE, 2 * WAVE, -9.80665 * WAVE], atol=1e-4)
+    assert (sound.seconds, sound.clipped.shape) == (pytest.approx(WAVE.size / 1650, rel=1e-6), WAVE.shape)
+    assert sound.part(0.1, 0.2).acceleration.shape == (3, 165)
+    assert np.allclose(read_sound(path, Description(response=2)).acceleration, 2 * WAVE, atol=1e-5)
+
+
+def test_several_accelerations_come_back_from_a_recording_of_ours(tmp_path: Path) -> None:
+    signal = read_sound(axes_table(tmp_path / "cut.csv"))
+    write_cut_signal(tmp_path / "c1.h5", signal, {"id": "c1"})
+    assert np.array_equal(read_sound(tmp_path / "c1.h5").acceleration, signal.acceleration)
+
+
+def test_a_column_is_named_as_its_heading_stands_in_the_file(tmp_path: Path) -> None:
+    said = Description(columns=("time=Time (s)", "acceleration=Accel Y (m/s^2)"))
+    assert np.allclose(read_sound(axes_table(tmp_path / "cut.csv"), said).acceleration, 2 * WAVE, atol=1e-5)
+
+
+HEARD = Description(sensor="microphone")
+
+
+@pytest.mark.parametrize("name", ["cut.wav", "cut.flac", "cut.mp3"])
+def test_a_microphone_needs_neither_unit_nor_full_scale(tmp_path: Path, name: str) -> None:
+    soundfile = pytest.importorskip("soundfile")
+    wave = 0.5 * np.sin(2 * np.pi * 440 * np.arange(48000) / 48000)
+    soundfile.write(tmp_path / name, np.stack([wave, 0.5 * wave], axis=1), 48000)
+    sound = read_sound(tmp_path / name, HEARD)
+    assert (sound.sample_rate, sound.sensor, sound.acceleration.shape[0]) == (48000.0, "microphone", 2)
+    power = np.abs(np.fft.rfft(sound.acceleration[0])) ** 2
+    assert np.argmax(power) * 48000 / sound.acceleration.shape[1] == pytest.approx(440, abs=1)
+    assert np.std(sound.acceleration[0]) == pytest.approx(0.5 / np.sqrt(2), rel=0.03)
+    write_cut_signal(tmp_path / "c1.h5", sound, {"id": "c1"})
+    assert read_sound(tmp_path / "c1.h5").sensor == "microphone"
+
+
+@pytest.mark.parametrize("head", [b"fLaC" + bytes(60), b"ID3" + bytes(60), b"\xff\xfb\x90\x44" + bytes(60)])
+def test_a_damaged_flac_or_mp3_is_refused_and_so_it_is_without_soundfile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, head: bytes
+) -> None:
+    path = tmp_path / "cut.bin"
+    path.write_bytes(head)
+    with pytest.raises(DataError, match=r"cut\.bin: (damaged, cut short|FLAC and MP3 are read by soundfile)"):
+        read_sound(path, HEARD)
+    monkeypatch.setitem(sys.modules, "soundfile", None)
+    with pytest.raises(DataError, match=r"lobewatch\[sound\]"):
+        read_sound(path, HEARD)
+
+
+def test_an_accelerometer_is_no_microphone(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="acceleration moves; leave --sensor microphone out"):
+        read_sound(table(tmp_path / "cut.csv", "time [s],acceleration [g]"), HEARD)
 
 
 def test_a_unit_that_the_file_does_not_say_is_asked_for(tmp_path: Path) -> None:

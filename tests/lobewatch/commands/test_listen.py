@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.io.wavfile
 from typer.testing import CliRunner, Result
 
 from acquisition.files.read_sound import read_sound
@@ -119,6 +120,19 @@ def test_a_tone_that_nothing_explains_is_told_with_its_distance_from_the_modes(s
     assert f"at 1712.3 Hz, {abs(nearest - 1712.3):.1f} Hz from the mode at {nearest:.1f} Hz" in said
 
 
+def test_a_microphone_is_said_and_kept_as_one(shop: Shop, tmp_path: Path) -> None:
+    values = read_sound(recording(tmp_path / "cut.csv", 1712.3)).acceleration
+    scipy.io.wavfile.write(tmp_path / "cut.wav", int(RATE), (values / 200).astype(np.float32))
+    arguments = ("--program", "A", "--speed", 12000, "--file", tmp_path / "cut.wav")
+    assert "--full-scale" in str(run(shop, *arguments).exception)
+    told = json.loads(run(shop, *arguments, "--sensor", "microphone", "--json").stdout)
+    assert (told["word"], told["sensor"]) == ("chatter", "microphone")
+    assert told["chatter_frequency_hz"] == pytest.approx(1712.3, abs=0.1)
+    assert shop.logbook.cuts[0].by == "microphone"
+    said = run(shop, *arguments[:4], "--file", shop.path / "cuts" / "c1.h5", "--dry-run").stdout
+    assert "by microphone: it hears the shop too" in said
+
+
 def test_what_cannot_be_told_says_why_and_is_kept_without_counting(shop: Shop, tmp_path: Path) -> None:
     file = recording(tmp_path / "cut.csv", seconds=0.05)
     told = json.loads(run(shop, "--program", "A", "--speed", 12000, "--file", file, "--json").stdout)
@@ -146,6 +160,11 @@ def test_nobody_listens_in_vain_where_nothing_can_be_written(shop: Shop, tmp_pat
         (("--program", "A"), "no port: give --port, --file"),
         (("--program", "A", "--port", "file:x.h5"), "with --file"),
         (("--program", "A", "--file", "none.csv"), "no such file"),
+        (
+            ("--program", "A", "--file", "none.csv", "--sensor", "ear"),
+            "--sensor ear: none of accelerometer, microphone",
+        ),
+        (("--program", "A", "--port", "x", "--sensor", "microphone"), "--sensor microphone is for a --file"),
         (("--program", "A", "--file", "none.csv", "--screen"), "--screen follows a device"),
     ],
 )

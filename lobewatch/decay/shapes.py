@@ -35,8 +35,16 @@ KINDS: tuple[Kind, ...] = (
 )
 
 
-ODDS: dict[Kind, float] = {"slopes": 4.0, "breaks": 4.0, "wander": 0.5, "bend": 0.5}
-"""How likely kinds are beforehand, all others 1: as much as the ranges of other courses allow; chosen."""
+ODDS: dict[Kind, float] = {
+    "none": 0.3,
+    "step": 0.3,
+    "slopes": 5.0,
+    "breaks": 5.0,
+    "crash": 4.0,
+    "wander": 0.5,
+    "bend": 0.5,
+}
+"""How likely kinds are beforehand, all others 1; chosen so that the ranges of as many courses as can be hold their dates."""
 
 
 class Shape(NamedTuple):

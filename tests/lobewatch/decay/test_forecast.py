@@ -30,7 +30,7 @@ def test_the_reference_series_reaches_3_percent_when_it_is_printed_to() -> None:
     )
     assert alone == pytest.approx(0.9997, abs=1e-4)
     assert (found.likeliest.kind, found.likeliest.start) == ("slope", 10.0)
-    np.testing.assert_allclose(np.array(found.reached(-3.0)) - 19, [6.9, 7.7, 8.4], atol=0.05)
+    np.testing.assert_allclose(np.array(found.reached(-3.0)) - 19, [6.85, 7.7, 8.4], atol=0.05)
 
 
 def test_dates_count_from_anywhere() -> None:

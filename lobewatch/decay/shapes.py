@@ -44,7 +44,7 @@ ODDS: dict[Kind, float] = {
     "wander": 0.5,
     "bend": 0.5,
 }
-"""How likely kinds are beforehand, all others 1; chosen so that the ranges of as many courses as can be hold their dates."""
+"""How likely kinds are beforehand, all others 1; so chosen that the ranges of many courses hold their dates."""
 
 
 class Shape(NamedTuple):

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from acquisition import Channel, Circumstances, Hit, TapsEmulator, TapsSource, Trigger, estimate_frf
+from acquisition import Channel, Circumstances, Hit, TapsEmulator, TapsSource, Trigger, check_hit, estimate_frf
 from acquisition.taps.protocol import Frame, FrameDecoder, MessageType, encode_data, encode_frame
 from acquisition.taps.stream import ScanStream
 from lobewatch.machine.folder import MachineFolder
@@ -209,6 +209,8 @@ def average() -> None:
         "bare rfft of one array (10, 2, 65536)": lambda: np.fft.rfft(batch),
         "the same, gathered from ten hits": lambda: np.fft.rfft([[hit.force, hit.acceleration] for hit in hits]),
         "lobewatch estimate_frf": lambda: estimate_frf(hits),
+        "lobewatch estimate_frf, hits of a file": lambda: estimate_frf([Hit(*record, RATE) for record in records]),
+        "lobewatch check_hit of ten of a file": lambda: [check_hit(Hit(*record, RATE)) for record in records],
     }
     try:
         import pyFRF

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,12 +67,20 @@ def _length_above(foot: float, signal: NDArray[np.float64]) -> int:
 
 
 def samples_before(hit: Hit) -> int:
-    """The pre-trigger, or where it is not known the samples before the force last rises above 5 % of its peak."""
+    """The pre-trigger, or where it is not known the samples before the force last rises above 5 % of its peak.
+
+    Each hit is looked at once.
+    """
     if hit.pre_trigger:
         return hit.pre_trigger
-    above = hit.force[: int(np.argmax(hit.force)) + 1] - np.median(hit.force)
-    low = np.flatnonzero(above < FALLEN * above[-1])
-    return int(low[-1]) + 1 if low.size else 0
+    if hit not in _known:
+        above = hit.force[: int(np.argmax(hit.force)) + 1] - np.median(hit.force)
+        low = np.flatnonzero(above < FALLEN * above[-1])
+        _known[hit] = int(low[-1]) + 1 if low.size else 0
+    return _known[hit]
+
+
+_known: WeakKeyDictionary[Hit, int] = WeakKeyDictionary()
 
 
 def baseline(signal: NDArray[np.float64], before: int) -> NDArray[np.float64]:

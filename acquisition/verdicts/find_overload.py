@@ -19,6 +19,8 @@ FLAT_SAMPLES = 2.5
 SCALES = (1.0, 0.25, 0.0625)
 """Half widths of the uppermost third, in 3 times the noise before the hit; a saturated amplifier cuts that off too."""
 
+FEW = 1024
+"""Samples that are looked at first for steps finer than any that are believed."""
 DIGITS = 1e-4
 """Finest step, as a share of the maximum, that is believed of a recording without codes."""
 
@@ -81,7 +83,11 @@ def _flat_top(above: NDArray[np.float64], half: float) -> int:
 def _finest_step(above: NDArray[np.float64]) -> float:
     """Smallest step between two values: that of the converter; at least that of four written digits."""
     top = float(above.max())
-    return max(float(np.min(np.diff(np.unique(above)), initial=top)), DIGITS * top)
+    for part in (above[:FEW], above):
+        step = float(np.min(np.diff(np.unique(part)), initial=top))
+        if step <= DIGITS * top:
+            break
+    return max(step, DIGITS * top)
 
 
 def _at_a_rail(above: NDArray[np.float64], step: float) -> int:

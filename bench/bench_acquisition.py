@@ -209,8 +209,8 @@ def average() -> None:
         "bare rfft of one array (10, 2, 65536)": lambda: np.fft.rfft(batch),
         "the same, gathered from ten hits": lambda: np.fft.rfft([[hit.force, hit.acceleration] for hit in hits]),
         "lobewatch estimate_frf": lambda: estimate_frf(hits),
-        "lobewatch estimate_frf, hits of a file": lambda: estimate_frf([Hit(*record, RATE) for record in records]),
-        "lobewatch check_hit of ten of a file": lambda: [check_hit(Hit(*record, RATE)) for record in records],
+        "lobewatch estimate_frf, hits of a file": lambda: estimate_frf([Hit(f, a, RATE) for f, a in records]),
+        "lobewatch check_hit of ten of a file": lambda: [check_hit(Hit(f, a, RATE)) for f, a in records],
     }
     try:
         import pyFRF

@@ -24,6 +24,7 @@ from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import msgspec
 import numpy as np
 from threadpoolctl import threadpool_limits
 
@@ -35,6 +36,8 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.journal.tap_entry import TapEntry
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.measuring import Estimate
+from lobewatch.plant import summarise_folder
+from lobewatch.screen.board import LOOK_EVERY, Board
 from lobewatch.tool.order import Place
 from modal import Mode, synthesize
 
@@ -45,21 +48,21 @@ PLANT = 500
 
 def make_plant(path: Path, machines: int, taps: int) -> None:
     """Machines of so many tap tests each, x and y in turn, the newest of today; their histories as if worked out."""
-    first, small = path / "mill-000", path.parent / "two-taps"
+    first = path / "mill-000"
     _make_machine(first, taps)
-    _make_machine(small, 2)
-    history = Logbook.open(small).history
-    shutil.rmtree(small)
+    summarise_folder(first, datetime.now(UTC))  # so that its history has the word on each program
+    history = Logbook.open(first).history
     for number in range(machines):
         folder = path / f"mill-{number:03d}"
         if number:
             shutil.copytree(first, folder, copy_function=_link)
-            (folder / "history.rows").unlink()
+            for derived in ("history.rows", "standing.json"):
+                (folder / derived).unlink()
         HistoryCache(MachineFolder(folder)).store(_scattered(history, Logbook.open(folder).files.places, number))
 
 
 def _scattered(history: History, places: Sequence[Place], seed: int) -> History:
-    """Rows like those of two tap tests, with 0.3 % of scatter and a fall of its own."""
+    """Rows like those of the first two tap tests, with 0.3 % of scatter and a fall of its own."""
     random, rows = np.random.default_rng(seed), history.rows
     falls = np.linspace(0.0, random.uniform(0.0, 3.0), len(places))
     shares = np.exp((random.normal(scale=0.3, size=len(places)) - falls) / 100).tolist()
@@ -123,6 +126,23 @@ def exported(table: Path, path: Path) -> float:
     return cpu_of("export", path, table)
 
 
+def served(path: Path) -> None:
+    """What the pages of lobewatch serve cost: the first, one where nothing has changed, one where one machine has."""
+    board = Board(path)
+    known = ""
+    for name in ("first page", "nothing changed", "a machine changed"):
+        if name == "a machine changed":
+            toml = path / "mill-000" / "machine.toml"
+            toml.write_text(toml.read_text("utf-8").replace('name = "', 'name = "New ', 1), "utf-8")
+            board.standings()  # its standing made anew is no part of the look
+        time.sleep(LOOK_EVERY)
+        begun = time.process_time()
+        answer = board.answer(known, set())
+        sent = msgspec.json.encode(answer)
+        print(f"  serve, {name:22s} {time.process_time() - begun:6.2f} s, {len(sent) / 1e3:.1f} kB")
+        known = answer["version"]
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -138,6 +158,10 @@ def main() -> None:
         told("status, standings made anew", n, made_anew, plant, 1)
         cpu_of("status", plant)
         told("status, standings fresh", n, partial(cpu_of, "status"), plant, 3)
+        served(plant)
+        months = Path(scratch, "months")
+        for name in ("all new", "nothing new"):
+            print(f"  export --append, {name}: {cpu_of('export', plant, '--append', months):.2f} s")
         for kind in ("sqlite", "csv", "parquet"):
             table = Path(scratch, f"fleet.{kind}")
             told(f"export to {kind}", n, partial(exported, table), plant, 3)

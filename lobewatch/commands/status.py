@@ -13,7 +13,7 @@ from lobewatch.show.terminal.output import Json, emit, results
 
 if TYPE_CHECKING:
     from lobewatch.machine.settings.notify_table import Broker
-    from lobewatch.plant.plant import MachineStanding
+    from lobewatch.plant.plant import MachineStanding, Plant
 
 FOR_THE_PAGE = ("points", "limits", "limit", "word", "why")
 """What only the dashboard draws; lobewatch trend and lobewatch export tell it in full."""
@@ -34,6 +34,12 @@ def status(
     prometheus: Annotated[
         Path | None, typer.Option(help="Write all of it into this file too, for the textfile collector of Prometheus.")
     ] = None,
+    jobs: Annotated[
+        int, typer.Option(min=1, max=64, help="Processes that make what is missing of standings; the same comes out.")
+    ] = 1,
+    scheduler: Annotated[
+        str, typer.Option(help="Address of a Dask scheduler whose workers, which must see FOLDER, make it.")
+    ] = "",
     as_csv: Annotated[bool, typer.Option("--csv", help="A table with commas on stdout instead of text.")] = False,
     as_json: Json = False,
 ) -> None:
@@ -57,7 +63,10 @@ def status(
     if forget and not to_notify:
         raise ValueError(f"--forget {forget}: is for the broker; give --notify too")
     machines = find_machines(folder)
-    standings = Plant(machines).standings()
+    plant = Plant(machines)
+    if jobs > 1 or scheduler:
+        _renew(plant, jobs, scheduler)
+    standings = plant.standings()
     rows = plant_rows(standings)
     shown = [row for row in rows if not due or row["days_left"] is None or row["days_left"] < 0]
     if as_csv:
@@ -76,6 +85,19 @@ def status(
     failures = _notify(folder, machines, standings, forget) if to_notify else {}
     needs_care = any(row["light"] is Light.ALARM or not row["can_be_judged"] for row in rows)
     raise typer.Exit(1 if needs_care else 2 * bool(failures))
+
+
+def _renew(plant: Plant, jobs: int, scheduler: str) -> None:
+    """Have others make the standings that are missing."""
+    from functools import partial
+
+    from lobewatch.measuring.workers.share_work import Workers
+    from lobewatch.plant.summarise import share_summaries
+    from lobewatch.show.terminal.output import note_remarks
+
+    workers = Workers(jobs, scheduler)
+    note_remarks(workers.remarks)
+    plant.renew(partial(share_summaries, workers=workers))
 
 
 def _notify(

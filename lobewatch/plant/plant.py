@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
@@ -20,6 +20,8 @@ from lobewatch.plant.summary import DatedStanding, Summary, unreadable_summary
 
 VERIFY_EVERY = 6 * 3600.0
 """Time between two looks at every byte (s); chosen."""
+Makers = Callable[[Sequence[Path], datetime], Iterable[tuple[Path, tuple[int, ...], Summary]]]
+"""Function that has others make the summaries of machine folders: those that could be, with the marks of their files."""
 KNOWN_BY = ("machine.toml", "journal.jsonl")
 """Files that tell a machine folder: one without machine.toml is a machine that cannot be judged."""
 
@@ -90,6 +92,17 @@ class Plant:
                 self._summaries.pop(key, None)
                 self._damage.pop(key, None)
             self.machines = machines
+
+    def renew(self, make: Makers, now: datetime | None = None) -> None:
+        """Have others make the summaries that are missing; what they cannot make is made when it is asked for.
+
+        What `make` raises.
+        """
+        now = now or datetime.now(UTC)
+        with self._lock:
+            missing = {path: key for key, path in self.machines.items() if read_standing(path, now) is None}
+            for path, mark, summary in make([*missing], now) if missing else ():
+                self._summaries[missing[path]] = _ReadSummary(mark, now, summary)
 
     def standings(self, now: datetime | None = None) -> list[MachineStanding]:
         """One a machine, those that cannot be judged first, then worst first; who asks meanwhile waits."""

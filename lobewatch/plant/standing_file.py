@@ -45,39 +45,56 @@ _encode, _decode = msgspec.json.Encoder().encode, msgspec.json.Decoder(_Standing
 def read_standing(folder: Path, now: datetime) -> Summary | None:
     """The summary beside a machine, where it fits its files; None for none, torn, altered, old, of another version,
     or of another folder."""
-    file = _read(folder)
+    return fitting_summary(folder, _content(folder), now)
+
+
+def read_kept(folder: Path) -> Summary | None:
+    """The summary beside a machine as it was kept last, whatever has become of its files; None for none and torn."""
+    file = _decoded(_content(folder))
+    return None if file is None else file.summary
+
+
+def fitting_summary(folder: Path, content: bytes, now: datetime) -> Summary | None:
+    """The summary in the content of such a file, as `read_standing` gives it."""
+    file = _decoded(content)
     if file is None or (file.software, file.mark) != (software(), mark_of(folder, file.summary.newest_file)):
         return None
-    age = now - file.made
-    named = file.summary.path
+    age, named = now - file.made, file.summary.path
     if not timedelta(0) <= age < LASTING or (named != str(folder) and file.summary.speaks_of(named)):
         return None
     return file.summary
 
 
-def read_kept(folder: Path) -> Summary | None:
-    """The summary beside a machine as it was kept last, whatever has become of its files; None for none and torn."""
-    file = _read(folder)
-    return None if file is None else file.summary
-
-
-def _read(folder: Path) -> _StandingFile | None:
-    try:
-        content = read_regular(folder / STANDING, SMALL)
-        body = b"{" + content[HEAD:]
-        file = _decode(body) if content[:HEAD] == _head(body) else None
-        return file if file is not None and file.make == MAKE else None
-    except (OSError, ValueError, TypeError):
-        return None
+def standing_content(summary: Summary, mark: tuple[int, ...], now: datetime) -> bytes:
+    """Content of the file; mark: of the files that the summary was made of."""
+    body = _encode(_StandingFile(MAKE, software(), mark, now, summary))
+    return _head(body) + body[1:]
 
 
 def write_standing(folder: Path, summary: Summary, mark: tuple[int, ...], now: datetime) -> None:
     """Keep a summary beside the machine, whole or not at all; to be called under the lock.
 
-    mark: of the files it was made of. OSError where it cannot be written.
+    OSError where it cannot be written.
     """
-    body = _encode(_StandingFile(MAKE, software(), mark, now, summary))
-    atomic_write(folder / STANDING, _head(body) + body[1:], lasting=False)
+    atomic_write(folder / STANDING, standing_content(summary, mark, now), lasting=False)
+
+
+def _content(folder: Path) -> bytes:
+    """Bytes of the file; none where it cannot be read."""
+    try:
+        return read_regular(folder / STANDING, SMALL)
+    except (OSError, ValueError):
+        return b""
+
+
+def _decoded(content: bytes) -> _StandingFile | None:
+    """What the file says; None where it is torn, altered or of another form."""
+    body = b"{" + content[HEAD:]
+    try:
+        file = _decode(body) if content[:HEAD] == _head(body) else None
+    except (ValueError, TypeError):
+        return None
+    return file if file is not None and file.make == MAKE else None
 
 
 def _head(body: bytes) -> bytes:

@@ -5,10 +5,13 @@ It needs the logbook and numpy; who may do without them asks `lobewatch.plant`, 
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +24,8 @@ from lobewatch.logbook.logbook import Logbook
 from lobewatch.logbook.outlook import Outlook, outlook_of
 from lobewatch.machine import BusyError
 from lobewatch.machine.folder_path import mark_of
-from lobewatch.plant.standing_file import write_standing
+from lobewatch.measuring.workers.share_work import Workers, share_work
+from lobewatch.plant.standing_file import fitting_summary, standing_content, write_standing
 from lobewatch.plant.summary import SeriesSummary, Summary
 
 MOST = 60
@@ -33,6 +37,45 @@ OF_THE_DATE = ("overdue", "tap-in-future")
 def summarise_folder(path: Path, now: datetime) -> Summary:
     """The summary of a machine folder as `summarise` makes it; DataError where it is none."""
     return summarise(Logbook.open(path), now)
+
+
+def share_summaries(
+    folders: Sequence[Path], now: datetime, workers: Workers
+) -> Iterator[tuple[Path, tuple[int, ...], Summary]]:
+    """The summaries of machine folders that others could make, each with the mark of its files.
+
+    They must see the folders under the same names; each leaves standing.json there as `summarise` does. What
+    `share_work` raises.
+    """
+    tasks = [_SummaryTask(os.getcwd(), str(folder), now) for folder in folders]  # noqa: PTH109
+    for folder, content in zip(folders, share_work(_standing_content, tasks, workers), strict=True):
+        summary = fitting_summary(folder, content, now)
+        if summary is not None:
+            yield folder, mark_of(folder, summary.newest_file), summary
+
+
+class _SummaryTask(NamedTuple):
+    """A machine to be summarised."""
+
+    place: str
+    """Folder that its path counts from."""
+    path: str
+    """Path of the machine folder as it was named."""
+    now: datetime
+    """Time of the summary."""
+
+
+def _standing_content(task: _SummaryTask) -> bytes:
+    """Content of its standing.json; empty where it cannot be made."""
+    folder = Path(task.path)
+    try:
+        with contextlib.chdir(task.place):
+            mark = mark_of(folder)
+            summary = summarise_folder(folder, task.now)
+            is_same = mark == mark_of(folder)
+            return standing_content(summary, mark_of(folder, summary.newest_file), task.now) if is_same else b""
+    except Exception:  # noqa: BLE001 - whatever is wrong with it is said by who asks for it
+        return b""
 
 
 def summarise_with_rows(path: Path, now: datetime) -> tuple[Summary, list[bytes]]:

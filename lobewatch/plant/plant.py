@@ -21,7 +21,7 @@ from lobewatch.plant.summary import DatedStanding, Summary, unreadable_summary
 VERIFY_EVERY = 6 * 3600.0
 """Time between two looks at every byte (s); chosen."""
 Makers = Callable[[Sequence[Path], datetime], Iterable[tuple[Path, tuple[int, ...], Summary]]]
-"""Function that has others make the summaries of machine folders: those that could be, with the marks of their files."""
+"""Function that has others make summaries of machine folders: those that could be, with the marks of their files."""
 KNOWN_BY = ("machine.toml", "journal.jsonl")
 """Files that tell a machine folder: one without machine.toml is a machine that cannot be judged."""
 

@@ -20,6 +20,8 @@ from lobewatch.plant.summary import DatedStanding, Summary, unreadable_summary
 
 VERIFY_EVERY = 6 * 3600.0
 """Time between two looks at every byte (s); chosen."""
+RENEWED = 4
+"""Number of summaries made anew at a look for their age alone: thousands of one day would hold up a server; chosen."""
 Makers = Callable[[Sequence[Path], datetime], Iterable[tuple[Path, tuple[int, ...], Summary]]]
 """Function that has others make summaries of machine folders: those that could be, with the marks of their files."""
 KNOWN_BY = ("machine.toml", "journal.jsonl")
@@ -81,6 +83,7 @@ class Plant:
         self._summaries: dict[str, _ReadSummary] = {}
         self._damage: dict[str, tuple[Remark, ...]] = {}
         self._outdated: set[str] = set()
+        self._renewals = RENEWED
         self._lock = threading.Lock()
 
     def know(self, machines: Mapping[str, Path]) -> None:
@@ -108,6 +111,7 @@ class Plant:
         """One a machine, those that cannot be judged first, then worst first; who asks meanwhile waits."""
         now = now or datetime.now(UTC)
         with self._lock:
+            self._renewals = RENEWED
             standings = [self._standing(key, path, now) for key, path in self.machines.items()]
         lights = list(Light)
         return sorted(
@@ -139,8 +143,10 @@ class Plant:
 
     def _summary(self, key: str, path: Path, now: datetime) -> Summary:
         last = self._summaries.get(key)
-        if last is not None and last.mark == mark_of(path, last.summary.newest_file) and now - last.time < LASTING:
-            return last.summary
+        if last is not None and last.mark == mark_of(path, last.summary.newest_file):
+            if now - last.time < LASTING or not self._renewals:
+                return last.summary
+            self._renewals -= 1
         mark = mark_of(path)
         try:
             summary = (None if key in self._outdated else read_standing(path, now)) or plant.summarise_folder(path, now)

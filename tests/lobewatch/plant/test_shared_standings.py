@@ -123,3 +123,25 @@ def test_jobs_and_scheduler_at_once_and_a_scheduler_that_is_none_are_refused(mil
         status(mills, "--jobs", "2", "--scheduler", "tcp://127.0.0.1:1")
     with pytest.raises(DataError, match="no Dask scheduler answers there"):
         status(mills, "--scheduler", "tcp://127.0.0.1:1")
+
+
+def test_summaries_that_grow_old_together_are_renewed_a_few_at_a_look(
+    mills: Path, shop: Shop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (mills / "broken" / "machine.toml").unlink()
+    now, asked = shop.start + timedelta(days=90), list[str]()
+    plant = Plant(find_machines(mills))
+    before = {standing.key: standing.summary for standing in plant.standings(now)}
+    made_here = lobewatch.plant.summarise_folder
+
+    def counted(path: Path, when: Any) -> Any:
+        asked.append(path.name)
+        return made_here(path, when)
+
+    monkeypatch.setattr("lobewatch.plant.summarise_folder", counted)
+    monkeypatch.setattr("lobewatch.plant.plant.RENEWED", 1)
+    for look in range(6):
+        standings = plant.standings(now + timedelta(days=8, seconds=look))
+        assert {standing.key for standing in standings} == before.keys()
+        assert len(asked) == min(look + 1, 4)
+    assert sorted(asked) == ["a", "b", "c", "new"]

@@ -9,6 +9,7 @@ from modal.fit_modes import fit_modes, modes_of
 from modal.fit_points import fit_points
 from modal.mass_loading import MassLoading, mass_loading, with_mass_doubt
 from modal.mode_indicator import mode_indicator
+from modal.modes.common_decay import common_decay
 from modal.modes.common_delay import CommonDelay, common_delay
 from modal.modes.follow import Followed, follow
 from modal.modes.mac import mac
@@ -37,6 +38,7 @@ __all__ = [
     "Trust",
     "believed",
     "candidates",
+    "common_decay",
     "common_delay",
     "cut_edges",
     "edit_modes",

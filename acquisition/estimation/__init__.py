@@ -8,6 +8,7 @@ from acquisition.estimation.exponential_window import (
     windowed_receptance,
 )
 from acquisition.estimation.force_noise import force_noise, force_noise_through
+from acquisition.estimation.hidden_window import hidden_window
 from acquisition.estimation.infer_averages import infer_averages
 from acquisition.estimation.running_mean import RunningMean
 from acquisition.estimation.without_mass import without_mass
@@ -20,6 +21,7 @@ __all__ = [
     "force_noise",
     "force_noise_through",
     "frf_of_spectra",
+    "hidden_window",
     "infer_averages",
     "time_after_hit",
     "time_of_hit",

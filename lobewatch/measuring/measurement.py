@@ -16,6 +16,7 @@ from dsm import Calibration, calibrate, modal_stiffness
 from lobewatch.machine import BY_FIT, Machine
 from lobewatch.measuring.questions import frequency_jump, no_mode_in_band, other_band, stiffness_off_model
 from lobewatch.measuring.sensor_remarks import Fitted, fit_without_sensor
+from lobewatch.measuring.window_remark import about_hidden_window
 from modal import Believed, Extraction, Mode, ModeEdits, believed, edit_modes, extract, follow, modes_of, predominant
 
 NOT_APPLIED = "hand-not-applied"
@@ -96,7 +97,8 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = BY_FIT) -> TapF
     with _threads().limit(limits=1):
         try:
             fitted = fit_without_sensor(tap.frf, machine.tap.sensor, lambda frf: _fitted(frf, tap, by_hand))
-            return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks))
+            windows = about_hidden_window(tap.accepted, fitted.modes)
+            return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks, *windows))
         except ValueError as error:
             failure = Remark("no-modes", "", f"no modes: {error}")
             return TapFit(*named, (), (*remarks, failure, no_mode_in_band((), machine)), failed=True)

@@ -42,6 +42,7 @@ def list_sensors(folder: MachineFolder, device: Device, tell: Callable[[str], No
     """Look at a connected device; a rate that is right is kept for it. tell: what is being done, for a person."""
     today = datetime.now(UTC).date()
     remarks = sensor_doubts(device.channels, today, folder.machine.daq.calibration_interval_months)
+    remarks += _about_aliasing(folder.machine.daq.anti_alias, device.sample_rate)
     nominal, measured = device.sample_rate, None
     if has_clock(device):
         tell(f"measuring the rate for {RATE_SECONDS:g} s")
@@ -52,3 +53,15 @@ def list_sensors(folder: MachineFolder, device: Device, tell: Callable[[str], No
             remarks.append(Remark("sample-rate-wrong", "", error.text, error.cure))
     replaced = device.sample_rate != nominal
     return SensorList(device.identity, device.channels, nominal, measured, replaced, tuple(remarks))
+
+
+def _about_aliasing(declared: bool | None, rate: float) -> list[Remark]:
+    """An FRF does not show what has folded into it; declared: whether a filter keeps that out, None: nobody says."""
+    if declared:
+        return []
+    filter_text = "nobody says that a filter keeps" if declared is None else "no filter keeps"
+    text = (
+        f"{filter_text} out what lies above {rate / 2:g} Hz, half the sample rate: it folds down and passes for modes"
+    )
+    cure = "enter [daq] anti_alias = true where the device or an amplifier has one, else choose a higher rate"
+    return [Remark("no-anti-alias", "", text, cure)]

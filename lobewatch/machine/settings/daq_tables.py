@@ -75,6 +75,7 @@ class Daq(Table, frozen=True):
     digital_clock: bool = False
     accept_measured_rate: bool = False
     calibration_interval_months: Positive = 12.0
+    anti_alias: bool | None = None
     channel: tuple[ChannelTable, ...] = ()
 
     def __post_init__(self) -> None:

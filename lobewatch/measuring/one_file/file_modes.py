@@ -22,6 +22,7 @@ from lobewatch.measuring.one_file.windows import (
     window_to_correct,
 )
 from lobewatch.measuring.sensor_remarks import Fitted, fit_without_sensor
+from lobewatch.measuring.window_remark import about_hidden_window
 from modal import (
     Extraction,
     Mode,
@@ -111,8 +112,11 @@ def modes_of_file(
         fitted, windowed = remove_given_window(modes, window.time_constant, delay, record)
     elif file_frf.time_constant is not None:
         fitted = tuple(remove_own_window(modes, file_frf.time_constant))
-    elif not accept:
-        fitted, windowed = refit_ringing_modes(modes, hits, band, mass)
+    else:
+        windowed = tuple(about_hidden_window(hits, modes))
+        if not accept:
+            fitted, ringing = refit_ringing_modes(modes, hits, band, mass)
+            windowed += ringing
     return FileModes(
         path=path,
         frf=frf,

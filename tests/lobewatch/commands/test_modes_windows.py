@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -219,3 +220,20 @@ def test_a_mode_that_outlasts_the_window_is_left_out_and_said(
     code, said = run(monkeypatch, capsys, str(file), "--window", "0.5", "--hit-at", "0", "--band", "500", "700")
     assert code == 2
     assert "600.0 Hz decays" in said
+
+
+def stiffness_at(frequency: float, modes: Sequence[Mode]) -> float:
+    return min(modes, key=lambda mode: abs(mode.frequency - frequency)).stiffness
+
+
+def test_a_window_that_nobody_named_is_said_with_its_time_constant(tmp_path: Path) -> None:
+    path = hit(tmp_path / "windowed.csv", 0.5, tau=0.05)
+    silent = modes_of_file(path)
+    (said,) = [remark for remark in silent.remarks if remark.code == "window-suspected"]
+    assert "an exponential window of 0.05 s" in said.text
+    assert "--window" in said.cure
+    assert stiffness_at(FREQUENCY, silent.fitted) / STIFFNESS > 1.2
+    named = modes_of_file(path, window=Window(0.05))
+    assert "window-suspected" not in [remark.code for remark in named.remarks]
+    assert stiffness_at(FREQUENCY, named.fitted) == pytest.approx(STIFFNESS, rel=0.03)
+    assert "window-suspected" not in [remark.code for remark in modes_of_file(hit(tmp_path / "x.csv", 0.5)).remarks]

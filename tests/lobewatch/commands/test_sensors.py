@@ -123,12 +123,14 @@ def test_the_list_names_channels_rate_and_doubts(sensors: Sensors, folder: Machi
     assert "warning: acceleration: a sensitivity of 100 V per m/s^2 is not believed (accelerometers have " in out
     assert "without gain); did you mean mV?" in out
     assert "warning: acceleration: date of calibration not known" in out
+    assert "warning: nobody says that a filter keeps out what lies above 51200 Hz, half the sample rate" in out
     assert "102400.0" in (folder.path / "daq.json").read_text()
 
 
 def test_the_interval_of_calibration_is_that_of_the_machine_file(sensors: Sensors, folder: MachineFolder) -> None:
     text = folder.toml.read_text("utf-8")
-    folder.toml.write_text(text.replace("[daq]", "[daq]\ncalibration_interval_months = 1200"), "utf-8")
+    keys = "[daq]\ncalibration_interval_months = 1200\nanti_alias = true"
+    folder.toml.write_text(text.replace("[daq]", keys), "utf-8")
     old = replace(FORCE, calibration_date="2000-01-15")
     assert "warning" not in sensors(silence, (old, ACCELERATION), rate=102400.0, realtime=True)[1]
 

@@ -277,7 +277,7 @@ def test_a_machine_without_spindle_gives_all_but_the_models_part(tmp_path: Path)
     folder.commit(recorded(about(folder), Mode(1700.0, 0.03, 3.5e7)))
     folder.commit(recorded(about(folder, 30.0), Mode(1600.0, 0.03, 3.5e7)))
     history, measurements = up_to_date(folder)
-    assert "no model" in measurements[0].remarks[0].text
+    assert any("no model" in remark.text for remark in measurements[0].remarks)
     assert REFERENCE_CUT in row_lobes(history.rows[0], folder.machine)
     html = render_report(Logbook.open(folder.path), "reference", "x")
     assert "natural frequency" in html

@@ -27,7 +27,7 @@ from lobewatch import Logbook
 from lobewatch.cli import app
 from lobewatch.history.history_cache import HistoryCache
 from lobewatch.logbook import compare_lobes
-from lobewatch.machine import Machine, MachineFolder, ProgramTable
+from lobewatch.machine import MachineFolder, ProgramTable
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.machine.rows import read_rows, write_rows
 from lobewatch.measuring import Measurement, measure
@@ -92,9 +92,9 @@ def analysed(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Identities of the tap tests analysed from now on."""
     found: list[str] = []
 
-    def counting(tap: TapTest, machine: Machine, last: Mode | None = None) -> Measurement:
+    def counting(tap: TapTest, *known: Any) -> Measurement:
         found.append(tap.id)
-        return measure(tap, machine, last)
+        return measure(tap, *known)
 
     monkeypatch.setattr("lobewatch.history.tap_measurements.measure", counting)
     return found

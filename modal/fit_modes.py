@@ -16,7 +16,7 @@ from modal.fitting import BandFit
 from modal.hammer_covariance import hammer_covariance
 from modal.jackknife import jackknife, left_out
 from modal.modes.mode import Mode, ratio_or_zero
-from modal.quality.assess import assess, with_phase_remarks
+from modal.quality.assess import assess, with_phase_remarks, with_smoothing_remarks
 
 UNKNOWN_PHASE = 90.0
 """Standard error (degrees) of a phase of which nothing is known."""
@@ -53,7 +53,8 @@ def modes_of(state: Extraction, hits: Sequence[Sequence[Hit]] = ()) -> list[Mode
         raise ValueError(f"hits of {len(hits)} FRFs for {len(state.frfs)}; give a list of hits for each, maybe empty")
     without = [left_out(hits_of_frf, frf) for hits_of_frf, frf in zip(hits, state.frfs, strict=False)]
     modes = [mode for band in state.bands for mode in _modes(state, band, hits, without)]
-    return with_phase_remarks(sorted(modes, key=lambda mode: mode.frequency))
+    rising = sorted(modes, key=lambda mode: mode.frequency)
+    return with_smoothing_remarks(state.frf, with_phase_remarks(rising))
 
 
 def _modes(

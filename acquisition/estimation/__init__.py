@@ -11,6 +11,7 @@ from acquisition.estimation.force_noise import force_noise, force_noise_through
 from acquisition.estimation.hidden_window import hidden_window
 from acquisition.estimation.infer_averages import infer_averages
 from acquisition.estimation.running_mean import RunningMean
+from acquisition.estimation.smoothed_lines import is_smoothed
 from acquisition.estimation.without_mass import without_mass
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "frf_of_spectra",
     "hidden_window",
     "infer_averages",
+    "is_smoothed",
     "time_after_hit",
     "time_of_hit",
     "windowed_receptance",

@@ -9,7 +9,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Remark
+from acquisition import Frf, Remark, is_smoothed
 from modal.bands.extraction import HELD, Extraction, FittedBand
 from modal.bands.fit_peaks import LARGEST_ERROR
 from modal.bands.left_about import left_about
@@ -26,6 +26,8 @@ FAR_STRONGER = 20.0
 """Height of a mode over that of one on its flank that may be no more than what makes the strong one no linear mode."""
 MOST_LEFT = 0.02
 """Share of a mode's decay that may be left when the record ends."""
+NARROW = 12.0
+"""Half-power half-width in lines from which smoothing over five of them bends a mode by less than 2 %."""
 LARGEST_SCATTER = 3.0
 """Standard error over hits over that of the fit."""
 LARGEST_DIFFERENCE, FEWEST_LINES = 0.25, 4
@@ -173,3 +175,17 @@ def _with_phase_remark(mode: Mode, expected: float) -> Mode:
     text = f"modal constant {mode.phase_deg:+.0f} ± {mode.phase_deg_std:.1g}° off real"
     cure = "look for loose clamping, for another mode close to it, and for a delay between the channels"
     return replace(mode, remarks=(*mode.remarks, Remark("complex-mode", _name(mode), text, cure)))
+
+
+def with_smoothing_remarks(frf: Frf, modes: Sequence[Mode]) -> list[Mode]:
+    """All modes of an FRF, with a remark on the narrow ones where its lines were smoothed."""
+    step = float(np.mean(np.diff(frf.frequency)))
+    narrow = [mode.damping_ratio * mode.frequency < NARROW * step for mode in modes]
+    if not any(narrow) or not is_smoothed(frf):
+        return [*modes]
+    text = f"its half-width is below {NARROW:g} lines, and lines were smoothed: zeta too large, K too small by percents"
+    cure = "export the lines without smoothing or window"
+    return [
+        replace(mode, remarks=(*mode.remarks, Remark("smoothed-lines", _name(mode), text, cure))) if is_narrow else mode
+        for mode, is_narrow in zip(modes, narrow, strict=True)
+    ]

@@ -24,7 +24,7 @@ MISFIT = 2.0
 """rms of what the fit leaves over rms of the noise that is more than noise; it matters ..."""
 MISFIT_SHARE = 0.01
 """... from this share of the peak; on the zeta and K of a mode without a peak of its own it bears more."""
-DOUBTFUL_CODES = ("bent-by-neighbour", "several-modes", "half-power-width")
+DOUBTFUL_CODES = ("bent-by-neighbour", "several-modes", "half-power-width", "smoothed-lines")
 """Remarks that stand for a figure which a mode does not carry."""
 
 

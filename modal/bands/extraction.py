@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Frf
+from acquisition import Frf, recorded_share
 from modal.bands.find_resonances import Resonance
 from modal.fitting import BandFit
 from modal.poles import StabilisationChart, stabilise
@@ -91,6 +91,13 @@ class Extraction:
     def frf(self) -> Frf:
         """The driving point: the FRF that stiffnesses belong to."""
         return self.frfs[0]
+
+    @cached_property
+    def record(self) -> float | None:
+        """Length of the record that the lines are of (s), without zeros behind it; None for an uneven axis."""
+        steps = np.diff(self.frf.frequency)
+        even = np.ptp(steps) < 1e-3 * steps[0]
+        return float(recorded_share(self.frf) / np.mean(steps)) if even else None
 
     @property
     def receptance(self) -> ComplexArray:

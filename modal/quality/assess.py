@@ -7,7 +7,6 @@ from dataclasses import replace
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import Frf, Remark, is_smoothed
 from modal.bands.extraction import HELD, Extraction, FittedBand
@@ -43,7 +42,7 @@ def assess(state: Extraction, band: FittedBand, i: int, mode: Mode) -> Mode:
         misfit=misfit,
         misfit_share=share,
         edge_distance=_edge_distance(state, mode),
-        left_ringing=_left_at_the_end(state.frf.frequency, mode.damping_ratio * mode.frequency),
+        left_ringing=_left_at_the_end(state.record, mode.damping_ratio * mode.frequency),
         half_power_damping=_half_power_damping(band, mode),
     )
     remarks = chain(
@@ -121,11 +120,9 @@ def _name(mode: Mode) -> str:
     return f"{mode.frequency:.0f} Hz"
 
 
-def _left_at_the_end(frequency: NDArray[np.float64], half_width: float) -> float | None:
-    """Share of the decay after the record, whose length is one over the line spacing; None for an uneven axis."""
-    steps = np.diff(frequency)
-    even = np.ptp(steps) < 1e-3 * steps[0]
-    return float(np.exp(-2 * np.pi * half_width / np.mean(steps))) if even else None
+def _left_at_the_end(record: float | None, half_width: float) -> float | None:
+    """Share of the decay after the record (s); None where its length is not known."""
+    return None if record is None else float(np.exp(-2 * np.pi * half_width * record))
 
 
 def _on_its_values(band: FittedBand, i: int, mode: Mode, share: float) -> Iterator[Remark]:

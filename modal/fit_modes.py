@@ -13,6 +13,7 @@ from modal.bands.extract import extract
 from modal.bands.extraction import Array, Extraction, FittedBand
 from modal.bands.systematic import systematic
 from modal.fitting import BandFit
+from modal.force_dependence import with_force_remarks
 from modal.hammer_covariance import hammer_covariance
 from modal.jackknife import jackknife, left_out
 from modal.modes.mode import Mode, ratio_or_zero
@@ -68,7 +69,8 @@ def _modes(
     over_hits = np.sum([jackknife(state, band, *pair) for pair in enumerate(without)], axis=0) if n_hits else None
     scatter = None if over_hits is None else over_hits + beyond.covariance
     modes = [_mode(fit, i, covariance, beyond.freedom, scatter, n_hits) for i in range(fit.frequency.size)]
-    return [assess(state, band, i, replace(mode, method=_method(state, band))) for i, mode in enumerate(modes)]
+    judged = [assess(state, band, i, replace(mode, method=_method(state, band))) for i, mode in enumerate(modes)]
+    return with_force_remarks(state, band, judged, hits[0], without[0]) if n_hits else judged
 
 
 def _mode(fit: BandFit, i: int, covariance: Array, freedom: float, scatter: Array | None, n_hits: int) -> Mode:

@@ -50,9 +50,18 @@ def jackknife(state: Extraction, band: FittedBand, i: int, without: Sequence[Frf
     shape as `BandFit.covariance`. Source: Efron & Stein (1981), The jackknife estimate of variance, Annals of
     Statistics 9, 586.
     """
-    part = band.lines
-    change = np.array([frf.receptance[part] for frf in without]) * state.weight[i, part]
-    change -= change.mean(axis=0)
-    steps = np.concatenate([change.real, change.imag], axis=1) @ band.fit.influence_of(i).T
-    n = len(without)
+    all_hits = np.mean([frf.receptance[band.lines] for frf in without], axis=0)
+    steps, n = changes(state, band, i, without, all_hits), len(without)
     return np.asarray((n - 1) / n * steps.T @ steps)
+
+
+def changes(
+    state: Extraction, band: FittedBand, i: int, without: Sequence[Frf], reference: NDArray[np.complex128]
+) -> NDArray[np.float64]:
+    """What the values of a band change by when FRF i is one of these instead of the reference (m/N, on its lines).
+
+    A row each, to first order; columns as `BandFit.covariance`.
+    """
+    part = band.lines
+    change = (np.array([frf.receptance[part] for frf in without]) - reference) * state.weight[i, part]
+    return np.asarray(np.concatenate([change.real, change.imag], axis=1) @ band.fit.influence_of(i).T)

@@ -24,7 +24,7 @@ from lobewatch.cuts.listening.spectrum import (
     without_skirts,
 )
 from lobewatch.cuts.listening.steadiness import unsteadiness
-from lobewatch.cuts.listening.true_speed import speed_of_spectra
+from lobewatch.cuts.listening.true_speed import speed_elsewhere, speed_of_spectra
 from lobewatch.machine.journal.heard_cut import CutWord
 
 CHATTERS = 5e-4
@@ -69,6 +69,8 @@ class HeardSound:
     """All lines, by where they come from."""
     spectrum: Spectrum | None = None
     """Spectrum of the cut."""
+    elsewhere_rpm: float = np.nan
+    """Speed further from the one that was set that the lines fit (rpm); NaN without one, or where one is near."""
     tone: float = np.nan
     """Frequency of a tone that nothing explains (Hz); NaN where that is not the reason."""
     axis: int = 0
@@ -103,7 +105,7 @@ def judge_cut(
     spectra, quiet = spectra_of(cut, sample_rate), spectra_of(air, sample_rate)
     turning = speed_of_spectra(spectra, quiet, teeth, commanded_rpm / 60)
     if turning is None:
-        return HeardSound("cannot tell", "speed-not-found", spectrum=spectra[0])
+        return _not_found(spectra[0], 60 * speed_elsewhere(spectra, quiet, teeth, commanded_rpm / 60, None))
     sounds = []
     for number, axis in enumerate(np.atleast_2d(cut)):
         lines = without_skirts(lines_of(spectra[number]), spectra[number].bin)
@@ -113,7 +115,16 @@ def judge_cut(
             "stable", "", turning=turning, ratio=0.0, lines=by_origin, spectrum=spectra[number], axis=number
         )
         sounds.append(_judge_lines(sound, axis, teeth, immersion))
-    return max(sounds, key=_evidence)
+    sound = max(sounds, key=_evidence)
+    if sound.word == "stable":
+        return sound
+    elsewhere = 60 * speed_elsewhere(spectra, quiet, teeth, commanded_rpm / 60, turning)
+    return sound if np.isnan(elsewhere) else _not_found(spectra[0], elsewhere)
+
+
+def _not_found(spectrum: Spectrum, elsewhere: float) -> HeardSound:
+    """Of a speed that is not near the one that was set; elsewhere: that which the lines fit (rpm), NaN without one."""
+    return HeardSound("cannot tell", "speed-not-found", spectrum=spectrum, elsewhere_rpm=elsewhere)
 
 
 def _evidence(sound: HeardSound) -> tuple[bool, float]:

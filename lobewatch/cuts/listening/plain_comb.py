@@ -26,6 +26,8 @@ CHANCE = 1e-4
 """A comb that as many lines as random would have more often than this, over all combs that are tried, is none."""
 CAP = 3.0
 """Most that one line counts, in log10 of its clearness: a loud one is no more than a line; chosen."""
+HALF = 0.5
+"""Share of the lines that a comb far from the speed that was set explains at least."""
 LEAST = 3
 """Multiples that a comb has at least: any two lines have one."""
 
@@ -58,6 +60,28 @@ def plain_comb(
         if best is not None and _chance(best, lines, images, bin_, teeth, around) < CHANCE:
             return _speed(best, lines, bin_)
     return None
+
+
+def comb_elsewhere(
+    lines: SpectralLines, bin_: float, sample_rate: float, teeth: int, frequency: float, around: float
+) -> SpindleSpeed | None:
+    """The comb that explains the most, half or twice the frequency (Hz) at most and further than `around` from it.
+
+    Of those that explain as many tenths of the lines that of which all are tooth passing, else the highest; none of
+    which all multiples have an order in common that the teeth have not: that is a part of another.
+    """
+    lines, best, rank = lines.loudest(LOUDEST), None, (0.0, False, 0.0)
+    steps = np.arange(1, int(np.log(2) / (2 * around)) + 1)
+    for centre in frequency * np.exp(2 * around * np.concatenate([-steps, steps])):
+        comb = plain_comb(lines, bin_, sample_rate, teeth, float(centre), around)
+        if comb is None or comb.share < HALF:
+            continue
+        order = np.round(lines.frequency / comb.frequency).astype(int)
+        common = int(np.gcd.reduce(order[np.abs(lines.frequency - order * comb.frequency) < TOLERANCE * bin_]))
+        ranked = round(comb.share, 1), common == teeth, comb.frequency
+        if common and teeth % common == 0 and ranked > rank:
+            best, rank = comb, ranked
+    return best
 
 
 def _images(lines: SpectralLines, sample_rate: float) -> Floats:

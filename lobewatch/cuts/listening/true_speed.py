@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from lobewatch.cuts.listening.lattice import SpindleSpeed, refine_speed
-from lobewatch.cuts.listening.plain_comb import plain_comb
+from lobewatch.cuts.listening.plain_comb import comb_elsewhere, plain_comb
 from lobewatch.cuts.listening.sorted_lines import is_foreign
 from lobewatch.cuts.listening.spectrum import (
     Floats,
@@ -78,8 +78,7 @@ def speed_of_spectra(
 ) -> SpindleSpeed | None:
     """`find_speed` of the spectra of all axes; commanded in turns a second (Hz)."""
     lines = [without_skirts(lines_of(spectrum), spectrum.bin) for spectrum in spectra]
-    heard = [axis[~is_foreign(axis, quiet)] for axis, quiet in zip(lines, air, strict=True)]
-    of_cut, first = joined_lines(heard), spectra[0]
+    of_cut, first = _lines_of_cut(spectra, air), spectra[0]
     voted = true_speed(of_cut, joined_lines(lines), first, teeth, commanded)
     comb = plain_comb(of_cut, first.bin, first.sample_rate, teeth, commanded, COMB_AROUND)
     if comb is None:
@@ -88,6 +87,29 @@ def speed_of_spectra(
         is_same = voted is not None and abs(comb.frequency / voted.frequency - 1) < SAME
         return voted if is_same else comb if comb.share >= LEAST_SHARE else None
     return voted
+
+
+def speed_elsewhere(
+    spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float, heard: SpindleSpeed | None
+) -> float:
+    """Turns a second (Hz) of a clear comb further from the speed that was set; NaN without one.
+
+    heard: the speed that was found: only a comb on which as many lines agree is one then, which has one unknown only,
+    and that of half of it is none, which chatter of period two makes.
+    """
+    lines, first = _lines_of_cut(spectra, air), spectra[0]
+    comb = comb_elsewhere(lines, first.bin, first.sample_rate, teeth, commanded, COMB_AROUND)
+    if comb is None:
+        return np.nan
+    if heard is not None and (comb.agreeing < heard.agreeing or abs(2 * comb.frequency / heard.frequency - 1) < SAME):
+        return np.nan
+    return comb.frequency
+
+
+def _lines_of_cut(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> SpectralLines:
+    """The lines of all axes that are not there in air, without skirts."""
+    lines = [without_skirts(lines_of(spectrum), spectrum.bin) for spectrum in spectra]
+    return joined_lines([axis[~is_foreign(axis, quiet)] for axis, quiet in zip(lines, air, strict=True)])
 
 
 def true_speed(

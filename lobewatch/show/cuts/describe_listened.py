@@ -16,7 +16,7 @@ WHY: Mapping[str, str] = {
     "knock": "a knock in the cut, as of a hammer; cut again without it",
     "overload": "the accelerometer or its input was overloaded; choose a larger range or another place",
     "lost-scans": "scans were lost in it; lower the sample rate or use another cable or port",
-    "speed-not-found": "no spindle speed within 2 % of the one that was set fits its lines; correct the speed",
+    "speed-not-found": "no spindle speed within 5 % of the one that was set fits its lines; correct the speed",
     "on-spindle-lines": "the lines of run-out are louder than tooth passing: chatter of two tooth periods of an even "
     "number of teeth, or chatter that has locked to the spindle, sounds alike; cut at a speed 3 % away",
     "faint": "lines beside those of the spindle, too faint to be called chatter; cut longer or a little deeper",
@@ -59,6 +59,8 @@ def reason_text(comparison: CutComparison) -> str:
 def _why(comparison: CutComparison) -> str:
     """Fault and cure, with the numbers of this cut."""
     reason, tone = comparison.heard.reason, comparison.heard.tone
+    if reason == "speed-not-found" and math.isfinite(comparison.heard.elsewhere_rpm):
+        return f"{WHY[reason]}; these lines fit {comparison.heard.elsewhere_rpm:.0f} rpm"
     if reason == "slow-sampling":
         return f"{WHY[reason]}: {SLOWEST * comparison.tooth_frequency:.0f} Hz or more"
     if reason == "unexplained-tone":
@@ -137,6 +139,7 @@ def listened_json(comparison: CutComparison) -> dict[str, Any]:
         "reason": heard.reason,
         "chatter_frequency_hz": None if chatter is None else chatter.frequency,
         "chatter_frequency_hz_std": None if chatter is None else chatter.error,
+        "elsewhere_rpm": heard.elsewhere_rpm,
         "unexplained_tone_hz": heard.tone,
         "sensor": comparison.sensor,
         "speed_rpm": heard.speed_rpm,

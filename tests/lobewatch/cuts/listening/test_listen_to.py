@@ -162,6 +162,19 @@ def test_a_speed_far_from_the_one_that_was_set_is_not_found() -> None:
     assert (heard.word, heard.reason) == ("cannot tell", "speed-not-found")
 
 
+@pytest.mark.parametrize("wrong", [0.6, 0.76, 0.9, 1.08, 1.327, 1.9])
+def test_a_clear_comb_far_from_the_speed_that_was_set_is_named_and_not_followed(wrong: float) -> None:
+    (heard,) = listen_to(CutRecording(recorded(a_cut()), RATE, 4, 0.5, wrong * SPEED))
+    assert (heard.reason, heard.turning) == ("speed-not-found", None)
+    assert heard.elsewhere_rpm == pytest.approx(SPEED, rel=1e-3)
+
+
+def test_pumps_name_no_speed() -> None:
+    random = np.random.default_rng(12)
+    pump = sines([(f, 3.0) for f in random.uniform(200, 6000, 6)], round(CUT * RATE), random)
+    assert np.isnan(listen(recorded(pump)).elsewhere_rpm)
+
+
 def test_a_tenth_of_a_second_is_too_short() -> None:
     assert listen(recorded(a_cut())[: round(0.1 * RATE)]).reason == "too-short"
     assert listen(recorded(a_cut()[: round(0.35 * RATE)])).reason == "too-short"

@@ -26,6 +26,8 @@ COMB_AROUND = 0.05
 SAME = 1e-3
 """... and up to which it is the same as that of the votes, which know of side bands; it is taken where it explains as
 many lines: it has one unknown, they have one more for each family of side bands."""
+MAINS, MAINS_AROUND = (50.0, 60.0), 2e-3
+"""Frequencies of the mains (Hz), whose hum is a comb too, and how far they are off at most, relative."""
 SURE = 6
 """Lines that must agree on a speed by votes that has no plain comb, and that does not fit (`FITS`) all of them."""
 AROUND = 0.021
@@ -95,15 +97,21 @@ def speed_elsewhere(
     """Turns a second (Hz) of a clear comb further from the speed that was set; NaN without one.
 
     heard: the speed that was found: only a comb on which as many lines agree is one then, which has one unknown only,
-    and that of half of it is none, which chatter of period two makes.
+    and that of half of it is none, which chatter of period two makes; the mains hum at multiples of theirs.
     """
     lines, first = _lines_of_cut(spectra, air), spectra[0]
-    comb = comb_elsewhere(lines, first.bin, first.sample_rate, teeth, commanded, COMB_AROUND)
-    if comb is None:
-        return np.nan
-    if heard is not None and (comb.agreeing < heard.agreeing or abs(2 * comb.frequency / heard.frequency - 1) < SAME):
-        return np.nan
-    return comb.frequency
+    about = first.bin, first.sample_rate, teeth
+    mains = [plain_comb(lines, *about, hum, MAINS_AROUND) for hum in MAINS if heard and not _is_same(heard, hum)]
+    combs = [comb for comb in (comb_elsewhere(lines, *about, commanded, COMB_AROUND), *mains) if comb is not None]
+    if heard is not None:
+        combs = [comb for comb in combs if comb.agreeing >= heard.agreeing]
+        combs = [comb for comb in combs if abs(2 * comb.frequency / heard.frequency - 1) >= SAME]
+    return max(combs, key=lambda comb: comb.agreeing).frequency if combs else np.nan
+
+
+def _is_same(speed: SpindleSpeed, hum: float) -> bool:
+    """Whether a spindle turns as fast as a hum (Hz), or twice: its multiples, or those of period two, are the same."""
+    return any(abs(speed.frequency / (times * hum) - 1) < MAINS_AROUND for times in (1, 2))
 
 
 def _lines_of_cut(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> SpectralLines:

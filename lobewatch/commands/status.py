@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,8 +11,7 @@ from lobewatch.machine.folder_path import named_folder
 from lobewatch.show.terminal.output import Json, emit, results
 
 if TYPE_CHECKING:
-    from lobewatch.machine.settings.notify_table import Broker
-    from lobewatch.plant.plant import MachineStanding, Plant
+    from lobewatch.plant.plant import Plant
 
 FOR_THE_PAGE = ("points", "limits", "limit", "word", "why")
 """What only the dashboard draws; lobewatch trend and lobewatch export tell it in full."""
@@ -82,9 +80,13 @@ def status(
         from lobewatch.notify.prometheus import prometheus_text
 
         atomic_write(prometheus, prometheus_text(standings).encode())
-    failures = _notify(folder, machines, standings, forget) if to_notify else {}
+    failures = 0
+    if to_notify:
+        from lobewatch.notify.telling import notify_folder
+
+        failures = len(notify_folder(folder, machines, standings, forget))
     needs_care = any(row["light"] is Light.ALARM or not row["can_be_judged"] for row in rows)
-    raise typer.Exit(1 if needs_care else 2 * bool(failures))
+    raise typer.Exit(1 if needs_care else 2 * (failures > 0))
 
 
 def _renew(plant: Plant, jobs: int, scheduler: str) -> None:
@@ -98,15 +100,3 @@ def _renew(plant: Plant, jobs: int, scheduler: str) -> None:
     workers = Workers(jobs, scheduler)
     note_remarks(workers.remarks)
     plant.renew(partial(share_summaries, workers=workers))
-
-
-def _notify(
-    folder: Path, machines: Mapping[str, Path], standings: Sequence[MachineStanding], gone: str
-) -> Mapping[Broker, str]:
-    """Why a broker was not told, by broker; gone: machine that is to be forgotten first."""
-    from lobewatch.notify.telling import forget, notify
-
-    plant = None if (folder / "machine.toml").exists() else folder
-    if gone:
-        forget(folder, gone, machines)
-    return notify(standings, plant=plant)

@@ -46,6 +46,15 @@ def tell(logbook: Logbook) -> None:
     notify([_standing(path.resolve().name, path, summary, now)], machines, now=now)
 
 
+def notify_folder(
+    folder: Path, machines: Mapping[str, Path], standings: Iterable[MachineStanding], gone: str = ""
+) -> dict[Broker, str]:
+    """As `notify`, of the machine or all machines in a folder; gone: machine that is to be forgotten first."""
+    if gone:
+        forget(folder, gone, machines)
+    return notify(standings, plant=None if (folder / "machine.toml").exists() else folder)
+
+
 def notify(
     standings: Iterable[MachineStanding],
     machines: Mapping[Path, Machine] | None = None,

@@ -87,7 +87,7 @@ def test_commands_only_parse_and_show() -> None:
     lines = HOUSE.lines("lobewatch")
     others = ("lobewatch.commands", "lobewatch.commands.help_page", "lobewatch.commands.file_options")
     commands = [count for name, count in lines.items() if name.startswith("lobewatch.commands") and name not in others]
-    assert mean(commands) <= 65
+    assert mean(commands) <= 70  # half of it options
 
 
 @pytest.mark.parametrize("room", DOMAIN)

@@ -33,9 +33,12 @@ NUMBERS = (
     "static_tip_stiffness_n_per_m",
     "modal_tip_stiffness_n_per_m",
     "temperature_c",
+    "hours",
 )
 """Columns of numbers: of the mode followed where it was tapped, each with its standard error; mean of the recalibrated
 bearings, likewise; of the recalibrated model; of the spindle."""
+SAID = NUMBERS[-2:]
+"""Those of them that are conditions of the tap test."""
 
 
 class _Code(msgspec.Struct, gc=False):
@@ -86,7 +89,7 @@ class TapTable(NamedTuple):
     remarks: Sequence[str]
     """Codes of what is in doubt of each tap test, with blanks between."""
     numbers: NDArray[np.float64]
-    """Numbers of each tap test as in `NUMBERS`, NaN where not known, shape (n, 11)."""
+    """Numbers of each tap test as in `NUMBERS`, NaN where not known, shape (n, 12)."""
 
 
 _decode = msgspec.msgpack.Decoder(list[_TableRow]).decode
@@ -126,8 +129,8 @@ def _codes(remarks: Sequence[_Code]) -> str:
 def _numbers(rows: Sequence[_TableRow]) -> NDArray[np.float64]:
     estimates = np.fromiter(chain.from_iterable(chain.from_iterable(map(_estimates, rows))), np.float64)
     modelled = np.fromiter(chain.from_iterable(map(_modelled, rows)), np.float64)
-    temperatures = [row.conditions.get("temperature_c", math.nan) if row.conditions else math.nan for row in rows]
-    return np.column_stack([estimates.reshape(-1, 8), modelled.reshape(-1, 2), np.array(temperatures)])
+    said = [[row.conditions.get(name, math.nan) if row.conditions else math.nan for row in rows] for name in SAID]
+    return np.column_stack([estimates.reshape(-1, 8), modelled.reshape(-1, 2), np.array(said).T])
 
 
 def _read_rows(path: Path, summary: Summary) -> list[_TableRow] | None:

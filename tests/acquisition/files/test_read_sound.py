@@ -49,7 +49,8 @@ def test_several_accelerations_are_all_heard_and_one_is_where_it_is_named(tmp_pa
     path = axes_table(tmp_path / "cut.csv")
     sound = read_sound(path)
     assert np.allclose(sound.acceleration, [WAVE, 2 * WAVE, -9.80665 * WAVE], atol=1e-4)
-    assert (sound.seconds, sound.clipped.shape) == (pytest.approx(WAVE.size / 1650, rel=1e-6), WAVE.shape)
+    assert sound.seconds == pytest.approx(WAVE.size / 1650, rel=1e-6)
+    assert sound.clipped.shape == WAVE.shape
     assert sound.part(0.1, 0.2).acceleration.shape == (3, 165)
     assert np.allclose(read_sound(path, Description(response=2)).acceleration, 2 * WAVE, atol=1e-5)
 

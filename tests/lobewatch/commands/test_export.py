@@ -34,7 +34,7 @@ def mills(shop: Shop, tmp_path: Path) -> Path:
     """Two machines alike, tapped in x and y, then in x with the temperature; one test of one of them is excluded."""
     shop.put("")
     shop.tap_both()
-    shop.tap(30, 1700.0, conditions=Conditions(temperature_c=24.5))
+    shop.tap(30, 1700.0, conditions=Conditions(temperature_c=24.5, hours=5120.0))
     for name in ("a, b", "c"):
         shutil.copytree(shop.path, tmp_path / "mills" / name)
     taps = Logbook.open(tmp_path / "mills" / "c").taps
@@ -54,6 +54,7 @@ def test_a_line_a_tap_test_that_counts_with_all_its_numbers(mills: Path) -> None
     ]
     assert [row["time"] for row in rows[:3]] == ["2026-01-15T09:00:00Z", "2026-01-15T11:24:00Z", "2026-02-14T09:00:00Z"]
     assert [row["temperature_c"] for row in rows[:3]] == ["", "", "24.5"]
+    assert [row["hours"] for row in rows[:3]] == ["", "", "5120.0"]
     history = Logbook.open(mills / "a, b").history
     for told, row in zip(rows[:3], history.rows, strict=True):
         assert float(told["frequency_hz"]) == pytest.approx(row.frequency.value, rel=1e-6)

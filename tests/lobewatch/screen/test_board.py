@@ -38,6 +38,11 @@ def rename(folder: Path, name: str) -> None:
     toml.write_text("\n".join(lines), "utf-8")
 
 
+def take_away(folder: Path) -> None:
+    """At once, while the server may be at work in it."""
+    shutil.rmtree(folder.rename(folder.parent.with_name(f"gone-{folder.name}")), ignore_errors=True)
+
+
 class Page:
     """A page that shows the list, as dashboard.js does it."""
 
@@ -87,7 +92,7 @@ def test_a_machine_that_goes_or_comes_is_told_to_the_page_and_to_prometheus(mill
     with DashboardServer(mills) as server:
         page = Page(server)
         page.refresh()
-        shutil.rmtree(mills / "m03")
+        take_away(mills / "m03")
         make(mills / "new")
         answer = page.refresh()
         assert answer["gone"] == ["m03"]
@@ -98,7 +103,7 @@ def test_a_machine_that_goes_or_comes_is_told_to_the_page_and_to_prometheus(mill
         make(mills / "m03")
         answer = page.refresh()
         assert ([row["key"] for _, row in answer["changed"]], answer["gone"]) == (["m03"], [])
-        shutil.rmtree(mills / "new")
+        take_away(mills / "new")
         metrics = ask(server, "GET", "/metrics")[1]
         assert 'folder="m03"' in metrics
         assert 'folder="new"' not in metrics
@@ -139,7 +144,8 @@ def test_after_any_changes_a_page_shows_what_a_new_page_shows(
         for step in steps:
             for name, what in step:
                 if what == "-":
-                    shutil.rmtree(mills / name, ignore_errors=True)
+                    if (mills / name).exists():
+                        take_away(mills / name)
                 elif not (mills / name).exists():
                     make(mills / name)
                 elif what == "!":

@@ -42,6 +42,8 @@ LIGHTS = {
     "tap-unreadable": Light.WARN,
     "tap-unlisted": Light.WARN,
     "file-damaged": Light.WARN,
+    "cut-damaged": Light.WARN,
+    "cut-unlisted": Light.WARN,
     "frequency-warn": Light.WARN,
     "decay-doubtful": Light.WARN,
     "frequency-jump": Light.WARN,

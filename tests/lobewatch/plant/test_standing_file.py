@@ -15,8 +15,10 @@ import pytest
 from typer.testing import CliRunner
 
 from lobewatch.cli import app
+from lobewatch.decay.light import LIGHTS
 from lobewatch.logbook import Logbook
 from lobewatch.machine import MachineFolder
+from lobewatch.machine.archive.verify import DAMAGE
 from lobewatch.plant.plant import Plant
 from lobewatch.plant.standing_file import LASTING, read_standing
 from lobewatch.plant.summarise import summarise
@@ -183,3 +185,21 @@ def test_every_byte_is_looked_at_again_every_six_hours(tapped: Shop) -> None:
 
     Plant({"m": tapped.path}).verify_until(Third())
     assert waits == [6 * 3600.0] * 3
+
+
+def test_a_recording_of_a_cut_that_is_in_no_journal_costs_its_machine_its_light_and_nobody_the_list(
+    tapped: Shop,
+) -> None:
+    (tapped.path / "cuts").mkdir()
+    (tapped.path / "cuts" / "c9.h5").write_bytes(b"of nobody")
+    plant = Plant({"m": tapped.path})
+    plant.standings(now(tapped))
+
+    class Once(threading.Event):
+        def wait(self, timeout: float | None = None) -> bool:  # noqa: ARG002
+            return True
+
+    plant.verify_until(Once())
+    ((_, _, _, dated),) = plant.standings(now(tapped))
+    assert "cut-unlisted" in [remark.code for remark in dated.remarks]
+    assert {*DAMAGE} <= LIGHTS.keys()

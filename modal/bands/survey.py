@@ -13,6 +13,8 @@ MOST_LINES = 200
 """Most lines of one chart between the bands, few enough for its order."""
 NEAR = 0.005
 """Relative distance up to which a pole beside a mode is that mode; chosen."""
+LEAST_SHARE = 0.05
+"""Own peak of a pole, over the mobility measured there, from which it is worth a look; chosen."""
 FEWEST_LINES = 16
 """Between bands that are nearer to each other than that there is nothing to look for."""
 
@@ -26,17 +28,25 @@ def survey(state: Extraction) -> list[StabilisationChart]:
 def candidates(state: Extraction) -> Array:
     """Natural frequencies of the poles (Hz) that stay where they are as the order grows and are no modes, rising.
 
-    A mode of the extraction within their half-power half-width, or half a percent, is the same.
+    Poles count whose own peak is a twentieth of what was measured there; one within the half-power half-width of a
+    mode, or half a percent of it, is that mode.
     """
     modes = np.array([frequency for band in state.bands for frequency in band.fit.frequency])
-    poles = [physical_poles(chart) for chart in survey(state)]
-    other = [
-        frequency
-        for chain in poles
-        for frequency, zeta in zip(chain.frequency, chain.damping_ratio, strict=True)
-        if np.min(np.abs(modes - frequency), initial=np.inf) > max(zeta, NEAR) * frequency
-    ]
-    return np.sort(np.array(other))
+    return np.sort([frequency for frequency, zeta in _seen(state) if _is_apart(frequency, zeta, modes)])
+
+
+def _seen(state: Extraction) -> Iterator[tuple[float, float]]:
+    """Frequency and damping ratio of each stable pole whose own peak is worth a share of what was measured there."""
+    measured = np.max([np.abs(frf.mobility) for frf in state.frfs], axis=0)
+    for poles in map(physical_poles, survey(state)):
+        for frequency, zeta, largest in zip(poles.frequency, poles.damping_ratio, poles.largest, strict=True):
+            there = measured[np.argmin(np.abs(state.frf.frequency - frequency))]
+            if np.pi * frequency * largest / zeta > LEAST_SHARE * there:
+                yield float(frequency), float(zeta)
+
+
+def _is_apart(frequency: float, zeta: float, modes: Array) -> bool:
+    return bool(np.min(np.abs(modes - frequency), initial=np.inf) > max(zeta, NEAR) * frequency)
 
 
 def _gaps(state: Extraction) -> Iterator[slice]:

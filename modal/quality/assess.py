@@ -99,7 +99,7 @@ def _on_its_place(state: Extraction, band: FittedBand, i: int, mode: Mode) -> It
         yield Remark("bent-by-neighbour", at, text)
     if any(abs(suspect - mode.frequency) < half_width for suspect in band.suspects):
         where = " and ".join(f"{suspect:.0f}" for suspect in band.suspects)
-        text = f"may be several modes, near {where} Hz: too noisy to tell"
+        text = f"may be several modes, near {where} Hz, too noisy to tell: its K is about that of all of them together"
         yield Remark("several-modes", at, text, "average more hits")
 
 

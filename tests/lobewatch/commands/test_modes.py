@@ -165,3 +165,7 @@ def test_figure_names_stable_poles_that_are_no_modes() -> None:
     chart = modes_figure(state, modes_of(state), "x").axes[1]
     assert "2800" in [text.get_text() for text in chart.texts]
     assert candidates(state) == pytest.approx([2800.0], rel=1e-3)
+
+
+def test_poles_that_are_hardly_a_part_of_what_was_measured_are_not_named() -> None:
+    assert candidates(extract([noisy()])).size == 0

@@ -28,8 +28,10 @@ def settle_sound(
     and nobody says which is meant.
     """
     signals = named_columns(contents.signals, description.columns, ledger) if description.columns else contents.signals
-    by_ear = description.sensor == MICROPHONE
-    in_units = list(signals) if by_ear and not description.full_scale else in_their_unit(signals, description, ledger)
+    is_microphone = description.sensor == MICROPHONE
+    in_units = (
+        list(signals) if is_microphone and not description.full_scale else in_their_unit(signals, description, ledger)
+    )
     scaled = in_sensor_units(in_units, description, ledger)
     if scaled is None or not ledger.is_clean:
         return None
@@ -41,9 +43,9 @@ def settle_sound(
         return None
     meant = [chosen(heard, description.response, "responses", ledger)] if description.response is not None else heard
     settled = [signal for signal in meant if signal is not None]
-    factors = [1.0 if by_ear else _factor(signal, description, ledger) for signal in settled]
+    factors = [1.0 if is_microphone else _factor(signal, description, ledger) for signal in settled]
     rate = rate_of(scaled, settled, description, ledger)
-    if by_ear and responses:
+    if is_microphone and responses:
         ledger.faults.append(f"{responses[0].name} moves; leave --sensor microphone out")
     if not settled or not ledger.is_clean:
         return None

@@ -2,7 +2,7 @@
 
 from lobes.aged_mode import aged_mode
 from lobes.average_angle import average_angle
-from lobes.coefficients import Coefficients, cutting_coefficients, tangential_and_radial
+from lobes.coefficients import Coefficients, tangential_and_radial
 from lobes.cut import Cut, Direction
 from lobes.cutting_power import deepest_for_drive, mean_torque
 from lobes.floquet import (
@@ -18,11 +18,19 @@ from lobes.floquet import (
 )
 from lobes.history import SldHistory
 from lobes.history_file import read_history, write_history
+from lobes.known_materials import (
+    cutting_coefficients,
+    find_materials,
+    folded_name,
+    materials_by_name,
+    nearest_name,
+)
 from lobes.lowest_of import lowest_of
 from lobes.milling_system import milling_system
 from lobes.pockets import Pocket, PocketShift, best_pockets, pocket_shifts, pockets
 from lobes.program import Program
 from lobes.radial_lobes import RadialLobes, radial_lobes
+from lobes.specific_force import SpecificForce
 from lobes.stability_lobes import Lobe, MethodName, Minimum, StabilityLobes
 from lobes.zero_order import zero_order
 
@@ -40,17 +48,22 @@ __all__ = [
     "ProgramLimit",
     "RadialLobes",
     "SldHistory",
+    "SpecificForce",
     "StabilityLobes",
     "aged_mode",
     "average_angle",
     "best_pockets",
     "cutting_coefficients",
     "deepest_for_drive",
+    "find_materials",
+    "folded_name",
     "growth",
     "joined_rows",
     "lowest_of",
+    "materials_by_name",
     "mean_torque",
     "milling_system",
+    "nearest_name",
     "piece_numbers",
     "pocket_shifts",
     "pockets",

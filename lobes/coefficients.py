@@ -1,13 +1,12 @@
-"""Published cutting coefficients, with their sources (cutting_coefficients.csv beside this module)."""
+"""Cutting coefficients of one material: what the force of a cut follows from."""
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
 
 import numpy as np
+
+from lobes.specific_force import SpecificForce
 
 
 @dataclass(frozen=True)
@@ -30,6 +29,16 @@ class Coefficients:
     """Publication that they stand in."""
     alloy: str = ""
     """The material without temper, tool and coolant, e.g. "Al 7075"; empty where it is not known."""
+    iso_group: str = ""
+    """Group of ISO 513: P, M, K, N, S or H; empty where it is not known."""
+    equivalents: tuple[str, ...] = ()
+    """Other names of the material: EN number, AISI, UNS ..."""
+    tangential_range: tuple[float, float] | None = None
+    """Lowest and highest published Ktc (Pa); None where no spread is published."""
+    ratio_range: tuple[float, float] | None = None
+    """Lowest and highest published Krc/Ktc (-); None where no spread is published."""
+    specific_forces: tuple[SpecificForce, ...] = ()
+    """Published specific cutting forces that the coefficients follow from; empty where they were measured as such."""
 
     def __post_init__(self) -> None:
         """Refuse what is no coefficient."""
@@ -38,24 +47,10 @@ class Coefficients:
         if not (np.isfinite(self.radial) and self.radial >= 0):
             raise ValueError(f"radial={self.radial} Pa is not a finite number >= 0; 1 MPa (N/mm^2) is 1e6 Pa")
 
-
-@cache
-def cutting_coefficients() -> tuple[Coefficients, ...]:
-    """All published coefficients that come with this package; their spread for one alloy is large."""
-    text = (files("lobes") / "cutting_coefficients.csv").read_text(encoding="utf-8")
-    return tuple(
-        Coefficients(
-            material=row["material"],
-            tangential=float(row["Ktc_MPa"]) * 1e6,
-            radial=float(row["Krc_MPa"]) * 1e6,
-            tangential_edge=float(row["Kte_N_per_mm"] or "nan") * 1e3,
-            radial_edge=float(row["Kre_N_per_mm"] or "nan") * 1e3,
-            note=row["note"],
-            source=row["source"],
-            alloy=row["alloy"],
-        )
-        for row in csv.DictReader(text.splitlines())
-    )
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names of the material."""
+        return (self.material, *self.equivalents)
 
 
 def tangential_and_radial(specific_force: float, force_angle: float) -> tuple[float, float]:

@@ -22,6 +22,7 @@ COMMANDS = {
     "tapped.",
     "calibrate": "Stiffness of bearings and joints for measured natural frequencies; nothing is stored.",
     "lobes": "Stability lobes of the newest tap tests, drawn beside those of the first, and the pockets that are safe.",
+    "materials": "Materials that machine.toml may name, with their cutting coefficients, ranges and sources.",
     "check": "Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.",
     "report": "One HTML file with everything in it: what has changed, which programs still hold, lobes then and now.",
     "trend": "How the frequency has fallen, whether that is more than scatter, and until when each program holds.",

@@ -25,7 +25,6 @@ def lobes(
     figure: Annotated[Path | None, typer.Option(help="Draw the diagram to this file (.svg, .png, .pdf).")] = None,
     radial: Annotated[Path | None, typer.Option(help="Draw the limit over speed and radial depth.")] = None,
     waterfall: Annotated[Path | None, typer.Option(help="Draw the limit over speed and time.")] = None,
-    materials: Annotated[bool, typer.Option("--materials", help="List the known cutting coefficients.")] = False,
     as_json: Json = False,
 ) -> None:
     """Stability lobes of the newest tap tests, drawn beside those of the first, and the pockets that are safe.
@@ -40,13 +39,10 @@ def lobes(
     """
     from lobewatch.logbook import Logbook, compare_lobes
     from lobewatch.show.figures.lobe_pictures import save_pictures
-    from lobewatch.show.programs.describe_lobes import comparison_json, comparison_texts, material_lines, materials_json
+    from lobewatch.show.programs.describe_lobes import comparison_json, comparison_texts
     from lobewatch.tool import Dynamics, Method
 
     logbook = Logbook.open(machine)
-    if materials:
-        emit({"materials": materials_json(logbook.machine)}, as_json, *material_lines(logbook.machine))
-        return
     if notes.is_terminal:
         notes.print("looking for speeds and depths that are safe; this takes some seconds")
     comparison = compare_lobes(logbook, tool, cut, Dynamics(source), Method(method))

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lobes import MillingRows, cutting_coefficients
+from lobes import MillingRows
 from lobewatch.machine import CutTable, DoubtTable, Machine
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.series import Scatter
@@ -25,8 +25,6 @@ LEAST = 0.02
 """Least share of its middle value that anything is drawn with ..."""
 MOST_TURNED = np.radians(89)
 """... and largest phase (rad)."""
-ALIKE = 2
-"""Number of tests of an alloy from which on their range counts."""
 CUTS = "cuts"
 """Cause of the doubt of modes that test cuts have taught: all that they have left open."""
 
@@ -202,12 +200,13 @@ def _mixing(mode: Mode) -> Floats:
 
 
 def _coefficients(table: CutTable, machine: Machine) -> tuple[Span, Span]:
-    """Kt and Kr/Kt over the middle: the published range of an alloy with several tests, else that of [doubt]."""
+    """Kt and Kr/Kt over the middle: the published range where there is one, else that of [doubt]."""
     middle = machine.coefficients(table)
-    alike = [test for test in cutting_coefficients() if middle.alloy and test.alloy == middle.alloy]
-    if len(alike) < ALIKE or middle.radial == 0:
+    if middle.tangential_range is None or middle.ratio_range is None:
         share = machine.doubt.coefficients_percent / 100
         return Span(1 - share, 1 + share), Span(1 - share, 1 + share)
-    tangential = [test.tangential / middle.tangential for test in alike]
-    ratio = [test.radial / test.tangential * middle.tangential / middle.radial for test in alike]
-    return Span(min(tangential), max(tangential)), Span(min(ratio), max(ratio))
+    ratio = middle.radial / middle.tangential
+    return (
+        Span(*(limit / middle.tangential for limit in middle.tangential_range)),
+        Span(*(limit / ratio for limit in middle.ratio_range)),
+    )

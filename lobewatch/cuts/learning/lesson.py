@@ -88,8 +88,8 @@ def _tool_evidence(
     cuts: Sequence[HeardCut], table: ProgramTable, assembly: Assembly, machine: Machine
 ) -> tuple[CutEvidence, ...]:
     """The cuts of the same tool that count, oldest first."""
-    cut = machine.build_cut(table)
-    materials = [(table.material or "", cut.tangential, cut.radial)]
+    known = machine.coefficients(table)
+    materials = [(known.material, known.tangential, known.radial)]
     evidence = []
     for heard in cuts:
         if heard.tool != table.tool or not heard.counts:

@@ -20,6 +20,8 @@ class CutSetting:
 
     table: CutTable
     """Table of machine.toml."""
+    material: str
+    """Name of its material, the one of several that is listed first; empty where machine.toml gives the numbers."""
     program: str | None
     """Name of the program; None for the reference cut."""
     tool: str
@@ -46,7 +48,7 @@ class CutSetting:
             "program": self.program,
             "tool": self.tool,
             "cut": self.cut,
-            "coefficients": self.table.material or "",
+            "coefficients": self.material,
             "feed": self.feed,
             "feed_per_tooth": None if feed is None else feed / 1e3,
             "commanded_rpm": self.speed_rpm,
@@ -73,7 +75,8 @@ def cut_setting(machine: Machine, program: str, speed_rpm: float | None, depth_m
         raise ValueError(f"--depth {depth:g} mm is deeper than flute_length_mm={table.flute_length_mm:g}")
     tool, feed = (preset.tool, preset.feed) if preset else (machine.tap.tool, "both")
     name = preset.name if preset else None
-    return CutSetting(table, name, tool, machine.build_cut(table), feed, float(speed), depth / 1e3)
+    material = machine.coefficients(table).material
+    return CutSetting(table, material, name, tool, machine.build_cut(table), feed, float(speed), depth / 1e3)
 
 
 def choose_cut(machine: Machine, program: str, cut: str, speed_rpm: float | None, depth_mm: float | None) -> CutSetting:

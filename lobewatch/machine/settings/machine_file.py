@@ -16,7 +16,7 @@ import msgspec
 
 from acquisition import DataError
 from dsm import Spindle
-from lobes import Coefficients, Cut, cutting_coefficients
+from lobes import Coefficients, Cut, folded_name, materials_by_name, nearest_name
 from lobewatch.machine.settings.cut_tables import FEED_ANGLES, CutTable, Drive, MaterialTable, ProgramTable
 from lobewatch.machine.settings.daq_tables import ChannelTable, Daq
 from lobewatch.machine.settings.doubt_table import DoubtTable
@@ -69,22 +69,26 @@ class Machine(Table, frozen=True):
                 )
         names = [material.name for material in self.material]
         for i, name in enumerate(names, 1):
-            if name in names[: i - 1]:
+            if folded_name(name) in map(folded_name, names[: i - 1]):
                 raise ValueError(f"material {i}: name={name!r} stands twice; give each its own")
         for table in (*([self.reference_cut] if self.reference_cut else []), *self.program):
             self.coefficients(table)
 
     def coefficients(self, table: CutTable) -> Coefficients:
-        """Cutting coefficients of a cut: its own, or those of its material; ValueError for one that is not known."""
+        """Cutting coefficients of a cut: its own, or those of its material; ValueError for one that is not known.
+
+        A material goes by any of its names; case and blanks do not count, and a [[material]] comes first.
+        """
         if table.material is None:
             tangential, radial = (1e6 * (k or 0) for k in (table.tangential_n_per_mm2, table.radial_n_per_mm2))
             return Coefficients("", tangential, radial, source="machine.toml")
-        by_name = {published.material: published for published in cutting_coefficients()}
-        by_name |= {material.name: material.build() for material in self.material}
-        if table.material not in by_name:
-            near = difflib.get_close_matches(table.material, by_name, n=1, cutoff=0.0)[0]
-            raise ValueError(f"material={table.material!r} is not known; is {near!r} meant? Or add a [[material]]")
-        return by_name[table.material]
+        own = {folded_name(material.name): material.build() for material in self.material}
+        by_name = {**materials_by_name(), **own}
+        if (name := folded_name(table.material)) not in by_name:
+            near = nearest_name(name, by_name)
+            known = f"is {near!r} meant? lobewatch materials lists those that are known; or add a [[material]]"
+            raise ValueError(f"material={table.material!r} is not known; {known}")
+        return by_name[name]
 
     def build_cut(self, table: CutTable) -> Cut:
         """A cut in SI units."""

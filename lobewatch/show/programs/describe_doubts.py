@@ -134,15 +134,14 @@ def _source(assembly: Assembly, side: str, given: DoubtTable) -> str:
 
 
 def _coefficients(verdict: Verdict, doubt: Doubt, machine: Machine) -> Iterator[str]:
-    standard = DoubtTable().coefficients_percent
-    alloy = machine.coefficients(verdict.program).alloy
-    share = machine.doubt.coefficients_percent / 100
-    by_default = doubt.tangential == Span(1 - share, 1 + share)
-    source = "" if machine.doubt.coefficients_percent == standard else f" ({GIVEN})"
+    known = machine.coefficients(verdict.program)
+    is_given = machine.doubt.coefficients_percent != DoubtTable().coefficients_percent
+    source = f" ({GIVEN})" if is_given else ""
+    if known.tangential_range is not None:
+        source = f" (published for {known.alloy or known.material})"
     if doubt.tangential == doubt.ratio:
         yield f"Kt and Kr/Kt {_span(doubt.tangential)}{source}"
     else:
-        source = source if by_default else f" (published for {alloy})"
         yield f"Kt {_span(doubt.tangential)}, Kr/Kt {_span(doubt.ratio)}{source}"
 
 

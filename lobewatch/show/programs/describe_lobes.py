@@ -1,4 +1,4 @@
-"""Pockets, their shifts and cutting coefficients as JSON objects and as lines for people."""
+"""Pockets and their shifts as JSON objects and as lines for people."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 from rich.table import Table
 
 from acquisition import Remark, joined
-from lobes import Pocket, PocketShift, StabilityLobes, cutting_coefficients
+from lobes import Pocket, PocketShift, StabilityLobes
 from lobewatch.logbook import LobeComparison
 from lobewatch.logbook.lobe_comparison import NO_POCKET
-from lobewatch.machine import REFERENCE_CUT, Machine
+from lobewatch.machine import REFERENCE_CUT
 from lobewatch.show.programs.describe_advice import setting_json
 from lobewatch.show.programs.describe_doubts import at_speed_line
 from lobewatch.show.programs.describe_verdicts import programs_json, verdict_table
@@ -113,28 +113,6 @@ def shift_lines(shifts: Sequence[PocketShift]) -> Iterator[str]:
             f"({100 * shift.speed_change:+.1f} %), its tip from {shift.then.depth * 1e3:.2f} to "
             f"{shift.now.depth * 1e3:.2f} mm ({100 * shift.depth_change:+.1f} %)"
         )
-
-
-def materials_json(machine: Machine) -> list[dict[str, Any]]:
-    """Cutting coefficients of one's own, then the published ones."""
-    return [
-        {
-            "material": coefficients.material,
-            "tangential_n_per_mm2": coefficients.tangential / 1e6,
-            "radial_n_per_mm2": coefficients.radial / 1e6,
-            "note": coefficients.note,
-            "source": coefficients.source,
-        }
-        for coefficients in (*(material.build() for material in machine.material), *cutting_coefficients())
-    ]
-
-
-def material_lines(machine: Machine) -> Iterator[str]:
-    """Cutting coefficients, a line each."""
-    for material in materials_json(machine):
-        kt, kr = material["tangential_n_per_mm2"], material["radial_n_per_mm2"]
-        about = "; ".join(filter(None, (material["note"], material["source"])))
-        yield f"{material['material']:<42} Kt {kt:5.0f}  Kr {kr:4.0f} N/mm²  {about}"
 
 
 def lobes_json(name: str, lobes: StabilityLobes) -> dict[str, Any]:

@@ -281,6 +281,17 @@ def test_other_doubts_are_told_by_program(shop: Shop, check: Check, no_search: N
     assert "tool 'long end mill': predicted by the model" in said
 
 
+def test_the_doubt_of_a_listed_material_is_its_published_range(shop: Shop, check: Check, no_search: None) -> None:
+    shop.run(("A", 12900, 0.2))
+    shop.edit("tangential_n_per_mm2 = 1400\nradial_n_per_mm2 = 500\nspeed", 'material = "AISI 4140"\nspeed')
+    shop.edit("[speed]", "[doubt]\ncoefficients_percent = 7\n\n[speed]")
+    shop.tap_both()
+    known = check("--json").programs["A"]["doubt"]["coefficients"]
+    assert known["tangential"] == pytest.approx([1929 / 2726 - 1, 4031 / 2726 - 1], abs=1e-3)
+    assert known["radial_over_tangential"] == pytest.approx([0.13 / 0.27 - 1, 1.0])
+    assert "Kt -29..+48 %, Kr/Kt -52..+100 % (published for 42CrMo4)" in check().out
+
+
 def test_a_series_of_eight_tells_its_own_scatter(shop: Shop, check: Check, no_search: None) -> None:
     shop.run(("A", 12900, 1))
     for day in range(8):

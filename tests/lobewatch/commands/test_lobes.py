@@ -1,8 +1,9 @@
-"""`lobewatch lobes`: methods, safe pockets, the band of the doubt, pictures, materials."""
+"""`lobewatch lobes`: methods, safe pockets, the band of the doubt, pictures, own materials."""
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from itertools import combinations, pairwise
@@ -313,17 +314,6 @@ def test_the_verdicts_are_those_of_check_whatever_the_chart(run: Run, folder: Ma
         assert {key: checked[one["name"]][key] for key in one} == one
 
 
-def test_materials_are_listed_with_their_sources(run: Run, folder: MachineFolder) -> None:
-    edit(
-        folder,
-        "[speed]",
-        '[[material]]\nname = "ours"\nspecific_force_n_per_mm2 = 750\nforce_angle_deg = 68\n\n[speed]',
-    )
-    said = run("lobes", "m", "--materials").out
-    assert "ours                                       Kt   695  Kr  281 N/mm²  machine.toml" in said
-    assert "Al 6061-T6 (carbide; dry)                  Kt   244  Kr  114 N/mm²  low outlier: not a default" in said
-
-
 def test_an_frf_beside_the_tip_is_refused(run: Run, folder: MachineFolder) -> None:
     folder = edit(folder, "position_mm = 0 ", "position_mm = 60 ")
     tap(folder, 1713.0)
@@ -395,6 +385,23 @@ def test_own_and_published_materials() -> None:
     assert steel.build_cut(steel.reference_cut).tangential == pytest.approx(2173.3e6)
 
 
+@pytest.mark.parametrize("name", ["42CrMo4", "42crmo4", "1.7225", "AISI 4140", "aisi4140", " UNS G41400"])
+def test_a_material_goes_by_any_of_its_names(name: str) -> None:
+    machine = parse_machine(EXAMPLE.replace('material = "ours"', f'material = "{name}"'))
+    assert machine.reference_cut is not None
+    known = machine.coefficients(machine.reference_cut)
+    assert (known.material, known.iso_group) == ("42CrMo4", "P")
+    assert machine.build_cut(machine.reference_cut).tangential == pytest.approx(2726e6, rel=1e-3)
+
+
+def test_a_material_of_ones_own_comes_before_a_published_one() -> None:
+    for name in ("C45", "c 45"):
+        text = EXAMPLE.replace('name = "ours"', 'name = "C45"').replace('material = "ours"', f'material = "{name}"')
+        machine = parse_machine(text)
+        assert machine.reference_cut is not None
+        assert machine.coefficients(machine.reference_cut).tangential == 800e6
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -402,6 +409,8 @@ def test_own_and_published_materials() -> None:
         ('material = "ours"', "", "give either material or both"),
         ('material = "ours"', 'material = "ours"\nradial_n_per_mm2 = 1', "give either material or both"),
         ('material = "ours"', "tangential_n_per_mm2 = 1", "give either material or both"),
+        ('material = "ours"', 'material = "42CrMo5"', "'42CrMo4' meant? lobewatch materials lists those"),
+        ('material = "ours"', 'material = "4140"', "is 'AISI 4140' meant"),
         ("tangential_n_per_mm2 = 800\n", "", "give either tangential_n_per_mm2 and radial_n_per_mm2"),
         ("radial_n_per_mm2 = 200", "radial_n_per_mm2 = 200\nforce_angle_deg = 60", "give either tangential"),
         ("helix_deg = 30", "helix_deg = 90", "helix_deg"),
@@ -410,7 +419,7 @@ def test_own_and_published_materials() -> None:
     ],
 )
 def test_bad_materials_are_told_with_their_place(old: str, new: str, message: str) -> None:
-    with pytest.raises(ValueError, match=message.replace("(", r"\(")):
+    with pytest.raises(ValueError, match=re.escape(message)):
         parse_machine(EXAMPLE.replace(old, new))
 
 

@@ -31,3 +31,16 @@ def test_a_cut_of_another_material_or_geometry_is_not_the_best_of_a_program(shop
     assert [cut.id for cut in lesson.own_cuts] == ["c1"]
     assert best_removal_rate(lesson.own_cuts) == pytest.approx(12900 * 1e-3)
     assert [cut.id for cut in lesson.learnt.cuts] == ["c1", "c2", "c3"]
+
+
+def test_a_cut_of_a_material_by_another_of_its_names_is_one_of_the_program(shop: Shop) -> None:
+    own_numbers = "tangential_n_per_mm2 = 1400\nradial_n_per_mm2 = 500\nspeed"
+    shop.edit(own_numbers, 'material = "1.7225"\nspeed')
+    shop.tap_both()
+    setting = cut_setting(shop.folder.machine, "A", 12900, 0.5)
+    heard = replace(observe_cut(setting, "stable", at=shop.start + timedelta(days=1)), id="c1")
+    shop.edit('material = "1.7225"', 'material = "AISI 4140"')
+    machine = shop.folder.machine
+    table = next(program for program in machine.program if program.name == "A")
+    lesson = learn_program(table, shop.logbook.assembly(table.tool), machine, [heard])
+    assert (heard.coefficients, [cut.id for cut in lesson.own_cuts]) == ("42CrMo4", ["c1"])

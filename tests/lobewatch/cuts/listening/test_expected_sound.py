@@ -23,7 +23,7 @@ ANGLES = {"x": 0.0, "y": np.pi / 2}
 
 
 def setting(feed: str, depth: float) -> CutSetting:
-    return CutSetting(TABLE, None, "A", SLOT, feed, 11000.0, depth)
+    return CutSetting(TABLE, "", None, "A", SLOT, feed, 11000.0, depth)
 
 
 def limit(feed: str, speed: float) -> tuple[float, float]:

@@ -1,0 +1,33 @@
+"""lobewatch materials."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from lobewatch.show.terminal.output import Json, emit
+
+
+def materials(
+    word: Annotated[
+        str, typer.Argument(help="Part of a name (C45, 1.7225, AISI 4140), or a group: P, M, K, N, S, H.")
+    ] = "",
+    as_json: Json = False,
+) -> None:
+    """Materials that machine.toml may name, with their cutting coefficients, ranges and sources.
+
+    Every name that is listed is known there: material = "42CrMo4", "1.7225" or "AISI 4140", case and blanks as you
+    like. The range is what the doubt of a program is made of.
+
+    Examples:
+
+      lobewatch materials
+      lobewatch materials 4140
+      lobewatch materials S --json
+    """
+    from lobes import find_materials
+    from lobewatch.show.programs.describe_materials import material_json, material_texts
+
+    known = find_materials(word)
+    emit({"materials": [material_json(one) for one in known]}, as_json, *material_texts(known))

@@ -1,0 +1,68 @@
+"""`lobewatch materials`: what machine.toml may name."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from lobewatch.cli import main
+
+Materials = Callable[..., tuple[Any, str, str]]
+
+
+@pytest.fixture
+def materials(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Materials:
+    """Exit code, output and errors of `lobewatch materials`."""
+
+    def command(*words: str) -> tuple[Any, str, str]:
+        monkeypatch.setattr(sys, "argv", ["lobewatch", "materials", *words])
+        with pytest.raises(SystemExit) as end:
+            main()
+        return end.value.code, *capsys.readouterr()
+
+    return command
+
+
+def test_a_material_is_shown_with_range_other_names_and_sources(materials: Materials) -> None:
+    code, out, _ = materials("1.0503")
+    assert code == 0
+    assert out.splitlines()[1].split()[:7] == ["C45", "P", "2237", "1667..2904", "0.27", "0.13..0.54", "56"]
+    assert "AISI" in out
+    assert "kc1.1 2220, mc 0.14: Kienzle & Victor 1957" in out
+    assert "h = 0.1 mm" in out
+
+
+def test_all_are_listed_without_their_sources(materials: Materials) -> None:
+    code, out, _ = materials()
+    assert code == 0
+    assert "Al 7075 (HSS; dry)" in out
+    assert "Kienzle" not in out
+    assert "sources: lobewatch materials NAME, or --json" in out
+
+
+def test_rows_of_json_carry_units_ranges_and_a_source(materials: Materials) -> None:
+    code, out, _ = materials("--json")
+    rows = {row["name"]: row for row in json.loads(out)["materials"]}
+    assert code == 0
+    assert len(rows) == 66
+    steel = rows["C45"]
+    assert (steel["iso_group"], "AISI 1045" in steel["equivalents"]) == ("P", True)
+    assert steel["kt_n_per_mm2"] == pytest.approx(2237, abs=1)
+    assert steel["kt_range_n_per_mm2"] == pytest.approx([1667, 2904], abs=1)
+    assert steel["kr_n_per_mm2"] == pytest.approx(604, abs=1)
+    assert steel["kr_over_kt_range"] == [0.13, 0.54]
+    assert steel["kte_n_per_mm"] == pytest.approx(56.3, abs=0.1)
+    assert steel["chip_thickness_mm"] == pytest.approx(0.1)
+    assert steel["specific_forces"][2] | {"source": ""} == {"kc1_1_n_per_mm2": 2220, "mc": 0.14, "source": ""}
+    assert rows["Steel (textbook)"]["kt_range_n_per_mm2"] is None
+    assert all(row["source"] for row in rows.values())
+
+
+def test_a_name_that_nothing_has_is_told_with_the_nearest(materials: Materials) -> None:
+    code, out, err = materials("42CrMo5", "--json")
+    assert (code, out) == (2, "")
+    assert "no material has '42CrMo5' in a name; is '42CrMo4' meant?" in err

@@ -111,7 +111,7 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
         return [CutParts("no-cut")]
     air = _longest_air(_stretches(is_loud | ~sounds), level.size, step)
     power = np.log10(np.sum(np.var(pieces, axis=2), axis=0) + np.finfo(np.float64).tiny)
-    cuts = [_parts(axes, power, stretch, air, sample_rate, step) for stretch in stretches]
+    cuts = [_parts(axes, power, stretch, air, sample_rate, size) for stretch in stretches]
     longest = max(cuts, key=lambda parts: parts.end - parts.begin)
     least = BURST * (longest.end - longest.begin)
     kept = [parts for parts in cuts if parts.reason != "too-short" and parts.end - parts.begin > least]
@@ -132,14 +132,17 @@ def _threshold(level: Floats) -> float:
 
 
 def _parts(
-    axes: Floats, power: Floats, stretch: tuple[int, int], air: slice, sample_rate: float, step: int
+    axes: Floats, power: Floats, stretch: tuple[int, int], air: slice, sample_rate: float, size: int
 ) -> CutParts:
-    """Entry, steady part and exit of a stretch of pieces, and what is wrong with it."""
+    """Entry, steady part and exit of a stretch of pieces, and what is wrong with it; size: of a piece (samples)."""
+    step, longest = size // 2, round(MOST_CUT * sample_rate)
     begin, end = (stretch[0] + 1) * step, stretch[1] * step
+    first, last = begin + step + round(SETTLED * sample_rate), end - size
     entry, leaving = _ends(power[slice(*stretch)], JOINED * sample_rate / step, MOST_ENDS * sample_rate / step)
-    first = begin + step + max(round(SETTLED * sample_rate), entry * step)
-    last = end - 2 * step - leaving * step
-    settled = slice(max(first, last - round(MOST_CUT * sample_rate)), max(first, last))
+    steady = max(first, begin + step + entry * step), last - leaving * step
+    if steady[1] - steady[0] >= longest:
+        first, last = steady
+    settled = slice(max(first, last - longest), max(first, last))
     times = (place / sample_rate for place in (begin, end, first, last))
     parts = CutParts("", air, settled, *times)
     return parts._replace(reason=_fault(axes, parts, sample_rate, step))

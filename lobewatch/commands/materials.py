@@ -17,8 +17,7 @@ def materials(
 ) -> None:
     """Materials that machine.toml may name, with their cutting coefficients, ranges and sources.
 
-    Every name that is listed is known there: material = "42CrMo4", "1.7225" or "AISI 4140", case and blanks as you
-    like. The range is what the doubt of a program is made of.
+    Each goes by any of its names: material = "42CrMo4", "1.7225" or "AISI 4140", case and blanks as you like.
 
     Examples:
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from time import monotonic
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -16,35 +16,53 @@ PATIENCE = 5.0
 
 
 def check(
-    machine: Annotated[
-        Path, typer.Argument(parser=named_folder, help="Machine folder with tap tests and cutting programs.")
-    ],
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
+    program: Annotated[
+        list[str] | None, typer.Option(help="Only this program; may be repeated. All where none is named.")
+    ] = None,
+    speed: Annotated[float | None, typer.Option(help="Of a cut that is no program: spindle speed, rpm.")] = None,
+    depth: Annotated[float | None, typer.Option(help="Its axial depth, mm.")] = None,
+    tool: Annotated[str | None, typer.Option(help="Its tool.")] = None,
+    material: Annotated[str | None, typer.Option(help="A [[material]], or one of lobewatch materials.")] = None,
+    teeth: Annotated[int | None, typer.Option(help="Teeth of the tool.")] = None,
+    diameter: Annotated[float | None, typer.Option(help="Diameter of the tool, mm.")] = None,
+    radial: Annotated[float | None, typer.Option(help="Its radial depth, mm.")] = None,
+    direction: Annotated[Literal["up", "down"] | None, typer.Option(help="Up or down milling.")] = None,
     as_json: Json = False,
 ) -> None:
     """Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.
 
     By semi-discretisation, over all that is not known: stable, doubtful, not stable or unknown. Says for each that is
-    not stable what decides and where to go. f_n left: how far f_n may fall before the program chatters.
+    not stable what decides and where to go. f_n left: how far f_n may fall before the program chatters. A cut that is
+    no program is judged alike; what is not said of it is taken from the programs of its tool where they agree.
 
     Examples:
 
       lobewatch check trial
-      lobewatch check trial --json
+      lobewatch check trial --program A --json
+      lobewatch check trial --speed 8000 --depth 2 --material 42CrMo4
     """
-    from acquisition import DataError
     from lobewatch.logbook import Logbook
+    from lobewatch.logbook.chosen_verdicts import chosen_verdicts
     from lobewatch.show.programs.describe_advice import ProgramAdvice, advise_program, check_json, check_texts
     from lobewatch.show.programs.describe_verdicts import is_safe
 
+    said = {
+        "speed_rpm": speed,
+        "depth_mm": depth,
+        "tool": tool,
+        "material": material,
+        "teeth": teeth,
+        "tool_diameter_mm": diameter,
+        "radial_depth_mm": radial,
+        "direction": direction,
+    }
     logbook = Logbook.open(machine)
-    if not logbook.machine.program:
-        raise DataError(f"{logbook.folder.toml}: no [[program]] to check; add one for each cut that the shop runs")
-    logbook.newest()
+    verdicts = chosen_verdicts(logbook, program or (), said)
     begin, slow, programs = monotonic(), False, list[ProgramAdvice]()
-    for verdict in logbook.verdicts():
+    for verdict in verdicts:
         if not slow and monotonic() - begin > PATIENCE:
-            count = len(logbook.machine.program)
-            notes.print(f"{len(programs)} of {count} programs are checked; the others take a while too")
+            notes.print(f"{len(programs)} of {len(verdicts)} programs are checked; the others take a while too")
             slow = True
         programs.append(advise_program(logbook, verdict))
     remarks = logbook.remarks

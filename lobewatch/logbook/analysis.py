@@ -12,7 +12,7 @@ from lobewatch.history.history import History, without_last_word
 from lobewatch.history.history_cache import HistoryCache
 from lobewatch.history.tap_measurements import TapMeasurements
 from lobewatch.history.usable_taps import NotTappedError, UsableTaps
-from lobewatch.machine import Machine, MachineFolder, TapEntry
+from lobewatch.machine import Machine, MachineFolder, ProgramTable, TapEntry
 from lobewatch.machine.journal.heard_cut import HeardCut
 from lobewatch.measuring.measurement import Measurement
 from lobewatch.tool.assembly import Assembly
@@ -134,6 +134,10 @@ class Analysis:
         verdicts |= {table.name: judge_at_speed(table, tools[table.tool], self.machine, cuts) for table in missing}
         return [verdicts[table.name] for table in tables]
 
+    def verdict_on(self, table: ProgramTable) -> Verdict:
+        """The verdict on a program that machine.toml does not hold, from the newest tap tests of its tool."""
+        return judge_at_speed(table, self.assembly_or_reason(table.tool), self.machine, self.cuts)
+
     def _verdicts_after(self, tap_id: str | None) -> dict[str, Verdict]:
         """Verdicts that are kept, by program."""
         verdicts = self._verdicts[tap_id] = self._verdicts.pop(tap_id, {})
@@ -160,7 +164,12 @@ class Analysis:
         return rulings
 
     def ruling_then(self, now: Verdict) -> Ruling | None:
-        """Word and limit of a program at the first tap tests of its tool in the same directions; None without them."""
+        """Word and limit of a program at the first tap tests of its tool in the same directions; None without them.
+
+        None for a program that machine.toml does not hold.
+        """
+        if now.program.name not in self.machine.cut_names:
+            return None
         then = None if now.assembly is None else self.first_assembly(now.assembly)
         return None if then is None else self.rulings(then.tap_id)[now.program.name]
 

@@ -16,7 +16,7 @@ from lobewatch.history.tap_measurements import TapMeasurements
 from lobewatch.history.usable_taps import UsableTaps
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.logbook.replaying.store import ReplayOutcome, store_recordings
-from lobewatch.machine import DamagedTapError, Machine, MachineFolder, TapEntry
+from lobewatch.machine import DamagedTapError, Machine, MachineFolder, ProgramTable, TapEntry
 from lobewatch.machine.additions.keep_modes import keep_modes
 from lobewatch.machine.archive.verify import enter_explained
 from lobewatch.machine.journal.heard_cut import HeardCut
@@ -126,6 +126,10 @@ class Logbook:
     def verdicts(self, until: str | None = None, names: Collection[str] | None = None) -> list[Verdict]:
         """See `Analysis.verdicts`."""
         return self.ask(Analysis.verdicts, until, names)
+
+    def verdict_on(self, table: ProgramTable) -> Verdict:
+        """See `Analysis.verdict_on`."""
+        return self.ask(Analysis.verdict_on, table)
 
     def rulings(self, tap_id: str, falls: bool = False) -> Mapping[str, Ruling]:
         """See `Analysis.rulings`."""

@@ -41,7 +41,7 @@ def settling_remark(cause: str, table: ProgramTable, tangential: float, assembly
     text, cure = {
         "coefficients": (
             f"the cutting coefficients decide: chatters above Kt {tangential / 1e6:.0f} N/mm2",
-            "measure them, or name the material",
+            "measure them" if table.material else "measure them, or name the material",
         ),
         "speed": ("the spindle speed decides", "run it in the middle of a window of speeds"),
         "clamping": (

@@ -15,7 +15,7 @@ def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:
 
     The window adds 1/time_constant to the decay rate zeta w_n and leaves the damped frequency and the strength of
     the free decay as they are: zeta falls by 1/(w_n time_constant), to first order, and K follows w_n^2. Standard
-    errors are carried over.
+    errors are carried over. A remark that lines were smoothed goes: that was the window.
 
     delay: time from the start of the window to the hit (s), the centre of the pulse. By then the window has fallen to
     exp(-delay/time_constant), so that all of the response is smaller by that and K is larger: it is taken off as well.
@@ -52,6 +52,7 @@ def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:
         covariance=covariances[0],
         jackknife=covariances[1],
         phase_correlation=_phase_correlation(mode, slope),
+        remarks=tuple(remark for remark in mode.remarks if remark.code != "smoothed-lines"),
         method=f"{mode.method}, without the window of {time_constant:g} s",
     )
 

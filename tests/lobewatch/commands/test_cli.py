@@ -276,7 +276,7 @@ def test_modes_of_bad_files_and_bands(run: Run, beam: Path, tmp_path: Path) -> N
     refused(run("modes", "nowhere.h5"), "nowhere.h5: No such file")
     (tmp_path / "empty.csv").touch()
     refused(run("modes", "empty.csv"), "the file is empty")
-    refused(run("modes", tmp_path), "directory")
+    refused(run("modes", tmp_path), "is a folder", "lobewatch modes MACHINE TAP")
     refused(run("modes", beam, "--band", 30000, 40000), "30000..40000")
     refused(run("modes", beam, "--band", 2000, 1000), "band")
     assert run("modes", beam, "--band", 600, 800, "--figure", "modes.png").out.count("695.") >= 1

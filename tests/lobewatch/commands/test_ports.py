@@ -72,7 +72,7 @@ def trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> MachineFolder:
     monkeypatch.setattr("acquisition.dataq.dialogue.QUIET", 0.05)
     make_machine_folder(Path("trial"), "surrogate_machine.toml")
     toml = Path("trial/machine.toml")
-    toml.write_text(toml.read_text("utf-8").replace("[daq]\n", "[daq]\n" + CHANNELS, 1), "utf-8")
+    toml.write_text(toml.read_text("utf-8").replace("anti_alias = true ", CHANNELS + "# ", 1), "utf-8")
     return MachineFolder("trial")
 
 

@@ -2,23 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 Direction = Literal["up", "down"]
 """Which way the tool turns against the feed: up (conventional) or down (climb) milling."""
 
 
+PITCH_SUM = np.radians(1e-3)
+"""Pitches sum to a turn within this (rad): angles may be written with three decimals of a degree."""
+SAME_PITCH = 1e-9
+"""Angles that differ by less (rad) are one."""
+
+
+def checked_pitch(pitch: Sequence[float], teeth: int) -> tuple[float, ...]:
+    """Pitches (rad) of so many teeth, those that are alike made equal; () where all are.
+
+    Raises ValueError unless there is one > 0 for each tooth and they sum to a turn.
+    """
+    if not pitch:
+        return ()
+    shown = ", ".join(f"{np.degrees(angle):g}" for angle in pitch)
+    if len(pitch) != teeth:
+        raise ValueError(f"pitch [{shown}] degrees has {len(pitch)} angles for {teeth} teeth; give one for each tooth")
+    if not all(np.isfinite(angle) and angle > 0 for angle in pitch):
+        raise ValueError(
+            f"pitch [{shown}] degrees holds an angle that is not > 0; each tooth follows the one before it"
+        )
+    if abs(sum(pitch) - 2 * np.pi) > PITCH_SUM:
+        raise ValueError(f"pitch [{shown}] sums to {np.degrees(sum(pitch)):g} degrees, not to 360; measure it again")
+    alike = [next(other for other in pitch if abs(other - angle) < SAME_PITCH) for angle in pitch]
+    return () if len(set(alike)) == 1 else tuple(float(angle) * 2 * np.pi / sum(alike) for angle in alike)
+
+
 @dataclass(frozen=True)
 class Cut:
-    """A milling cut with evenly spaced teeth. Conventions, kept everywhere in this package:
+    """A milling cut. Conventions, kept everywhere in this package:
 
     x is the feed, y the normal to it; the tooth angle phi runs clockwise from +y (rad). A tooth at phi in a cut
     of depth b answers the displacement q = (x, y) with the force F = -b H(phi) (q(t) - q(t - tau)),
     H = [[(Kt c + Kr s) s, (Kt c + Kr s) c], [(-Kt s + Kr c) s, (-Kt s + Kr c) c]], s = sin phi, c = cos phi,
-    tau the tooth period. Raises ValueError for a value that is no cut.
+    tau the time since the tooth before it passed. Raises ValueError for a value that is no cut.
     """
 
     teeth: int
@@ -35,6 +63,8 @@ class Cut:
     """Lag of a helical tooth along the axis, 2 tan(helix angle) / diameter (rad/m); 0 for straight teeth."""
     feed_angle: float = 0.0
     """Angle from x to the feed (rad): 0 feeds along x, pi/2 along y; angles half a turn apart are alike."""
+    pitch: tuple[float, ...] = ()
+    """Angle by which each tooth follows the tooth before it (rad), in order of entry; () for evenly spaced teeth."""
 
     def __post_init__(self) -> None:
         """Refuse what is no cut."""
@@ -56,6 +86,7 @@ class Cut:
             )
         if not np.isfinite(self.feed_angle):
             raise ValueError(f"feed_angle={self.feed_angle} rad is not finite; 0 feeds along x, pi/2 along y")
+        object.__setattr__(self, "pitch", checked_pitch(self.pitch, self.teeth))
 
     @property
     def entry_angle(self) -> float:
@@ -71,6 +102,24 @@ class Cut:
     def mean_angle(self) -> float:
         """Average angle of a tooth in the cut (rad)."""
         return (self.entry_angle + self.exit_angle) / 2
+
+    @property
+    def pattern(self) -> tuple[float, ...]:
+        """Pitches after which those of the cutter repeat (rad): one of even teeth, two of 85/95/85/95 degrees."""
+        pitch = self.pitch or (2 * np.pi / self.teeth,)
+        return next(pitch[:k] for k in range(1, len(pitch) + 1) if pitch[:k] * (len(pitch) // k) == pitch)
+
+    @property
+    def ahead(self) -> NDArray[np.float64]:
+        """Angle by which each tooth is ahead of the first (rad), shape (teeth,): not above 0 of uneven teeth."""
+        if not self.pitch:
+            return np.asarray(np.arange(self.teeth) * 2 * np.pi / self.teeth)
+        return np.asarray(-np.cumsum((0.0, *self.pitch[1:])))
+
+    @property
+    def delays(self) -> tuple[float, ...]:
+        """The different pitches (rad), rising: how long before a tooth the one before it passed."""
+        return tuple(sorted(set(self.pattern)))
 
     @property
     def teeth_in_cut(self) -> float:

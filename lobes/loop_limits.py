@@ -12,6 +12,7 @@ from acquisition import Remark
 from lobes.cut import Cut
 from lobes.stability_lobes import Lobe, MethodName, StabilityLobes
 from lobes.tip_response import TipResponse
+from lobes.uneven_limits import uneven_limits
 
 FIRST_BLOCK = 64
 """Grid steps searched first; every further block is twice as long ..."""
@@ -39,14 +40,17 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
     """Limiting depth b at each speed (rpm) of loops b L (1 - exp(-2 pi i f_c / f_t)) = -1.
 
     The branches give L over frequency (1/m); the lowest limit of all branches counts: b = -1 / (2 Re L) where Re L < 0,
-    and f_c / f_t = j + eps / (2 pi), j = 0, 1, 2 ..., eps / 2 = atan2(-Re L, Im L).
+    and f_c / f_t = j + eps / (2 pi), j = 0, 1, 2 ..., eps / 2 = atan2(-Re L, Im L). With teeth unevenly spaced see
+    `lobes.uneven_limits`; they have limits and no lobes.
     """
     tooth_frequency = cut.teeth * speed_rpm / 60
     depth, chatter = np.full(speed_rpm.shape, np.inf), np.full(speed_rpm.shape, np.nan)
     setting = np.zeros(speed_rpm.shape, dtype=np.intp)
     responses = [branch.on_grid for branch in branches]
     for i, branch in enumerate(branches):
-        frequency, limit = _limits(branch, responses[i], tooth_frequency)
+        limit, frequency = (
+            uneven_limits(branch, cut, tooth_frequency) if cut.pitch else _limits(branch, responses[i], tooth_frequency)
+        )
         lower = limit < depth
         depth[lower], chatter[lower], setting[lower] = limit[lower], frequency[lower], i
     limited = np.isfinite(depth)
@@ -59,7 +63,7 @@ def loop_limits(branches: Sequence[TipResponse], cut: Cut, speed_rpm: Floats, me
         kind=np.where(limited, "hopf", ""),
         crossings=depth[:, np.newaxis],
         method=method,
-        curves=partial(_lobes_of, loops, cut, speed_rpm),
+        curves=tuple if cut.pitch else partial(_lobes_of, loops, cut, speed_rpm),
         remarks=_out_of_band(branches, responses)
         or _out_of_range(method, cut, _weakest(branches, responses), speed_rpm),
     )
@@ -104,14 +108,14 @@ def _out_of_range(method: MethodName, cut: Cut, chatter: float, speed_rpm: Float
 
 
 def _limits(branch: TipResponse, response: Complexes, tooth_frequency: Floats) -> tuple[Floats, Floats]:
-    """Frequency of the lowest crossing at each tooth frequency (Hz) and its depth (m); nan and inf where none."""
+    """Depth of the lowest crossing at each tooth frequency (Hz) in m and its frequency (Hz); inf and nan where none."""
     chatter = _chatter_frequency(branch, response, tooth_frequency)
     limited = np.flatnonzero(np.isfinite(chatter))
     real = branch.receptance(chatter[limited]).real
     chatter[limited[real >= 0]] = np.nan
     depth = np.full(chatter.shape, np.inf)
     depth[limited[real < 0]] = -1 / (2 * real[real < 0])
-    return chatter, depth
+    return depth, chatter
 
 
 def _chatter_frequency(branch: TipResponse, response: Complexes, tooth_frequency: Floats) -> Floats:

@@ -22,25 +22,33 @@ def mean_force(cut: Cut) -> Floats:
 
 @lru_cache(maxsize=64)
 def interval_forces(cut: Cut, intervals: int) -> Floats:
-    """Force matrix of all teeth per depth, straight as they may not be, averaged over each interval of a tooth period.
+    """Force matrix per depth, straight as teeth may not be, averaged over each interval of the pattern of teeth.
 
-    Returns Pa, shape (intervals, 2, 2).
+    Of the teeth of each delay of the cut apart; the pattern is one tooth period of even teeth. Returns Pa, shape
+    (delays, intervals, 2, 2).
     """
-    step = 2 * np.pi / (cut.teeth * intervals)
-    edges = _teeth(cut) + step * np.arange(intervals + 1)
-    forces = _in_machine(cut, np.diff(_once(cut, edges), axis=1).sum(axis=0)) / step
+    step = sum(cut.pattern) / intervals
+    edges = cut.ahead[:, np.newaxis] + step * np.arange(intervals + 1)
+    forces = _in_machine(cut, _by_delay(cut, np.diff(_once(cut, edges), axis=1))) / step
     forces.flags.writeable = False
     return np.asarray(forces)
 
 
-def force_shares(cut: Cut, angle: Floats, depth: Floats) -> Floats:
-    """Force matrix of all teeth per depth, for Kt alone and for Kr alone, each 1, in the frame of the feed.
+def mean_regeneration(cut: Cut, waves: Floats) -> NDArray[np.complex128]:
+    """1 - exp(-i w tau) in the mean of all teeth, for waves in the mean tooth period (...)."""
+    delays = np.array(cut.pattern) / (2 * np.pi / cut.teeth)
+    return np.asarray(np.mean([1 - np.exp(-2j * np.pi * waves * delay) for delay in delays], axis=0))
 
-    angle: of one tooth since its entry at the tip (rad), shape (..., s); depth (...) in m counts for helical teeth,
-    whose force is the mean along the axis. Returns shape (..., s, 2, 2, 2), the coefficient first. Not to be asked
-    for at an angle where a tooth enters or leaves.
+
+def force_shares(cut: Cut, angle: Floats, depth: Floats) -> Floats:
+    """Force matrix per depth, for Kt alone and for Kr alone, each 1, in the frame of the feed.
+
+    Of the teeth of each delay of the cut apart. angle: of the first tooth since its entry at the tip (rad), shape
+    (..., s); depth (...) in m counts for helical teeth, whose force is the mean along the axis. Returns shape
+    (delays, ..., s, 2, 2, 2), the coefficient before the matrix. Not to be asked for at an angle where a tooth enters
+    or leaves.
     """
-    tooth = cut.entry_angle + angle + _teeth(cut).reshape(-1, *np.ones(angle.ndim, dtype=int))
+    tooth = cut.entry_angle + angle + cut.ahead.reshape(-1, *np.ones(angle.ndim, dtype=int))
     if cut.helix_lag == 0:
         inside = (np.mod(tooth, 2 * np.pi) > cut.entry_angle) & (np.mod(tooth, 2 * np.pi) < cut.exit_angle)
         cuts = inside.astype(np.float64)
@@ -49,7 +57,7 @@ def force_shares(cut: Cut, angle: Floats, depth: Floats) -> Floats:
         lag = cut.helix_lag * np.broadcast_to(depth[..., np.newaxis], tooth.shape)
         lag = np.maximum(lag, 1e-9)
         shares = (_once(cut, tooth) - _once(cut, tooth - lag)) / _expanded(lag)
-    return np.asarray(shares.sum(axis=0))
+    return _by_delay(cut, shares)
 
 
 def turned(matrix: Floats, feed_angle: Floats) -> Floats:
@@ -64,9 +72,11 @@ def _in_machine(cut: Cut, shares: Floats) -> Floats:
     return turned(cut.tangential * shares[..., 0, :, :] + cut.radial * shares[..., 1, :, :], np.array(cut.feed_angle))
 
 
-def _teeth(cut: Cut) -> Floats:
-    """Angles between the first tooth and each (rad), shape (teeth, 1)."""
-    return np.arange(cut.teeth)[:, np.newaxis] * 2 * np.pi / cut.teeth
+def _by_delay(cut: Cut, shares: Floats) -> Floats:
+    """What each tooth does (teeth, ...) summed over those of one delay, shape (delays, ...)."""
+    if not cut.pitch:
+        return np.asarray(shares.sum(axis=0, keepdims=True))
+    return np.stack([shares[np.array(cut.pitch) == delay].sum(axis=0) for delay in cut.delays])
 
 
 def _once(cut: Cut, angle: Floats) -> Floats:

@@ -51,7 +51,7 @@ def zero_order(x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: ArrayLike) -> 
 
 def _cancelling(cut: Cut, axis: int) -> tuple[Remark, ...]:
     """Whether most of the force in the one direction that is known cancels over a turn."""
-    forces = interval_forces(cut, SAMPLES)[:, axis, axis]
+    forces = interval_forces(cut, SAMPLES).sum(axis=0)[:, axis, axis]
     share = abs(np.mean(forces)) / np.mean(np.abs(forces))
     if share >= CANCELS:
         return ()

@@ -60,8 +60,13 @@ class MillingRows:
 
     @property
     def tooth_period(self) -> Floats:
-        """Time between two teeth (s), shape (r,)."""
+        """Mean time between two teeth (s), shape (r,)."""
         return np.asarray(60 / (self.cut.teeth * self.speed_rpm))
+
+    @property
+    def period(self) -> Floats:
+        """Time after which the cut repeats (s), shape (r,): the tooth period of evenly spaced teeth."""
+        return self.tooth_period * len(self.cut.pattern)
 
     @property
     def force(self) -> Floats:

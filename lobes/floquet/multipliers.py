@@ -11,6 +11,7 @@ from lobes.floquet.milling_rows import MillingRows
 from lobes.floquet.period_map import PeriodMap, period_map
 from lobes.floquet.pieces import is_free, segment_ends, segment_pieces
 from lobes.floquet.stages import gauss_stages
+from lobes.floquet.uneven_map import UnevenMap
 
 EFFORTS = ((5, 8), (12, 14), (20, 24), (40, 40), (80, 80), (80, 600))
 """Power steps and Arnoldi vectors of each attempt; what an attempt leaves in doubt goes on to the next."""
@@ -18,7 +19,7 @@ TOLERANCE = 1e-8
 """Largest residual of a multiplier that counts as found, relative to it, unless another is asked for."""
 HUGE = 1e6
 """Of larger multipliers only the order of magnitude is found."""
-AT_ONCE = 400_000
+AT_ONCE = 1_600_000
 """Numbers in the matrices of the cases that are solved at once: as much as a processor keeps near."""
 
 Floats = NDArray[np.float64]
@@ -28,9 +29,9 @@ Complexes = NDArray[np.complex128]
 def largest_multipliers(
     rows: MillingRows, depth: Floats, numbers: NDArray[np.int64], tolerance: float = TOLERANCE
 ) -> Complexes:
-    """Multiplier of largest magnitude over one tooth period, shape (r, d).
+    """Multiplier of largest magnitude over one tooth period, of uneven teeth over their pattern, shape (r, d).
 
-    depth (r, d) in m, numbers (r,): pieces of the tooth period (`piece_numbers`). Power steps, then Arnoldi, until the
+    depth (r, d) in m, numbers (r,): pieces of that time (`piece_numbers`). Power steps, then Arnoldi, until the
     residual is below `tolerance` times the multiplier. Raises ArithmeticError for one that stays in doubt.
     """
     if rows.cut.helix_lag > 0 and depth.shape[1] > 1:
@@ -47,7 +48,7 @@ def _alike(
 ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.int64]]]:
     """Rows that are divided alike, few enough to be solved at once, and the pieces of each segment (k,)."""
     ends = segment_ends(rows.cut, depth[:, 0])
-    pieces = segment_pieces(numbers, ends)
+    pieces = segment_pieces(rows.cut, numbers, ends)
     free = is_free(rows.cut, ends, depth[:, 0])
     keys, number = np.unique(np.where(free, -np.minimum(pieces, 1), pieces), axis=0, return_inverse=True)
     for i, key in enumerate(keys):
@@ -78,7 +79,9 @@ def _multipliers(rows: MillingRows, depth: Floats, pieces: NDArray[np.int64], to
     )
 
 
-def _attempt(over_period: PeriodMap, shape: tuple[int, ...], effort: tuple[int, int]) -> tuple[Complexes, Floats]:
+def _attempt(
+    over_period: PeriodMap | UnevenMap, shape: tuple[int, ...], effort: tuple[int, int]
+) -> tuple[Complexes, Floats]:
     """Multipliers and residuals, each of a shape (r, d), after some power steps with some Arnoldi vectors."""
     states = over_period.states
     state = np.broadcast_to(np.random.default_rng(0).normal(size=states), (*shape, states))
@@ -89,7 +92,7 @@ def _attempt(over_period: PeriodMap, shape: tuple[int, ...], effort: tuple[int, 
         return _largest(_hessenberg(over_period, state, min(effort[1], states)))
 
 
-def _hessenberg(over_period: PeriodMap, start: Floats, vectors: int) -> Floats:
+def _hessenberg(over_period: PeriodMap | UnevenMap, start: Floats, vectors: int) -> Floats:
     """Hessenberg matrices (..., k + 1, k) of k Arnoldi steps; zeros from where the space is exhausted."""
     basis = np.zeros((*start.shape[:-1], vectors + 1, start.shape[-1]))
     basis[..., 0, :] = start / np.linalg.norm(start, axis=-1, keepdims=True)

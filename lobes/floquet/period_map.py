@@ -16,14 +16,17 @@ Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lobes.floquet.milling_rows import MillingRows
+from lobes.floquet.piece_response import PieceResponse, ringing
 from lobes.floquet.pieces import is_free, segment_ends
 from lobes.floquet.stages import gauss_stages
+from lobes.floquet.uneven_map import UnevenMap, UnevenPiece, surfaces
 from lobes.tooth_force import force_shares, turned
 
 Floats = NDArray[np.float64]
@@ -65,125 +68,84 @@ class PeriodMap:
         return np.concatenate((z, *parts), axis=-1)
 
 
-def period_map(rows: MillingRows, depth: Floats, numbers: NDArray[np.int64]) -> PeriodMap:
+def period_map(rows: MillingRows, depth: Floats, numbers: NDArray[np.int64]) -> PeriodMap | UnevenMap:
     """The map of each row at depths (r, d) in m; numbers (k,): pieces of each segment, the same in all rows.
 
     For helical teeth, whose segments depend on the depth, d is 1.
     """
     ends = segment_ends(rows.cut, depth[:, 0])
     free = is_free(rows.cut, ends, depth[:, 0])
-    pieces = list[tuple[bool, Floats]]()
-    for k in np.flatnonzero(numbers):
-        number = int(numbers[k])
-        angle = (ends[:, k + 1] - ends[:, k]) / number
-        time = angle / (2 * np.pi / rows.cut.teeth) * rows.tooth_period
-        if np.all(free[:, k]):
-            pieces.append((False, _ringing(rows, number * time)[:, np.newaxis]))
-        else:
-            starts = ends[:, k, np.newaxis] + angle[:, np.newaxis] * np.arange(number)
-            maps = _Response.of(rows, time).cutting(_forces(rows, starts, angle, depth))
-            pieces += [(True, maps[:, :, i]) for i in range(number)]
-    return PeriodMap(tuple(pieces), rows.direction.size, gauss_stages().node.size * rows.axes.size)
-
-
-def _forces(rows: MillingRows, starts: Floats, angle: Floats, depth: Floats) -> Floats:
-    """Depth times force matrix at the nodes of pieces that start at angles (r, k) (N/m), shape (r, d, k, s, p, p)."""
-    apart = slice(None) if rows.cut.helix_lag > 0 else slice(1)  # straight teeth: the angles are those of the first row
-    at = starts[apart, :, np.newaxis] + angle[apart, np.newaxis, np.newaxis] * gauss_stages().node
-    shares = force_shares(rows.cut, at, depth[apart, :1])
-    matrix = np.einsum("rc,rkscij->rksij", np.stack((rows.tangential, rows.radial), axis=1), shares)
-    matrix = turned(matrix, rows.feed_angle[:, np.newaxis, np.newaxis])[..., rows.axes[:, np.newaxis], rows.axes]
-    return np.asarray(depth[..., *([np.newaxis] * 4)] * matrix[:, np.newaxis])
-
-
-def _ringing(rows: MillingRows, time: Floats) -> Floats:
-    """Map of (q, velocity / w) of all modes over a time (r,) in s without force, shape (r, 2n, 2n)."""
-    theta, zeta = rows.frequency * time[:, np.newaxis], rows.damping_ratio
-    root = np.sqrt(np.where(zeta == 1, 1 - 1e-12, zeta) ** 2 - 1 + 0j)
-    fast, slow = np.exp((-zeta - root) * theta), np.exp((-zeta + root) * theta)
-    sine = np.real((slow - fast) / (2 * root))
-    cosine = np.real(slow + fast) / 2
-    return _blocks(cosine + zeta * sine, sine, -sine, cosine - zeta * sine)
-
-
-def _blocks(qq: Floats, qv: Floats, vq: Floats, vv: Floats) -> Floats:
-    """A matrix (r, 2n, 2n) of four diagonals (r, n)."""
-    n = qq.shape[1]
-    matrix, i = np.zeros((len(qq), 2 * n, 2 * n)), np.arange(n)
-    matrix[:, i, i], matrix[:, i, n + i], matrix[:, n + i, i], matrix[:, n + i, n + i] = qq, qv, vq, vv
-    return matrix
+    segments = [
+        _Segment.of(rows, depth, ends[:, k : k + 2], int(numbers[k]), bool(np.all(free[:, k])))
+        for k in np.flatnonzero(numbers)
+    ]
+    make = _uneven_map if rows.cut.pitch else _even_map
+    return make(rows, segments)
 
 
 @dataclass(frozen=True, eq=False)
-class _Response:
-    """What a piece of some length does to modes, before the cut closes the loop."""
+class _Segment:
+    """Pieces of one length, all with the same teeth in the cut."""
 
-    ends: Floats
-    """z at the end from z at the begin, shape (r, 2n, 2n)."""
-    shows: Floats
-    """Displacements at the nodes from z at the begin, shape (r, p, s, 2n)."""
-    gives: Floats
-    """Displacements at the nodes from forces there, shape (r, p, s, s)."""
-    pushes: Floats
-    """z at the end from forces at the nodes, shape (r, 2n, p, s)."""
+    starts: Floats
+    """Angles at which they start (rad), shape (r, k)."""
+    angle: Floats
+    """Angle of each (rad), shape (r,)."""
+    time: Floats
+    """Time of each (s), shape (r,)."""
+    forces: Floats | None
+    """Depth times force matrix at their nodes (N/m), shape (delays, r, d, k, s, p, p); None where no tooth cuts."""
 
     @classmethod
-    def of(cls, rows: MillingRows, time: Floats) -> _Response:
-        """For pieces of a length (r,) in s."""
-        node, weight, integral = gauss_stages()
-        theta, zeta = (
-            a[..., np.newaxis, np.newaxis] for a in (rows.frequency * time[:, np.newaxis], rows.damping_ratio)
-        )
-        solved = np.linalg.inv(np.eye(node.size) + 2 * zeta * theta * integral + theta**2 * (integral @ integral))
-        velocity = np.concatenate((-theta * (solved @ node)[..., np.newaxis], solved.sum(-1, keepdims=True)), axis=-1)
-        forced = solved @ integral * (theta / rows.stiffness[..., np.newaxis, np.newaxis])
-        place = theta * (integral @ velocity) + [1.0, 0.0]
-        yields = theta * (integral @ forced)
-        q = theta * (weight @ velocity)[..., np.newaxis, :] + [[1.0, 0.0]]
-        drive = -theta * (weight @ (place + 2 * zeta * velocity))[..., np.newaxis, :] + [[0.0, 1.0]]
-        q_push = theta[..., 0] * (weight @ forced)
-        v_push = theta[..., 0] * (weight / rows.stiffness[..., np.newaxis] - weight @ (yields + 2 * zeta * forced))
-        shown, shown_forced = place, yields
-        if np.any(rows.phase):
-            of_place, of_velocity = (share[..., np.newaxis, np.newaxis] for share in rows.seen)
-            shown = of_place * place + of_velocity * velocity
-            shown_forced = of_place * yields + of_velocity * forced
-        return cls(
-            ends=_blocks(q[..., 0, 0], q[..., 0, 1], drive[..., 0, 0], drive[..., 0, 1]),
-            shows=_by_direction(rows, shown),
-            gives=np.einsum("rnij,np->rpij", shown_forced, _moves(rows)),
-            pushes=np.concatenate([np.einsum("rns,np->rnps", push, _moves(rows)) for push in (q_push, v_push)], axis=1),
-        )
+    def of(cls, rows: MillingRows, depth: Floats, ends: Floats, number: int, is_free: bool) -> _Segment:
+        angle = (ends[:, 1] - ends[:, 0]) / number
+        starts = ends[:, :1] + angle[:, np.newaxis] * np.arange(number)
+        time = angle / sum(rows.cut.pattern) * rows.period
+        return cls(starts, angle, time, None if is_free else _forces(rows, starts, angle, depth))
 
-    def cutting(self, force: Floats) -> Floats:
-        """The maps (r, d, k, m, m) of k pieces with forces -force (d - w) at their nodes, force (r, d, k, s, p, p)."""
-        *cases, s, p, _ = force.shape
-        size, states = p * s, self.ends.shape[-1]
-        forces = np.ascontiguousarray(np.moveaxis(force, -3, -1))
-        loop, push = np.empty((*cases, size, size)), np.zeros((*cases, states, size))
-        gives = self.gives[:, np.newaxis, np.newaxis, :, :, np.newaxis]
-        np.multiply(gives, forces[..., np.newaxis, :, :], out=loop.reshape(*cases, p, s, p, s))
-        i = np.arange(size)
-        loop[..., i, i] += 1
-        for direction in range(p):
-            pushes = self.pushes[:, np.newaxis, np.newaxis, :, direction, np.newaxis]
-            push.reshape(*cases, states, p, s)[...] += pushes * forces[..., np.newaxis, direction, :, :]
-        inverse = np.linalg.inv(loop)
-        maps = np.empty((*cases, states + size, states + size))
-        np.matmul(inverse, self.shows.reshape(-1, 1, 1, size, states), out=maps[..., states:, :states])
-        np.negative(inverse, out=maps[..., states:, states:])
-        maps[..., :states, :] = np.negative(push, out=push) @ maps[..., states:, :]
-        maps[..., :states, :states] += self.ends[:, np.newaxis, np.newaxis]
-        maps[..., states + i, states + i] += 1
-        return maps
+    def ringing(self, rows: MillingRows) -> Floats:
+        """Map of z over all pieces without a cut, shape (r, 1, 2n, 2n)."""
+        return ringing(rows, self.starts.shape[1] * self.time)[:, np.newaxis]
 
 
-def _moves(rows: MillingRows) -> Floats:
-    """1 where a mode moves in a direction, shape (n, p)."""
-    return np.asarray(np.eye(rows.axes.size)[rows.direction])
+def _even_map(rows: MillingRows, segments: Sequence[_Segment]) -> PeriodMap:
+    pieces = list[tuple[bool, Floats]]()
+    for segment in segments:
+        if segment.forces is None:
+            pieces.append((False, segment.ringing(rows)))
+        else:
+            maps = PieceResponse.of(rows, segment.time).cutting(segment.forces[0])
+            pieces += [(True, maps[:, :, i]) for i in range(maps.shape[2])]
+    return PeriodMap(tuple(pieces), rows.direction.size, gauss_stages().node.size * rows.axes.size)
 
 
-def _by_direction(rows: MillingRows, place: Floats) -> Floats:
-    """Displacements from z: places (r, n, s, 2) of the modes, each in its own direction, shape (r, p, s, 2n)."""
-    shown = np.einsum("rnsk,np->rpskn", place, _moves(rows))
-    return np.asarray(shown.reshape(*shown.shape[:3], -1))
+def _uneven_map(rows: MillingRows, segments: Sequence[_Segment]) -> UnevenMap:
+    apart = slice(None) if rows.cut.helix_lag > 0 else slice(1)  # straight teeth: the angles are those of the first row
+    cutting = [segment for segment in segments if segment.forces is not None]
+    starts = np.hstack([segment.starts[apart] for segment in cutting])
+    lengths = np.hstack(
+        [np.repeat(segment.angle[apart, np.newaxis], segment.starts.shape[1], 1) for segment in cutting]
+    )
+    forces = np.concatenate([segment.forces for segment in cutting if segment.forces is not None], axis=3)
+    met = surfaces(rows.cut.delays, sum(rows.cut.pattern), starts, lengths, forces)
+    pieces = list[UnevenPiece]()
+    for segment in segments:
+        if segment.forces is None:
+            pieces.append(UnevenPiece(segment.ringing(rows)))
+        else:
+            maps = PieceResponse.of(rows, segment.time).loaded(segment.forces.sum(axis=0))
+            pieces += [UnevenPiece(maps[:, :, i], next(met)) for i in range(maps.shape[2])]
+    return UnevenMap(tuple(pieces), rows.direction.size, rows.axes.size)
+
+
+def _forces(rows: MillingRows, starts: Floats, angle: Floats, depth: Floats) -> Floats:
+    """Depth times force matrix of the teeth of each delay at the nodes of pieces that start at angles (r, k) (N/m).
+
+    Shape (delays, r, d, k, s, p, p).
+    """
+    apart = slice(None) if rows.cut.helix_lag > 0 else slice(1)  # straight teeth: the angles are those of the first row
+    at = starts[apart, :, np.newaxis] + angle[apart, np.newaxis, np.newaxis] * gauss_stages().node
+    shares = force_shares(rows.cut, at, depth[apart, :1])
+    matrix = np.einsum("rc,grkscij->grksij", np.stack((rows.tangential, rows.radial), axis=1), shares)
+    matrix = turned(matrix, rows.feed_angle[:, np.newaxis, np.newaxis])[..., rows.axes[:, np.newaxis], rows.axes]
+    return np.asarray(depth[..., *([np.newaxis] * 4)] * matrix[:, :, np.newaxis])

@@ -62,5 +62,5 @@ def chatter_at(
 ) -> tuple[Floats, NDArray[np.str_]]:
     """Chatter frequency (Hz) and kind at limits (r,) in m, with pieces (r,)."""
     multiplier = largest_multipliers(rows, depth[:, np.newaxis], number)[:, 0]
-    chatter = chatter_frequency(system, rows.cut, multiplier, depth, 1 / rows.tooth_period)
+    chatter = chatter_frequency(system, rows.cut, multiplier, depth, 1 / rows.period)
     return chatter, np.where(is_flip(multiplier), "flip", "hopf")

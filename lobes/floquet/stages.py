@@ -24,6 +24,16 @@ class Stages(NamedTuple):
     """Integrals from the begin to each node, shape (s, s)."""
 
 
+def polynomial_at(place: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Weights of the values at the nodes in the polynomial through them at places (...) in 0 to 1, shape (..., s)."""
+    node = gauss_stages().node
+    apart = place[..., np.newaxis, np.newaxis] - node
+    own = np.eye(node.size, dtype=bool)
+    return np.asarray(
+        np.prod(np.where(own, 1.0, apart), axis=-1) / np.prod(np.where(own, 1.0, node[:, np.newaxis] - node), axis=-1)
+    )
+
+
 @cache
 def gauss_stages(count: int = STAGES) -> Stages:
     """Nodes and integrals of the polynomial through them.

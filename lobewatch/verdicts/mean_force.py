@@ -211,8 +211,10 @@ def _unwrapped(angle: Floats) -> Floats:
 
 def is_constant(cut: Cut) -> bool:
     """Whether the force does not change over the turn: then the mean force is all of it."""
-    force = interval_forces(cut, 64)
-    return cut.helix_lag == 0 and bool(np.max(np.ptp(force, axis=0)) < CONSTANT * np.max(np.abs(force)))
+    force = interval_forces(cut, 64)[0]
+    return (
+        not cut.pitch and cut.helix_lag == 0 and bool(np.max(np.ptp(force, axis=0)) < CONSTANT * np.max(np.abs(force)))
+    )
 
 
 def _unit_forces(cut: Cut) -> tuple[Floats, Floats]:

@@ -1,0 +1,136 @@
+"""What a piece of time does to the modes: without a cut, and with the forces of one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobes.floquet.milling_rows import MillingRows
+from lobes.floquet.stages import gauss_stages
+
+Floats = NDArray[np.float64]
+
+
+def ringing(rows: MillingRows, time: Floats) -> Floats:
+    """Map of (q, velocity / w) of all modes over a time (r,) in s without force, shape (r, 2n, 2n)."""
+    theta, zeta = rows.frequency * time[:, np.newaxis], rows.damping_ratio
+    root = np.sqrt(np.where(zeta == 1, 1 - 1e-12, zeta) ** 2 - 1 + 0j)
+    fast, slow = np.exp((-zeta - root) * theta), np.exp((-zeta + root) * theta)
+    sine = np.real((slow - fast) / (2 * root))
+    cosine = np.real(slow + fast) / 2
+    return _blocks(cosine + zeta * sine, sine, -sine, cosine - zeta * sine)
+
+
+def _blocks(qq: Floats, qv: Floats, vq: Floats, vv: Floats) -> Floats:
+    """A matrix (r, 2n, 2n) of four diagonals (r, n)."""
+    n = qq.shape[1]
+    matrix, i = np.zeros((len(qq), 2 * n, 2 * n)), np.arange(n)
+    matrix[:, i, i], matrix[:, i, n + i], matrix[:, n + i, i], matrix[:, n + i, n + i] = qq, qv, vq, vv
+    return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class PieceResponse:
+    """What a piece of some length does to modes, before the cut closes the loop."""
+
+    ends: Floats
+    """z at the end from z at the begin, shape (r, 2n, 2n)."""
+    shows: Floats
+    """Displacements at the nodes from z at the begin, shape (r, p, s, 2n)."""
+    gives: Floats
+    """Displacements at the nodes from forces there, shape (r, p, s, s)."""
+    pushes: Floats
+    """z at the end from forces at the nodes, shape (r, 2n, p, s)."""
+
+    @classmethod
+    def of(cls, rows: MillingRows, time: Floats) -> PieceResponse:
+        """For pieces of a length (r,) in s."""
+        node, weight, integral = gauss_stages()
+        theta, zeta = (
+            a[..., np.newaxis, np.newaxis] for a in (rows.frequency * time[:, np.newaxis], rows.damping_ratio)
+        )
+        solved = np.linalg.inv(np.eye(node.size) + 2 * zeta * theta * integral + theta**2 * (integral @ integral))
+        velocity = np.concatenate((-theta * (solved @ node)[..., np.newaxis], solved.sum(-1, keepdims=True)), axis=-1)
+        forced = solved @ integral * (theta / rows.stiffness[..., np.newaxis, np.newaxis])
+        place = theta * (integral @ velocity) + [1.0, 0.0]
+        yields = theta * (integral @ forced)
+        q = theta * (weight @ velocity)[..., np.newaxis, :] + [[1.0, 0.0]]
+        drive = -theta * (weight @ (place + 2 * zeta * velocity))[..., np.newaxis, :] + [[0.0, 1.0]]
+        q_push = theta[..., 0] * (weight @ forced)
+        v_push = theta[..., 0] * (weight / rows.stiffness[..., np.newaxis] - weight @ (yields + 2 * zeta * forced))
+        shown, shown_forced = place, yields
+        if np.any(rows.phase):
+            of_place, of_velocity = (share[..., np.newaxis, np.newaxis] for share in rows.seen)
+            shown = of_place * place + of_velocity * velocity
+            shown_forced = of_place * yields + of_velocity * forced
+        return cls(
+            ends=_blocks(q[..., 0, 0], q[..., 0, 1], drive[..., 0, 0], drive[..., 0, 1]),
+            shows=_by_direction(rows, shown),
+            gives=np.einsum("rnij,np->rpij", shown_forced, _moves(rows)),
+            pushes=np.concatenate([np.einsum("rns,np->rnps", push, _moves(rows)) for push in (q_push, v_push)], axis=1),
+        )
+
+    def cutting(self, force: Floats) -> Floats:
+        """The maps (r, d, k, m, m) of k pieces with forces -force (d - w) at their nodes, force (r, d, k, s, p, p).
+
+        From z and w at the begin to z at the end and d.
+        """
+        inverse, push = self._closed(force)
+        states, size = push.shape[-2:]
+        maps, i = np.empty((*inverse.shape[:3], states + size, states + size)), np.arange(size)
+        np.matmul(inverse, self.shows.reshape(-1, 1, 1, size, states), out=maps[..., states:, :states])
+        np.negative(inverse, out=maps[..., states:, states:])
+        maps[..., :states, :] = np.negative(push, out=push) @ maps[..., states:, :]
+        maps[..., :states, :states] += self.ends[:, np.newaxis, np.newaxis]
+        maps[..., states + i, states + i] += 1
+        return maps
+
+    def loaded(self, force: Floats) -> Floats:
+        """The maps (r, d, k, m, m) of k pieces with forces f - force d at their nodes, force (r, d, k, s, p, p).
+
+        From z at the begin and f to z at the end and d.
+        """
+        inverse, push = self._closed(force)
+        states, size = push.shape[-2:]
+        maps = np.empty((*inverse.shape[:3], states + size, states + size))
+        np.matmul(inverse, self.shows.reshape(-1, 1, 1, size, states), out=maps[..., states:, :states])
+        np.matmul(inverse, self._given()[:, np.newaxis, np.newaxis], out=maps[..., states:, states:])
+        maps[..., :states, :] = np.negative(push, out=push) @ maps[..., states:, :]
+        maps[..., :states, :states] += self.ends[:, np.newaxis, np.newaxis]
+        maps[..., :states, states:] += self.pushes.reshape(-1, 1, 1, states, size)
+        return maps
+
+    def _closed(self, force: Floats) -> tuple[Floats, Floats]:
+        """Displacements of the closed loop from the open one's (r, d, k, ps, ps), z from them (r, d, k, 2n, ps)."""
+        *cases, s, p, _ = force.shape
+        size, states = p * s, self.ends.shape[-1]
+        forces = np.ascontiguousarray(np.moveaxis(force, -3, -1))
+        loop, push = np.empty((*cases, size, size)), np.zeros((*cases, states, size))
+        gives = self.gives[:, np.newaxis, np.newaxis, :, :, np.newaxis]
+        np.multiply(gives, forces[..., np.newaxis, :, :], out=loop.reshape(*cases, p, s, p, s))
+        i = np.arange(size)
+        loop[..., i, i] += 1
+        for direction in range(p):
+            pushes = self.pushes[:, np.newaxis, np.newaxis, :, direction, np.newaxis]
+            push.reshape(*cases, states, p, s)[...] += pushes * forces[..., np.newaxis, direction, :, :]
+        return np.linalg.inv(loop), push
+
+    def _given(self) -> Floats:
+        """Displacements at the nodes from forces there in all directions, shape (r, ps, ps)."""
+        r, p, s, _ = self.gives.shape
+        given, i = np.zeros((r, p, s, p, s)), np.arange(p)
+        given[:, i, :, i] = np.moveaxis(self.gives, 1, 0)
+        return given.reshape(r, p * s, p * s)
+
+
+def _moves(rows: MillingRows) -> Floats:
+    """1 where a mode moves in a direction, shape (n, p)."""
+    return np.asarray(np.eye(rows.axes.size)[rows.direction])
+
+
+def _by_direction(rows: MillingRows, place: Floats) -> Floats:
+    """Displacements from z: places (r, n, s, 2) of the modes, each in its own direction, shape (r, p, s, 2n)."""
+    shown = np.einsum("rnsk,np->rpskn", place, _moves(rows))
+    return np.asarray(shown.reshape(*shown.shape[:3], -1))

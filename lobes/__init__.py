@@ -30,6 +30,7 @@ from lobes.milling_system import milling_system
 from lobes.pockets import Pocket, PocketShift, best_pockets, pocket_shifts, pockets
 from lobes.program import Program
 from lobes.radial_lobes import RadialLobes, radial_lobes
+from lobes.shown_modes import ShownModes, shown_modes
 from lobes.specific_force import SpecificForce
 from lobes.stability_lobes import Lobe, MethodName, Minimum, StabilityLobes
 from lobes.zero_order import zero_order
@@ -47,6 +48,7 @@ __all__ = [
     "Program",
     "ProgramLimit",
     "RadialLobes",
+    "ShownModes",
     "SldHistory",
     "SpecificForce",
     "StabilityLobes",
@@ -71,6 +73,7 @@ __all__ = [
     "radial_lobes",
     "read_history",
     "rows_of",
+    "shown_modes",
     "spectral_radius",
     "stability_boundary",
     "tangential_and_radial",

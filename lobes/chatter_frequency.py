@@ -33,10 +33,10 @@ def chatter_frequency(
     reach = NEIGHBOURS * len(cut.pattern)
     harmonics = waves + np.arange(-reach, reach + 1)
     frequency = harmonics * base[:, np.newaxis]
-    receptance = -depth[:, np.newaxis, np.newaxis] * system.receptance(frequency)
+    receptance = -depth[:, np.newaxis, np.newaxis, np.newaxis] * system.receptance(frequency)
     regenerated = 1 - np.exp(-2j * np.pi * harmonics[..., np.newaxis] * _delays(cut))
     forces = np.einsum("gklpq,nlg->nkplq", _force_harmonics(system, cut, harmonics.shape[1]), regenerated)
-    balance = receptance[..., np.newaxis, np.newaxis] * forces
+    balance = np.einsum("gkpr,gkrlq->gkplq", receptance, forces)
     size = harmonics.shape[1] * system.axes.size
     values, vectors = np.linalg.eig(balance.reshape(-1, size, size))
     row = np.arange(depth.size)
@@ -55,8 +55,8 @@ def _nearest_to_mean_force(
     waves = np.concatenate((whole + part, whole + 1 - part), axis=1)
     gain = depth[:, np.newaxis] * mean_regeneration(cut, waves / len(cut.pattern))
     force = mean_force(cut)[np.ix_(system.axes, system.axes)]
-    receptance = system.receptance(waves * base[:, np.newaxis])[..., np.newaxis, :]
-    loop = np.eye(system.axes.size) + gain[..., np.newaxis, np.newaxis] * force * receptance
+    receptance = system.receptance(waves * base[:, np.newaxis])
+    loop = np.eye(system.axes.size) + gain[..., np.newaxis, np.newaxis] * (force @ receptance)
     best = np.argmin(np.abs(np.linalg.det(loop)), axis=1)[:, np.newaxis]
     return np.take_along_axis(waves, best, axis=1)[:, 0]
 

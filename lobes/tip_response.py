@@ -74,6 +74,18 @@ def tip_responses(x: Tip | None, y: Tip | None, tooth_frequency: float) -> list[
     ]
 
 
+def cross_response(cross: Tip, highest: float) -> TipResponse:
+    """Receptance from a force in x to a displacement in y: modes are known up to a frequency (Hz), an FRF in its band.
+
+    Modes have the sign of what they show; ValueError for an empty list.
+    """
+    if isinstance(cross, Frf):
+        return _from_frf(cross.in_band(cross.usable_band))
+    if not cross:
+        raise ValueError("cross has no modes; give at least one mode, or None where x and y do not move each other")
+    return _from_modes(cross, highest)
+
+
 def common_grid(tips: Sequence[TipResponse]) -> NDArray[np.float64]:
     """Frequencies (Hz) that show every turn of all, where all are known; ValueError where bands do not overlap."""
     low = max(tip.grid[0] for tip in tips)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,7 @@ from lobes.cut import Cut
 from lobes.loop_limits import INSTEAD, loop_limits
 from lobes.speeds import check_speeds
 from lobes.stability_lobes import StabilityLobes
-from lobes.tip_response import Tip, TipResponse, common_grid, tip_responses, weighted_sum
+from lobes.tip_response import Tip, TipResponse, common_grid, cross_response, tip_responses, weighted_sum
 from lobes.tooth_force import interval_forces, mean_force
 
 CANCELS = 0.7
@@ -22,12 +21,14 @@ SAMPLES = 400
 """Intervals of a tooth period that they are taken over."""
 
 
-def zero_order(x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: ArrayLike) -> StabilityLobes:
+def zero_order(
+    x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: ArrayLike, cross: Tip | None = None
+) -> StabilityLobes:
     """Limiting depth at each speed (rpm) for the force matrix averaged over a turn of the cutter.
 
     x is the feed, y the normal to it; None stands for a direction that is rigid or not known. With H0 the mean of the
-    force matrix (`lobes.tooth_force`; H0 = -N Kt alpha / (4 pi) of the source) and G = diag(Gx, Gy) the cut is at its
-    limit where chatter at frequency f_c > 0 sustains itself,
+    force matrix (`lobes.tooth_force`; H0 = -N Kt alpha / (4 pi) of the source) and G = [[Gx, Gxy], [Gxy, Gy]] the cut
+    is at its limit where chatter at frequency f_c > 0 sustains itself,
 
         det(I + b (1 - exp(-2 pi i f_c / f_t)) H0 G(f_c)) = 0,     tooth frequency f_t = N speed / 60:
 
@@ -35,18 +36,25 @@ def zero_order(x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: ArrayLike) -> 
     A mean force knows no flip lobes: at low immersion (below 0.25) the true limit can be lower, at half immersion it
     can be 15 % off at a given speed.
 
-    From FRFs only chatter inside their common usable band is seen; x and y may have different lines. A depth of inf
-    means no chatter there. Raises ValueError as `average_angle` does.
+    cross is what is hit in x and seen in y: its FRF, or modes whose stiffness has the sign of theirs (`cross_modes`).
+    None: x and y do not move each other. From FRFs only chatter inside their common usable band is seen; each may have
+    its own lines. A depth of inf means no chatter there. Raises ValueError as `average_angle` does, and for a cross FRF
+    without both directions.
     Source: Altintas & Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362.
     """
     speed = check_speeds(speed_rpm)
     tips = tip_responses(x, y, cut.teeth * float(speed.max()) / 60)
     force = mean_force(cut)
+    if cross is not None and len(tips) == 1:
+        raise ValueError("cross is known, x or y is not; give the modes or the FRF of both directions")
     if len(tips) == 1:
         ((axis, tip),) = tips
         lobes = loop_limits([weighted_sum([(force[axis, axis], tip)])], cut, speed, "zero order")
         return replace(lobes, remarks=(*_cancelling(cut, axis), *lobes.remarks))
-    return loop_limits(_eigenvalues(force, [tip for _, tip in tips]), cut, speed, "zero order")
+    responses = [tip for _, tip in tips]
+    if cross is not None:
+        responses.append(cross_response(cross, float(responses[0].grid[-1])))
+    return loop_limits(_eigenvalues(force, *responses), cut, speed, "zero order")
 
 
 def _cancelling(cut: Cut, axis: int) -> tuple[Remark, ...]:
@@ -62,14 +70,21 @@ def _cancelling(cut: Cut, axis: int) -> tuple[Remark, ...]:
     return (Remark("force-cancels", "", text, INSTEAD),)
 
 
-def _eigenvalues(force: NDArray[np.float64], tips: Sequence[TipResponse]) -> list[TipResponse]:
+def _eigenvalues(
+    force: NDArray[np.float64], x: TipResponse, y: TipResponse, cross: TipResponse | None = None
+) -> list[TipResponse]:
     """Both eigenvalues L = t +- sqrt(t^2 - det) of H0 G, t = trace / 2, each followed continuously over frequency."""
-    grid = common_grid(tips)
+    grid = common_grid([tip for tip in (x, y, cross) if tip is not None])
 
     def half_trace_and_root(frequency: NDArray[np.float64]) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-        gx, gy = (tip.receptance(frequency) for tip in tips)
+        gx, gy = x.receptance(frequency), y.receptance(frequency)
         half = (force[0, 0] * gx + force[1, 1] * gy) / 2
-        product = (force[0, 0] * force[1, 1] - force[0, 1] * force[1, 0]) * gx * gy
+        determinant = force[0, 0] * force[1, 1] - force[0, 1] * force[1, 0]
+        product = determinant * gx * gy
+        if cross is not None:
+            gxy = cross.receptance(frequency)
+            half = half + (force[0, 1] + force[1, 0]) * gxy / 2
+            product = product - determinant * gxy**2
         return half, np.sqrt(half**2 - product)
 
     half_trace, root = half_trace_and_root(grid)

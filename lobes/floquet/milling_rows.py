@@ -21,7 +21,7 @@ class MillingRows:
     cut: Cut
     """Teeth, immersion, direction of milling and helix of all rows; its coefficients and feed angle do not count."""
     direction: NDArray[np.int64]
-    """Row of `axes` in which each mode moves, shape (n,)."""
+    """Row of `axes` in which each mode was tapped, shape (n,)."""
     axes: NDArray[np.int64]
     """Directions that give way, 0 for x and 1 for y, shape (p,)."""
     frequency: Floats
@@ -29,9 +29,11 @@ class MillingRows:
     damping_ratio: Floats
     """Damping ratios, shape (r, n)."""
     stiffness: Floats
-    """Stiffnesses at the tool tip (N/m), shape (r, n)."""
+    """Stiffnesses at the tool tip along their directions (N/m), shape (r, n)."""
     phase: Floats
     """Phases of the modal constants (rad), shape (r, n); 0 for real modes."""
+    vector: Floats
+    """Directions of the modes in `axes`, shape (r, n, p): what each takes of a force, and shows. 1 and 0 along one."""
     speed_rpm: Floats
     """Spindle speeds (rpm), shape (r,)."""
     tangential: Floats
@@ -74,7 +76,17 @@ class MillingRows:
         return np.asarray(np.hypot(self.tangential, self.radial))
 
 
-_VARYING = ("frequency", "damping_ratio", "stiffness", "phase", "speed_rpm", "tangential", "radial", "feed_angle")
+_VARYING = (
+    "frequency",
+    "damping_ratio",
+    "stiffness",
+    "phase",
+    "vector",
+    "speed_rpm",
+    "tangential",
+    "radial",
+    "feed_angle",
+)
 
 
 def joined_rows(first: MillingRows, second: MillingRows) -> MillingRows:
@@ -94,6 +106,7 @@ def rows_of(system: MillingSystem, cut: Cut, speed_rpm: Floats) -> MillingRows:
         damping_ratio=ones * system.damping_ratio,
         stiffness=ones * (system.frequency / system.shape) ** 2,
         phase=ones * system.phase,
+        vector=np.tile(system.vector, (speed_rpm.size, 1, 1)),
         speed_rpm=speed_rpm,
         tangential=np.full(speed_rpm.shape, cut.tangential),
         radial=np.full(speed_rpm.shape, cut.radial),

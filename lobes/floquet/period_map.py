@@ -8,7 +8,8 @@ the cut the modes ring freely, exactly. For r rows and d depths:
     z (r, d, 2n), w (r, d, nodes p), p directions      theta = w_n times the length of a piece
     D = (1 + 2 zeta theta A + theta^2 A^2)^-1          A integrates from the begin of the piece to its nodes
     velocity = D (p_0 - theta c q_0 + theta/K A force),  q = q_0 + theta A velocity
-    displacement = q, of a complex mode its shares of q and velocity (`MillingRows.seen`)
+    displacement = vector q, of a complex mode vector times its shares of q and velocity (`MillingRows.seen`);
+    force = vector . F
 
 Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, ch. 3, with polynomials of degree
 7 instead of 1 for the delayed term; Hairer & Wanner, Solving Ordinary Differential Equations II, ch. IV.5.

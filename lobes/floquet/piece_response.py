@@ -40,7 +40,7 @@ class PieceResponse:
     shows: Floats
     """Displacements at the nodes from z at the begin, shape (r, p, s, 2n)."""
     gives: Floats
-    """Displacements at the nodes from forces there, shape (r, p, s, s)."""
+    """Displacements at the nodes from forces there, shape (r, p, p, s, s)."""
     pushes: Floats
     """z at the end from forces at the nodes, shape (r, 2n, p, s)."""
 
@@ -68,8 +68,8 @@ class PieceResponse:
         return cls(
             ends=_blocks(q[..., 0, 0], q[..., 0, 1], drive[..., 0, 0], drive[..., 0, 1]),
             shows=_by_direction(rows, shown),
-            gives=np.einsum("rnij,np->rpij", shown_forced, _moves(rows)),
-            pushes=np.concatenate([np.einsum("rns,np->rnps", push, _moves(rows)) for push in (q_push, v_push)], axis=1),
+            gives=np.einsum("rnij,rnp,rnq->rpqij", shown_forced, rows.vector, rows.vector),
+            pushes=np.concatenate([np.einsum("rns,rnp->rnps", push, rows.vector) for push in (q_push, v_push)], axis=1),
         )
 
     def cutting(self, force: Floats) -> Floats:
@@ -107,9 +107,10 @@ class PieceResponse:
         *cases, s, p, _ = force.shape
         size, states = p * s, self.ends.shape[-1]
         forces = np.ascontiguousarray(np.moveaxis(force, -3, -1))
-        loop, push = np.empty((*cases, size, size)), np.zeros((*cases, states, size))
-        gives = self.gives[:, np.newaxis, np.newaxis, :, :, np.newaxis]
-        np.multiply(gives, forces[..., np.newaxis, :, :], out=loop.reshape(*cases, p, s, p, s))
+        loop, push = np.zeros((*cases, size, size)), np.zeros((*cases, states, size))
+        for shown, pushed in zip(*np.nonzero(np.any(self.gives, axis=(0, 3, 4))), strict=True):
+            gives = self.gives[:, np.newaxis, np.newaxis, shown, pushed, :, np.newaxis]
+            loop.reshape(*cases, p, s, p, s)[..., shown, :, :, :] += gives * forces[..., np.newaxis, pushed, :, :]
         i = np.arange(size)
         loop[..., i, i] += 1
         for direction in range(p):
@@ -119,18 +120,11 @@ class PieceResponse:
 
     def _given(self) -> Floats:
         """Displacements at the nodes from forces there in all directions, shape (r, ps, ps)."""
-        r, p, s, _ = self.gives.shape
-        given, i = np.zeros((r, p, s, p, s)), np.arange(p)
-        given[:, i, :, i] = np.moveaxis(self.gives, 1, 0)
-        return given.reshape(r, p * s, p * s)
-
-
-def _moves(rows: MillingRows) -> Floats:
-    """1 where a mode moves in a direction, shape (n, p)."""
-    return np.asarray(np.eye(rows.axes.size)[rows.direction])
+        r, p, _, s, _ = self.gives.shape
+        return np.moveaxis(self.gives, 2, 3).reshape(r, p * s, p * s)
 
 
 def _by_direction(rows: MillingRows, place: Floats) -> Floats:
-    """Displacements from z: places (r, n, s, 2) of the modes, each in its own direction, shape (r, p, s, 2n)."""
-    shown = np.einsum("rnsk,np->rpskn", place, _moves(rows))
+    """Displacements from z: places (r, n, s, 2) of the modes, each along its vector, shape (r, p, s, 2n)."""
+    shown = np.einsum("rnsk,rnp->rpskn", place, rows.vector)
     return np.asarray(shown.reshape(*shown.shape[:3], -1))

@@ -47,6 +47,7 @@ def is_free(cut: Cut, ends: Floats, depth: Floats) -> NDArray[np.bool_]:
 def piece_numbers(rows: MillingRows, deepest: float) -> NDArray[np.int64]:
     """Pieces of the whole pattern of teeth that each row needs for depths (m) up to `deepest`, shape (r,)."""
     loop = deepest * rows.force[:, np.newaxis] / (2 * rows.stiffness * rows.damping_ratio) * np.hypot(*rows.seen)
+    loop = loop * np.sum(rows.vector**2, axis=-1)
     fastest = np.maximum(np.max(np.where(loop > QUIET, rows.frequency, 0.0), axis=1), np.min(rows.frequency, axis=1))
     cycles = fastest / (2 * np.pi) * rows.period
     return np.asarray(np.ceil(np.maximum(cycles / CYCLES, 1.0)), dtype=np.int64)

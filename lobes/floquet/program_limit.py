@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from lobes.floquet.growth import growth
 from lobes.floquet.milling_rows import MillingRows, rows_of
@@ -44,13 +44,20 @@ class ProgramLimit:
     """The limits for each direction of feed (m)."""
 
 
-def program_limit(program: Program, x: Modes, y: Modes, feed_angles: Sequence[float] | None = None) -> ProgramLimit:
+def program_limit(
+    program: Program,
+    x: Modes,
+    y: Modes,
+    feed_angles: Sequence[float] | None = None,
+    vectors: ArrayLike | None = None,
+) -> ProgramLimit:
     """State and limit of a program by semi-discretisation, in the worst of its directions of feed.
 
-    feed_angles: from x (rad); None: that of its cut. Raises ValueError for bad modes.
+    feed_angles: from x (rad); None: that of its cut. vectors: directions (n, 2) of the modes of x, then of y, where
+    they lie askew (`milling_system`). Raises ValueError for bad modes or vectors.
     """
     angles = np.array([program.cut.feed_angle] if feed_angles is None else feed_angles)
-    system = milling_system(x, y)
+    system = milling_system(x, y, vectors)
     rows = replace(rows_of(system, program.cut, np.full(angles.size, program.speed_rpm)), feed_angle=angles)
     crossings, number = settled_crossings(rows, DEEPEST * program.depth)
     unstable = _unstable(rows, program, number)

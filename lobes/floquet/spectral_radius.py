@@ -18,19 +18,25 @@ from modal import Mode
 
 
 def spectral_radius(
-    x: Sequence[Mode] | None, y: Sequence[Mode] | None, cut: Cut, speed_rpm: ArrayLike, depth: ArrayLike
+    x: Sequence[Mode] | None,
+    y: Sequence[Mode] | None,
+    cut: Cut,
+    speed_rpm: ArrayLike,
+    depth: ArrayLike,
+    vectors: ArrayLike | None = None,
 ) -> NDArray[np.float64]:
     """Largest magnitude of the Floquet multipliers over a tooth period at each speed (rpm) and depth (m); < 1: stable.
 
     x and y are directions of the machine (`Cut.feed_angle` says how the feed lies in them); None stands for one that
     is rigid. Any immersion, any number of modes, straight or helical teeth. The tooth period is divided finely enough
-    for all modes that count at the deepest depth. Returns shape (n_speed, n_depth).
+    for all modes that count at the deepest depth. vectors: directions (n, 2) of the modes of x, then of y, where they
+    lie askew (`milling_system`). Returns shape (n_speed, n_depth).
 
-    Raises ValueError for bad speeds, depths or modes.
+    Raises ValueError for bad speeds, depths, modes or vectors.
     Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, with a high order
     (`lobes.floquet.period_map`).
     """
-    system, speed, deep = milling_system(x, y), check_speeds(speed_rpm), check_depths(depth)
+    system, speed, deep = milling_system(x, y, vectors), check_speeds(speed_rpm), check_depths(depth)
     rows = rows_of(system, cut, speed)
     grid = np.broadcast_to(deep, (speed.size, deep.size))
     return np.abs(largest_multipliers(rows, grid, piece_numbers(rows, float(np.max(deep)))))

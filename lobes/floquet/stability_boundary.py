@@ -21,7 +21,12 @@ Floats = NDArray[np.float64]
 
 
 def stability_boundary(
-    x: Sequence[Mode] | None, y: Sequence[Mode] | None, cut: Cut, speed_rpm: ArrayLike, max_depth: float
+    x: Sequence[Mode] | None,
+    y: Sequence[Mode] | None,
+    cut: Cut,
+    speed_rpm: ArrayLike,
+    max_depth: float,
+    vectors: ArrayLike | None = None,
 ) -> StabilityLobes:
     """Depths (m) up to max_depth at each speed (rpm) where milling changes from stable to unstable or back.
 
@@ -29,13 +34,14 @@ def stability_boundary(
     there is none; `crossings` are all, islands too. `kind` is "flip" where the multiplier is -1 (period two), else
     "hopf"; the chatter frequency is the loudest of those that the multiplier leaves. The tooth period is divided into
     pieces for all modes that count, and again twice as finely until limits and kinds have settled within 0.25 %;
-    `detail` states how many that took.
+    `detail` states how many that took. vectors: directions (n, 2) of the modes of x, then of y, where they lie askew
+    (`milling_system`).
 
-    Raises ValueError for bad speeds, depths or modes, ArithmeticError where a limit does not settle.
+    Raises ValueError for bad speeds, depths, modes or vectors, ArithmeticError where a limit does not settle.
     Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, with a high order
     (`lobes.floquet.period_map`).
     """
-    system, speed = milling_system(x, y), check_speeds(speed_rpm)
+    system, speed = milling_system(x, y, vectors), check_speeds(speed_rpm)
     if not (np.isfinite(max_depth) and max_depth > 0):
         raise ValueError(f"max_depth={max_depth} m is not a finite depth > 0; give the deepest cut of interest")
     rows = rows_of(system, cut, speed)

@@ -1,6 +1,7 @@
 """Zero order of many spindles at once: limits over speeds, and the loop at a depth beyond its limit.
 
-With the mean force matrix H0, G = diag(Gx, Gy) and tau between two teeth, motion exp(s t) sustains itself where
+With the mean force matrix H0, G = [[Gx, Gxy], [Gxy, Gy]] and tau between two teeth, motion exp(s t) sustains itself
+where
 
     det(I + b (1 - exp(-s tau)) H0 G(s)) = 0:      at the limit s = 2 pi i f_c, beyond it Re s > 0.
 
@@ -48,6 +49,8 @@ class ModeColumns(NamedTuple):
     """Share of its coordinate that the tip shows (-)."""
     velocity: Floats
     """Share of its velocity over the natural frequency that the tip shows (-)."""
+    share: Floats
+    """Product of its parts in the direction of the force and that of the displacement (-)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,46 +114,60 @@ class MeanForce:
 
     def _closed(self, s: Complexes, tau: Floats, depth: float) -> tuple[Complexes, Complexes]:
         """det(I + b (1 - exp(-s tau)) H0 G) and its derivative by s."""
-        (gx, dx), (gy, dy) = self._with_slope(s, 0), self._with_slope(s, 1)
+        (gx, dx), (gy, dy) = self._with_slope(s, 0, 0), self._with_slope(s, 1, 1)
         h = self.force[..., np.newaxis]
         wave = np.exp(-np.clip(s.real * tau, -50, 50) - 1j * s.imag * tau)
         gain, dgain = depth * (1 - wave), depth * tau * wave
         trace, dtrace = h[:, 0, 0] * gx + h[:, 1, 1] * gy, h[:, 0, 0] * dx + h[:, 1, 1] * dy
         product = h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] * h[:, 1, 0]
         minor, dminor = product * gx * gy, product * (dx * gy + gx * dy)
+        if self._is_askew:
+            gxy, dxy = self._with_slope(s, 0, 1)
+            both = h[:, 0, 1] + h[:, 1, 0]
+            trace, dtrace = trace + both * gxy, dtrace + both * dxy
+            minor, dminor = minor - product * gxy**2, dminor - 2 * product * gxy * dxy
         return (
             1 + gain * trace + gain**2 * minor,
             dgain * trace + gain * dtrace + 2 * gain * dgain * minor + gain**2 * dminor,
         )
 
-    def _receptance(self, frequency: Floats, axis: int) -> Complexes:
-        """Receptance in one direction at frequencies (rad/s) (r, k)."""
+    @property
+    def _is_askew(self) -> bool:
+        """Whether a force in x moves the tip in y."""
+        return bool(np.any(np.prod(self.rows.vector, axis=-1)))
+
+    def _receptance(self, frequency: Floats, force: int, shown: int) -> Complexes:
+        """Receptance from one direction to another at frequencies (rad/s) (r, k)."""
         total = np.zeros(frequency.shape, np.complex128)
-        for mode in self._modes(axis):
+        for mode in self._modes(force, shown):
             r = frequency / mode.frequency
             elastic, damped, moving = 1 - r * r, 2 * mode.damping_ratio * r, mode.velocity * r
-            share = 1 / (mode.stiffness * (elastic * elastic + damped * damped))
+            share = mode.share / (mode.stiffness * (elastic * elastic + damped * damped))
             total.real += (mode.place * elastic + moving * damped) * share
             total.imag += (moving * elastic - mode.place * damped) * share
         return total
 
-    def _with_slope(self, s: Complexes, axis: int) -> tuple[Complexes, Complexes]:
-        """Receptance in one direction at s (r, k) (1/s), and its derivative."""
+    def _with_slope(self, s: Complexes, force: int, shown: int) -> tuple[Complexes, Complexes]:
+        """Receptance from one direction to another at s (r, k) (1/s), and its derivative."""
         total, slope = np.zeros(s.shape, np.complex128), np.zeros(s.shape, np.complex128)
-        for mode in self._modes(axis):
+        for mode in self._modes(force, shown):
             r = s / mode.frequency
             flexible = 1 / (mode.stiffness * (1 + (2 * mode.damping_ratio + r) * r))
             part = (mode.place + mode.velocity * r) * flexible
-            total += part
+            total += mode.share * part
             bend = part * (2 * mode.stiffness * (mode.damping_ratio + r))
-            slope += (mode.velocity - bend) * flexible / mode.frequency
+            slope += mode.share * (mode.velocity - bend) * flexible / mode.frequency
         return total, slope
 
-    def _modes(self, axis: int) -> Iterator[ModeColumns]:
-        """Modes of one direction."""
+    def _modes(self, force: int, shown: int) -> Iterator[ModeColumns]:
+        """Modes that a force in one direction moves in another."""
         place, velocity = self.rows.seen
-        parts = self.rows.frequency, self.rows.damping_ratio, self.rows.stiffness, place, velocity
-        for k in np.flatnonzero(self.rows.axes[self.rows.direction] == axis):
+        axes, vector = self.rows.axes.tolist(), self.rows.vector
+        if force not in axes or shown not in axes:
+            return
+        share = vector[..., axes.index(force)] * vector[..., axes.index(shown)]
+        parts = self.rows.frequency, self.rows.damping_ratio, self.rows.stiffness, place, velocity, share
+        for k in np.flatnonzero(np.any(share, axis=0)):
             yield ModeColumns(*(part[:, k, np.newaxis] for part in parts))
 
     def _grid(self) -> Floats:
@@ -162,10 +179,13 @@ class MeanForce:
 
     def _eigenvalues(self, grid: Floats) -> list[Complexes]:
         """Both eigenvalues of H0 G at frequencies (r, k), each followed over them."""
-        gx, gy = (self._receptance(2 * np.pi * grid, axis) for axis in (0, 1))
+        gx, gy = (self._receptance(2 * np.pi * grid, axis, axis) for axis in (0, 1))
         h = self.force[..., np.newaxis]
-        half = (h[:, 0, 0] * gx + h[:, 1, 1] * gy) / 2
-        root = np.sqrt(half**2 - (h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] * h[:, 1, 0]) * gx * gy)
+        half, product = (h[:, 0, 0] * gx + h[:, 1, 1] * gy) / 2, gx * gy
+        if self._is_askew:
+            gxy = self._receptance(2 * np.pi * grid, 0, 1)
+            half, product = half + (h[:, 0, 1] + h[:, 1, 0]) * gxy / 2, product - gxy**2
+        root = np.sqrt(half**2 - (h[:, 0, 0] * h[:, 1, 1] - h[:, 0, 1] * h[:, 1, 0]) * product)
         jumps = np.real(root[:, 1:] * np.conj(root[:, :-1])) < 0
         root[:, 1:] *= np.cumprod(np.where(jumps, -1.0, 1.0), axis=1)
         return [half + root, half - root]

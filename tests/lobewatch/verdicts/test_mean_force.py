@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lobes import Cut, milling_system, rows_of, zero_order
+from lobes import Cut, milling_system, rows_of, shown_modes, zero_order
 from lobes.floquet import largest_multipliers, piece_numbers
 from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.verdicts.mean_force import MeanForce, is_constant
@@ -32,9 +32,23 @@ def test_limits_are_those_of_zero_order(cut: Cut, angle: float) -> None:
     assert depth[1] == pytest.approx(depth[0] / 2)
 
 
-def test_growth_and_frequency_beyond_the_limit_are_those_of_semi_discretisation() -> None:
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_limits_of_askew_modes_are_those_of_zero_order(angle: float) -> None:
+    cut, vectors = Cut(3, 0.5, "up", 7e8, 1e8, feed_angle=angle), [[0.8, 0.6], [0.3, 0.95], [-0.6, 0.8]]
+    rows = rows_of(milling_system(X, Y, vectors), cut, np.ones(1))
+    shown = shown_modes([*X, *Y], vectors)
+    wanted = zero_order(shown.x, shown.y, cut, SPEEDS, shown.cross)
+    depth, chatter = MeanForce.of(rows).limits(SPEEDS)
+    assert depth[0] == pytest.approx(wanted.depth, rel=0.02)
+    assert chatter[0] == pytest.approx(wanted.chatter_frequency, rel=2e-3)
+
+
+@pytest.mark.parametrize("vectors", [None, [[0.8, 0.6], [0.3, 0.95], [-0.6, 0.8]]])
+def test_growth_and_frequency_beyond_the_limit_are_those_of_semi_discretisation(
+    vectors: list[list[float]] | None,
+) -> None:
     cut = Cut(4, 1.0, "down", 1.4e9, 5e8)
-    rows = rows_of(milling_system(X, Y), cut, SPEEDS)
+    rows = rows_of(milling_system(X, Y, vectors), cut, SPEEDS)
     depth = 3e-3
     multiplier = largest_multipliers(rows, np.full((60, 1), depth), piece_numbers(rows, depth))[:, 0]
     grown, frequency = MeanForce.of(rows).loudest(SPEEDS, depth)

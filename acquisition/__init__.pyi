@@ -14,6 +14,7 @@ from .devices import (
     driver_names,
     find_driver,
     load_drivers,
+    on_no_serial_port,
     probe_port,
     survey_ports,
 )
@@ -65,7 +66,7 @@ from .sensors import (
     stiffness_doubt,
     unit_mistake,
 )
-from .source import Device, DeviceIdentity, Source
+from .source import Device, DeviceAddress, DeviceIdentity, Source
 from .tap import UNSAID, Circumstances, Conditions, SourceFile, TapTest, machine_of, named_in_id, new_tap_id
 from .taps import Faults, TapsEmulator, TapsSource
 from .verdicts import HitVerdict, average_good, check_hit, judge_hit
@@ -88,6 +89,7 @@ __all__ = [
     "DataqTraits",
     "Description",
     "Device",
+    "DeviceAddress",
     "DeviceError",
     "DeviceIdentity",
     "DeviceSettings",
@@ -161,6 +163,7 @@ __all__ = [
     "named_in_id",
     "new_tap_id",
     "no_ports_hint",
+    "on_no_serial_port",
     "probe_port",
     "read_frf",
     "read_hits",

@@ -94,6 +94,8 @@ class SensorInput:
     """Number of the input, as printed beside the terminals."""
     channel: Channel
     """The sensor; its full scale is the range to set."""
+    iepe: bool = True
+    """Whether the device feeds the sensor (IEPE, ICP), where it can."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -52,6 +52,18 @@ class DeviceIdentity:
     """Version; empty where it has none."""
 
 
+@dataclass(frozen=True)
+class DeviceAddress:
+    """Where a device is that is no serial port, and who it is."""
+
+    address: str
+    """Address as `[daq] port` and --port take it: the name of the driver, a colon, and what the driver knows it by."""
+    identity: DeviceIdentity
+    """Model, serial number and firmware, as far as they are known before it is opened."""
+    description: str = ""
+    """Description in the words of the system."""
+
+
 class Device(Source, Protocol):
     """A connected source that says who it is and how it fares, and can be given back. A context manager."""
 

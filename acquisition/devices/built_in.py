@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from acquisition.devices.driver import DeviceSettings, Driver, SensorPlace
+from acquisition.devices.driver import DeviceSettings, Driver, SensorPlace, on_no_serial_port
 
 if TYPE_CHECKING:
     from acquisition.emulation import Bench, EmulatorThread
     from acquisition.ports import SerialLink
-    from acquisition.source import Device, DeviceIdentity
+    from acquisition.source import Device, DeviceAddress, DeviceIdentity
 
 CLOCK = 1000.0
 """Of an emulated generator (Hz)."""
@@ -73,6 +74,24 @@ def _emulate_dataq(bench: Bench) -> EmulatorThread:
     return DataqEmulator(bench.signal_at, bench.inputs, realtime=bench.realtime, tcp=bench.tcp, traits=traits)
 
 
+def _by_library(name: str, title: str, extra: str) -> Driver:
+    """A kind of device that a library of its maker reads."""
+
+    def open_device(port: str, settings: DeviceSettings) -> Device:
+        from acquisition import makers
+
+        opened: Device = getattr(makers, f"open_{name}")(port, settings.inputs, settings.sample_rate)
+        return opened
+
+    def search() -> Sequence[DeviceAddress]:
+        from acquisition import makers
+
+        listed: Sequence[DeviceAddress] = getattr(makers, f"search_{name}")()
+        return listed
+
+    return Driver(name, title, open_device, on_no_serial_port, search=search, is_tried=False, extra=extra)
+
+
 BUILT_IN = (
     Driver(
         "taps",
@@ -93,5 +112,10 @@ BUILT_IN = (
         vendors=frozenset({0x0683}),
         emulate=_emulate_dataq,
     ),
+    _by_library("audio", "a sound device with two inputs, such as The Modal Shop 485B39", "audio"),
+    _by_library("nidaqmx", "an NI device, such as an NI 9234 or 9230", "nidaqmx"),
+    _by_library("mcc172", "an MCC 172 on a Raspberry Pi", "mcc172"),
+    _by_library("uldaq", "a Measurement Computing USB device", "uldaq"),
+    _by_library("ljm", "a LabJack T7 or T8", "ljm"),
 )
 """In the order in which they are asked for."""

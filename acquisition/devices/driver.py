@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from acquisition.channel import SensorInput
     from acquisition.emulation import Bench, EmulatorThread
     from acquisition.ports import SerialLink
-    from acquisition.source import Device, DeviceIdentity
+    from acquisition.source import Device, DeviceAddress, DeviceIdentity
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,11 @@ def anything_goes(settings: DeviceSettings) -> None:
     """Take all settings."""
 
 
+def on_no_serial_port(_link: SerialLink) -> DeviceIdentity | None:
+    """Answer of a device that is on no serial port: nobody."""
+    return None
+
+
 @dataclass(frozen=True)
 class Driver:
     """One kind of device. Its functions import what they need when they are called: a list of drivers costs nothing."""
@@ -55,7 +60,8 @@ class Driver:
     """Function that connects to a device on a port; DeviceError where none is there, ValueError for settings that it
     does not have."""
     probe: Callable[[SerialLink], DeviceIdentity | None]
-    """Function that asks once who answers on an open link; None where no device of this kind does."""
+    """Function that asks once who answers on an open link; None where no device of this kind does. `on_no_serial_port`
+    for devices that are on none."""
     check: Callable[[DeviceSettings], None] = anything_goes
     """Function that raises ValueError for settings that no device of this kind has; its sensors are checked already."""
     sensors: SensorPlace | None = None
@@ -67,3 +73,9 @@ class Driver:
     """Function that makes a device of this kind of software."""
     emulates_fast: bool = False
     """Whether the emulated device can tell the host that its scans do not follow the clock."""
+    search: Callable[[], Sequence[DeviceAddress]] | None = None
+    """Function that lists devices of this kind that are on no serial port; none where its library is not installed."""
+    is_tried: bool = True
+    """Whether somebody has reported that it works on hardware."""
+    extra: str = ""
+    """Name of the extra of lobewatch that brings the library it needs; empty where it needs none."""

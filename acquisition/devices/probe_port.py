@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import queue
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
+from acquisition.devices.ask_driver import ask_driver
 from acquisition.devices.driver import Driver
 from acquisition.devices.registry import not_answering
-from acquisition.errors import DeviceError
-from acquisition.plugin import words_of
 from acquisition.ports.serial_link import SerialLink
 from acquisition.remark import Remark
 from acquisition.source import DeviceIdentity
-
-PROBE_TIME = 10.0
-"""Time within which a driver has asked who answers (s), three times what ours take; chosen."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +22,8 @@ class Answer:
     """Name of the driver, as in [daq] of machine.toml."""
     identity: DeviceIdentity
     """Model, serial number and firmware."""
+    is_tried: bool = True
+    """Whether somebody has reported that the driver works on hardware."""
 
 
 def probe_port(
@@ -43,7 +40,7 @@ def probe_port(
         for driver in _suggested(drivers, vendor):
             identity = _ask(driver, link)
             if isinstance(identity, DeviceIdentity):
-                return Answer(driver.name, identity)
+                return Answer(driver.name, identity, driver.is_tried)
             if isinstance(identity, Remark):
                 if remarks is not None:
                     remarks.append(identity)
@@ -56,27 +53,17 @@ def probe_port(
 
 def _ask(driver: Driver, link: SerialLink) -> DeviceIdentity | Remark | None:
     """What a driver says of a port: who answers, nobody, or why it cannot be believed."""
-    answers = queue.SimpleQueue[object]()
-
-    def ask() -> None:
-        try:
-            answers.put(driver.probe(link))
-        except BaseException as error:  # noqa: BLE001  (of another package: it ends nothing of ours)
-            answers.put(error)
-
-    threading.Thread(target=ask, name=f"probe of {driver.name}", daemon=True).start()
-    try:
-        answer = answers.get(timeout=PROBE_TIME)
-    except queue.Empty:
-        return not_answering(driver.name, f"has not answered within {PROBE_TIME:g} s who is on {link.port}")
-    if answer is None or isinstance(answer, DeviceError):  # unplugged while it was asked
-        return None
-    if isinstance(answer, BaseException):
-        return not_answering(driver.name, f"fails when asked who is on {link.port} ({words_of(answer)})")
-    if isinstance(answer, DeviceIdentity) and all(isinstance(word, str) for word in vars(answer).values()):
-        return answer
-    text = f"answers {type(answer).__name__} when asked who is on {link.port}, not a DeviceIdentity of texts"
+    about = f"who is on {link.port}"
+    answer = ask_driver(driver.name, lambda: driver.probe(link), about)
+    if answer is None or isinstance(answer, Remark) or is_identity(answer):
+        return cast("DeviceIdentity | Remark | None", answer)
+    text = f"answers {type(answer).__name__} when asked {about}, not a DeviceIdentity of texts"
     return not_answering(driver.name, text)
+
+
+def is_identity(answer: object) -> bool:
+    """Whether an answer is a DeviceIdentity of texts."""
+    return isinstance(answer, DeviceIdentity) and all(isinstance(word, str) for word in vars(answer).values())
 
 
 def _suggested(drivers: Sequence[Driver], vendor: int | None) -> list[Driver]:

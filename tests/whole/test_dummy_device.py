@@ -109,3 +109,21 @@ def test_a_package_that_cannot_be_loaded_is_named_and_disables_nothing(trial: Pa
             "cure": "update or remove that package",
         }
     ]
+
+
+def test_a_device_that_is_on_no_serial_port(trial: Path) -> None:
+    bench = PLUGIN.parent / "dummy_bench"
+    trial.write_text(trial.read_text("utf-8").replace('"dummy"', '"dummybench"\nport = "dummybench:left"', 1), "utf-8")
+    listed = run("ports", plugin=bench)
+    assert "dummybench:left" in listed.stdout
+    assert "dummybench: BENCH-1, serial number 0007, firmware 2.0" in listed.stdout
+    (only,) = json.loads(run("ports", "--port", "dummybench:left", "--json", plugin=bench).stdout)["ports"]
+    assert (only["description"], only["answer"]["model"]) == ("bench at the window", "BENCH-1")
+    tapped = run("tap", "trial", "--direction", "x", "--json", plugin=bench)
+    assert tapped.returncode == 0, tapped.stderr
+    assert json.loads(tapped.stdout)["followed"]["frequency_hz"] == pytest.approx(1700.0, abs=0.5)
+    wrong = run("tap", "trial", "--port", "dummybench:right", plugin=bench)
+    assert (wrong.returncode, wrong.stderr.splitlines()[-1]) == (
+        2,
+        "error: there is no bench dummybench:right; there is dummybench:left",
+    )

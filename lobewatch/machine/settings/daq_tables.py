@@ -31,6 +31,7 @@ class ChannelTable(Table, frozen=True):
     sensitivity_mv_per_n: Sensitivity | None = None
     sensitivity_mv_per_g: Sensitivity | None = None
     gain: Positive = 1.0
+    iepe: bool = True
     direction: TapDirection | Literal[""] = ""
     serial_number: str = ""
     calibration_date: date | None = None
@@ -62,7 +63,7 @@ class ChannelTable(Table, frozen=True):
             calibration_date=self.calibration_date.isoformat() if self.calibration_date else "",
             skew=self.skew_us / 1e6,
         )
-        return SensorInput(self.input, channel)
+        return SensorInput(self.input, channel, self.iepe)
 
 
 class Daq(Table, frozen=True):

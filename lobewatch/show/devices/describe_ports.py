@@ -41,7 +41,9 @@ def _port_json(listed: SeenPort) -> dict[str, Any]:
         "usb": _usb(port),
         "serial_number": port.serial_number,
         "description": port.description,
-        "answer": {"driver": answer.driver, **asdict(answer.identity)} if answer else None,
+        "answer": {"driver": answer.driver, **asdict(answer.identity), "tried_on_hardware": answer.is_tried}
+        if answer
+        else None,
         "problem": listed.problem or None,
     }
 
@@ -58,7 +60,10 @@ def _answer(listed: SeenPort) -> str:
     if listed.answer is None:
         return listed.text
     who = listed.answer.identity
-    return f"{listed.answer.driver}: {who.model}, serial number {who.serial}, firmware {who.firmware}"
+    words = [f"{listed.answer.driver}: {who.model}"]
+    words += [f"serial number {who.serial}"] if who.serial else []
+    words += [f"firmware {who.firmware}"] if who.firmware else []
+    return ", ".join([*words, *([] if listed.answer.is_tried else ["not tried on hardware"])])
 
 
 def _summary(ports: tuple[SeenPort, ...]) -> str:

@@ -118,7 +118,7 @@ def test_a_probe_that_fails_or_talks_rubbish_is_named_and_the_next_is_asked(
 
 
 def test_a_probe_that_hangs_is_left_behind(port: str, bad_daq: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["acquisition.devices.probe_port"], "PROBE_TIME", 0.2)
+    monkeypatch.setattr(sys.modules["acquisition.devices.ask_driver"], "PROBE_TIME", 0.2)
     end, remarks = threading.Event(), list[Remark]()
     found = probe_port(port, [driver("bad", lambda _: end.wait()), driver("good", lambda _: WHO)], None, remarks)
     end.set()

@@ -1,0 +1,134 @@
+"""USB audio: a sound interface or a signal conditioner with two IEPE inputs, through PortAudio."""
+
+from __future__ import annotations
+
+import queue
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from acquisition.channel import Channel, SensorInput
+from acquisition.errors import DeviceError
+from acquisition.makers.library import installed_library, load_library, only_inputs
+from acquisition.makers.library_device import LibraryDevice, Piece
+from acquisition.makers.name_calibration import NameCalibration, calibration_in
+from acquisition.source import DeviceAddress, DeviceIdentity
+
+RATE = 48000.0
+"""Sample rate where none is asked for (Hz)."""
+BLOCK_TIME = 0.02
+"""Length of a block (s)."""
+CODE_SPAN = 2.0**31
+"""Codes of 32 bits from 0 to full scale; devices of 24 bits fill the upper ones."""
+LEAST_AGREEMENT = 0.2
+"""Share by which range_v may differ from the calibration in the name; more is a mistake."""
+
+
+def search_audio() -> Sequence[DeviceAddress]:
+    """Sound devices with at least two inputs."""
+    library = installed_library("sounddevice", "audio")
+    return [_address(entry) for entry in library.query_devices() if entry["max_input_channels"] >= 2] if library else []
+
+
+def open_audio(port: str, inputs: Sequence[SensorInput], sample_rate: float | None = None) -> LibraryDevice:
+    """The sound device "audio:NAME", "audio:PART OF ITS NAME" or "audio:NUMBER", sampled by its own clock."""
+    library = load_library("sounddevice", "audio")
+    entry = _find(library.query_devices(), port.removeprefix("audio:"))
+    numbers = tuple(sensor.number for sensor in inputs)
+    only_inputs(numbers, entry["max_input_channels"], entry["name"])
+    rate = sample_rate or RATE
+    try:
+        library.check_input_settings(entry["index"], max(numbers) + 1, "int32", samplerate=rate)
+    except library.PortAudioError as error:
+        raise ValueError(f"sample_rate_hz={rate:g}: {entry['name']} has no such rate ({error}); try 48000") from error
+    calibration = calibration_in(entry["name"])
+    channels = tuple(_channel(sensor.channel, sensor.number, calibration) for sensor in inputs)
+    reader = AudioReader(library, entry["index"], numbers, rate, [channel.full_scale for channel in channels])
+    return LibraryDevice(port, reader, _address(entry).identity, channels, rate, "callback status")
+
+
+class AudioReader:
+    """Reads blocks that PortAudio hands over in a thread of its own."""
+
+    def __init__(
+        self, library: Any, index: int, numbers: tuple[int, ...], rate: float, full_scales: Sequence[float]
+    ) -> None:
+        """The device with this index; numbers: its inputs in order; full_scales: of those (V)."""
+        self.errors: tuple[type[Exception], ...] = (library.PortAudioError,)
+        self._numbers, self._volts = list(numbers), np.array(full_scales)[:, None] / CODE_SPAN
+        self._pieces = queue.SimpleQueue[Piece]()
+        self._stream = library.InputStream(
+            rate, round(rate * BLOCK_TIME), index, max(numbers) + 1, "int32", callback=self._keep
+        )
+        if abs(self._stream.samplerate / rate - 1) > 1e-3:
+            actual = self._stream.samplerate
+            self._stream.close()
+            raise DeviceError(
+                f"the sound device samples at {actual:g} Hz where {rate:g} Hz was asked",
+                "name its rate as sample_rate_hz in [daq]",
+            )
+
+    def start(self) -> None:
+        """See Reader."""
+        self._pieces = queue.SimpleQueue()
+        self._stream.start()
+
+    def read(self, timeout: float) -> Piece | None:
+        """See Reader."""
+        try:
+            return self._pieces.get(timeout=timeout)
+        except queue.Empty:
+            return None
+
+    def stop(self) -> None:
+        """See Reader."""
+        self._stream.stop()
+
+    def close(self) -> None:
+        """See Reader."""
+        self._stream.close()
+
+    def fault(self) -> str:
+        """Nothing: a sound device does not tell."""
+        return ""
+
+    def _keep(self, data: Any, _frames: int, _times: Any, status: Any) -> None:
+        volts = np.asarray(data, np.float64).T[self._numbers] * self._volts
+        self._pieces.put(Piece(volts, lost_before=int(bool(status.input_overflow))))
+
+
+def _address(entry: dict[str, Any]) -> DeviceAddress:
+    calibration = calibration_in(entry["name"])
+    identity = DeviceIdentity(entry["name"], entry["name"])
+    if calibration:
+        identity = DeviceIdentity(calibration.model, calibration.serial)
+    return DeviceAddress(f"audio:{entry['name']}", identity, f"{entry['max_input_channels']} inputs")
+
+
+def _find(devices: Sequence[dict[str, Any]], wanted: str) -> dict[str, Any]:
+    """The one sound device with inputs of this name or number, or whose name holds it."""
+    inputs = [entry for entry in devices if entry["max_input_channels"]]
+    exact = [entry for entry in inputs if wanted in (entry["name"], str(entry["index"]))]
+    listed = exact or [entry for entry in inputs if wanted.casefold() in entry["name"].casefold()]
+    if len(listed) == 1:
+        return listed[0]
+    names = ", ".join(f"{entry['index']}: {entry['name']}" for entry in listed or inputs) or "none"
+    reason = f"{len(listed)} sound devices fit" if listed else "no sound device fits"
+    raise DeviceError(f'{reason} "audio:{wanted}" ({names})', "plug it in, or give its number, as in audio:3")
+
+
+def _channel(channel: Channel, number: int, calibration: NameCalibration | None) -> Channel:
+    """A channel of 24 bits with the full scale of the calibration where the name has it, else range_v."""
+    if calibration is None:
+        return replace(channel, adc_bits=24)
+    if number >= len(calibration.full_scales):
+        raise ValueError(f"input={number}: a {calibration.model} measures acceleration itself, and no force")
+    scale = calibration.full_scales[number]
+    if abs(channel.full_scale / scale - 1) > LEAST_AGREEMENT:
+        raise ValueError(
+            f"range_v={channel.full_scale:g}: the calibration of {calibration.model} says {scale:.4g} V for input "
+            f"{number}; write that"
+        )
+    return replace(channel, adc_bits=24, full_scale=scale)

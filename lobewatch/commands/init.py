@@ -3,33 +3,94 @@
 from __future__ import annotations
 
 import shlex
+import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, emit
+from lobewatch.show.terminal.output import Json, emit, notes
+
+if TYPE_CHECKING:
+    from lobewatch.machine.set_up.draft import Draft
+
+Answer = str | None
 
 
 def init(
     machine: Annotated[Path, typer.Argument(parser=named_folder, help="The folder to make.")],
     example: Annotated[bool, typer.Option("--example", help="With the surrogate spindle and three programs.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Ask nothing: what no option answers stays as it is.")] = False,
+    edit: Annotated[str, typer.Option(help="Ask one thing again, by the name of its option: --edit drive.")] = "",
+    name: Annotated[Answer, typer.Option(help="Name of the machine.")] = None,
+    speeds: Annotated[Answer, typer.Option(help='Lowest and highest spindle speed, rpm: "1000 18000".')] = None,
+    drive: Annotated[Answer, typer.Option(help='Power in kW and torque in N m: "15 40".')] = None,
+    daq: Annotated[Answer, typer.Option(help='Port of the DAQ, and its driver: "/dev/ttyUSB0 dataq".')] = None,
+    hammer: Annotated[Answer, typer.Option(help='Input, mV/N, range in V; not of TAPS/1: "0 2.25 5".')] = None,
+    accelerometer: Annotated[Answer, typer.Option(help='Input, mV/g, range in V: "1 10 5".')] = None,
+    fixing: Annotated[Answer, typer.Option(help='Mass (g) of the accelerometer, and how it is fixed: "4 wax".')] = None,
+    tool: Annotated[Answer, typer.Option(help='Teeth, diameter mm, helix deg, length out mm: "4 20 30 80".')] = None,
+    material: Annotated[Answer, typer.Option(help='What is cut: 42CrMo4; or Kt and Kr in N/mm2: "1400 500".')] = None,
+    program: Annotated[
+        Answer, typer.Option(help='Speed rpm, depth, radial depth, feed per tooth: "8000 2 20".')
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Make a machine folder with a commented machine.toml to fill in.
+    """Make a machine folder with a commented machine.toml: ten questions, or their answers as options.
+
+    At a terminal it asks; with --yes, and where nobody sits, it takes what options say and leaves the rest to fill in.
 
     Examples:
 
       lobewatch init mill-3
+      lobewatch init mill-3 --edit tool
+      lobewatch init mill-3 --yes --daq COM3 --tool "4 20 30 80" --material 42CrMo4 --program "slot: 8000 2 20"
       lobewatch init trial --example
     """
-    from lobewatch.machine.new_folder import make_machine_folder
+    from lobewatch.machine.new_folder import new_machine_text, write_machine
 
-    toml = make_machine_folder(machine, "surrogate_machine.toml" if example else "new_machine.toml")
+    asked = {"name": name, "speeds": speeds, "drive": drive, "daq": daq, "hammer": hammer, "fixing": fixing}
+    asked |= {"accelerometer": accelerometer, "tool": tool, "material": material, "program": program}
+    answers = {key: answer for key, answer in asked.items() if answer is not None}
+    asks = sys.stdin.isatty() and notes.is_terminal and not (yes or as_json or example)
+    toml = machine / "machine.toml"
+    if edit:
+        from lobewatch.machine.folder import MachineFolder
+
+        text = MachineFolder(machine).toml_text
+    else:
+        text = new_machine_text(machine, "surrogate_machine.toml" if example else "new_machine.toml")
+    next_step = f"lobewatch tap {shlex.quote(str(machine))}"
+    if asks or answers or edit:
+        draft = _set_up(text, answers, edit, asks)
+        text, next_step = draft.text, next_step if draft.daq.port else f"{next_step} --port PORT"
+    else:
+        next_step = f"fill it in, then tap with: {next_step} --port PORT"
+    write_machine(machine, text)
     emit(
         {"machine": str(machine), "machine_toml": str(toml)},
         as_json,
-        f"made {toml}",
-        f"next: fill it in, then tap with: lobewatch tap {shlex.quote(str(machine))} --port PORT",
+        f"{'altered' if edit else 'made'} {toml}",
+        f"next: {next_step}",
     )
+
+
+def _set_up(text: str, answers: Mapping[str, str], edit: str, asks: bool) -> Draft:
+    """Draft with the answers of options and of whoever sits at the terminal."""
+    from lobewatch.machine.set_up.draft import Draft
+    from lobewatch.machine.set_up.questions import QUESTIONS, find_question
+    from lobewatch.show.terminal.set_up_dialogue import answer_questions, ask_questions
+
+    draft = Draft(text, {})
+    chosen = (find_question(edit),) if edit else QUESTIONS
+    if edit and not asks and edit not in answers:
+        raise ValueError(f"--edit {edit}: nobody is at the terminal to ask; give the answer with --{edit}")
+    if not asks:
+        return answer_questions(draft, answers)
+    try:
+        return ask_questions(draft, chosen, answers)
+    except (EOFError, KeyboardInterrupt):
+        notes.print("\nnothing is written")
+        raise KeyboardInterrupt from None

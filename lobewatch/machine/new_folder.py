@@ -16,13 +16,24 @@ def make_machine_folder(folder: Path, template: str) -> Path:
 
     ValueError for a folder whose name holds control characters.
     """
+    return write_machine(folder, new_machine_text(folder, template))
+
+
+def new_machine_text(folder: Path, template: str) -> str:
+    """Text of the machine.toml of a folder to be made; DataError where there is one already."""
     name = folder.resolve().name or "machine"  # the root of a disk has no name
     check_name(name, "folder")
     toml = folder / "machine.toml"
     if toml.exists():
         raise DataError(f"{toml}: is there already; choose another folder or edit that file")
-    make_folder(folder)
     text = resources.files("sim_data").joinpath(template).read_text(encoding="utf-8")
     quoted = json.dumps(name, ensure_ascii=False)  # TOML escapes as JSON does
-    atomic_write(toml, text.replace('"MACHINE_NAME"', quoted).encode())
+    return text.replace('"MACHINE_NAME"', quoted)
+
+
+def write_machine(folder: Path, text: str) -> Path:
+    """Write the machine.toml of a folder, which is made where it is not there."""
+    make_folder(folder)
+    toml = folder / "machine.toml"
+    atomic_write(toml, text.encode())
     return toml

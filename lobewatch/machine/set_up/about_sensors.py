@@ -1,0 +1,121 @@
+"""Questions about what the machine is tapped with: DAQ, hammer, accelerometer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import get_args
+
+from acquisition import driver_names
+from lobewatch.machine.set_up.daq_look import look_at
+from lobewatch.machine.set_up.draft import Draft
+from lobewatch.machine.set_up.question import SetUpQuestion
+from lobewatch.machine.set_up.read_answer import OPEN, is_open, number_text, read_numbers
+from lobewatch.machine.settings.edit_text import Value
+from lobewatch.machine.settings.sensor_loading import Mounting
+
+SENSITIVITY = {"force": "sensitivity_mv_per_n", "acceleration": "sensitivity_mv_per_g"}
+"""Key of the sensitivity of a sensor, by its quantity."""
+NUMBERS = {"force": 0, "acceleration": 1}
+"""Number of a sensor in [[daq.channel]]."""
+
+
+def _port(draft: Draft) -> str:
+    daq = draft.table("daq")
+    driver = f" {daq['driver']}" if "driver" in daq else ""
+    if port := daq.get("port"):
+        return f"{port}{driver}"
+    answering = [look.port for look in draft.looks.values() if look.text]
+    return answering[0] if answering else OPEN
+
+
+def _set_port(draft: Draft, answer: str) -> Draft:
+    """Port, with the driver behind it where nobody answers there, or the number of one that was listed."""
+    if is_open(answer):
+        return draft.set("daq", port=None, driver=None)
+    answering = [look.port for look in draft.looks.values() if look.text]
+    if answer.strip().isdecimal():
+        number = int(answer)
+        if not 1 <= number <= len(answering):
+            raise ValueError(f"{answer}: no DAQ of this number is listed; give the port, as in /dev/ttyACM0")
+        answer = answering[number - 1]
+    port, _, driver = answer.strip().partition(" ")
+    if driver and driver not in driver_names():
+        raise ValueError(f"driver {driver!r} is not known; there are {', '.join(driver_names())}")
+    look = draft.looks.get(port) or look_at(port)
+    draft = replace(draft, looks={**draft.looks, port: look})
+    driver = driver or look.driver
+    return draft.set("daq", port=port, driver=None if driver == "taps" else driver)
+
+
+def _known_by_daq(quantity: str, draft: Draft) -> str:
+    if draft.needs_sensors:
+        return ""
+    says = draft.daq.sensor_text(quantity)
+    return f"{says}, says the DAQ" if says else "the DAQ will say it itself"
+
+
+def _sensor(quantity: str, draft: Draft) -> str:
+    channel = draft.table("daq.channel", NUMBERS[quantity])
+    if channel.get("quantity") != quantity:
+        return ""
+    return " ".join(number_text(channel[key]) for key in ("input", SENSITIVITY[quantity], "range_v"))
+
+
+def _set_sensor(quantity: str, draft: Draft, answer: str) -> Draft:
+    unit = "mV/N" if quantity == "force" else "mV/g"
+    number, sensitivity, reach = read_numbers(answer, ("input of the DAQ", f"sensitivity in {unit}", "range in V"))
+    if not number.is_integer():
+        raise ValueError(f"{answer!r}: input {number:g} is none; inputs are counted 0, 1, 2 ...")
+    if len(draft.table("daq").get("channel", ())) < NUMBERS[quantity]:
+        raise ValueError("the hammer comes first: answer --hammer too")
+    values: dict[str, Value] = {
+        "input": int(number),
+        "quantity": quantity,
+        SENSITIVITY[quantity]: sensitivity,
+        "range_v": reach,
+    }
+    return draft.set("daq.channel", NUMBERS[quantity], **values)
+
+
+def _fixing(draft: Draft) -> str:
+    tap = draft.table("tap")
+    words = [number_text(tap["sensor_mass_g"])] if "sensor_mass_g" in tap else []
+    return " ".join([*words, *([tap["mounting"]] if "mounting" in tap else [])]) or OPEN
+
+
+def _set_fixing(draft: Draft, answer: str) -> Draft:
+    if is_open(answer):
+        return draft.set("tap", sensor_mass_g=None, mounting=None)
+    words = [word.strip(",;") for word in answer.casefold().split()]
+    mountings = [word for word in words if word in get_args(Mounting)]
+    rest = " ".join(word for word in words if word not in get_args(Mounting))
+    names = (f"mass in g, then {', '.join(get_args(Mounting))}",)
+    mass = read_numbers(rest, names, 0 if mountings else 1)
+    return draft.set("tap", sensor_mass_g=mass[0] if mass else None, mounting=mountings[0] if mountings else None)
+
+
+DAQ = SetUpQuestion("daq", "On which port is the DAQ?", "/dev/ttyACM0, COM3, /dev/ttyUSB0 dataq", _port, _set_port)
+HAMMER = SetUpQuestion(
+    "hammer",
+    "Hammer: input of the DAQ, sensitivity (mV/N, on its calibration sheet), range (V)?",
+    "0 2.25 5",
+    partial(_sensor, "force"),
+    partial(_set_sensor, "force"),
+    partial(_known_by_daq, "force"),
+)
+ACCELEROMETER = SetUpQuestion(
+    "accelerometer",
+    "Accelerometer: input of the DAQ, sensitivity (mV/g, on its calibration sheet), range (V)?",
+    "1 10 5",
+    partial(_sensor, "acceleration"),
+    partial(_set_sensor, "acceleration"),
+    partial(_known_by_daq, "acceleration"),
+)
+FIXING = SetUpQuestion(
+    "fixing",
+    f"Accelerometer on the tool: its mass (g), and fixed by {', '.join(get_args(Mounting)[:-1])} or hand?",
+    "4.5 wax",
+    _fixing,
+    _set_fixing,
+)

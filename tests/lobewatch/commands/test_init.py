@@ -1,0 +1,154 @@
+"""lobewatch init: a conversation at a terminal, its answers as options, one question asked again."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquisition import find_driver
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.set_up.questions import QUESTIONS
+from lobewatch.tap.emulated_spindle import emulate_machine
+from tests.lobewatch.commands.conftest import Run, refused
+from tests.lobewatch.commands.pty_talk import Terminal
+
+ANSWERS = {
+    "name": "Mill 3",
+    "speeds": "1000 18000",
+    "drive": "15 40",
+    "daq": "/dev/ttyNOPE dataq",
+    "hammer": "0 2.25 5",
+    "accelerometer": "1 10.2 5",
+    "fixing": "4,5 g wax",
+    "tool": "4 teeth 16 mm 30 deg 80 mm",
+    "material": "1.7225",
+    "program": "slot: 8000 2 16 0,1",
+}
+
+
+def tables(path: str = "mill-3") -> dict[str, Any]:
+    return tomllib.loads(Path(path, "machine.toml").read_text("utf-8"))
+
+
+def options(answers: dict[str, str]) -> list[str]:
+    return [word for name, answer in answers.items() for word in (f"--{name}", answer)]
+
+
+def test_every_answer_is_an_option_and_stands_in_the_file(run: Run) -> None:
+    said = run("init", "mill-3", "--yes", *options(ANSWERS))
+    assert said.code == 0, said.err
+    assert said.out.endswith("next: lobewatch tap mill-3\n")
+    assert "note: port /dev/ttyNOPE cannot be opened" in said.err
+    known = tables()
+    assert known["machine"] == {"name": "Mill 3", "tap_interval_days": 30}
+    assert known["speed"] == {"low_rpm": 1000, "high_rpm": 18000}
+    assert known["drive"] == {"power_kw": 15, "torque_nm": 40}
+    hammer, accelerometer = known["daq"].pop("channel")
+    assert known["daq"] == {"port": "/dev/ttyNOPE", "driver": "dataq"}
+    assert hammer == {"input": 0, "quantity": "force", "sensitivity_mv_per_n": 2.25, "range_v": 5}
+    assert accelerometer == {"input": 1, "quantity": "acceleration", "sensitivity_mv_per_g": 10.2, "range_v": 5}
+    assert [known["tap"][key] for key in ("sensor_mass_g", "mounting", "stick_out_mm")] == [4.5, "wax", 80]
+    tool = {"teeth": 4, "tool_diameter_mm": 16, "helix_deg": 30, "direction": "down", "material": "1.7225"}
+    assert known["reference_cut"] == tool | {"radial_depth_mm": 16}
+    program = {"name": "slot", "tool": "reference", "speed_rpm": 8000, "depth_mm": 2, "feed_per_tooth_mm": 0.1}
+    assert known["program"] == [tool | program | {"radial_depth_mm": 16}]
+
+
+def test_the_options_are_the_questions(run: Run) -> None:
+    assert [question.name for question in QUESTIONS] == list(ANSWERS)
+    assert all(f"--{question.name}" in run("init", "--help").out for question in QUESTIONS)
+
+
+def test_where_nobody_sits_nothing_is_asked_and_the_template_is_as_it_was(run: Run) -> None:
+    next_step = "next: fill it in, then tap with: lobewatch tap plain --port PORT"
+    assert run("init", "plain").out == f"made plain/machine.toml\n{next_step}\n"
+    assert run("init", "mill-3", "--yes").code == 0
+    plain = Path("plain/machine.toml").read_text("utf-8")
+    assert plain.replace('name = "plain"', 'name = "mill-3"') == Path("mill-3/machine.toml").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("name", "answer", "words"),
+    [
+        ("speeds", "18000 1000", "--speeds machine.toml: speed: low_rpm=18000 is not below high_rpm=1000"),
+        ("speeds", "1000,18000", "1 number; wanted are, with blanks between them: lowest speed in rpm"),
+        ("drive", "15 hp 40 Nm", "what is 'hp'?"),
+        ("daq", "/dev/ttyNOPE acme", "driver 'acme' is not known; there are taps, dataq"),
+        ("daq", "7", "no DAQ of this number"),
+        ("hammer", "0 2.25", "2 numbers; wanted are, with blanks between them: input of the DAQ, sensitivity in mV/N"),
+        ("hammer", "0.5 2.25 5", "input 0.5 is none"),
+        ("fixing", "4 tape", "what is 'tape'?"),
+        ("tool", "4.5 20 30", "4.5 teeth"),
+        ("tool", "4 20 95", "reference_cut helix_deg"),
+        ("material", "42CrMo5", "is not known; is '42CrMo4' meant?"),
+        ("program", "slot: 8000 2", "2 numbers; wanted are"),
+        ("program", "slot: 8000 2 25", "radial_depth_mm=25 is larger than tool_diameter_mm=16"),
+        ("program", "slot: 20000 2 16", "speed_rpm=20000 is outside [speed] 1000..18000 rpm"),
+    ],
+)
+def test_an_answer_that_is_none_names_its_option_and_makes_nothing(
+    run: Run, name: str, answer: str, words: str
+) -> None:
+    given = {key: text for key, text in (ANSWERS | {name: answer}).items() if key != "daq" or name == "daq"}
+    said = run("init", "mill-3", "--yes", *options({"daq": "socket://127.0.0.1:9 dataq"} | given))
+    refused(said._replace(err=said.err[said.err.index("error") :]), f"--{name} ", words)
+    assert not Path("mill-3").exists()
+
+
+def test_a_daq_that_does_not_know_its_sensors_has_them_asked_for(run: Run) -> None:
+    said = run("init", "mill-3", "--daq", "/dev/ttyNOPE dataq", "--hammer", "0 2.25 5")
+    refused(
+        said._replace(err=said.err[said.err.index("error") :]), "--accelerometer: missing", "does not know its sensors"
+    )
+    refused(run("init", "mill-3", "--hammer", "0 2.25 5"), "--hammer machine.toml: daq", "names its own sensors")
+
+
+def test_one_question_is_asked_again_and_comments_and_order_stay(run: Run, tmp_path: Path) -> None:
+    run("init", "mill-3", "--yes", *options(ANSWERS))
+    toml = Path("mill-3/machine.toml")
+    toml.write_text(toml.read_text("utf-8") + "\n# ours: spindle rebuilt in May\n", "utf-8")
+    before = toml.read_text("utf-8").splitlines()
+    refused(run("init", "mill-3", "--edit", "drive"), "nobody is at the terminal to ask; give the answer with --drive")
+    refused(run("init", "mill-3", "--edit", "drives"), "no such question; there are name, speeds, drive")
+    refused(run("init", "none", "--edit", "drive"), "no machine.toml in it")
+    with Terminal(tmp_path, "init", "mill-3", "--edit", "drive") as person:
+        assert "Power (kW) and torque" in person.answer("22 60")
+        assert person.end() == 0
+        assert "altered mill-3/machine.toml" in person.text
+    changed = [pair for pair in zip(before, toml.read_text("utf-8").splitlines(), strict=True) if len(set(pair)) > 1]
+    assert changed == [("power_kw = 15", "power_kw = 22"), ("torque_nm = 40", "torque_nm = 60")]
+    assert run("init", "mill-3", "--edit", "drive", "--drive", "-").code == 0
+    assert tables()["drive"] == {}
+
+
+def test_a_conversation_knows_the_daq_and_takes_enter(run: Run, trial: MachineFolder, tmp_path: Path) -> None:
+    device = emulate_machine(trial, find_driver("taps"), realtime=False).device
+    with device, Terminal(tmp_path, "init", "mill-3") as person:
+        person.answer("")
+        person.answer("12000 1000")
+        assert "low_rpm=12000 is not below" in person.answer("")
+        assert "[-]" in person.answer("")
+        person.answer(device.port)
+        asked = person.answer("0")
+        assert "hammer: 2.25 mV/N, says the DAQ" in asked
+        assert "accelerometer: 10 mV/g, says the DAQ" in asked
+        person.answer("4 20 30 80")
+        person.answer("42CrMo4")
+        person.answer("slot: 12600 1.5 20")
+        assert person.end() == 0
+        assert "next: lobewatch tap mill-3" in person.text
+    assert tables()["daq"] == {"port": device.port}
+    assert tables()["program"][0]["material"] == "42CrMo4"
+
+
+def test_a_conversation_that_is_broken_off_writes_nothing(run: Run, tmp_path: Path) -> None:
+    with Terminal(tmp_path, "init", "mill-3") as person:
+        person.answer("")
+        person.wait_for("> ")
+        person.type("\x04")
+        assert person.end() == 130
+        assert "nothing is written" in person.text
+    assert not Path("mill-3").exists()

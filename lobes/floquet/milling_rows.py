@@ -55,6 +55,10 @@ class MillingRows:
         """All rows with the feed at an angle from x (rad)."""
         return replace(self, feed_angle=np.full(len(self), angle))
 
+    def making(self, cut: Cut) -> MillingRows:
+        """All rows with the teeth, immersion and feed of a cut; their coefficients stay."""
+        return replace(self, cut=cut).fed_at(cut.feed_angle)
+
     @property
     def seen(self) -> tuple[Floats, Floats]:
         """What the tip shows of each mode's coordinate q and of its velocity q' / w, each of shape (r, n)."""

@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lobes.cut import Cut
 from lobes.floquet.growth import growth
 from lobes.floquet.milling_rows import MillingRows, rows_of
 from lobes.floquet.settled_crossings import settled_crossings
 from lobes.floquet.stability_boundary import chatter_at
-from lobes.milling_system import milling_system
+from lobes.milling_system import MillingSystem, milling_system
 from lobes.program import SHARES, Modes, Program
 from lobes.stability_lobes import MethodName
 
@@ -22,7 +23,7 @@ DEEPEST = 20.0
 
 @dataclass(frozen=True)
 class ProgramLimit:
-    """How one program stands on one spindle, in the direction of feed that is worst."""
+    """How one program stands on one spindle, in the engagement and direction of feed that are worst."""
 
     stable: bool
     """Whether its depth lies below the limit at its speed, and the multipliers at its depth below 1."""
@@ -38,36 +39,39 @@ class ProgramLimit:
     """Detail of the method: into how many pieces the tooth period was divided."""
     pieces: int
     """The same as a number."""
-    feed_angle: float
-    """Angle from x to the feed that is worst (rad)."""
+    cut: Cut
+    """The cut that is worst of all that the program makes."""
     limits: tuple[float, ...]
-    """The limits for each direction of feed (m)."""
+    """The limits of each of them (m)."""
+
+    @property
+    def feed_angle(self) -> float:
+        """Angle from x to the feed that is worst (rad)."""
+        return self.cut.feed_angle
 
 
 def program_limit(
-    program: Program,
-    x: Modes,
-    y: Modes,
-    feed_angles: Sequence[float] | None = None,
-    vectors: ArrayLike | None = None,
+    program: Program, x: Modes, y: Modes, cuts: Sequence[Cut] | None = None, vectors: ArrayLike | None = None
 ) -> ProgramLimit:
-    """State and limit of a program by semi-discretisation, in the worst of its directions of feed.
+    """State and limit of a program by semi-discretisation, in the worst of the cuts that it makes on its way.
 
-    feed_angles: from x (rad); None: that of its cut. vectors: directions (n, 2) of the modes of x, then of y, where
-    they lie askew (`milling_system`). Raises ValueError for bad modes or vectors.
+    cuts: differ in feed angle and immersion alone; None: its cut. vectors: directions (n, 2) of the modes of x, then of
+    y, where they lie askew (`milling_system`). Raises ValueError for bad modes or vectors.
     """
-    angles = np.array([program.cut.feed_angle] if feed_angles is None else feed_angles)
-    system = milling_system(x, y, vectors)
-    rows = replace(rows_of(system, program.cut, np.full(angles.size, program.speed_rpm)), feed_angle=angles)
-    crossings, number = settled_crossings(rows, DEEPEST * program.depth)
-    unstable = _unstable(rows, program, number)
-    limit = np.where(unstable, np.minimum(crossings[:, 0], program.depth), crossings[:, 0])
+    cuts, system = cuts or (program.cut,), milling_system(x, y, vectors)
+    limit, number = np.empty(len(cuts)), np.empty(len(cuts), dtype=np.int64)
+    crossing = np.empty(len(cuts))
+    for places in _alike(cuts):
+        rows = _rows(system, program, [cuts[place] for place in places])
+        crossings, number[places] = settled_crossings(rows, DEEPEST * program.depth)
+        crossing[places] = crossings[:, 0]
+        unstable = _unstable(rows, program, number[places])
+        limit[places] = np.where(unstable, np.minimum(crossing[places], program.depth), crossing[places])
     worst = int(np.argmin(limit))
     chatter, kind = np.array([np.nan]), np.array([""])
-    if np.isfinite(crossings[worst, 0]):
-        row = slice(worst, worst + 1)
-        cut = replace(program.cut, feed_angle=float(angles[worst]))
-        chatter, kind = chatter_at(system, replace(rows[row], cut=cut), crossings[row, 0], number[row])
+    if np.isfinite(crossing[worst]):
+        here = slice(worst, worst + 1)
+        chatter, kind = chatter_at(system, _rows(system, program, [cuts[worst]]), crossing[here], number[here])
     return ProgramLimit(
         stable=program.depth < limit[worst],
         limit=float(limit[worst]),
@@ -76,9 +80,23 @@ def program_limit(
         method="semi-discretisation",
         detail=f"{number[worst]} pieces of order 16 a tooth period",
         pieces=int(np.max(number)),
-        feed_angle=float(angles[worst]),
+        cut=cuts[worst],
         limits=tuple(limit.tolist()),
     )
+
+
+def _alike(cuts: Sequence[Cut]) -> list[list[int]]:
+    """Places of the cuts that differ in their feed angle alone."""
+    places: dict[Cut, list[int]] = {}
+    for place, cut in enumerate(cuts):
+        places.setdefault(replace(cut, feed_angle=0.0), []).append(place)
+    return list(places.values())
+
+
+def _rows(system: MillingSystem, program: Program, cuts: Sequence[Cut]) -> MillingRows:
+    """A system at the speed of the program, with cuts that differ in their feed angle alone."""
+    rows = rows_of(system, cuts[0], np.full(len(cuts), program.speed_rpm))
+    return replace(rows, feed_angle=np.array([cut.feed_angle for cut in cuts]))
 
 
 def _unstable(rows: MillingRows, program: Program, number: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -6,7 +6,7 @@ from .folder_lock import BusyError
 from .journal.tap_entry import BY_FIT, DamagedTapError, TapEntry
 from .known_devices import checked_rate, has_clock, known_rate, use_rate
 from .new_folder import make_machine_folder
-from .settings.cut_tables import CutTable, ProgramTable
+from .settings.cut_tables import FEED_ANGLES, CutTable, ProgramTable, Wear
 from .settings.daq_tables import Daq
 from .settings.doubt_table import DoubtTable
 from .settings.drive import drive_limit
@@ -15,6 +15,7 @@ from .settings.setup_tables import Limits, SpeedRange, TapSetup
 
 __all__ = [
     "BY_FIT",
+    "FEED_ANGLES",
     "REFERENCE_CUT",
     "BusyError",
     "CutTable",
@@ -28,6 +29,7 @@ __all__ = [
     "SpeedRange",
     "TapEntry",
     "TapSetup",
+    "Wear",
     "checked_rate",
     "drive_limit",
     "has_clock",

@@ -17,7 +17,8 @@ from lobewatch.verdicts.doubt import doubt_of
 from lobewatch.verdicts.draws import as_program, draw
 from lobewatch.verdicts.setting_search import MM, SPARE, Setting, SettingSearch
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
-from lobewatch.verdicts.verdict import Verdict, Word
+from lobewatch.verdicts.verdict import Verdict, Word, is_sure
+from lobewatch.verdicts.ways import ways
 
 SHARE = 0.5
 """Depth that the search for pockets begins with, over the lowest limit of the diagram."""
@@ -47,7 +48,7 @@ def advise(verdict: Verdict, machine: Machine) -> Advice:
     stiffness_at, remark = softening(tool)
     decay = tolerable_decay(draws, verdict.program.depth_mm / 1e3, stiffness_at) if verdict.stable else 0.0
     remarks = (remark,) if verdict.stable else ()
-    if verdict.word is Word.STABLE or not tool.is_sure:
+    if verdict.word is Word.STABLE or not is_sure(verdict.program, tool):
         return Advice(decay=decay, remarks=remarks)
     search = SettingSearch.of(verdict.program, draws, tool, machine, verdict.at_speed)
     best = search.elsewhere()
@@ -69,9 +70,9 @@ def robust_pockets(
         return []
     spindle = at_speed.moved(assembly)
     program_table = _stable_somewhere(at_speed.taught(table), spindle, machine)
-    program, angles = as_program(program_table, machine), program_table.feed_angles
+    program, cuts = as_program(program_table, machine), ways(program_table, machine, spindle)
     doubt = at_speed.doubt or doubt_of(assembly, program_table, machine)
-    draws = draw(program, program_limit(program, spindle.x, spindle.y, angles), angles, spindle, doubt)
+    draws = draw(program, program_limit(program, spindle.x, spindle.y, cuts), cuts, spindle, doubt)
     return SettingSearch.of(program_table, draws, assembly, machine, at_speed).pockets(count)
 
 

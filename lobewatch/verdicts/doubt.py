@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lobes import MillingRows
-from lobewatch.machine import CutTable, DoubtTable, Machine
+from lobewatch.machine import CutTable, DoubtTable, Machine, ProgramTable, Wear
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.series import Scatter
 from modal import Mode
@@ -25,6 +25,8 @@ LEAST = 0.02
 """Least share of its middle value that anything is drawn with ..."""
 MOST_TURNED = np.radians(89)
 """... and largest phase (rad)."""
+WEAR: Mapping[Wear, float] = {"new": 1.0, "used": 1.3, "worn": 1.6}
+"""Largest factor on the cutting coefficients, by how worn a tool may be; chosen."""
 CUTS = "cuts"
 """Cause of the doubt of modes that test cuts have taught: all that they have left open."""
 
@@ -91,19 +93,28 @@ class Doubt:
     """Range of the cutting coefficient Kt over the middle."""
     ratio: Span
     """Range of Kr/Kt, the direction of the force, over the middle."""
+    wear: float = 1.0
+    """Largest factor on both cutting coefficients by edges that are no longer new; the least is 1."""
     learnt: LearntDraws | None = None
     """Draws that test cuts have left, which stand for the half-widths; None where none has taught anything."""
 
     @property
     def causes(self) -> tuple[str, ...]:
         """Names of all that it comes from."""
-        return (*self.modes, "speed", "coefficients")
+        return (*self.modes, "speed", "coefficients", *(["wear"] if self.wear > 1 else []))
 
     def draw(self, middle: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
         """Systems within the doubt (count rows) around one (a row), the same for a seed whatever is left out.
 
         without: a cause that is taken as known.
         """
+        rows = self._of_new_edges(middle, count, seed, without)
+        if self.wear == 1 or without == "wear":
+            return rows
+        worn = 1 + (self.wear - 1) * np.random.default_rng((seed, 2)).uniform(0, 1, count)
+        return replace(rows, tangential=rows.tangential * worn, radial=rows.radial * worn)
+
+    def _of_new_edges(self, middle: MillingRows, count: int, seed: int, without: str) -> MillingRows:
         if self.learnt is not None:
             rows = self.learnt.rows(middle, count, without)
             speed = 1 + self.speed * np.random.default_rng(seed).uniform(-1, 1, count) * (without != "speed")
@@ -147,7 +158,14 @@ def doubt_of(assembly: Assembly, table: CutTable, machine: Machine) -> Doubt:
     tangential, ratio = _coefficients(table, machine)
     modes = [*(assembly.x or ()), *(assembly.y or ())]
     mixing = np.array([_mixing(mode) for mode in modes])
-    return Doubt(_modes(assembly, machine.doubt), mixing, machine.doubt.speed_percent / 100, tangential, ratio)
+    speed, wear = machine.doubt.speed_percent / 100, wear_of(table, machine)
+    return Doubt(_modes(assembly, machine.doubt), mixing, speed, tangential, ratio, wear)
+
+
+def wear_of(table: CutTable, machine: Machine) -> float:
+    """Largest factor of wear on the cutting coefficients: what the program says, else [doubt]."""
+    said = table.wear if isinstance(table, ProgramTable) else None
+    return WEAR[said or machine.doubt.wear]
 
 
 def _modes(assembly: Assembly, given: DoubtTable) -> dict[str, Floats]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lobes import MillingRows, Program, ProgramLimit, growth, joined_rows, milling_system, piece_numbers, rows_of
+from lobes import Cut, MillingRows, Program, ProgramLimit, growth, joined_rows, milling_system, piece_numbers, rows_of
 from lobes.floquet.program_limit import DEEPEST
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
@@ -34,34 +35,35 @@ class ProgramDraws:
 
     rows: MillingRows
     """All draws, the feed along x."""
-    angles: Floats
-    """Directions of feed (rad), the worst first."""
+    cuts: tuple[Cut, ...]
+    """Cuts that the program makes on its way, the worst first."""
     limits: Floats
-    """Deepest stable depth in the middle in each of them (m)."""
+    """Deepest stable depth of each in the middle (m)."""
     finer: int
     """Number of pieces of a turn over those that modes alone ask for."""
     doubt: Doubt
     """Doubt that they were drawn from."""
 
     def growth(self, depth: float | Floats) -> Floats:
-        """Growth from tooth to tooth in the worst direction of feed; negative where stable.
+        """Growth from tooth to tooth in the worst of its cuts; negative where stable.
 
         depth in m: one, several (d,) or those of each draw (draws, d). Returns shape (draws, d).
         """
         rows, wanted = self.rows, np.atleast_2d(depth)
         depths = np.broadcast_to(wanted, (len(rows), wanted.shape[1]))
         number = self.finer * piece_numbers(rows, float(np.max(depths)))
-        return np.asarray(np.max([growth(rows.fed_at(angle), depths, number) for angle in self.angles], axis=0))
+        return np.asarray(np.max([growth(rows.making(cut), depths, number) for cut in self.cuts], axis=0))
 
     def __getitem__(self, places: NDArray[np.intp]) -> ProgramDraws:
         """The draws at some places."""
         return replace(self, rows=self.rows[places])
 
     def fed(self, below: float, most: int | None = None) -> ProgramDraws:
-        """The directions of feed with a limit up to a depth (m) alone, at most so many; the worst stays."""
+        """The cuts with a limit up to a depth (m) alone, at most so many; the worst stays."""
         wanted = (self.limits <= below) & np.isfinite(self.limits) & (np.arange(self.limits.size) < (most or np.inf))
         wanted[0] = True
-        return replace(self, angles=self.angles[wanted], limits=self.limits[wanted])
+        cuts = tuple(cut for cut, stays in zip(self.cuts, wanted, strict=True) if stays)
+        return replace(self, cuts=cuts, limits=self.limits[wanted])
 
     def at(self, speed: float = 1.0, frequency: float = 1.0, stiffness: float = 1.0) -> ProgramDraws:
         """The same draws with speed, frequencies and stiffnesses times these factors."""
@@ -91,16 +93,13 @@ def middle_row(program: Program, assembly: Assembly) -> MillingRows:
     return rows_of(milling_system(assembly.x, assembly.y), program.cut, np.array([program.speed_rpm]))
 
 
-def draw(
-    program: Program, limit: ProgramLimit, feed_angles: tuple[float, ...], assembly: Assembly, doubt: Doubt
-) -> ProgramDraws:
+def draw(program: Program, limit: ProgramLimit, cuts: Sequence[Cut], assembly: Assembly, doubt: Doubt) -> ProgramDraws:
     """The draws of a program; limit: that in the middle of the doubt."""
-    middle = middle_row(program, assembly)
-    limits = np.array(limit.limits)
+    middle, limits = middle_row(program, assembly), np.array(limit.limits)
     order = np.argsort(limits)
     finer = max(limit.pieces // int(piece_numbers(middle, DEEPEST * program.depth)[0]), 1)
     rows = joined_rows(middle, doubt.draw(middle, DRAWS))
-    return ProgramDraws(rows, np.array(feed_angles)[order], limits[order], finer, doubt)
+    return ProgramDraws(rows, tuple(cuts[place] for place in order), limits[order], finer, doubt)
 
 
 def turning_draws(draws: ProgramDraws, seed: int = TURNING_SEED) -> ProgramDraws:

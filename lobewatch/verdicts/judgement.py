@@ -14,11 +14,12 @@ from lobewatch.verdicts.doubt import doubt_of
 from lobewatch.verdicts.drawn_limits import drawn_limits
 from lobewatch.verdicts.draws import ProgramDraws, as_program, draw
 from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
+from lobewatch.verdicts.ways import ways
 
 QUANTILES = (0.01, 0.99)
 """Quantiles of the limit over the doubt that a band reaches between."""
 SURELY = 1.15
-"""Factor that the limit of a direction of feed, were it as doubtful as the lowest, has to spare where it is passed
+"""Factor that the limit of a cut on its way, were it as doubtful as the lowest, has to spare where it is passed
 over."""
 
 
@@ -45,9 +46,10 @@ class Judgement(NamedTuple):
 def weigh(table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed) -> Judgement:
     """A program with the coefficients that were learnt, over its doubt; charts by other methods decide nothing."""
     program, spindle = as_program(table, machine), at_speed.moved(assembly)
-    middle = program_limit(program, spindle.x, spindle.y, table.feed_angles)
+    cuts = ways(table, machine, spindle)
+    middle = program_limit(program, spindle.x, spindle.y, cuts)
     doubt = at_speed.doubt or doubt_of(assembly, table, machine)
-    draws = draw(program, middle, table.feed_angles, spindle, doubt)
+    draws = draw(program, middle, cuts, spindle, doubt)
     limits = drawn_limits(draws, program.depth)[1:]
     low, high = np.quantile(limits, QUANTILES, method="closest_observation")
     near = draws.fed(SURELY * program.depth * middle.limit / low if np.isfinite(middle.limit) else 0.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,5 +73,5 @@ def limit_band(
 
 def _depths(rows: MillingRows, cuts: Sequence[Cut], speed_rpm: Floats) -> Floats:
     """Limit of each row in the worst of some cuts at speeds (rpm) of its own (r, s), DEEP where there is none."""
-    depths = [MeanForce.of(replace(rows, cut=cut).fed_at(cut.feed_angle)).limits(speed_rpm)[0] for cut in cuts]
+    depths = [MeanForce.of(rows.making(cut)).limits(speed_rpm)[0] for cut in cuts]
     return np.asarray(np.minimum(np.min(depths, axis=0), DEEP))

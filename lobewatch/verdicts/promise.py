@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
@@ -50,8 +50,7 @@ class Promise:
         """
         low, high = machine.speed.low_rpm, machine.speed.high_rpm
         speeds = np.geomspace(low, high, max(int(math.log(high / low) / GRID), 2))
-        cuts = [replace(machine.build_cut(program), feed_angle=angle) for angle in draws.angles.tolist()]
-        limit = lowest_of([zero_order(assembly.x, assembly.y, cut, speeds) for cut in cuts]).depth * 1e3
+        limit = lowest_of([zero_order(assembly.x, assembly.y, cut, speeds) for cut in draws.cuts]).depth * 1e3
         steps, ahead = math.ceil((draws.doubt.speed + BESIDE + fall / 2) / GRID), round(fall / 2 / GRID)
         around = scipy.ndimage.minimum_filter1d(np.minimum(limit, 1e6), 2 * steps + 1, origin=-ahead, mode="nearest")
         deepest = np.minimum(program.deepest_mm, 1e3 * drive_limit(machine, program, speeds))

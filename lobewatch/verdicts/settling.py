@@ -50,6 +50,14 @@ def settling_remark(cause: str, table: ProgramTable, tangential: float, assembly
         ),
         "tap": ("the error of the tap test decides", "tap again with more hits"),
         "prediction": ("the prediction decides", f"tap tool {table.tool!r}"),
+        "wear": (
+            f"wear decides: chatters above Kt {tangential / 1e6:.0f} N/mm2",
+            'run it with new edges and write wear = "new"',
+        ),
+        "workpiece": (
+            "the wall that is cut is thin: it gives way, and its modes are not known",
+            "support it and take thin = true out, or find the depth by test cuts",
+        ),
         "cuts": (
             f"the spindle at speed decides, as {cuts} test cuts have left it open",
             f"make the next test cut: lobewatch suggest names it for {table.name!r}",

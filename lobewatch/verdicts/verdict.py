@@ -17,6 +17,7 @@ from lobewatch.verdicts.draws import DRAWS, ProgramDraws, turning_draws
 from lobewatch.verdicts.judgement import Judgement, weigh
 from lobewatch.verdicts.settling import decisive_cause, settling_remark
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
+from lobewatch.verdicts.unsaid import unsaid
 
 
 class Word(StrEnum):
@@ -81,8 +82,8 @@ class Verdict:
     chance_turning: float = math.nan
     """Chance of chatter with the spindle turning, under plausible differences between rest and cut, or those learnt."""
     decided_by: str = ""
-    """Cause of the doubt that decides (`Doubt.causes`), "question" where a tap test is in question; empty unless it is
-    doubtful."""
+    """Cause of the doubt that decides (`Doubt.causes`), "question" where a tap test is in question, "workpiece" where
+    it is thin; empty unless it is doubtful."""
     chatter_frequency: float = math.nan
     """Frequency that is heard at the limit (Hz); NaN where there is none."""
     kind: str = ""
@@ -141,10 +142,10 @@ def judge(
         return _unknown(table, tool.remarks, tool)
     table = at_speed.taught(table)
     judgement, depth = weigh(table, tool, machine, at_speed), table.depth_mm / 1e3
-    middle, word, cause = judgement.middle, _word(judgement, tool), ""
-    remarks = [*_remarks(table, tool, at_speed, machine)]
+    middle, word, cause = judgement.middle, _word(table, judgement, tool), ""
+    remarks = [*_remarks(table, tool, at_speed, machine), *unsaid(table, machine, judgement)]
     if word is Word.DOUBTFUL:
-        cause = "question" if tool.questions else decisive_cause(judgement, depth)
+        cause = _cause(table, judgement, tool)
         tangential = middle.limit / depth * machine.build_cut(table).tangential
         remarks.append(settling_remark(cause, table, tangential, tool, at_speed.cuts))
     return Verdict(
@@ -175,10 +176,24 @@ def _unknown(table: ProgramTable, reasons: tuple[Remark, ...], assembly: Assembl
     return Verdict(table, Word.UNKNOWN, assembly, remarks=(remark,))
 
 
-def _word(judgement: Judgement, assembly: Assembly) -> Word:
+def _word(table: ProgramTable, judgement: Judgement, assembly: Assembly) -> Word:
     if not judgement.middle.stable:
         return Word.NOT_STABLE
-    return Word.STABLE if judgement.is_stable_throughout and assembly.is_sure else Word.DOUBTFUL
+    return Word.STABLE if judgement.is_stable_throughout and is_sure(table, assembly) else Word.DOUBTFUL
+
+
+def is_sure(table: ProgramTable, assembly: Assembly) -> bool:
+    """Whether all that gives way is known: both directions of the tool, without a question, and no thin wall."""
+    return assembly.is_sure and not table.thin
+
+
+def _cause(table: ProgramTable, judgement: Judgement, assembly: Assembly) -> str:
+    """Cause of the doubt that decides."""
+    if assembly.questions:
+        return "question"
+    if table.thin and assembly.is_sure and not np.any(judgement.chatters):
+        return "workpiece"
+    return decisive_cause(judgement, table.depth_mm / 1e3)
 
 
 def _chance_turning(judgement: Judgement, depth: float, at_speed: SpindleAtSpeed) -> float:

@@ -13,6 +13,7 @@ from lobes import growth, piece_numbers
 from lobewatch.verdicts.doubt import doubt_of
 from lobewatch.verdicts.draws import as_program, middle_row
 from lobewatch.verdicts.verdict import Word, judge
+from lobewatch.verdicts.ways import ways
 
 
 def say(text: str) -> None:
@@ -71,7 +72,7 @@ def test_what_is_stable_in_all_of_the_doubt_with_5_percent_to_spare_is_called_st
         tool, cut = assembly(milling), as_program(table, MACHINE)
         truths = doubt_of(tool, table, MACHINE).draw(middle_row(cut, tool), 2000, seed=99)
         depths = np.full((2000, 1), 1.05 * cut.depth)
-        turned = [truths.fed_at(angle) for angle in table.feed_angles]
+        turned = [truths.making(way) for way in ways(table, MACHINE, tool)]
         if all(np.all(growth(rows, depths, piece_numbers(rows, 1.05 * cut.depth)) < 0) for rows in turned):
             called.append(judge(table, tool, MACHINE).word is Word.STABLE)
     say(f"{share(sum(called), len(called))} called stable")

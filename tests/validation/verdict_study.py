@@ -24,6 +24,7 @@ from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.advice import advise
 from lobewatch.verdicts.draws import as_program
 from lobewatch.verdicts.verdict import Word, judge
+from lobewatch.verdicts.ways import ways
 from modal import Mode
 
 MACHINE: Machine = parse_machine('[machine]\nname = "random"\n[speed]\nlow_rpm = 1500\nhigh_rpm = 24000\n')
@@ -85,7 +86,7 @@ def drawn_truths(milling: RandomMilling, table: ProgramTable, count: int, rng: n
             radial=milling.radial * push * share,
             speed_rpm=table.speed_rpm * speed,
         )
-        angle = rng.uniform(0, math.pi) if milling.immersion < 0.5 else rng.choice([0.0, math.pi / 2])
+        angle = rng.uniform(0, math.pi)
         feed = {"x": 0.0, "y": math.pi / 2}.get(milling.feed, float(angle))
         made.append(true.case(table.depth_mm / 1e3, feed))
     return made
@@ -112,7 +113,8 @@ def upper_limit(number: int, of: int) -> float:
 def limit_mm(milling: RandomMilling) -> float:
     """Deepest stable depth (mm) without any doubt."""
     table = program(milling, 2.0)
-    return 1e3 * program_limit(as_program(table, MACHINE), *_modes(milling), table.feed_angles).limit
+    cuts = ways(table, MACHINE, assembly(milling))
+    return 1e3 * program_limit(as_program(table, MACHINE), *_modes(milling), cuts).limit
 
 
 def program(milling: RandomMilling, depth_mm: float, speed_rpm: float | None = None) -> ProgramTable:

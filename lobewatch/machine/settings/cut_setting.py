@@ -73,10 +73,10 @@ def cut_setting(machine: Machine, program: str, speed_rpm: float | None, depth_m
         raise ValueError(f"{missing} is missing: the {REFERENCE_CUT} has none of its own; give what was cut with")
     if table.flute_length_mm is not None and depth > table.flute_length_mm:
         raise ValueError(f"--depth {depth:g} mm is deeper than flute_length_mm={table.flute_length_mm:g}")
-    tool, feed = (preset.tool, preset.feed) if preset else (machine.tap.tool, "both")
+    tool = preset.tool if preset else machine.tap.tool
     name = preset.name if preset else None
     material = machine.coefficients(table).material
-    return CutSetting(table, material, name, tool, machine.build_cut(table), feed, float(speed), depth / 1e3)
+    return CutSetting(table, material, name, tool, machine.build_cut(table), table.feed, float(speed), depth / 1e3)
 
 
 def choose_cut(machine: Machine, program: str, cut: str, speed_rpm: float | None, depth_mm: float | None) -> CutSetting:

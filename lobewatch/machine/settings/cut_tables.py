@@ -3,37 +3,88 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from collections.abc import Sequence
+from typing import Annotated, Literal
 
 from msgspec import Meta
 
 from lobes import Coefficients, Direction, tangential_and_radial
+from lobes.cut import checked_pitch
 from lobewatch.machine.settings.toml_table import NotNegative, Positive, PositiveOrInfinite, Table
 
 FEED_ANGLES = {"x": 0.0, "y": math.pi / 2}
 """Angles from x to the feed (rad), by axis of the machine."""
-BETWEEN = 0.5
-"""Radial depth over diameter below which a cut in both directions is worst at angles between x and y."""
+ENGAGEMENTS = math.radians(15)
+"""Engagements of a path are looked at no further apart (rad)."""
+Range = Annotated[tuple[Positive, ...], Meta(min_length=2, max_length=2)]
+"""Least and greatest value. Of fixed length, `tuple[A, B]`, msgspec 0.22 reads it wrongly beside a number."""
+Wear = Literal["new", "used", "worn"]
+"""How worn the edges of a tool may be."""
+
+
+def pitch_of(pitch_deg: Sequence[float] | None, teeth: int) -> tuple[float, ...]:
+    """Pitches (rad) of a cutter, () where its teeth are evenly spaced; ValueError for what is none."""
+    return checked_pitch([math.radians(angle) for angle in pitch_deg or ()], teeth)
+
+
+def corner_engagement(tool: float, radial: float, corner: float) -> float:
+    """Angle of engagement (rad) of a tool of this radius in a corner; all lengths in one unit.
+
+    radial: its radial depth on the way there; corner: radius that is left in the corner, not below that of the tool.
+    The wall before the corner is an arc about the same centre: law of cosines between the two centres and where they
+    meet.
+    """
+    path = corner - tool
+    if path == 0:
+        return math.pi
+    cosine = ((corner - radial) ** 2 - path**2 - tool**2) / (2 * path * tool)
+    return math.acos(max(cosine, -1.0))
+
+
+def engagements_between(least: float, most: float) -> tuple[float, ...]:
+    """Radial depths over diameter from one to another, at most `ENGAGEMENTS` apart as angles of engagement."""
+    low, high = (math.acos(1 - 2 * immersion) for immersion in (least, most))
+    steps = math.ceil((high - low) / ENGAGEMENTS - 1e-9)
+    between = [(1 - math.cos(low + (high - low) * i / steps)) / 2 for i in range(1, steps)]
+    return (least, *between, *([most] if steps else []))
 
 
 class CutTable(Table, frozen=True):
     """[reference_cut], and what it shares with a program."""
 
     teeth: Annotated[int, Meta(ge=1)]
-    radial_depth_mm: Positive
+    radial_depth_mm: Positive | Range
     tool_diameter_mm: Positive
     direction: Direction
     material: str | None = None
     tangential_n_per_mm2: Positive | None = None
     radial_n_per_mm2: NotNegative | None = None
-    helix_deg: Annotated[float, Meta(ge=0, lt=90)] = 0.0
+    helix_deg: Annotated[float, Meta(ge=0, lt=90)] | None = None
     feed_per_tooth_mm: Positive | None = None
     flute_length_mm: Positive | None = None
+    pitch_deg: tuple[float, ...] | None = None
+    feed: str = "both"
 
     @property
     def feeds(self) -> tuple[str, ...]:
         """Axes of the machine that it is fed along."""
-        return tuple(FEED_ANGLES)
+        return tuple(FEED_ANGLES) if self.feed == "both" else (self.feed,)
+
+    @property
+    def radial_mm(self) -> tuple[float, float]:
+        """Least and greatest radial depth on the straight part of its path (mm)."""
+        depths = self.radial_depth_mm if isinstance(self.radial_depth_mm, tuple) else (self.radial_depth_mm,)
+        return depths[0], depths[-1]
+
+    @property
+    def immersion(self) -> float:
+        """Greatest radial depth on the straight part of its path over diameter (-)."""
+        return self.radial_mm[1] / self.tool_diameter_mm
+
+    @property
+    def immersions(self) -> tuple[float, ...]:
+        """Radial depths over diameter that it meets on its way, rising: one, or so many that none lies far between."""
+        return engagements_between(self.radial_mm[0] / self.tool_diameter_mm, self.immersion)
 
     @property
     def deepest_mm(self) -> float:
@@ -42,14 +93,17 @@ class CutTable(Table, frozen=True):
 
     def __post_init__(self) -> None:
         """Refuse a cut wider than the tool, and coefficients that are missing or stand twice."""
-        if self.radial_depth_mm > self.tool_diameter_mm:
-            raise ValueError(
-                f"radial_depth_mm={self.radial_depth_mm:g} is larger than tool_diameter_mm={self.tool_diameter_mm:g}"
-            )
-
+        least, most = self.radial_mm
+        if least > most:
+            raise ValueError(f"radial_depth_mm=[{least:g}, {most:g}] does not rise; give [least, greatest]")
+        if most > self.tool_diameter_mm:
+            raise ValueError(f"radial_depth_mm={most:g} is larger than tool_diameter_mm={self.tool_diameter_mm:g}")
         given = {self.tangential_n_per_mm2 is None, self.radial_n_per_mm2 is None}
         if given != {self.material is not None}:
             raise ValueError("give either material or both tangential_n_per_mm2 and radial_n_per_mm2")
+        if self.feed not in (*FEED_ANGLES, "both"):
+            raise ValueError(f'feed={self.feed!r} is no direction; give "x", "y" or "both"')
+        pitch_of(self.pitch_deg, self.teeth)
 
 
 class ProgramTable(CutTable, frozen=True, kw_only=True):
@@ -59,33 +113,42 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
     tool: str = "reference"
     speed_rpm: Positive
     depth_mm: Positive
-    feed: str = "both"
+    corner_radius_mm: Positive | None = None
+    wear: Wear | None = None
+    thin: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse a feed that is none, and a cut deeper than the flutes."""
+        """Refuse a cut deeper than the flutes."""
         super().__post_init__()
-        if self.feed not in (*FEED_ANGLES, "both"):
-            raise ValueError(f'feed={self.feed!r} is no direction; give "x", "y" or "both"')
         if self.flute_length_mm is not None and self.depth_mm > self.flute_length_mm:
             raise ValueError(f"depth_mm={self.depth_mm:g} is deeper than flute_length_mm={self.flute_length_mm:g}")
+        if self.corner_radius_mm is not None:
+            self.in_corner(self.corner_radius_mm)
+
+    @property
+    def immersions(self) -> tuple[float, ...]:
+        """Radial depths over diameter that it meets on its way, those into its corners too."""
+        if self.corner_radius_mm is None:
+            return super().immersions
+        return engagements_between(self.radial_mm[0] / self.tool_diameter_mm, self.in_corner(self.corner_radius_mm))
+
+    def in_corner(self, radius_mm: float) -> float:
+        """Radial depth over diameter of a straight cut that is engaged as this one in a corner of that radius (mm).
+
+        ValueError for a corner tighter than the tool.
+        """
+        tool = self.tool_diameter_mm / 2
+        if radius_mm < tool:
+            raise ValueError(
+                f"corner_radius_mm={radius_mm:g} is tighter than the tool, whose radius is {tool:g} mm: "
+                "give the radius that is left in the corner, or a smaller tool"
+            )
+        return (1 - math.cos(corner_engagement(tool, self.radial_mm[1], radius_mm))) / 2
 
     @property
     def deepest_mm(self) -> float:
         """Greatest depth of cut of the tool (mm); without a known length of flutes one diameter or what it cuts now."""
         return max(super().deepest_mm, self.depth_mm)
-
-    @property
-    def feeds(self) -> tuple[str, ...]:
-        """Axes of the machine that it is fed along."""
-        return super().feeds if self.feed == "both" else (self.feed,)
-
-    @property
-    def feed_angles(self) -> tuple[float, ...]:
-        """Directions of feed in which it is judged, as angles from x (rad): half a turn apart they are alike."""
-        if self.feed != "both":
-            return (FEED_ANGLES[self.feed],)
-        number = 2 if self.radial_depth_mm / self.tool_diameter_mm >= BETWEEN else 12
-        return tuple(i * math.pi / number for i in range(number))
 
 
 class MaterialTable(Table, frozen=True):

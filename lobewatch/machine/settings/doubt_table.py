@@ -6,6 +6,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
+from lobewatch.machine.settings.cut_tables import Wear
 from lobewatch.machine.settings.toml_table import Table
 
 Percent = Annotated[float, Meta(ge=0, le=100)]
@@ -34,3 +35,5 @@ class DoubtTable(Table, frozen=True):
     """Natural frequencies in a direction that was not tapped, against the other one."""
     untapped_stiffness_percent: Percent = 30.0
     """Modal stiffnesses in such a direction."""
+    wear: Wear = "new"
+    """How worn tools may be; a program may say otherwise."""

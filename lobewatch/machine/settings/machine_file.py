@@ -7,7 +7,8 @@ import hashlib
 import math
 import re
 import tomllib
-from collections.abc import Collection, Mapping
+import typing
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,16 +18,12 @@ import msgspec
 from acquisition import DataError
 from dsm import Spindle
 from lobes import Coefficients, Cut, folded_name, materials_by_name, nearest_name
-from lobewatch.machine.settings.cut_tables import FEED_ANGLES, CutTable, Drive, MaterialTable, ProgramTable
-from lobewatch.machine.settings.daq_tables import ChannelTable, Daq
+from lobewatch.machine.settings.cut_tables import FEED_ANGLES, CutTable, Drive, MaterialTable, ProgramTable, pitch_of
+from lobewatch.machine.settings.daq_tables import Daq
 from lobewatch.machine.settings.doubt_table import DoubtTable
 from lobewatch.machine.settings.notify_table import NotifyTable
 from lobewatch.machine.settings.setup_tables import Identity, Limits, ModeChoice, SpeedRange, TapSetup
 from lobewatch.machine.settings.spindle_tables import (
-    BearingTable,
-    JointTable,
-    MassTable,
-    SegmentTable,
     SpindleTable,
     ToolTable,
 )
@@ -71,8 +68,11 @@ class Machine(Table, frozen=True):
         for i, name in enumerate(names, 1):
             if folded_name(name) in map(folded_name, names[: i - 1]):
                 raise ValueError(f"material {i}: name={name!r} stands twice; give each its own")
-        for table in (*([self.reference_cut] if self.reference_cut else []), *self.program):
-            self.coefficients(table)
+        if self.reference_cut:
+            self.coefficients(self.reference_cut)
+        for i, program in enumerate(self.program, 1):
+            self.coefficients(program)
+            self._check_pitch(f"program {i}", program)
 
     def coefficients(self, table: CutTable) -> Coefficients:
         """Cutting coefficients of a cut: its own, or those of its material; ValueError for one that is not known.
@@ -91,16 +91,35 @@ class Machine(Table, frozen=True):
         return by_name[name]
 
     def build_cut(self, table: CutTable) -> Cut:
-        """A cut in SI units."""
+        """A cut in SI units, at its greatest radial depth on the straight, the feed along x."""
         coefficients, diameter = self.coefficients(table), table.tool_diameter_mm / 1e3
         return Cut(
             teeth=table.teeth,
-            immersion=table.radial_depth_mm / table.tool_diameter_mm,
+            immersion=table.immersion,
             direction=table.direction,
             tangential=coefficients.tangential,
             radial=coefficients.radial,
-            helix_lag=2 * math.tan(math.radians(table.helix_deg)) / diameter,
+            helix_lag=2 * math.tan(math.radians(table.helix_deg or 0.0)) / diameter,
+            pitch=pitch_of(self._pitch_deg(table), table.teeth),
         )
+
+    def engaged_cuts(self, table: CutTable) -> tuple[Cut, ...]:
+        """A cut in all engagements that it meets on its way, the feed along x."""
+        cut = self.build_cut(table)
+        return tuple(replace(cut, immersion=immersion) for immersion in table.immersions)
+
+    def _pitch_deg(self, table: CutTable) -> Sequence[float] | None:
+        """Pitches of a cut (deg): its own, of a program else those of its [[tool]]."""
+        if table.pitch_deg is not None or not isinstance(table, ProgramTable):
+            return table.pitch_deg
+        return next((tool.pitch_deg for tool in self.tool if tool.name == table.tool), None)
+
+    def _check_pitch(self, place: str, program: ProgramTable) -> None:
+        """Refuse the pitches of a tool with other teeth than the program says."""
+        try:
+            pitch_of(self._pitch_deg(program), program.teeth)
+        except ValueError as error:
+            raise ValueError(f"{place}: {error} (pitch_deg of tool {program.tool!r})") from error
 
     def _check_tools(self) -> None:
         taken = [self.tap.tool]
@@ -147,7 +166,9 @@ class Machine(Table, frozen=True):
         tables = {REFERENCE_CUT: self.reference_cut} if self.reference_cut else {}
         tables |= {program.name: program for program in self.program if program.tool == tool}
         return {
-            name: tuple(replace(self.build_cut(table), feed_angle=FEED_ANGLES[feed]) for feed in table.feeds)
+            name: tuple(
+                replace(cut, feed_angle=FEED_ANGLES[feed]) for cut in self.engaged_cuts(table) for feed in table.feeds
+            )
             for name, table in tables.items()
         }
 
@@ -173,7 +194,9 @@ class Machine(Table, frozen=True):
     def program_hashes(self) -> dict[str, str]:
         """SHA-256 of all that decides the word on a program beside `settings_hash`, by its name."""
         return {
-            program.name: _hash("four words over the doubt", program, self.coefficients(program), self.doubt)
+            program.name: _hash(
+                "four words over the doubt", program, self._pitch_deg(program), self.coefficients(program), self.doubt
+            )
             for program in self.program
         }
 
@@ -197,27 +220,25 @@ def parse_machine(text: str, name: str = "machine.toml") -> Machine:
     except tomllib.TOMLDecodeError as error:
         raise DataError(f"{name}: {error}{_comma_hint(text)}") from error
     except msgspec.ValidationError as error:
-        raise DataError(f"{name}: {_readable(str(error), tables, _keys())}") from error
+        raise DataError(f"{name}: {_readable(str(error), tables)}") from error
     except (ValueError, ArithmeticError, RecursionError) as error:
         raise DataError(f"{name}: {error}") from error
 
 
-def _keys() -> set[str]:
-    tables = [
-        Machine,
-        Identity,
-        TapSetup,
-        Daq,
-        ChannelTable,
-        ModeChoice,
-        Limits,
-        SpeedRange,
-        Drive,
-        DoubtTable,
-        NotifyTable,
-    ]
-    tables += [MaterialTable, ProgramTable, SpindleTable, SegmentTable, BearingTable, MassTable, JointTable, ToolTable]
-    return {field for table in tables for field in table.__struct_fields__}
+def _keys(place: str) -> tuple[str, ...]:
+    """Keys of the table at a place like ".program[0]"."""
+    table: type[Table] = Machine
+    for key in re.findall(r"\.(\w+)", place):
+        kinds = typing.get_type_hints(table, include_extras=True)[key]
+        table = next(kind for kind in _kinds(kinds) if isinstance(kind, type) and issubclass(kind, Table))
+    return table.__struct_fields__
+
+
+def _kinds(kind: object) -> Iterator[object]:
+    """All that a type is made of, itself first."""
+    yield kind
+    for part in typing.get_args(kind):
+        yield from _kinds(part)
 
 
 def _comma_hint(text: str) -> str:
@@ -226,14 +247,14 @@ def _comma_hint(text: str) -> str:
     return f"; write {match[1]}.{match[2]} with a point" if match else ""
 
 
-def _readable(message: str, tables: Mapping[str, Any], keys: Collection[str]) -> str:
-    """Message of msgspec with its place first, the value that is refused, and a known key for a mistyped one."""
+def _readable(message: str, tables: Mapping[str, Any]) -> str:
+    """Message of msgspec with its place first, the value that is refused, and a key of the table for a mistyped one."""
     text, _, place = message.partition(" - at `$")
     place = place.rstrip("`")
     where = re.sub(r"\.?(\w+?)s?\[(\d+)\]", lambda m: f" {m[1]} {int(m[2]) + 1}", place).strip(" .")
     unknown = re.search(r"unknown field `(\w+)`", text)
     if unknown:
-        near = difflib.get_close_matches(unknown[1], keys, n=1)
+        near = difflib.get_close_matches(unknown[1], _keys(place), n=1)
         text = f"unknown key {unknown[1]!r}" + (f"; is {near[0]!r} meant?" if near else "")
     elif re.match(r"Expected `\w+` [<>]", text):
         text += f", not {_value(tables, place)}"

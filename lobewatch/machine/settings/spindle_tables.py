@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory, change_tool
+from lobewatch.machine.settings.cut_tables import pitch_of
 from lobewatch.machine.settings.toml_table import NotNegative, Positive, PositiveOrInfinite, Table
 
 
@@ -163,6 +164,11 @@ class ToolTable(Table, frozen=True):
     name: Annotated[str, Meta(min_length=1)]
     segments: Annotated[list[SegmentTable], Meta(min_length=1)]
     masses: tuple[MassTable, ...] = ()
+    pitch_deg: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse pitches that are none."""
+        pitch_of(self.pitch_deg, len(self.pitch_deg or ()))
 
     def build(self, spindle: Spindle) -> Spindle:
         """The tool as a free shaft in SI units, of the spindle's theory and material where it names none."""

@@ -21,7 +21,7 @@ from lobewatch.show.terminal.output import remark_json, remark_lines
 from lobewatch.tool import Assembly
 from lobewatch.verdicts import Advice, Setting, Verdict, Word
 from lobewatch.verdicts.setting_search import LEFT
-from lobewatch.verdicts.verdict import Ruling
+from lobewatch.verdicts.verdict import Ruling, is_sure
 
 IN_LINES = ("doubt-decides", "not-checked")
 """Remarks that the lines of a program hold already."""
@@ -159,7 +159,8 @@ def _worst_feed(verdict: Verdict) -> str:
 
 def _or_elsewhere(program: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:
     """What to do until it is settled; tapping what was not tapped comes first."""
-    if program.verdict.assembly is not None and program.verdict.assembly.is_sure:
+    verdict = program.verdict
+    if verdict.assembly is not None and is_sure(verdict.program, verdict.assembly):
         yield f"until then {_elsewhere(program, speeds)}"
 
 
@@ -169,6 +170,8 @@ def _elsewhere(advice: ProgramAdvice, speeds: SpeedRange) -> str:
     assembly = verdict.assembly
     if assembly is not None and len(assembly.directions) == 1:
         return f"tap direction {_missing(assembly)} too: only then can a safe speed be named"
+    if verdict.program.thin:
+        return "support the wall, which is thin: only then can a safe speed be named"
     if assembly is not None and assembly.questions:
         cure = "answer what is asked of its tap tests"
         cure = "tap again" if any(question.code == "newest-damaged" for question in assembly.questions) else cure

@@ -16,6 +16,7 @@ from lobes import Program, program_limit
 from lobewatch.cli import main
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.verdicts import Advice, Setting
+from lobewatch.verdicts.ways import ways
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
@@ -155,7 +156,7 @@ def test_the_numbers_are_those_of_the_limit_in_the_worst_feed(shop: Shop, check:
     machine, newest = shop.folder.machine, shop.logbook.assembly()
     for entry, table in zip(check("--json").json["programs"], machine.program, strict=True):
         program = Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
-        found = program_limit(program, newest.x, newest.y, table.feed_angles)
+        found = program_limit(program, newest.x, newest.y, ways(table, machine, newest))
         assert entry["limit_mm"] == pytest.approx(found.limit * 1e3, rel=1e-6)
         assert entry["stable"] == found.stable
         assert entry["worst_feed_deg"] == pytest.approx(np.degrees(found.feed_angle))

@@ -93,7 +93,8 @@ def test_the_verdict_is_that_of_the_complex_modes(machine: Machine) -> None:
     for phase in (-30.0, 0.0, 30.0):
         found = judge(table, of([turned(phase)]), machine)
         program = as_program(table, machine)
-        assert found.limit == program_limit(program, [turned(phase)], [turned(phase)], table.feed_angles).limit
+        assert found.draws is not None
+        assert found.limit == program_limit(program, [turned(phase)], [turned(phase)], found.draws.cuts).limit
         assert 0.97 * found.limit < found.limit_low < found.limit < found.limit_high < 1.03 * found.limit
         limits[phase] = found.limit
     assert limits[-30.0] < 0.9 * limits[0.0] < 0.7 * limits[30.0]

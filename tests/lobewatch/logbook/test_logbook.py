@@ -21,7 +21,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
-from lobes import Program, ProgramLimit, program_limit, zero_order
+from lobes import Cut, Program, ProgramLimit, program_limit, zero_order
 from lobes.program import Modes
 from lobewatch import Logbook
 from lobewatch.cli import app
@@ -215,7 +215,7 @@ def test_an_old_tap_of_the_other_direction_counts(shop: Shop) -> None:
     assert [round(modes[0].frequency) for modes in (assembly.x, assembly.y)] == [1560, 1700]
     for found in logbook.verdicts():
         program = as_program(found.program, logbook.machine)
-        limit = program_limit(program, assembly.x, assembly.y, found.program.feed_angles).limit
+        limit = program_limit(program, assembly.x, assembly.y, found.draws.cuts).limit
         assert found.limit == pytest.approx(limit)
         assert found.remarks[0].code == "older-direction"
         assert "direction x is that of 2026-02-14, 370 days older" in found.remarks[0].text
@@ -260,9 +260,9 @@ def test_light_report_and_history_have_one_formula_for_the_fall(path: Path) -> N
 def test_only_the_newest_row_pays_for_its_verdicts(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Program] = []
 
-    def counting(program: Program, x: Modes, y: Modes, feed_angles: Sequence[float]) -> ProgramLimit:
+    def counting(program: Program, x: Modes, y: Modes, cuts: Sequence[Cut]) -> ProgramLimit:
         asked.append(program)
-        return program_limit(program, x, y, feed_angles)
+        return program_limit(program, x, y, cuts)
 
     monkeypatch.setattr("lobewatch.verdicts.judgement.program_limit", counting)
     for day in range(5):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -74,7 +75,10 @@ def test_a_program_runs_along_one_axis_or_both(shop: Shop) -> None:
     shop.edit("radial_depth_mm = 20\n", "radial_depth_mm = 5\n")
     (verdict,) = shop.logbook.verdicts()
     program = as_program(verdict.program, shop.folder.machine)
-    limits = [program_limit(program, assembly.x, assembly.y, [np.radians(15.0 * i)]).limit for i in range(12)]
+    limits = [
+        program_limit(program, assembly.x, assembly.y, [replace(program.cut, feed_angle=np.radians(15.0 * i))]).limit
+        for i in range(12)
+    ]
     assert verdict.limit == pytest.approx(min(limits))
     assert verdict.feed_angle == pytest.approx(np.radians(15.0 * np.argmin(limits)))
 
@@ -99,7 +103,7 @@ def limit_after(verdict: Any, program: Program, fall: float, stiffness: float) -
     """Limit in the middle with all frequencies fallen."""
     tool = verdict.assembly
     x, y = ([mode.scaled(1 - fall, stiffness, "aged") for mode in modes] for modes in (tool.x, tool.y))
-    return program_limit(program, x, y, verdict.program.feed_angles).limit
+    return program_limit(program, x, y, verdict.draws.cuts).limit
 
 
 def test_k_follows_the_model_as_the_frequency_falls_and_stays_without_one(shop: Shop) -> None:

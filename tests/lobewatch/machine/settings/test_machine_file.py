@@ -57,7 +57,7 @@ def test_the_doubt_in_comments_is_the_default_and_complete(text: str) -> None:
     own = {"frequency_percent": 0.3, "damping_percent": 10.0, "stiffness_percent": 3.0}
     assert msgspec.structs.asdict(shown) == msgspec.structs.asdict(DoubtTable()) | own
     assert pytest.approx([value / 100 for value in own.values()]) == SCATTER[:3]
-    assert len(re.findall(r"_percent = [\d.]+ +# \S", block)) == len(DoubtTable.__struct_fields__)
+    assert len(re.findall(r"^# \w+ = \S+ +# \S", block, re.MULTILINE)) == len(DoubtTable.__struct_fields__)
 
 
 @pytest.mark.parametrize("text", [EXAMPLE, FRESH], ids=["example", "fresh"])

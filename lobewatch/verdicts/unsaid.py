@@ -1,0 +1,60 @@
+"""What a program does not say of itself, and what it costs when the silence means something else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from acquisition import Remark
+from lobewatch.machine import Machine, ProgramTable
+from lobewatch.verdicts.draws import ProgramDraws
+from lobewatch.verdicts.judgement import Judgement
+from lobewatch.verdicts.mean_force import MeanForce
+from lobewatch.verdicts.ways import STEP
+
+NARROW = 0.5
+"""Radial depth over diameter below which a corner engages the tool far more than the straight before it ..."""
+CORNER = 1.5
+"""... as one with so many times the radius of the tool does, which stands for corners."""
+HELIX_MATTERS = 0.2
+"""Radial depth over diameter below which a helix moves the limit."""
+
+
+def unsaid(table: ProgramTable, machine: Machine, judgement: Judgement) -> Iterator[Remark]:
+    """Remarks on what is assumed because the program does not say it."""
+    if table.immersion < NARROW and table.corner_radius_mm is None and not isinstance(table.radial_depth_mm, tuple):
+        yield _one_engagement(table, machine, judgement)
+    if table.helix_deg is None and min(table.immersions) < HELIX_MATTERS:
+        yield Remark(
+            "helix-not-written",
+            table.name,
+            f"helix_deg is not written, and taken as 0: at a/D {min(table.immersions):.2g} edges with a helix may have "
+            "0.7 to 1.7 times the limit",
+            "write helix_deg, 0 for straight edges",
+        )
+
+
+def _one_engagement(table: ProgramTable, machine: Machine, judgement: Judgement) -> Remark:
+    radius = CORNER * table.tool_diameter_mm / 2
+    inside, radial = table.in_corner(radius), table.radial_mm[1]
+    limit = _limit_at(inside, table, machine, judgement.draws)
+    share = f", {100 * limit / judgement.middle.limit:.0f} % of it" if limit < judgement.middle.limit < math.inf else ""
+    return Remark(
+        "one-engagement",
+        table.name,
+        f"judged at a/D {table.immersion:.2g} all the way: in a corner of {radius:g} mm radius it becomes "
+        f"{inside:.2g}, and the limit about {1e3 * limit:.2g} mm{share}",
+        f"write corner_radius_mm, or [least, greatest] as radial_depth_mm; [{radial:g}, {radial:g}] where the path is "
+        "straight",
+    )
+
+
+def _limit_at(immersion: float, table: ProgramTable, machine: Machine, draws: ProgramDraws) -> float:
+    """Limit (m) in the middle of the doubt by zero order at another engagement, whatever the feed."""
+    cut, middle = replace(machine.build_cut(table), immersion=immersion), draws.rows[np.array([0])]
+    fed = [replace(cut, feed_angle=i * STEP) for i in range(round(math.pi / STEP))]
+    speed = np.array([table.speed_rpm])
+    return min(float(MeanForce.of(middle.making(way)).limits(speed)[0][0, 0]) for way in fed)

@@ -66,7 +66,7 @@ def robust_pockets(
     The speed is the middle of those that are safe now and until it is tapped again. Empty where nothing is safe in the
     range of speeds, or a direction was not tapped or is in question: then nothing is called stable.
     """
-    if not assembly.is_sure:
+    if not is_sure(table, assembly):
         return []
     spindle = at_speed.moved(assembly)
     program_table = _stable_somewhere(at_speed.taught(table), spindle, machine)

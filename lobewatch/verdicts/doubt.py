@@ -94,7 +94,8 @@ class Doubt:
     ratio: Span
     """Range of Kr/Kt, the direction of the force, over the middle."""
     wear: float = 1.0
-    """Largest factor on both cutting coefficients by edges that are no longer new; the least is 1."""
+    """Largest factor on both cutting coefficients by edges that are no longer new, drawn with the largest Kt; the least
+    is 1."""
     learnt: LearntDraws | None = None
     """Draws that test cuts have left, which stand for the half-widths; None where none has taught anything."""
 
@@ -111,7 +112,8 @@ class Doubt:
         rows = self._of_new_edges(middle, count, seed, without)
         if self.wear == 1 or without == "wear":
             return rows
-        worn = 1 + (self.wear - 1) * np.random.default_rng((seed, 2)).uniform(0, 1, count)
+        worn = np.empty(count)
+        worn[np.argsort(rows.tangential, kind="stable")] = np.linspace(1, self.wear, count)
         return replace(rows, tangential=rows.tangential * worn, radial=rows.radial * worn)
 
     def _of_new_edges(self, middle: MillingRows, count: int, seed: int, without: str) -> MillingRows:

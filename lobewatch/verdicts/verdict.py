@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from acquisition import DataError, Remark
-from lobewatch.machine import Machine, ProgramTable, drive_limit
+from lobewatch.machine import CutTable, Machine, ProgramTable, drive_limit
 from lobewatch.tool.assembly import ABOUT_DIRECTIONS, Assembly
 from lobewatch.verdicts.draws import DRAWS, ProgramDraws, turning_draws
 from lobewatch.verdicts.judgement import Judgement, weigh
@@ -182,9 +182,9 @@ def _word(table: ProgramTable, judgement: Judgement, assembly: Assembly) -> Word
     return Word.STABLE if judgement.is_stable_throughout and is_sure(table, assembly) else Word.DOUBTFUL
 
 
-def is_sure(table: ProgramTable, assembly: Assembly) -> bool:
+def is_sure(table: CutTable, assembly: Assembly) -> bool:
     """Whether all that gives way is known: both directions of the tool, without a question, and no thin wall."""
-    return assembly.is_sure and not table.thin
+    return assembly.is_sure and not (isinstance(table, ProgramTable) and table.thin)
 
 
 def _cause(table: ProgramTable, judgement: Judgement, assembly: Assembly) -> str:

@@ -53,7 +53,8 @@ def test_vectors_along_the_axes_change_nothing() -> None:
     kinds, program = (None, turned_by(0)), Program(CUT, 9000.0, 2e-3)
     radius = [spectral_radius(PAIR[:1], PAIR[1:], CUT, SPEEDS, [1e-3, 4e-3], kind) for kind in kinds]
     np.testing.assert_array_equal(radius[0], radius[1])
-    limits = [program_limit(program, PAIR[:1], PAIR[1:], (0.0, 0.5), kind).limits for kind in kinds]
+    cuts = [replace(program.cut, feed_angle=angle) for angle in (0.0, 0.5)]
+    limits = [program_limit(program, PAIR[:1], PAIR[1:], cuts, kind).limits for kind in kinds]
     assert limits[0] == limits[1]
 
 

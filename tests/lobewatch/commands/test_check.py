@@ -386,9 +386,9 @@ def test_the_feed_of_a_program_counts(shop: Shop, check: Check, no_search: None)
         found = check("--json").programs["A"]
         limits[feed], worst[feed] = found["limit_mm"], found["worst_feed_deg"]
         assert found["feed"] == feed
-    assert limits["both"] == pytest.approx(min(limits["x"], limits["y"]))
+    assert 0.9 * min(limits["x"], limits["y"]) < limits["both"] < 0.95 * min(limits["x"], limits["y"])
     assert (worst["x"], worst["y"]) == (0, pytest.approx(90))
-    assert worst["both"] == pytest.approx(worst[min("xy", key=lambda axis: limits[axis])])
+    assert worst["both"] % 90 != 0
     assert abs(limits["x"] / limits["y"] - 1) > 0.05
 
 

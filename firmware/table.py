@@ -1,0 +1,43 @@
+"""A table of scans for the boards that have no converter: `python firmware/table.py MACHINE TABLE`."""
+
+from __future__ import annotations
+
+import argparse
+import struct
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import HammeredStructure, Hammering
+from acquisition.emulation import quantise
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE, emulated_structure
+
+
+def write_table(path: Path, codes: NDArray[np.int32], *, by_clock: bool) -> None:
+    """Scans (2, n) of force and acceleration, played over and over: by the clock, or as fast as the host reads."""
+    header = struct.pack("<4sII", b"TAPS", codes.shape[1], by_clock)
+    path.write_bytes(header + codes.T.astype("<i4").tobytes())
+
+
+def main() -> None:
+    """The spindle of a machine, tapped twice a second."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("machine", type=Path, help="folder with a spindle in its machine.toml")
+    parser.add_argument("table", type=Path, help="file to write")
+    parser.add_argument("--seconds", type=float, default=60.0, help="length, up to 80 s fit into QEMU's board")
+    parser.add_argument("--seed", type=int, default=1, help="of the random numbers")
+    parser.add_argument("--by-clock", action="store_true", help="played at the rate, not as fast as the host reads")
+    options = parser.parse_args()
+    spindle = MachineFolder(options.machine).machine.spindle
+    if spindle is None:
+        parser.error(f"{options.machine}: machine.toml has no [spindle] table: there is nothing to tap")
+    structure = emulated_structure(spindle.build(), spindle.damping_ratio)
+    tapper = HammeredStructure(structure, SAMPLE_RATE, np.random.default_rng(options.seed), Hammering())
+    codes = quantise(tapper(0, round(options.seconds * SAMPLE_RATE)), CHANNELS)
+    write_table(options.table, codes, by_clock=options.by_clock)
+
+
+if __name__ == "__main__":
+    main()

@@ -207,16 +207,21 @@ static void stop(void) {
   now.streaming = 0;
 }
 
-static const char *start(size_t size) {
-  if (size != 8) return "START without u64";
+/* No scan taken, none sent. */
+static void forget_scans(void) {
   stop();
   ring.head = ring.tail = 0;
   ring.losing = ring.gap = 0;
   ring.taken = ring.overruns = 0;
   now.next = now.sent = now.limit = 0;
-  for (size = 8; size--;) now.limit = now.limit << 8 | in.raw[HEADER + size];
-  now.told = 0u - now.rate;
   now.peak = 0;
+}
+
+static const char *start(size_t size) {
+  if (size != 8) return "START without u64";
+  forget_scans();
+  while (size--) now.limit = now.limit << 8 | in.raw[HEADER + size];
+  now.told = 0u - now.rate;
   now.session++;
   now.streaming = 1;
   board_start(now.rate);
@@ -241,7 +246,7 @@ static void answer_command(void) {
   } else {
     memcpy(out.raw + HEADER, in.raw + 4, 4);
     put(out.raw + HEADER + 4, refusal != NULL, 2);
-    send_frame(refusal ? NACK : ACK, 0, refusal ? add_text(add_text(6, "not taken: "), refusal) : 6);
+    send_frame(refusal ? NACK : ACK, 0, add_text(6, refusal ? refusal : ""));
   }
   in.size = in.ready = 0;
 }
@@ -318,7 +323,7 @@ static void stream(void) {
 
 void taps_init(const char *const pieces[]) {
   info = pieces;
-  stop();
+  forget_scans();
   out.size = in.size = 0;
   in.code = in.left = in.bad = in.ready = 0;
   now.seq = 0;
@@ -330,7 +335,7 @@ void taps_init(const char *const pieces[]) {
 
 void taps_poll(void) {
   int byte, count;
-  uint8_t pressed = board_button() != 0;
+  uint8_t pressed = (uint8_t)board_button();
   send_on();
   for (count = 0; count < PER_POLL && !in.ready && (byte = board_receive()) >= 0; count++) receive((uint8_t)byte);
   if (out.size) return;

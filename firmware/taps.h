@@ -46,6 +46,6 @@ size_t board_send(const uint8_t *data, size_t size); /* how many of these bytes 
 int board_receive(void);                             /* the next byte from the host; -1: none now */
 void board_start(uint32_t rate);                     /* taps_scan is called rate times a second from now on */
 void board_stop(void);                               /* taps_scan is not called any more when this returns */
-int board_button(void);                              /* whether the button is down */
+int board_button(void);                              /* 1 while the button is down, 0 else */
 
 #endif

@@ -1,5 +1,5 @@
-/* A converter made of a table: its scans over and over, by the clock or as fast as they are sent; and a bench beside it,
-   where a byte presses the button (B, b), overloads the force input (O, o), or keeps the link shut for a while (L). */
+/* A converter made of a table: its scans over and over, by the clock or as fast as they are sent; and what happens beside it
+   at certain scans: the button is pressed (B, b), the force input overloaded (O, o), the link shut for a while (L). */
 #ifndef SIMULATED_H
 #define SIMULATED_H
 
@@ -7,17 +7,20 @@
 
 enum { SHUT_SCANS = 3 * TAPS_RING_SCANS, AT_ONCE = 128 };
 
-/* What firmware/table.py writes, little-endian. */
+/* What firmware/scan_table.py writes, little-endian. */
 struct table {
-  char magic[4];      /* "TAPS" */
-  uint32_t scans;     /* in it */
-  uint32_t by_clock;  /* whether they come at the rate, or as fast as the host reads */
+  char magic[4];     /* "TAPS" */
+  uint32_t scans;    /* in it */
+  uint32_t by_clock; /* whether they come at the rate, or as fast as the host reads */
+  struct {
+    uint32_t scan, letter; /* scans since power came on, what happens then; letter 0: nothing */
+  } events[16];
   int32_t codes[][2]; /* force, acceleration */
 };
 
 static struct {
   const struct table *table;
-  uint32_t next, rate, shut; /* rate 0: stopped; shut: scans until the link is open again */
+  uint32_t played, rate, shut; /* rate 0: stopped; shut: scans until the link is open again */
   uint8_t is_down, overload, is_blocked;
 } simulated;
 
@@ -40,15 +43,19 @@ static int simulated_fits(const struct table *table) {
          table->scans > 0;
 }
 
-static void simulated_bench(int byte) {
-  if (byte == 'B' || byte == 'b') simulated.is_down = byte == 'B';
-  if (byte == 'O' || byte == 'o') simulated.overload = byte == 'O';
-  if (byte == 'L') simulated.shut = SHUT_SCANS;
+static void simulated_event(uint32_t letter) {
+  if (letter == 'B' || letter == 'b') simulated.is_down = letter == 'B';
+  if (letter == 'O' || letter == 'o') simulated.overload = letter == 'O';
+  if (letter == 'L') simulated.shut = SHUT_SCANS;
 }
 
 static void simulated_play(uint32_t scans) {
-  for (; scans-- && simulated.rate; simulated.next = (simulated.next + 1) % simulated.table->scans) {
-    taps_scan(simulated.table->codes[simulated.next], simulated.overload);
+  const struct table *table = simulated.table;
+  size_t i;
+  for (; scans-- && simulated.rate; simulated.played++) {
+    for (i = 0; i < sizeof table->events / sizeof *table->events; i++)
+      if (table->events[i].scan == simulated.played) simulated_event(table->events[i].letter);
+    taps_scan(table->codes[simulated.played % table->scans], simulated.overload);
     if (simulated.shut) simulated.shut--;
   }
 }

@@ -1,4 +1,4 @@
-/* A program of this computer as a board: taps TABLE prints its pseudo-terminal; the bench is its standard input. */
+/* A program of this computer as a board: taps TABLE prints its pseudo-terminal, and runs until it is ended. */
 #include <errno.h>
 #include <fcntl.h>
 #include <poll.h>
@@ -53,7 +53,7 @@ static const struct table *read_table(const char *path) {
   fclose(file);
   if ((size_t)size < sizeof *table || !simulated_fits(table) ||
       table->scans > ((size_t)size - sizeof *table) / sizeof *table->codes) {
-    fprintf(stderr, "%s is no table of scans; firmware/table.py makes one\n", path);
+    fprintf(stderr, "%s is no table of scans; firmware/scan_table.py makes one\n", path);
     exit(2);
   }
   return table;
@@ -77,17 +77,12 @@ static void play_by_clock(void) {
   due -= (uint32_t)due;
 }
 
-/* Wait for the host, the bench, or a millisecond; not at all where there is more to send. False: the bench has gone. */
-static int wait_a_little(void) {
+/* Wait for the host, a millisecond at most; not at all where there is more to send. */
+static void wait_a_little(void) {
   int is_busy = simulated.rate && !simulated.table->by_clock && !simulated.is_blocked;
-  struct pollfd ends[] = {{line, POLLIN, 0}, {STDIN_FILENO, POLLIN, 0}};
-  char byte;
-  if (simulated.is_blocked) ends[0].events |= POLLOUT;
-  poll(ends, 2, is_busy ? 0 : 1);
-  if (!ends[1].revents) return 1;
-  if (read(STDIN_FILENO, &byte, 1) != 1) return 0;
-  simulated_bench(byte);
-  return 1;
+  struct pollfd end = {line, POLLIN, 0};
+  if (simulated.is_blocked) end.events |= POLLOUT;
+  poll(&end, 1, is_busy ? 0 : 1);
 }
 
 int main(int count, char **words) {
@@ -97,10 +92,10 @@ int main(int count, char **words) {
   }
   simulated_begin(read_table(words[1]));
   open_line();
-  while (wait_a_little()) {
+  for (;;) {
+    wait_a_little();
     play_by_clock();
     simulated_play_free();
     taps_poll();
   }
-  return 0;
 }

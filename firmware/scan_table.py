@@ -1,9 +1,10 @@
-"""A table of scans for the boards that have no converter: `python firmware/table.py MACHINE TABLE`."""
+"""A table of scans for the boards that have no converter: `python firmware/scan_table.py MACHINE TABLE`."""
 
 from __future__ import annotations
 
 import argparse
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,20 @@ from acquisition.emulation import quantise
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.emulated_spindle import CHANNELS, SAMPLE_RATE, emulated_structure
 
+EVENTS = 16
+"""What a table has room for."""
 
-def write_table(path: Path, codes: NDArray[np.int32], *, by_clock: bool) -> None:
-    """Scans (2, n) of force and acceleration, played over and over: by the clock, or as fast as the host reads."""
+
+def write_table(
+    path: Path, codes: NDArray[np.int32], *, by_clock: bool = False, events: Sequence[tuple[int, str]] = ()
+) -> None:
+    """Scans (2, n) of force and acceleration, played over and over: by the clock, or as fast as the host reads.
+
+    events: at so many scans since power came on a letter of firmware/boards/simulated.h happens; 16 at most.
+    """
+    happening = [*events, *[(0, "\0")] * (EVENTS - len(events))]
     header = struct.pack("<4sII", b"TAPS", codes.shape[1], by_clock)
+    header += b"".join(struct.pack("<II", scan, ord(letter)) for scan, letter in happening)
     path.write_bytes(header + codes.T.astype("<i4").tobytes())
 
 

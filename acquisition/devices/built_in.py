@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from acquisition.ports import SerialLink
     from acquisition.source import Device, DeviceAddress, DeviceIdentity
 
+LINES_RATE = 10_000.0
+"""Of an emulated board that prints lines (Hz)."""
 CLOCK = 1000.0
 """Of an emulated generator (Hz)."""
 
@@ -74,6 +76,35 @@ def _emulate_dataq(bench: Bench) -> EmulatorThread:
     return DataqEmulator(bench.signal_at, bench.inputs, realtime=bench.realtime, tcp=bench.tcp, traits=traits)
 
 
+def _open_lines(port: str, settings: DeviceSettings) -> Device:
+    from acquisition.lines import LinesSource
+
+    return LinesSource(port, settings.inputs, settings.sample_rate, settings.printing)
+
+
+def _probe_lines(link: SerialLink) -> DeviceIdentity | None:
+    from acquisition.lines import probe_lines
+
+    return probe_lines(link)
+
+
+def _check_lines(settings: DeviceSettings) -> None:
+    from acquisition.lines import check_lines
+
+    check_lines(settings.inputs, settings.sample_rate)
+
+
+def _emulate_lines(bench: Bench) -> EmulatorThread:
+    from acquisition.lines import LinesEmulator
+
+    force, acceleration = (sensor.channel for sensor in bench.inputs)
+    sensitivities = force.sensitivity, acceleration.sensitivity
+    rate = min(bench.sample_rate, LINES_RATE)
+    return LinesEmulator(
+        bench.signal_at(rate), sensitivities, force.full_scale, rate, realtime=bench.realtime, tcp=bench.tcp
+    )
+
+
 def _by_library(name: str, title: str, extra: str) -> Driver:
     """A kind of device that a library of its maker reads."""
 
@@ -111,6 +142,16 @@ BUILT_IN = (
         _check_dataq,
         vendors=frozenset({0x0683}),
         emulate=_emulate_dataq,
+    ),
+    Driver(
+        "lines",
+        "a board that prints lines of numbers",
+        _open_lines,
+        _probe_lines,
+        _check_lines,
+        emulate=_emulate_lines,
+        prints=True,
+        is_tried=False,
     ),
     _by_library("audio", "a sound device with two inputs, such as The Modal Shop 485B39", "audio"),
     _by_library("nidaqmx", "an NI device, such as an NI 9234 or 9230", "nidaqmx"),

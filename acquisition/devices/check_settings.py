@@ -16,6 +16,8 @@ def check_settings(driver: Driver, settings: DeviceSettings) -> None:
             f"channel: {driver.title} names its own sensors: leave [[daq.channel]] out, or name another driver "
             '("dataq" takes them)'
         )
+    if settings.printing and not driver.prints:
+        raise ValueError(f'printing: [daq.printing] is for driver = "lines"; leave it out for {driver.title}')
     with named_package(driver.name, "checking [daq]", DataError):
         driver.check(settings)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from acquisition.channel import SensorInput
     from acquisition.emulation import Bench, EmulatorThread
+    from acquisition.lines import Printing
     from acquisition.ports import SerialLink
     from acquisition.source import Device, DeviceAddress, DeviceIdentity
 
@@ -25,6 +26,8 @@ class DeviceSettings:
     """Whether lost scans are to be found."""
     digital_clock: bool = False
     """Whether a square wave on digital input 0 shows the loss of whole scans."""
+    printing: Printing | None = None
+    """What a board prints; None for volts in lines."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,8 @@ class Driver:
     """Whether the emulated device can tell the host that its scans do not follow the clock."""
     search: Callable[[], Sequence[DeviceAddress]] | None = None
     """Function that lists devices of this kind that are on no serial port; none where its library is not installed."""
+    prints: bool = False
+    """Whether such a device prints its samples, as [daq.printing] says."""
     is_tried: bool = True
     """Whether somebody has reported that it works on hardware."""
     extra: str = ""

@@ -28,11 +28,14 @@ BUFFER_BYTES = 16 << 20
 class SerialLink:
     """An open port; `read` hands over what the reader thread has gathered."""
 
-    def __init__(self, port: str) -> None:
-        """Open the port for this program alone; DeviceError with the system's own words and a cure."""
+    def __init__(self, port: str, baud_rate: int = 9600) -> None:
+        """Open the port for this program alone; DeviceError with the system's own words and a cure.
+
+        baud_rate: of a port that is no USB device itself (baud); such a one has none.
+        """
         self.port = port
         try:
-            self._serial = _open(port)
+            self._serial = _open(port, baud_rate)
         except (OSError, ValueError, TermiosError) as error:
             raise explain_open_error(port, error) from error
         self._chunks: deque[bytes] = deque()
@@ -133,13 +136,13 @@ class _TcpPort:
         self._socket.close()
 
 
-def _open(port: str) -> Any:  # a pyserial port, which has no types, or a _TcpPort
+def _open(port: str, baud_rate: int) -> Any:  # a pyserial port, which has no types, or a _TcpPort
     url = urlsplit(port)
     if url.scheme == "socket":
         if not url.hostname or not url.port:
             raise ValueError("socket://HOST:PORT is expected")
         return _TcpPort(url.hostname, url.port)
-    opened = serial.Serial(port, timeout=0.1, write_timeout=2.0, exclusive=True)
+    opened = serial.Serial(port, baud_rate, timeout=0.1, write_timeout=2.0, exclusive=True)
     if hasattr(opened, "set_buffer_size"):  # Windows only
         opened.set_buffer_size(rx_size=1 << 20)
     return opened

@@ -16,6 +16,7 @@ from acquisition import (
     check_settings,
     find_driver,
 )
+from acquisition.lines import FrameFormat, Printing
 from lobewatch.machine.settings.toml_table import Positive, Table
 
 Sensitivity = Annotated[float, Meta(ge=-1e6, le=1e6)]
@@ -66,6 +67,26 @@ class ChannelTable(Table, frozen=True):
         return SensorInput(self.input, channel, self.iepe)
 
 
+class PrintingTable(Table, frozen=True):
+    """[daq.printing]: what a board with driver = "lines" prints."""
+
+    adc_bits: Annotated[int, Meta(ge=8, le=24)] | None = None
+    frame_start: str = ""
+    counter: bool = False
+    checksum: bool = True
+    baud_rate: Annotated[int, Meta(ge=300, le=20_000_000)] = 115200
+
+    def build(self) -> Printing:
+        """The same with the start of a frame as bytes; ValueError where that is no hexadecimal number."""
+        try:
+            start = bytes.fromhex(self.frame_start)
+        except ValueError:
+            text = f'frame_start="{self.frame_start}" is no row of bytes in hexadecimal; write it as in "AA BB"'
+            raise ValueError(text) from None
+        frame = FrameFormat(start, self.counter, self.checksum) if start else None
+        return Printing(self.adc_bits, frame, self.baud_rate)
+
+
 class Daq(Table, frozen=True):
     """[daq]: the port is remembered here by hand, never written by the program."""
 
@@ -77,6 +98,7 @@ class Daq(Table, frozen=True):
     accept_measured_rate: bool = False
     calibration_interval_months: Positive = 12.0
     anti_alias: bool | None = None
+    printing: PrintingTable | None = None
     channel: tuple[ChannelTable, ...] = ()
 
     def __post_init__(self) -> None:
@@ -87,4 +109,5 @@ class Daq(Table, frozen=True):
     def settings(self) -> DeviceSettings:
         """Settings asked of the device, in SI units."""
         inputs = tuple(channel.build() for channel in self.channel)
-        return DeviceSettings(self.sample_rate_hz, inputs, self.loss_detection, self.digital_clock)
+        printing = self.printing.build() if self.printing else None
+        return DeviceSettings(self.sample_rate_hz, inputs, self.loss_detection, self.digital_clock, printing)

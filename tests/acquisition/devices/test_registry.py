@@ -43,7 +43,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
 
 
 def test_ours_come_first_and_a_package_adds_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    ours = ("taps", "dataq", "audio", "nidaqmx", "mcc172", "uldaq", "ljm")
+    ours = ("taps", "dataq", "lines", "audio", "nidaqmx", "mcc172", "uldaq", "ljm")
     assert driver_names() == ours
     monkeypatch.syspath_prepend(PLUGINS / "dummy_device")
     assert driver_names() == (*ours, "dummy")

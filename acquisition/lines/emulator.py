@@ -1,0 +1,93 @@
+"""A board made of software that prints counter, force and acceleration."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquisition.emulation import EmulatorThread, Signal
+from acquisition.lines.printing import Printing
+
+
+@dataclass(frozen=True)
+class LinesTraits:
+    """What the board is made for, and what goes wrong."""
+
+    counter_bits: int = 16
+    """Bits of the counter; 0 prints none."""
+    drop_every: int = 0
+    """Every so many scans one is lost; 0: none."""
+    garble_every: int = 0
+    """Every so many scans one is printed with a broken byte; 0: none."""
+
+
+SCANS = 64
+"""Printed at once."""
+
+
+class LinesEmulator(EmulatorThread):
+    """Prints from the moment it is plugged in, whoever listens; it reads nothing."""
+
+    def __init__(
+        self,
+        signal: Signal,
+        sensitivities: tuple[float, float],
+        full_scale: float,
+        sample_rate: float,
+        *,
+        realtime: bool = True,
+        tcp: bool = False,
+        printing: Printing | None = None,
+        traits: LinesTraits | None = None,
+    ) -> None:
+        """signal: N and m/s^2; sensitivities: V per N and per m/s^2; full_scale: of both (V); sample_rate (Hz)."""
+        super().__init__(tcp)
+        self._signal, self._rate, self._realtime, self._printing = signal, sample_rate, realtime, printing or Printing()
+        self._traits = traits or LinesTraits()
+        self._sensitivities, self._full_scale = np.array(sensitivities)[:, None], full_scale
+        self._scan, self._begun = 0, time.monotonic()
+
+    def serve_once(self) -> bool:
+        """See EmulatorThread."""
+        self.wire.exchange(0.002)
+        while self._due():
+            volts = np.clip(self._signal(self._scan, SCANS) * self._sensitivities, -self._full_scale, self._full_scale)
+            for k, row in enumerate(volts.T):
+                self._print(self._scan + k, row)
+            self._scan += SCANS
+        return True
+
+    def _due(self) -> bool:
+        if not self._realtime:
+            return len(self.wire.pending) < 1 << 15
+        return self._scan + SCANS <= (time.monotonic() - self._begun) * self._rate
+
+    def _print(self, number: int, volts: np.ndarray) -> None:
+        how = self._traits
+        if how.drop_every and number % how.drop_every == how.drop_every - 1:
+            return
+        text = bytearray(self._frame(number, volts) if self._printing.frame else self._line(number, volts))
+        if how.garble_every and number % how.garble_every == how.garble_every - 1:
+            text[len(text) // 2] ^= 0x55
+        self.wire.pending += text
+
+    def _counter(self, number: int) -> list[int]:
+        return [number % 2**self._traits.counter_bits] if self._traits.counter_bits else []
+
+    def _line(self, number: int, volts: np.ndarray) -> bytes:
+        bits = self._printing.adc_bits
+        if bits is None:
+            words = [f"{volt:.7f}" for volt in volts]
+        else:
+            codes = np.rint(volts / self._full_scale * 2 ** (bits - 1)) + 2 ** (bits - 1)
+            words = [str(int(code)) for code in np.clip(codes, 0, 2**bits - 1)]
+        return ",".join([*map(str, self._counter(number)), *words]).encode() + b"\r\n"
+
+    def _frame(self, number: int, volts: np.ndarray) -> bytes:
+        form = self._printing.frame
+        assert form is not None
+        codes = np.clip(np.rint(volts / self._full_scale * 2**15), -(2**15), 2**15 - 1).astype("<i2").tobytes()
+        payload = (number % 65536).to_bytes(2, "little") * form.counter + codes
+        return form.start + payload + bytes([sum(payload) & 0xFF]) * form.checksum

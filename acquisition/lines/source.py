@@ -1,0 +1,130 @@
+"""A board that prints its samples as a source of scans."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition.channel import Block, Channel, SensorInput
+from acquisition.errors import DeviceError
+from acquisition.event import Event
+from acquisition.lines.frames import SimpleFrameDecoder
+from acquisition.lines.printing import Printing
+from acquisition.lines.scans import ScanCounter
+from acquisition.lines.text import LineDecoder
+from acquisition.ports.find_port import usb_identity
+from acquisition.ports.serial_link import SerialLink
+from acquisition.source import DeviceIdentity
+
+SILENCE = 3.0
+"""A board that prints no samples for so long has failed (s); one that is reset by the opening of its port needs two."""
+
+
+class LinesSource:
+    """Listens; the board prints by itself and is never written to. A context manager.
+
+    The order is force, acceleration, with a counter before them where three numbers come. The numbers are volts, or,
+    where adc_bits is given, codes of a converter from 0 to 2^adc_bits - 1 whose middle is 0 V. What cannot be known:
+    whole lines that are lost where no counter is printed, and whether both sensors were sampled at once.
+    """
+
+    follows_clock = True
+    """Its rate is measured against the clock, and known no better than that."""
+    fault = ""
+    """It tells of no faults."""
+
+    def __init__(
+        self,
+        port: str,
+        inputs: Sequence[SensorInput],
+        sample_rate: float | None,
+        printing: Printing | None = None,
+    ) -> None:
+        """Open a port. ValueError without a sample rate (Hz), DeviceError where there is no port."""
+        self.sample_rate = check_lines(inputs, sample_rate)
+        self.events: deque[Event] = deque()
+        self.loss_detection = "broken lines"
+        self._printing = printing or Printing()
+        self.channels: tuple[Channel, ...] = tuple(
+            replace(sensor.channel, adc_bits=self._printing.bits) for sensor in inputs
+        )
+        self._rows = [sensor.number for sensor in inputs]
+        self._running = False
+        self._link = SerialLink(port, self._printing.baud_rate)
+        usb = usb_identity(port)
+        self.identity = DeviceIdentity("lines", usb[1] if usb else port)
+
+    def __enter__(self) -> Self:
+        """The connected source."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close it."""
+        self.close()
+
+    def start(self) -> None:
+        """Count scans from the next whole line on."""
+        while self._link.read(0.0):
+            pass
+        frame = self._printing.frame
+        self._decoder = SimpleFrameDecoder(frame) if frame else LineDecoder()
+        self._counter = ScanCounter()
+        self._running = True
+
+    def stop(self) -> None:
+        """Listen no more; the board goes on."""
+        self._running = False
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._running = False
+        self._link.close()
+
+    def blocks(self) -> Iterator[Block]:
+        """Blocks as they arrive; DeviceError where the board is unplugged, or prints nothing that it should."""
+        scan, heard, overruns = 0, time.monotonic(), self._link.overruns
+        while self._running:
+            runs = [run for printed in self._decoder.feed(self._link.read(0.2)) for run in self._counter.runs(printed)]
+            for run in runs:
+                late, overruns = self._link.overruns - overruns, self._link.overruns
+                lost = max(run.lost_before, late)
+                scan += lost
+                yield Block(scan, self._codes(run.values), lost_before=lost)
+                scan, heard = scan + run.values.shape[1], time.monotonic()
+            if time.monotonic() - heard > SILENCE:
+                raise DeviceError(
+                    f"the board on {self._link.port} has printed no samples for {SILENCE:g} s",
+                    "check its program and baud_rate: it must print counter,force,acceleration or force,acceleration",
+                )
+
+    def _codes(self, values: NDArray[np.float64]) -> NDArray[np.int32]:
+        """Codes of the converter, one row a channel."""
+        rows = values[self._rows]
+        if self._printing.frame is None and self._printing.adc_bits is None:
+            volts = zip(self.channels, rows, strict=True)
+            return np.array([channel.encode(row / channel.sensitivity) for channel, row in volts], np.int32)
+        low, high = self.channels[0].rails
+        zero = 0 if self._printing.frame else -low
+        codes: NDArray[np.int32] = np.clip(np.rint(rows) - zero, low, high).astype(np.int32)
+        return codes
+
+
+def check_lines(inputs: Sequence[SensorInput], sample_rate: float | None) -> float:
+    """The sample rate (Hz); ValueError where it is missing, or inputs are no columns."""
+    if sample_rate is None:
+        raise ValueError(
+            'sample_rate_hz is missing: a board with driver = "lines" does not tell its rate; give the number of '
+            "lines a second that it was made for: it is measured against the clock"
+        )
+    if sorted(sensor.number for sensor in inputs) != [0, 1]:
+        raise ValueError("input: the numbers after the counter are the inputs 0 and 1; correct [[daq.channel]]")
+    return sample_rate

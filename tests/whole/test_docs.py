@@ -37,7 +37,7 @@ def test_every_command_and_option_stands_in_readme() -> None:
     group = typer.main.get_command(app)
     assert isinstance(group, typer.core.TyperGroup)
     known = dict(commands(group))
-    assert len(known) == 30
+    assert len(known) >= 31
     for name, options in known.items():
         assert f"lobewatch {name}" in README, name
         for option in options:

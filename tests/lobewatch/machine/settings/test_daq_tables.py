@@ -73,7 +73,7 @@ def test_channels_are_converted_at_the_door() -> None:
         (
             'driver = "dataq"',
             'driver = "ni"',
-            "daq: driver='ni' is none of taps, dataq; correct the name, or install",
+            "daq: driver='ni' is none of taps, dataq, lines, audio, nidaqmx, mcc172, uldaq, ljm; correct the name, or install",
         ),
         ('driver = "dataq"', "", "daq: channel: a TAPS/1 device names its own sensors"),
         ('driver = "dataq"', "loss_detection = false", "daq: channel: a TAPS/1 device names its own sensors"),

@@ -63,6 +63,7 @@ from .sensors import (
     check_rate,
     measure_rate,
     measure_skew,
+    rate_doubt,
     stiffness_doubt,
     unit_mistake,
 )
@@ -165,6 +166,7 @@ __all__ = [
     "no_ports_hint",
     "on_no_serial_port",
     "probe_port",
+    "rate_doubt",
     "read_frf",
     "read_hits",
     "read_recording",

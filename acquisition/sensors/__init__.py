@@ -1,7 +1,7 @@
 """Whether hammer, accelerometer and DAQ are right: rate, skew, mass calibration, plausibility."""
 
 from acquisition.sensors.mass_calibration import AGREES, MassCalibration, calibrate_by_mass
-from acquisition.sensors.measure_rate import MeasuredRate, check_rate, measure_rate
+from acquisition.sensors.measure_rate import MeasuredRate, check_rate, measure_rate, rate_doubt
 from acquisition.sensors.measure_skew import MeasuredSkew, measure_skew
 from acquisition.sensors.plausibility import calibration_doubt, channel_doubts, stiffness_doubt, unit_mistake
 
@@ -16,6 +16,7 @@ __all__ = [
     "check_rate",
     "measure_rate",
     "measure_skew",
+    "rate_doubt",
     "stiffness_doubt",
     "unit_mistake",
 ]

@@ -10,12 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.errors import DeviceError
+from acquisition.remark import Remark
 from acquisition.source import Source
 
 TOLERANCE = 0.002
 """Share by which the measured rate may differ from the nominal one."""
-LARGEST_STD = TOLERANCE / 4
-"""Standard error of the rate, as a share of it, above which nothing can be said."""
+SURE_STD = TOLERANCE / 4
+"""Standard error of the rate, as a share of it, up to which it is sure ..."""
+LARGEST_STD = TOLERANCE
+"""... and above which nothing can be said."""
 FEWEST_BLOCKS = 10
 """Arrivals needed for a slope and its error."""
 LATENCY = 1e-3
@@ -37,6 +40,11 @@ class MeasuredRate:
     seconds: float
     """Time between them (s)."""
 
+    @property
+    def is_sure(self) -> bool:
+        """Whether it is known to 0.05 %."""
+        return self.std <= SURE_STD * self.rate
+
 
 def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float] = time.monotonic) -> MeasuredRate:
     """Start a source, count its scans against the clock (s) for so many seconds, and stop it.
@@ -46,8 +54,8 @@ def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float
     The standard error is that of the slope, enlarged where neighbouring residuals are alike (lag-1 correlation), and
     joined with that of two ends each known to 1 ms (rectangular: 1 ms / sqrt(6) over the whole time).
 
-    Raises ValueError for seconds that are not > 0, DeviceError where fewer than 10 blocks arrive, the stream ends
-    before, or the arrivals scatter so much that the standard error exceeds 0.05 %, and what the source raises.
+    Raises ValueError for seconds that are not > 0, DeviceError where fewer than 10 blocks arrive or the stream ends
+    before, and what the source raises.
     """
     if not (np.isfinite(seconds) and seconds > 0):
         raise ValueError(f"seconds={seconds} is not > 0; the rate of a device takes about 5 s")
@@ -69,24 +77,34 @@ def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float
         )
     period, scatter = _slope(np.array(scans, dtype=np.float64), np.array(arrived))
     std = float(np.hypot(scatter, LATENCY / np.sqrt(6) / n_scans) / period**2)
-    if std > LARGEST_STD / period:
-        raise DeviceError(
-            f"the DAQ's rate cannot be measured: its samples arrive too unevenly ({1 / period:.6g} Hz "
-            f"± {std * period:.2%}, needed ± {LARGEST_STD:.2%})",
-            "close other programs and try again",
-        )
     return MeasuredRate(float(1 / period), std, n_scans, float(elapsed))
 
 
 def check_rate(measured: MeasuredRate, nominal: float) -> None:
-    """DeviceError where the measured rate differs by more than 0.2 % from the nominal one (Hz)."""
+    """DeviceError where the measured rate differs by more than 0.2 % from the nominal one (Hz); where it is not sure,
+    by two standard errors more. DeviceError, too, where the standard error exceeds 0.2 %."""
+    if measured.std > LARGEST_STD * measured.rate:
+        raise DeviceError(
+            f"the DAQ's rate cannot be measured: its samples arrive too unevenly ({measured.rate:.6g} Hz "
+            f"± {measured.std / measured.rate:.2%}, needed ± {LARGEST_STD:.2%})",
+            "close other programs and try again",
+        )
     off = nominal / measured.rate - 1
-    if abs(measured.rate / nominal - 1) > TOLERANCE:
+    if abs(measured.rate / nominal - 1) > TOLERANCE + (0 if measured.is_sure else 2 * measured.std / nominal):
         raise DeviceError(
             f"the DAQ delivers {measured.rate:.2f} ± {measured.std:.2f} scans a second, not {nominal:g}: every "
             f"frequency would be {abs(off):.1%} too {'high' if off > 0 else 'low'}",
             "correct the DAQ's sample rate or work with the measured one",
         )
+
+
+def rate_doubt(measured: MeasuredRate) -> Remark | None:
+    """Remark on a rate that is not sure; None where it is."""
+    if measured.is_sure:
+        return None
+    share = measured.std / measured.rate
+    text = f"the DAQ's sample rate is known to ±{share:.2%} only, and with it every frequency: this computer is busy"
+    return Remark("rate-not-sure", "", text, "close other programs and run lobewatch sensors, which measures it again")
 
 
 def _slope(scans: NDArray[np.float64], arrived: NDArray[np.float64]) -> tuple[float, float]:

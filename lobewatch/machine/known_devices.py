@@ -9,9 +9,22 @@ from datetime import UTC, datetime
 
 import msgspec
 
-from acquisition import DataError, Device, DeviceError, MeasuredRate, atomic_write, check_rate, measure_rate
+from acquisition import (
+    DataError,
+    Device,
+    DeviceError,
+    MeasuredRate,
+    Remark,
+    atomic_write,
+    check_rate,
+    measure_rate,
+    rate_doubt,
+)
 from acquisition.regular_file import SMALL, read_regular
 from lobewatch.machine.folder import MachineFolder
+
+TRIES = 3
+"""Measurements of a rate at most, where the computer is too busy for a sure one."""
 
 
 class KnownDevice(msgspec.Struct, frozen=True):
@@ -41,7 +54,11 @@ class KnownDevice(msgspec.Struct, frozen=True):
 
 
 def checked_rate(
-    folder: MachineFolder, device: Device, seconds: float = 5.0, clock: Callable[[], float] = time.monotonic
+    folder: MachineFolder,
+    device: Device,
+    seconds: float = 5.0,
+    clock: Callable[[], float] = time.monotonic,
+    remarks: list[Remark] | None = None,
 ) -> float:
     """Rate of a connected device that is not started (Hz), measured where this machine does not know it yet.
 
@@ -51,11 +68,24 @@ def checked_rate(
     changes and that rate is returned. Further off: DeviceError, one sentence with the measured rate; or, with
     accept_measured_rate = true in [daq], device.sample_rate is set to the measured rate and that is returned, so that
     every Hit of capture_hits(device, ...) has it: make the Trigger from the returned rate. A refused rate is not kept
-    and is measured again the next time. The rate of a device whose scans do not follow the clock is not checked.
+    and is measured again the next time. One that is not sure, in the best of three tries, is not kept either; a remark
+    on it is added to `remarks`. The rate of a device whose scans do not follow the clock is not checked.
     """
     if not has_clock(device):
         return device.sample_rate
-    return use_rate(folder, device, known_rate(folder, device) or measure_rate(device, seconds, clock))
+    measured = known_rate(folder, device) or _measure(device, seconds, clock)
+    doubt = rate_doubt(measured)
+    if doubt is not None and remarks is not None:
+        remarks.append(doubt)
+    return use_rate(folder, device, measured)
+
+
+def _measure(device: Device, seconds: float, clock: Callable[[], float]) -> MeasuredRate:
+    """The first of several tries that is sure, else the surest."""
+    tries = [measure_rate(device, seconds, clock)]
+    while not tries[-1].is_sure and len(tries) < TRIES:
+        tries.append(measure_rate(device, seconds, clock))
+    return min(tries, key=lambda measured: measured.std / measured.rate)
 
 
 def has_clock(device: Device) -> bool:
@@ -72,16 +102,18 @@ def known_rate(folder: MachineFolder, device: Device) -> MeasuredRate | None:
 
 
 def use_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -> float:
-    """Check a measured rate, accept it where [daq] says so, keep it in daq.json, and return the rate to use (Hz)."""
+    """Rate to use (Hz): a measured one is checked, accepted where [daq] says so, and kept in daq.json where it is sure."""
     try:
         check_rate(measured, device.sample_rate)
         rate = device.sample_rate
     except DeviceError as error:
+        if not measured.is_sure:
+            raise
         if not folder.machine.daq.accept_measured_rate:
             cure = f"{error.cure} (accept_measured_rate = true in [daq] of {folder.toml})"
             raise DeviceError(error.text, cure) from None
         rate = measured.rate
-    if measured != known_rate(folder, device):
+    if measured.is_sure and measured != known_rate(folder, device):
         _remember(folder, device, measured)
     device.sample_rate = rate
     return rate

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from acquisition import Channel, Device, DeviceError, DeviceIdentity, MeasuredRate, Remark, measure_rate
+from acquisition import Channel, Device, DeviceError, DeviceIdentity, MeasuredRate, Remark, measure_rate, rate_doubt
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import has_clock, use_rate
 from lobewatch.tap.self_check import WRONG, sensor_doubts
@@ -49,6 +49,7 @@ def list_sensors(folder: MachineFolder, device: Device, tell: Callable[[str], No
         try:
             measured = measure_rate(device, RATE_SECONDS)
             use_rate(folder, device, measured)
+            remarks += filter(None, [rate_doubt(measured)])
         except DeviceError as error:
             remarks.append(Remark("sample-rate-wrong", "", error.text, error.cure))
     replaced = device.sample_rate != nominal

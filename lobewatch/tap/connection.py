@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 
-from acquisition import Block, Channel, Device, DeviceError, Event, EventKind
+from acquisition import Block, Channel, Device, DeviceError, Event, EventKind, Remark
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import checked_rate, has_clock, known_rate
 from lobewatch.tap.in_progress import TapInProgress
 from lobewatch.tap.live_signal import LiveSignal, description
 from lobewatch.tap.publisher import Publisher
-from lobewatch.tap.state import TapStep
+from lobewatch.tap.state import Check, TapStep
 
 RETRY_TIME = 0.5
 """Time between two tries to find the device again (s)."""
@@ -138,4 +138,7 @@ class Connector:
         """Against the clock, of a device that this machine does not know yet."""
         if has_clock(device) and known_rate(self._folder, device) is None:
             self._publisher.show(reason="New device: its sample rate is measured against the clock for 5 s.")
-        checked_rate(self._folder, device)
+        remarks = list[Remark]()
+        checked_rate(self._folder, device, remarks=remarks)
+        if remarks:
+            self._publisher.show(checks=tuple(Check("sample rate", False, f"{remark}") for remark in remarks))

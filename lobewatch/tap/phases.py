@@ -58,7 +58,11 @@ class Phases:
         self._tap.baseline = quiet_stretch(connection.signal.record(self._loop.blocks(connection), BASELINE_TIME))
         free = shutil.disk_usage(self._folder.path).free
         calibration = calibration_check(connection.signal.channels, machine.daq.calibration_interval_months)
-        checks = (*_guarded_checks(self._tap.baseline, trigger.level if trigger else None, free), calibration)
+        checks = (
+            *self._publisher.state.checks,
+            *_guarded_checks(self._tap.baseline, trigger.level if trigger else None, free),
+            calibration,
+        )
         failed = [f"{check.name}: {check.text}." for check in checks if not check.passed]
         self._publisher.show(checks=checks, reason=" ".join(failed))
 

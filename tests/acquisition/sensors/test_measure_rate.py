@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from acquisition import (
     DeviceError,
     DeviceIdentity,
     MeasuredRate,
+    Remark,
     SimulatedSource,
     TapsEmulator,
     TapsSource,
@@ -131,8 +133,9 @@ def test_a_stall_of_the_host_changes_nothing() -> None:
 
 def test_chaos_is_refused() -> None:
     arrival = even(25600.0)
+    chaos = measured(np.sort(arrival + np.random.default_rng(1).exponential(0.5, arrival.size)))
     with pytest.raises(DeviceError, match=r"arrive too unevenly .* close other programs"):
-        measured(np.sort(arrival + np.random.default_rng(1).exponential(0.5, arrival.size)))
+        check_rate(chaos, 25600.0)
 
 
 def test_too_few_blocks_a_stream_that_ends_and_no_time_are_refused() -> None:
@@ -282,3 +285,29 @@ def test_hits_have_the_measured_rate(folder: MachineFolder, tapper: Callable[...
         hit = next(capture_hits(source, Trigger(20.0, 6400, 512)))
         source.stop()
     assert hit.sample_rate == rate == pytest.approx(12800.0, rel=1e-6)
+
+
+def busy(rate: float) -> NDArray[np.float64]:
+    """Arrivals at a computer that is so busy that the rate is known to about 0.1 %."""
+    arrival = even(rate)
+    return np.sort(arrival + np.random.default_rng(1).exponential(0.03, arrival.size))
+
+
+def test_a_busy_computer_is_a_remark_and_the_rate_is_measured_again_next_time(folder: MachineFolder) -> None:
+    assert 0.0007 < measured(busy(25600.0)).std / 25600 < 0.002
+    remarks = list[Remark]()
+    stream = Stream(busy(25600.0))
+    assert checked_rate(folder, stream, clock=stream.clock, remarks=remarks) == 25600.0
+    assert stream.starts == 3
+    assert [remark.code for remark in remarks] == ["rate-not-sure"]
+    assert re.match(r"the DAQ's sample rate is known to ±0\.\d\d% only", remarks[0].text)
+    assert not (folder.path / "daq.json").exists()
+    quiet = Stream(even(25600.0))
+    assert checked_rate(folder, quiet, clock=quiet.clock, remarks=remarks) == 25600.0
+    assert (quiet.starts, len(remarks)) == (1, 1)
+
+
+def test_a_wrong_rate_is_refused_on_a_busy_computer_too_and_never_worked_with(folder: MachineFolder) -> None:
+    with pytest.raises(DeviceError, match="not 25600"):
+        check(accepting(folder), Stream(busy(12800.0)))
+    assert not (folder.path / "daq.json").exists()

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquisition import Channel, HammeredStructure, Hammering, HitFlags, Structure
-from lobewatch.tap.state import Check, Outcome, Plots, TakenHit, TapState, TapStep
+from lobewatch.tap.state import Check, Choice, Outcome, Plots, ProgramWord, TakenHit, TapState, TapStep
 
 DATA = Path(__file__).parent / "data"
 
@@ -88,6 +88,7 @@ class ScriptedSession:
         self.undone = threading.Event()
         self.stopped = threading.Event()
         self.refusal = ""
+        self.chosen: list[tuple[str, str]] = []
 
     def show(self, word: TapStep, **changes: object) -> TapState:
         """The next state."""
@@ -121,8 +122,15 @@ class ScriptedSession:
     def finish(self) -> None:
         """All hits are there."""
         texts = ("f_1 1688.20 ± 0.12 Hz, 1.9 % below the first test", "K 33.1 ± 0.2 N/um, bearing stiffness 1190 N/um")
-        done = Outcome("warn", texts, "Tap again in 14 days, and run lobewatch check mill-3 today.")
+        words = ("bracket, slot (8000 rpm, 2 mm)", "stable"), ("pocket (12600 rpm, 2.5 mm)", "not stable")
+        programs = [ProgramWord(*word) for word in words]
+        step = "Tap again in 14 days, and run lobewatch check mill-3 today."
+        done = Outcome("warn", texts, step, programs=programs)
         self.show(TapStep.DONE, reason="", outcome=done)
+
+    def pause(self, word: TapStep, *choices: tuple[str, str], reason: str = "") -> None:
+        """Wait for a person between two tests."""
+        self.show(word, reason=reason, choices=tuple(Choice(*choice) for choice in choices))
 
     def undo(self) -> None:
         """Take back the last good hit."""
@@ -137,6 +145,10 @@ class ScriptedSession:
     def stop(self) -> None:
         """Remember that it was asked for."""
         self.stopped.set()
+
+    def choose(self, key: str, tool: str = "") -> None:
+        """Remember what was chosen."""
+        self.chosen.append((key, tool))
 
 
 def scripted_plots(good: int) -> Plots:

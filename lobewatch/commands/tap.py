@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import contextlib
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from lobewatch.machine.folder_path import named_folder
-from lobewatch.show.terminal.output import Json, emit, notes
+from lobewatch.show.terminal.output import Json, notes
 from lobewatch.show.terminal.show_address import Listen, Token, WatchToken, serving
+
+if TYPE_CHECKING:
+    from acquisition import TapDirection
 
 
 def tap(
     machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder.")],
     port: Annotated[str, typer.Option(help="Serial port of the DAQ, socket://HOST:PORT, or file:RECORDING.")] = "",
     tool: Annotated[str, typer.Option(help="What is in the spindle; [tap] tool where not given.")] = "",
-    direction: Annotated[str, typer.Option(help="Direction at the tool tip, x or y.")] = "x",
+    direction: Annotated[
+        str, typer.Option(help="Only this direction at the tool tip, x or y; without it x, then y at a terminal.")
+    ] = "",
     operator: Annotated[str, typer.Option(help="Who holds the hammer.")] = "",
     new: Annotated[bool, typer.Option("--new", help="Begin anew, do not go on with an interrupted test.")] = False,
     accept: Annotated[
@@ -32,13 +38,16 @@ def tap(
     listen: Listen = "127.0.0.1",
     token: Token = None,
     watch_token: WatchToken = None,
+    details: Annotated[bool, typer.Option("--details", help="All modes, the model and the doubt, too.")] = False,
     as_json: Json = False,
 ) -> None:
     """The live tap test: hit until ten hits are good, then see what has changed.
 
-    Keys: u or Page Up takes the last good hit back, q stops, m mutes. Every hit is on the disk before it is counted.
-    After a crash the same command goes on at the same hit; an unplugged cable is waited for. --screen --listen 0.0.0.0
-    can be watched on a tablet; --port file:RECORDING takes recorded hits as if they were made now.
+    At a terminal, or with --screen, x is tapped, then y; then you say what comes next: another test, the next tool, or
+    that you are done. With --direction, --json, or where nobody sits, it is one test. Keys: u or Page Up takes the last
+    good hit back, q stops, m mutes. Every hit is on the disk before it is counted. After a crash the same command goes
+    on at the same hit; an unplugged cable is waited for. --screen --listen 0.0.0.0 can be watched on a tablet; --port
+    file:RECORDING takes recorded hits as if they were made now.
 
     Examples:
 
@@ -48,40 +57,43 @@ def tap(
       lobewatch tap mill-3 --temperature 24 --reclamped --note "after a warm-up of 20 min"
       lobewatch tap trial --port file:taps/ID.h5
     """
-    from acquisition import Conditions
+    from acquisition import Conditions, tap_direction
     from lobewatch.logbook import Logbook
     from lobewatch.machine import MachineFolder
-    from lobewatch.measuring.questions import unasked_text
     from lobewatch.notify.telling import tell
-    from lobewatch.show.history.describe_measurement import measurement_json, measurement_texts
-    from lobewatch.show.programs.describe_verdicts import program_texts, programs_json
+    from lobewatch.show.history.describe_visit import emit_visit
     from lobewatch.show.terminal.printer import TapPrinter
     from lobewatch.show.terminal.terminal_screen import TerminalScreen
     from lobewatch.tap.hit_loop import TapStopped
-    from lobewatch.tap.session import plan_session
+    from lobewatch.tap.session import TapSession, plan_session
+    from lobewatch.tap.visit import TapVisit, first_direction
 
-    folder = MachineFolder(machine)
+    folder, finished = MachineFolder(machine), list[TapSession]()
     conditions = Conditions(temperature_c=temperature, hours=hours, note=note, reclamped=reclamped)
-    named = {"port": port, "tool": tool, "direction": direction, "operator": operator}
-    session = plan_session(folder, **named, resume=not new, accept=accept or (), conditions=conditions)
+    leads = screen or (notes.is_terminal and sys.stdin.isatty())
+    leads = leads and not (direction or as_json or port.startswith("file:"))
+
+    def plan(tool: str, direction: TapDirection) -> TapSession:
+        named = {"port": port, "tool": tool, "direction": direction, "operator": operator}
+        return plan_session(folder, **named, resume=not new, accept=accept or (), conditions=conditions)
+
+    def after(session: TapSession) -> None:
+        finished.append(session)
+        tell(Logbook(folder))
+
+    tool = tool or folder.machine.tap.tool
+    first = tap_direction(direction) if direction else first_direction(folder, tool) if leads else "x"
+    visit = TapVisit(plan, tool, first, leads=leads, after=after)
     try:
         with contextlib.ExitStack() as screens:
             if screen:
                 from lobewatch.screen import ScreenServer  # brings aiohttp, which most tap tests do not need
 
-                server = ScreenServer(session, listen=listen, token=token, watch_token=watch_token)
-                screens.enter_context(serving(server))
-            screens.enter_context(TerminalScreen(session) if notes.is_terminal else TapPrinter(session, notes))
-            done = session.run()
+                screens.enter_context(serving(ScreenServer(visit, listen=listen, token=token, watch_token=watch_token)))
+            screens.enter_context(TerminalScreen(visit) if notes.is_terminal else TapPrinter(visit, notes))
+            visit.run()
     except (TapStopped, KeyboardInterrupt) as stopped:
-        notes.print(f"stopped with {session.state.good} good hits; the same command goes on with them")
+        if not visit.waits:
+            notes.print(f"stopped with {visit.state.good} good hits; the same command goes on with them")
         raise KeyboardInterrupt from stopped
-    notes.print(f"saved {done.id}")
-    accepted = [remark.about for remark in session.measurement.remarks if remark.code == "accepted"]
-    notes.print(*(f"accepted: {code}" for code in accepted), sep="\n", end="\n" if accepted else "")
-    logbook, measurement = Logbook(folder), session.measurement
-    if session.unasked:
-        notes.print(unasked_text(session.unasked, [done.id], logbook.questions), markup=False)
-    payload = measurement_json(measurement, logbook) | {"programs": programs_json(logbook.verdicts())}
-    emit(payload, as_json, *measurement_texts(measurement, logbook), *program_texts(logbook))
-    tell(logbook)
+    emit_visit(Logbook(folder), finished, as_json, details)

@@ -102,7 +102,7 @@ def known_rate(folder: MachineFolder, device: Device) -> MeasuredRate | None:
 
 
 def use_rate(folder: MachineFolder, device: Device, measured: MeasuredRate) -> float:
-    """Rate to use (Hz): a measured one is checked, accepted where [daq] says so, and kept in daq.json where it is sure."""
+    """Rate to use (Hz): a measured one is checked, accepted where [daq] says so, kept in daq.json where it is sure."""
     try:
         check_rate(measured, device.sample_rate)
         rate = device.sample_rate

@@ -128,6 +128,8 @@ class DashboardServer(WebThread):
             raise web.HTTPBadRequest(text='the body must be {"direction": "x"} or {"direction": "y"}') from None
         test = self._tests.get(key)
         if test is None or not test.running:
+            if test is not None:  # it may wait for a choice that is made by this
+                await asyncio.to_thread(_end, test)
             self._tests[key] = LiveTest(folder, wish.direction, resume=wish.resume)
         return web.json_response({"url": f"/tap/{quote(key)}/"})
 
@@ -145,6 +147,11 @@ class DashboardServer(WebThread):
             raise web.HTTPNotFound(text="this report is gone; open it from the list of machines")
         self.door.trust(request)
         return web.Response(text=html, content_type="text/html", headers={"Content-Security-Policy": REPORT_POLICY})
+
+
+def _end(test: LiveTest) -> None:
+    test.stop()
+    test.join()
 
 
 def _render(folder: MachineFolder) -> str:

@@ -41,7 +41,9 @@ def state_message(state: TapState) -> str:
                 "is_early": state.outcome.is_early,
                 "texts": list(state.outcome.texts),
                 "next_step": state.outcome.next_step,
+                "programs": [program._asdict() for program in state.outcome.programs],
             },
+            "choices": [choice._asdict() for choice in state.choices],
         },
         allow_nan=False,
     )

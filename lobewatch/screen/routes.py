@@ -1,4 +1,4 @@
-"""Routes that servers share: pages, the feed of what is watched, undo and stop."""
+"""Routes that servers share: pages, the feed of what is watched, undo, stop and what comes next."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from collections.abc import Callable
 from importlib import resources
 from typing import Protocol
 
+import msgspec
 from aiohttp import web
 
+from acquisition import check_name
 from lobewatch.screen.feed import Messages, PictureSource, State, feed
 from lobewatch.screen.guard import MAY_ALTER, OPEN
 from lobewatch.screen.messages import plots_message, state_message
@@ -21,6 +23,15 @@ TYPES = {"css": "text/css", "html": "text/html", "js": "text/javascript", "svg":
 
 class WatchedTest(RunningTest, PictureSource[TapState], Protocol):
     """A live tap test that pages follow."""
+
+
+class ChoiceRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Body of the request that says what comes after a test."""
+
+    key: str
+    """Key of the choice."""
+    tool: str = ""
+    """Name of the next tool, where that is chosen."""
 
 
 def add_pages(application: web.Application, pages: dict[str, str]) -> None:
@@ -67,7 +78,10 @@ def add_feed(
 
 
 def add_session(application: web.Application, prefix: str, find: Callable[[web.Request], WatchedTest]) -> None:
-    """Serve the screen of a session: its feed, undo and stop. `find` raises HTTPNotFound where there is none."""
+    """Serve the screen of a session: its feed, undo, stop and what comes next.
+
+    `find` raises HTTPNotFound where there is none.
+    """
 
     async def undo(request: web.Request) -> web.Response:
         await asyncio.to_thread(find(request).undo)
@@ -77,9 +91,19 @@ def add_session(application: web.Application, prefix: str, find: Callable[[web.R
         await asyncio.to_thread(find(request).stop)
         return web.json_response({})
 
+    async def choose(request: web.Request) -> web.Response:
+        try:
+            choice = msgspec.json.decode(await request.read(), type=ChoiceRequest)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            raise web.HTTPBadRequest(text='the body must be like {"key": "y"}') from None
+        check_name(choice.tool, "tool")
+        find(request).choose(choice.key, choice.tool)
+        return web.json_response({})
+
     add_feed(application, prefix, find, Messages(state_message, plots_message))
     application.router.add_post(f"{prefix}undo", undo)
     application.router.add_post(f"{prefix}stop", stop)
+    application.router.add_post(f"{prefix}choose", choose)
 
 
 def _answer(files: dict[str, bytes], name: str) -> web.Response:

@@ -34,7 +34,7 @@ from lobewatch.tap.judged_hits import JudgedHits
 from lobewatch.tap.phases import Phases
 from lobewatch.tap.plug import Plug
 from lobewatch.tap.publisher import Publisher
-from lobewatch.tap.state import Outcome, TapState, TapStep
+from lobewatch.tap.state import Outcome, ProgramWord, TapState, TapStep
 
 
 class TapSession:
@@ -89,6 +89,10 @@ class TapSession:
     def stop(self) -> None:
         """End the test now; `run` raises TapStopped, the hits so far stay in the spool."""
         self._wishes.stop()
+
+    def choose(self, key: str, tool: str = "") -> None:
+        """Refuse a choice: after a test alone nothing comes; ValueError."""
+        raise ValueError(f"{f'{key} {tool}'.strip()!r} cannot be chosen: this is one test alone")
 
     def run(self) -> TapTest:
         """Take hits until enough are good, commit the test and return it; blocks.
@@ -173,7 +177,12 @@ def outcome_of(logbook: Logbook, measurement: Measurement) -> Outcome:
     remarks = [*(remark for remark in measurement.remarks if remark not in questions), *joined(standing.remarks)]
     remarks += [remark for remark in logbook.remarks if remark.code not in LIGHTS]
     texts = [*_values(measurement, series), *(f"{remark.finding}." for remark in remarks)]
-    return Outcome(standing.light, texts, standing.next_step, standing.is_early)
+    programs = [
+        ProgramWord(f"{program.name} ({program.speed_rpm:g} rpm, {program.depth_mm:g} mm)", verdict.word.value)
+        for verdict in logbook.verdicts()
+        if (program := verdict.program)
+    ]
+    return Outcome(standing.light, texts, standing.next_step, standing.is_early, programs)
 
 
 def _values(measurement: Measurement, series: SeriesStanding | None) -> list[str]:

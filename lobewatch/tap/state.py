@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,8 @@ class TapStep(enum.StrEnum):
     """The last hit was refused; the screen shows its verdict instead of this word."""
     NO_DEVICE = "NO DEVICE"
     """The DAQ was unplugged or fell silent; the test goes on at the same hit when it is back."""
+    MOVE = "MOVE SENSOR"
+    """One direction is tapped; hammer and sensor are to be turned to the other."""
     DONE = "DONE"
     """Enough good hits; the result is there or being worked out."""
     FAILED = "FAILED"
@@ -87,6 +90,24 @@ class Plots:
     """Band in which the force reaches (Hz)."""
 
 
+class Choice(NamedTuple):
+    """What a person can choose between two tests."""
+
+    key: str
+    """Key that stands for it: "x", "y", "tool" or "done"."""
+    text: str
+    """Words on its button."""
+
+
+class ProgramWord(NamedTuple):
+    """A program and the word on it."""
+
+    program: str
+    """Name, speed and depth."""
+    word: str
+    """Word on it."""
+
+
 @dataclass(frozen=True)
 class Outcome:
     """The result as it stands at the end."""
@@ -99,6 +120,8 @@ class Outcome:
     """Sentence on what to do now."""
     is_early: bool = False
     """Whether the alarm is that of a fall short of every limit."""
+    programs: Sequence[ProgramWord] = ()
+    """Programs with the words on them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,6 +163,8 @@ class TapState:
     """Curves of the last hit and the mean."""
     outcome: Outcome | None = None
     """Result; None before the end."""
+    choices: tuple[Choice, ...] = ()
+    """What can be chosen now; empty while a test runs."""
 
     @property
     def shown_word(self) -> str:

@@ -13,6 +13,7 @@ let stopTimer = null;
 let undoing = false;
 let over = false;
 let aheadOfHit = false;
+let mayAlter = false;
 
 function showState(next) {
   const before = state;
@@ -29,6 +30,7 @@ function showState(next) {
   if (JSON.stringify(state.hits) !== JSON.stringify(before?.hits)) showHits();
   if (JSON.stringify(state.checks) !== JSON.stringify(before?.checks)) showChecks();
   if (JSON.stringify(state.outcome) !== JSON.stringify(before?.outcome)) showOutcome();
+  if (JSON.stringify(state.choices) !== JSON.stringify(before?.choices)) showChoices();
   over = false;
   const finished = ["done", "failed"].includes(state.kind);
   at("undo").disabled = finished || state.good === 0;
@@ -99,17 +101,68 @@ function showOutcome() {
   at("light").querySelector("[data-light=alarm]").textContent = outcome.is_early ? "✗ EARLY ALARM" : "✗ ALARM";
   at("light").hidden = !LIGHTS.includes(outcome.light);
   at("texts").replaceChildren(...outcome.texts.map((text) => element("li", text)));
+  at("programs").replaceChildren(
+    ...outcome.programs.map(({ program, word }) => {
+      const row = element("li", `${program}: `);
+      row.append(element("b", word, word.replaceAll(" ", "-")));
+      return row;
+    }),
+  );
   put("next", outcome.next_step && `Next: ${outcome.next_step}`);
+}
+
+// Between two tests the buttons say what can come next; the others stand for a test that runs.
+function showChoices() {
+  const { choices } = state;
+  at("choices").replaceChildren(
+    ...choices.map(({ key, text }) => {
+      const button = element("button", text);
+      button.type = "button";
+      button.addEventListener("click", () => { button.blur(); choose(key); });
+      return button;
+    }),
+  );
+  at("tool-form").hidden = true;
+  showButtons();
+}
+
+function showButtons() {
+  const choosing = Boolean(state?.choices.length);
+  at("choices").hidden = !(choosing && mayAlter);
+  at("undo").hidden = at("stop").hidden = choosing || !mayAlter;
+  document.body.classList.toggle("choosing", choosing);
+}
+
+async function choose(key, tool = "") {
+  if (key === "tool" && !tool) {
+    at("tool-form").hidden = !at("tool-form").hidden;
+    if (!at("tool-form").hidden) at("tool-name").focus();
+    return;
+  }
+  await ask("choose", "POST", { key, tool }).catch((error) => toast(error.message));
+}
+
+// While the sensor is moved, the foot switch goes on with the other direction.
+function chooseByKey(key) {
+  if (at("choices").hidden) return false;
+  const pressed = state.kind === "move" && UNDO_KEYS.includes(key) ? state.choices[0].key : key.toLowerCase();
+  if (!["x", "y"].includes(pressed) || !state.choices.some((choice) => choice.key === pressed)) return false;
+  choose(pressed);
+  return true;
 }
 
 // Where lobewatch has ended as it should, its last picture stays, or the word says so.
 function showLost(why, ended) {
   over ||= ended;
   const finished = ["done", "failed"].includes(state?.kind);
-  if (over && finished) return put("device", "lobewatch has ended; this is its last picture");
+  if (over && finished) {
+    at("choices").hidden = at("tool-form").hidden = true;
+    return put("device", "lobewatch has ended; this is its last picture");
+  }
   showWord("no-connection", over ? "ENDED" : "NO CONNECTION");
   put("reason", over ? "lobewatch has ended. The hits are kept: the same command goes on with them." : why);
   document.title = at("text").textContent;
+  at("choices").hidden = at("tool-form").hidden = true;
   at("undo").disabled = at("stop").disabled = true;
 }
 
@@ -143,16 +196,17 @@ function showStop() {
 }
 
 // Who came by the address that is only to watch has no buttons that alter anything; the server refuses them too.
-async function showButtons() {
-  const { may_alter: mayAlter } = await ask("access");
-  at("undo").hidden = at("stop").hidden = !mayAlter;
+async function learnWhatIsAllowed() {
+  ({ may_alter: mayAlter } = await ask("access"));
+  showButtons();
 }
 
 function onKey(event) {
   unlock();
   showSound();
-  if (event.repeat || event.ctrlKey || event.altKey || event.metaKey) return;
-  if (UNDO_KEYS.includes(event.key)) undo();
+  if (event.repeat || event.ctrlKey || event.altKey || event.metaKey || event.target === at("tool-name")) return;
+  if (chooseByKey(event.key)) event.preventDefault();
+  else if (UNDO_KEYS.includes(event.key)) undo();
   else if (event.key.toLowerCase() === "m") mute();
   else if (event.key === "Escape") stop();
   else return;
@@ -168,9 +222,13 @@ at("back").hidden = location.pathname === "/";
 onClick("undo", undo);
 onClick("mute", mute);
 onClick("stop", stop);
+at("tool-form").addEventListener("submit", (event) => {
+  event.preventDefault();
+  choose("tool", at("tool-name").value.trim());
+});
 addEventListener("keydown", onKey);
 addEventListener("pointerdown", () => { unlock(); showSound(); });
 makePlots();
 showSound();
-showButtons().catch(() => {});
+learnWhatIsAllowed().catch(() => {});
 follow(showState, showPlots, showLost);

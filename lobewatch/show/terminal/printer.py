@@ -31,6 +31,10 @@ class RunningTest(Protocol):
         """End the test."""
         ...
 
+    def choose(self, key: str, tool: str = "") -> None:
+        """Say what comes after a test, by the key of a choice of its state."""
+        ...
+
 
 class TapPrinter:
     """Prints from a thread of its own between __enter__ and __exit__; the test never waits for it."""
@@ -63,6 +67,8 @@ class TapPrinter:
     def show(self, state: TapState) -> None:
         """Print what is new in a state."""
         before, self._before = self._before, state
+        if state.title != before.title:
+            self._told = 0
         if state.device != before.device:
             self._console.print(f"{state.device}. TAP the tool, again and again.", markup=False)
         for check in state.checks:

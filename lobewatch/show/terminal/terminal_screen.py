@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping
@@ -18,7 +20,7 @@ from rich.text import Text
 from lobewatch.show.terminal.keys import Keys
 from lobewatch.show.terminal.output import Terminal
 from lobewatch.show.terminal.printer import RunningTest, verdict_markup
-from lobewatch.tap.state import TapState, TapStep
+from lobewatch.tap.state import Outcome, TapState, TapStep
 
 INTERVAL = 0.05
 """Between two looks at keys and state (s)."""
@@ -35,6 +37,7 @@ LOOKS: Mapping[TapStep, tuple[str, str]] = {
     TapStep.GOOD: ("✓", "black on #2bb48d"),
     TapStep.REFUSED: ("✗", "black on #ee8238"),
     TapStep.NO_DEVICE: ("!", "black on #f0e442"),
+    TapStep.MOVE: ("⟳", "black on #f0e442"),
     TapStep.DONE: ("■", "black on #2bb48d"),
     TapStep.FAILED: ("✗", "black on #ee8238"),
 }
@@ -47,6 +50,8 @@ LIGHTS: Mapping[str, tuple[str, str]] = {
     "alarm": ("✗", "black on #ee8238"),
     "unknown": ("?", "black on #dddddd"),
 }
+CHOICE_KEYS: Mapping[str, str] = {"x": "x", "y": "y", "tool": "n", "done": "q"}
+"""Key that stands for each choice."""
 
 
 class TerminalScreen:
@@ -90,8 +95,15 @@ class TerminalScreen:
             before = state
 
     def press(self, key: str) -> None:
-        """Do what a key stands for."""
-        if key == "u":
+        """Do what a key stands for; while the sensor is moved, Enter and undo stand for the first choice."""
+        state = self._session.state
+        if state.choices and key != "m":
+            if state.word is TapStep.MOVE and key in "\nu":
+                key = CHOICE_KEYS[state.choices[0].key]
+            chosen = [choice.key for choice in state.choices if CHOICE_KEYS[choice.key] == key]
+            if chosen:
+                self._choose(chosen[0])
+        elif key == "u":
             now = time.monotonic()
             if now - self._undo_at > HELD_TIME:
                 self._session.undo()
@@ -100,6 +112,23 @@ class TerminalScreen:
             self._session.stop()
         elif key == "m":
             self._muted = not self._muted
+
+    def _choose(self, key: str) -> None:
+        """Hand a choice on, with the name of the next tool."""
+        tool = self._ask_tool() if key == "tool" else ""
+        with contextlib.suppress(ValueError):  # no name, or a page was quicker
+            self._session.choose(key, tool)
+
+    def _ask_tool(self) -> str:
+        """A line that is typed, the screen standing still meanwhile."""
+        self._live.stop()
+        self._keys.__exit__(None, None, None)
+        self._console.print("\nnext tool, by its name in machine.toml or a new one (Enter: none) > ", end="")
+        try:
+            return sys.stdin.readline().strip()
+        finally:
+            self._keys.__enter__()
+            self._live.start()
 
     def ring(self, before: TapState, state: TapState) -> None:
         """The bells of a new word or hit; a verdict's word may come a picture ahead of its hit, and then rings once."""
@@ -117,7 +146,8 @@ class TerminalScreen:
 
 def picture(state: TapState, muted: bool) -> RenderableType:
     """One state of a test, as it stands on the terminal."""
-    return Group(*_lines(state), Text(f"u undo   q stop   m {'sound' if muted else 'mute'}", "bold"))
+    keys = [f"{CHOICE_KEYS[choice.key]} {choice.text}" for choice in state.choices] or ["u undo", "q stop"]
+    return Group(*_lines(state), Text("   ".join([*keys, f"m {'sound' if muted else 'mute'}"]), "bold"))
 
 
 def _lines(state: TapState) -> Iterator[RenderableType]:
@@ -126,16 +156,24 @@ def _lines(state: TapState) -> Iterator[RenderableType]:
         yield Text(state.resumed)
     yield _banner(state)
     yield Text(state.reason or " ", "bold")
+    if state.outcome is not None:
+        yield from _outcome_lines(state.outcome)
+        return
     yield Text(_numbers(state))
     for check in (check for check in state.checks if not (state.hits and check.passed)):
         yield Text(f"{'✓' if check.passed else '✗'} {check.name}: {check.text}")
     for hit in state.hits[-SHOWN_HITS:]:
         yield Text.from_markup(f"{hit.number:3d}  {hit.peak_force:6.0f} N  {verdict_markup(hit)}")
-    if state.outcome is not None:
-        symbol, style = LIGHTS[state.outcome.light]
-        early = "EARLY " if state.outcome.is_early else ""
-        yield Text(f" {symbol} {early}{state.outcome.light.upper()} ", style)
-        yield Text(" ".join([*state.outcome.texts, state.outcome.next_step]))
+
+
+def _outcome_lines(outcome: Outcome) -> Iterator[RenderableType]:
+    """What was measured, the programs, and last the light with the next step."""
+    yield Text(" ".join(outcome.texts))
+    for program in outcome.programs:
+        yield Text(f"  {program.program}: {program.word}")
+    symbol, style = LIGHTS[outcome.light]
+    early = "EARLY " if outcome.is_early else ""
+    yield Text.assemble((f" {symbol} {early}{outcome.light.upper()} ", style), f"  next: {outcome.next_step}")
 
 
 def _banner(state: TapState) -> RenderableType:

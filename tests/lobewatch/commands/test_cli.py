@@ -36,7 +36,7 @@ def device(trial: MachineFolder) -> Iterator[TapsEmulator]:
 
 
 def test_a_live_tap_finds_the_emulated_spindle(run: Run, trial: MachineFolder, device: TapsEmulator) -> None:
-    said = run("tap", "trial", "--port", device.port, "--operator", "Kim")
+    said = run("tap", "trial", "--port", device.port, "--operator", "Kim", "--details")
     assert said.code == 0
     assert "10 / 10  ✓ GOOD" in said.err
     assert "followed: 1713.0" in said.out

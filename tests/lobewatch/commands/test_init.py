@@ -152,3 +152,31 @@ def test_a_conversation_that_is_broken_off_writes_nothing(run: Run, tmp_path: Pa
         assert person.end() == 130
         assert "nothing is written" in person.text
     assert not Path("mill-3").exists()
+
+
+def test_from_an_empty_folder_to_a_verdict_on_a_tapped_tool_in_three_commands(
+    run: Run, trial: MachineFolder, tmp_path: Path
+) -> None:
+    """init, tap and check at a terminal, with an emulated DAQ and no editor."""
+    with emulate_machine(trial, find_driver("taps"), realtime=False).device as device:
+        with Terminal(tmp_path, "init", "mill-3") as person:
+            for answer in ("", "3000 24000", "-", device.port, "0 glue", "4 20 0", "1400 500", "slot: 16000 0.2 20"):
+                person.answer(answer)
+            assert person.end() == 0
+        with Terminal(tmp_path, "tap", "mill-3") as person:
+            person.wait_for("MOVE SENSOR")
+            person.wait_for("y tap y")
+            person.type("\n")
+            person.wait_for("direction y")
+            person.wait_for("n next tool   q done")
+            person.type("n")
+            person.wait_for("next tool, by its name in machine.toml")
+            person.type("\n")  # not now
+            person.wait_for("n next tool   q done")
+            person.type("q")
+            assert person.end() == 0
+            last = person.text.rstrip().splitlines()[-1]
+            assert last.startswith("✓ GOOD  next: ")
+    said = run("check", "mill-3")
+    assert (said.code, said.out.splitlines()[-1]) == (0, "1 program: 1 stable")
+    assert [tap.direction for tap in MachineFolder("mill-3").taps()] == ["x", "y"]

@@ -103,7 +103,7 @@ def test_a_tap_test_through_a_dataq_device_finds_the_emulated_spindle(run: Any, 
         with open_source(trial.machine.daq, device.port) as source:
             assert isinstance(source, DataqSource)
             use_rate(trial, source, MeasuredRate(source.sample_rate, 1.0, 250_000, 5.0))
-        said = run("tap", "trial", "--port", device.port)
+        said = run("tap", "trial", "--port", device.port, "--details")
     assert said.code == 0, said.err
     assert "DI-4108, 50000 Hz" in said.err
     assert "10 / 10  ✓ GOOD" in said.err

@@ -167,3 +167,27 @@ def test_a_real_test_from_the_first_tap_to_the_light(
             browser.see("good", "10")
             browser.see("light", "GOOD")
             browser.see("texts", "first test")
+
+
+def test_between_two_tests_the_buttons_say_what_can_come_next(
+    browser: Browser, session: Session, server: ScreenServer
+) -> None:
+    browser.open(server.url)
+    session.hit()
+    session.pause(TapStep.MOVE, ("y", "tap y"), ("done", "done"), reason="x is saved. Turn to y.")
+    browser.see("text", "MOVE SENSOR")
+    browser.see("choices", "tap y")
+    assert not browser.part("undo").is_displayed()
+    browser.press(Keys.PAGE_UP)  # the foot switch goes on
+    browser.wait(lambda: session.chosen == [("y", "")])
+    session.finish()
+    session.pause(TapStep.DONE, ("x", "tap x"), ("y", "tap y"), ("tool", "next tool"), ("done", "done"))
+    browser.see("programs", "bracket, slot (8000 rpm, 2 mm): stable")
+    browser.ask("document.querySelectorAll('#choices button')[2].click()")
+    browser.wait(lambda: browser.part("tool-form").is_displayed())
+    browser.press(*"drill y", Keys.ENTER)
+    browser.wait(lambda: session.chosen[1:] == [("tool", "drill y")])
+    browser.ask("document.querySelectorAll('#choices button')[3].click()")
+    browser.wait(lambda: session.chosen[2:] == [("done", "")])
+    session.pause(TapStep.TAP)
+    browser.wait(lambda: browser.part("undo").is_displayed() and not browser.part("choices").is_displayed())

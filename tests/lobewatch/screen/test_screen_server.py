@@ -134,6 +134,8 @@ class Watched:
 
     def stop(self) -> None: ...
 
+    def choose(self, key: str, tool: str = "") -> None: ...
+
 
 def test_nothing_is_looked_at_while_nothing_changes(session: Session) -> None:
     """But once a second, for the sign of life; what has changed is sent at once, and a page that is gone not told."""
@@ -414,3 +416,13 @@ def test_a_real_test_through_an_emulated_device(tmp_path: Path, tapper: Callable
             follow(server, talk)
     assert (shown[-1]["word"], shown[-1]["good"]) == ("DONE", 10)
     assert "first test" in shown[-1]["outcome"]["texts"][0]
+
+
+def test_what_comes_next_is_chosen_with_the_full_token_alone(session: Session) -> None:
+    with ScreenServer(session, token=TOKEN) as server:
+        assert ask(server, "POST", "/choose", '{"key": "tool", "tool": "drill 8"}')[0] == 200
+        assert ask(server, "POST", "/choose", '{"tool": "drill 8"}')[0] == 400
+        assert ask(server, "POST", "/choose", r'{"key": "tool", "tool": "\u001b[2J"}')[0] == 409
+        watching = {"Authorization": f"Bearer {server.watch_token}"}
+        assert ask(server, "POST", "/choose", '{"key": "done"}', **watching)[0] == 403
+    assert session.chosen == [("tool", "drill 8")]

@@ -16,7 +16,7 @@ from acquisition import HitFlags
 from lobewatch.show.terminal.keys import letters
 from lobewatch.show.terminal.printer import TapPrinter
 from lobewatch.show.terminal.terminal_screen import TerminalScreen, picture
-from lobewatch.tap.state import Check, Outcome, TakenHit, TapState, TapStep
+from lobewatch.tap.state import Check, Choice, Outcome, ProgramWord, TakenHit, TapState, TapStep
 
 GOOD = TakenHit(1, HitFlags.OK, 231.4)
 DOUBLE = TakenHit(
@@ -43,6 +43,10 @@ class Session:
         self.asked.append("stop")
         self.called.set()
 
+    def choose(self, key: str, tool: str = "") -> None:
+        self.asked.append(f"choose {key} {tool}".strip())
+        self.called.set()
+
 
 def seen(state: TapState, width: int = 100, **options: bool) -> str:
     console = Console(file=io.StringIO(), width=width, force_terminal=True, **options)  # type: ignore[arg-type]
@@ -55,7 +59,9 @@ def plain(state: TapState, width: int = 100) -> str:
     return re.sub(r"\x1b\[[0-9;]*m", "", seen(state, width))
 
 
-SYMBOLS = dict(zip(TapStep, ("…", "▼", "…", "✓", "✗", "!", "■", "✗"), strict=True))
+CHOICES = Choice("y", "tap y"), Choice("tool", "next tool"), Choice("done", "done")
+KEYS = "y tap y   n next tool   q done   m mute"
+SYMBOLS = dict(zip(TapStep, ("…", "▼", "…", "✓", "✗", "!", "⟳", "■", "✗"), strict=True))
 
 
 @pytest.mark.parametrize("word", TapStep)
@@ -98,9 +104,30 @@ def test_checks_before_the_first_hit_and_the_result_after_the_last() -> None:
     later = plain(replace(STATE, checks=checks))
     assert "disk" not in later
     assert "✗ hum: 1 N rms at 50 Hz" in later
-    done = plain(replace(STATE, word=TapStep.DONE, outcome=Outcome("warn", ["f_n 1700 Hz."], "Tap again.")))
-    assert "! WARN" in done
-    assert "f_n 1700 Hz. Tap again." in done
+    words = [ProgramWord("slot (8000 rpm, 2 mm)", "stable")]
+    outcome = Outcome("warn", ["f_n 1700 Hz."], "Tap again.", programs=words)
+    done = plain(replace(STATE, word=TapStep.DONE, outcome=outcome, choices=CHOICES))
+    lines = [line.strip() for line in done.splitlines() if line.strip()][-4:]
+    assert lines == ["f_n 1700 Hz.", "slot (8000 rpm, 2 mm): stable", "! WARN   next: Tap again.", KEYS]
+
+
+@pytest.mark.parametrize(
+    ("word", "keys", "chosen"),
+    [
+        (TapStep.MOVE, "y", ["choose y"]),
+        (TapStep.MOVE, "\n", ["choose y"]),
+        (TapStep.MOVE, "u", ["choose y"]),  # the foot switch
+        (TapStep.DONE, "u", []),
+        (TapStep.DONE, "q", ["choose done"]),
+        (TapStep.DONE, "z", []),
+        (TapStep.TAP, "u", ["undo"]),
+    ],
+)
+def test_keys_between_two_tests_choose_what_comes_next(word: TapStep, keys: str, chosen: list[str]) -> None:
+    session = Session(replace(STATE, word=word, choices=() if word is TapStep.TAP else CHOICES))
+    screen, _ = screen_of(session)
+    screen.press(keys)
+    assert session.asked == chosen
 
 
 def test_colours_go_without_and_the_words_stay() -> None:

@@ -1,0 +1,116 @@
+"""A visit to a machine: tapped in x, then in y, then as the person who taps says; one thread runs it."""
+
+from __future__ import annotations
+
+import queue
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from acquisition import TapDirection
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap.session import TapSession
+from lobewatch.tap.spool import interrupted_tests
+from lobewatch.tap.state import Choice, TapState, TapStep
+
+TAP_X, TAP_Y = Choice("x", "tap x"), Choice("y", "tap y")
+NEXT_TOOL, DONE = Choice("tool", "next tool"), Choice("done", "done")
+TAPS: dict[TapDirection, Choice] = {"x": TAP_X, "y": TAP_Y}
+
+
+def first_direction(folder: MachineFolder, tool: str) -> TapDirection:
+    """Direction to begin with: x, but y where only a test in y was interrupted."""
+    interrupted = interrupted_tests(folder) if tool == folder.machine.tap.tool else {}
+    return "y" if interrupted.keys() == {"y"} else "x"
+
+
+class TapVisit:
+    """Tap tests one after the other: `run` them in one thread; all else is for every thread."""
+
+    def __init__(
+        self,
+        plan: Callable[[str, TapDirection], TapSession],
+        tool: str,
+        direction: TapDirection = "x",
+        *,
+        leads: bool = True,
+        after: Callable[[TapSession], None],
+    ) -> None:
+        """plan: a test of a tool in a direction. leads False: that of `direction` alone. after: what is done with each
+        finished test."""
+        self._plan, self._after, self._leads = plan, after, leads
+        self._tool, self._direction = tool, direction
+        self._session = plan(tool, direction)
+        self._pause: TapState | None = None
+        self._answers = queue.SimpleQueue[tuple[str, str]]()
+        self.wakes: set[Callable[[], None]] = set()
+        """Functions that are called after every new picture, by the thread of the test; none may take time."""
+
+    @property
+    def state(self) -> TapState:
+        """The newest picture; between two tests with what can be chosen."""
+        return self._pause or self._session.state
+
+    @property
+    def waits(self) -> bool:
+        """Whether no test runs and a person is waited for."""
+        return self._pause is not None and bool(self._pause.choices)
+
+    def undo(self) -> None:
+        """Take back the last good hit; again: the one before."""
+        if not self.waits:
+            self._session.undo()
+
+    def stop(self) -> None:
+        """End the test that runs, or the visit between two tests."""
+        self._answers.put((DONE.key, ""))
+        self._session.stop()
+
+    def choose(self, key: str, tool: str = "") -> None:
+        """Say what comes next, by the key of a choice; tool: name of the next one. ValueError where it cannot be."""
+        if not self.waits or key not in [choice.key for choice in self.state.choices]:
+            raise ValueError(f"{key!r} cannot be chosen now; the page shows what can")
+        if key == NEXT_TOOL.key and not tool.strip():
+            raise ValueError("the next tool has no name; give the one that stands in machine.toml, or a new one")
+        self._answers.put((key, tool.strip()))
+
+    def run(self) -> None:
+        """Tap until the person is done; raises what `TapSession.run` raises."""
+        tapped = set[TapDirection]()
+        while True:
+            self._session.wakes.add(self._wake)
+            self._session.run()
+            tapped.add(self._direction)
+            self._after(self._session)
+            if not self._leads:
+                return
+            key, tool = self._wait(tapped)
+            if key == DONE.key:
+                self._show(None)
+                return
+            if key == NEXT_TOOL.key:
+                self._tool, tapped = tool, set()
+            self._direction = "y" if key == TAP_Y.key else "x"
+            self._session = self._plan(self._tool, self._direction)
+            self._show(None)
+
+    def _wait(self, tapped: set[TapDirection]) -> tuple[str, str]:
+        """Show the result, or that the sensor is to be moved first, and wait for what is chosen."""
+        state = self._session.state
+        missing = [direction for direction in TAPS if direction not in tapped]
+        if missing:
+            tap = TAPS[missing[0]]
+            reason = f"{self._direction} is saved. Turn hammer and accelerometer to {missing[0]}, then: {tap.text}."
+            choices: Sequence[Choice] = (tap, DONE)
+            state = replace(state, word=TapStep.MOVE, reason=reason, outcome=None)
+        else:
+            choices = (TAP_X, TAP_Y, NEXT_TOOL, DONE)
+        self._show(replace(state, revision=state.revision + 1, choices=tuple(choices)))
+        return self._answers.get()
+
+    def _show(self, pause: TapState | None) -> None:
+        self._pause = pause
+        self._wake()
+
+    def _wake(self) -> None:
+        for wake in tuple(self.wakes):
+            wake()

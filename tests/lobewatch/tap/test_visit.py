@@ -1,0 +1,135 @@
+"""A visit: x, then y, then what a person chooses."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from datetime import UTC, datetime
+from typing import Any
+
+import pytest
+
+from acquisition import Circumstances, HammeredStructure, TapDirection
+from lobewatch.logbook import Logbook
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap.hit_loop import TapStopped
+from lobewatch.tap.session import TapSession
+from lobewatch.tap.state import TapState, TapStep
+from lobewatch.tap.visit import TapVisit, first_direction
+
+
+class Visit:
+    """A visit to a machine that taps itself, in a thread of its own, as a person sees it."""
+
+    def __init__(
+        self, folder: MachineFolder, simulated: Any, tapper: Any, channels: Any, *, leads: bool = True
+    ) -> None:
+        self._folder, self._device = folder, lambda: simulated(tapper(), channels)
+        self.planned: list[tuple[str, str]] = []
+        self.words: list[str] = []
+        self.visit = TapVisit(self._plan, "reference", leads=leads, after=lambda _: None)
+        self.visit.wakes.add(self._note)
+        self.error: BaseException | None = None
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def _plan(self, tool: str, direction: TapDirection) -> TapSession:
+        self.planned.append((tool, direction))
+        about = Circumstances("m", datetime.now(UTC), tool, direction)
+        return TapSession(self._folder, self._device, about, sleep=lambda _: None)
+
+    def _run(self) -> None:
+        try:
+            self.visit.run()
+        except TapStopped as error:
+            self.error = error
+
+    def _note(self) -> None:
+        if self.visit.state.word not in self.words[-1:]:
+            self.words.append(self.visit.state.word)
+
+    def wait(self, done: Callable[[TapState], object]) -> TapState:
+        woken = threading.Event()
+        self.visit.wakes.add(woken.set)
+        while not done(self.visit.state):
+            assert woken.wait(30)
+            woken.clear()
+        return self.visit.state
+
+    def end(self) -> None:
+        self._thread.join(30)
+        assert not self._thread.is_alive()
+
+
+@pytest.fixture
+def visit(
+    folder: MachineFolder,
+    simulated: Any,
+    tapper: Callable[..., HammeredStructure],
+    channels: Any,
+) -> Callable[..., Visit]:
+    text = folder.toml.read_text("utf-8").replace("hits = 10 ", "hits = 3 ")
+    folder.toml.write_text(text, "utf-8")
+    return lambda **options: Visit(MachineFolder(folder.path), simulated, tapper, channels, **options)
+
+
+def keys(state: TapState) -> list[str]:
+    return [choice.key for choice in state.choices]
+
+
+def test_x_then_y_then_the_next_tool(visit: Callable[..., Visit], folder: MachineFolder) -> None:
+    person = visit()
+    moved = person.wait(lambda state: state.choices)
+    assert (moved.word, keys(moved)) == (TapStep.MOVE, ["y", "done"])
+    assert moved.reason == "x is saved. Turn hammer and accelerometer to y, then: tap y."
+    assert moved.outcome is None
+    with pytest.raises(ValueError, match="'x' cannot be chosen now"):
+        person.visit.choose("x")
+    person.visit.undo()  # that test is saved
+    person.visit.choose("y")
+    end = person.wait(lambda state: state.choices and state.word is TapStep.DONE)
+    assert keys(end) == ["x", "y", "tool", "done"]
+    assert end.outcome is not None
+    assert next(word.program for word in end.outcome.programs) == "A: slot at 12 600 rpm (12600 rpm, 2.5 mm)"
+    assert {word.word for word in end.outcome.programs} <= {"stable", "doubtful", "not stable"}
+    with pytest.raises(ValueError, match="the next tool has no name"):
+        person.visit.choose("tool", " ")
+    person.visit.choose("tool", "drill 8")
+    assert keys(person.wait(lambda state: state.word is TapStep.MOVE)) == ["y", "done"]
+    person.visit.choose("done")
+    person.end()
+    assert person.planned == [("reference", "x"), ("reference", "y"), ("drill 8", "x")]
+    assert [(tap.tool, tap.direction) for tap in Logbook(folder).taps] == person.planned
+    assert (person.visit.state.word, person.visit.state.choices) == (TapStep.DONE, ())
+    assert person.visit.state.outcome is not None
+
+
+def test_one_test_alone_asks_nothing(visit: Callable[..., Visit]) -> None:
+    person = visit(leads=False)
+    person.end()
+    assert TapStep.MOVE not in person.words
+    assert person.planned == [("reference", "x")]
+
+
+def test_stop_ends_a_visit_between_two_tests_and_a_test_that_runs(visit: Callable[..., Visit]) -> None:
+    person = visit()
+    person.wait(lambda state: state.choices)
+    person.visit.stop()
+    person.end()
+    assert person.error is None
+    again = visit()
+    again.visit.stop()
+    again.end()
+    assert isinstance(again.error, TapStopped)
+
+
+def test_a_visit_that_was_broken_off_in_y_begins_in_y(visit: Callable[..., Visit], folder: MachineFolder) -> None:
+    assert first_direction(folder, "reference") == "x"
+    person = visit()
+    person.wait(lambda state: state.choices)
+    person.visit.choose("y")
+    person.wait(lambda state: state.word is not TapStep.MOVE and 0 < state.good < 3)
+    person.visit.stop()
+    person.end()
+    assert first_direction(folder, "reference") == "y"
+    assert first_direction(folder, "drill 8") == "x"

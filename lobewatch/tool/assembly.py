@@ -11,15 +11,14 @@ from numpy.typing import NDArray
 
 from acquisition import Remark
 from dsm import Calibration
-from lobes import Cut, StabilityLobes, lowest_of, zero_order
+from lobes import Cut, StabilityLobes
 from lobewatch.machine import Machine
 from lobewatch.measuring.measurement import Measurement
 from lobewatch.measuring.questions import in_question, open_questions
+from lobewatch.tool.axes import ModeAxes, mode_axes
+from lobewatch.tool.mean_lobes import Modes, mean_lobes
 from lobewatch.tool.series import FollowedMode, Scatter, frequency_at, scatter_of
-from modal import Mode
 
-Modes = Sequence[Mode] | None
-"""Modes of one direction at the tool tip; None where neither direction is known."""
 ABOUT_DIRECTIONS = ("one-direction", "older-direction")
 """Codes of the remarks on what is known in x and y."""
 TOGETHER = timedelta(hours=24)
@@ -52,6 +51,8 @@ class Assembly:
     """Remarks on what is not known, and what is in doubt."""
     series: Mapping[str, Sequence[FollowedMode]] = field(default_factory=dict)
     """Tap tests of the same tool up to then, by direction; empty where it is predicted."""
+    cross: Modes = None
+    """Modes at the tool tip hit in x and seen in y, signed; None where that was not tapped."""
     questions: tuple[Remark, ...] = ()
     """Questions about these tap tests that nobody has answered; until then nothing is sure."""
 
@@ -64,6 +65,11 @@ class Assembly:
     def label(self) -> str:
         """Name in a legend."""
         return f"predicted, bearings of {self.time:%Y-%m-%d}" if self.predicted else f"{self.time:%Y-%m-%d}"
+
+    @property
+    def axes(self) -> ModeAxes:
+        """Axes of the modes of x, then of y, and what is open of them."""
+        return mode_axes(self.x or (), self.y or (), self.cross)
 
     def scatter(self, direction: str) -> Scatter | None:
         """Scatter from tap test to tap test; None where there are too few."""
@@ -135,11 +141,11 @@ def lobes_of(assembly: Assembly, machine: Machine) -> dict[str, StabilityLobes]:
 
     Each shows the lower one of its directions of feed. Empty where no modes are known.
     """
-    return tip_lobes(assembly.tool, assembly.x, assembly.y, machine)
+    return tip_lobes(assembly.tool, assembly.x, assembly.y, machine, cross=assembly.cross)
 
 
 def tip_lobes(
-    tool: str, x: Modes, y: Modes, machine: Machine, names: Collection[str] | None = None
+    tool: str, x: Modes, y: Modes, machine: Machine, names: Collection[str] | None = None, cross: Modes = None
 ) -> dict[str, StabilityLobes]:
     """Diagrams of modes at the tip; names: of these cuts alone. Cuts that are alike are worked out once."""
     if not x and not y:
@@ -148,5 +154,5 @@ def tip_lobes(
     wanted = {name: cuts for name, cuts in machine.cuts(tool).items() if names is None or name in names}
     for cuts in wanted.values():
         if cuts not in diagrams:
-            diagrams[cuts] = lowest_of([zero_order(x, y, cut, speeds) for cut in cuts])
+            diagrams[cuts] = mean_lobes(x, y, cuts, speeds, cross)
     return {name: diagrams[cuts] for name, cuts in wanted.items()}

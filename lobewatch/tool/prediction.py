@@ -11,7 +11,8 @@ from dsm import Calibration, calibrate, modes_at
 from lobewatch.machine import Machine
 from lobewatch.measuring.measurement import Measurement
 from lobewatch.measuring.model import model_state
-from lobewatch.tool.assembly import Assembly, Modes, untapped_remark
+from lobewatch.tool.assembly import Assembly, untapped_remark
+from lobewatch.tool.mean_lobes import Modes
 from modal import Mode
 
 MODES = 8

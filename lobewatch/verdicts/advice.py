@@ -9,12 +9,12 @@ from typing import Any
 import msgspec
 
 from acquisition import Remark
-from lobes import program_limit, zero_order
 from lobewatch.machine import REFERENCE_CUT, CutTable, Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly, speed_grid
+from lobewatch.tool.mean_lobes import mean_lobes
 from lobewatch.verdicts.aging import softening, tolerable_decay
 from lobewatch.verdicts.doubt import doubt_of
-from lobewatch.verdicts.draws import as_program, draw
+from lobewatch.verdicts.draws import as_program, draw, worst_limit
 from lobewatch.verdicts.setting_search import MM, SPARE, Setting, SettingSearch
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
 from lobewatch.verdicts.verdict import Verdict, Word, is_sure
@@ -72,14 +72,15 @@ def robust_pockets(
     program_table = _stable_somewhere(at_speed.taught(table), spindle, machine)
     program, cuts = as_program(program_table, machine), ways(program_table, machine, spindle)
     doubt = at_speed.doubt or doubt_of(assembly, program_table, machine)
-    draws = draw(program, program_limit(program, spindle.x, spindle.y, cuts), cuts, spindle, doubt)
+    limit, axes, _ = worst_limit(program, spindle, cuts)
+    draws = draw(program, limit, cuts, spindle, doubt, axes)
     return SettingSearch.of(program_table, draws, assembly, machine, at_speed).pockets(count)
 
 
 def _stable_somewhere(table: CutTable, assembly: Assembly, machine: Machine) -> ProgramTable:
     """A cut as a program that is surely stable somewhere: in the middle of the range of speeds, not deep."""
     cut, speeds = machine.build_cut(table), machine.speed
-    lowest = zero_order(assembly.x, assembly.y, cut, speed_grid(machine)).minimum.depth
+    lowest = mean_lobes(assembly.x, assembly.y, [cut], speed_grid(machine), assembly.cross).minimum.depth
     depth = min(max(SHARE * lowest * 1e3, MM), table.deepest_mm)
     place: dict[str, Any] = {"speed_rpm": math.sqrt(speeds.low_rpm * speeds.high_rpm), "depth_mm": depth}
     if isinstance(table, ProgramTable):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from lobes import MillingRows
 from lobewatch.machine import CutTable, DoubtTable, Machine, ProgramTable, Wear
 from lobewatch.tool.assembly import Assembly
+from lobewatch.tool.axes import ModeAxes
 from lobewatch.tool.series import Scatter
 from modal import Mode
 
@@ -27,6 +28,8 @@ MOST_TURNED = np.radians(89)
 """... and largest phase (rad)."""
 WEAR: Mapping[Wear, float] = {"new": 1.0, "used": 1.3, "worn": 1.6}
 """Largest factor on the cutting coefficients, by how worn a tool may be; chosen."""
+CROSS = "cross"
+"""Cause of the doubt of the axes of modes: what direct taps leave open."""
 CUTS = "cuts"
 """Cause of the doubt of modes that test cuts have taught: all that they have left open."""
 
@@ -96,13 +99,16 @@ class Doubt:
     wear: float = 1.0
     """Largest factor on both cutting coefficients by edges that are no longer new, drawn with the largest Kt; the least
     is 1."""
+    axes: ModeAxes | None = None
+    """Axes of the modes, and what is open of them; None where they count as known."""
     learnt: LearntDraws | None = None
     """Draws that test cuts have left, which stand for the half-widths; None where none has taught anything."""
 
     @property
     def causes(self) -> tuple[str, ...]:
         """Names of all that it comes from."""
-        return (*self.modes, "speed", "coefficients", *(["wear"] if self.wear > 1 else []))
+        across = [CROSS] if self.axes is not None and self.axes.are_open else []
+        return (*self.modes, *across, "speed", "coefficients", *(["wear"] if self.wear > 1 else []))
 
     def draw(self, middle: MillingRows, count: int, seed: int = 0, without: str = "") -> MillingRows:
         """Systems within the doubt (count rows) around one (a row), the same for a seed whatever is left out.
@@ -120,7 +126,7 @@ class Doubt:
         if self.learnt is not None:
             rows = self.learnt.rows(middle, count, without)
             speed = 1 + self.speed * np.random.default_rng(seed).uniform(-1, 1, count) * (without != "speed")
-            return replace(rows, speed_rpm=rows.speed_rpm * np.maximum(speed, LEAST))
+            return self._turned(replace(rows, speed_rpm=rows.speed_rpm * np.maximum(speed, LEAST)), seed, without)
         random, phases = np.random.default_rng(seed), np.random.default_rng((seed, 1))
         factor = np.ones((count, middle.frequency.shape[1], 3))
         turned = np.zeros(factor.shape[:2])
@@ -135,7 +141,7 @@ class Doubt:
         if without == "coefficients":
             tangential, ratio = np.ones((2, count))
         rows = middle[np.zeros(count, dtype=np.intp)]
-        return replace(
+        drawn = replace(
             rows,
             frequency=rows.frequency * factor[..., 0],
             damping_ratio=rows.damping_ratio * factor[..., 1],
@@ -145,6 +151,13 @@ class Doubt:
             tangential=rows.tangential * np.maximum(tangential, LEAST),
             radial=rows.radial * np.maximum(tangential, LEAST) * np.maximum(ratio, 0.0),
         )
+        return self._turned(drawn, seed, without)
+
+    def _turned(self, rows: MillingRows, seed: int, without: str) -> MillingRows:
+        """With axes drawn from what is open of them."""
+        if self.axes is None or not self.axes.are_open or without == CROSS:
+            return rows
+        return replace(rows, vector=self.axes.draw(len(rows), seed))
 
     def _mixed(self, cause: str, uniform: Floats) -> Floats:
         """Correlated where the cause is the error of the tap test, shape (count, n, 4)."""
@@ -161,7 +174,7 @@ def doubt_of(assembly: Assembly, table: CutTable, machine: Machine) -> Doubt:
     modes = [*(assembly.x or ()), *(assembly.y or ())]
     mixing = np.array([_mixing(mode) for mode in modes])
     speed, wear = machine.doubt.speed_percent / 100, wear_of(table, machine)
-    return Doubt(_modes(assembly, machine.doubt), mixing, speed, tangential, ratio, wear)
+    return Doubt(_modes(assembly, machine.doubt), mixing, speed, tangential, ratio, wear, assembly.axes)
 
 
 def wear_of(table: CutTable, machine: Machine) -> float:

@@ -4,11 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lobes import Cut, MillingRows, Program, ProgramLimit, growth, joined_rows, milling_system, piece_numbers, rows_of
+from lobes import (
+    Cut,
+    MillingRows,
+    Program,
+    ProgramLimit,
+    growth,
+    joined_rows,
+    milling_system,
+    piece_numbers,
+    program_limit,
+    rows_of,
+)
 from lobes.floquet.program_limit import DEEPEST
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
@@ -88,14 +100,44 @@ def as_program(table: ProgramTable, machine: Machine) -> Program:
     return Program(machine.build_cut(table), table.speed_rpm, table.depth_mm / 1e3)
 
 
-def middle_row(program: Program, assembly: Assembly) -> MillingRows:
-    """The program without any doubt, the feed along x."""
-    return rows_of(milling_system(assembly.x, assembly.y), program.cut, np.array([program.speed_rpm]))
+def middle_row(program: Program, assembly: Assembly, axes: Floats | None = None) -> MillingRows:
+    """The program without any doubt, the feed along x; axes: of its modes (n, 2), None: the first that may be."""
+    vectors = assembly.axes.patterns[0] if axes is None else axes
+    return rows_of(milling_system(assembly.x, assembly.y, vectors), program.cut, np.array([program.speed_rpm]))
 
 
-def draw(program: Program, limit: ProgramLimit, cuts: Sequence[Cut], assembly: Assembly, doubt: Doubt) -> ProgramDraws:
-    """The draws of a program; limit: that in the middle of the doubt."""
-    middle, limits = middle_row(program, assembly), np.array(limit.limits)
+class WorstLimit(NamedTuple):
+    """Limit of a program in the middle of its doubt, with the axes that are worst of those that may be."""
+
+    limit: ProgramLimit
+    """The lowest limit."""
+    axes: Floats | None
+    """Vectors of the modes that have it, shape (n, 2); None along x and y."""
+    across: float
+    """The highest limit over the lowest: over the open signs, and with modes along x and y; 1 where nothing is open."""
+
+
+def worst_limit(program: Program, assembly: Assembly, cuts: Sequence[Cut]) -> WorstLimit:
+    """The lowest limit of the cuts that a program makes on its way, over what is open of the signs of the axes."""
+    axes = assembly.axes
+    patterns = [*axes.patterns, *([None] if axes.signs else [])]
+    limits = [program_limit(program, assembly.x, assembly.y, cuts, vectors) for vectors in patterns]
+    worst = min(range(len(axes.patterns)), key=lambda i: limits[i].limit)
+    deepest = DEEPEST * program.depth
+    depths = [min(limit.limit, deepest) for limit in limits]
+    return WorstLimit(limits[worst], patterns[worst], max(depths) / min(depths))
+
+
+def draw(
+    program: Program,
+    limit: ProgramLimit,
+    cuts: Sequence[Cut],
+    assembly: Assembly,
+    doubt: Doubt,
+    axes: Floats | None = None,
+) -> ProgramDraws:
+    """The draws of a program; limit: that in the middle of the doubt, with modes along axes (n, 2)."""
+    middle, limits = middle_row(program, assembly, axes), np.array(limit.limits)
     order = np.argsort(limits)
     finer = max(limit.pieces // int(piece_numbers(middle, DEEPEST * program.depth)[0]), 1)
     rows = joined_rows(middle, doubt.draw(middle, DRAWS))

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from lobes import ProgramLimit, program_limit
+from lobes import ProgramLimit
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.doubt import doubt_of
 from lobewatch.verdicts.drawn_limits import drawn_limits
-from lobewatch.verdicts.draws import ProgramDraws, as_program, draw
+from lobewatch.verdicts.draws import ProgramDraws, as_program, draw, worst_limit
 from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
 from lobewatch.verdicts.ways import ways
 
@@ -36,6 +36,8 @@ class Judgement(NamedTuple):
     """Spindles that it was judged on."""
     chatters: NDArray[np.bool_]
     """Whether each draw chatters, without the middle, shape (DRAWS,)."""
+    across: float
+    """Highest limit in the middle over the lowest, whatever the open axes are; 1 where none are."""
 
     @property
     def is_stable_throughout(self) -> bool:
@@ -47,11 +49,11 @@ def weigh(table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: S
     """A program with the coefficients that were learnt, over its doubt; charts by other methods decide nothing."""
     program, spindle = as_program(table, machine), at_speed.moved(assembly)
     cuts = ways(table, machine, spindle)
-    middle = program_limit(program, spindle.x, spindle.y, cuts)
+    middle, axes, across = worst_limit(program, spindle, cuts)
     doubt = at_speed.doubt or doubt_of(assembly, table, machine)
-    draws = draw(program, middle, cuts, spindle, doubt)
+    draws = draw(program, middle, cuts, spindle, doubt, axes)
     limits = drawn_limits(draws, program.depth)[1:]
     low, high = np.quantile(limits, QUANTILES, method="closest_observation")
     near = draws.fed(SURELY * program.depth * middle.limit / low if np.isfinite(middle.limit) else 0.0)
     chatters = (near.growth(program.depth)[1:, 0] >= 0) | (limits <= program.depth)
-    return Judgement(middle, float(low), float(high), draws, chatters)
+    return Judgement(middle, float(low), float(high), draws, chatters, across)

@@ -10,9 +10,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from lobes import lowest_of, zero_order
 from lobewatch.machine import Machine, ProgramTable, drive_limit
 from lobewatch.tool.assembly import Assembly
+from lobewatch.tool.mean_lobes import mean_lobes
 from lobewatch.verdicts.draws import ProgramDraws
 
 GRID = 0.002
@@ -50,7 +50,7 @@ class Promise:
         """
         low, high = machine.speed.low_rpm, machine.speed.high_rpm
         speeds = np.geomspace(low, high, max(int(math.log(high / low) / GRID), 2))
-        limit = lowest_of([zero_order(assembly.x, assembly.y, cut, speeds) for cut in draws.cuts]).depth * 1e3
+        limit = mean_lobes(assembly.x, assembly.y, draws.cuts, speeds, assembly.cross).depth * 1e3
         steps, ahead = math.ceil((draws.doubt.speed + BESIDE + fall / 2) / GRID), round(fall / 2 / GRID)
         around = scipy.ndimage.minimum_filter1d(np.minimum(limit, 1e6), 2 * steps + 1, origin=-ahead, mode="nearest")
         deepest = np.minimum(program.deepest_mm, 1e3 * drive_limit(machine, program, speeds))

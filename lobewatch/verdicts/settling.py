@@ -62,6 +62,7 @@ def settling_remark(cause: str, table: ProgramTable, tangential: float, assembly
             f"the spindle at speed decides, as {cuts} test cuts have left it open",
             f"make the next test cut: lobewatch suggest names it for {table.name!r}",
         ),
+        "cross": ("the axes of the modes decide, which taps in x and in y leave open", "tap --direction xy"),
         "question": (
             f"it rests on a tap test in question ({', '.join(dict.fromkeys(q.code for q in assembly.questions))})",
             "answer the question, or tap again",

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from acquisition import Remark
 from lobewatch.machine import CutTable
-from lobewatch.tool.assembly import Assembly, Modes
+from lobewatch.tool.assembly import Assembly
+from lobewatch.tool.mean_lobes import Modes
 from lobewatch.verdicts.doubt import Doubt, Span
 
 Table = TypeVar("Table", bound=CutTable)

@@ -1,4 +1,4 @@
-"""What a program does not say of itself, and what it costs when the silence means something else."""
+"""What nobody says of a program or its spindle, and what it costs when the silence means something else."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ CORNER = 1.5
 """... as one with so many times the radius of the tool does, which stands for corners."""
 HELIX_MATTERS = 0.2
 """Radial depth over diameter below which a helix moves the limit."""
+CROSS_MATTERS = 1.04
+"""Highest limit over the lowest, whatever the open axes of the modes are, from which on a cross tap is asked for."""
 
 
 def unsaid(table: ProgramTable, machine: Machine, judgement: Judgement) -> Iterator[Remark]:
@@ -34,6 +36,14 @@ def unsaid(table: ProgramTable, machine: Machine, judgement: Judgement) -> Itera
             f"helix_deg is not written, and taken as 0: at a/D {min(table.immersions):.2g} edges with a helix may have "
             "0.7 to 1.7 times the limit",
             "write helix_deg, 0 for straight edges",
+        )
+    if judgement.across > CROSS_MATTERS:
+        yield Remark(
+            "cross-not-tapped",
+            table.name,
+            "x and y show the same modes, taken as askew at their worst: the axes, which direct taps leave open, move "
+            f"its limit by up to {100 * (judgement.across - 1):.0f} %",
+            "tap --direction xy: hit in x, sensor in y",
         )
 
 

@@ -73,6 +73,7 @@ def _learnt(lesson: Lesson, tool: Assembly, machine: Machine, remarks: tuple[Rem
             speed=machine.doubt.speed_percent / 100,
             tangential=_span(force),
             ratio=_span(direction),
+            axes=tool.axes,
             learnt=left,
         ),
         factors=np.stack(middle, axis=1),
@@ -118,6 +119,6 @@ def lobes_at_speed(verdicts: Sequence[Verdict], machine: Machine) -> LobesAtSpee
         if tool is None or not at_speed.cuts:
             continue
         taught, spindle = msgspec.structs.replace(machine, program=(verdict.program,)), at_speed.moved(tool)
-        lobes = tip_lobes(spindle.tool, spindle.x, spindle.y, taught, [name])[name]
+        lobes = tip_lobes(spindle.tool, spindle.x, spindle.y, taught, [name], spindle.cross)[name]
         return LobesAtSpeed(at_speed.cuts, lobes, limit_band(lobes, name, tool, taught, at_speed))
     return None

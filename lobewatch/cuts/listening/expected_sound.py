@@ -29,7 +29,7 @@ def expected_sound(setting: CutSetting, assembly: Assembly, speed_rpm: float) ->
 
     The multiplier is that of the cut's own depth. ValueError for an assembly without modes.
     """
-    system = milling_system(assembly.x, assembly.y)
+    system = milling_system(assembly.x, assembly.y, assembly.axes.patterns[0])
     axes = FEED_ANGLES.values() if setting.feed == "both" else (FEED_ANGLES[setting.feed],)
     cuts = [replace(setting.cut, feed_angle=angle) for angle in axes]
     depth, speed = np.array([[setting.depth]]), np.array([speed_rpm])

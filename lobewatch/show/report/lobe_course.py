@@ -114,7 +114,7 @@ def _foretold_depths(cut: str, assembly: Assembly, trends: Mapping[str, Trend], 
             break
         worst = max(falls.values())
         x, y = (_aged(assembly, name, falls.get(name, worst)) for name in ("x", "y"))
-        lobes = tip_lobes(assembly.tool, x, y, machine, [cut]).get(cut)
+        lobes = tip_lobes(assembly.tool, x, y, machine, [cut], assembly.cross).get(cut)
         if lobes is not None:
             at = assembly.time + timedelta(days=months * MONTH)
             depths[f"{at:%Y-%m} (forecast)"] = lobes.depth

@@ -1,0 +1,103 @@
+"""Along which axes modes are taken to lie, by taps in x, in y and across."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from lobes import shown_modes
+from lobewatch.tool.axes import HIDDEN, mode_axes
+from modal import Mode
+
+PAIR = [Mode(1500.0, 0.03, 20e6), Mode(1575.0, 0.028, 22e6)]
+
+
+def turned_by(degrees: float) -> NDArray[np.float64]:
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[c, s], [-s, c]])
+
+
+def residues(vectors: NDArray[np.float64], modes: list[Mode], near: float) -> NDArray[np.float64]:
+    """Residues in xx, xy, yx and yy (2, 2) of the modes near a frequency (Hz)."""
+    chosen = [(u, mode) for u, mode in zip(vectors, modes, strict=True) if abs(mode.frequency / near - 1) < 0.01]
+    return np.asarray(sum(np.outer(u, u) / mode.stiffness for u, mode in chosen))
+
+
+@pytest.mark.parametrize("angle", [10.0, 45.0, -70.0])
+def test_two_peaks_in_both_are_two_modes_askew_and_one_sign_is_open(angle: float) -> None:
+    vectors = turned_by(angle)
+    shown = shown_modes(PAIR, vectors)
+    axes = mode_axes(shown.x, shown.y)
+    assert (len(axes.pairs), axes.signs, axes.are_open) == (2, 1, True)
+    modes = [*shown.x, *shown.y]
+    errors = []
+    for pattern in axes.patterns:
+        assert pattern is not None
+        at = [residues(pattern, modes, mode.frequency) for mode in PAIR]
+        true = [np.outer(u, u) / mode.stiffness for u, mode in zip(vectors, PAIR, strict=True)]
+        assert [np.diag(r) for r in at] == [pytest.approx(np.diag(r)) for r in true]
+        errors.append(np.max(np.abs(np.array(at) - true) / np.max(true)))
+    assert min(errors) < 1e-6
+    assert max(errors) > 0.1
+
+
+@pytest.mark.parametrize("angle", [10.0, 45.0, -70.0])
+def test_a_cross_tap_says_to_which_side(angle: float) -> None:
+    shown = shown_modes(PAIR, turned_by(angle))
+    axes = mode_axes(shown.x, shown.y, shown.cross)
+    assert not axes.are_open
+    (pattern,) = axes.patterns
+    assert pattern is not None
+    for u, mode in zip(turned_by(angle), PAIR, strict=True):
+        wanted = np.outer(u, u) / mode.stiffness
+        found = residues(pattern, [*shown.x, *shown.y], mode.frequency)
+        assert found == pytest.approx(wanted, abs=1e-4 / mode.stiffness)
+
+
+def test_a_cross_tap_that_shows_nothing_leaves_modes_along_x_and_y() -> None:
+    shown = shown_modes(PAIR, turned_by(45))
+    assert mode_axes(shown.x, shown.y, []).patterns == [None]
+
+
+def test_one_peak_in_each_at_one_frequency_is_a_round_spindle_turned_by_any_angle() -> None:
+    axes = mode_axes([PAIR[0]], [PAIR[0].scaled(1.001, 1.1, "")])
+    assert axes.patterns == [None]
+    assert axes.pairs[0].turn == pytest.approx(np.pi / 2)
+    vectors = axes.draw(500, 3)
+    stiffness = np.array([20e6, 22e6])
+    shown = np.einsum("cna,cnb,n->cab", vectors, vectors, 1 / stiffness)
+    assert shown == pytest.approx(np.broadcast_to(np.diag(1 / stiffness), shown.shape), abs=1e-16)
+    assert np.ptp(np.arctan2(vectors[:, 0, 1], vectors[:, 0, 0])) > 3
+
+
+def test_peaks_apart_are_turned_as_far_as_the_other_tap_would_not_have_shown() -> None:
+    axes = mode_axes(PAIR[:1], PAIR[1:])
+    share = axes.draw(2000, 1)[:, 0, 1] ** 2 / PAIR[0].stiffness * PAIR[1].stiffness
+    assert np.max(share) == pytest.approx(HIDDEN, rel=0.05)
+
+
+def test_a_mode_of_one_direction_alone_leans_by_what_is_hidden() -> None:
+    axes = mode_axes([PAIR[0], Mode(3000.0, 0.02, 60e6)], [PAIR[0].scaled(1.001, 1.0, "")])
+    assert axes.lean == pytest.approx([0, np.sqrt(3 * HIDDEN), 0])
+    assert np.all(np.abs(axes.draw(100, 0)[:, 1, 1]) <= np.sqrt(3 * HIDDEN))
+
+
+def test_two_families_of_modes_far_apart_are_two_round_pairs() -> None:
+    x = [PAIR[0], Mode(2400.0, 0.02, 25e6)]
+    axes = mode_axes(x, [mode.scaled(1.002, 1.05, "") for mode in x])
+    assert axes.signs == 0
+    assert axes.patterns == [None]
+
+
+def test_a_small_mode_beside_a_large_one_makes_no_pair_askew() -> None:
+    x = [PAIR[0], Mode(1650.0, 0.02, 250e6)]
+    assert mode_axes(x, [mode.scaled(1.002, 1.05, "") for mode in x]).signs == 0
+
+
+def test_x_and_y_of_one_mode_3_percent_apart_still_belong_together() -> None:
+    shown = shown_modes(PAIR, turned_by(30))
+    moved = [mode.scaled(1.03, 1.0, "") for mode in shown.y]
+    axes = mode_axes(shown.x, moved)
+    assert [(pair.x, pair.y) for pair in axes.pairs] == [(0, 2), (1, 3)]
+    assert axes.signs == 1

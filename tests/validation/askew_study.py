@@ -1,0 +1,143 @@
+"""What is said of spindles whose modes lie askew: random ones, tapped in x and y (and across), judged, simulated.
+
+The truth is two modes square to each other, 5 to 85 degrees off x and y, within 18 % of each other. Their FRFs are
+noisy and fitted as those of a tap test; the limits that are said are held against `delayed_milling`, which shares
+nothing with what made them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import numpy as np
+from delayed_milling import DelayedCase, growth_per_turn
+from numpy.typing import NDArray
+from verdict_study import MACHINE
+
+from acquisition import Frf
+from lobes import shown_modes
+from lobewatch.machine import FEED_ANGLES, ProgramTable
+from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.draws import as_program, worst_limit
+from lobewatch.verdicts.verdict import Verdict, judge
+from lobewatch.verdicts.ways import ways
+from modal import Mode, believed, fit_modes, synthesize
+
+LINES = np.arange(100.0, 5000.0, 2.0)
+NOISE = 0.001
+"""Noise of each line of an FRF over its tallest peak."""
+TEETH = (2, 3, 4, 5)
+IMMERSIONS = (0.05, 0.1, 0.15, 0.25, 0.35, 0.5, 0.75, 1.0)
+DIAMETER_MM = 16.0
+DEEPEST_MM = 60.0
+"""Limits beyond this are none."""
+
+
+@dataclass(frozen=True)
+class AskewSpindle:
+    """Two modes square to each other, with a cut."""
+
+    modes: tuple[Mode, Mode]
+    angle: float
+    """Angle of the first from x (rad)."""
+    cut: ProgramTable
+    """Cut at any depth."""
+
+    @property
+    def vectors(self) -> NDArray[np.float64]:
+        c, s = math.cos(self.angle), math.sin(self.angle)
+        return np.array([[c, s], [-s, c]])
+
+    def assembly(self, rng: np.random.Generator, across: bool) -> Assembly:
+        """The tool as tap tests show it."""
+        x, y, cross = (_fitted(modes, rng) for modes in shown_modes(self.modes, self.vectors))
+        time, sides = datetime(2026, 1, 1, tzinfo=UTC), ("x", "y")
+        x, y = (list(believed(modes).modes) for modes in (x, y))
+        return Assembly("reference", time, "drawn", x, y, sides, None, {}, False, (), cross=cross if across else None)
+
+    def truths(self, depth_mm: float) -> Iterator[DelayedCase]:
+        """The cut at a depth in each of its directions of feed."""
+        cut = MACHINE.build_cut(self.cut)
+        angles = np.arange(12) * math.pi / 12 if self.cut.feed == "both" else np.array([FEED_ANGLES[self.cut.feed]])
+        for feed in angles.tolist():
+            along = zip(self.modes, (self.angle, self.angle + math.pi / 2), strict=True)
+            yield DelayedCase(
+                tuple((mode.frequency, mode.damping_ratio, mode.stiffness, angle - feed) for mode, angle in along),
+                (360 // cut.teeth,) * cut.teeth,
+                cut.immersion,
+                cut.direction,
+                cut.tangential,
+                cut.radial,
+                0.0,
+                self.cut.speed_rpm,
+                depth_mm / 1e3,
+            )
+
+
+def _fitted(modes: list[Mode], rng: np.random.Generator) -> list[Mode]:
+    receptance = synthesize(modes, LINES).receptance
+    noise = NOISE * np.max(np.abs(receptance)) / math.sqrt(2)
+    return fit_modes(Frf(LINES, receptance + noise * (rng.normal(size=LINES.size) + 1j * rng.normal(size=LINES.size))))
+
+
+def random_spindle(rng: np.random.Generator) -> AskewSpindle:
+    frequency, stiffness = rng.uniform(600, 2200), 10 ** rng.uniform(6.9, 7.7)
+    others = frequency * (1 + rng.uniform(0, 0.18)), rng.uniform(0.015, 0.045), stiffness * rng.uniform(0.75, 1.35)
+    modes = Mode(frequency, rng.uniform(0.015, 0.045), stiffness), Mode(*others)
+    teeth, tangential = int(rng.choice(TEETH)), rng.uniform(600, 2000)
+    cut = ProgramTable(
+        name="drawn",
+        teeth=teeth,
+        radial_depth_mm=float(rng.choice(IMMERSIONS)) * DIAMETER_MM,
+        tool_diameter_mm=DIAMETER_MM,
+        direction=rng.choice(["up", "down"]).item(),
+        tangential_n_per_mm2=tangential,
+        radial_n_per_mm2=tangential * rng.uniform(0.1, 0.6),
+        speed_rpm=60 * frequency / teeth / rng.uniform(0.5, 7),
+        depth_mm=1.0,
+        feed=rng.choice(["x", "y", "both"]).item(),
+    )
+    return AskewSpindle(modes, math.radians(rng.uniform(5, 85)), cut)
+
+
+@dataclass(frozen=True)
+class Saying:
+    """What was said of a spindle at half its limit."""
+
+    spindle: AskewSpindle
+    verdict: Verdict
+
+    @property
+    def low_mm(self) -> float:
+        return 1e3 * self.verdict.limit_low
+
+
+def sayings(count: int, seed: int, across: bool = False) -> list[Saying]:
+    """Of so many random spindles that have a limit."""
+    made = list[Saying]()
+    for rng in np.random.default_rng(seed).spawn(4 * count):
+        spindle = random_spindle(rng)
+        tool = spindle.assembly(rng, across)
+        limit, _, _ = worst_limit(as_program(spindle.cut, MACHINE), tool, ways(spindle.cut, MACHINE, tool))
+        if 1e3 * limit.limit < DEEPEST_MM and len(made) < count:
+            half = _at(spindle.cut, 1e3 * limit.limit / 2)
+            made.append(Saying(spindle, judge(half, tool, MACHINE)))
+    return made
+
+
+def _at(cut: ProgramTable, depth_mm: float) -> ProgramTable:
+    return ProgramTable(**{name: getattr(cut, name) for name in cut.__struct_fields__} | {"depth_mm": depth_mm})
+
+
+def hold(said: list[Saying], share: float) -> NDArray[np.bool_]:
+    """Whether each truth is stable at a share of the low end of what was said of it, by simulation."""
+    cases = [(i, case) for i, saying in enumerate(said) for case in saying.spindle.truths(share * saying.low_mm)]
+    growth, cycles = np.empty(len(cases)), [max(m[0] for m in case.modes) / case.speed_rpm for _, case in cases]
+    for part in np.array_split(np.argsort(cycles), -(-len(cases) // 60)):
+        growth[part] = growth_per_turn([cases[i][1] for i in part])
+    stable = np.ones(len(said), dtype=bool)
+    np.logical_and.at(stable, [i for i, _ in cases], growth < 0)
+    return stable

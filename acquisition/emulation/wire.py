@@ -63,14 +63,21 @@ class PtyWire:
 
 
 class TcpWire:
-    """A listening socket on 127.0.0.1; one host at a time."""
+    """A listening socket; one host at a time."""
 
-    def __init__(self, number: int = 0) -> None:
-        """Listen on this port, 0 for a free one."""
-        self._listener = socket.create_server(("127.0.0.1", number))
+    def __init__(self, number: int = 0, address: str = "127.0.0.1") -> None:
+        """Listen on this port, 0 for a free one, at an address of this computer."""
+        family = socket.AF_INET6 if ":" in address else socket.AF_INET
+        self._listener = socket.create_server((address, number), family=family)
         self._host: socket.socket | None = None
-        self.port = f"socket://127.0.0.1:{self._listener.getsockname()[1]}"
+        host = f"[{address}]" if ":" in address else address
+        self.port = f"socket://{host}:{self._listener.getsockname()[1]}"
         self.pending = bytearray()
+
+    @property
+    def has_host(self) -> bool:
+        """Whether one is connected."""
+        return self._host is not None
 
     def exchange(self, timeout: float) -> bytes:
         """See Wire."""

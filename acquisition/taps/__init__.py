@@ -1,5 +1,6 @@
-"""TAPS/1, the open frame for data acquisition boards: protocol, events, stream, source and emulator."""
+"""TAPS/1, the open frame for data acquisition boards: protocol, events, stream, source, emulator and bridge."""
 
+from acquisition.taps.bridge import TapsBridge
 from acquisition.taps.emulator import TapsEmulator
 from acquisition.taps.faults import Faults
 from acquisition.taps.probe import probe_taps
@@ -11,6 +12,7 @@ __all__ = [
     "Frame",
     "FrameDecoder",
     "MessageType",
+    "TapsBridge",
     "TapsEmulator",
     "TapsSource",
     "encode_frame",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import struct
 import time
 from collections import deque
 from dataclasses import replace
@@ -14,11 +12,14 @@ from acquisition.channel import Channel
 from acquisition.emulation.simulated_source import Signal, quantise
 from acquisition.emulation.thread import EmulatorThread
 from acquisition.event import Event, EventKind
+from acquisition.source import DeviceIdentity
+from acquisition.taps.device_end import Commands, configured_bits, info_of
 from acquisition.taps.event import encode_event
 from acquisition.taps.faults import NOISE, Faults
 from acquisition.taps.protocol import (
     LOST_BEFORE,
     SAMPLE_BITS,
+    STATUS_INTERVAL,
     Frame,
     FrameDecoder,
     MessageType,
@@ -27,10 +28,10 @@ from acquisition.taps.protocol import (
     encode_frame,
 )
 
+IDENTITY = DeviceIdentity("lobewatch emulator", "EMU-1", "1.0")
+"""Who it says it is."""
 BUFFER_SECONDS = 1.0
 """What the device keeps for a slow host before it drops scans (s)."""
-STATUS_INTERVAL = 0.5
-"""Time between STATUS frames (s)."""
 
 
 class TapsEmulator(EmulatorThread):
@@ -91,7 +92,7 @@ class TapsEmulator(EmulatorThread):
     def serve_once(self) -> bool:
         """See EmulatorThread."""
         for frame in self._decoder.feed(self.wire.exchange(0.0 if self._streaming and self._has_room() else 0.05)):
-            self._answer(frame)
+            self._send(*Commands(self._info, self._configure, self._start, self._stop).answer(frame))
         while self._pressed:
             self._tell(self._pressed.popleft())
         if self._streaming:
@@ -124,58 +125,17 @@ class TapsEmulator(EmulatorThread):
             self._standing[event.kind, event.channel] = event
         self._send(MessageType.EVENT, encode_event(replace(event, scan=self._scan)))
 
-    def _answer(self, frame: Frame) -> None:
-        about = frame.seq.to_bytes(4, "little")
-        try:
-            if frame.type == MessageType.HELLO:
-                self._send(MessageType.INFO, json.dumps(self._info()).encode())
-                return
-            if frame.type == MessageType.CONFIG:
-                self._configure(json.loads(frame.body))
-            elif frame.type == MessageType.START:
-                self._start(int.from_bytes(frame.body, "little"))
-            elif frame.type == MessageType.STOP:
-                self._streaming = False
-            else:
-                raise ValueError(f"unknown command {frame.type:#04x}")
-        except (ValueError, LookupError, TypeError) as error:
-            self._send(MessageType.NACK, about + struct.pack("<H", 1) + str(error).encode())
-        else:
-            self._send(MessageType.ACK, about + struct.pack("<H", 0))
-
     def _info(self) -> dict[str, Any]:
-        return {
-            "proto": 1,
-            "model": "lobewatch emulator",
-            "serial": "EMU-1",
-            "fw": "1.0",
-            "adc_bits": self._channels[0].adc_bits,
-            "fs_choices": [self._rate],
-            "simultaneous": True,
-            "clock_ppm": 0 if self._realtime else None,
-            "channels": [
-                {
-                    "i": i,
-                    "name": channel.quantity,
-                    "quantity": channel.quantity,
-                    "sens_V_per_EU": channel.sensitivity,
-                    "sens_date": channel.calibration_date,
-                    "fs_V": channel.full_scale,
-                    "gain": 1.0,
-                    "coupling": "IEPE",
-                    "skew_s": channel.skew,
-                    "delay_s": 0.0,
-                }
-                for i, channel in enumerate(self._channels)
-            ],
-        }
+        return info_of(IDENTITY, self._channels, self._rate, follows_clock=self._realtime)
 
     def _configure(self, wish: dict[str, Any]) -> None:
         if self._streaming:
             raise ValueError("CONFIG while streaming; send STOP first")
-        if wish["fs"] != self._rate or wish["channels"] != list(range(len(self._channels))):
-            raise ValueError(f"CONFIG asks for what this device does not have: {wish}")
-        self._per_frame, self._bits = int(wish["samples_per_frame"]), SAMPLE_BITS[wish["format"]]
+        self._bits = configured_bits(wish, self._channels, self._rate)
+        self._per_frame = int(wish["samples_per_frame"])
+
+    def _stop(self) -> None:
+        self._streaming = False
 
     def _start(self, n_scans: int) -> None:
         """Begin a session, and tell what is wrong since earlier."""

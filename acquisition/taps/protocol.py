@@ -25,6 +25,10 @@ SAMPLE_BITS = (16, 24, 32)
 """ADC word of DATA formats 0 (i16), 1 (i24 packed) and 2 (i32)."""
 FRAME_OVERHEAD = 28
 """Bytes of a DATA frame besides its samples."""
+NO_TEMPERATURE = -327.68
+"""In STATUS, of a device without a thermometer (degC)."""
+STATUS_INTERVAL = 0.5
+"""Time between STATUS frames (s)."""
 MAX_ENCODED = MAX_FRAME + -(-MAX_FRAME // 254)
 """The same in COBS, without its delimiter (bytes)."""
 _HEADER = struct.Struct("<BBHI")

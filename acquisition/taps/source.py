@@ -245,6 +245,8 @@ def _channels(info: dict[str, Any]) -> tuple[Channel, ...]:
             sensitivity=entry["sens_V_per_EU"] * entry.get("gain", 1.0),
             full_scale=entry["fs_V"],
             adc_bits=info["adc_bits"],
+            direction=entry.get("direction") or "",
+            serial_number=str(entry.get("sensor_serial") or ""),
             calibration_date=str(entry.get("sens_date") or ""),
             skew=entry.get("skew_s", 0.0),
         )

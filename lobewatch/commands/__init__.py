@@ -32,6 +32,8 @@ COMMANDS = {
     "rebuild": "The history anew from the tap tests, and the journal where that is damaged; nothing is deleted.",
     "serve": "Machines in a browser, worst first; START begins a tap test on the port that machine.toml names. "
     "Ctrl-C ends it.",
+    "bridge": "Any device as a TAPS/1 device on TCP: plugged in here, used by lobewatch on another computer. "
+    "Ctrl-C ends it.",
     "emulate": "A data acquisition device made of software, on a pseudo-terminal.",
 }
 """What each command does, the first line of its help: the list of all is shown without importing any of them."""

@@ -1,0 +1,204 @@
+"""Any device as a TAPS/1 device on TCP: its scans, losses, overloads and events, for a host elsewhere."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from acquisition.channel import Block
+from acquisition.emulation.wire import TcpWire
+from acquisition.errors import DeviceError
+from acquisition.source import Device
+from acquisition.taps.device_end import Commands, configured_bits, info_of
+from acquisition.taps.event import encode_event
+from acquisition.taps.protocol import (
+    LOST_BEFORE,
+    NO_TEMPERATURE,
+    SAMPLE_BITS,
+    STATUS_INTERVAL,
+    Frame,
+    FrameDecoder,
+    MessageType,
+    Status,
+    encode_data,
+    encode_frame,
+)
+
+BUFFER_BYTES = 4 << 20
+"""Bytes kept for a host that is late, 20 s of two channels at 51.2 kHz and 16 bits; then scans are dropped and told."""
+AHEAD_BYTES = 1 << 16
+"""Bytes that a device without a clock may be ahead of its host: it waits, and nothing is dropped."""
+RETRY_TIME = 0.5
+"""Time between two tries to find the device again (s)."""
+UNNUMBERED = "no-number"
+"""Serial number in INFO of a device that has none."""
+
+
+class TapsBridge:
+    """Serves one device at a time to one host at a time; while the device is away nobody is let in."""
+
+    def __init__(
+        self,
+        open_device: Callable[[], Device],
+        tell: Callable[[str], None],
+        *,
+        address: str = "127.0.0.1",
+        number: int = 0,
+    ) -> None:
+        """Open the device and listen at an address; number: of the TCP port, 0 for a free one.
+
+        tell is given a sentence when the device goes away or comes back. Raises DeviceError where there is no device,
+        OSError where it cannot listen.
+        """
+        self._open, self._tell, self._address = open_device, tell, address
+        self._device = open_device()
+        self._stopping = False
+        try:
+            self._listen(number)
+        except OSError:
+            self._device.close()
+            raise
+
+    @property
+    def port(self) -> str:
+        """What the host opens."""
+        return self._wire.port
+
+    @property
+    def device(self) -> Device:
+        """The device, as it was opened last."""
+        return self._device
+
+    def stop(self) -> None:
+        """End run(), from another thread."""
+        self._stopping = True
+
+    def run(self) -> None:
+        """Serve until stopped or interrupted."""
+        try:
+            while not self._stopping:
+                try:
+                    _Link(self._device, self._wire).serve(lambda: self._stopping)
+                except DeviceError as error:
+                    self._wire.close()
+                    self._device.close()
+                    self._tell(str(error))
+                    self._wait()
+        finally:
+            self._wire.close()
+            self._device.close()
+
+    def _listen(self, number: int) -> None:
+        self._wire = TcpWire(number, self._address)
+
+    def _wait(self) -> None:
+        """Until the device is there again."""
+        while not self._stopping:
+            time.sleep(RETRY_TIME)
+            try:
+                self._device = self._open()
+            except DeviceError:
+                continue
+            self._listen(int(self.port.rpartition(":")[2]))
+            self._tell("the device is back")
+            return
+
+
+class _Link:
+    """One device and the wire to its host."""
+
+    def __init__(self, device: Device, wire: TcpWire) -> None:
+        self._device, self._wire, self._decoder = device, wire, FrameDecoder()
+        self._commands = Commands(self._info, self._configure, self._start, self._stop)
+        self._bits, self._per_frame = SAMPLE_BITS[0], 512
+        self._shift = [max(channel.adc_bits for channel in device.channels) - c.adc_bits for c in device.channels]
+        self._seq = self._session = self._limit = 0
+        self._streaming = False
+
+    def serve(self, is_over: Callable[[], bool]) -> None:
+        """Answer and send until it is over; DeviceError where the device goes away or falls silent."""
+        while not is_over():
+            if not self._streaming:
+                self._answer(0.05)
+                continue
+            session = self._session
+            for block in self._device.blocks():
+                self._send_block(block)
+                self._answer(0.0)
+                while not self._device.follows_clock and len(self._wire.pending) > AHEAD_BYTES:
+                    self._answer(0.05)
+                if is_over() or not self._streaming or session != self._session:
+                    break
+            else:
+                self._streaming = False
+        self._stop()
+
+    def _answer(self, timeout: float) -> None:
+        for frame in self._decoder.feed(self._wire.exchange(timeout)):
+            self._send(*self._commands.answer(frame))
+        if not self._wire.has_host:
+            self._decoder = FrameDecoder()
+            self._stop()
+
+    def _send(self, kind: MessageType, body: bytes, flags: int = 0) -> None:
+        self._wire.pending += encode_frame(Frame(kind, self._seq, body, self._session, flags))
+        self._seq = (self._seq + 1) % 2**32
+
+    def _info(self) -> dict[str, Any]:
+        device = self._device
+        info = info_of(device.identity, device.channels, device.sample_rate, follows_clock=device.follows_clock)
+        return info | {"serial": info["serial"] or UNNUMBERED}
+
+    def _configure(self, wish: dict[str, Any]) -> None:
+        if self._streaming:
+            raise ValueError("CONFIG while streaming; send STOP first")
+        self._bits = configured_bits(wish, self._device.channels, self._device.sample_rate)
+        self._per_frame = int(wish["samples_per_frame"])
+
+    def _start(self, n_scans: int) -> None:
+        self._stop()
+        self._device.events.clear()
+        self._device.start()
+        self._session, self._limit, self._streaming = (self._session + 1) % 2**16, n_scans, True
+        self._next = self._sent = self._overruns = self._peak = 0
+        self._lost, self._status_due = False, 0.0
+
+    def _stop(self) -> None:
+        if self._streaming:
+            self._streaming = False
+            self._device.stop()
+
+    def _send_block(self, block: Block) -> None:
+        """Send the scans of a block, or drop them where the host is late; the index tells what is missing."""
+        self._next += block.lost_before
+        self._lost = self._lost or block.lost_before > 0
+        codes = block.codes << np.array(self._shift, np.int32)[:, np.newaxis]
+        if self._limit:
+            codes = codes[:, : max(self._limit - self._next, 0)]
+        for begin in range(0, codes.shape[1], self._per_frame):
+            part = codes[:, begin : begin + self._per_frame]
+            if len(self._wire.pending) > BUFFER_BYTES:
+                self._overruns += not self._lost
+                self._lost = True
+            else:
+                body = encode_data(self._next, part, self._bits, block.overload)
+                self._send(MessageType.DATA, body, LOST_BEFORE if self._lost else 0)
+                self._lost = False
+                self._sent += part.shape[1]
+            self._next += part.shape[1]
+        self._report()
+        if self._limit and self._next >= self._limit:
+            self._stop()
+
+    def _report(self) -> None:
+        """What has happened at the device, and now and then how it fares."""
+        while self._device.events:
+            self._send(MessageType.EVENT, encode_event(self._device.events.popleft()))
+        self._peak = max(self._peak, min(100 * len(self._wire.pending) // BUFFER_BYTES, 100))
+        if time.monotonic() >= self._status_due:
+            self._status_due = time.monotonic() + STATUS_INTERVAL
+            status = Status(self._next, self._sent, self._peak, self._overruns, NO_TEMPERATURE)
+            self._send(MessageType.STATUS, status.encode())

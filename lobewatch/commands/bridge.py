@@ -1,0 +1,66 @@
+"""lobewatch bridge."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lobewatch.machine.folder_path import named_folder
+from lobewatch.show.terminal.output import Json, notes, results
+
+
+def bridge(
+    driver: Annotated[str, typer.Argument(help="Name of the driver, as in [daq] of machine.toml.")],
+    machine: Annotated[
+        Path | None,
+        typer.Argument(parser=named_folder, help="Machine folder whose [daq] sets the device up: port, sensors, rate."),
+    ] = None,
+    port: Annotated[str, typer.Option(help="Port of the device; that of [daq] where not given.")] = "",
+    listen: Annotated[
+        str, typer.Option(help="Address of this computer at which it can be reached; 0.0.0.0: at all.")
+    ] = "127.0.0.1",
+    tcp_port: Annotated[int, typer.Option(min=0, max=65535, help="Number of the TCP port; 0: any free one.")] = 0,
+    as_json: Json = False,
+) -> None:
+    """Any device as a TAPS/1 device on TCP: plugged in here, used by lobewatch on another computer. Ctrl-C ends it.
+
+    Lost scans, overloads and the button are carried through; while the device is unplugged the host waits for it.
+    There is no password: whoever reaches the address can start and stop the device.
+
+    Examples:
+
+      lobewatch bridge dataq mill-3 --port /dev/ttyACM0 --listen 0.0.0.0 --tcp-port 5025
+      lobewatch tap mill-3 --port socket://10.0.0.5:5025  # on the other computer, with driver = "taps"
+    """
+    from acquisition import DataError, find_driver
+    from acquisition.taps import TapsBridge
+    from lobewatch.machine.folder import MachineFolder
+    from lobewatch.machine.settings.daq_tables import Daq
+    from lobewatch.tap.plug import Plug
+
+    folder, kind = None if machine is None else MachineFolder(machine), find_driver(driver)
+    if folder is None and kind.sensors is None:
+        raise DataError(
+            f"{kind.title} does not know its sensors: give the machine folder whose [[daq.channel]] names them"
+        )
+    daq = Daq(driver=driver) if folder is None else folder.machine.daq
+    if folder is not None and daq.driver != driver:
+        raise DataError(f'{folder.toml}: driver = "{daq.driver}", not "{driver}"; give the same one')
+    port = port or daq.port
+    if not port:
+        raise ValueError("no port: give --port, or a machine folder with port in [daq]")
+    server = TapsBridge(Plug(daq, port).open, _tell, address=listen, number=tcp_port)
+    identity = server.device.identity
+    results.print(json.dumps({"port": server.port}) if as_json else f"port {server.port}", markup=False)
+    results.file.flush()
+    _tell(
+        f"{identity.model} on {port}, {server.device.sample_rate:g} Hz; tap with --port {server.port} (Ctrl-C ends it)"
+    )
+    server.run()
+
+
+def _tell(text: str) -> None:
+    notes.print(text, markup=False)

@@ -110,11 +110,10 @@ def _measured_frf(logbook: Logbook, assembly: Assembly, direction: str) -> Frf:
 
 def _no_pocket(now: Chart, machine: Machine) -> Remark:
     """Why nothing is recommended."""
-    directions, speeds = "".join(now.assembly.directions), machine.speed
-    if len(directions) == 1:
-        missing = "y" if directions == "x" else "x"
-        text = f"no speed and depth can be called safe: direction {missing} was not tapped"
-        return Remark(NO_POCKET, now.name, text, f"tap direction {missing} of tool {now.assembly.tool!r} too")
+    speeds = machine.speed
+    if len(now.assembly.directions) == 1:
+        gap, cure = now.assembly.gap
+        return Remark(NO_POCKET, now.name, f"no speed and depth can be called safe: {gap}", cure)
     text = f"no safe speed and depth found in {speeds.low_rpm:g}..{speeds.high_rpm:g} rpm"
     return Remark(NO_POCKET, now.name, text, "choose another tool or a narrower cut")
 

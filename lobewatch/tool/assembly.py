@@ -21,6 +21,13 @@ from lobewatch.tool.series import FollowedMode, Scatter, frequency_at, scatter_o
 
 ABOUT_DIRECTIONS = ("one-direction", "older-direction")
 """Codes of the remarks on what is known in x and y."""
+UNUSABLE = {
+    "no-lobes-driving-point": ("not a driving point", "hit and measure at one point in {} and tap again"),
+    "no-lobes-beside-tip": ("not at the tool tip", "tap {} at the tip, or add a [spindle]"),
+}
+"""Why a tap test gives no modes at the tip, and what to do in its direction, by the code of its remark ..."""
+NO_MODES = ("no mode in the band", "tap {} again")
+"""... and without such a remark."""
 TOGETHER = timedelta(hours=24)
 """Time between the taps in x and y beyond which the older one is moved, and called so; chosen."""
 
@@ -51,6 +58,8 @@ class Assembly:
     """Remarks on what is not known, and what is in doubt."""
     series: Mapping[str, Sequence[FollowedMode]] = field(default_factory=dict)
     """Tap tests of the same tool up to then, by direction; empty where it is predicted."""
+    unusable: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """Why a tap test gives no modes at the tip, and what to do, by its direction."""
     cross: Modes = None
     """Modes at the tool tip hit in x and seen in y, signed; None where that was not tapped."""
     questions: tuple[Remark, ...] = ()
@@ -60,6 +69,15 @@ class Assembly:
     def is_sure(self) -> bool:
         """Whether both directions are known, from tap tests that nothing is asked about."""
         return len(self.directions) == 2 and not self.questions
+
+    @property
+    def gap(self) -> tuple[str, str]:
+        """Which direction is not known, in words, and what to do, where one is not."""
+        missing = "y" if "x" in self.directions else "x"
+        if missing not in self.unusable:
+            return f"direction {missing} was not tapped", f"tap direction {missing} of tool {self.tool!r} too"
+        why, cure = self.unusable[missing]
+        return f"direction {missing} is tapped, not usable: {why}", cure
 
     @property
     def label(self) -> str:
@@ -100,15 +118,24 @@ def assemble(newest: Measurement, across: Measurement | None, series: Mapping[st
         predicted=False,
         remarks=(*newest.remarks, *_about_directions(newest, across, directions, moved)),
         series=series,
+        unusable={tap.direction: _why_unusable(tap) for tap in taps if not tap.at_tip},
         questions=tuple(in_question(tap.tap_id, asked) for tap in taps for asked in open_questions(tap.remarks)),
     )
 
 
-def untapped_remark(tool: str, tapped: str) -> Remark:
-    """Remark that one direction alone is known."""
+def _why_unusable(tap: Measurement) -> tuple[str, str]:
+    codes = {remark.code for remark in tap.remarks}
+    why, cure = next((words for code, words in UNUSABLE.items() if code in codes), NO_MODES)
+    return why, cure.format(tap.direction)
+
+
+def untapped_remark(tool: str, tapped: str, unusable: tuple[str, str] | None = None) -> Remark:
+    """Remark that one direction alone is known; unusable: why the tap test of the other one is not, and what to do."""
     missing = "y" if tapped == "x" else "x"
     text = f"modes in the {tapped} direction alone, {missing} taken like {tapped}"
-    return Remark("one-direction", tool, text, f"tap direction {missing} of the same tool too")
+    if unusable is None:
+        return Remark("one-direction", tool, text, f"tap direction {missing} of the same tool too")
+    return Remark("one-direction", tool, f"{text}; {missing} is tapped, not usable: {unusable[0]}", unusable[1])
 
 
 def _change_since(time: datetime, series: Sequence[FollowedMode]) -> float | None:
@@ -121,7 +148,8 @@ def _about_directions(
     newest: Measurement, across: Measurement | None, directions: Sequence[str], moved: float | None
 ) -> tuple[Remark, ...]:
     if len(directions) == 1:
-        return (untapped_remark(newest.tool, directions[0]),)
+        useless = [tap for tap in (newest, across) if tap is not None and not tap.at_tip]
+        return (untapped_remark(newest.tool, directions[0], _why_unusable(useless[0]) if useless else None),)
     if across is None or newest.time - across.time <= TOGETHER:
         return ()
     days = round((newest.time - across.time) / timedelta(days=1))

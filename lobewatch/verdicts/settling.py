@@ -37,7 +37,6 @@ def settling_remark(cause: str, table: ProgramTable, tangential: float, assembly
 
     cuts: number of test cuts that have taught of it.
     """
-    missing = "y" if assembly.directions == ("x",) else "x"
     text, cure = {
         "coefficients": (
             f"the cutting coefficients decide: chatters above Kt {tangential / 1e6:.0f} N/mm2",
@@ -67,6 +66,6 @@ def settling_remark(cause: str, table: ProgramTable, tangential: float, assembly
             f"it rests on a tap test in question ({', '.join(dict.fromkeys(q.code for q in assembly.questions))})",
             "answer the question, or tap again",
         ),
-        "untapped": (f"direction {missing} was not tapped", f"tap {missing}"),
+        "untapped": assembly.gap,
     }[cause]
     return Remark("doubt-decides", table.name, text, cure)

@@ -15,6 +15,8 @@ REASONS = {
     "uncertain": "its damping or stiffness is hardly known",
 }
 """Why a mode is rejected, in words, by the rule of `trust_rules`."""
+SMALL = 0.1
+"""Peak of a mode with negative stiffness over the largest, below which it is left out; chosen."""
 CURE = "look at it with lobewatch modes --figure; against drift let the sensor rest longer, or change its cable"
 
 
@@ -25,7 +27,7 @@ class Believed:
     modes: tuple[Mode, ...]
     """Modes that may be followed, calibrated and used for lobes."""
     against: tuple[Mode, ...]
-    """Modes that could be, were their stiffness not negative: no driving point."""
+    """Modes that could be, were their stiffness not negative: no driving point. Small ones are left out."""
     remarks: tuple[Remark, ...]
     """One about each of the rest, with the reason."""
 
@@ -34,11 +36,25 @@ def believed(modes: Sequence[Mode]) -> Believed:
     """Leave out drift, peaks cut by the edge of the lines, stiffness of no machine, and what trust_of rejects."""
     judged = [(mode, _doubt(mode)) for mode in modes]
     plausible = [mode for mode, doubt in judged if doubt is None]
+    largest = max(map(_peak, plausible), default=0.0)
+    against = [mode for mode in plausible if not mode.is_driving_point]
+    small = [mode for mode in against if _peak(mode) < SMALL * largest]
     return Believed(
         tuple(mode for mode in plausible if mode.is_driving_point),
-        tuple(mode for mode in plausible if not mode.is_driving_point),
-        tuple(doubt for _, doubt in judged if doubt is not None),
+        tuple(mode for mode in against if mode not in small),
+        (*(doubt for _, doubt in judged if doubt is not None), *(_left_out(mode, largest) for mode in small)),
     )
+
+
+def _peak(mode: Mode) -> float:
+    """Receptance at its resonance, 1 / (2 |K| zeta) (m/N)."""
+    return float(1 / (2 * abs(mode.stiffness) * mode.damping_ratio))
+
+
+def _left_out(mode: Mode, largest: float) -> Remark:
+    text = f"left out: K is negative, its peak {100 * _peak(mode) / largest:.1g} % of the largest"
+    cure = "where it is a mode of the machine, hit and measure at one point in one direction"
+    return Remark("small-against", f"{mode.frequency:.4g} Hz", text, cure)
 
 
 def _doubt(mode: Mode) -> Remark | None:

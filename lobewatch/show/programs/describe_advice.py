@@ -18,7 +18,6 @@ from lobewatch.machine import Machine, SpeedRange
 from lobewatch.show.programs.describe_doubts import reading_lines
 from lobewatch.show.programs.describe_verdicts import verdict_json, verdict_table
 from lobewatch.show.terminal.output import remark_json, remark_lines
-from lobewatch.tool import Assembly
 from lobewatch.verdicts import Advice, Setting, Verdict, Word
 from lobewatch.verdicts.setting_search import LEFT
 from lobewatch.verdicts.verdict import Ruling, is_sure
@@ -169,7 +168,7 @@ def _elsewhere(advice: ProgramAdvice, speeds: SpeedRange) -> str:
     verdict, best, shallower = advice.verdict, advice.advice.best, advice.advice.here
     assembly = verdict.assembly
     if assembly is not None and len(assembly.directions) == 1:
-        return f"tap direction {_missing(assembly)} too: only then can a safe speed be named"
+        return f"{assembly.gap[1]}: only then can a safe speed be named"
     if verdict.program.thin:
         return "support the wall, which is thin: only then can a safe speed be named"
     if assembly is not None and assembly.questions:
@@ -192,10 +191,6 @@ def _elsewhere(advice: ProgramAdvice, speeds: SpeedRange) -> str:
 
 def _is_same(best: Setting, shallower: Setting | None) -> bool:
     return shallower is not None and (best.speed_rpm, best.depth_mm) == (shallower.speed_rpm, shallower.depth_mm)
-
-
-def _missing(assembly: Assembly) -> str:
-    return "y" if assembly.directions[0] == "x" else "x"
 
 
 def _floored(depth: float) -> str:

@@ -90,16 +90,19 @@ def doubt_lines(verdicts: Sequence[Verdict], machine: Machine) -> list[str]:
 
 def _parts(verdict: Verdict, doubt: Doubt, assembly: Assembly, machine: Machine) -> Iterator[str]:
     given, standard = machine.doubt, DoubtTable()
-    tapped = "".join(assembly.directions)
     if verdict.cuts:
         yield from _learnt(verdict.at_speed, doubt.speed)
         return
-    about = {"prediction": "by the prediction", "untapped": f"in {'y' if tapped == 'x' else 'x'}, not tapped"}
+    missing = "y" if "x" in assembly.directions else "x"
+    lacking = "usable" if missing in assembly.unusable else "tapped"
+    about = {"prediction": "by the prediction", "untapped": f"in {missing}, not {lacking}"}
     for cause, widths in doubt.modes.items():
         if cause == "clamping":
             yield from _clamping(widths, assembly, given)
         elif np.any(widths > NOTHING):
             yield f"{_sizes(np.max(widths, axis=0))} {about.get(cause, 'by the tap test')}"
+    if doubt.axes is not None and doubt.axes.signs:
+        yield "modes askew to either side (cross not tapped)"
     yield f"speed {_half(doubt.speed)}" + (f" ({GIVEN})" if given.speed_percent != standard.speed_percent else "")
     yield from _coefficients(verdict, doubt, machine)
 

@@ -96,9 +96,12 @@ def test_one_direction_is_never_enough_to_be_called_stable(shop: Shop, check: Ch
     assert {one["verdict"] for one in said.json["programs"]} == {"doubtful"}
     assert {one["decided_by"] for one in said.json["programs"]} == {"untapped"}
     assert {one["stable"] for one in said.json["programs"]} == {True}
-    assert check().line("A") == "A: direction y was not tapped; to settle it: tap y"
+    assert check().line("A") == "A: direction y was not tapped; to settle it: tap direction y of tool 'reference' too"
     shop.tap(0.1, 1690.0, "y", tool="another")
-    assert (check("--json").programs["A"]["verdict"], check().line("A").endswith("tap y")) == ("doubtful", True)
+    assert (
+        check("--json").programs["A"]["verdict"],
+        check().line("A").endswith("tap direction y of tool 'reference' too"),
+    ) == ("doubtful", True)
     shop.tap(0.2, 1690.0, "y")
     both = check("--json")
     assert (both.code, {one["verdict"] for one in both.json["programs"]}) == (0, {"stable"})
@@ -109,7 +112,7 @@ def test_without_the_other_direction_nothing_is_recommended(shop: Shop, check: C
     shop.tap(0, 1713.0, "y")
     said = check("--json")
     assert (said.programs["A"]["verdict"], said.programs["A"]["advice"]) == ("not stable", None)
-    assert check().line("A").endswith("tap direction x too: only then can a safe speed be named")
+    assert check().line("A").endswith("tap direction x of tool 'reference' too: only then can a safe speed be named")
 
 
 def test_the_object_of_a_program(shop: Shop, check: Check) -> None:

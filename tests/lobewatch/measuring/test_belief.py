@@ -65,3 +65,19 @@ def test_a_bearing_stiffness_of_no_bearing_is_unknown(machine: Machine) -> None:
     measurement = measured(machine, Mode(2301.0, 0.03, 3.5e7))
     assert measurement.calibration is None
     assert [remark.text for remark in measurement.remarks if "is outside 100000 to 1e+11 N/m" in remark.text]
+
+
+def test_a_small_mode_against_the_hammer_is_left_out_and_said(machine: Machine) -> None:
+    """13 Hz with K < 0, its peak 8 % of that of a perfect mode, once took all lobes of the direction away."""
+    large, zeta = 1 / (2 * TRUE.stiffness * TRUE.damping_ratio), 0.05
+    measurement = measured(machine, Mode(60.0, zeta, -1 / (2 * zeta * 0.08 * large)), TRUE)
+    assert [mode.frequency for mode in measurement.at_tip] == pytest.approx([1713.0], rel=1e-3)
+    (said,) = [remark for remark in measurement.remarks if remark.code == "small-against"]
+    assert (said.about, said.text) == ("60 Hz", "left out: K is negative, its peak 8 % of the largest")
+
+
+def test_a_large_mode_against_the_hammer_leaves_no_modes_at_the_tip(machine: Machine) -> None:
+    large, zeta = 1 / (2 * TRUE.stiffness * TRUE.damping_ratio), 0.05
+    measurement = measured(machine, Mode(60.0, zeta, -1 / (2 * zeta * 0.12 * large)), TRUE)
+    assert not measurement.at_tip
+    assert codes(measurement)[-1] == "no-lobes-driving-point"

@@ -4,6 +4,7 @@ COMMANDS = {
     "demo": "A simulated spindle ages over 24 months, tapped in x and y; a forecast beside the truth, a report.",
     "init": "Make a machine folder with a commented machine.toml: ten questions, or their answers as options.",
     "ports": "Serial ports, and which DAQ answers there.",
+    "doctor": "What of this computer stands in the way of a tap test: ports, rights, clock, disk, packages, browser.",
     "sensors": "Hammer, accelerometer and DAQ: what they are, and whether they are right.",
     "tap": "The live tap test: hit until ten hits are good, then see what has changed.",
     "replay": "Recorded files through the same pipeline as a live test; each is stored once.",

@@ -1,0 +1,34 @@
+"""lobewatch doctor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lobewatch.machine.folder_path import named_folder
+from lobewatch.show.terminal.output import Json, emit
+
+
+def doctor(
+    machine: Annotated[Path | None, typer.Argument(parser=named_folder, help="Machine folder.")] = None,
+    as_json: Json = False,
+) -> None:
+    """What of this computer stands in the way of a tap test: ports, rights, clock, disk, packages, browser.
+
+    With a machine its port, its driver and its folder are looked at, too. Exit code 1 where something hinders.
+
+    Examples:
+
+      lobewatch doctor
+      lobewatch doctor mill-3 --json
+    """
+    from lobewatch.machine.folder import MachineFolder
+    from lobewatch.sensors import examine_computer
+    from lobewatch.show.devices.describe_findings import findings_json, findings_texts
+
+    findings = examine_computer(MachineFolder(machine) if machine else None)
+    emit(findings_json(findings), as_json, *findings_texts(findings))
+    if any(finding.state == "hinders" for finding in findings):
+        raise typer.Exit(1)

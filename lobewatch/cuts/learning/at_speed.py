@@ -45,7 +45,7 @@ def spindle_at_speed(table: CutTable, tool: Assembly, machine: Machine, cuts: Se
         return AT_REST
     lesson = learn_program(table, tool, machine, cuts)
     remarks = tuple(contradiction_remarks(lesson.learnt, lesson.contradicting, table.name))
-    return _learnt(lesson, tool, machine, remarks) if lesson.learnt.cuts else SpindleAtSpeed(remarks=remarks)
+    return _learnt(lesson, tool, machine, remarks) if lesson.believed else SpindleAtSpeed(remarks=remarks)
 
 
 def _learnt(lesson: Lesson, tool: Assembly, machine: Machine, remarks: tuple[Remark, ...]) -> SpindleAtSpeed:
@@ -65,7 +65,7 @@ def _learnt(lesson: Lesson, tool: Assembly, machine: Machine, remarks: tuple[Rem
         direction=direction / np.mean(direction) if np.all(direction > 0) else np.ones(direction.shape),
     )
     return SpindleAtSpeed(
-        cuts=len(lesson.learnt.cuts),
+        cuts=len(lesson.believed),
         remarks=remarks,
         doubt=Doubt(
             modes={CUTS: _widths(parts, phases)},

@@ -1,4 +1,4 @@
-"""Cuts that contradict the model beyond chance: left out with their likely cause, never averaged in."""
+"""Cuts that are more likely written down wrong than right, or sound where no mode is: said with their likely cause."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ import numpy as np
 
 from acquisition import Remark
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.likelihood import FREQUENCY, MISJUDGED
+from lobewatch.cuts.learning.likelihood import FREQUENCY, log_likelihood, misheard
 from lobewatch.cuts.learning.posterior import USUAL, NewEvidence, Posterior
 
-CHANCE = MISJUDGED + 0.01
-"""Chance below which what was heard is beyond chance: hardly more than that it was misheard; chosen."""
+WRONG = 0.5
+"""Chance that the word of a cut is wrong, given all cuts, from which it is not believed."""
+DRAWS = 300
+"""Number of draws that are asked what they say of a cut."""
 AWAY = 4.0
 """Distance from all frequencies predicted (standard deviations) at which chatter is that of something else; chosen."""
 NONE = 0.005
-"""Share of the weight that counts as nothing; chosen."""
+"""Share of the weight by the other cuts that counts as nothing; chosen."""
 
 
 class Contradiction(StrEnum):
@@ -28,54 +30,42 @@ class Contradiction(StrEnum):
     FREQUENCY = "frequency"
     """It chatters where no mode is."""
     CHATTERS = "chatters"
-    """It chatters where all spindles that explain the other cuts are stable."""
+    """It chatters where most spindles that explain the other cuts are stable."""
     STABLE = "stable"
-    """It is stable where all of them chatter."""
+    """It is stable where most of them chatter."""
 
 
 @dataclass(frozen=True)
 class ContradictingCut:
-    """A cut that is left out."""
+    """A cut whose word is not believed, or whose frequency is of no mode."""
 
     cut: CutEvidence
     """The cut."""
     why: Contradiction
-    """Contradiction for which it is left out."""
+    """Contradiction for which it is not believed."""
+    wrong: float = 0.0
+    """Chance that its word is wrong."""
 
 
-def contradiction(evidence: NewEvidence) -> Contradiction | None:
-    """Whether a cut contradicts what was learnt from others; None where it may be chance."""
+def contradiction(evidence: NewEvidence) -> ContradictingCut | None:
+    """What is wrong with a cut under spindles that explain all; None where nothing is."""
     cut, prediction, weights = evidence.cut, evidence.prediction, evidence.before.weights
-    chatters = float(np.sum(weights * prediction.chance))
-    if (chatters if cut.chatters else 1 - chatters) < CHANCE:
-        return Contradiction.CHATTERS if cut.chatters else Contradiction.STABLE
-    if not np.isfinite(cut.frequency) or not cut.chatters:
+    wrong = float(np.sum(weights * misheard(cut, prediction)))
+    if np.isfinite(cut.frequency) and cut.chatters:
+        near = np.any(prediction.distances(cut) < AWAY * FREQUENCY * cut.frequency, axis=0)
+        others = weights * np.exp(-cut.weight * log_likelihood(cut, prediction))
+        if np.sum(others * near) < NONE * np.sum(others):
+            return ContradictingCut(cut, Contradiction.FREQUENCY, wrong)
+    if wrong <= WRONG:
         return None
-    near = np.any(prediction.distances(cut) < AWAY * FREQUENCY * cut.frequency, axis=0)
-    return Contradiction.FREQUENCY if np.sum(weights * near) < NONE else None
+    return ContradictingCut(cut, Contradiction.CHATTERS if cut.chatters else Contradiction.STABLE, wrong)
 
 
-def learn_from_consistent(
-    start: Posterior, cuts: Sequence[CutEvidence]
-) -> tuple[Posterior, tuple[ContradictingCut, ...]]:
-    """Learn from those cuts that do not contradict what was learnt before them; and the others.
-
-    A cut that contradicts those before it is asked again once all others are learnt.
-    """
-    learnt, doubtful = start, list[CutEvidence]()
-    for cut in cuts:
-        evidence = learnt.predict(cut)
-        if contradiction(evidence) is None:
-            learnt = evidence.learn()
-        else:
-            doubtful.append(cut)
-    contradicting = list[ContradictingCut]()
-    for cut in doubtful:
-        evidence = learnt.predict(cut)
-        why = contradiction(evidence)
-        learnt = evidence.learn() if why is None else learnt
-        contradicting += [] if why is None else [ContradictingCut(cut, why)]
-    return learnt, tuple(contradicting)
+def contradictions(learnt: Posterior) -> tuple[ContradictingCut, ...]:
+    """Cuts that are not believed, of those that were learnt from: each counts as its chance to be right says."""
+    few = learnt.drawn(DRAWS)
+    doubted = (contradiction(few.predict(cut)) for cut in learnt.cuts)
+    return tuple(doubt for doubt in doubted if doubt is not None)
 
 
 def contradiction_remarks(learnt: Posterior, contradicting: Sequence[ContradictingCut], about: str) -> Iterator[Remark]:
@@ -88,22 +78,23 @@ def contradiction_remarks(learnt: Posterior, contradicting: Sequence[Contradicti
 
 
 def _contradiction_remark(contradicting: ContradictingCut) -> Remark:
-    """Remark on a cut that no spindle explains which explains the others."""
+    """Remark on a cut that is not believed."""
     cut = contradicting.cut
     at = f"at {cut.speed_rpm:.6g} rpm, {1e3 * cut.depth:.4g} mm"
     pitch = f" at {cut.frequency:.0f} Hz" if math.isfinite(cut.frequency) else ""
+    wrong = f"by the other cuts wrong with {100 * contradicting.wrong:.0f} %"
     text, cure = {
         Contradiction.FREQUENCY: (
             f"chatters{pitch} {at}, where no mode is: workpiece or fixture?",
             "tap the workpiece where it is cut",
         ),
         Contradiction.CHATTERS: (
-            f"chatters{pitch} {at}, which no spindle does that explains the others: workpiece, fixture, worn tool?",
-            "cut it again; tap again if it stays",
+            f"chatter{pitch} {at}, {wrong}: a slip, workpiece, fixture, worn tool?",
+            "cut it again, or take it out with lobewatch exclude; tap again if it stays",
         ),
         Contradiction.STABLE: (
-            f"stable {at}, which no spindle is that explains the others: another depth or speed than told?",
+            f"stable {at}, {wrong}: a slip, another depth or speed than told?",
             "cut it again, or take it out with lobewatch exclude",
         ),
     }[contradicting.why]
-    return Remark("cut-unexplained", cut.id, f"{text}; left out", cure)
+    return Remark("cut-unexplained", cut.id, f"{text}; not believed", cure)

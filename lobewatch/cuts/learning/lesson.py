@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lobewatch.cuts.learning.contradicting import ContradictingCut, learn_from_consistent
+from lobewatch.cuts.learning.contradicting import ContradictingCut, contradictions
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.grid import Grid, speeds_between, zero_order_trust
 from lobewatch.cuts.learning.posterior import Posterior, prior
@@ -33,9 +33,19 @@ class Lesson:
     learnt: Posterior
     """Spindle and coefficients as known with the cuts."""
     contradicting: tuple[ContradictingCut, ...]
-    """Cuts that were left out."""
+    """Cuts that are not believed."""
     own_cuts: tuple[CutEvidence, ...]
     """Cuts of this very program, in its material and of its geometry, at whatever speed and depth."""
+
+    @property
+    def doubted(self) -> tuple[CutEvidence, ...]:
+        """Cuts that are not believed."""
+        return tuple(contradiction.cut for contradiction in self.contradicting)
+
+    @property
+    def believed(self) -> tuple[CutEvidence, ...]:
+        """Cuts that are."""
+        return tuple(cut for cut in self.learnt.cuts if cut not in self.doubted)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,19 +69,18 @@ def learn_program(table: ProgramTable, assembly: Assembly, machine: Machine, cut
     """Learn from the cuts of a machine; those of other tools say nothing of this one."""
     evidence = _tool_evidence(cuts, table, assembly, machine)
     start = prior(middle_row(as_program(table, machine), assembly), doubt_of(assembly, table, machine))
-    learnt, contradicting = learn_from_consistent(start, evidence)
+    learnt = start.learn_from_all(evidence)
     shape = geometry(machine.build_cut(table))
     own_cuts = tuple(cut for cut in evidence if cut.material == 0 and geometry(cut.cut) == shape)
-    return Lesson(table, start, learnt, contradicting, own_cuts)
+    return Lesson(table, start, learnt, contradictions(learnt), own_cuts)
 
 
 def next_cut(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[HeardCut], most: int) -> NextCut:
     """The next test cut of a program of which so many shall be made at most."""
     lesson = learn_program(table, assembly, machine, cuts)
     left = max(most - len(lesson.own_cuts), 0)
-    left_out = {contradiction.cut for contradiction in lesson.contradicting}
-    heard = [cut for cut in lesson.own_cuts if cut not in left_out]
-    suggested = suggest(lesson.learnt, grid_of(table, assembly, machine), heard, left) if left else None
+    grid = grid_of(table, assembly, machine)
+    suggested = suggest(lesson.learnt, grid, lesson.own_cuts, left, lesson.doubted) if left else None
     return NextCut(lesson, suggested, left)
 
 

@@ -18,8 +18,8 @@ from lobewatch.verdicts.mean_force import MeanForce, is_constant
 
 EDGE = 0.05
 """Standard deviation of the depth, relative, within which a cut is stable or not; chosen."""
-MISJUDGED = 0.02
-"""Share of cuts that are heard as what they are not; chosen, see docs/cuts.md, How often it is right."""
+MISJUDGED = 0.03
+"""Share of cuts that are written down as what they are not; chosen: 2.7 % are heard wrong, some are typed wrong."""
 FREQUENCY = 0.01
 """Standard deviation of a chatter frequency against the one predicted, relative; chosen, see docs/cuts.md."""
 STRANGE = 0.05
@@ -49,9 +49,14 @@ class CutPrediction(NamedTuple):
     """Whether that is of period two."""
 
     @property
+    def chatters(self) -> Floats:
+        """Chance that it chatters."""
+        return np.asarray(ndtr(self.excess / EDGE))
+
+    @property
     def chance(self) -> Floats:
-        """Chance that it is heard to chatter."""
-        return np.asarray(MISJUDGED + (1 - 2 * MISJUDGED) * ndtr(self.excess / EDGE))
+        """Chance that it is written down as chatter."""
+        return MISJUDGED + (1 - 2 * MISJUDGED) * self.chatters
 
     def distances(self, cut: CutEvidence) -> Floats:
         """Distances of the chatter of a cut from both frequencies (Hz), shape (2, r).
@@ -74,10 +79,23 @@ def predict_cut(cut: CutEvidence, draws: Draws) -> CutPrediction:
 
 
 def log_likelihood(cut: CutEvidence, prediction: CutPrediction) -> Floats:
-    """Logarithm of the likelihood of what was heard, shape (r,)."""
+    """Logarithm of the likelihood of what was written down, shape (r,)."""
+    return np.asarray(np.log(sum(_likelihoods(cut, prediction))))
+
+
+def misheard(cut: CutEvidence, prediction: CutPrediction) -> Floats:
+    """Chance that the word of a cut is wrong, of spindles that are the truth, shape (r,)."""
+    right, wrong = _likelihoods(cut, prediction)
+    return np.asarray(wrong / (right + wrong))
+
+
+def _likelihoods(cut: CutEvidence, prediction: CutPrediction) -> tuple[Floats, Floats]:
+    """Likelihood of what was written down with its word right, and with it wrong; a wrong one sounds anyhow."""
+    chatters = prediction.chatters
     if not cut.chatters:
-        return np.asarray(np.log(1 - prediction.chance))
-    return np.asarray(np.log(prediction.chance) + _log_of_sound(cut, prediction))
+        return (1 - MISJUDGED) * (1 - chatters), MISJUDGED * chatters
+    sound = np.exp(_log_of_sound(cut, prediction))
+    return (1 - MISJUDGED) * chatters * sound, MISJUDGED * (1 - chatters) * (0.5 if cut.has_frequency else 1.0)
 
 
 def most_likely(cut: CutEvidence) -> float:

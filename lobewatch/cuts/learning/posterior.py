@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -84,7 +85,9 @@ class Posterior:
         """Intervals by name (`Draws.ratios`); of natural frequencies they stay open until chatter was heard twice."""
         intervals = {name: _interval(values, self.weights) for name, values in self.draws.ratios().items()}
         if self.frequencies < SETTLED:
-            intervals |= {name: intervals[name].no_narrower(*OPEN) for name in ("frequency_x", "frequency_y")}
+            intervals |= {
+                name: intervals[name].no_narrower(*OPEN) for name in intervals if name.startswith("frequency")
+            }
         return intervals
 
     @property
@@ -95,13 +98,17 @@ class Posterior:
     @property
     def is_far_off(self) -> bool:
         """Whether a natural frequency is more likely than not further from that at rest than 95 % of spindles are."""
-        ratios = self.draws.ratios()
-        beside = [(USUAL[0] < ratios[name]) & (ratios[name] < USUAL[1]) for name in ("frequency_x", "frequency_y")]
+        leading = [values for name, values in self.draws.ratios().items() if name in ("frequency_x", "frequency_y")]
+        beside = [(USUAL[0] < values) & (values < USUAL[1]) for values in leading]
         return self.frequencies >= SETTLED and float(np.sum(self.weights * np.all(beside, axis=0))) < 1 / 2
 
     def learn_from(self, cut: CutEvidence) -> Posterior:
         """What is known after one more cut."""
         return self.predict(cut).learn()
+
+    def learn_from_all(self, cuts: Iterable[CutEvidence]) -> Posterior:
+        """What is known after some more."""
+        return reduce(Posterior.learn_from, cuts, self)
 
     def predict(self, cut: CutEvidence) -> NewEvidence:
         """A cut, and what it would sound like on the spindles that are not ruled out."""
@@ -113,6 +120,10 @@ class Posterior:
     def sample(self, count: int) -> Draws:
         """Draws of equal weight."""
         return self.draws[_spread(self.weights, count, np.random.default_rng((self.seed, 4, len(self.cuts))))]
+
+    def drawn(self, count: int) -> Posterior:
+        """The same by so many draws of equal weight."""
+        return replace(self, draws=self.sample(count), log_weight=np.zeros(count))
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lobewatch.cuts.learning.cut_again import cut_again, is_taken
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 from lobewatch.cuts.learning.grid import Grid, floor_depth
 from lobewatch.cuts.learning.likelihood import predict_cut
@@ -42,6 +43,8 @@ class Suggestion:
     """Expected gain of removal rate, relative to the best heard stable so far; inf where there is none."""
     settles: str
     """Name of what it tells most of (as in `Draws.ratios`)."""
+    repeats: str = ""
+    """Number in the journal of the cut that it makes again, since that is not believed; empty for a new one."""
 
 
 def best_removal_rate(cuts: Sequence[CutEvidence]) -> float:
@@ -49,37 +52,55 @@ def best_removal_rate(cuts: Sequence[CutEvidence]) -> float:
     return max((cut.speed_rpm * cut.depth for cut in cuts if not cut.chatters), default=0.0)
 
 
-def suggest(learnt: Posterior, grid: Grid, cuts: Sequence[CutEvidence], left: int = 1) -> Suggestion | None:
+def suggest(
+    learnt: Posterior,
+    grid: Grid,
+    cuts: Sequence[CutEvidence],
+    left: int = 1,
+    doubted: Collection[CutEvidence] = (),
+) -> Suggestion | None:
     """The next test cut; None where nothing more is to be gained.
 
-    cuts: those of this very program; left: test cuts that are still to be made, this one with them. With more than
-    one a cut is worth what it gains itself and what the best next one is then expected to gain. A diagram by zero order
-    proposes; what is chosen was judged by semi-discretisation.
+    cuts: those of this very program; left: test cuts that are still to be made, this one with them; doubted: cuts that
+    are not believed. One of those is made again, once. Else, with more than one left, a cut is worth what it gains
+    itself and what the best next one is then expected to gain. A diagram by zero order proposes; what is chosen was
+    judged by semi-discretisation.
     """
-    best, draws = best_removal_rate(cuts), learnt.sample(DRAWS)
+    best, draws = best_removal_rate([cut for cut in cuts if cut not in doubted]), learnt.sample(DRAWS)
+    if (again := cut_again(cuts, doubted)) is not None:
+        return replace(_judged(grid, again.speed_rpm, again.depth, best, draws), repeats=again.id)
     chart = LimitCharts.of(draws, grid)
     most = float(np.max(chart.chips))
     least = GAINED * max(best, LEAST_RATE * most)
-    worth = {place: chart.worth(place[0], place[1], best, left) for place in chart.candidates(best)}
+    places = [place for place in chart.candidates(best) if not is_taken(float(grid.speeds[place[0]]), place[1], cuts)]
+    worth = {place: chart.worth(place[0], place[1], best, left) for place in places}
     for row, depth in sorted(worth, key=lambda place: -worth[place]):
         if worth[row, depth] < least:
             return None
-        suggestion = _judge(grid, float(grid.speeds[row]), depth, best, draws)
+        suggestion = _likely_stable(grid, float(grid.speeds[row]), depth, best, draws)
         if suggestion is not None:
             return suggestion
     return None
 
 
-def _judge(grid: Grid, speed: float, depth: float, best: float, draws: Draws) -> Suggestion | None:
+def _likely_stable(grid: Grid, speed: float, depth: float, best: float, draws: Draws) -> Suggestion | None:
     """The cut, or one not as deep where it is more likely to chatter than not."""
     for share in (1.0,) if is_constant(grid.cut) else NEARBY:
         deep = floor_depth(share * depth)
-        chance = predict_cut(grid.evidence(speed, deep), draws).chance
-        if deep > 0 and np.mean(chance) < 1 - LIKELY:
-            gain = float(1 - np.mean(chance)) * (speed * deep - best)
-            settles = _settles(draws.ratios(), chance)
-            return Suggestion(speed, deep, float(np.mean(chance)), gain / best if best else np.inf, settles)
+        if deep > 0:
+            suggestion = _judged(grid, speed, deep, best, draws)
+            if suggestion.chance < 1 - LIKELY:
+                return suggestion
     return None
+
+
+def _judged(grid: Grid, speed: float, depth: float, best: float, draws: Draws) -> Suggestion:
+    """A cut with what it promises."""
+    prediction = predict_cut(grid.evidence(speed, depth), draws)
+    chance = float(np.mean(prediction.chatters))
+    gain = (1 - chance) * (speed * depth - best)
+    settles = _settles(draws.ratios(), prediction.chance)
+    return Suggestion(speed, depth, chance, gain / best if best else np.inf, settles)
 
 
 def _settles(ratios: Mapping[str, Floats], chance: Floats) -> str:

@@ -16,7 +16,7 @@ from lobewatch.cuts.learning.lesson import Lesson, NextCut
 from lobewatch.cuts.learning.posterior import Interval
 from lobewatch.cuts.learning.suggest import Suggestion
 from lobewatch.show.programs.describe_advice import rpm
-from lobewatch.show.programs.describe_doubts import NAMES
+from lobewatch.show.programs.describe_doubts import term
 from lobewatch.show.terminal.output import table
 
 
@@ -40,6 +40,7 @@ def _cut_json(cut: Suggestion) -> dict[str, Any]:
         "chance_of_chatter": cut.chance,
         "expected_gain": cut.gain,
         "settles": cut.settles,
+        "repeats": cut.repeats or None,
     }
 
 
@@ -52,7 +53,7 @@ def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
         depth = f"{1e3 * cut.depth:.4g}"
         yield (
             f"{name}: test cut {n_made + 1} of {n_made + next_cut.left}: {rpm(cut.speed_rpm)} rpm, {depth} mm, "
-            f"chance of chatter {round(100 * cut.chance)} %; it tells most of {NAMES[cut.settles]}"
+            f"chance of chatter {round(100 * cut.chance)} %; {_why(cut)}"
         )
         observe = shlex.join(["lobewatch", "observe", str(folder), "--program", name])
         yield f"then: {observe} --speed {cut.speed_rpm:g} --depth {depth} --stable (or --chatter --frequency HZ)"
@@ -63,6 +64,12 @@ def suggestion_lines(next_cut: NextCut, folder: Path) -> Iterator[str]:
     yield "a test cut is no advice: lobewatch check says what may be run"
 
 
+def _why(cut: Suggestion) -> str:
+    if cut.repeats:
+        return f"{cut.repeats} once more, since it is not believed"
+    return f"it tells most of {term(cut.settles)}"
+
+
 def _why_none(next_cut: NextCut) -> str:
     if not next_cut.left:
         return f"{len(next_cut.lesson.own_cuts)} test cuts are made; a larger --cuts asks for more"
@@ -71,7 +78,9 @@ def _why_none(next_cut: NextCut) -> str:
 
 def _best(next_cut: NextCut) -> tuple[float, float] | None:
     """Speed (rpm) and depth (m) of most chips that were heard stable; None where none was."""
-    stable = [(cut.speed_rpm, cut.depth) for cut in next_cut.lesson.own_cuts if not cut.chatters]
+    lesson = next_cut.lesson
+    believed = [cut for cut in lesson.own_cuts if cut not in lesson.doubted]
+    stable = [(cut.speed_rpm, cut.depth) for cut in believed if not cut.chatters]
     return max(stable, key=lambda setting: setting[0] * setting[1], default=None)
 
 
@@ -79,11 +88,11 @@ def learnt_json(lesson: Lesson) -> dict[str, Any]:
     """Factors on what was tapped at rest (Kt, Kr/Kt: on what machine.toml says), with and without the cuts."""
     before, now = lesson.before.intervals, lesson.learnt.intervals
     return {
-        "cuts": [cut.id for cut in lesson.learnt.cuts],
+        "cuts": [cut.id for cut in lesson.believed],
         "chatter_frequencies": lesson.learnt.frequencies,
         "frequency_learnt": lesson.learnt.frequencies > 0,
         "effective_sample_size": lesson.learnt.size,
-        "factors": {name: _interval_json(now[name]) | {"before": _interval_json(before[name])} for name in NAMES},
+        "factors": {name: _interval_json(now[name]) | {"before": _interval_json(before[name])} for name in now},
     }
 
 
@@ -93,7 +102,7 @@ def _interval_json(interval: Interval) -> dict[str, float]:
 
 def learnt_texts(lesson: Lesson) -> list[str | Table]:
     """What the cuts have taught; nothing where there are none."""
-    count = len(lesson.learnt.cuts)
+    count = len(lesson.believed)
     return [f"learnt from {count} cut{'s' if count > 1 else ''}:", learnt_table(lesson)] if count else []
 
 
@@ -101,9 +110,9 @@ def learnt_table(lesson: Lesson) -> Table:
     """Factors, a line each: before the cuts, and now."""
     rows = table("~at speed, over at rest", "before (95 %)", "learnt (95 %)")
     before, now = lesson.before.intervals, lesson.learnt.intervals
-    for name, term in NAMES.items():
+    for name in now:
         is_open = name.startswith("frequency") and not lesson.learnt.frequencies
-        rows.add_row(term, _text(before[name]), "not learnt" if is_open else _text(now[name]))
+        rows.add_row(term(name), _text(before[name]), "not learnt" if is_open else _text(now[name]))
     return rows
 
 
@@ -114,6 +123,6 @@ def _text(interval: Interval) -> str:
 def lesson_remarks(lesson: Lesson) -> Iterator[Remark]:
     """What was left out, and what the cuts say nothing of."""
     yield from contradiction_remarks(lesson.learnt, lesson.contradicting, lesson.program.name)
-    if lesson.learnt.cuts and not lesson.learnt.frequencies:
+    if lesson.believed and not lesson.learnt.frequencies:
         text = "f not learnt: no chatter frequency was heard yet"
         yield Remark("frequency-not-learnt", lesson.program.name, text, "tell what the next chatter sounds at")

@@ -37,9 +37,17 @@ NAMES = {
     "stiffness_x": "K in x",
     "stiffness_y": "K in y",
 }
-"""Terms of what test cuts teach, by the name of the factor."""
+"""Terms of what test cuts teach, by the name of the factor; further modes of a direction: `term`."""
 
 Floats = NDArray[np.float64]
+
+
+def term(name: str) -> str:
+    """Term of a factor: "frequency_x_2" is that of the second mode in x."""
+    if name in NAMES:
+        return NAMES[name]
+    leading, place = name.rsplit("_", 1)
+    return f"{NAMES[leading]}, mode {place}"
 
 
 def doubt_json(verdict: Verdict) -> dict[str, Any] | None:
@@ -110,9 +118,9 @@ def _parts(verdict: Verdict, doubt: Doubt, assembly: Assembly, machine: Machine)
 def _learnt(at_speed: SpindleAtSpeed, speed: float) -> Iterator[str]:
     """Intervals before and after the cuts; speed: half-width of the spindle speed, relative."""
     cuts = _cuts(at_speed)
-    for name in ("Kt", "Kr/Kt", "f_n in x", "f_n in y"):
-        key = next(key for key, term in NAMES.items() if term == name)
+    for key in ("tangential", "ratio", *(name for name in at_speed.before if name.startswith("frequency"))):
         before, after = (f"{span.low:.2f}..{span.high:.2f}" for span in (at_speed.before[key], at_speed.after[key]))
+        name = term(key)
         yield f"{name} x {after}, {before} before the {cuts}" if name == "Kt" else f"{name} x {after} ({before})"
     yield f"speed {_half(speed)}"
 

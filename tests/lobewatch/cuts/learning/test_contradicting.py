@@ -13,10 +13,10 @@ from lobewatch.cuts.learning.contradicting import (
     Contradiction,
     contradiction,
     contradiction_remarks,
-    learn_from_consistent,
+    contradictions,
 )
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.likelihood import CutPrediction
+from lobewatch.cuts.learning.likelihood import CutPrediction, log_likelihood
 from lobewatch.cuts.learning.posterior import NewEvidence
 from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
 
@@ -34,43 +34,53 @@ def evidence(cut: CutEvidence, share: float, base: float = 150.0) -> NewEvidence
     return NewEvidence(before, cut, prediction)
 
 
-@pytest.mark.parametrize(("chance", "is_odd"), [(0.029, True), (0.031, False)])
-def test_a_cut_contradicts_where_all_else_gives_it_less_than_3_percent(chance: float, is_odd: bool) -> None:
-    share = (chance - 0.02) / 0.96
+@pytest.mark.parametrize(("share", "is_odd"), [(0.029, True), (0.031, False)])
+def test_a_cut_is_not_believed_where_all_else_gives_it_less_than_it_is_to_be_wrong(share: float, is_odd: bool) -> None:
+    """Of weights that have learnt from the cut: 3 % of the weight before make half of that after."""
     without = replace(CHATTER, frequency=math.nan)
-    chatters, stable = contradiction(evidence(without, share)), contradiction(evidence(STABLE, 1 - share))
-    assert (chatters, stable) == ((Contradiction.CHATTERS, Contradiction.STABLE) if is_odd else (None, None))
+    after = share * 0.97 / (share * 0.97 + (1 - share) * 0.03)
+    chatters, stable = contradiction(evidence(without, after)), contradiction(evidence(STABLE, 1 - after))
+    assert (chatters is not None, stable is not None) == (is_odd, is_odd)
+    if is_odd:
+        assert chatters == ContradictingCut(without, Contradiction.CHATTERS, pytest.approx(1 - after))
+        assert stable == ContradictingCut(STABLE, Contradiction.STABLE, pytest.approx(1 - after))
 
 
 @pytest.mark.parametrize(("off", "is_odd"), [(69.0, False), (71.0, True)])
 def test_chatter_contradicts_where_its_frequency_is_four_standard_deviations_from_all(off: float, is_odd: bool) -> None:
     """Standard deviation: 1 % of 1750 Hz."""
     told = contradiction(evidence(CHATTER, 0.999, 150.0 + off))
-    assert told is (Contradiction.FREQUENCY if is_odd else None)
+    assert (told and told.why) is (Contradiction.FREQUENCY if is_odd else None)
     assert contradiction(evidence(replace(CHATTER, frequency=math.nan), 0.999, 150.0 + off)) is None
 
 
 @pytest.mark.parametrize(("share", "is_odd"), [(0.004, True), (0.006, False)])
-def test_chatter_of_half_a_percent_of_the_weight_is_explained(share: float, is_odd: bool) -> None:
+def test_chatter_of_half_a_percent_of_the_weight_by_the_others_is_explained(share: float, is_odd: bool) -> None:
     found = evidence(CHATTER, share)
-    chatters = replace(found, prediction=found.prediction._replace(excess=np.array([5.0, 5.0])))
-    assert contradiction(chatters) is (Contradiction.FREQUENCY if is_odd else None)
+    prediction = found.prediction._replace(excess=np.array([5.0, 5.0]))
+    learnt = np.log([share, 1 - share]) + log_likelihood(CHATTER, prediction)
+    learnt = replace(found.before, log_weight=learnt)
+    chatters = replace(found, before=learnt, prediction=prediction)
+    odd = contradiction(chatters)
+    assert (odd and odd.why) is (Contradiction.FREQUENCY if is_odd else None)
 
 
-def test_a_cut_that_contradicts_those_before_it_is_learnt_from_where_those_after_explain_it(mill: Mill) -> None:
+def test_a_cut_that_contradicts_those_before_it_is_believed_where_those_after_explain_it(mill: Mill) -> None:
     stable = CutEvidence(mill.cut, 12000, 1.6e-3, "stable")
-    shallow, deep = (CutEvidence(mill.cut, 12000, depth, "chatter") for depth in (1.1e-3, 1.65e-3))
-    learnt, left_out = learn_from_consistent(mill.prior, [stable, shallow])
-    assert (learnt.cuts, left_out) == ((stable,), (ContradictingCut(shallow, Contradiction.CHATTERS),))
-    learnt, left_out = learn_from_consistent(mill.prior, [stable, shallow, deep])
-    assert (learnt.cuts, left_out) == ((stable, deep, shallow), ())
+    shallow, deep = (CutEvidence(mill.cut, 12000, depth, "chatter") for depth in (0.9e-3, 1.65e-3))
+    (odd,) = contradictions(mill.prior.learn_from_all([stable, replace(stable, depth=1.7e-3), shallow]))
+    assert (odd.cut, odd.why) == (shallow, Contradiction.CHATTERS)
+    assert odd.wrong > 0.9
+    again = [stable, shallow, deep, replace(shallow, depth=0.95e-3), replace(shallow, speed_rpm=12100)]
+    (odd,) = contradictions(mill.prior.learn_from_all(again))
+    assert (odd.cut, odd.why) == (stable, Contradiction.STABLE)
 
 
 def test_each_contradiction_is_said_with_its_cause(mill: Mill) -> None:
     odd = [
         ContradictingCut(CHATTER, Contradiction.FREQUENCY),
-        ContradictingCut(replace(CHATTER, frequency=math.nan), Contradiction.CHATTERS),
-        ContradictingCut(STABLE, Contradiction.STABLE),
+        ContradictingCut(replace(CHATTER, frequency=math.nan), Contradiction.CHATTERS, 0.871),
+        ContradictingCut(STABLE, Contradiction.STABLE, 0.6),
     ]
     remarks = list(contradiction_remarks(mill.prior, odd, "A"))
     assert [(remark.code, remark.about) for remark in remarks] == [
@@ -78,5 +88,5 @@ def test_each_contradiction_is_said_with_its_cause(mill: Mill) -> None:
     ]  # fmt: skip
     texts = [str(remark) for remark in remarks]
     assert "chatters at 1750 Hz at 12000 rpm, 3 mm, where no mode is" in texts[0]
-    assert "chatters at 12000 rpm, 3 mm, which no spindle does" in texts[1]
-    assert "stable at 12000 rpm, 3 mm, which no spindle is" in texts[2]
+    assert "chatter at 12000 rpm, 3 mm, by the other cuts wrong with 87 %" in texts[1]
+    assert "stable at 12000 rpm, 3 mm, by the other cuts wrong with 60 %" in texts[2]

@@ -110,7 +110,7 @@ def test_no_more_than_eight_speeds_are_looked_at() -> None:
 def test_a_chart_is_that_of_zero_order_corrected_and_as_deep_as_is_allowed(mill: Mill) -> None:
     draws = mill.prior.draws[:3]
     draws.normal[:] = 0.0
-    draws.normal[1, [0, 3]] = 1.5
+    draws.normal[1, :2] = 1.5
     speeds = np.array([6000.0, 8000.0, 12000.0, 16000.0])
     deepest, trust = np.array([0.02, 0.02, 0.02, 0.0013]), np.array([1.0, 0.7, 1.3, 1.0])
     grid = Grid(mill.cut, (0.0, np.pi / 2), speeds, deepest, trust)
@@ -125,7 +125,8 @@ def test_a_chart_is_that_of_zero_order_corrected_and_as_deep_as_is_allowed(mill:
             )
             for side, mode in (("x", mill.x), ("y", mill.y))
         )
-        pushed = replace(mill.cut, tangential=1.1 * mill.cut.tangential, radial=1.1 * mill.cut.radial)
+        radial = 1.1 * ratios["ratio"][number] * mill.cut.radial
+        pushed = replace(mill.cut, tangential=1.1 * mill.cut.tangential, radial=radial)
         lobes = [zero_order([x], [y], replace(pushed, feed_angle=angle), speeds) for angle in grid.feed_angles]
         limit = np.minimum(np.min([part.depth for part in lobes], axis=0) * trust, deepest)
         assert chart.limits[number] == pytest.approx(limit, rel=0.01)

@@ -123,7 +123,7 @@ def test_a_gain_below_half_a_percent_of_the_best_so_far_is_none(mill: Mill) -> N
         suggestion = suggest(mill.prior, grid, [best], 1)
         assert (suggestion is not None) is is_worth
         if suggestion is not None:
-            assert suggestion.gain == pytest.approx(0.98 * gain, rel=1e-3)
+            assert suggestion.gain == pytest.approx(gain, rel=1e-3)
 
 
 def test_a_cut_settles_what_its_outcome_depends_on_most() -> None:
@@ -133,9 +133,9 @@ def test_a_cut_settles_what_its_outcome_depends_on_most() -> None:
     suggestion = suggest(plain.prior, grid, (), 1)
     assert suggestion is not None
     assert suggestion.settles == "tangential"
-    steep = Mill(x=Mode(1400.0, 0.003, 2.5e7), y=Mode(1400.0, 0.003, 2.5e7))
+    steep = Mill(x=Mode(1400.0, 0.001, 2.5e7), y=Mode(1400.0, 0.001, 2.5e7))
     settled = set()
-    for speed in np.arange(19000.0, 22000.0, 500.0):
+    for speed in (19800.0, 20600.0, 21000.0):
         grid = replace(steep.grid, speeds=np.array([speed]), deepest=np.array([0.012]), trust=np.ones(1))
         suggestion = suggest(steep.prior, grid, (), 1)
         settled |= {suggestion.settles} if suggestion else set()

@@ -1,0 +1,58 @@
+"""Which places test cuts have taken, and which cut is asked for once more."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lobewatch.cuts.learning.cut_again import cut_again, is_taken
+from lobewatch.cuts.learning.cut_evidence import CutEvidence
+from lobewatch.cuts.learning.suggest import suggest
+from tests.lobewatch.cuts.learning.conftest import SLOT, Mill
+
+CHATTER = CutEvidence(SLOT, 9000, 12.2e-3, "chatter", 700.0, id="c2")
+STABLE = replace(CHATTER, word="stable", frequency=math.nan, id="c3")
+
+
+@pytest.mark.parametrize(("speed", "depth", "taken"), [
+    (9000, 12.1e-3, True), (9000, 20e-3, True), (9080, 12.2e-3, True), (8920, 11.2e-3, True),
+    (9000, 10.9e-3, False), (9100, 12.2e-3, False), (8900, 20e-3, False),
+])  # fmt: skip
+def test_chatter_takes_its_place_a_tenth_above_it_and_all_below(speed: float, depth: float, taken: bool) -> None:
+    assert is_taken(speed, depth, [CHATTER]) is taken
+    assert not is_taken(speed, depth, [STABLE])
+
+
+def test_a_place_is_free_again_where_the_same_cut_was_stable_later_and_not_before() -> None:
+    assert not is_taken(9000, 12.1e-3, [CHATTER, STABLE])
+    assert is_taken(9000, 12.1e-3, [STABLE, CHATTER])
+    assert is_taken(9000, 12.1e-3, [CHATTER, replace(STABLE, depth=11e-3)])
+
+
+def test_a_cut_that_is_not_believed_is_asked_for_once_and_never_a_third_time() -> None:
+    other = replace(STABLE, speed_rpm=12000.0, id="c1")
+    assert cut_again([other, CHATTER], [CHATTER]) is CHATTER
+    assert cut_again([other, CHATTER], []) is None
+    for second in (STABLE, replace(CHATTER, id="c3")):
+        assert cut_again([other, CHATTER, second], [CHATTER, second]) is None
+    assert cut_again([CHATTER, replace(CHATTER, depth=11e-3)], [CHATTER]) is CHATTER
+
+
+def test_the_cut_suggested_is_the_one_that_is_not_believed_then_never_where_it_chattered(mill: Mill) -> None:
+    """Chatter far below all that is stable, twice: no cut there or hardly shallower, whatever the others say."""
+    speed = float(mill.grid.speeds[np.argmin(np.abs(mill.grid.speeds - 18000))])
+    cuts = [CutEvidence(mill.cut, speed, depth, "stable", id=f"c{k}") for k, depth in enumerate((2e-3, 2.5e-3))]
+    odd = CutEvidence(mill.cut, speed, 1e-3, "chatter", id="c2")
+    learnt = mill.prior.learn_from_all([*cuts, odd])
+    again = suggest(learnt, mill.grid, [*cuts, odd], 2, [odd])
+    assert again is not None
+    assert (again.speed_rpm, again.depth, again.repeats) == (speed, 1e-3, "c2")
+    assert again.chance < 0.1
+    twice = [*cuts, odd, replace(odd, id="c3")]
+    following = suggest(learnt, mill.grid, twice, 2, [odd, twice[-1]])
+    assert following is not None
+    assert following.repeats == ""
+    assert abs(math.log(following.speed_rpm / speed)) >= 0.01

@@ -165,14 +165,21 @@ def slot_limits(x: Modes, y: Modes, tangential: float, radial: float, speeds: Fl
     """
     frequencies = [mode[0] for mode in (*x, *y)]
     f = np.linspace(0.6 * min(frequencies), 1.6 * max(frequencies), 12000)
-    gx, gy = (sum(1 / (k * (1 - (f / own) ** 2 + 2j * zeta * f / own)) for own, zeta, k in modes) for modes in (x, y))
-    half, product = TEETH / 4 * radial * (gx + gy) / 2, (TEETH / 4) ** 2 * (radial**2 + tangential**2) * gx * gy
+    gx, gy = _receptance(f, x), _receptance(f, y)
+    half = TEETH / 4 * radial * (gx + gy) / 2
+    product = (TEETH / 4) ** 2 * (radial**2 + tangential**2) * gx * gy
     root = np.sqrt(half**2 - product)
     root[1:] *= np.cumprod(np.where(np.real(root[1:] * np.conj(root[:-1])) < 0, -1.0, 1.0))
     limits = np.full(speeds.shape, np.inf)
     for speed, depth in _lobes(f, (half + root, half - root), float(speeds[0])):
         np.minimum(limits, _lowest(speed, depth, speeds), out=limits)
     return limits
+
+
+def _receptance(f: Floats, modes: Modes) -> NDArray[np.complex128]:
+    """Displacement at the tip by a force (m/N) at frequencies (Hz)."""
+    own, zeta, k = np.array(modes).T[..., np.newaxis]
+    return np.asarray(np.sum(1 / (k * (1 - (f / own) ** 2 + 2j * zeta * f / own)), axis=0))
 
 
 def _lobes(f: Floats, loops: Sequence[NDArray[np.complex128]], slowest: float) -> Iterator[tuple[Floats, Floats]]:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from acquisition import Frf
-from modal.bands.extraction import Extraction
+from modal.bands.extraction import Extraction, FittedBand
 from modal.bands.find_resonances import Resonance, find_resonances, resonances_beside
 from modal.bands.fit_peaks import fit_peaks, fit_real
 from modal.bands.line_weights import line_weights
-from modal.bands.local_bands import local_bands
+from modal.bands.local_bands import LocalBand, local_bands
 from modal.bands.look_closer import look_closer
 from modal.bands.noise_by_height import weights_by_residual
 from modal.bands.one_thread import one_thread
@@ -46,25 +46,29 @@ def _extract(lines: tuple[Frf, ...]) -> Extraction:
     peaks = _common([find_resonances(frf) for frf in lines])
     state = settle(_fitted(empty, peaks))
     beside = _beside(state, peaks)
-    state = state if len(beside) == len(peaks) else settle(_fitted(empty, beside))
+    state = state if len(beside) == len(peaks) else settle(_fitted(state, beside))
     closer = tuple(look_closer(band) for band in state.bands)
     if any(new is not old for new, old in zip(closer, state.bands, strict=True)):
         state = settle(replace(state, bands=closer))
     stray = _stray_lines(state)
     if np.any(stray):
-        state = settle(replace(state, weight=np.where(stray, 0.0, state.weight)), everything=True)
+        state = settle(replace(state, weight=np.where(stray, 0.0, state.weight)))
     state = _reweighted(state)
     return replace(state, bands=tuple(fit_real(band) for band in state.bands))
 
 
 def _reweighted(state: Extraction) -> Extraction:
-    """All bands fitted with the weights that what they leave asks for, until those stay about as they are."""
+    """Bands fitted with the weights that what they leave asks for, until those stay about as they are."""
     given = state.weight
     for _ in range(ROUNDS):
         weight = weights_by_residual(state, given)
-        if np.all(np.abs(weight - state.weight) <= SAME_WEIGHT * state.weight):
+        for band in state.bands:
+            before = state.weight[:, band.lines]
+            if np.all(np.abs(weight[:, band.lines] - before) <= SAME_WEIGHT * before):
+                weight[:, band.lines] = before
+        if np.array_equal(weight, state.weight):
             break
-        state = settle(replace(state, weight=weight), everything=True)
+        state = settle(replace(state, weight=weight))
     return state
 
 
@@ -88,13 +92,24 @@ def _common(found: Sequence[list[Resonance]]) -> list[Resonance]:
     return sorted(common, key=lambda r: r.frequency)
 
 
-def _fitted(empty: Extraction, resonances: list[Resonance]) -> Extraction:
-    """A first fit of every band around these, the highest first, each without the tails of those before."""
-    state = empty
-    for local in sorted(local_bands(resonances, empty.frf.frequency), key=lambda local: -local.height):
-        band = fit_peaks(state.data(local.lines), local.resonances)
-        state = state if band is None else replace(state, bands=(*state.bands, band))
+def _fitted(before: Extraction, resonances: list[Resonance]) -> Extraction:
+    """A first fit of every band around these, the highest first, each without the tails of those before.
+
+    A band that was there before as it is now keeps its fit.
+    """
+    wanted = sorted(local_bands(resonances, before.frf.frequency), key=lambda local: -local.height)
+    kept = [band for band in before.bands if any(_is_of(band, local) for local in wanted)]
+    state = replace(before, bands=tuple(kept))
+    for local in wanted:
+        if not any(_is_of(band, local) for band in kept):
+            band = fit_peaks(state.data(local.lines), local.resonances)
+            state = state if band is None else replace(state, bands=(*state.bands, band))
     return replace(state, bands=tuple(sorted(state.bands, key=lambda band: band.lines.start)))
+
+
+def _is_of(band: FittedBand, local: LocalBand) -> bool:
+    """Whether a band was laid around these peaks on these lines."""
+    return (band.resonances, band.lines) == (local.resonances, local.lines)
 
 
 def _beside(state: Extraction, known: list[Resonance]) -> list[Resonance]:

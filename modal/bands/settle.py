@@ -6,31 +6,38 @@ from dataclasses import replace
 
 import numpy as np
 
-from modal.bands.extraction import Extraction, FittedBand
+from modal.bands.extraction import BandLines, Extraction, FittedBand
 from modal.bands.fit_peaks import fit_again
+from modal.fitting import beyond_terms
 
 SWEEPS = 4
 """Most rounds over the bands, each with the tails of the other bands' modes as they are then."""
 SETTLED = 0.01
-"""Change of those tails, as a share of what the fit leaves, that is not worth another fit."""
+"""Change of those tails beyond the residual terms, as a share of what the fit leaves, that is not worth another fit."""
 
 
-def settle(state: Extraction, everything: bool = False) -> Extraction:
-    """Bands fitted again until the tails of the others' modes stay as they are; everything: each one at least once."""
-    for sweep in range(SWEEPS):
+def settle(state: Extraction) -> Extraction:
+    """Bands fitted again, where their weights are others, and until the tails of the others' modes stay as they are."""
+    for _ in range(SWEEPS):
         before = state.bands
         for band in before:
-            state = _with(state, band, _again(state, band, everything and sweep == 0))
+            state = _with(state, band, _again(state, band))
         if all(new is old for new, old in zip(state.bands, before, strict=False)):
             break
     return state
 
 
-def _again(state: Extraction, band: FittedBand, anyway: bool) -> FittedBand | None:
+def _again(state: Extraction, band: FittedBand) -> FittedBand | None:
     """A band fitted to what the modes of all others leave now; the same where that has not changed."""
     data = state.data(band.lines, without=band)
-    change = np.linalg.norm((data.own - band.data.own) * data.weight)
-    return fit_again(band, data) if anyway or change**2 >= SETTLED**2 * band.fit.sum_of_squares else band
+    is_settled = _change(band, data) < SETTLED * np.sqrt(band.fit.sum_of_squares)
+    return band if is_settled and np.array_equal(data.weight, band.data.weight) else fit_again(band, data)
+
+
+def _change(band: FittedBand, data: BandLines) -> float:
+    """Change (norm) of the weighted data of a band that its residual terms do not take up."""
+    off = data.own - band.data.own
+    return float(np.linalg.norm(beyond_terms(data.frequency, off, data.weight, band.terms)))
 
 
 def _with(state: Extraction, old: FittedBand, new: FittedBand | None) -> Extraction:

@@ -2,6 +2,16 @@
 
 from modal.fitting.band_fit import BandFit
 from modal.fitting.fit_band import fit_band, values_nearby, with_real_constants
+from modal.fitting.projected_band import beyond_terms
 from modal.fitting.residual_terms import LEAST_TERMS, MOST_TERMS, gain_of_a_term
 
-__all__ = ["LEAST_TERMS", "MOST_TERMS", "BandFit", "fit_band", "gain_of_a_term", "values_nearby", "with_real_constants"]
+__all__ = [
+    "LEAST_TERMS",
+    "MOST_TERMS",
+    "BandFit",
+    "beyond_terms",
+    "fit_band",
+    "gain_of_a_term",
+    "values_nearby",
+    "with_real_constants",
+]

@@ -8,8 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
+from modal.fitting.fit_at_poles import Array, ComplexArray, FitAtPoles
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +27,8 @@ class BandFit:
     """Modal constants A (m/N), shape (p, m); all of them real where complex ones were not asked for."""
     freedom: int
     """Real values that were fitted less unknowns."""
-    influence: Array
-    """Errors by a change of the weighted FRFs, one Gauss-Newton step with complex constants, (2 m + 2 p m, 2 n p)."""
+    with_phases: FitAtPoles
+    """The fit with complex constants, whose errors are those of the modes."""
     residual: Array
     """Residuals of the weighted FRFs, each its real and then its imaginary part, shape (2 n p,)."""
     unasked: Array
@@ -40,7 +39,12 @@ class BandFit:
     @cached_property
     def covariance(self) -> Array:
         """Of the errors, by what the fit leaves, shape (2 m + 2 p m, 2 m + 2 p m)."""
-        return np.asarray(self.influence @ self.influence.T * (self.sum_of_squares / self.freedom))
+        return self.with_phases.covariance * (self.sum_of_squares / self.freedom)
+
+    @property
+    def influence(self) -> Array:
+        """Errors by a change of the weighted FRFs, one Gauss-Newton step, shape (2 m + 2 p m, 2 n p)."""
+        return self.with_phases.influence
 
     @property
     def standard_error(self) -> Array:

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from modal.fitting.band_fit import Array, BandFit, ComplexArray
-from modal.fitting.projected_band import FitAtPoles, ProjectedBand, projected_band
+from modal.fitting.band_fit import BandFit
+from modal.fitting.fit_at_poles import Array, ComplexArray, FitAtPoles
+from modal.fitting.projected_band import ProjectedBand, projected_band
 from modal.fitting.residual_terms import LEAST_TERMS
 
 AKAIKE = 2.0
@@ -18,12 +19,16 @@ MOST_TRIALS = 60
 """Evaluations of the model; a mode in its own band takes some five."""
 CONVERGED = 1e-13
 """Step (share of the half-power half-width) after which there is nothing left to gain."""
+FIRST_DAMPING = 1e-3
+"""Damping of the first step, over the diagonal of the scaled normal matrix."""
+FELT = 0.1
+"""Damping after a step that led nowhere, at least; less hardly changes the step."""
+KEPT, BROKEN = 0.75, 0.25
+"""Share of the promised fall from which the damping falls, and below which it rises."""
 NEAR_TRIALS = 5
 """Evaluations of the model after which the values of much the same fit are taken as they are."""
 GAINED = 1e-3
 """Fall of the sum of squares, against that by chance of one unknown, not worth a step: a thirtieth of an error."""
-LEAST_SINGULAR = 1e-10
-"""Share of the largest singular value below which an unknown cannot be told from the others."""
 
 
 def fit_band(
@@ -52,8 +57,7 @@ def fit_band(
     with np.errstate(all="ignore"), contextlib.suppress(np.linalg.LinAlgError):
         fixed = np.zeros(m, bool) if held is None else held
         state = _solved(projected_band(frequency, receptance, weight, terms, fixed), starts, is_complex=True)
-        influence = None if state is None else _influence(state)
-        return None if state is None or influence is None else _fit_of(state, influence)
+        return None if state is None or not np.all(np.isfinite(state.covariance)) else _fit_of(state, state)
     return None
 
 
@@ -72,7 +76,7 @@ def with_real_constants(fit: BandFit, frequency: Array, receptance: ComplexArray
         state = _solved(band, _poles_of_real(fit), is_complex=False)
         if state is not None and state.cost - fit.sum_of_squares <= allowed:
             across = fit.constant / state.constant
-            return replace(_fit_of(state, fit.influence), unasked=np.angle(across * np.sign(across.real)))
+            return replace(_fit_of(state, fit.with_phases), unasked=np.angle(across * np.sign(across.real)))
     return fit
 
 
@@ -103,13 +107,13 @@ def _poles_of_real(fit: BandFit) -> Array:
     return moved if np.all(moved > 0) and np.all(moved[1] < 1) else fit.poles
 
 
-def _fit_of(state: FitAtPoles, influence: Array) -> BandFit:
+def _fit_of(state: FitAtPoles, with_phases: FitAtPoles) -> BandFit:
     return BandFit(
         state.poles[0],
         state.poles[1],
         state.constant,
         state.freedom,
-        influence,
+        with_phases,
         state.residual,
         np.zeros(state.constant.shape),
         np.array(~state.free[: state.poles.shape[1]]),
@@ -124,51 +128,34 @@ def _solved(band: ProjectedBand, starts: Array, is_complex: bool) -> FitAtPoles 
 
 def _descended(band: ProjectedBand, starts: Array, is_complex: bool, trials: int) -> tuple[FitAtPoles, bool]:
     """Where so many evaluations lead, and whether there is nothing left to gain there."""
-    state, damping = band.at(starts, is_complex), 1e-4
+    state, damping = band.at(starts, is_complex), FIRST_DAMPING
     for _ in range(trials):
         if not np.isfinite(state.cost):
             break
-        step, gain = _step(state, damping)
-        if gain < GAINED * state.cost / state.freedom or np.max(np.abs(step), initial=0.0) < CONVERGED:
+        step, gain, promise = _step(state, damping)
+        size = float(np.max(np.abs(step), initial=0.0))
+        if gain < GAINED * state.cost / state.freedom or size < CONVERGED:
             return state, True
         trial = band.at(state.poles + state.spread(step * state.scale).reshape(2, -1), is_complex)
         if trial.cost < state.cost:
-            state, damping = trial, damping / 10
-        elif damping > 1e8 or np.max(np.abs(step)) < 1e-6:
+            kept = (state.cost - trial.cost) / promise
+            state, damping = trial, damping * (0.1 if kept > KEPT else 1.0 if kept > BROKEN else 4.0)
+        elif damping > 1e8 or size < 1e-6:
             return state, True
         else:
-            damping = max(damping, 1e-6) * 10
+            damping = max(10 * damping, FELT)
     return state, False
 
 
-def _step(state: FitAtPoles, damping: float) -> tuple[Array, float]:
-    """Damped Gauss-Newton step in units of the scale, shape (k,), and the fall of the cost that it promises."""
+def _step(state: FitAtPoles, damping: float) -> tuple[Array, float, float]:
+    """Damped Gauss-Newton step in units of the scale, shape (k,), the squared change of the model that it makes to
+    first order, and the fall of the cost that it promises."""
     jacobian = state.jacobian
     gram = jacobian.T @ jacobian
     norm = np.sqrt(np.diagonal(gram))
     scaled = gram / (norm[:, np.newaxis] * norm)
     scaled.flat[:: norm.size + 1] += damping
-    step = np.linalg.solve(scaled, -(jacobian.T @ state.residual) / norm) / norm
-    return step, float(step @ gram @ step)
-
-
-def _influence(state: FitAtPoles) -> Array | None:
-    """Of the weighted FRFs on the errors of a complex fit; None where an unknown cannot be told from the others."""
-    jacobian = state.jacobian
-    norm = np.linalg.norm(jacobian, axis=0)
-    left, singular, right = np.linalg.svd(jacobian / norm, full_matrices=False)
-    if not np.min(singular, initial=np.inf) > LEAST_SINGULAR * np.max(singular, initial=0.0):
-        return None
-    steps = -(right.T / singular) @ left.T / norm[:, None]
-    on_poles = state.spread(steps)
-    n = jacobian.shape[0] // len(state.frfs)
-    on_constants = np.zeros((len(state.frfs), state.poles.size, jacobian.shape[0]))
-    for i, frf in enumerate(state.frfs):
-        on_constants[i] = -frf.inverse @ (frf.q.T @ frf.slope) @ on_poles
-        on_constants[i, :, i * n : (i + 1) * n] += frf.inverse @ frf.q.T
-    real, imaginary = np.split(on_constants, 2, axis=1)
-    turn = np.exp(-1j * np.angle(state.constant))[:, :, np.newaxis]
-    off = turn * (real + 1j * imaginary)
-    width = jacobian.shape[0]
-    errors = state.spread(steps * state.scale[:, None])
-    return np.concatenate([errors, off.real.reshape(-1, width), off.imag.reshape(-1, width)])
+    gradient = jacobian.T @ state.residual
+    step = np.linalg.solve(scaled, -gradient / norm) / norm
+    gain = float(step @ gram @ step)
+    return step, gain, float(-2 * step @ gradient) - gain

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from modal.fitting.band_fit import Array, BandFit, split
+from modal.fitting.band_fit import BandFit, split
+from modal.fitting.fit_at_poles import Array
 
 POWERS = (-2, 0, 2, 4, 6, 8)
 """Of the frequency, in the order in which residual terms are taken."""

@@ -271,7 +271,8 @@ def test_the_core_is_small_and_needs_nothing_else(
     assert text + data <= CODE_BYTES
     assert data + bss <= RAM_BYTES
     names = subprocess.check_output(["arm-none-eabi-nm", "--undefined-only", core], text=True)
-    assert {name for name in re.findall(r"U (\w+)", names) if not name.startswith("__aeabi_")} == OUTSIDE
+    outside = {name for name in re.findall(r"U (\w+)", names) if not name.startswith("__aeabi_")}
+    assert outside | {"memcpy"} == OUTSIDE  # a compiler may copy by itself
 
 
 @pytest.mark.parametrize("count", [20_000, pytest.param(1_000_000, marks=pytest.mark.long)])

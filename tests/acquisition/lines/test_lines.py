@@ -10,7 +10,7 @@ from itertools import islice
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -95,6 +95,7 @@ def test_without_a_counter_a_broken_line_is_seen_and_a_lost_one_is_not() -> None
         assert sum(block.lost_before for block in take(source, 7000)) == 0
 
 
+@settings(deadline=None)
 @given(
     st.lists(
         st.tuples(st.integers(0, 65535), st.integers(-(2**15), 2**15 - 1), st.integers(-(2**15), 2**15 - 1)), min_size=2
@@ -116,6 +117,7 @@ def _frame(counter: int, *values: int) -> bytes:
     return b"\xaa\xbb" + payload + bytes([sum(payload) % 256])
 
 
+@settings(deadline=None)
 @given(st.binary(max_size=400))
 def test_any_bytes_are_read_without_an_error(noise: bytes) -> None:
     for decoder in (LineDecoder(), SimpleFrameDecoder(FRAME)):

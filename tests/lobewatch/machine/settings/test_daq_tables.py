@@ -123,9 +123,11 @@ def test_what_the_machine_files_show_in_comments_is_right(name: str) -> None:
     assert [channel.build().channel.quantity for channel in daq.channel] == ["force", "acceleration"]
 
 
-def test_the_example_in_the_documentation_is_right() -> None:
+def test_the_examples_in_the_documentation_are_right() -> None:
     page = (Path(__file__).parents[4] / "docs" / "devices.md").read_text("utf-8")
-    (shown,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
-    daq = parse_machine(HEAD + shown).daq
-    assert daq.driver == "dataq"
-    assert [channel.build().channel.full_scale for channel in daq.channel] == [5.0, 5.0]
+    shown = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    channels = shown[0][shown[0].index("[[daq.channel]]") :]
+    for example, driver in zip(shown, ("dataq", "lines", "audio"), strict=True):
+        daq = parse_machine(HEAD + example + ("" if "[[daq.channel]]" in example else channels)).daq
+        assert daq.driver == driver
+        assert [channel.build().channel.full_scale for channel in daq.channel] == [5.0, 5.0]

@@ -6,7 +6,7 @@ import tomllib
 from importlib import resources
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition import DataError
@@ -20,6 +20,7 @@ TEXTS = st.text(st.characters(exclude_categories=["Cs", "Cc"]))
 VALUES = st.one_of(st.booleans(), st.integers(-(2**53), 2**53), st.floats(-1e12, 1e12), TEXTS)
 
 
+@settings(deadline=None)
 @given(st.sampled_from([NEW, EXAMPLE]), st.sampled_from(["tap", "daq", "speed", "drive", "limits"]), VALUES)
 def test_any_value_comes_back_and_other_lines_stay(text: str, table: str, value: Value) -> None:
     edited = edit_text(text, TablePlace(table), {"state": value})

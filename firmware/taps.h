@@ -29,9 +29,9 @@
 #define TAPS_INFO_CLOCK \
   "\",\"adc_bits\":" TAPS_TEXT(TAPS_BITS) ",\"fs_choices\":[" TAPS_TEXT(TAPS_RATES) "],\"clock_ppm\":"
 #define TAPS_INFO_CHANNELS ",\"channels\":["
-#define TAPS_CHANNEL(i, quantity, sensitivity, date, full_scale, skew)                                          \
-  "{\"i\":" #i ",\"quantity\":\"" quantity "\",\"sens_V_per_EU\":" #sensitivity ",\"sens_date\":\"" date "\"," \
-  "\"fs_V\":" #full_scale ",\"gain\":1,\"skew_s\":" #skew "}"
+#define TAPS_CHANNEL(i, quantity, sensitivity, date, full_scale, skew)                                           \
+  "{\"i\":" #i ",\"quantity\":\"" quantity "\",\"sens_V_per_EU\":" TAPS_TEXT(sensitivity) ",\"sens_date\":\"" date \
+  "\",\"fs_V\":" TAPS_TEXT(full_scale) ",\"gain\":1,\"skew_s\":" TAPS_TEXT(skew) "}"
 
 /* Begin: nothing configured, nothing streaming. info: the text of INFO in pieces, ended by NULL; it must stay where it is. */
 void taps_init(const char *const info[]);

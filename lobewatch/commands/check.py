@@ -28,6 +28,10 @@ def check(
     diameter: Annotated[float | None, typer.Option(help="Diameter of the tool, mm.")] = None,
     radial: Annotated[float | None, typer.Option(help="Its radial depth, mm.")] = None,
     direction: Annotated[Literal["up", "down"] | None, typer.Option(help="Up or down milling.")] = None,
+    accept: Annotated[
+        list[str] | None,
+        typer.Option(help="A number of machine.toml that is asked about is right, by its key; may be repeated."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.
@@ -35,6 +39,7 @@ def check(
     By semi-discretisation, over all that is not known: stable, doubtful, not stable or unknown. Says for each that is
     not stable what decides and where to go. f_n left: how far f_n may fall before the program chatters. A cut that is
     no program is judged alike; what is not said of it is taken from the programs of its tool where they agree.
+    A number of machine.toml that is not plausible makes its programs unknown until it is corrected, or accepted.
 
     Examples:
 
@@ -44,6 +49,8 @@ def check(
     """
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.chosen_verdicts import chosen_verdicts
+    from lobewatch.machine import MachineFolder
+    from lobewatch.machine.additions.accept_settings import accept_settings
     from lobewatch.show.programs.describe_advice import ProgramAdvice, advise_program, check_json, check_texts
     from lobewatch.show.programs.describe_verdicts import is_safe
 
@@ -57,6 +64,10 @@ def check(
         "radial_depth_mm": radial,
         "direction": direction,
     }
+    if accept:
+        notes.print(
+            *(f"accepted: {line}\n" for line in accept_settings(MachineFolder(machine), accept)), sep="", end=""
+        )
     logbook = Logbook.open(machine)
     verdicts = chosen_verdicts(logbook, program or (), said)
     begin, slow, programs = monotonic(), False, list[ProgramAdvice]()

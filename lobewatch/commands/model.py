@@ -29,13 +29,18 @@ def model(
       lobewatch model trial --figure model.png
       lobewatch model trial --tool "end mill 16" --modes 6 --json
     """
+    from acquisition import DataError
     from lobewatch.logbook import Logbook, model_picture
+    from lobewatch.machine.settings.setting_questions import guessed_bearings
     from lobewatch.measuring import model_state, model_summary
     from lobewatch.show.spindle.describe_model import model_json, model_texts
     from lobewatch.show.terminal.output import remark_lines
 
     logbook = Logbook.open(machine)
-    state = model_state(logbook.machine, logbook.calibrated, tool)
+    calibrated, guessed = logbook.calibrated, guessed_bearings(logbook.machine)
+    if calibrated is None and guessed is not None:
+        raise DataError(f"{guessed.remark}")
+    state = model_state(logbook.machine, calibrated, tool)
     if figure is not None:
         from lobewatch.show.figures.model_figures import model_figure
         from lobewatch.show.figures.style import save_figure

@@ -12,6 +12,7 @@ import numpy as np
 
 from acquisition import DataError, Remark
 from lobewatch.machine import CutTable, Machine, ProgramTable, drive_limit
+from lobewatch.machine.settings.setting_questions import questions_of_program
 from lobewatch.tool.assembly import ABOUT_DIRECTIONS, Assembly
 from lobewatch.verdicts.draws import DRAWS, ProgramDraws, turning_draws
 from lobewatch.verdicts.judgement import Judgement, weigh
@@ -140,6 +141,9 @@ def judge(
         return _unknown(table, (Remark("no-tap", "", str(tool)),))
     if not tool.directions:
         return _unknown(table, tool.remarks, tool)
+    on_model = tool.predicted or machine.tap.position_mm > 0
+    if asked := questions_of_program(machine, table, on_model):
+        return _unknown(table, tuple(doubted.remark for doubted in asked), tool)
     table = at_speed.taught(table)
     judgement, depth = weigh(table, tool, machine, at_speed), table.depth_mm / 1e3
     middle, word, cause = judgement.middle, _word(table, judgement, tool), ""

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 from acquisition import DataError
 from lobewatch.machine.settings.toml_text import toml_tables
 
-Value = str | bool | int | float | None
+Value = str | bool | int | float | list[str] | None
 """Value of a key; None takes the key out."""
 HEADER = re.compile(r"(# )?\[(\[?)([\w.]+)\]?\][ \t]*(#.*)?$")
 """Line that begins a table, or would if it were no comment."""
-VALUE = r"(?:\"(?:[^\"\\]|\\.)*\"|'[^']*'|\[[^\]]*\]|[^#]*?)"
+VALUE = r"(?:\"(?:[^\"\\]|\\.)*\"|'[^']*'|\[(?:[^\]\"]|\"(?:[^\"\\]|\\.)*\")*\]|[^#]*?)"
 """Value in one line."""
 
 

@@ -22,6 +22,7 @@ from lobewatch.machine.settings.cut_tables import FEED_ANGLES, CutTable, Drive, 
 from lobewatch.machine.settings.daq_tables import Daq
 from lobewatch.machine.settings.doubt_table import DoubtTable
 from lobewatch.machine.settings.notify_table import NotifyTable
+from lobewatch.machine.settings.setting_questions import questions_of_program
 from lobewatch.machine.settings.setup_tables import Identity, Limits, ModeChoice, SpeedRange, TapSetup
 from lobewatch.machine.settings.spindle_tables import (
     SpindleTable,
@@ -193,12 +194,12 @@ class Machine(Table, frozen=True):
     @property
     def program_hashes(self) -> dict[str, str]:
         """SHA-256 of all that decides the word on a program beside `settings_hash`, by its name."""
-        return {
-            program.name: _hash(
-                "four words over the doubt", program, self._pitch_deg(program), self.coefficients(program), self.doubt
-            )
-            for program in self.program
-        }
+        hashes = {}
+        for program in self.program:
+            asked = [doubted.claim for doubted in questions_of_program(self, program, on_model=True)]
+            decides = program, self._pitch_deg(program), self.coefficients(program), self.doubt, asked
+            hashes[program.name] = _hash("four words over the doubt, plausible or asked", *decides)
+        return hashes
 
 
 def _hash(*settings: object) -> str:

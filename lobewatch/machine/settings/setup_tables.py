@@ -16,6 +16,8 @@ class Identity(Table, frozen=True):
 
     name: Annotated[str, Meta(min_length=1)]
     tap_interval_days: Positive = 30.0
+    accepted: tuple[str, ...] = ()
+    """What was asked about numbers of this file, and is right: lines of `lobewatch check --accept`."""
 
 
 class TapSetup(Table, frozen=True):

@@ -18,6 +18,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 from typer.testing import CliRunner, Result
 
 from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
@@ -260,11 +261,13 @@ def test_light_report_and_history_have_one_formula_for_the_fall(path: Path) -> N
 def test_only_the_newest_row_pays_for_its_verdicts(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[Program] = []
 
-    def counting(program: Program, x: Modes, y: Modes, cuts: Sequence[Cut]) -> ProgramLimit:
+    def counting(
+        program: Program, x: Modes, y: Modes, cuts: Sequence[Cut], vectors: ArrayLike | None = None
+    ) -> ProgramLimit:
         asked.append(program)
-        return program_limit(program, x, y, cuts)
+        return program_limit(program, x, y, cuts, vectors)
 
-    monkeypatch.setattr("lobewatch.verdicts.judgement.program_limit", counting)
+    monkeypatch.setattr("lobewatch.verdicts.draws.program_limit", counting)
     for day in range(5):
         tap(path, day, 1713.0 - day)
     tap(path, 4.1, 1690.0, "y")

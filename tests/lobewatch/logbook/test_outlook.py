@@ -224,14 +224,14 @@ def test_the_report_says_until_when_and_draws_the_line(worn: Shop) -> None:
 
 
 def test_a_tool_that_was_never_tapped_holds_as_far_as_is_looked(worn: Shop) -> None:
-    worn.run(("shallow", 12900, 0.02), tool="long end mill")
+    worn.run(("shallow", 12900, 0.05), tool="long end mill")
     assert run("report", worn.path).exit_code == 0
     last = f"not before {date(dates(outlook(worn.logbook).programs['shallow'].doubtful)[3]):%Y-%m}"
     assert f"doubtful {last}" in (worn.path / "report.html").read_text("utf-8")
 
 
 def test_a_program_holds_as_far_as_is_looked_beside_a_tool_that_foretells_nothing(worn: Shop) -> None:
-    worn.run(("shallow", 12900, 0.02))
+    worn.run(("shallow", 12900, 0.05))
     for days in (161.0, 171.0, 181.0):
         worn.tap(days, 1500.0, tool="other")
     found = outlook(worn.logbook)

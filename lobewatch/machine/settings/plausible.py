@@ -1,0 +1,272 @@
+"""Numbers of machine.toml that are asked about: a slip of the keyboard or of a unit rather than a machine.
+
+All ranges are chosen: what shops have, with room beside it, and where that can be had less than a factor of 1000 wide,
+so that a slip of 1000 leaves them. docs/plausible.md says which slips are not seen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from acquisition import Remark
+from lobewatch.machine.settings.cut_tables import CutTable, Drive, MaterialTable, ProgramTable
+from lobewatch.machine.settings.daq_tables import ChannelTable, Daq
+from lobewatch.machine.settings.doubt_table import DoubtTable
+from lobewatch.machine.settings.setup_tables import Identity, Limits, ModeChoice, SpeedRange, TapSetup
+from lobewatch.machine.settings.spindle_tables import (
+    BearingTable,
+    JointTable,
+    MassTable,
+    SegmentTable,
+    SpindleTable,
+    ToolTable,
+)
+from lobewatch.machine.settings.toml_table import Table
+
+Range = tuple[float, float]
+FORCE = (200.0, 6000.0)
+"""Kt (N/mm2)."""
+RATIO = (0.01, 1.2)
+"""Kr/Kt where it is not 0."""
+STICK_OUT = (0.8, 15.0)
+"""Length of a tool out of its holder over its diameter."""
+DEPTH = (0.002, 2.0)
+"""Axial depth over diameter."""
+FLUTE = (0.2, 15.0)
+"""Length of flutes over diameter."""
+RADIAL = (0.005, 1.0)
+"""Radial depth over diameter."""
+CUTTING_SPEED = (3.0, 6000.0)
+"""Speed of the edge (m/min)."""
+GYRATION = (5.0, 500.0)
+"""Radius of gyration of a lumped mass (mm)."""
+RANGES: Mapping[type[Table], Mapping[str, Range]] = {
+    Identity: {"tap_interval_days": (0.5, 400)},
+    TapSetup: {
+        "record_s": (0.01, 9),
+        "pre_trigger_s": (0.001, 0.9),
+        "trigger_n": (0.2, 199),
+        "position_mm": (1, 999),
+        "stick_out_mm": (3, 1000),
+        "drawbar_kn": (0.5, 150),
+        "sensor_mass_g": (0.1, 99),
+        "cable_mass_g": (0.1, 99),
+    },
+    Daq: {"sample_rate_hz": (1000, 999_999), "calibration_interval_months": (1, 120)},
+    ChannelTable: {
+        "range_v": (0.05, 40),
+        "sensitivity_mv_per_n": (0.08, 30),
+        "sensitivity_mv_per_g": (0.8, 799),
+        "gain": (0.2, 199),
+        "skew_us": (0.05, 49),
+    },
+    ModeChoice: {"band_hz": (5, 100_000)},
+    Limits: {"frequency_warn_percent": (0.1, 60), "frequency_alarm_percent": (0.1, 60)},
+    SpeedRange: {"low_rpm": (10, 60_000), "high_rpm": (300, 250_000)},
+    Drive: {"power_kw": (0.1, 99), "torque_nm": (0.05, 5000)},
+    DoubtTable: {
+        "frequency_percent": (0.01, 9),
+        "damping_percent": (0.5, 100),
+        "stiffness_percent": (0.1, 50),
+        "speed_percent": (0.02, 10),
+        "coefficients_percent": (1, 100),
+        "predicted_frequency_percent": (0.1, 50),
+        "predicted_damping_percent": (1, 100),
+        "predicted_stiffness_percent": (0.5, 100),
+        "untapped_frequency_percent": (0.1, 50),
+        "untapped_stiffness_percent": (1, 100),
+    },
+    CutTable: {
+        "teeth": (1, 40),
+        "tool_diameter_mm": (0.3, 299),
+        "helix_deg": (1, 70),
+        "feed_per_tooth_mm": (0.002, 1.9),
+        "tangential_n_per_mm2": FORCE,
+        "corner_radius_mm": (0.2, 199),
+    },
+    MaterialTable: {
+        "tangential_n_per_mm2": FORCE,
+        "specific_force_n_per_mm2": FORCE,
+        "force_angle_deg": (39, 90),
+        "tangential_edge_n_per_mm": (0.5, 400),
+        "radial_edge_n_per_mm": (0.5, 400),
+    },
+    SpindleTable: {
+        "bearing_stiffness_n_per_um": (5, 4999),
+        "youngs_modulus_gpa": (10, 700),
+        "shear_modulus_gpa": (5, 300),
+        "density_kg_per_m3": (1000, 20_000),
+        "damping_ratio": (0.001, 0.3),
+        "tool_length_mm": (3, 1000),
+        "tolerance": (0.0002, 0.1),
+    },
+    SegmentTable: {
+        **dict.fromkeys(("length_mm", "outer_mm", "bore_mm"), (0.6, 599)),
+        **dict.fromkeys(("end_outer_mm", "end_bore_mm", "mass_outer_mm"), (0.6, 599)),
+    },
+    BearingTable: {
+        "position_mm": (1, 999),
+        "stiffness_n_per_um": (5, 4999),
+        "damping_n_s_per_m": (5, 50_000),
+        "rotational_stiffness_n_m_per_rad": (100, 9e6),
+        "housing_stiffness_n_per_um": (5, 9999),
+    },
+    MassTable: {"position_mm": (1, 999), "mass_kg": (0.02, 199)},
+    JointTable: {
+        "position_mm": (1, 999),
+        "stiffness_n_per_um": (20, 1e5),
+        "rotational_stiffness_n_m_per_rad": (1e4, 2e8),
+    },
+}
+"""Ranges by table and key, in the units of the key; 0 and infinity stand for "none" and are not asked about."""
+TEMPLATE_PAIR, TEMPLATE_BEARINGS = (700.0, 250.0), 500.0
+"""Kt and Kr (N/mm2), and stiffness of a bearing (N/um), that stand in a new machine.toml: nobody's."""
+
+
+class Doubted(NamedTuple):
+    """A number that is asked about."""
+
+    code: str
+    """Code of the question."""
+    place: str
+    """Table that it stands in, for people."""
+    key: str
+    """Key in that table."""
+    value: str
+    """Value of it."""
+    why: str
+    """What speaks against it."""
+
+    @property
+    def claim(self) -> str:
+        """Words that a person accepts, and that stand in [machine] accepted."""
+        return " ".join(filter(None, [self.place, f"{self.key} = {self.value}"]))
+
+    @property
+    def remark(self) -> Remark:
+        """The question."""
+        cure = f"correct it in machine.toml, or, where it is right: lobewatch check MACHINE --accept {self.key}"
+        return Remark(self.code, self.place, f"{self.key} = {self.value} {self.why}", cure)
+
+
+def out_of_range(table: Table, place: str) -> Iterator[Doubted]:
+    """Numbers of one table that lie outside what shops have."""
+    for kind, ranges in RANGES.items():
+        if isinstance(table, kind):
+            for key, limits in ranges.items():
+                value = getattr(table, key, None)
+                for number in value if isinstance(value, tuple) else (value,):
+                    if isinstance(number, int | float) and not isinstance(number, bool):
+                        yield from _outside(place, key, abs(number), limits)
+
+
+def _outside(place: str, key: str, number: float, limits: Range) -> Iterator[Doubted]:
+    low, high = limits
+    if number != 0 and math.isfinite(number) and not low <= number <= high:
+        yield Doubted("setting-not-plausible", place, key, f"{number:g}", f"is outside {low:g} to {high:g}")
+
+
+def _share(place: str, key: str, value: float, over: float, limits: Range, words: str) -> Iterator[Doubted]:
+    """Asked where a number over another one lies outside limits."""
+    low, high = limits
+    if value and not low <= value / over <= high:
+        why = f"is {value / over:.3g} {words}, not {low:g} to {high:g}"
+        yield Doubted("setting-not-plausible", place, key, f"{value:g}", why)
+
+
+def about_cut(cut: CutTable, place: str) -> Iterator[Doubted]:
+    """A program or the reference cut: each number, and numbers that do not go together."""
+    yield from out_of_range(cut, place)
+    diameter = cut.tool_diameter_mm
+    if cut.tangential_n_per_mm2 and cut.radial_n_per_mm2 is not None:
+        key, kt = "radial_n_per_mm2", cut.tangential_n_per_mm2
+        yield from _share(place, key, cut.radial_n_per_mm2, kt, RATIO, "times tangential_n_per_mm2")
+        if (kt, cut.radial_n_per_mm2) == TEMPLATE_PAIR:
+            why = "with radial_n_per_mm2 = 250 is what a new machine.toml holds: nobody has given it"
+            yield Doubted("setting-guessed", place, "tangential_n_per_mm2", f"{kt:g}", why)
+    for radial in dict.fromkeys(cut.radial_mm):
+        yield from _share(place, "radial_depth_mm", radial, diameter, RADIAL, "diameters")
+    if cut.flute_length_mm is not None:
+        yield from _share(place, "flute_length_mm", cut.flute_length_mm, diameter, FLUTE, "diameters")
+    if isinstance(cut, ProgramTable):
+        yield from _share(place, "depth_mm", cut.depth_mm, diameter, DEPTH, "diameters")
+        speed = math.pi * diameter / 1000 * cut.speed_rpm
+        yield from _share(place, "speed_rpm", cut.speed_rpm, cut.speed_rpm / speed, CUTTING_SPEED, "m/min at the edge")
+
+
+def about_material(material: MaterialTable, place: str) -> Iterator[Doubted]:
+    """A [[material]]."""
+    yield from out_of_range(material, place)
+    if material.tangential_n_per_mm2 and material.radial_n_per_mm2:
+        kt, kr = material.tangential_n_per_mm2, material.radial_n_per_mm2
+        yield from _share(place, "radial_n_per_mm2", kr, kt, RATIO, "times tangential_n_per_mm2")
+
+
+def about_drive(drive: Drive, speeds: SpeedRange) -> Iterator[Doubted]:
+    """Power and torque, and the speed from which on the power is there."""
+    yield from out_of_range(drive, "[drive]")
+    if math.isfinite(drive.power_kw) and math.isfinite(drive.torque_nm):
+        corner = 1000 * drive.power_kw / drive.torque_nm * 30 / math.pi
+        if not 50 <= corner <= 2 * speeds.high_rpm:
+            why = f"and torque_nm = {drive.torque_nm:g} meet at {corner:.3g} rpm, where [speed] ends at "
+            why += f"{speeds.high_rpm:g}"
+            yield Doubted("settings-contradict", "[drive]", "power_kw", f"{drive.power_kw:g}", why)
+
+
+def about_stick_out(tap: TapSetup, cuts: Mapping[str, CutTable]) -> Iterator[Doubted]:
+    """The length of the tapped tool against its diameter; cuts: those of that tool, by their places."""
+    if tap.stick_out_mm is not None:
+        for cut in cuts.values():
+            words = f"diameters of {cut.tool_diameter_mm:g} mm"
+            yield from _share("[tap]", "stick_out_mm", tap.stick_out_mm, cut.tool_diameter_mm, STICK_OUT, words)
+
+
+def about_alike(programs: Mapping[str, ProgramTable]) -> Iterator[Doubted]:
+    """Programs of one tool that do not agree on its diameter or its teeth; programs: by their places."""
+    for place, program in programs.items():
+        for key in ("tool_diameter_mm", "teeth"):
+            value = getattr(program, key)
+            others = [other for other in programs.values() if getattr(other, key) != value]
+            if others:
+                why = f"where {others[0].name!r} of the same tool has {getattr(others[0], key):g}: a radius, an inch, "
+                yield Doubted("settings-contradict", place, key, f"{value:g}", f"{why}another tool?")
+
+
+def about_spindle(spindle: SpindleTable) -> Iterator[Doubted]:
+    """All parts of the model."""
+    yield from out_of_range(spindle, "[spindle]")
+    lists: dict[str, Sequence[Table]] = {
+        "segment": spindle.segments,
+        "bearing": spindle.bearings,
+        "joint": spindle.joints,
+    }
+    for kind, parts in lists.items():
+        for i, part in enumerate(parts, 1):
+            yield from out_of_range(part, f"[spindle] {kind} {i}")
+    for i, mass in enumerate(spindle.masses, 1):
+        yield from about_mass(mass, f"[spindle] mass {i}")
+
+
+def about_mass(mass: MassTable, place: str) -> Iterator[Doubted]:
+    """A lumped mass, and how far out it lies."""
+    yield from out_of_range(mass, place)
+    for key in ("diametral_inertia_kg_mm2", "polar_inertia_kg_mm2"):
+        if (inertia := getattr(mass, key)) and mass.mass_kg:
+            radius = math.sqrt(inertia / mass.mass_kg)
+            if not GYRATION[0] <= radius <= GYRATION[1]:
+                why = f"with {mass.mass_kg:g} kg lies at {radius:.3g} mm from the axis"
+                yield Doubted("setting-not-plausible", place, key, f"{inertia:g}", why)
+
+
+def about_tool(tool: ToolTable, place: str) -> Iterator[Doubted]:
+    """A [[tool]], and how slender it is."""
+    for i, segment in enumerate(tool.segments, 1):
+        yield from out_of_range(segment, f"{place} segment {i}")
+    for i, mass in enumerate(tool.masses, 1):
+        yield from about_mass(mass, f"{place} mass {i}")
+    length, thickest = sum(part.length_mm for part in tool.segments), max(part.outer_mm for part in tool.segments)
+    if length > STICK_OUT[1] * thickest:
+        why = f"add up to {length / thickest:.3g} diameters, more than {STICK_OUT[1]:g}"
+        yield Doubted("setting-not-plausible", place, "segments", f"{length:g} mm", why)

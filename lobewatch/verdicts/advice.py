@@ -10,18 +10,12 @@ import msgspec
 
 from acquisition import Remark
 from lobewatch.machine import REFERENCE_CUT, CutTable, Machine, ProgramTable
-from lobewatch.tool.assembly import Assembly, speed_grid
-from lobewatch.tool.mean_lobes import mean_lobes
+from lobewatch.machine.settings.cut_range import MM
+from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.aging import softening, tolerable_decay
-from lobewatch.verdicts.doubt import doubt_of
-from lobewatch.verdicts.draws import as_program, draw, worst_limit
-from lobewatch.verdicts.setting_search import MM, SPARE, Setting, SettingSearch
+from lobewatch.verdicts.setting_search import Setting, SettingSearch
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
 from lobewatch.verdicts.verdict import Verdict, Word, is_sure
-from lobewatch.verdicts.ways import ways
-
-SHARE = 0.5
-"""Depth that the search for pockets begins with, over the lowest limit of the diagram."""
 
 
 @dataclass(frozen=True)
@@ -50,12 +44,11 @@ def advise(verdict: Verdict, machine: Machine) -> Advice:
     remarks = (remark,) if verdict.stable else ()
     if verdict.word is Word.STABLE or not is_sure(verdict.program, tool):
         return Advice(decay=decay, remarks=remarks)
-    search = SettingSearch.of(verdict.program, draws, tool, machine, verdict.at_speed)
-    best = search.elsewhere()
-    if best is not None:
-        return Advice(best, None, decay, remarks)
-    at_own_speed = search.here(1e3 * min(verdict.limit_low, verdict.limit / (1 + SPARE)))
-    return Advice(search.most_chips() or at_own_speed, at_own_speed, decay, remarks)
+    search, program = SettingSearch(verdict.program, tool, machine, verdict.at_speed), verdict.program
+    elsewhere = search.nearest(program.depth_mm, program.speed_rpm)
+    if elsewhere is not None:
+        return Advice(elsewhere, None, decay, remarks)
+    return Advice(search.best, search.here(program.speed_rpm, program.depth_mm), decay, remarks)
 
 
 def robust_pockets(
@@ -68,21 +61,13 @@ def robust_pockets(
     """
     if not is_sure(table, assembly):
         return []
-    spindle = at_speed.moved(assembly)
-    program_table = _stable_somewhere(at_speed.taught(table), spindle, machine)
-    program, cuts = as_program(program_table, machine), ways(program_table, machine, spindle)
-    doubt = at_speed.doubt or doubt_of(assembly, program_table, machine)
-    limit, axes, _ = worst_limit(program, spindle, cuts)
-    draws = draw(program, limit, cuts, spindle, doubt, axes)
-    return SettingSearch.of(program_table, draws, assembly, machine, at_speed).pockets(count)
+    program = as_cut_program(at_speed.taught(table), assembly.tool, machine)
+    return SettingSearch(program, assembly, machine, at_speed).pockets(count)
 
 
-def _stable_somewhere(table: CutTable, assembly: Assembly, machine: Machine) -> ProgramTable:
-    """A cut as a program that is surely stable somewhere: in the middle of the range of speeds, not deep."""
-    cut, speeds = machine.build_cut(table), machine.speed
-    lowest = mean_lobes(assembly.x, assembly.y, [cut], speed_grid(machine), assembly.cross).minimum.depth
-    depth = min(max(SHARE * lowest * 1e3, MM), table.deepest_mm)
-    place: dict[str, Any] = {"speed_rpm": math.sqrt(speeds.low_rpm * speeds.high_rpm), "depth_mm": depth}
+def as_cut_program(table: CutTable, tool: str, machine: Machine) -> ProgramTable:
+    """A cut as a program of a tool, at any speed and depth where it has none: no search rests on them."""
     if isinstance(table, ProgramTable):
-        return msgspec.structs.replace(table, **place)
-    return ProgramTable(**{"name": REFERENCE_CUT, "tool": assembly.tool} | msgspec.structs.asdict(table) | place)
+        return table
+    place: dict[str, Any] = {"speed_rpm": machine.speed.high_rpm, "depth_mm": MM}
+    return ProgramTable(**{"name": REFERENCE_CUT, "tool": tool} | msgspec.structs.asdict(table) | place)

@@ -35,6 +35,8 @@ FREQUENCY, DAMPING, STIFFNESS = (0.985, 0.02), (1.1, 0.25), (1.0, 0.10)
 FORCE_MIDDLE, FORCE_SPREAD = 1.0, 0.30
 """Middle and standard deviation of Kt in the cut over that of the table; chosen, as those. The prior of the learning
 begins 10 % higher (`priors.FORCE`), since cuts then correct it; nothing corrects the chance made here."""
+BESIDE, LOOKS = 0.003, 7
+"""Relative distance of the frequency that is looked at beside the doubt of the speed, and number of looks."""
 LEAST_FACTOR = 0.1
 """Least share of its middle that a factor has."""
 
@@ -74,8 +76,21 @@ class ProgramDraws:
         """The cuts with a limit up to a depth (m) alone, at most so many; the worst stays."""
         wanted = (self.limits <= below) & np.isfinite(self.limits) & (np.arange(self.limits.size) < (most or np.inf))
         wanted[0] = True
-        cuts = tuple(cut for cut, stays in zip(self.cuts, wanted, strict=True) if stays)
-        return replace(self, cuts=cuts, limits=self.limits[wanted])
+        return self.fed_where(wanted)
+
+    def fed_where(self, wanted: NDArray[np.bool_]) -> ProgramDraws:
+        """The cuts at some places alone; the worst where it is none of them."""
+        places = np.flatnonzero(wanted) if np.any(wanted) else np.zeros(1, dtype=np.intp)
+        return replace(self, cuts=tuple(self.cuts[place] for place in places), limits=self.limits[places])
+
+    def around(self, depth: float, fall: float = 0.0) -> Floats:
+        """Largest growth of the middle in each cut at a depth (m), as far as speed and frequency may be off.
+
+        fall: of the frequency, that is to come; it moves a cut as a faster speed does. Shape (cuts,).
+        """
+        beside = self.doubt.speed + BESIDE
+        middle = self[np.zeros(1, dtype=np.intp)].swept(np.linspace(1 - beside, (1 + beside) / (1 - fall), LOOKS))
+        return np.array([np.max(replace(middle, cuts=(cut,)).growth(depth)) for cut in self.cuts])
 
     def at(self, speed: float = 1.0, frequency: float = 1.0, stiffness: float = 1.0) -> ProgramDraws:
         """The same draws with speed, frequencies and stiffnesses times these factors."""

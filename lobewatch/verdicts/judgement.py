@@ -19,8 +19,8 @@ from lobewatch.verdicts.ways import ways
 QUANTILES = (0.01, 0.99)
 """Quantiles of the limit over the doubt that a band reaches between."""
 SURELY = 1.15
-"""Factor that the limit of a cut on its way, were it as doubtful as the lowest, has to spare where it is passed
-over."""
+"""Factor that the limit of a cut on its way, were it as doubtful as the lowest, has to spare where it is passed over,
+unless the middle chatters in it at a depth so much larger somewhere within the doubt of the speed."""
 
 
 class Judgement(NamedTuple):
@@ -54,6 +54,7 @@ def weigh(table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: S
     draws = draw(program, middle, cuts, spindle, doubt, axes)
     limits = drawn_limits(draws, program.depth)[1:]
     low, high = np.quantile(limits, QUANTILES, method="closest_observation")
-    near = draws.fed(SURELY * program.depth * middle.limit / low if np.isfinite(middle.limit) else 0.0)
+    below = SURELY * program.depth * middle.limit / low if np.isfinite(middle.limit) else 0.0
+    near = draws.fed_where((draws.limits <= below) | (draws.around(SURELY * program.depth) >= 0))
     chatters = (near.growth(program.depth)[1:, 0] >= 0) | (limits <= program.depth)
     return Judgement(middle, float(low), float(high), draws, chatters, across)

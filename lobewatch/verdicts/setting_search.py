@@ -1,29 +1,35 @@
-"""Looking for settings that would be called stable, with something to spare.
+"""The one search for settings that would be called stable, with something to spare: advice, pockets, recommendations.
 
-A diagram by zero order says where to look. What is recommended has been judged like any program: `weigh` finds it
-stable throughout, and the same draws are stable as the spindle will be when it is tapped again.
+Zero order and the multipliers of the middle say where to look (`LikelyDepths`), few draws how deep (`HardDraws`). What
+is recommended has been judged like any program: `weigh` finds it stable throughout, and the same draws are stable as
+the spindle will be when it is tapped again. Where no speed of the grid has such a depth, nothing is recommended.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import islice
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from lobewatch.machine import Machine, ProgramTable, drive_limit
+from lobes import Cut, Program
+from lobewatch.machine import Machine, ProgramTable
+from lobewatch.machine.settings.cut_range import MM, RPM, CutRange, floored_mm
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.series import fall_in
 from lobewatch.verdicts.aging import StiffnessAt, age, softening
-from lobewatch.verdicts.drawn_limits import ALIKE
+from lobewatch.verdicts.doubt import Doubt, doubt_of
 from lobewatch.verdicts.draws import ProgramDraws
-from lobewatch.verdicts.judgement import weigh
-from lobewatch.verdicts.promise import Promise
-from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
+from lobewatch.verdicts.hard_draws import HardDraws, deepest_calm, hard_draws
+from lobewatch.verdicts.judgement import SURELY, weigh
+from lobewatch.verdicts.likely_depths import LikelyDepths, likely_depths
+from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
+from lobewatch.verdicts.ways import ways
 
 SPARE = 0.20
 """Depth that a recommended setting has to spare in the middle of the doubt."""
@@ -33,18 +39,22 @@ INTERVALS = 2
 """Number of tap intervals that it must last ..."""
 UNKNOWN_FALL = 0.02
 """... or fall of the frequency that it must stand where no rate is known; chosen."""
-RPM, MM = 10.0, 0.05
-"""Steps that can be set at a machine; numbers are rounded inwards to them."""
-DEPTHS = np.geomspace(0.2, 1.0, 9)
-"""Shares of what the diagram promises that are looked at with a few draws ..."""
-LESS = (0.95, 0.88, 0.8)
-"""... and shares of what they leave that are judged."""
 PLACES = 4
-"""Number of pockets that are looked at closely."""
-LATER = np.array([0.0, 0.5, 1.0])
+"""Number of speeds that few draws are looked at at before one is judged ..."""
+MOST_PLACES = 12
+"""... and of those that are before it is said that there is none."""
+TRIES, MOST_TRIES = 4, 12
+"""Number of depths that are judged at one speed, and at all of them."""
+DISAPPOINTING = 0.95
+"""Share of a depth, less than which is left where it is judged, has one more speed looked at."""
+REMEMBERED = 8
+"""Draws of each judgement that are remembered where they chatter."""
+LESS = 0.98
+"""Share of a depth, at least as much less of which is looked at where draws chatter."""
+LATER = np.array([0.5, 1.0])
 """Shares of the fall that a setting must stand at which it is looked at."""
 FEW = 24
-"""Number of draws that a setting is looked at with before all of them decide, the hardest where they are known."""
+"""Number of draws, the hardest, that bound a window before all of them decide."""
 EDGE, WIDEST = 0.006, 8
 """Relative step of a window of speeds, and most steps on each side."""
 LEFT = np.arange(0, 0.1001, 0.01)
@@ -78,113 +88,174 @@ def needed_fall(assembly: Assembly, machine: Machine) -> float:
 
 @dataclass(frozen=True, eq=False)
 class SettingSearch:
-    """Looking for settings of one program with a tool that is surely known."""
+    """Looking for settings of one cut with a tool that is surely known."""
 
-    program: ProgramTable
-    """Program with the coefficients that were learnt."""
-    draws: ProgramDraws
-    """Draws of the program, in the worst directions of feed."""
+    table: ProgramTable
+    """Cut, with the coefficients that were learnt; its own speed and depth do not count."""
     assembly: Assembly
     """Tool as tapped."""
     machine: Machine
     """Machine, with its speeds, its drive and its tap interval."""
-    at_speed: SpindleAtSpeed
+    at_speed: SpindleAtSpeed = AT_REST
     """Spindle as test cuts have taught it."""
-    stiffness_at: StiffnessAt
-    """Stiffness over that of now by the fall of the frequency."""
-    fall: float
-    """Fall of the frequency that a setting must stand, relative."""
-    promise: Promise
-    """Depths that are likely to be safe: where to look."""
+    hard: dict[float, HardDraws] = field(default_factory=dict)
+    """Few draws by speed (rpm), worked out anew where more of them are known to chatter."""
+    chattered: set[int] = field(default_factory=set)
+    """Draws that have chattered where few others made it seem safe."""
 
-    @classmethod
-    def of(
-        cls, program: ProgramTable, draws: ProgramDraws, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed
-    ) -> SettingSearch:
-        """The search around a program that was drawn."""
-        fall = needed_fall(assembly, machine)
-        promise = Promise.of(program, draws, at_speed.moved(assembly), machine, fall, SPARE)
-        worst = draws.fed(ALIKE * float(draws.limits[0]), 2)
-        return cls(program, worst, assembly, machine, at_speed, softening(assembly)[0], fall, promise)
+    @cached_property
+    def spindle(self) -> Assembly:
+        """The tool in the middle of what was learnt."""
+        return self.at_speed.moved(self.assembly)
 
-    def elsewhere(self) -> Setting | None:
-        """The nearest window of speeds at the program's depth."""
-        depth = self.program.depth_mm
-        middles = sorted(self.promise.middles(depth), key=self._distance)
-        return next(filter(None, (self._verified(_rounded(speed), depth) for speed in middles[:PLACES])), None)
+    @cached_property
+    def reach(self) -> CutRange:
+        """Speeds and depths that may be recommended."""
+        return CutRange.of(self.machine, self.table)
 
-    def most_chips(self) -> Setting | None:
-        """The speed and depth of largest removal rate."""
-        return next(filter(None, (self._deepest(*place) for place in self._calm(self.promise.tops()))), None)
+    @cached_property
+    def cuts(self) -> tuple[Cut, ...]:
+        """Cuts that it makes on its way."""
+        return ways(self.table, self.machine, self.spindle)
+
+    @cached_property
+    def fall(self) -> float:
+        """Fall of the frequency that a setting must stand, relative."""
+        return needed_fall(self.assembly, self.machine)
+
+    @cached_property
+    def doubt(self) -> Doubt:
+        """What is not known."""
+        return self.at_speed.doubt or doubt_of(self.assembly, self.table, self.machine)
+
+    @cached_property
+    def stiffness_at(self) -> StiffnessAt:
+        """Stiffness over that of now by the fall of the frequency."""
+        return softening(self.assembly)[0]
+
+    @cached_property
+    def likely(self) -> LikelyDepths:
+        """Where to look."""
+        return likely_depths(self.reach, self.cuts, self.spindle, self.doubt, self.fall, SPARE)
+
+    @cached_property
+    def best(self) -> Setting | None:
+        """The setting of largest removal rate at the same feed per tooth; None where nothing is safe."""
+        return next(self._settings(), None)
 
     def pockets(self, count: int) -> list[Setting]:
-        """The settings of largest removal rate, one a pocket.
+        """The best setting, and the next best of other pockets."""
+        taken: list[Setting] = []
+        for setting in self._settings():
+            if not any(self.likely.is_joined(setting.speed_rpm, other.speed_rpm) for other in taken):
+                taken.append(setting)
+            if len(taken) == count:
+                break
+        return taken
 
-        Each in the middle of the speeds that are promised to be safe now and after the fall.
+    def nearest(self, depth_mm: float, speed_rpm: float) -> Setting | None:
+        """A depth (mm) at the window of speeds nearest to one (rpm)."""
+        middles = self.likely.middles(depth_mm)
+        near = sorted(middles, key=lambda speed: abs(math.log(speed / speed_rpm)))
+        return self._first_at(depth_mm, near[:PLACES])
+
+    def here(self, speed_rpm: float, most_mm: float) -> Setting | None:
+        """The deepest at a speed (rpm), up to a depth (mm)."""
+        if self.best is None or not self.reach.low_rpm <= speed_rpm <= self.reach.high_rpm:
+            return None
+        return self._deepest(speed_rpm, min(most_mm, self._calm(speed_rpm)))
+
+    def _first_at(self, depth_mm: float, speeds: Iterable[float]) -> Setting | None:
+        """The first of some speeds (rpm) at which a depth (mm) is safe."""
+        if self.best is None:
+            return None
+        for speed in map(_rounded, speeds):
+            if self.reach.holds(speed, depth_mm) and self._calm(speed) >= depth_mm:
+                setting = self._verified(speed, depth_mm)
+                if isinstance(setting, Setting):
+                    return setting
+        return None
+
+    def _settings(self) -> Iterator[Setting]:
+        """The deepest at speeds of the grid, the most chips first as far as few draws tell.
+
+        What was judged in vain comes back with less depth, and the draws that chattered count from then on.
         """
-        places = self._calm(self.promise.pockets())
-        settings = (self._deepest(_rounded(self.promise.middle(*place)), place[1]) for place in places)
-        return list(islice(filter(None, settings), count))
+        tops = iter([_rounded(float(self.likely.speeds[top])) for top in self.likely.tops(MOST_PLACES)])
+        depths = {speed: floored_mm(self._calm(speed)) for speed in islice(tops, PLACES)}
+        for _ in range(MOST_TRIES):
+            while not any(depths.values()) and (speed := next(tops, None)):
+                depths[speed] = floored_mm(self._calm(speed))
+            speed = self._most_chips(depths)
+            if not depths.get(speed):
+                return
+            setting = self._verified(speed, depths[speed])
+            if isinstance(setting, Setting):
+                del depths[speed]
+                yield setting
+                continue
+            if setting < DISAPPOINTING * depths[speed] and (other := next(tops, None)):
+                depths[other] = floored_mm(self._calm(other))
+            depths[speed] = floored_mm(setting)
 
-    def _calm(self, tops: Sequence[int]) -> list[tuple[float, float]]:
-        """Speeds (rpm) and depths (mm) there at which a few draws are stable, the largest removal rate first."""
-        promised = [(_rounded(float(self.promise.speeds[i])), self.promise.depths[i]) for i in tops[:PLACES]]
-        places = [(speed, self._calm_depth(speed, depth_mm)) for speed, depth_mm in promised]
-        return sorted(places, key=lambda place: -place[0] * place[1])
+    def _most_chips(self, depths: dict[float, float]) -> float:
+        """The speed (rpm) of most chips, of these with the depth (mm) that few draws allow; 0 where there is none."""
+        while True:
+            speed = max(depths, key=lambda speed: speed * depths[speed], default=0.0)
+            if not speed or self.hard[speed].chattered == self.chattered:
+                return speed
+            depths[speed] = min(depths[speed], floored_mm(self._calm(speed)))
 
-    def here(self, depth_mm: float) -> Setting | None:
-        """The deepest at the program's own speed, up to a depth (mm)."""
-        speed = self.program.speed_rpm
-        return self._deepest(speed, self._calm_depth(speed, min(depth_mm, self.program.deepest_mm)))
+    def _calm(self, speed: float) -> float:
+        """The deepest (mm) at a speed (rpm) at which few draws are stable now and later, with depth to spare."""
+        most = float(self.reach.depths(np.array([speed]))[0]) / 1e3
+        if speed not in self.hard or self.hard[speed].chattered != self.chattered:
+            likely = float(np.interp(speed, self.likely.speeds, self.likely.depths)) / 1e3
+            program = Program(self.machine.build_cut(self.table), speed, max(likely, MM / 1e3))
+            spindle = self.spindle, self.doubt, self.fall, self.stiffness_at
+            self.hard[speed] = hard_draws(program, self.cuts, *spindle, frozenset(self.chattered))
+        hard = self.hard[speed]
+        return 1e3 * hard.deepest(min(most, hard.limit / (1 + SPARE)))
 
     def _deepest(self, speed: float, depth_mm: float) -> Setting | None:
-        settings = (self._verified(speed, depth) for share in LESS if (depth := _floored(share * depth_mm)) > 0)
-        return next(filter(None, settings), None)
+        """The deepest setting up to a depth (mm)."""
+        for _ in range(TRIES):
+            if (depth_mm := floored_mm(depth_mm)) < MM:
+                return None
+            setting = self._verified(speed, depth_mm)
+            if isinstance(setting, Setting):
+                return setting
+            depth_mm = setting
+        return None
 
-    def _calm_depth(self, speed: float, depth_mm: float) -> float:
-        """The deepest up to a depth (mm) at which, and below which, a few draws are stable now and later."""
-        depths = depth_mm * DEPTHS
-        calm = np.all(self._early(speed, FEW // 2).growth(depths / 1e3) < 0, axis=0)
-        return float(depths[calm.size - 1 if np.all(calm) else np.argmin(calm) - 1]) if calm[0] else 0.0
-
-    def _early(self, speed: float, number: int = FEW) -> ProgramDraws:
-        """A few draws at a speed (rpm), now and when the spindle is tapped again."""
-        few = self.draws[np.arange(number)].at(speed / self.program.speed_rpm)
-        return age(few, self.fall * LATER[[0, -1]], self.stiffness_at)
-
-    def _lasts(self, speed: float, depth: float) -> bool:
-        """Whether a few draws are stable at a speed (rpm) and depth (m) now and when the spindle is tapped again."""
-        return bool(np.all(self._early(speed).growth(depth) < 0))
-
-    def _distance(self, speed: float) -> float:
-        return abs(math.log(speed / self.program.speed_rpm))
-
-    def _verified(self, speed: float, depth_mm: float) -> Setting | None:
-        """The setting where it is stable throughout, and will be when the spindle is tapped again."""
-        table = msgspec.structs.replace(self.program, speed_rpm=speed, depth_mm=depth_mm)
-        if not self.machine.speed.low_rpm <= speed <= self.machine.speed.high_rpm:
-            return None
-        if not self._lasts(speed, depth_mm / 1e3):
-            return None
-        depth, deepest = depth_mm / 1e3, drive_limit(self.machine, table, np.array([speed]))[0]
+    def _verified(self, speed: float, depth_mm: float) -> Setting | float:
+        """The setting where it is stable throughout now and when it is tapped again; else a depth (mm) that may be."""
+        table, depth = msgspec.structs.replace(self.table, speed_rpm=speed, depth_mm=depth_mm), depth_mm / 1e3
         judgement = weigh(table, self.assembly, self.machine, self.at_speed)
-        margin = judgement.middle.limit / depth - 1
-        if not judgement.is_stable_throughout or margin < SPARE or depth > deepest:
-            return None
-        near = judgement.draws.fed(2 * depth)
-        later = age(near, self.fall * LATER[1:], self.stiffness_at).growth(depth)
+        limit = judgement.middle.limit
+        if limit < depth * (1 + SPARE):
+            return 1e3 * limit / (1 + SPARE)
+        near = judgement.draws.fed_where(judgement.draws.around(SURELY * depth, self.fall) >= 0)
+        if not judgement.is_stable_throughout:
+            places = 1 + np.flatnonzero(judgement.chatters)
+            self.chattered.update(places[:REMEMBERED].tolist())
+            calm = 1e3 * min(deepest_calm(near[places[:FEW]], depth), judgement.low)
+            return min(calm, LESS * depth_mm, depth_mm - MM)
+        aged = age(near, self.fall * LATER, self.stiffness_at)
+        later = aged.growth(depth)[:, 0]
         if np.any(later >= 0):
-            return None
-        hardest = near[np.argsort(np.max(later.reshape(LATER.size - 1, -1), axis=0))[-FEW:]]
+            places = np.argsort(-later)[:FEW]
+            self.chattered.update((places[later[places] >= 0] % len(near.rows))[:REMEMBERED].tolist())
+            return min(1e3 * deepest_calm(aged[places], depth), depth_mm - MM)
+        hardest = near[np.argsort(np.max(later.reshape(LATER.size, -1), axis=0))[-FEW:]]
         window, left = self._window(near, hardest, speed, depth), self._left(hardest, depth)
-        return Setting(speed, depth_mm, window, min(margin, MOST_SPARE), left)
+        return Setting(speed, depth_mm, window, min(limit / depth - 1, MOST_SPARE), left)
 
     def _window(self, near: ProgramDraws, hardest: ProgramDraws, speed: float, depth: float) -> tuple[float, float]:
         steps = np.arange(WIDEST + 1.0)
-        low, high = self.machine.speed.low_rpm, self.machine.speed.high_rpm
         slow, fast = (_last_calm(near, hardest, np.power(1 + EDGE, sign * steps), depth) for sign in (-1, 1))
-        slowest, fastest = max(speed * slow, low) / RPM, min(speed * fast, high) / RPM
-        return min(math.ceil(slowest) * RPM, speed), max(math.floor(fastest) * RPM, speed)
+        slowest, fastest = max(speed * slow, self.reach.low_rpm), min(speed * fast, self.reach.high_rpm)
+        return min(math.ceil(slowest / RPM) * RPM, speed), max(math.floor(fastest / RPM) * RPM, speed)
 
     def _left(self, hardest: ProgramDraws, depth: float) -> float:
         grown = age(hardest, LEFT, self.stiffness_at).growth(depth).reshape(LEFT.size, -1)
@@ -207,7 +278,3 @@ def _calm_from_the_first(grown: Floats) -> int:
 
 def _rounded(speed: float) -> float:
     return round(speed / RPM) * RPM
-
-
-def _floored(depth_mm: float) -> float:
-    return round(math.floor(depth_mm / MM + 1e-9) * MM, 6)

@@ -9,11 +9,12 @@ import numpy as np
 
 from lobewatch.cuts.learning.contradicting import ContradictingCut, contradictions
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
-from lobewatch.cuts.learning.grid import Grid, speeds_between, zero_order_trust
+from lobewatch.cuts.learning.grid import STEP, Grid, zero_order_trust
 from lobewatch.cuts.learning.posterior import Posterior, prior
 from lobewatch.cuts.learning.suggest import Suggestion, suggest
-from lobewatch.machine import Machine, ProgramTable, drive_limit
+from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.journal.heard_cut import HeardCut, geometry
+from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.machine.settings.cut_setting import find_named
 from lobewatch.machine.settings.cut_tables import FEED_ANGLES
 from lobewatch.tool.assembly import Assembly
@@ -86,10 +87,11 @@ def next_cut(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Se
 
 def grid_of(table: ProgramTable, assembly: Assembly, machine: Machine) -> Grid:
     """Speeds of the machine, and depths that tool and drive allow."""
-    speeds = speeds_between(machine.speed.low_rpm, machine.speed.high_rpm)
-    deepest = np.minimum(table.deepest_mm / 1e3, drive_limit(machine, table, speeds))
+    reach = CutRange.of(machine, table)
+    speeds = reach.speeds(STEP)
+    deepest = reach.depths(speeds) / 1e3
     cut, angles = machine.build_cut(table), tuple(FEED_ANGLES[feed] for feed in table.feeds)
-    trust = zero_order_trust(assembly.x, assembly.y, cut, angles, speeds, table.deepest_mm / 1e3)
+    trust = zero_order_trust(assembly.x, assembly.y, cut, angles, speeds, reach.deepest_mm / 1e3)
     return Grid(cut, angles, speeds, deepest, trust)
 
 

@@ -1,0 +1,59 @@
+"""Speeds and depths that machine and tool allow for a cut: nothing outside of them is recommended."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lobewatch.machine.settings.cut_tables import CutTable
+from lobewatch.machine.settings.drive import drive_limit
+from lobewatch.machine.settings.machine_file import Machine
+
+RPM, MM = 10.0, 0.05
+"""Steps that can be set at a machine (rpm and mm); numbers are rounded inwards to them."""
+ROUNDING = 1e-6
+"""Share of a step that rounding of numbers may miss."""
+
+
+@dataclass(frozen=True)
+class CutRange:
+    """Where a cut may be put."""
+
+    machine: Machine
+    """Machine, with its drive."""
+    table: CutTable
+    """Cut, whatever its speed and depth."""
+    low_rpm: float
+    """Slowest speed (rpm)."""
+    high_rpm: float
+    """Fastest speed (rpm)."""
+    deepest_mm: float
+    """Greatest depth of cut of the tool (mm)."""
+
+    @classmethod
+    def of(cls, machine: Machine, table: CutTable) -> CutRange:
+        """The range of a cut."""
+        return cls(machine, table, machine.speed.low_rpm, machine.speed.high_rpm, table.deepest_mm)
+
+    def depths(self, speed_rpm: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Deepest cut (mm) that tool and drive allow at speeds (rpm)."""
+        return np.minimum(self.deepest_mm, 1e3 * drive_limit(self.machine, self.table, speed_rpm))
+
+    def holds(self, speed_rpm: float, depth_mm: float) -> bool:
+        """Whether a speed (rpm) and a depth (mm) lie inside."""
+        is_reached = self.low_rpm <= speed_rpm <= self.high_rpm
+        return is_reached and depth_mm <= float(self.depths(np.array([speed_rpm]))[0])
+
+    def speeds(self, step: float) -> NDArray[np.float64]:
+        """Speeds that can be set (rpm), rising, a relative step apart at least."""
+        number = int(math.log(self.high_rpm / self.low_rpm) / step) + 2
+        wanted = np.round(np.geomspace(self.low_rpm, self.high_rpm, number) / RPM) * RPM
+        return np.unique(np.clip(wanted, self.low_rpm, self.high_rpm))
+
+
+def floored_mm(depth_mm: float) -> float:
+    """The deepest depth (mm) that can be set and is not deeper."""
+    return round(math.floor(depth_mm / MM + ROUNDING) * MM, 6)

@@ -1,7 +1,7 @@
 """From the DAQ to hits, averaged FRF and HDF5 files."""
 
 from .atomic import atomic_write
-from .channel import Block, Channel, SensorInput, TapDirection, tap_direction
+from .channel import ACROSS, Block, Channel, SensorInput, TapDirection, tap_direction
 from .dataq import DataqEmulator, DataqFaults, DataqSource, DataqTraits
 from .devices import (
     Answer,
@@ -73,6 +73,7 @@ from .taps import Faults, TapsEmulator, TapsSource
 from .verdicts import HitVerdict, average_good, check_hit, judge_hit
 
 __all__ = [
+    "ACROSS",
     "STANDARD_GRAVITY",
     "UNSAID",
     "Answer",

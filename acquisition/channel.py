@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 ChannelQuantity = Literal["force", "acceleration"]
 FEWEST_BITS = 8
 """No converter for sensors has fewer."""
-TapDirection = Literal["x", "y"]
-"""Direction at the tool tip in which is tapped."""
+TapDirection = Literal["x", "y", "xy"]
+"""Direction at the tool tip in which is tapped: "xy" hits in x with the sensor in y."""
+ACROSS: TapDirection = "xy"
+"""Direction of a cross tap: no driving point."""
 
 
 def tap_direction(text: str) -> TapDirection:

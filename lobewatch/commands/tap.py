@@ -22,7 +22,11 @@ def tap(
     port: Annotated[str, typer.Option(help="Serial port of the DAQ, socket://HOST:PORT, or file:RECORDING.")] = "",
     tool: Annotated[str, typer.Option(help="What is in the spindle; [tap] tool where not given.")] = "",
     direction: Annotated[
-        str, typer.Option(help="Only this direction at the tool tip, x or y; without it x, then y at a terminal.")
+        str,
+        typer.Option(
+            help="Only this direction at the tool tip: x, y, or xy (hit in x, sensor in y); without it x, then y at "
+            "a terminal."
+        ),
     ] = "",
     operator: Annotated[str, typer.Option(help="Who holds the hammer.")] = "",
     new: Annotated[bool, typer.Option("--new", help="Begin anew, do not go on with an interrupted test.")] = False,

@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
-from acquisition import Remark
+from acquisition import ACROSS, Remark
 from lobewatch.decay.series_history import SeriesHistory
 from lobewatch.decay.trend import Trend
 from lobewatch.history.history import Row
@@ -23,7 +23,7 @@ SETTLING = "; it fell among its first tests and has slowed since: settling (run-
 
 def about_loss(name: str, newest: Row) -> Iterator[Remark]:
     """Remark on a newest test that does not show the mode followed."""
-    if not newest.frequency.is_known:
+    if not newest.frequency.is_known and newest.direction != ACROSS:
         cure = "Tap again: the mode that is followed was not found in the newest test."
         yield Remark("mode-lost", name, "the newest test does not show the mode followed", cure)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
-from acquisition import Remark
+from acquisition import ACROSS, Remark
 from lobewatch.decay.alarm import Alarm, Raised, with_acknowledgements
 from lobewatch.decay.change_point import FIRST_JUDGED
 from lobewatch.decay.light import (
@@ -170,7 +170,7 @@ def _standing(
 
 
 def _series_of(history: History, tool: str, direction: str, scatter: KnownScatter | None) -> SeriesHistory:
-    rows, beside = (history.series(tool, one) for one in (direction, "y" if direction == "x" else "x"))
+    rows, beside = (history.series(tool, one) for one in (direction, {"x": "y", "y": "x"}.get(direction, "")))
     if scatter is None or sum(row.time <= scatter.time for row in rows) >= FIRST_JUDGED:
         return series_history(rows, beside)
     return series_history(rows, beside, SeriesScatter(KnownSpread(*scatter.alone), KnownSpread(*scatter.common)))
@@ -225,7 +225,7 @@ def _raised_of_program(remark: Remark, rows: Sequence[Row]) -> Raised:
 
 
 def _about_directions(rows: Sequence[Row]) -> Iterator[Remark]:
-    pairs = dict.fromkeys((row.tool, row.direction) for row in rows)
+    pairs = dict.fromkeys((row.tool, row.direction) for row in rows if row.direction != ACROSS)
     for tool in dict.fromkeys(tool for tool, _ in pairs):
         tapped = {direction for name, direction in pairs if name == tool and _is_known(rows, name, direction)}
         if len(tapped) == 1:

@@ -40,6 +40,8 @@ class _Ground(NamedTuple):
     """The mode followed before it."""
     other: str
     """Tap test that the other direction is taken from; empty without any."""
+    cross: str
+    """Cross tap that its axes are taken from; empty without any."""
     near: tuple[FollowedMode, ...]
     """Modes that it is moved by where it is that old."""
 
@@ -54,10 +56,11 @@ class _Archive:
     def ground(self, place: Place) -> _Ground:
         before = (self.rows[number] for number in earlier_numbers(place, self.places))
         last = next((row.followed for row in before if math.isfinite(row.followed[0]) and not row.questions), None)
+        cross = "" if place.cross is None else self.places[place.cross].entry.id
         if place.across is None:
-            return _Ground(place.remarks, last, "", ())
+            return _Ground(place.remarks, last, "", cross, ())
         other = self.places[place.across].entry
-        return _Ground(place.remarks, last, other.id, self._near(place, datetime.fromisoformat(other.time)))
+        return _Ground(place.remarks, last, other.id, cross, self._near(place, datetime.fromisoformat(other.time)))
 
     def _near(self, place: Place, then: datetime) -> tuple[FollowedMode, ...]:
         if datetime.fromisoformat(place.entry.time) - then <= TOGETHER:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from acquisition import DataError
+from acquisition import ACROSS, DataError
 from lobewatch.history.followed_modes import FollowedModes
 from lobewatch.history.history import Row, row_of
 from lobewatch.history.kept_rows import kept_in_place
@@ -58,12 +58,15 @@ class TapMeasurements:
 
     def assembly_after(self, place: Place, rows: Sequence[Row]) -> Assembly:
         """The tool of one tap test as it was known then."""
+        cross = None if place.cross is None else self.measurement(self._places[place.cross], rows)
+        if place.entry.direction == ACROSS and place.across is not None:
+            place = self._places[place.across]
         newest = self.measurement(place, rows)
         other = None if place.across is None else self.measurement(self._places[place.across], rows)
         series = self._followed.before(place, rows)
         if newest.followed is not None and not open_questions(newest.remarks):
             series[newest.direction].append(_followed_mode(newest, newest.followed))
-        return assemble(newest, other, series)
+        return assemble(newest, other, series, cross)
 
     def assembly_of(self, tool: str, places: Sequence[Place], rows: Sequence[Row]) -> Assembly:
         """A tool as the newest of these tap tests with it tells, predicted where none is of it.

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from acquisition import Frf, Remark, TapTest
+from acquisition import ACROSS, Frf, Remark, TapTest
 from dsm import Calibration, calibrate, modal_stiffness
 from lobewatch.machine import BY_FIT, Machine
 from lobewatch.measuring.questions import frequency_jump, no_mode_in_band, other_band, stiffness_off_model
@@ -52,6 +52,8 @@ class Measurement:
     """Modes that lobes are computed from, at the tool tip; empty where there are none."""
     remarks: tuple[Remark, ...] = ()
     """Remarks on what could not be done, and on what is in doubt."""
+    cross: Sequence[Mode] | None = None
+    """Modes of a cross tap at the tool tip, signed; None of another tap, and where it was not at the tip."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +129,8 @@ def about_hand(by_hand: ModeEdits) -> Remark:
 
 def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
     """Measurement that follows from the modes of a tap test; last: the mode that was followed in the test before."""
+    if fit.direction == ACROSS:
+        return _across(fit, machine, last)
     remarks, modes = [*fit.remarks], fit.modes
     named = (fit.tap_id, fit.time, fit.tool, fit.direction)
     if fit.failed:
@@ -138,6 +142,23 @@ def interpret_fit(fit: TapFit, machine: Machine, last: Mode | None) -> Measureme
         calibration = _calibrate(followed, machine, fit.tool, remarks, last)
         at_tip = _modes_at_tip(trusted, followed, calibration, machine, remarks)
     return Measurement(*named, modes, followed, calibration, at_tip, tuple(remarks))
+
+
+def _across(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
+    """What a cross tap says: modes of either sign, none where x and y do not move each other. It calibrates nothing."""
+    signed = _in_band(fit.modes, machine)
+    plain = [replace(mode, stiffness=abs(mode.stiffness)) for mode in signed]
+    trusted = believed(plain)
+    cross = [mode for mode, size in zip(signed, plain, strict=True) if size in trusted.modes]
+    followed = predominant(trusted.modes) if last is None else follow(last, trusted.modes).mode
+    remarks = [remark for remark in fit.remarks if remark.code != "no-mode-in-band"]
+    if machine.tap.position_mm:
+        text = "cross tap not used: it was not at the tool tip ([tap] position_mm)"
+        remarks.append(Remark("cross-beside-tip", "", text, "tap across at the tip"))
+    named = (fit.tap_id, fit.time, fit.tool, fit.direction)
+    at_tip = None if machine.tap.position_mm else cross
+    said = (*remarks, *trusted.remarks)
+    return Measurement(*named, modes=fit.modes, followed=followed, cross=at_tip, remarks=said)
 
 
 def _in_band(modes: Sequence[Mode], machine: Machine) -> list[Mode]:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
+from acquisition import ACROSS
 from lobewatch.decay.change_point import FIRST_JUDGED
 from lobewatch.decay.known_scatter import scatter_of, scatter_of_others
 from lobewatch.decay.readings import NOTHING_KNOWN, UNKNOWN_SCATTER, KnownSpread, SeriesScatter
@@ -28,7 +29,7 @@ def learn_scatter(logbook: Logbook) -> None:
     """
     history = logbook.history
     rows = history.current
-    counts = Counter((row.tool, row.direction) for row in rows)
+    counts = Counter((row.tool, row.direction) for row in rows if row.direction != ACROSS)
     if not counts or logbook.files.known_scatter is not None or all(count >= FIRST_JUDGED for count in counts.values()):
         return
     known = [*_scatters_beside(logbook.folder.path), *_scatters_before(history)]

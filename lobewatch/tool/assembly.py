@@ -9,13 +9,14 @@ from datetime import datetime, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Remark
+from acquisition import ACROSS, Remark
 from dsm import Calibration
 from lobes import Cut, StabilityLobes
 from lobewatch.machine import Machine
 from lobewatch.measuring.measurement import Measurement
 from lobewatch.measuring.questions import in_question, open_questions
 from lobewatch.tool.axes import ModeAxes, mode_axes
+from lobewatch.tool.cross_tap import fitting_cross
 from lobewatch.tool.mean_lobes import Modes, mean_lobes
 from lobewatch.tool.series import FollowedMode, Scatter, frequency_at, scatter_of
 
@@ -94,11 +95,16 @@ class Assembly:
         return scatter_of(self.series.get(direction, ()))
 
 
-def assemble(newest: Measurement, across: Measurement | None, series: Mapping[str, Sequence[FollowedMode]]) -> Assembly:
+def assemble(
+    newest: Measurement,
+    across: Measurement | None,
+    series: Mapping[str, Sequence[FollowedMode]],
+    cross: Measurement | None = None,
+) -> Assembly:
     """The tool by its newest tap test and the newest one across, in the other direction, where there is one.
 
-    series: tap tests of both directions up to the newest. The frequencies of an older direction, however old, are moved
-    by as much as those of the newest one have changed since.
+    series: tap tests of both directions up to the newest; cross: the newest cross tap, where there is one. The
+    frequencies of an older direction, however old, are moved by as much as those of the newest one have changed since.
     """
     taps = [newest, *([across] if across is not None else [])]
     modes: dict[str, Modes] = {tap.direction: tap.at_tip for tap in taps if tap.at_tip}
@@ -106,6 +112,7 @@ def assemble(newest: Measurement, across: Measurement | None, series: Mapping[st
     if across is not None and moved is not None and newest.time - across.time > TOGETHER:
         modes[across.direction] = [mode.scaled(moved, 1.0, "moved with the other direction") for mode in across.at_tip]
     directions = tuple(name for name in ("x", "y") if modes.get(name))
+    signed, about_cross = fitting_cross(modes.get("x"), modes.get("y"), None if cross is None else cross.cross)
     return Assembly(
         tool=newest.tool,
         time=newest.time,
@@ -116,9 +123,10 @@ def assemble(newest: Measurement, across: Measurement | None, series: Mapping[st
         calibration=next((tap.calibration for tap in taps if tap.calibration is not None), None),
         taps={tap.direction: tap.tap_id for tap in taps},
         predicted=False,
-        remarks=(*newest.remarks, *_about_directions(newest, across, directions, moved)),
+        remarks=(*newest.remarks, *_about_directions(newest, across, directions, moved), *about_cross),
+        cross=signed,
         series=series,
-        unusable={tap.direction: _why_unusable(tap) for tap in taps if not tap.at_tip},
+        unusable={tap.direction: _why_unusable(tap) for tap in taps if not tap.at_tip and tap.direction != ACROSS},
         questions=tuple(in_question(tap.tap_id, asked) for tap in taps for asked in open_questions(tap.remarks)),
     )
 

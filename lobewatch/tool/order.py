@@ -7,7 +7,7 @@ from datetime import datetime
 
 import msgspec
 
-from acquisition import Remark
+from acquisition import ACROSS, Remark
 from lobewatch.machine import TapEntry
 from lobewatch.tool.mountings import MountedTools
 
@@ -22,12 +22,14 @@ class Place(msgspec.Struct, frozen=True, gc=False):
     before: int | None
     """Place of the one before it of the same series and direction."""
     across: int | None
-    """Place of the newest one before it of the same series in another direction."""
+    """Place of the newest one before it of the same series in another direction, x or y."""
     baseline: datetime | None = None
     """The event before it from which on all comparing begins anew; nothing before that is built on."""
     series: str = ""
     """Identity of the first tap test of its series: of one tool with one stick-out in one state, both directions, since
     the baseline."""
+    cross: int | None = None
+    """Place of the newest cross tap of the same series, itself where it is; None without any."""
     remarks: tuple[Remark, ...] = ()
     """Remarks where the series or the drawbar force is not that of the test before."""
 
@@ -52,10 +54,11 @@ class Order:
         newest = self._newest.setdefault(series, {})
         across = None
         for direction, place in newest.items():
-            if direction != tap.direction and (across is None or place > across):
+            if direction not in (tap.direction, ACROSS) and (across is None or place > across):
                 across = place
-        self.places.append(Place(number, tap, newest.get(tap.direction), across, baseline, series, remarks))
+        before = newest.get(tap.direction)
         newest[tap.direction] = number
+        self.places.append(Place(number, tap, before, across, baseline, series, newest.get(ACROSS), remarks))
 
 
 def places(taps: Iterable[TapEntry], baselines: Sequence[datetime] = ()) -> list[Place]:

@@ -1,0 +1,132 @@
+"""A cross tap among those in x and in y: it says to which side modes lie, and nothing else is taken from it."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from acquisition import Circumstances, Frf, TapDirection, TapTest, from_accelerance, new_tap_id
+from lobes import shown_modes
+from lobewatch.logbook import Logbook
+from lobewatch.show.report.report import render_report
+from modal import Mode, synthesize
+from tests.lobewatch.conftest import Shop
+
+LINES = np.arange(4.0, 4000.0, 2.0)
+PAIR = [Mode(1600.0, 0.03, 30e6), Mode(1720.0, 0.028, 33e6)]
+NARROW = """
+[[program]]
+name = "N"
+tool = "reference"
+teeth = 4
+tool_diameter_mm = 20
+radial_depth_mm = [4, 4]
+direction = "down"
+tangential_n_per_mm2 = 1400
+radial_n_per_mm2 = 500
+speed_rpm = 9000
+depth_mm = 0.5
+helix_deg = 0
+feed = "x"
+"""
+
+
+def turned_by(degrees: float) -> NDArray[np.float64]:
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.array([[c, s], [-s, c]])
+
+
+def tap(shop: Shop, days: float, direction: TapDirection, modes: list[Mode], seed: int = 0) -> None:
+    about = Circumstances("m", shop.start + timedelta(days=days), "reference", direction, "", shop.folder.toml_text)
+    random, frf = np.random.default_rng(seed), synthesize(modes, LINES)
+    noise = 1e-3 * np.max(np.abs(frf.accelerance)) * random.normal(size=(2, LINES.size))
+    noisy: Frf = from_accelerance(LINES, frf.accelerance + noise[0] + 1j * noise[1])
+    shop.folder.commit(TapTest(new_tap_id(about), about, noisy))
+
+
+@pytest.fixture
+def askew(shop: Shop) -> Shop:
+    """A spindle whose modes lie 35 degrees askew, tapped in x and y, with a narrow program."""
+    shop.put(NARROW)
+    shown = shown_modes(PAIR, turned_by(35))
+    tap(shop, 0, "x", shown.x)
+    tap(shop, 0.01, "y", shown.y)
+    return shop
+
+
+def remark_codes(logbook: Logbook) -> list[str]:
+    (verdict,) = logbook.verdicts()
+    return [remark.code for remark in verdict.remarks]
+
+
+def test_a_cross_tap_settles_to_which_side_modes_lie(askew: Shop) -> None:
+    before = askew.logbook
+    assert "cross-not-tapped" in remark_codes(before)
+    assert len(before.assembly("reference").axes.patterns) == 2
+    tap(askew, 0.02, "xy", shown_modes(PAIR, turned_by(35)).cross)
+    after = askew.logbook
+    assert "cross-not-tapped" not in remark_codes(after)
+    tool = after.assembly("reference")
+    (pattern,) = tool.axes.patterns
+    assert pattern is not None
+    first = np.argmin(np.abs([mode.frequency - 1600.0 for mode in tool.x or ()]))
+    assert pattern[first] == pytest.approx([np.cos(np.radians(35)), np.sin(np.radians(35))], abs=0.01)
+    assert tool.directions == ("x", "y")
+
+
+def test_a_cross_tap_is_a_series_of_its_own_and_asks_nothing(askew: Shop) -> None:
+    tap(askew, 0.02, "xy", shown_modes(PAIR, turned_by(35)).cross)
+    logbook = askew.logbook
+    standing = logbook.standing(askew.start + timedelta(days=1))
+    assert [series.direction for series in standing.series].count("xy") == 1
+    assert not {"no-mode-in-band", "mode-lost", "one-direction"} & {remark.code for remark in standing.remarks}
+    assert logbook.measurement(logbook.taps[-1].id).calibration is None
+    assert "xy" in render_report(logbook, "reference", "x")
+    tap(askew, 40, "x", shown_modes(PAIR, turned_by(35)).x, seed=3)
+    assert len(askew.logbook.assembly("reference").axes.patterns) == 1
+
+
+def test_a_cross_tap_of_a_round_spindle_shows_nothing_and_loses_no_mode(shop: Shop) -> None:
+    shop.put(NARROW)
+    tap(shop, 0, "x", [PAIR[0]])
+    tap(shop, 0.01, "y", [PAIR[0].scaled(1.001, 1.0, "")])
+    tap(shop, 0.02, "xy", [Mode(1600.0, 0.03, 1e12)])
+    logbook = shop.logbook
+    assert logbook.assembly("reference").axes.patterns == [None]
+    standing = logbook.standing(shop.start + timedelta(days=1))
+    assert not {"no-mode-in-band", "mode-lost"} & {remark.code for remark in standing.remarks}
+
+
+@pytest.mark.parametrize(
+    ("cross", "problem"),
+    [
+        ([Mode(1660.0, 0.03, 6e7)], "it shows 1660 Hz, 3.5 % from the nearest mode of x and y: another clamping"),
+        ([Mode(1600.0, 0.03, 5e6)], "times what x and y allow"),
+    ],
+)
+def test_a_cross_tap_of_another_clamping_is_not_used(askew: Shop, cross: list[Mode], problem: str) -> None:
+    tap(askew, 0.02, "xy", cross)
+    tool = askew.logbook.assembly("reference")
+    assert tool.cross is None
+    (remark,) = [remark for remark in tool.remarks if remark.code == "cross-other-clamping"]
+    assert problem in remark.text
+    assert "cross-not-tapped" in remark_codes(askew.logbook)
+
+
+def test_a_cross_tap_alone_tells_no_tool(shop: Shop) -> None:
+    shop.put(NARROW)
+    tap(shop, 0, "xy", shown_modes(PAIR, turned_by(35)).cross)
+    assert shop.logbook.assembly("reference").directions == ()
+    (verdict,) = shop.logbook.verdicts()
+    assert verdict.word.value == "unknown"
+
+
+def test_stored_rows_hold_beside_a_cross_tap_that_comes_later(askew: Shop) -> None:
+    before = askew.logbook.history.rows
+    tap(askew, 0.02, "xy", shown_modes(PAIR, turned_by(35)).cross)
+    rows = askew.logbook.history.rows
+    assert [row.direction for row in rows] == ["x", "y", "xy"]
+    assert [row.frequency for row in rows[:2]] == [row.frequency for row in before]

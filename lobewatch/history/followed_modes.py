@@ -6,7 +6,6 @@ import math
 from bisect import bisect_left
 from collections.abc import Sequence
 
-from acquisition import ACROSS
 from lobewatch.history.history import Row
 from lobewatch.tool.order import Place
 from lobewatch.tool.series import FollowedMode
@@ -31,7 +30,7 @@ class FollowedModes:
             direction: modes[: bisect_left(numbers[direction], place.number)]
             for direction, modes in self._modes.get(place.series, {}).items()
         }
-        return {"x": [], "y": [], ACROSS: [], **earlier}
+        return {"x": [], "y": [], **earlier}
 
     def _add(self, number: int, row: Row) -> None:
         values = row.followed

@@ -65,7 +65,7 @@ class TapMeasurements:
         other = None if place.across is None else self.measurement(self._places[place.across], rows)
         series = self._followed.before(place, rows)
         if newest.followed is not None and not open_questions(newest.remarks):
-            series[newest.direction].append(_followed_mode(newest, newest.followed))
+            series.setdefault(newest.direction, []).append(_followed_mode(newest, newest.followed))
         return assemble(newest, other, series, cross)
 
     def assembly_of(self, tool: str, places: Sequence[Place], rows: Sequence[Row]) -> Assembly:

@@ -125,7 +125,7 @@ def assemble(
         predicted=False,
         remarks=(*newest.remarks, *_about_directions(newest, across, directions, moved), *about_cross),
         cross=signed,
-        series=series,
+        series={direction: modes for direction, modes in series.items() if direction != ACROSS},
         unusable={tap.direction: _why_unusable(tap) for tap in taps if not tap.at_tip and tap.direction != ACROSS},
         questions=tuple(in_question(tap.tap_id, asked) for tap in taps for asked in open_questions(tap.remarks)),
     )

@@ -75,6 +75,9 @@ def test_a_cross_tap_settles_to_which_side_modes_lie(askew: Shop) -> None:
     first = np.argmin(np.abs([mode.frequency - 1600.0 for mode in tool.x or ()]))
     assert pattern[first] == pytest.approx([np.cos(np.radians(35)), np.sin(np.radians(35))], abs=0.01)
     assert tool.directions == ("x", "y")
+    assert tool.series.keys() == {"x", "y"}
+    tap(askew, 0.03, "xy", shown_modes(PAIR, turned_by(35)).cross, seed=2)
+    assert askew.logbook.assembly("reference").series.keys() == {"x", "y"}
 
 
 def test_a_cross_tap_is_a_series_of_its_own_and_asks_nothing(askew: Shop) -> None:

@@ -108,6 +108,10 @@ def test_a_cross_tap_of_a_round_spindle_shows_nothing_and_loses_no_mode(shop: Sh
     [
         ([Mode(1660.0, 0.03, 6e7)], "it shows 1660 Hz, 3.6 % from the nearest mode of x and y: another clamping"),
         ([Mode(1600.0, 0.03, 5e6)], "times what x and y allow"),
+        (
+            shown_modes(PAIR, turned_by(35)).x,
+            "it is the tap in x once more: hammer and sensor were in the same direction",
+        ),
     ],
 )
 def test_a_cross_tap_of_another_clamping_is_not_used(askew: Shop, cross: list[Mode], problem: str) -> None:

@@ -14,7 +14,7 @@ NEAR = 0.01
 MOST = 1.5
 """Largest cross residue over sqrt(Rx Ry): above 1 by more than the errors of three stiffnesses it cannot be."""
 ALIKE = 0.1
-"""Relative difference of stiffnesses below which a cross mode is that of x or y; chosen: three times a usual scatter."""
+"""Relative difference of stiffnesses below which a cross mode is that of x or y; chosen: three times the scatter."""
 LOUD = 0.3
 """Peak of a cross mode over the largest peak, from which on it is asked where it belongs."""
 

@@ -110,6 +110,11 @@ class Cut:
         return next(pitch[:k] for k in range(1, len(pitch) + 1) if pitch[:k] * (len(pitch) // k) == pitch)
 
     @property
+    def repeats(self) -> int:
+        """Times that the cutter looks the same in a turn: its teeth where they are evenly spaced."""
+        return self.teeth // len(self.pattern)
+
+    @property
     def ahead(self) -> NDArray[np.float64]:
         """Angle by which each tooth is ahead of the first (rad), shape (teeth,): not above 0 of uneven teeth."""
         if not self.pitch:

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from acquisition.emulation.milling_cut import MillingCut, Passage
 from acquisition.emulation.milling_tables import ModeTables, ToothTables, steps_needed, tables
+from acquisition.emulation.uneven_milling import turn_tables, uneven_cutting
 
 Floats = NDArray[np.float64]
 
@@ -57,6 +58,9 @@ def simulate_cut(cut: MillingCut, passage: Passage | None = None) -> TipMotion:
 def simulate_cuts(cuts: Sequence[MillingCut], passage: Passage | None = None) -> Iterator[tuple[int, TipMotion]]:
     """Index and tip motion of each cut, in the order in which they are ready: cuts alike are stepped together."""
     passage = passage or Passage()
+    for number, cut in enumerate(cuts):
+        if cut.pitch:
+            yield number, _uneven_motion(cut, passage)
     for group in _groups(cuts):
         members = [cuts[i] for i in group]
         modes, teeth = tables(members, max(map(steps_needed, members)))
@@ -66,10 +70,17 @@ def simulate_cuts(cuts: Sequence[MillingCut], passage: Passage | None = None) ->
             yield number, _motion(cutting[:, place], swing[place], modes, place, passage, turn)
 
 
+def _uneven_motion(cut: MillingCut, passage: Passage) -> TipMotion:
+    modes, tooth = turn_tables(cut)
+    swings, gains, swing = uneven_cutting(cut, modes, tooth, passage)
+    cutting = _acceleration(swings, gains, modes)[:, 0].astype(np.float32)
+    return _motion(cutting, swing, modes, 0, passage, len(tooth.root))
+
+
 def _groups(cuts: Sequence[MillingCut]) -> Iterator[list[int]]:
-    """Indices of cuts to step together."""
+    """Indices of cuts to step together, all whose teeth are evenly spaced."""
     group: list[int] = []
-    for i in sorted(range(len(cuts)), key=lambda i: cuts[i].tooth_period):
+    for i in sorted((i for i, cut in enumerate(cuts) if not cut.pitch), key=lambda i: cuts[i].tooth_period):
         if group and (len(group) == TOGETHER or cuts[i].tooth_period > ALIKE * cuts[group[0]].tooth_period):
             yield group
             group = []
@@ -93,7 +104,7 @@ def _cutting(
     for period in range(periods):
         stands_out = np.take_along_axis(runout[np.newaxis], (teeth.place - period) % number, axis=2)
         time = (period * steps + np.arange(steps)[:, np.newaxis] + 0.5) * step
-        depth = _depth(passage, time)
+        depth = passage.depth_at(time)
         push, rub = teeth.push, teeth.rub * depth[..., np.newaxis]
         if np.any(depth < 1):
             push = push * depth[..., np.newaxis, np.newaxis]
@@ -103,12 +114,6 @@ def _cutting(
         swing = swings[-1]
         record[period * steps : (period + 1) * steps] = _acceleration(swings, gains, modes)
     return record, swing
-
-
-def _depth(passage: Passage, time: Floats) -> Floats:
-    """Share of the depth at times since first contact (s)."""
-    times = [0.0, passage.ramp, passage.ramp + passage.steady, passage.cutting]
-    return np.interp(time, times, [float(passage.ramp == 0), 1.0, 1.0, 0.0])
 
 
 def _period(

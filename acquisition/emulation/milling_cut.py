@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition.emulation.hammered_structure import Structure
 
@@ -18,7 +19,7 @@ class MillingCut:
     """
 
     teeth: int
-    """Number of evenly spaced teeth."""
+    """Number of teeth."""
     entry_angle: float
     """Angle at which a tooth enters the cut (rad), 0 to pi."""
     exit_angle: float
@@ -47,6 +48,8 @@ class MillingCut:
     """Lag of a helical tooth along the axis (rad/m); 0 for straight teeth."""
     feed_angle: float = 0.0
     """Angle from x to the feed (rad)."""
+    pitch: tuple[float, ...] = ()
+    """Angle by which each tooth follows the tooth before it (rad), in order of entry; () for evenly spaced teeth."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot be simulated."""
@@ -65,12 +68,18 @@ class MillingCut:
             raise ValueError(f"radial, tangential_edge, radial_edge, helix_lag = {least} must be finite and >= 0")
         if len(self.runout) not in (0, self.teeth):
             raise ValueError(f"runout has {len(self.runout)} values for {self.teeth} teeth; give one a tooth, or none")
+        if self.pitch and not (len(self.pitch) == self.teeth and min(self.pitch) > 0 and self._is_turn):
+            raise ValueError(f"pitch={self.pitch} rad: give one above 0 for each of {self.teeth} teeth, a turn in all")
         if self.x is None and self.y is None:
             raise ValueError("x and y are both rigid; give the modes of one direction at least")
 
     @property
+    def _is_turn(self) -> bool:
+        return abs(sum(self.pitch) - 2 * np.pi) < 1e-6
+
+    @property
     def tooth_period(self) -> float:
-        """From tooth to tooth (s)."""
+        """From tooth to tooth, in the mean (s)."""
         return 60 / (self.teeth * self.speed_rpm)
 
 
@@ -91,6 +100,11 @@ class Passage:
         """Refuse times that are none."""
         if not (min(self.before, self.ramp, self.steady, self.after) >= 0 and self.cutting > 0):
             raise ValueError(f"{self}: times must be >= 0, and ramp or steady > 0")
+
+    def depth_at(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Share of the depth at times since first contact (s)."""
+        times = [0.0, self.ramp, self.ramp + self.steady, self.cutting]
+        return np.interp(time, times, [float(self.ramp == 0), 1.0, 1.0, 0.0])
 
     @property
     def cutting(self) -> float:

@@ -45,8 +45,8 @@ class CutComparison:
 
     @property
     def tooth_frequency(self) -> float:
-        """Teeth a second at the speed that was heard, else as it was set (Hz)."""
-        return self.setting.cut.teeth * self.speed_rpm / 60
+        """Times a second that the cut repeats, at the speed that was heard, else as it was set (Hz)."""
+        return self.setting.cut.repeats * self.speed_rpm / 60
 
     @property
     def speed_rpm(self) -> float:
@@ -57,7 +57,7 @@ class CutComparison:
     def lobe(self) -> int | None:
         """Whole waves of chatter between two teeth; None without chatter."""
         chatter = self.heard.chatter
-        return None if chatter is None else int(chatter.frequency / self.tooth_frequency)
+        return None if chatter is None else int(chatter.frequency * 60 / (self.setting.cut.teeth * self.speed_rpm))
 
     @property
     def apart(self) -> float | None:
@@ -94,7 +94,7 @@ def compare_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> li
     recording = CutRecording(
         signal.acceleration,
         signal.sample_rate,
-        cut.teeth,
+        cut.repeats,
         cut.immersion,
         setting.speed_rpm,
         signal.clipped,

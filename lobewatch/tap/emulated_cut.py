@@ -13,7 +13,7 @@ import numpy as np
 from acquisition import Bench, DataError, Driver, EmulatorThread, Structure
 from acquisition.emulation import CutSound, Housing, MillingCut, Passage, random_housing, simulate_cut
 from dsm import Spindle
-from lobes import Program, program_limit
+from lobes import Cut, Program, program_limit
 from lobewatch.cuts.learning.priors import FORCE
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.cut_setting import CutSetting
@@ -114,7 +114,7 @@ def emulate_cut(
     if driver.emulate is None:
         raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
     truth, random, noise = hidden_truth(seed), *np.random.default_rng(seed).spawn(2)
-    runout = runout_of(setting.cut.teeth, random)
+    runout = runout_of(setting.cut, random)
     cut = _turning_cut(folder, setting, _at_rest(folder, setting, spindle), truth, runout)
     motion, housing = simulate_cut(cut, passage), _levelled(random_housing(random, cut.speed_rpm))
     bench = Bench(
@@ -168,6 +168,7 @@ def _turning_cut(
         y=truth.y.of(at_rest),
         runout=runout,
         helix_lag=setting.cut.helix_lag,
+        pitch=setting.cut.pitch,
         feed_angle=FEED_ANGLES.get(setting.feed, 0.0),
     )
 
@@ -190,9 +191,9 @@ def hidden_truth(seed: int) -> HiddenTruth:
     return HiddenTruth(x, y, _drawn(random, *FORCE), 1 + random.uniform(-OFF_COMMAND, OFF_COMMAND))
 
 
-def runout_of(teeth: int, random: np.random.Generator) -> tuple[float, ...]:
+def runout_of(cut: Cut, random: np.random.Generator) -> tuple[float, ...]:
     """Run-out of each tooth of an eccentric tool: how far it stands out (m)."""
-    angle = 2 * np.pi * np.arange(teeth) / teeth + random.uniform(0, 2 * np.pi)
+    angle = np.abs(cut.ahead) + random.uniform(0, 2 * np.pi)
     return tuple((random.uniform(0, RUNOUT) * np.cos(angle)).tolist())
 
 

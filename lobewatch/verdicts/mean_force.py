@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from lobes import Cut, MillingRows
 from lobes.tooth_force import interval_forces, mean_force, turned
+from lobewatch.verdicts.uneven_loop import lowest_uneven, with_waves
 
 REACH = 0.7
 """Distance from each natural frequency up to which frequencies are looked at, relative ..."""
@@ -85,10 +86,14 @@ class MeanForce:
 
     def _limits(self, teeth: Floats, deepest: float) -> tuple[Floats, Floats]:
         """Limits and chatter frequencies at tooth frequencies (Hz) (r, s)."""
-        grid = self._grid()
+        grid, cut = self._grid(), self.rows.cut
+        if cut.pitch:
+            grid = with_waves(grid, cut, teeth)
         depth, chatter = np.full(teeth.shape, np.inf), np.full(teeth.shape, np.nan)
         for loop in self._eigenvalues(grid):
-            limit, frequency = _lowest(grid, loop, teeth, deepest)
+            limit, frequency = (
+                lowest_uneven(grid, loop, cut, teeth) if cut.pitch else _lowest(grid, loop, teeth, deepest)
+            )
             chatter = np.where(limit < depth, frequency, chatter)
             depth = np.minimum(limit, depth)
         return depth, chatter

@@ -17,7 +17,7 @@ class CutEvidence:
     """One test cut in SI units."""
 
     cut: Cut
-    """Teeth, immersion, direction, helix, and the coefficients that its material was taken for."""
+    """Teeth and their pitch, immersion, direction, helix, and the coefficients that its material was taken for."""
     speed_rpm: float
     """Spindle speed (rpm)."""
     depth: float
@@ -44,8 +44,8 @@ class CutEvidence:
 
     @property
     def tooth_frequency(self) -> float:
-        """Teeth a second (Hz)."""
-        return self.cut.teeth * self.speed_rpm / 60
+        """Times a second that the cut repeats (Hz): teeth a second where they are evenly spaced."""
+        return self.cut.repeats * self.speed_rpm / 60
 
     @property
     def chatters(self) -> bool:

@@ -41,7 +41,7 @@ class LimitCharts:
     limits: Floats
     """Limits in the worst direction of feed, as deep as is allowed (m), shape (r, s)."""
     frequencies: Floats
-    """Chatter frequencies at them, folded by the teeth (Hz), shape (r, s)."""
+    """Chatter frequencies at them, folded by how often the cut repeats (Hz), shape (r, s)."""
     order: NDArray[np.intp]
     """Draws of each speed by their limits, the deepest first, shape (r, s)."""
     typical: float
@@ -61,7 +61,7 @@ class LimitCharts:
         order = np.argsort(-limit, axis=0, kind="stable")
         depth = np.floor(np.take_along_axis(limit, order, axis=0) * 1e3 / MM + ROUNDING) * MM / 1e3
         typical = float(np.mean(rows.frequency)) / (2 * np.pi)
-        teeth = grid.cut.teeth * grid.speeds / 60
+        teeth = grid.cut.repeats * grid.speeds / 60
         return cls(grid, limit, fold_frequency(frequency, teeth), order, typical, grid.speeds * depth)
 
     def gains(self, weights: Floats, best: float) -> Floats:

@@ -38,6 +38,6 @@ def expected_sound(setting: CutSetting, assembly: Assembly, speed_rpm: float) ->
         rows = rows_of(system, cut, speed)
         multipliers.append(largest_multipliers(rows, depth, piece_numbers(rows, setting.depth))[0])
     worst = int(np.argmax([abs(multiplier[0]) for multiplier in multipliers]))
-    tooth = np.array([setting.cut.teeth * speed_rpm / 60])
-    frequency = chatter_frequency(system, cuts[worst], multipliers[worst], depth[0], tooth)
+    repeats = np.array([setting.cut.repeats * speed_rpm / 60])
+    frequency = chatter_frequency(system, cuts[worst], multipliers[worst], depth[0], repeats)
     return ExpectedSound(bool(abs(multipliers[worst][0]) < 1), float(frequency[0]))

@@ -45,7 +45,7 @@ class HeardCut:
     tool: str
     """Tool in the spindle."""
     cut: Cut
-    """Teeth, immersion, direction and the coefficients that it was judged with."""
+    """Teeth and their pitch, immersion, direction and the coefficients that it was judged with."""
     coefficients: str
     """Material that these are of; empty where machine.toml gave the numbers themselves."""
     feed: str
@@ -97,9 +97,9 @@ class HeardCut:
         return {"kind": KIND, **fields, "at": self.at.isoformat()}
 
 
-def geometry(cut: Cut) -> tuple[int, float, str, float]:
+def geometry(cut: Cut) -> tuple[int, float, str, float, tuple[float, ...]]:
     """Properties that two cuts with one cutter at one immersion have alike, whatever the material and the feed."""
-    return cut.teeth, cut.immersion, cut.direction, cut.helix_lag
+    return cut.teeth, cut.immersion, cut.direction, cut.helix_lag, cut.pitch
 
 
 def cut_of_line(line: Mapping[str, Any], excluded: str = "") -> HeardCut:

@@ -37,8 +37,8 @@ class CutSetting:
 
     @property
     def tooth_frequency(self) -> float:
-        """Teeth a second (Hz)."""
-        return self.cut.teeth * self.speed_rpm / 60
+        """Times a second that the cut repeats (Hz): teeth a second where they are evenly spaced."""
+        return self.cut.repeats * self.speed_rpm / 60
 
     @property
     def heard_cut_fields(self) -> dict[str, Any]:

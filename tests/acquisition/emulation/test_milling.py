@@ -240,3 +240,35 @@ def test_what_is_no_cut_is_refused(change: dict[str, Any]) -> None:
 def test_a_passage_without_a_cut_is_refused() -> None:
     with pytest.raises(ValueError, match="ramp or steady"):
         Passage(ramp=0.0, steady=0.0)
+
+
+def test_pitches_that_are_alike_are_even_teeth() -> None:
+    even = cut_of(HALF_UP, 7000.0, 1e-3, runout=(3e-6, 0.0, -5e-6), helix_lag=60.0)
+    passage = Passage(before=0.0, ramp=0.02, steady=0.2, after=0.0)
+    motion, same = (simulate_cut(cut, passage) for cut in (even, replace(even, pitch=(2 * math.pi / 3,) * 3)))
+    spectra = [
+        np.abs(np.fft.rfft(middle(one, 60 / 7000 * 10, end=0.21), axis=1))[:, 10:160:10] / one.sample_rate
+        for one in (motion, same)
+    ]
+    assert spectra[1] == pytest.approx(spectra[0], rel=0.03, abs=0.01 * float(np.max(spectra[0])))
+
+
+@pytest.mark.parametrize(("pitch", "speed"), [((80, 100, 80, 100), 6600.0), ((75, 85, 95, 105), 5200.0)])
+def test_uneven_teeth_chatter_beyond_their_limit_and_not_below(pitch: tuple[float, ...], speed: float) -> None:
+    cut = Cut(4, 1.0, "down", 6e8, 2e8, pitch=tuple(np.radians(pitch)))
+    x, y = ([Mode(*one) for one in side] for side in (X, Y))
+    limit, even = (
+        float(stability_boundary(x, y, one, [speed], 0.03).depth[0]) for one in (cut, replace(cut, pitch=()))
+    )
+    assert limit > 1.3 * even
+    below, above = (
+        simulate_cut(cut_of(cut, speed, side * limit, pitch=cut.pitch), Passage(0.0, 0.02, 0.5, 0.0)).wander
+        for side in (0.94, 1.06)
+    )
+    assert below < 0.01 < 0.3 < above
+
+
+@pytest.mark.parametrize("pitch", [(1.0, 2.0), (2.0, 2.0, 2.0), (-1.0, 3.0, 2 * math.pi - 2.0)])
+def test_pitches_that_are_none_are_refused(pitch: tuple[float, ...]) -> None:
+    with pytest.raises(ValueError, match=r"pitch=.* one above 0 for each of 3 teeth, a turn in all"):
+        cut_of(HALF_UP, 7000.0, 1e-3, pitch=pitch)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from acquisition import DataError, TapsSource
 from acquisition.devices import find_driver
 from acquisition.emulation import Passage
+from lobes import Cut
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
@@ -110,7 +111,7 @@ def test_truths_scatter_as_spindles_at_speed_may() -> None:
 
 
 def test_an_eccentric_tool_has_teeth_on_a_circle() -> None:
-    runout = np.array(runout_of(4, np.random.default_rng(1)))
+    runout = np.array(runout_of(Cut(4, 1.0, "down", 1e9, 3e8), np.random.default_rng(1)))
     assert np.max(np.abs(runout)) <= 20e-6
     assert runout[0] == pytest.approx(-runout[2])
 

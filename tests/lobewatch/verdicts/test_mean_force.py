@@ -19,7 +19,14 @@ SPEEDS = np.geomspace(4000, 24000, 60)
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7])
-@pytest.mark.parametrize("cut", [Cut(4, 1.0, "down", 1.4e9, 5e8), Cut(3, 0.5, "up", 7e8, 1e8)])
+@pytest.mark.parametrize(
+    "cut",
+    [
+        Cut(4, 1.0, "down", 1.4e9, 5e8),
+        Cut(3, 0.5, "up", 7e8, 1e8),
+        Cut(4, 0.75, "down", 1.4e9, 5e8, pitch=tuple(np.radians((80, 90, 95, 95)))),
+    ],
+)
 def test_limits_are_those_of_zero_order(cut: Cut, angle: float) -> None:
     cut = replace(cut, feed_angle=angle)
     rows = rows_of(milling_system(X, Y), cut, np.ones(2))

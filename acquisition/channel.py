@@ -51,8 +51,8 @@ class Channel:
         """Refuse what cannot be a channel."""
         if self.quantity not in get_args(ChannelQuantity):
             raise ValueError(f"quantity={self.quantity!r} is none of {', '.join(get_args(ChannelQuantity))}")
-        if self.direction:
-            tap_direction(self.direction)
+        if self.direction and tap_direction(self.direction) == ACROSS:
+            raise ValueError(f"direction={self.direction!r} is that of a tap across; a sensor has x or y")
         if not np.isfinite(self.sensitivity) or self.sensitivity == 0:
             raise ValueError(f"{self.quantity} sensitivity={self.sensitivity} is not a finite number other than 0")
         if not (np.isfinite(self.full_scale) and self.full_scale > 0):

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lobes.peaks import peaks
 from lobes.stability_lobes import StabilityLobes
 
 SHARE = 0.8
@@ -58,10 +59,8 @@ def pockets(lobes: StabilityLobes, deepest: ArrayLike) -> list[Pocket]:
         raise ValueError(f"deepest={deepest!r} m is not finite and > 0; give the deepest cut of interest")
     speed, depth = lobes.speed_rpm[order], np.minimum(lobes.depth[order], most)
     padded = np.concatenate(([0.0], depth, [0.0]))
-    from scipy.signal import find_peaks  # takes longer to import than all of lobes
-
-    peaks = find_peaks(padded, plateau_size=1, prominence=0.05 * depth.min())[0] - 1
-    return [Pocket(float(speed[i]), float(depth[i]), *_ends(speed, depth, i)) for i in peaks]
+    tops = peaks(padded, prominence=0.05 * depth.min()) - 1
+    return [Pocket(float(speed[i]), float(depth[i]), *_ends(speed, depth, i)) for i in tops]
 
 
 def _ends(speed: NDArray[np.float64], depth: NDArray[np.float64], peak: int) -> tuple[float, float]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from acquisition import Frf
@@ -114,11 +115,12 @@ def weighted_sum(parts: Sequence[tuple[float, TipResponse]]) -> TipResponse:
 
 
 def _from_frf(frf: Frf) -> TipResponse:
-    from scipy.interpolate import CubicSpline  # takes longer to import than all of lobes
 
     lines = np.arange(frf.frequency.size)
     steps = np.arange(lines[-1] * STEPS_PER_LINE + 1) / STEPS_PER_LINE
-    return TipResponse(np.interp(steps, lines, frf.frequency), CubicSpline(frf.frequency, frf.receptance))
+    return TipResponse(
+        np.interp(steps, lines, frf.frequency), scipy.interpolate.CubicSpline(frf.frequency, frf.receptance)
+    )
 
 
 def _highest(tip: Tip) -> float:

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from acquisition import Frf, Hit, Remark
 from modal.bands.extraction import Extraction, FittedBand
@@ -48,7 +48,7 @@ def _single(change: NDArray[np.float64], power: NDArray[np.float64]) -> NDArray[
 
 def _with_remark(mode: Mode, peaks: NDArray[np.float64], change: NDArray[np.float64]) -> Mode:
     slope, error = _line(peaks, change)
-    sure = float(stdtrit(peaks.size - 2, SURE))
+    sure = float(scipy.special.stdtrit(peaks.size - 2, SURE))
     is_felt = abs(slope) * np.ptp(peaks) > LEAST_CHANGE * mode.frequency
     if trust_of(mode) is not Trust.TRUSTED or not is_felt or abs(slope) < sure * error:
         return mode

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from dsm.calibration.plus_minus import plus_minus
@@ -240,6 +241,5 @@ def _highest(dampers: _Dampers, low: _Point, high: _Point) -> _Point:
 
 
 def _zero(function: Callable[[float], float], low: float, high: float, **tolerances: float) -> float:
-    from scipy.optimize import brentq  # takes longer to import than all of dsm
 
-    return float(brentq(function, low, high, **tolerances))
+    return float(scipy.optimize.brentq(function, low, high, **tolerances))

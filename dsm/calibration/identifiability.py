@@ -9,8 +9,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri, stdtrit
 
 from dsm.calibration.fit_remark import FitRemark
 from dsm.calibration.least_squares import Iterate, Problem, minimize
@@ -57,7 +57,7 @@ class Allowed(NamedTuple):
         """For a fit with a covariance."""
         given = problem.measured.std is not None
         variance, spare = (1.0, math.inf) if given else (best.cost / problem.spare, problem.spare)
-        return cls(variance, float(stdtrit(spare, (1 + CONFIDENCE) / 2)) ** 2, spare)
+        return cls(variance, float(scipy.special.stdtrit(spare, (1 + CONFIDENCE) / 2)) ** 2, spare)
 
     @property
     def limit(self) -> float:
@@ -246,8 +246,8 @@ def _reach(side: Sequence[tuple[float, float]], least: float, half: float) -> fl
 def _held(rises: Sequence[float]) -> float:
     """How often an interval holds the truth at whose ends the sum of squares rises by so many times what it should."""
     outside = (1 - CONFIDENCE) / 2
-    deviates = [-float(ndtri(outside)) * math.sqrt(max(rise, 0.0)) for rise in rises]
-    return float(1 - ndtr(-deviates[0]) - ndtr(-deviates[1]))
+    deviates = [-float(scipy.special.ndtri(outside)) * math.sqrt(max(rise, 0.0)) for rise in rises]
+    return float(1 - scipy.special.ndtr(-deviates[0]) - scipy.special.ndtr(-deviates[1]))
 
 
 def _falling(side: Sequence[Iterate]) -> list[Iterate]:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtrc
 
 from dsm.calibration.drawing import diameters, frequency_effects
 from dsm.calibration.measured import Measured
@@ -104,7 +104,7 @@ class Problem(NamedTuple):
         measured = self.measured
         if measured.std is None:
             return float(np.max(np.abs(state.fitted / measured.frequency - 1))) < UNLIKELY
-        return float(chdtrc(max(self.spare, 1), state.cost)) > UNLIKELY
+        return float(scipy.special.chdtrc(max(self.spare, 1), state.cost)) > UNLIKELY
 
 
 def minimize(

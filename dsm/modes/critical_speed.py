@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import scipy
+
 from dsm.modes.find_modes import find_modes
 from dsm.spindle.spindle import Spindle, require_support
 
@@ -21,7 +23,6 @@ def critical_speed(spindle: Spindle, mode: int = 1) -> float:
     Raises ValueError for a mode below 1 and for a shaft that is not held, ArithmeticError where there is none up to
     32 times the frequency at rest.
     """
-    from scipy.optimize import brentq  # takes longer to import than all of dsm
 
     if mode < 1:
         raise ValueError(f"mode={mode} is not at least 1, the lowest")
@@ -39,4 +40,4 @@ def critical_speed(spindle: Spindle, mode: int = 1) -> float:
             raise ArithmeticError(
                 f"mode {mode} has no critical speed up to {low * 30 / math.pi:.6g} rpm: its forward whirl stays ahead"
             )
-    return float(brentq(lead, low, high, xtol=1e-12 * at_rest, rtol=1e-13)) * 30 / math.pi
+    return float(scipy.optimize.brentq(lead, low, high, xtol=1e-12 * at_rest, rtol=1e-13)) * 30 / math.pi

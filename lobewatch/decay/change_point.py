@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import Literal, NamedTuple, Self
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri, stdtr, stdtrit
 
 from lobewatch.decay.readings import Readings
 from lobewatch.decay.series_base import SeriesBase, base_of
@@ -162,7 +162,7 @@ def _surer(
     merged = LikeliestChange(alone.score.copy(), alone.fell.copy(), alone.point.copy())
     for values, part in zip(merged, (together.score[n - 1], fell, shared[middle]), strict=True):
         values[last[counts]] = part[counts]
-    merged.score[last] = -ndtri(np.minimum(2 * ndtr(-merged.score[last]), 1.0))
+    merged.score[last] = -scipy.special.ndtri(np.minimum(2 * scipy.special.ndtr(-merged.score[last]), 1.0))
     return merged
 
 
@@ -192,7 +192,7 @@ def _farthest(base: SeriesBase, n: NDArray[np.intp]) -> tuple[NDArray[np.intp], 
 def _likeliest(base: SeriesBase, n: NDArray[np.intp], points: NDArray[np.intp], leans: Floats) -> LikeliestChange:
     """The likelier of two changes in the first n (r,), one of each kind at a point (2, r), that explain so much."""
     t = [base.t_of(lean, n) for lean in leans]
-    scores = -ndtri(stdtr(base.freedom(n), -np.maximum(*t)))
+    scores = -scipy.special.ndtri(scipy.special.stdtr(base.freedom(n), -np.maximum(*t)))
     fell = t[0] >= t[1]
     return LikeliestChange(scores, fell, np.where(fell, points[0], points[1]))
 
@@ -203,5 +203,5 @@ def _fall(base: SeriesBase, change: LikeliestChange, at: int, sign: int) -> Fall
     n, point = base.y.size, int(change.point[at])
     beta, error = base.fit_change(kind, n, point)
     length = n - 1 - point if kind == "slope" else 1
-    student = float(stdtrit(base.freedom(np.array([n]))[0], 0.975))
+    student = float(scipy.special.stdtrit(base.freedom(np.array([n]))[0], 0.975))
     return Fall(kind, point, -sign * beta * length, error * length * student)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import stdtr, stdtrit
 
 from lobewatch.decay.readings import Readings
 from lobewatch.decay.regressions import Regressions, pair_regressions, single_regressions, triple_regressions
@@ -223,18 +223,18 @@ def _heaviest(families: Sequence[Family]) -> tuple[tuple[Family, ...], Floats]:
 def _below(freedom: Floats, t: Floats) -> Floats:
     """Distribution of Student's t (j, d) of degrees of freedom (j,): 0 and 1 where nobody asks for more."""
     freedom = np.broadcast_to(freedom[:, np.newaxis], t.shape)
-    share, near = (t > 0).astype(np.float64), ~(np.abs(t) > stdtrit(freedom[:, :1], 1 - SURELY_NOT))
-    share[near] = stdtr(freedom[near], t[near])
+    share, near = (t > 0).astype(np.float64), ~(np.abs(t) > scipy.special.stdtrit(freedom[:, :1], 1 - SURELY_NOT))
+    share[near] = scipy.special.stdtr(freedom[near], t[near])
     return np.asarray(share)
 
 
 def _quantile(weight: Floats, middle: Floats, error: Floats, freedom: Floats, p: float) -> float:
     """Quantile of a mixture of Student's t, where an error of 0 is a value that is certain."""
-    reach = stdtrit(freedom, 1 - SURELY_NOT) * error
+    reach = scipy.special.stdtrit(freedom, 1 - SURELY_NOT) * error
     low, high = float((middle - reach).min()), float((middle + reach).max())
     for _ in range(HALVINGS):
         value = (low + high) / 2
         with np.errstate(invalid="ignore", divide="ignore"):
-            below = np.where(error > 0, stdtr(freedom, (value - middle) / error), middle <= value)
+            below = np.where(error > 0, scipy.special.stdtr(freedom, (value - middle) / error), middle <= value)
         low, high = (value, high) if weight @ below < p else (low, value)
     return high

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.special import digamma, polygamma
 
 from lobewatch.decay.lone_points import MAD
 from lobewatch.decay.readings import UNKNOWN_SCATTER, KnownSpread
@@ -21,8 +20,6 @@ FEWEST = 4
 """Series that anything is said of others from; chosen."""
 MOST = 30.0
 """Degrees of freedom that others are worth at most; chosen."""
-ALMOST_ALIKE = float(polygamma(1, MOST / 2))
-"""Variance of ln of a variance where they are worth that."""
 
 Floats = NDArray[np.float64]
 
@@ -45,10 +42,10 @@ def scatter_of_others(series: Sequence[KnownSpread]) -> KnownSpread:
     if len(known) < FEWEST:
         return UNKNOWN_SCATTER
     half = known[:, 1] / 2
-    logs = 2 * np.log(known[:, 0]) - digamma(half) + np.log(half)
-    spread = float(np.var(logs, ddof=1) - polygamma(1, half).mean())
+    logs = 2 * np.log(known[:, 0]) - scipy.special.digamma(half) + np.log(half)
+    spread = float(np.var(logs, ddof=1) - scipy.special.polygamma(1, half).mean())
     freedom = MOST
-    if spread > ALMOST_ALIKE:
-        freedom = 2 * brentq(lambda x: polygamma(1, x) - spread, 1e-3, MOST / 2)
-    variance = np.exp(logs.mean() + digamma(freedom / 2) - np.log(freedom / 2))
+    if spread > scipy.special.polygamma(1, MOST / 2):
+        freedom = 2 * scipy.optimize.brentq(lambda x: scipy.special.polygamma(1, x) - spread, 1e-3, MOST / 2)
+    variance = np.exp(logs.mean() + scipy.special.digamma(freedom / 2) - np.log(freedom / 2))
     return KnownSpread(float(np.sqrt(variance)), float(freedom))

@@ -8,7 +8,7 @@ from datetime import datetime, timedelta
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import stdtrit
+import scipy
 
 ENOUGH = 8
 """Number of tap tests from which on a series tells its own scatter."""
@@ -51,7 +51,7 @@ def scatter_of(series: Sequence[FollowedMode]) -> Scatter | None:
     values = np.array([point[1:] for point in series])
     values[:, :3] = np.log(values[:, :3])
     steps = np.diff(values, axis=0)
-    width = np.std(steps, axis=0, ddof=1) / np.sqrt(2) * stdtrit(len(steps) - 1, 0.975)
+    width = np.std(steps, axis=0, ddof=1) / np.sqrt(2) * scipy.special.stdtrit(len(steps) - 1, 0.975)
     return Scatter(*width.tolist())
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 from itertools import chain
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
 from acquisition import Frf
 from modal.bands.extraction import Extraction, FittedBand
@@ -125,6 +125,6 @@ def _stray_lines(state: Extraction) -> NDArray[np.bool_]:
     for band in state.bands:
         size = np.abs(band.data.own) * band.data.weight
         for mask, left, own in zip(stray, np.abs(band.fit.complex_residual), size, strict=True):
-            far = left > STRAY * np.maximum(median_filter(left, size=11), np.median(left))
+            far = left > STRAY * np.maximum(scipy.ndimage.median_filter(left, size=11), np.median(left))
             mask[band.lines] |= far & (left > ROUNDING * np.max(own))
     return stray

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter, uniform_filter1d
 
 from acquisition import Frf
 from modal.bands.line_weights import incoherent, measuring_factor
@@ -158,7 +158,7 @@ def _running_mean(values: NDArray[Any], length: int) -> NDArray[Any]:
     """Box mean over this many lines, twice."""
     if length == 1:
         return values
-    return np.asarray(uniform_filter1d(uniform_filter1d(values, length), length))
+    return np.asarray(scipy.ndimage.uniform_filter1d(scipy.ndimage.uniform_filter1d(values, length), length))
 
 
 def _is_same(a: _Peak, b: _Peak) -> bool:
@@ -234,6 +234,6 @@ def mobility_noise(frf: Frf) -> NDArray[np.float64]:
     """
     factor = measuring_factor(frf)
     rough = np.abs(np.diff(frf.receptance * factor, 3)) / np.sqrt(20)
-    scatter = np.pad(median_filter(rough, size=SEEN_OVER) / np.sqrt(np.log(2)), (1, 2), mode="edge")
-    noise = np.maximum(scatter, median_filter(incoherent(frf), size=SEEN_OVER))
+    scatter = np.pad(scipy.ndimage.median_filter(rough, size=SEEN_OVER) / np.sqrt(np.log(2)), (1, 2), mode="edge")
+    noise = np.maximum(scatter, scipy.ndimage.median_filter(incoherent(frf), size=SEEN_OVER))
     return np.asarray(noise * 2 * np.pi * frf.frequency / factor)

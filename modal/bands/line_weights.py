@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter, uniform_filter1d
 
 from acquisition import Frf
 
@@ -48,8 +48,10 @@ def incoherent(frf: Frf) -> NDArray[np.float64]:
 
 def _smoothed(variance: NDArray[np.float64]) -> NDArray[np.float64]:
     """Running mean that a disturbed line (hum) does not spread over; such a line keeps its own variance."""
-    most = OUTSTANDING * median_filter(variance, SMOOTHED_OVER)
-    return np.where(variance > most, variance, uniform_filter1d(np.minimum(variance, most), SMOOTHED_OVER))
+    most = OUTSTANDING * scipy.ndimage.median_filter(variance, SMOOTHED_OVER)
+    return np.where(
+        variance > most, variance, scipy.ndimage.uniform_filter1d(np.minimum(variance, most), SMOOTHED_OVER)
+    )
 
 
 def measuring_factor(frf: Frf) -> NDArray[np.float64]:

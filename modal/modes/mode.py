@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from acquisition import Remark
 
@@ -146,7 +146,7 @@ class Mode:
         if not 0 < level < 1:
             raise ValueError(f"level={level} is not between 0 and 1")
         p = (1 + level) / 2
-        return float(stdtrit(self.freedom if self.jackknife is None else self.n_hits - 1, p))
+        return float(scipy.special.stdtrit(self.freedom if self.jackknife is None else self.n_hits - 1, p))
 
     def interval(self, level: float = 0.95) -> NDArray[np.float64]:
         """Limits that hold the truth with this probability, (low, high) of frequency, damping and stiffness, (3, 2).

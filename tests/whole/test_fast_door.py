@@ -11,6 +11,7 @@ import pytest
 from lobewatch.commands import COMMANDS
 
 HEAVY = {"numpy", "scipy", "matplotlib", "aiohttp", "h5py", "jinja2"}
+NUMERICAL = {f"scipy.{part}" for part in ("signal", "stats", "interpolate", "optimize", "special", "ndimage", "linalg")}
 COMMAND_LINE = """
 import sys
 sys.argv[0] = "lobewatch"
@@ -59,8 +60,8 @@ def test_the_first_word_does_not_wait_for_rich_and_pydantic(line: str, tmp_path:
     ("code", "left_out"),
     [
         ("from acquisition import *", {"scipy.signal", "scipy.stats"}),
-        ("import modal, lobes, lobewatch.logbook.logbook", {"scipy.signal", "scipy.stats", "scipy.interpolate"}),
-        ("import dsm", {"scipy.signal", "scipy.stats", "scipy.optimize"}),
+        ("import modal, lobes, lobewatch.logbook.logbook, lobewatch.decay.standing", NUMERICAL),
+        ("import dsm", NUMERICAL - {"scipy.linalg"}),
         ("import acquisition.ports, acquisition.atomic, acquisition.errors, acquisition.remark", HEAVY),
         ("import lobewatch, lobewatch.machine.new_folder", HEAVY),
     ],

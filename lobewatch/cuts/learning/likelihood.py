@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from lobes import MillingRows, piece_numbers
 from lobes.floquet import largest_multipliers
@@ -51,7 +51,7 @@ class CutPrediction(NamedTuple):
     @property
     def chatters(self) -> Floats:
         """Chance that it chatters."""
-        return np.asarray(ndtr(self.excess / EDGE))
+        return np.asarray(scipy.special.ndtr(self.excess / EDGE))
 
     @property
     def chance(self) -> Floats:

@@ -9,10 +9,11 @@ standard normal, so that draws can be moved without leaving the prior out of sig
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
 
 from lobes import MillingRows
 from lobewatch.verdicts.doubt import Doubt, Span
@@ -123,8 +124,8 @@ class Draws:
         """Factors of Kt and of Kr/Kt of a material with these coefficients (Pa), shape (r,) each."""
         first, doubted = self._first(material), self.doubt.tangential
         at_speed, normal, direction = self.normal[:, first : first + OF_MATERIAL].T
-        force = doubted.low + (doubted.high - doubted.low) * ndtr(normal)
-        ratio = _wide_ratio(ndtr(direction), self.doubt.ratio, radial / tangential)
+        force = doubted.low + (doubted.high - doubted.low) * scipy.special.ndtr(normal)
+        ratio = _wide_ratio(scipy.special.ndtr(direction), self.doubt.ratio, radial / tangential)
         return FORCE[0] * np.maximum(1 + FORCE[1] * at_speed, LEAST) * force, np.maximum(ratio, 0.0)
 
 
@@ -155,14 +156,12 @@ def _wide_ratio(share: Floats, doubted: Span, middle: float) -> Floats:
 
 def _heavy_tailed(normal: Floats) -> Floats:
     """Standard normal numbers as those of a mixture of which a share is wider, of the same order."""
-    return np.asarray(np.interp(normal, *_QUANTILES))
+    return np.asarray(np.interp(normal, *_quantiles()))
 
 
+@cache
 def _quantiles() -> tuple[Floats, Floats]:
     """Standard normal numbers, and those of the mixture that as many lie below."""
     value = np.linspace(-REACH, REACH, POINTS)
-    beyond = (1 - SHARE) * ndtr(-np.abs(value)) + SHARE * ndtr(-np.abs(value) / WIDE)
-    return np.asarray(-np.sign(value) * ndtri(beyond)), value
-
-
-_QUANTILES = _quantiles()
+    beyond = (1 - SHARE) * scipy.special.ndtr(-np.abs(value)) + SHARE * scipy.special.ndtr(-np.abs(value) / WIDE)
+    return np.asarray(-np.sign(value) * scipy.special.ndtri(beyond)), value

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
 
 Floats = NDArray[np.float64]
 
@@ -120,7 +120,7 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
 
 def _threshold(level: Floats) -> float:
     """Halfway between the means of what is below and what is above it, the lowest such (Ridler & Calvard 1978)."""
-    smooth = uniform_filter1d(level, QUIET_PIECES)
+    smooth = scipy.ndimage.uniform_filter1d(level, QUIET_PIECES)
     beside = QUIET_PIECES // 2
     least = threshold = float(np.min(smooth[beside:-beside])) + LOUDER
     for _ in range(STEPS):
@@ -153,7 +153,7 @@ def _ends(power: Floats, join: float, most: float) -> tuple[int, int]:
 
     Where those are more than a quarter of the cut, or than `most`, it is no entry and no exit: the cut itself changes.
     """
-    smooth = uniform_filter1d(power, QUIET_PIECES)
+    smooth = scipy.ndimage.uniform_filter1d(power, QUIET_PIECES)
     usual = _join(_stretches(np.abs(smooth - np.median(smooth)) < ENDS), join)
     first, last = max(usual, key=lambda stretch: stretch[1] - stretch[0])
     entry, leaving = (n if n <= min(power.size / 4, most) else 0 for n in (first, power.size - last))
@@ -178,9 +178,11 @@ def _loudness(pieces: Floats, sample_rate: float) -> Floats:
     pieces = (pieces - np.mean(pieces, axis=1, keepdims=True)) * np.hanning(size)
     power = np.abs(np.fft.rfft(pieces, axis=1)[:, int(LOWEST * size / sample_rate) + 1 :]) ** 2
     power += np.finfo(np.float64).tiny
-    smooth = uniform_filter1d(power, SMOOTHED, axis=0)
+    smooth = scipy.ndimage.uniform_filter1d(power, SMOOTHED, axis=0)
     beside = QUIET_PIECES // 2
-    quiet = int(np.argmin(uniform_filter1d(np.mean(np.log10(power), axis=1), QUIET_PIECES)[beside:-beside]))
+    quiet = int(
+        np.argmin(scipy.ndimage.uniform_filter1d(np.mean(np.log10(power), axis=1), QUIET_PIECES)[beside:-beside])
+    )
     least = np.minimum(np.quantile(smooth, QUIETEST, axis=0), np.mean(power[quiet : quiet + QUIET_PIECES], axis=0))
     return np.asarray(np.log10(np.mean(np.minimum(power / least, LOUDEST), axis=1)))
 

@@ -33,11 +33,23 @@ from lobes.radial_lobes import RadialLobes, radial_lobes
 from lobes.shown_modes import ShownModes, shown_modes
 from lobes.specific_force import SpecificForce
 from lobes.stability_lobes import Lobe, MethodName, Minimum, StabilityLobes
+from lobes.tool_data import (
+    TOOL_MATERIALS,
+    CutKind,
+    PublishedRange,
+    ToolMaterial,
+    cut_kind,
+    cutting_speed,
+    fastest_of_all,
+    feed_per_tooth,
+)
 from lobes.zero_order import zero_order
 
 __all__ = [
+    "TOOL_MATERIALS",
     "Coefficients",
     "Cut",
+    "CutKind",
     "Direction",
     "Lobe",
     "MethodName",
@@ -47,16 +59,22 @@ __all__ = [
     "PocketShift",
     "Program",
     "ProgramLimit",
+    "PublishedRange",
     "RadialLobes",
     "ShownModes",
     "SldHistory",
     "SpecificForce",
     "StabilityLobes",
+    "ToolMaterial",
     "aged_mode",
     "average_angle",
     "best_pockets",
+    "cut_kind",
     "cutting_coefficients",
+    "cutting_speed",
     "deepest_for_drive",
+    "fastest_of_all",
+    "feed_per_tooth",
     "find_materials",
     "folded_name",
     "growth",

@@ -31,6 +31,8 @@ class Coefficients:
     """The material without temper, tool and coolant, e.g. "Al 7075"; empty where it is not known."""
     iso_group: str = ""
     """Group of ISO 513: P, M, K, N, S or H; empty where it is not known."""
+    vdi_3323_group: str = ""
+    """Group of VDI 3323: 1 to 41; empty where it is not known."""
     equivalents: tuple[str, ...] = ()
     """Other names of the material: EN number, AISI, UNS ..."""
     tangential_range: tuple[float, float] | None = None

@@ -65,6 +65,7 @@ def _material(row: dict[str, str]) -> Coefficients:
         source="; ".join(_sources(forces, tests, ratio["source"])),
         alloy=row["alloy"],
         iso_group=row["iso_group"],
+        vdi_3323_group=row["vdi_3323_group"],
         equivalents=tuple(row["equivalents"].split(";")),
         tangential_range=_range(float(tangential), forces, tests),
         ratio_range=(float(ratio["low"]), float(ratio["high"])),

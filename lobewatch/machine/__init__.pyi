@@ -10,8 +10,10 @@ from .settings.cut_tables import FEED_ANGLES, CutTable, ProgramTable, Wear
 from .settings.daq_tables import Daq
 from .settings.doubt_table import DoubtTable
 from .settings.drive import drive_limit
+from .settings.known_tool import KnownTool, known_tool
 from .settings.machine_file import REFERENCE_CUT, Machine
 from .settings.setup_tables import Limits, SpeedRange, TapSetup
+from .settings.tool_limits import ToolLimits, Unknown, tool_limits
 
 __all__ = [
     "BY_FIT",
@@ -22,6 +24,7 @@ __all__ = [
     "DamagedTapError",
     "Daq",
     "DoubtTable",
+    "KnownTool",
     "Limits",
     "Machine",
     "MachineFolder",
@@ -29,12 +32,16 @@ __all__ = [
     "SpeedRange",
     "TapEntry",
     "TapSetup",
+    "ToolLimits",
+    "Unknown",
     "Wear",
     "checked_rate",
     "drive_limit",
     "has_clock",
     "known_rate",
+    "known_tool",
     "make_machine_folder",
+    "tool_limits",
     "use_rate",
     "verify",
 ]

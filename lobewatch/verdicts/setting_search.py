@@ -155,6 +155,8 @@ class SettingSearch:
 
     def nearest(self, depth_mm: float, speed_rpm: float) -> Setting | None:
         """A depth (mm) at the window of speeds nearest to one (rpm)."""
+        if self.best is None:
+            return None
         middles = self.likely.middles(depth_mm)
         near = sorted(middles, key=lambda speed: abs(math.log(speed / speed_rpm)))
         return self._first_at(depth_mm, near[:PLACES])
@@ -167,8 +169,6 @@ class SettingSearch:
 
     def _first_at(self, depth_mm: float, speeds: Iterable[float]) -> Setting | None:
         """The first of some speeds (rpm) at which a depth (mm) is safe."""
-        if self.best is None:
-            return None
         for speed in map(_rounded, speeds):
             if self.reach.holds(speed, depth_mm) and self._calm(speed) >= depth_mm:
                 setting = self._verified(speed, depth_mm)
@@ -181,6 +181,8 @@ class SettingSearch:
 
         What was judged in vain comes back with less depth, and the draws that chattered count from then on.
         """
+        if self.reach.is_empty:
+            return
         tops = iter([_rounded(float(self.likely.speeds[top])) for top in self.likely.tops(MOST_PLACES)])
         depths = {speed: floored_mm(self._calm(speed)) for speed in islice(tops, PLACES)}
         for _ in range(MOST_TRIES):

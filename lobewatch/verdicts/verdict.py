@@ -12,6 +12,7 @@ import numpy as np
 
 from acquisition import DataError, Remark
 from lobewatch.machine import CutTable, Machine, ProgramTable, drive_limit
+from lobewatch.machine.settings.known_tool import feed_that_counts
 from lobewatch.machine.settings.setting_questions import questions_of_program
 from lobewatch.tool.assembly import ABOUT_DIRECTIONS, Assembly
 from lobewatch.verdicts.draws import DRAWS, ProgramDraws, turning_draws
@@ -211,5 +212,5 @@ def _remarks(table: ProgramTable, assembly: Assembly, at_speed: SpindleAtSpeed, 
     yield from (remark for remark in assembly.remarks if remark.code in (*ABOUT_DIRECTIONS, "predicted"))
     yield from at_speed.remarks
     yield from assembly.questions
-    if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and table.feed_per_tooth_mm is None:
+    if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and feed_that_counts(machine, table) is None:
         yield Remark("drive-ignored", table.name, "[drive] does not count: feed_per_tooth_mm is missing")

@@ -80,9 +80,10 @@ def next_cut(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Se
     """The next test cut of a program of which so many shall be made at most."""
     lesson = learn_program(table, assembly, machine, cuts)
     left = max(most - len(lesson.own_cuts), 0)
+    if not left or CutRange.of(machine, table).is_empty:
+        return NextCut(lesson, None, left)
     grid = grid_of(table, assembly, machine)
-    suggested = suggest(lesson.learnt, grid, lesson.own_cuts, left, lesson.doubted) if left else None
-    return NextCut(lesson, suggested, left)
+    return NextCut(lesson, suggest(lesson.learnt, grid, lesson.own_cuts, left, lesson.doubted), left)
 
 
 def grid_of(table: ProgramTable, assembly: Assembly, machine: Machine) -> Grid:

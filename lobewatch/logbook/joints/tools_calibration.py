@@ -84,7 +84,7 @@ def calibrate_tools(
 def _predictions(
     machine: Machine, fit: StiffnessFit, grouping: Grouping, tools: Sequence[str]
 ) -> Iterator[tuple[str, PredictedMode]]:
-    for name in [machine.tap.tool, *(tool.name for tool in machine.tool)]:
+    for name in [machine.tap.tool, *(tool.name for tool in machine.modelled_tools)]:
         if name in tools:
             continue
         spindle = grouping(machine.model(name))

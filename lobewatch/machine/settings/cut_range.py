@@ -1,4 +1,4 @@
-"""Speeds and depths that machine and tool allow for a cut: nothing outside of them is recommended."""
+"""Speeds and depths that machine and tool bear in a cut: nothing outside of them is recommended."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lobewatch.machine.settings.cut_tables import CutTable
 from lobewatch.machine.settings.drive import drive_limit
 from lobewatch.machine.settings.machine_file import Machine
+from lobewatch.machine.settings.tool_limits import ToolLimits, tool_limits
 
 RPM, MM = 10.0, 0.05
 """Steps that can be set at a machine (rpm and mm); numbers are rounded inwards to them."""
@@ -26,17 +27,35 @@ class CutRange:
     """Machine, with its drive."""
     table: CutTable
     """Cut, whatever its speed and depth."""
-    low_rpm: float
-    """Slowest speed (rpm)."""
-    high_rpm: float
-    """Fastest speed (rpm)."""
-    deepest_mm: float
-    """Greatest depth of cut of the tool (mm)."""
+    limits: ToolLimits
+    """Limits of its tool."""
 
     @classmethod
     def of(cls, machine: Machine, table: CutTable) -> CutRange:
         """The range of a cut."""
-        return cls(machine, table, machine.speed.low_rpm, machine.speed.high_rpm, table.deepest_mm)
+        return cls(machine, table, tool_limits(machine, table))
+
+    @property
+    def low_rpm(self) -> float:
+        """Slowest speed (rpm)."""
+        low, spindle = self.limits.low_rpm, self.machine.speed.low_rpm
+        return low if low == spindle else math.ceil(low / RPM) * RPM
+
+    @property
+    def high_rpm(self) -> float:
+        """Fastest speed (rpm), below the slowest where there is none."""
+        high, spindle = self.limits.high_rpm, self.machine.speed.high_rpm
+        return high if high == spindle else math.floor(high / RPM) * RPM
+
+    @property
+    def deepest_mm(self) -> float:
+        """Greatest depth of cut of the tool (mm)."""
+        return self.limits.deepest_mm
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no speed lies inside."""
+        return self.low_rpm > self.high_rpm
 
     def depths(self, speed_rpm: NDArray[np.float64]) -> NDArray[np.float64]:
         """Deepest cut (mm) that tool and drive allow at speeds (rpm)."""
@@ -49,6 +68,8 @@ class CutRange:
 
     def speeds(self, step: float) -> NDArray[np.float64]:
         """Speeds that can be set (rpm), rising, a relative step apart at least."""
+        if self.is_empty:
+            return np.empty(0)
         number = int(math.log(self.high_rpm / self.low_rpm) / step) + 2
         wanted = np.round(np.geomspace(self.low_rpm, self.high_rpm, number) / RPM) * RPM
         return np.unique(np.clip(wanted, self.low_rpm, self.high_rpm))

@@ -20,6 +20,8 @@ Range = Annotated[tuple[Positive, ...], Meta(min_length=2, max_length=2)]
 """Least and greatest value. Of fixed length, `tuple[A, B]`, msgspec 0.22 reads it wrongly beside a number."""
 Wear = Literal["new", "used", "worn"]
 """How worn the edges of a tool may be."""
+IsoGroup = Literal["P", "M", "K", "N", "S", "H"]
+"""Group of materials by ISO 513."""
 
 
 def pitch_of(pitch_deg: Sequence[float] | None, teeth: int) -> tuple[float, ...]:
@@ -162,6 +164,7 @@ class MaterialTable(Table, frozen=True):
     tangential_edge_n_per_mm: NotNegative = math.nan
     radial_edge_n_per_mm: NotNegative = math.nan
     source: str = "machine.toml"
+    iso_group: IsoGroup | None = None
 
     def __post_init__(self) -> None:
         """Refuse a material without one whole pair of coefficients."""
@@ -188,6 +191,7 @@ class MaterialTable(Table, frozen=True):
             self.tangential_edge_n_per_mm * 1e3,
             self.radial_edge_n_per_mm * 1e3,
             source=self.source,
+            iso_group=self.iso_group or "",
         )
 
 

@@ -24,12 +24,10 @@ from lobewatch.machine.settings.doubt_table import DoubtTable
 from lobewatch.machine.settings.notify_table import NotifyTable
 from lobewatch.machine.settings.setting_questions import questions_of_program
 from lobewatch.machine.settings.setup_tables import Identity, Limits, ModeChoice, SpeedRange, TapSetup
-from lobewatch.machine.settings.spindle_tables import (
-    SpindleTable,
-    ToolTable,
-)
+from lobewatch.machine.settings.spindle_tables import SpindleTable
 from lobewatch.machine.settings.toml_table import Table, check_texts
 from lobewatch.machine.settings.toml_text import toml_tables, toml_text
+from lobewatch.machine.settings.tool_table import ToolTable
 
 REFERENCE_CUT = "reference cut"
 """Name of [reference_cut] beside the names of programs."""
@@ -123,11 +121,17 @@ class Machine(Table, frozen=True):
             raise ValueError(f"{place}: {error} (pitch_deg of tool {program.tool!r})") from error
 
     def _check_tools(self) -> None:
-        taken = [self.tap.tool]
+        names = [tool.name for tool in self.tool]
         for i, tool in enumerate(self.tool, 1):
-            if tool.name in taken:
-                raise ValueError(f"tool {i}: name={tool.name!r} stands twice ([tap] tool counts); give each its own")
-            taken.append(tool.name)
+            if tool.name in names[: i - 1]:
+                raise ValueError(f"tool {i}: name={tool.name!r} stands twice; give each tool its own")
+            if not tool.segments:
+                continue
+            if tool.name == self.tap.tool:
+                raise ValueError(
+                    f"tool {i}: segments of {tool.name!r}, which is [tap] tool: its shape stands in [spindle]; "
+                    "leave them out here, or give another name"
+                )
             if self.spindle is None or self.spindle.tool_length_mm is None:
                 raise ValueError(
                     f"tool {i}: needs [spindle] tool_length_mm, the part of the shaft that is {self.tap.tool!r}"
@@ -150,17 +154,22 @@ class Machine(Table, frozen=True):
         return self.tool_named(tool).put_into(spindle, self.spindle.tool_length_mm or 0.0)
 
     @property
+    def modelled_tools(self) -> list[ToolTable]:
+        """Tools with a shape of their own that the model can put into the spindle."""
+        return [tool for tool in self.tool if tool.segments]
+
+    @property
     def drawing_tolerance(self) -> float:
         """Standard error of each diameter of the model, relative (-); 0 without a model."""
         return self.spindle.tolerance if self.spindle else 0.0
 
     def tool_named(self, name: str) -> ToolTable:
-        """A [[tool]]; DataError where there is none of this name."""
-        for tool in self.tool:
+        """A [[tool]] with a shape; DataError where there is none of this name."""
+        for tool in self.modelled_tools:
             if tool.name == name:
                 return tool
-        names = ", ".join(map(repr, [self.tap.tool, *(tool.name for tool in self.tool)]))
-        raise DataError(f"tool {name!r} has no model; modelled are {names}: add a [[tool]] table")
+        names = ", ".join(map(repr, [self.tap.tool, *(tool.name for tool in self.modelled_tools)]))
+        raise DataError(f"tool {name!r} has no model; modelled are {names}: add a [[tool]] table with its segments")
 
     def cuts(self, tool: str) -> dict[str, tuple[Cut, ...]]:
         """Reference cut and programs that run with a tool, by name, fed along x, y or both."""
@@ -185,7 +194,7 @@ class Machine(Table, frozen=True):
             "questions, K against the model",
             self.mode,
             self.spindle,
-            self.tool,
+            [(tool.name, tool.segments, tool.masses) for tool in self.modelled_tools],
             self.tap.tool,
             self.tap.position_mm,
             self.tap.sensor,

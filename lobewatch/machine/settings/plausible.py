@@ -21,9 +21,9 @@ from lobewatch.machine.settings.spindle_tables import (
     MassTable,
     SegmentTable,
     SpindleTable,
-    ToolTable,
 )
 from lobewatch.machine.settings.toml_table import Table
+from lobewatch.machine.settings.tool_table import ToolTable
 
 Range = tuple[float, float]
 FORCE = (200.0, 6000.0)
@@ -266,6 +266,8 @@ def about_tool(tool: ToolTable, place: str) -> Iterator[Doubted]:
         yield from out_of_range(segment, f"{place} segment {i}")
     for i, mass in enumerate(tool.masses, 1):
         yield from about_mass(mass, f"{place} mass {i}")
+    if not tool.segments:
+        return
     length, thickest = sum(part.length_mm for part in tool.segments), max(part.outer_mm for part in tool.segments)
     if length > STICK_OUT[1] * thickest:
         why = f"add up to {length / thickest:.3g} diameters, more than {STICK_OUT[1]:g}"

@@ -22,7 +22,8 @@ from lobewatch.machine.settings.plausible import (
     out_of_range,
 )
 from lobewatch.machine.settings.setup_tables import Identity, Limits, ModeChoice, SpeedRange, TapSetup
-from lobewatch.machine.settings.spindle_tables import SpindleTable, ToolTable
+from lobewatch.machine.settings.spindle_tables import SpindleTable
+from lobewatch.machine.settings.tool_table import ToolTable
 
 
 class AskedMachine(Protocol):

@@ -1,4 +1,4 @@
-"""[spindle] and [[tool]] of machine.toml: the model, in the units of a drawing."""
+"""[spindle] of machine.toml: the model, in the units of a drawing."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory, change_tool
-from lobewatch.machine.settings.cut_tables import pitch_of
+from dsm import MATERIALS, Bearing, Joint, LumpedMass, Segment, Spindle, Theory
 from lobewatch.machine.settings.toml_table import NotNegative, Positive, PositiveOrInfinite, Table
 
 
@@ -156,35 +155,6 @@ class SpindleTable(Table, frozen=True):
             masses=[mass.build() for mass in self.masses],
             joints=[joint.build() for joint in self.joints],
         )
-
-
-class ToolTable(Table, frozen=True):
-    """[[tool]]: a tool other than the one that is tapped, from its tip to where it leaves the holder."""
-
-    name: Annotated[str, Meta(min_length=1)]
-    segments: Annotated[list[SegmentTable], Meta(min_length=1)]
-    masses: tuple[MassTable, ...] = ()
-    pitch_deg: tuple[float, ...] | None = None
-
-    def __post_init__(self) -> None:
-        """Refuse pitches that are none."""
-        pitch_of(self.pitch_deg, len(self.pitch_deg or ()))
-
-    def build(self, spindle: Spindle) -> Spindle:
-        """The tool as a free shaft in SI units, of the spindle's theory and material where it names none."""
-        return Spindle(
-            [segment.build() for segment in self.segments],
-            (),
-            youngs_modulus=spindle.youngs_modulus,
-            density=spindle.density,
-            theory=spindle.theory,
-            shear_modulus=spindle.shear_modulus,
-            masses=[mass.build() for mass in self.masses],
-        )
-
-    def put_into(self, spindle: Spindle, tool_length_mm: float) -> Spindle:
-        """The whole spindle with this tool in place of the one drawn."""
-        return change_tool(spindle, tool_length_mm / 1e3, self.build(spindle))
 
 
 def _check_wall(bore: float, outer: float, bore_key: str, outer_key: str) -> None:

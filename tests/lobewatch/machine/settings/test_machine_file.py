@@ -156,7 +156,7 @@ def test_programs_belong_to_their_tool() -> None:
             "tool_length_mm=935 reaches beyond the first bearing, at 166 mm",
         ),
         ("tool_length_mm = 93.5", "", "tool 1: needs [spindle] tool_length_mm"),
-        ('name = "long end mill"', 'name = "reference"', "tool 1: name='reference' stands twice"),
+        ('name = "long end mill"', 'name = "reference"', "tool 1: segments of 'reference', which is [tap] tool"),
         ("outer_mm = 17.0", "outer_mm = 0", "tool 1 segment 1 outer_mm: Expected `float` > 0.0, not 0"),
         ("band_hz = [1200, 2200]", "band_hz = [1200, -1]", "mode band_hz 2: Expected `float` > 0.0, not -1"),
         (

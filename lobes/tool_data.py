@@ -1,0 +1,119 @@
+"""Cutting speeds and feeds per tooth that are published for kinds of tool (the .csv beside this module).
+
+A row of cutting_speeds.csv or feeds_per_tooth.csv is one source: for a group of VDI 3323 or of ISO 513, a tool
+material, and slots or cuts at the side. The finest group that has rows counts; the range is taken over all of its rows,
+and at least a quarter to both sides of its middle.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Literal, get_args
+
+import numpy as np
+
+from lobes.coefficients import Coefficients
+
+ToolMaterial = Literal["HSS", "carbide", "coated carbide", "PCD", "CBN"]
+"""Material of the edges of a tool."""
+CutKind = Literal["slot", "side"]
+"""Slot, or cut at the side of what is there."""
+TOOL_MATERIALS: tuple[ToolMaterial, ...] = get_args(ToolMaterial)
+SLOT_FROM = 0.4
+"""Radial depth over diameter from which on a cut counts as a slot, as in the tables of Tungaloy."""
+LEAST = 0.25
+"""Least half-width of a range, of its middle: what one source is taken to be off by."""
+ANY = "any"
+"""Group of rows that hold for every material."""
+
+
+@dataclass(frozen=True)
+class PublishedRange:
+    """Range that is published of a number."""
+
+    low: float
+    """Least value (m/s or m)."""
+    high: float
+    """Greatest value (m/s or m)."""
+    sources: tuple[str, ...]
+    """Sources that it lies over."""
+
+
+def cut_kind(immersion: float) -> CutKind:
+    """Kind of a cut by its radial depth over diameter (-)."""
+    return "slot" if immersion >= SLOT_FROM else "side"
+
+
+def cutting_speed(material: Coefficients, tool: ToolMaterial, cut: CutKind) -> PublishedRange | None:
+    """Speeds of the edge (m/s) that are published; None where none are."""
+    rows = _rows_of("cutting_speeds.csv", material, tool, cut)
+    ranges = [(float(row["low_m_per_min"]) / 60, float(row["high_m_per_min"]) / 60) for row in rows]
+    return _joined(ranges, rows)
+
+
+def feed_per_tooth(material: Coefficients, tool: ToolMaterial, cut: CutKind, diameter: float) -> PublishedRange | None:
+    """Feeds per tooth (m) that are published for tools of a diameter (m); None where none are.
+
+    Between the diameters of a source on a line, below them in proportion to the diameter, above them as at the last.
+    """
+    rows = _rows_of("feeds_per_tooth.csv", material, tool, cut)
+    sources = dict.fromkeys(row["source"] for row in rows)
+    return _joined([_feed([row for row in rows if row["source"] == name], diameter) for name in sources], rows)
+
+
+def fastest_of_all(material: Coefficients, cut: CutKind) -> PublishedRange | None:
+    """Speeds of the edge (m/s) up to the highest that is published of any tool material; None where none are."""
+    known = [speed for tool in TOOL_MATERIALS if (speed := cutting_speed(material, tool, cut))]
+    if not known:
+        return None
+    fastest = max(known, key=lambda speed: speed.high)
+    return PublishedRange(0.0, fastest.high, fastest.sources)
+
+
+@cache
+def published_rows(name: str) -> tuple[dict[str, str], ...]:
+    """Rows of cutting_speeds.csv or feeds_per_tooth.csv."""
+    return tuple(csv.DictReader((files("lobes") / name).read_text(encoding="utf-8").splitlines()))
+
+
+def _rows_of(name: str, material: Coefficients, tool: ToolMaterial, cut: CutKind) -> list[dict[str, str]]:
+    """Rows of the finest group that has any."""
+    for group in (f"VDI {material.vdi_3323_group}", material.iso_group, *([ANY] if material.iso_group else ())):
+        rows = [
+            row
+            for row in published_rows(name)
+            if group in row["of"].split(";") and tool in row["tool_material"].split(";") and cut == row["cut"]
+        ]
+        if rows:
+            return rows
+    return []
+
+
+def _feed(rows: Sequence[dict[str, str]], diameter: float) -> tuple[float, float]:
+    """Feeds (m) of one source at a diameter (m)."""
+    if rows[0]["unit"] == "D":
+        return float(rows[0]["low"]) * diameter, float(rows[0]["high"]) * diameter
+    points = sorted(point for row in rows for point in _points(row))
+    at, low, high = np.array(points).T * 1e-3
+    share = min(diameter / float(at[0]), 1.0)
+    return float(np.interp(diameter, at, low)) * share, float(np.interp(diameter, at, high)) * share
+
+
+def _points(row: dict[str, str]) -> Iterator[tuple[float, float, float]]:
+    """Diameters of a row (mm), each with least and greatest feed (mm)."""
+    for diameter in row["diameter_mm"].split(".."):
+        yield float(diameter), float(row["low"]), float(row["high"])
+
+
+def _joined(ranges: Sequence[tuple[float, float]], rows: Sequence[dict[str, str]]) -> PublishedRange | None:
+    """Over all of them, and at least as wide as one source is taken to be off."""
+    if not ranges:
+        return None
+    low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
+    middle = (low + high) / 2
+    sources = tuple(dict.fromkeys(row["source"] for row in rows))
+    return PublishedRange(min(low, (1 - LEAST) * middle), max(high, (1 + LEAST) * middle), sources)

@@ -7,6 +7,7 @@ from modal.cut_edges import cut_edges
 from modal.edit_modes import edit_modes
 from modal.fit_modes import fit_modes, modes_of
 from modal.fit_points import fit_points
+from modal.free_decays import decay_spectra, fit_decays, modes_of_decays
 from modal.mass_loading import MassLoading, mass_loading, with_mass_doubt
 from modal.mode_indicator import mode_indicator
 from modal.modes.common_decay import common_decay
@@ -41,8 +42,10 @@ __all__ = [
     "common_decay",
     "common_delay",
     "cut_edges",
+    "decay_spectra",
     "edit_modes",
     "extract",
+    "fit_decays",
     "fit_modes",
     "fit_points",
     "follow",
@@ -50,6 +53,7 @@ __all__ = [
     "mass_loading",
     "mode_indicator",
     "modes_of",
+    "modes_of_decays",
     "parse_edits",
     "peaks_beyond",
     "physical_poles",

@@ -61,16 +61,23 @@ def modes_of(state: Extraction, hits: Sequence[Sequence[Hit]] = ()) -> list[Mode
 def _modes(
     state: Extraction, band: FittedBand, hits: Sequence[Sequence[Hit]], without: Sequence[Sequence[Frf]]
 ) -> list[Mode]:
-    fit = band.fit
-    beyond = systematic(band)
     by_hammer = sum(hammer_covariance(state, band, i, hits_of_frf) for i, hits_of_frf in enumerate(hits))
-    covariance = fit.covariance * beyond.factor + by_hammer + beyond.covariance
     n_hits = min(map(len, without), default=0)
     over_hits = np.sum([jackknife(state, band, *pair) for pair in enumerate(without)], axis=0) if n_hits else None
+    judged = modes_of_band(state, band, by_hammer, over_hits, n_hits)
+    return with_force_remarks(state, band, judged, hits[0], without[0]) if n_hits else judged
+
+
+def modes_of_band(
+    state: Extraction, band: FittedBand, by_hammer: Array | int, over_hits: Array | None, n_hits: int
+) -> list[Mode]:
+    """Modes of one band with their figures of quality; the covariances, of the hammer's noise and over this many hits,
+    are in the order of `BandFit`."""
+    fit, beyond = band.fit, systematic(band)
+    covariance = fit.covariance * beyond.factor + by_hammer + beyond.covariance
     scatter = None if over_hits is None else over_hits + beyond.covariance
     modes = [_mode(fit, i, covariance, beyond.freedom, scatter, n_hits) for i in range(fit.frequency.size)]
-    judged = [assess(state, band, i, replace(mode, method=_method(state, band))) for i, mode in enumerate(modes)]
-    return with_force_remarks(state, band, judged, hits[0], without[0]) if n_hits else judged
+    return [assess(state, band, i, replace(mode, method=_method(state, band))) for i, mode in enumerate(modes)]
 
 
 def _mode(fit: BandFit, i: int, covariance: Array, freedom: float, scatter: Array | None, n_hits: int) -> Mode:

@@ -39,7 +39,8 @@ def follow(last: Mode, modes: Sequence[Mode]) -> Followed:
     """Of modes (driving points) the one that is most like the last one followed, with a remark where that is not clear.
 
     The distance is the root of the sum of squares of the changes of frequency, damping ratio and stiffness, each
-    in units of a likely change, and of 1 - MAC where both modes have shapes over the same points. A mode that is alike
+    in units of a likely change (of the stiffness where both know it), and of 1 - MAC where both modes have shapes over
+    the same points. A mode that is alike
     but for its frequency is the same up to 15 %, the fall of a spindle that must be seen.
     """
     near = sorted((m for m in modes if m.is_driving_point), key=lambda mode: _distance(last, mode))
@@ -65,14 +66,14 @@ def _is_same(last: Mode, mode: Mode) -> bool:
 
 
 def _values(mode: Mode) -> str:
-    return f"{mode.frequency:.1f} Hz with {mode.stiffness / 1e6:.3g} N/um"
+    return f"{mode.frequency:.1f} Hz" + (f" with {mode.stiffness / 1e6:.3g} N/um" if mode.has_stiffness else "")
 
 
 def _distance(a: Mode, b: Mode) -> float:
     ratios = (b.frequency / a.frequency, b.damping_ratio / a.damping_ratio, b.stiffness / a.stiffness)
-    changes = [
-        np.log(ratio) / likely if ratio > 0 else np.inf for ratio, likely in zip(ratios, LIKELY_CHANGE, strict=True)
-    ]
+    known = 3 if a.has_stiffness and b.has_stiffness else 2
+    pairs = list(zip(ratios, LIKELY_CHANGE, strict=True))[:known]
+    changes = [np.log(ratio) / likely if ratio > 0 else np.inf for ratio, likely in pairs]
     if a.shape is not None and b.shape is not None and a.shape.shape == b.shape.shape:
         changes.append((1 - mac(a.shape, b.shape)) / LIKELY_MAC_LOSS)
     return float(np.linalg.norm(changes))

@@ -32,7 +32,8 @@ class Mode:
     damping_ratio: float
     """Viscous damping ratio zeta (-)."""
     stiffness: float
-    """Modal stiffness K between hammer and sensor (N/m), signed: 1/|A|, negative where Re A is."""
+    """Modal stiffness K between hammer and sensor (N/m), signed: 1/|A|, negative where Re A is; NaN of a mode seen in
+    free decays alone, where no force was measured."""
     covariance: NDArray[np.float64] | None = None
     """Covariance of (frequency, damping_ratio, stiffness) from the residual of the fit, SI units, shape (3, 3).
 
@@ -66,6 +67,9 @@ class Mode:
     """Damping ratio from the width of the peak at half power, for comparison; None where it has no such width."""
     shape: NDArray[np.float64] | None = None
     """Mode shape over the FRFs of `fit_points`, the largest 1 or -1 and the first > 0, shape (p,); None of one FRF."""
+    relative_peak: float | None = None
+    """Its peak of receptance over the highest of the same free decays, had all been excited alike; None where the
+    force was measured and K tells."""
     remarks: tuple[Remark, ...] = ()
     """Reasons why it may not be trusted; empty where nothing speaks against it. Their codes: docs/remarks.md."""
 
@@ -78,7 +82,10 @@ class Mode:
         for name, value in (("frequency", self.frequency), ("damping_ratio", self.damping_ratio)):
             if not (np.isfinite(value) and value > 0):
                 yield f"{name}={value} is not a finite number > 0"
-        if not np.isfinite(self.stiffness) or self.stiffness == 0:
+        if self.relative_peak is not None:
+            if self.has_stiffness or not self.relative_peak > 0:
+                yield f"relative_peak={self.relative_peak} with stiffness={self.stiffness}: give NaN and a number > 0"
+        elif not np.isfinite(self.stiffness) or self.stiffness == 0:
             yield f"stiffness={self.stiffness} is not a finite number other than 0 (N/m)"
         if not abs(self.phase_deg) <= 90:
             yield f"phase_deg={self.phase_deg} is not -90 to 90 degrees; beyond that give the stiffness the other sign"
@@ -97,9 +104,21 @@ class Mode:
             yield f"n_hits={self.n_hits}: a jackknife has at least 2 hits"
 
     @property
+    def has_stiffness(self) -> bool:
+        """Whether K is known: whether the force was measured."""
+        return not np.isnan(self.stiffness)
+
+    @property
     def is_driving_point(self) -> bool:
-        """True where hammer and sensor move together in this mode (positive stiffness)."""
-        return self.stiffness > 0
+        """True unless hammer and sensor move against each other in this mode (negative stiffness)."""
+        return not self.stiffness < 0
+
+    @property
+    def peak(self) -> float:
+        """Receptance at its resonance, 1 / (2 |K| zeta) (m/N); of free decays `relative_peak`, to compare these."""
+        if self.relative_peak is not None:
+            return self.relative_peak
+        return float(1 / (2 * abs(self.stiffness) * self.damping_ratio))
 
     @property
     def constant(self) -> complex:

@@ -16,4 +16,4 @@ def predominant(modes: Sequence[Mode], band: tuple[float, float] | None = None) 
     if not low < high:
         raise ValueError(f"band {low:g}..{high:g} Hz is empty; give the lower frequency first")
     able = [mode for mode in modes if mode.is_driving_point and low <= mode.frequency <= high]
-    return min(able, key=lambda mode: mode.damping_ratio * mode.stiffness, default=None)
+    return max(able, key=lambda mode: mode.peak, default=None)

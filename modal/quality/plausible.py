@@ -36,9 +36,9 @@ def believed(modes: Sequence[Mode]) -> Believed:
     """Leave out drift, peaks cut by the edge of the lines, stiffness of no machine, and what trust_of rejects."""
     judged = [(mode, _doubt(mode)) for mode in modes]
     plausible = [mode for mode, doubt in judged if doubt is None]
-    largest = max(map(_peak, plausible), default=0.0)
+    largest = max((mode.peak for mode in plausible), default=0.0)
     against = [mode for mode in plausible if not mode.is_driving_point]
-    small = [mode for mode in against if _peak(mode) < SMALL * largest]
+    small = [mode for mode in against if mode.peak < SMALL * largest]
     return Believed(
         tuple(mode for mode in plausible if mode.is_driving_point),
         tuple(mode for mode in against if mode not in small),
@@ -46,20 +46,16 @@ def believed(modes: Sequence[Mode]) -> Believed:
     )
 
 
-def _peak(mode: Mode) -> float:
-    """Receptance at its resonance, 1 / (2 |K| zeta) (m/N)."""
-    return float(1 / (2 * abs(mode.stiffness) * mode.damping_ratio))
-
-
 def _left_out(mode: Mode, largest: float) -> Remark:
-    text = f"left out: K is negative, its peak {100 * _peak(mode) / largest:.1g} % of the largest"
+    text = f"left out: K is negative, its peak {100 * mode.peak / largest:.1g} % of the largest"
     cure = "where it is a mode of the machine, hit and measure at one point in one direction"
     return Remark("small-against", f"{mode.frequency:.4g} Hz", text, cure)
 
 
 def _doubt(mode: Mode) -> Remark | None:
     """Why a mode is not believed; None where it is."""
-    at, stiffness = f"{mode.frequency:.4g} Hz", stiffness_doubt(mode.stiffness)
+    at = f"{mode.frequency:.4g} Hz"
+    stiffness = stiffness_doubt(mode.stiffness) if mode.has_stiffness else None
     reasons = [REASONS.get(code, code) for code, verdict in trust_rules(mode) if verdict is Trust.REJECTED]
     if any(remark.code == "cut-by-edge" for remark in mode.remarks):
         reasons.append("its peak is cut by the edge of the lines")

@@ -75,13 +75,17 @@ def _limits(mode: Mode) -> Iterator[tuple[str, float, float, float]]:
 
 def most_left(mode: Mode) -> float:
     """Share of its decay that may be left when the record ends before K is off by more than its interval says."""
+    if not mode.has_stiffness:
+        return MOST_LEFT
     error = 0.0 if mode.best_covariance is None else float(mode.standard_error[2] / abs(mode.stiffness))
     return min(max(2 * error, LEAST_LEFT), MOST_LEFT)
 
 
 def relative_error(mode: Mode) -> float:
-    """The larger of the relative standard errors of damping ratio and stiffness (-); 0 where not estimated."""
+    """The larger of the relative standard errors of damping ratio and stiffness (-), of what is known; 0 where not
+    estimated."""
     if mode.best_covariance is None:
         return 0.0
     _, damping, stiffness = mode.standard_error
-    return max(float(damping) / mode.damping_ratio, float(stiffness) / abs(mode.stiffness))
+    shares = float(damping) / mode.damping_ratio, float(stiffness) / abs(mode.stiffness)
+    return max(shares) if mode.has_stiffness else shares[0]

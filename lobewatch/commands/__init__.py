@@ -21,6 +21,7 @@ COMMANDS = {
     "convert": "A recorded file written for other programs: universal file, text table, MATLAB, SEP005.",
     "model": "The spindle model: modes, stiffness, critical speed; with another tool in it, predicted before it is "
     "tapped.",
+    "paper": "The numbers and figures of Gaber & Hashemi beside ours, with the reason of each difference.",
     "calibrate": "Stiffness of bearings and joints for measured natural frequencies; nothing is stored.",
     "lobes": "Stability lobes of the newest tap tests, drawn beside those of the first, and the pockets that are safe.",
     "materials": "Materials that machine.toml may name, with their cutting coefficients, ranges and sources.",

@@ -1,0 +1,40 @@
+"""lobewatch paper."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lobewatch.show.terminal.output import Json, emit
+
+
+def paper(
+    out: Annotated[
+        Path | None, typer.Option(help="A folder for a page (paper.md) and its figures, made where it is not there.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """The numbers and figures of Gaber & Hashemi beside ours, with the reason of each difference.
+
+    Computed in this run on a surrogate of their spindle: the spinning element as printed, finite elements, bearings,
+    critical speeds, peak picking, tip stiffness, stability lobes new and old; then which of their claims hold.
+
+    Examples:
+
+      lobewatch paper
+      lobewatch paper --out paper
+    """
+    from lobewatch.commands.help_page import page_width
+    from lobewatch.paper import study_paper
+    from lobewatch.show.paper.describe_paper import paper_json, paper_lines
+
+    study = study_paper()
+    page = None
+    if out is not None:
+        from lobewatch.show.paper.paper_page import write_paper
+
+        page = write_paper(study, out)
+    written = [f"page: {page}"] if page else []
+    emit(paper_json(study, page), as_json, *paper_lines(study, page_width()), *written)

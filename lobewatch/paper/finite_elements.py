@@ -1,0 +1,143 @@
+"""The first frequency of a stepped shaft by textbook finite elements, which share nothing with the spindle model."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsm import Spindle
+
+_Float = NDArray[np.float64]
+
+ElementKind = Literal["euler-bernoulli", "timoshenko", "linear"]
+"""Hermite cubics without shear; the cubics of Timoshenko theory; straight lines with shear, as BEAM188 has them."""
+
+
+def first_frequency(spindle: Spindle, elements: int, kind: ElementKind, rigid_bearings: bool = False) -> float:
+    """The lowest bending frequency (Hz) of so many elements, shared out over the segments by their length.
+
+    Bearings are springs at the nodes, or hold the deflection. Consistent mass, with rotary inertia where there is
+    shear; the straight lines have their strain from the middle alone, or they would lock. Segments are uniform, and
+    bearings stand at their ends. Raises ValueError for fewer elements than segments.
+
+    Source: J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, ch. 5 and 11; T. J. R. Hughes, The Finite
+    Element Method, 1987, ch. 5.4 (straight lines).
+    """
+    from scipy.linalg import eigh  # takes longer to import than what it solves
+
+    length, section = _mesh(spindle, elements)
+    stiffness, mass = (_assembled(part) for part in _matrices(length, section, kind))
+    nodes = np.concatenate(([0.0], np.cumsum(length)))
+    places = [2 * int(np.argmin(np.abs(nodes - bearing.position))) for bearing in spindle.bearings]
+    if rigid_bearings:
+        free = np.setdiff1d(np.arange(2 * nodes.size), places)
+        stiffness, mass = stiffness[np.ix_(free, free)], mass[np.ix_(free, free)]
+    else:
+        stiffness[places, places] += [bearing.stiffness for bearing in spindle.bearings]
+    last = len(mass) - 1
+    inverse = eigh(mass, stiffness, eigvals_only=True, subset_by_index=[last, last])  # of 1/w^2: the lowest is exact
+    return float(1 / np.sqrt(inverse[0]) / (2 * np.pi))
+
+
+def _mesh(spindle: Spindle, elements: int) -> tuple[_Float, _Float]:
+    """Length of each element (m), and EI (N m^2), kappa GA (N), mass per length (kg/m), rho I (kg m), shape (4, n)."""
+    if elements < len(spindle.segments):
+        raise ValueError(f"elements={elements} is less than the {len(spindle.segments)} segments; give one for each")
+    length, outer, bore = np.array([(s.length, s.outer_diameter, s.bore_diameter) for s in spindle.segments]).T
+    count = np.ones(length.size, dtype=int)
+    for _ in range(elements - length.size):
+        count[np.argmax(length / count)] += 1
+    area, moment = np.pi * (outer**2 - bore**2) / 4, np.pi * (outer**4 - bore**4) / 64
+    steel = spindle.material
+    ratio = steel.youngs_modulus / (2 * steel.shear_modulus) - 1
+    section = np.array(
+        [
+            steel.youngs_modulus * moment,
+            _cowper(ratio, bore / outer) * steel.shear_modulus * area,
+            steel.density * area,
+            steel.density * moment,
+        ]
+    )
+    return np.repeat(length / count, count), np.repeat(section, count, axis=1)
+
+
+def _cowper(poisson: float, bore: _Float) -> _Float:
+    """Shear coefficient of a ring, bore over outer diameter (G. R. Cowper, J. Appl. Mech. 33, 1966)."""
+    square = (1 + bore**2) ** 2
+    return np.asarray(6 * (1 + poisson) * square / ((7 + 6 * poisson) * square + (20 + 12 * poisson) * bore**2))
+
+
+def _matrices(length: _Float, section: _Float, kind: ElementKind) -> tuple[_Float, _Float]:
+    """Stiffness and mass of each element, shape (n, 4, 4): deflection and rotation at its two ends."""
+    rigidity, shear, mass, rotary = section
+    point, weight = np.polynomial.legendre.leggauss(4)
+    if kind == "linear":
+        strain_point, strain_weight = np.array([0.5]), np.array([1.0])
+    else:
+        strain_point, strain_weight = (1 + point) / 2, weight / 2
+    softness = 12 * rigidity / (shear * length**2) if kind == "timoshenko" else np.zeros(length.size)
+    stiff, heavy = np.zeros((length.size, 4, 4)), np.zeros((length.size, 4, 4))
+    for x, share in zip(strain_point, strain_weight, strict=True):
+        bend, slide = _strains(x, length, softness, kind)
+        stiff += _squares(bend, share * length * rigidity)
+        if kind != "euler-bernoulli":
+            stiff += _squares(slide, share * length * shear)
+    for x, share in zip((1 + point) / 2, weight / 2, strict=True):
+        deflection, rotation = _shapes(x, length, softness, kind)
+        heavy += _squares(deflection, share * length * mass)
+        if kind != "euler-bernoulli":
+            heavy += _squares(rotation, share * length * rotary)
+    return stiff, heavy
+
+
+def _shapes(x: float, length: _Float, softness: _Float, kind: ElementKind) -> tuple[_Float, _Float]:
+    """Deflection and rotation at x (0 to 1) for each end value, shape (4, n)."""
+    one, none = np.ones(length.size), np.zeros(length.size)
+    if kind == "linear":
+        return np.array([(1 - x) * one, none, x * one, none]), np.array([none, (1 - x) * one, none, x * one])
+    bump = x - x**2
+    deflection = np.array(
+        [
+            1 - 3 * x**2 + 2 * x**3 + softness * (1 - x),
+            length * (x - 2 * x**2 + x**3 + softness * bump / 2),
+            3 * x**2 - 2 * x**3 + softness * x,
+            length * (x**3 - x**2 - softness * bump / 2),
+        ]
+    )
+    rotation = np.array(
+        [
+            -6 * bump / length,
+            1 - 4 * x + 3 * x**2 + softness * (1 - x),
+            6 * bump / length,
+            3 * x**2 - 2 * x + softness * x,
+        ]
+    )
+    return deflection / (1 + softness), rotation / (1 + softness)
+
+
+def _strains(x: float, length: _Float, softness: _Float, kind: ElementKind) -> tuple[_Float, _Float]:
+    """Curvature (1/m) and shear strain at x for each end value, shape (4, n)."""
+    one, none = np.ones(length.size), np.zeros(length.size)
+    if kind == "linear":
+        rotation = _shapes(x, length, softness, kind)[1]
+        return np.array([none, -one, none, one]) / length, np.array([-one, none, one, none]) / length - rotation
+    turn = 1 - 2 * x
+    curvature = np.array([-6 * turn / length, 6 * x - 4 - softness, 6 * turn / length, 6 * x - 2 + softness]) / (
+        length * (1 + softness)
+    )
+    slide = softness / (1 + softness) * np.array([-1 / length, -one / 2, 1 / length, -one / 2])
+    return curvature, slide
+
+
+def _squares(shape: _Float, weight: _Float) -> _Float:
+    return np.asarray(np.einsum("in,jn,n->nij", shape, shape, weight))
+
+
+def _assembled(parts: _Float) -> _Float:
+    """All elements in a row, shape (2 n + 2, 2 n + 2)."""
+    whole = np.zeros((2 * len(parts) + 2, 2 * len(parts) + 2))
+    for i, part in enumerate(parts):
+        whole[2 * i : 2 * i + 4, 2 * i : 2 * i + 4] += part
+    return whole

@@ -1,0 +1,138 @@
+"""The stability lobes of Fig. 10, new and old, by the paper's rule for K and by the model's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lobes import Cut, StabilityLobes, aged_mode, average_angle, pocket_shifts, zero_order
+from lobewatch.paper import printed
+from lobewatch.paper.comparison import Comparison, NumberGroup
+from modal import Mode
+
+CUT = Cut(teeth=2, immersion=1.0, direction="up", tangential=600e6, radial=180e6)
+"""A slot with two teeth. The paper says nothing of its cut: Kt scales all depths alike, the teeth all speeds."""
+SPEEDS = np.arange(6000.0, 30001.0, 2.0)
+"""Speeds (rpm)."""
+DEEP = 20.0
+"""Pockets are cut off at so many times the lowest limit."""
+
+
+@dataclass(frozen=True, eq=False)
+class LobeStudy:
+    """Lobes of one mode, new and old, and of more modes."""
+
+    new: StabilityLobes
+    """Lobes of the measured mode."""
+    by_rule: StabilityLobes
+    """Lobes of the old one: f_1 and K 10 % lower, as the paper has it."""
+    by_model: StabilityLobes
+    """Lobes of the old one with the K of the recalibrated model."""
+    one_mode: StabilityLobes
+    """Lobes of mode 1 of the surrogate."""
+    six_modes: StabilityLobes
+    """Lobes of all its modes that are looked at."""
+    by_zero_order: tuple[StabilityLobes, StabilityLobes]
+    """One and all modes, alike in x and y, by the zero-order approximation."""
+    masses: tuple[float, float, float]
+    """Modal mass of mode 1 (kg): measured, old by the rule, old by the model."""
+
+    def share(self, lobes: StabilityLobes) -> float:
+        """Lowest limit over that of the new spindle."""
+        return lobes.minimum.depth / self.new.minimum.depth
+
+    @property
+    def pocket(self) -> tuple[float, float]:
+        """Speed of the deepest pocket below the end of the chart, new and old (rpm)."""
+        shifts = pocket_shifts(self.new, self.by_rule, DEEP * self.new.minimum.depth)
+        deepest = max(shifts, key=lambda shift: shift.then.depth)
+        return deepest.then.speed_rpm, deepest.now.speed_rpm
+
+    def left_in_pocket(self, lobes: StabilityLobes) -> float:
+        """Limit at the speed of the new spindle's pocket over what it was there."""
+        speed = self.pocket[0]
+        return float(lobes.depth_at(speed) / self.new.depth_at(speed))
+
+    @staticmethod
+    def errors_of_one_mode(first: StabilityLobes, several: StabilityLobes) -> tuple[float, float, float]:
+        """Share by which the lowest limit of one mode is off that of several; median and largest over all speeds."""
+        error = np.abs(first.depth / several.depth - 1)
+        return first.minimum.depth / several.minimum.depth - 1, float(np.median(error)), float(np.max(error))
+
+
+def study_lobes(measured: Mode, stiffness_ratio: float, modes: Sequence[Mode]) -> LobeStudy:
+    """From the paper's mode, the model's K old over new, and the modes of the surrogate."""
+    ratio = printed.OLD_FREQUENCY / printed.FREQUENCY
+    aged = aged_mode(measured, 0.9, "paper"), aged_mode(measured, ratio, "model", stiffness_ratio)
+    first = modes[:1]
+    new, by_rule, by_model, one_mode, six_modes = (
+        average_angle(tip, None, CUT, SPEEDS) for tip in ([measured], [aged[0]], [aged[1]], first, modes)
+    )
+    wide = zero_order(first, first, CUT, SPEEDS), zero_order(modes, modes, CUT, SPEEDS)
+    masses = (_mass(measured), _mass(aged[0]), _mass(aged[1]))
+    return LobeStudy(new, by_rule, by_model, one_mode, six_modes, wide, masses)
+
+
+def _mass(mode: Mode) -> float:
+    """Modal mass (kg)."""
+    return float(mode.stiffness / (2 * np.pi * mode.frequency) ** 2)
+
+
+def lobe_section(study: LobeStudy) -> NumberGroup:
+    """Numbers of the lobes."""
+    return NumberGroup(
+        "Stability lobes, new and old: Fig. 10", ("fig-10",), (*_limits(study), *_pockets(study), *_more(study))
+    )
+
+
+def _limits(study: LobeStudy) -> list[Comparison]:
+    loop = CUT.specific_force * CUT.teeth_in_cut * CUT.orientation_factors[0]
+    per_stiffness = 2 * printed.DAMPING_RATIO * (1 + printed.DAMPING_RATIO)
+    new, old = study.new.minimum.depth * loop, study.by_rule.minimum.depth * loop
+    form = "2 K zeta (1 + zeta) of the printed K and zeta; ours is the lowest point of the chart"
+    by_rule, by_model = study.share(study.by_rule), study.share(study.by_model)
+    rule = "by K x 0.9, whatever the cut: the paper gives neither coefficients nor teeth"
+    tip = "the lowest limit goes with K, which worn bearings hardly change at the tip"
+    masses = ("new", "K/w^2 of the paper's mode"), ("old, rule", "K x 0.9 for f x 0.9 is mass / 0.9")
+    named = (*masses, ("old, model", "more of the shaft moves with the tip"))
+    return [
+        Comparison("b_lim Ks mu Nt*, new", "Fig. 10", per_stiffness * printed.STIFFNESS, new, "N/m", 6, form),
+        Comparison("b_lim Ks mu Nt*, old", "Fig. 10", per_stiffness * printed.OLD_STIFFNESS, old, "N/m", 6, form),
+        Comparison("lowest limit, old over new", "Fig. 10", 0.9, by_rule, "-", 4, rule),
+        Comparison("the same, the model's K", "", 0.9, by_model, "-", 4, tip),
+        *(
+            Comparison(f"modal mass, {name}", "", None, mass, "kg", 4, reason)
+            for (name, reason), mass in zip(named, study.masses, strict=True)
+        ),
+    ]
+
+
+def _pockets(study: LobeStudy) -> list[Comparison]:
+    before, after = study.pocket
+    deepest = f"the deepest below {SPEEDS[-1]:.0f} rpm, two teeth"
+    moved = f"x {after / before:.3f}: goes with f_1, whatever K does"
+    text = "limit at the speed of that pocket over what it was: a cut that sat in it"
+    rule, model = study.left_in_pocket(study.by_rule), study.left_in_pocket(study.by_model)
+    return [
+        Comparison("a pocket, new", "Fig. 10", None, before, "rpm", 5, deepest),
+        Comparison("the same pocket, old", "Fig. 10", None, after, "rpm", 5, moved),
+        Comparison("left at the speed of the first", "Fig. 10", None, rule, "-", 3, text),
+        Comparison("the same, the model's K", "", None, model, "-", 3, text),
+    ]
+
+
+def _more(study: LobeStudy) -> list[Comparison]:
+    rows = []
+    for name, first, several in (("feed alone", study.one_mode, study.six_modes), ("x and y", *study.by_zero_order)):
+        lowest, median, worst = (100 * error for error in study.errors_of_one_mode(first, several))
+        beginning = f"1 mode for 6, {name}"
+        claim = f"error of the lowest limit; {several.method}; the claim is that of its reference [18]"
+        side = "on the side of a pocket, which other modes move"
+        rows += [
+            Comparison(f"{beginning}: lowest", "", None, lowest, "%", 2, claim),
+            Comparison(f"{beginning}: median", "", None, median, "%", 2, "size of the error over all speeds"),
+            Comparison(f"{beginning}: worst", "", None, worst, "%", 2, side),
+        ]
+    return rows

@@ -1,0 +1,153 @@
+"""The shaft of Figs. 3, 7, 8 and 9: frequencies, bearings calibrated to them, critical speeds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dsm import (
+    Calibration,
+    Spindle,
+    Theory,
+    WhirlMap,
+    calibrate,
+    critical_speed,
+    natural_frequencies,
+    stiffness_curve,
+    whirl_map,
+)
+from lobewatch.paper import printed
+from lobewatch.paper.comparison import Comparison, NumberGroup, share_text
+from lobewatch.paper.shaft import surrogate
+
+_Float = NDArray[np.float64]
+POINTS = 300
+"""Points of Fig. 8; chosen, finer than a screen shows."""
+SPEEDS = np.linspace(0.0, 150e3, 61)
+"""Speeds of Figs. 7 and 9 (rpm)."""
+OPERATING_SPEED = 24000.0
+"""The fastest that the machine of the example turns (rpm)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShaftStudy:
+    """Frequencies and bearings of the surrogate, by one beam theory."""
+
+    rigid: Spindle
+    """Shaft on rigid bearings."""
+    rigid_frequency: float
+    """First natural frequency on rigid bearings (Hz)."""
+    printed_frequencies: tuple[float, float]
+    """First natural frequency with the two printed bearing stiffnesses, new and old (Hz)."""
+    new: Calibration
+    """Bearings calibrated to the measured frequency."""
+    old: Calibration
+    """Those bearings calibrated to the frequency after the fall."""
+    critical_speeds: tuple[float, float]
+    """Critical speed on rigid and on calibrated bearings (rpm)."""
+    curve: tuple[_Float, _Float]
+    """Bearing stiffness (N/m) and first natural frequency (Hz), shape (n,) each."""
+    rigid_whirl: WhirlMap
+    """Frequencies over speed on rigid bearings."""
+    whirl: WhirlMap
+    """Frequencies over speed on calibrated bearings."""
+    at_speed: tuple[float, float]
+    """Backward and forward whirl on calibrated bearings at `OPERATING_SPEED`, seen from the housing (Hz)."""
+
+
+def study_shaft(theory: Theory) -> ShaftStudy:
+    """All of it by "euler-bernoulli" or "timoshenko"."""
+    shaft = surrogate(printed.BEARING_STIFFNESS, theory)
+    rigid = surrogate(math.inf, theory)
+    new = calibrate(shaft, printed.FREQUENCY)
+    highest = float(natural_frequencies(rigid, 1)[0])
+    frequency = np.linspace(0.13, 0.9985, POINTS) * highest
+    turning = whirl_map(new.spindle, np.array([OPERATING_SPEED]), 1)
+    old = surrogate(printed.OLD_BEARING_STIFFNESS, theory)
+    return ShaftStudy(
+        rigid,
+        highest,
+        (float(natural_frequencies(shaft, 1)[0]), float(natural_frequencies(old, 1)[0])),
+        new,
+        calibrate(new.spindle, printed.OLD_FREQUENCY),
+        (critical_speed(rigid), critical_speed(new.spindle)),
+        (stiffness_curve(shaft, frequency), frequency),
+        whirl_map(rigid, SPEEDS, 1),
+        whirl_map(new.spindle, SPEEDS, 1),
+        (float(turning.backward[0, 0]), float(turning.forward[0, 0])),
+    )
+
+
+def shaft_sections(plain: ShaftStudy, shear: ShaftStudy) -> tuple[NumberGroup, NumberGroup]:
+    """Numbers of the model at rest and of the model that spins; plain is Euler-Bernoulli, shear Timoshenko theory."""
+    return (
+        NumberGroup("The model, its bearings: Figs. 3 and 8", ("fig-3", "fig-8"), tuple(_at_rest(plain, shear))),
+        NumberGroup("The spindle spins: Figs. 7 and 9", ("fig-7", "fig-9"), tuple(_spinning(plain, shear))),
+    )
+
+
+def _at_rest(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
+    fitted = "what the fit of the surrogate leaves"
+    same = "as many; dimensions are not public: those of the surrogate are fitted to the frequencies"
+    excess = (plain.rigid_frequency / printed.FREQUENCY - 1) * 100
+    rounded = f"the paper rounds {(printed.RIGID_FREQUENCY / printed.FREQUENCY - 1) * 100:.1f} %; the rest is the fit"
+    new, old = plain.printed_frequencies
+    return [
+        Comparison("segments", "Fig. 3", printed.SEGMENTS, len(plain.rigid.segments), "", 2, same),
+        Comparison("bearings", "Fig. 3", printed.BEARINGS, len(plain.rigid.bearings), "", 2, same),
+        Comparison("f_1, rigid bearings", "", printed.RIGID_FREQUENCY, plain.rigid_frequency, "Hz", 6, fitted),
+        Comparison("it is above f_1 measured by", "", printed.RIGID_EXCESS, excess, "%", 3, rounded),
+        Comparison("f_1 at 1.28e9 N/m", "Fig. 8", printed.FREQUENCY, new, "Hz", 6, fitted),
+        Comparison("f_1 at 7.72e8 N/m", "Fig. 8", printed.OLD_FREQUENCY, old, "Hz", 6, fitted),
+        *_bearings(plain, shear, fitted),
+    ]
+
+
+def _bearings(plain: ShaftStudy, shear: ShaftStudy, fitted: str) -> list[Comparison]:
+    theory = "a stiffness calibrated to a frequency is an equivalent number of the beam theory"
+    new, old = printed.BEARING_STIFFNESS, printed.OLD_BEARING_STIFFNESS
+    left = "a quotient of the two above"
+    return [
+        Comparison("each bearing, for 1722 Hz", "Fig. 8", new, plain.new.bearing_stiffness, "N/m", 5, fitted),
+        Comparison("the same with shear", "", None, shear.new.bearing_stiffness, "N/m", 5, theory),
+        Comparison("each bearing, for 1550 Hz", "Fig. 8", old, plain.old.bearing_stiffness, "N/m", 5, fitted),
+        Comparison("the same with shear", "", None, shear.old.bearing_stiffness, "N/m", 5, theory),
+        Comparison("stiffness that is left", "Fig. 8", round(old / new, 3), plain.old.factor, "-", 3, left),
+        Comparison("the same with shear", "", None, shear.old.factor, "-", 3, theory),
+    ]
+
+
+def _spinning(plain: ShaftStudy, shear: ShaftStudy) -> list[Comparison]:
+    pairs = (
+        ("critical speed, rigid", "Fig. 7", printed.RIGID_CRITICAL_SPEED, 60 * printed.RIGID_FREQUENCY),
+        ("critical speed, 1722 Hz", "Fig. 9", printed.CRITICAL_SPEED, 60 * printed.FREQUENCY),
+    )
+    lifted = "gyroscopic moments lift the forward whirl"
+    rows = []
+    for i, (name, where, value, exact) in enumerate(pairs):
+        off = share_text(value / exact - 1, "+")
+        reason = lifted if i else f"{lifted}, shear and rotary inertia lower f_1 more"
+        rows += [
+            Comparison(
+                name,
+                where,
+                value,
+                plain.critical_speeds[i],
+                "rpm",
+                6,
+                f"exact is 60 f_1, {exact:.0f} rpm with the paper's: {off} off, as if read in the figure",
+            ),
+            Comparison("the same with shear", "", None, shear.critical_speeds[i], "rpm", 6, reason),
+        ]
+    seen = "seen from the housing: spin changes the view from the shaft alone"
+    parted = "seen from the housing: what spin does where rotary inertia counts"
+    turning = f"at {OPERATING_SPEED:.0f} rpm"
+    return [
+        *rows,
+        Comparison(f"f_1 {turning}", "", None, plain.at_speed[1], "Hz", 6, seen),
+        Comparison("backward, with shear", "", None, shear.at_speed[0], "Hz", 6, parted),
+        Comparison("forward, with shear", "", None, shear.at_speed[1], "Hz", 6, parted),
+    ]

@@ -1,0 +1,13 @@
+"""What the tests of this room share."""
+
+from __future__ import annotations
+
+import pytest
+
+from lobewatch.paper import PaperStudy, study_paper
+
+
+@pytest.fixture(scope="session")
+def study() -> PaperStudy:
+    """One run."""
+    return study_paper()

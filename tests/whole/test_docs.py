@@ -8,6 +8,7 @@ import shutil
 import sys
 import tomllib
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Literal, get_origin
 
@@ -33,28 +34,44 @@ def commands(group: typer.core.TyperGroup, prefix: str = "") -> Iterator[tuple[s
             yield f"{prefix}{name}", {option for parameter in command.params for option in parameter.opts}
 
 
-def test_every_command_and_option_stands_in_readme() -> None:
+def test_the_page_of_all_commands_is_what_they_say() -> None:
+    sys.path.insert(0, str(ROOT / "docs"))
+    try:
+        page = import_module("make_commands").page()
+    finally:
+        sys.path.pop(0)
+    written = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
+    assert written == page, "run: .venv/bin/python docs/make_commands.py"
+
+
+def test_every_command_and_option_stands_in_the_docs_and_no_other_in_readme() -> None:
     group = typer.main.get_command(app)
     assert isinstance(group, typer.core.TyperGroup)
     known = dict(commands(group))
     assert len(known) >= 31
+    page = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")
     for name, options in known.items():
-        assert f"lobewatch {name}" in README, name
+        section = page.partition(f"## `lobewatch {name}`")[2].partition("\n## ")[0]
         for option in options:
-            assert not option.startswith("--") or f"`{option}" in README or f" {option}" in README, (name, option)
+            assert not option.startswith("--") or f"`{option}" in section or f"/{option}" in section, (name, option)
     mentioned = set(re.findall(r"--[a-z][a-z0-9-]+", re.sub(r"`pip [^`]*`", "", README)))
     assert mentioned <= {"--debug", "--help"}.union(*known.values())
-    assert set(re.findall(r"`lobewatch ([a-z]+)", README)) == {name.split()[0] for name in known}
+    assert set(re.findall(r"`lobewatch ([a-z]+)", README)) <= {name.split()[0] for name in known}
 
 
-def shown(command: str) -> str:
-    """What README shows below a command."""
-    block = re.search(rf"^\$ {re.escape(command)}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+def test_readme_is_short_and_names_ten_commands() -> None:
+    assert len(README.splitlines()) <= 150
+    assert len(re.findall(r"^\| `lobewatch ", README, re.MULTILINE)) == 10
+
+
+def shown(command: str, page: str = README) -> str:
+    """What README, or another page, shows below a command."""
+    block = re.search(rf"^\$ {re.escape(command)}\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     assert block is not None
     return block[1]
 
 
-def test_the_modes_in_readme_are_what_the_command_prints(
+def test_the_modes_of_the_beam_are_what_the_command_prints(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(ROOT)
@@ -62,7 +79,8 @@ def test_the_modes_in_readme_are_what_the_command_prints(
     with pytest.raises(SystemExit):
         main()
     printed = [line.rstrip() for line in capsys.readouterr().out.splitlines()]
-    assert printed == shown("python3 run.py modes tests/data/ladisk_beam/acceleration.lvm").splitlines()
+    page = (ROOT / "docs" / "modal.md").read_text(encoding="utf-8")
+    assert printed == shown("python3 run.py modes tests/data/ladisk_beam/acceleration.lvm", page).splitlines()
 
 
 @pytest.mark.timeout(300)

@@ -1,0 +1,29 @@
+"""docs/commands.md from the commands themselves: `.venv/bin/python docs/make_commands.py`."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from lobewatch.commands import COMMANDS
+
+INTRODUCTION = """For whoever looks an option up: what `--help` says of each command, made from the code by
+`docs/make_commands.py`. The ten that a shop needs stand in the [README](../README.md#ten-commands)."""
+
+
+def page() -> str:
+    """The page in Markdown, by typer's own description of an application."""
+    command = ["typer", "lobewatch.cli", "utils", "docs", "--name", "lobewatch", "--title", "All commands"]
+    text = subprocess.run([sys.executable, "-m", *command], capture_output=True, text=True, check=True).stdout
+    head, _, rest = text.partition("**Commands**:")
+    rest = rest[rest.index("## `") :]
+    head = head.replace("# All commands\n", f"# All commands\n\n{INTRODUCTION}\n", 1)
+    listed = "\n".join(f"* [`{name}`](#lobewatch-{name}): {summary}" for name, summary in COMMANDS.items())
+    examples = re.sub(r"^  (?=lobewatch )", "    ", f"{head}**Commands**:\n\n{listed}\n\n{rest}", flags=re.MULTILINE)
+    return examples.rstrip() + "\n"
+
+
+if __name__ == "__main__":
+    Path(__file__).with_name("commands.md").write_text(page(), encoding="utf-8")

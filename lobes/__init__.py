@@ -27,6 +27,7 @@ from lobes.known_materials import (
 )
 from lobes.lowest_of import lowest_of
 from lobes.milling_system import milling_system
+from lobes.pitch_patterns import PitchPattern, equal_pitch, half_wave_deg, pitch_patterns, with_pattern
 from lobes.pockets import Pocket, PocketShift, best_pockets, pocket_shifts, pockets
 from lobes.program import Program
 from lobes.radial_lobes import RadialLobes, radial_lobes
@@ -55,6 +56,7 @@ __all__ = [
     "MethodName",
     "MillingRows",
     "Minimum",
+    "PitchPattern",
     "Pocket",
     "PocketShift",
     "Program",
@@ -73,11 +75,13 @@ __all__ = [
     "cutting_coefficients",
     "cutting_speed",
     "deepest_for_drive",
+    "equal_pitch",
     "fastest_of_all",
     "feed_per_tooth",
     "find_materials",
     "folded_name",
     "growth",
+    "half_wave_deg",
     "joined_rows",
     "lowest_of",
     "materials_by_name",
@@ -85,6 +89,7 @@ __all__ = [
     "milling_system",
     "nearest_name",
     "piece_numbers",
+    "pitch_patterns",
     "pocket_shifts",
     "pockets",
     "program_limit",
@@ -95,6 +100,7 @@ __all__ = [
     "spectral_radius",
     "stability_boundary",
     "tangential_and_radial",
+    "with_pattern",
     "write_history",
     "zero_order",
 ]

@@ -26,6 +26,7 @@ COMMANDS = {
     "lobes": "Stability lobes of the newest tap tests, drawn beside those of the first, and the pockets that are safe.",
     "materials": "Materials that machine.toml may name, with their cutting coefficients, ranges and sources.",
     "check": "Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.",
+    "pitch": "Unequal pitches for a cutter at one speed: what they gain over equal pitch, or that equal is as good.",
     "report": "One HTML file with everything in it: what has changed, which programs still hold, lobes then and now.",
     "trend": "How the frequency has fallen, whether that is more than scatter, and until when each program holds.",
     "status": "How all machines of a folder stand, worst first: light, fall, why, what to do next, when to tap again.",

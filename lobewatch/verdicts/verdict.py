@@ -147,7 +147,7 @@ def judge(
         return _unknown(table, tuple(doubted.remark for doubted in asked), tool)
     table = at_speed.taught(table)
     judgement, depth = weigh(table, tool, machine, at_speed), table.depth_mm / 1e3
-    middle, word, cause = judgement.middle, _word(table, judgement, tool), ""
+    middle, word, cause = judgement.middle, word_of(table, judgement, tool), ""
     remarks = [*_remarks(table, tool, at_speed, machine), *unsaid(table, machine, judgement)]
     if word is Word.DOUBTFUL:
         cause = _cause(table, judgement, tool)
@@ -181,7 +181,8 @@ def _unknown(table: ProgramTable, reasons: tuple[Remark, ...], assembly: Assembl
     return Verdict(table, Word.UNKNOWN, assembly, remarks=(remark,))
 
 
-def _word(table: ProgramTable, judgement: Judgement, assembly: Assembly) -> Word:
+def word_of(table: ProgramTable, judgement: Judgement, assembly: Assembly) -> Word:
+    """The word on a program with a tool that was judged."""
     if not judgement.middle.stable:
         return Word.NOT_STABLE
     return Word.STABLE if judgement.is_stable_throughout and is_sure(table, assembly) else Word.DOUBTFUL

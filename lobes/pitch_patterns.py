@@ -1,0 +1,89 @@
+"""Unequal pitches as tool makers grind them, within what chips and balance allow."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lobes.cut import Cut
+
+MOST_UNEVEN = 0.2
+"""Largest difference of a pitch from the mean, relative: a tooth cuts chips of so much more than the mean; chosen."""
+MOST_OFF_CENTRE = 0.1
+"""Largest distance of the middle of the edges from the axis over the radius; chosen: grinding has to balance it."""
+PER_HALF_WAVE = 6
+"""Number of steps in which the difference between neighbouring pitches grows by half a wave ..."""
+HALF_WAVES = 3.5
+"""... and half waves up to which it does: further on the doubt of the frequency blurs what is gained."""
+COARSE, FINE = 1.0, 0.2
+"""Differences are whole multiples of this (deg), of the second where half a wave is less than six times the first."""
+
+
+@dataclass(frozen=True)
+class PitchPattern:
+    """Pitches of a cutter, with what they ask of its chips and its balance."""
+
+    pitch_deg: tuple[float, ...]
+    """Angle by which each tooth follows the tooth before it (deg), in order of entry."""
+    name: str
+    """Name: "equal", "alternating", "linear", "linear, 2 times" (the same steps so often in a turn), "as it is"."""
+
+    @property
+    def chips(self) -> tuple[float, float]:
+        """Smallest and largest feed of a tooth over the mean feed per tooth: each cuts what its pitch has left."""
+        mean = sum(self.pitch_deg) / len(self.pitch_deg)
+        return min(self.pitch_deg) / mean, max(self.pitch_deg) / mean
+
+    @property
+    def off_centre(self) -> float:
+        """Distance of the middle of all edges from the axis over the radius of the tool; 0 is balanced."""
+        edges = np.exp(1j * np.radians(np.cumsum(self.pitch_deg)))
+        return round(float(abs(np.mean(edges))), 12)
+
+
+def half_wave_deg(speed_rpm: float, chatter_frequency: float) -> float:
+    """Difference of neighbouring pitches (deg) that takes half of a wave of chatter (Hz) at a speed (rpm).
+
+    The closed form of the best difference for an even number of teeth, after which the waves that two neighbours leave
+    cancel. Source: Budak, An analytical design method for milling cutters with nonconstant pitch to increase stability,
+    J. Manuf. Sci. Eng. 125 (2003) 29-34, after Altintas, Engin & Budak, J. Manuf. Sci. Eng. 121 (1999) 173-178.
+    """
+    return 180 * speed_rpm / 60 / chatter_frequency
+
+
+def pitch_patterns(teeth: int, half_wave: float) -> Iterator[PitchPattern]:
+    """Patterns whose neighbouring pitches differ by up to a few half waves (deg, `half_wave_deg`).
+
+    Pitches rise by equal steps over so many teeth as divide the number of all, two of them alternate, and begin anew.
+    Those beyond `MOST_UNEVEN` or `MOST_OFF_CENTRE` are left out. Raises ValueError for less than two teeth.
+    """
+    if teeth < 2:
+        raise ValueError(f"teeth={teeth}: a cutter of one tooth has no pitch to divide; pitches need two teeth or more")
+    unit = COARSE if half_wave >= PER_HALF_WAVE * COARSE else FINE
+    wanted = half_wave * np.arange(1, PER_HALF_WAVE * HALF_WAVES + 1) / PER_HALF_WAVE
+    for block in (number for number in range(2, teeth + 1) if teeth % number == 0):
+        for difference in np.unique(np.maximum(np.round(wanted / unit), 1)) * unit:
+            pattern = _pattern(teeth, block, float(difference))
+            low, high = pattern.chips
+            if max(1 - low, high - 1) <= MOST_UNEVEN + 1e-9 and pattern.off_centre <= MOST_OFF_CENTRE:
+                yield pattern
+
+
+def _pattern(teeth: int, block: int, difference: float) -> PitchPattern:
+    steps = difference * (np.arange(block) - (block - 1) / 2)
+    pitch = np.round(360 / teeth + np.tile(steps, teeth // block), 2)
+    pitch[-1] = round(360 - float(np.sum(pitch[:-1])), 2)
+    name = "alternating" if block == 2 else "linear" if block == teeth else f"linear, {teeth // block} times"
+    return PitchPattern(tuple(pitch.tolist()), name)
+
+
+def equal_pitch(teeth: int) -> PitchPattern:
+    """Evenly spaced teeth."""
+    return PitchPattern((360 / teeth,) * teeth, "equal")
+
+
+def with_pattern(cut: Cut, pattern: PitchPattern) -> Cut:
+    """A cut by a cutter with these pitches."""
+    return replace(cut, pitch=tuple(np.radians(pattern.pitch_deg).tolist()))

@@ -1,0 +1,56 @@
+"""lobewatch pitch."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from lobewatch.machine.folder_path import named_folder
+from lobewatch.show.terminal.output import Json, emit, notes
+
+
+def pitch(
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
+    speed: Annotated[float, typer.Option(help="Spindle speed, rpm: pitches are for one speed.")],
+    tool: Annotated[str | None, typer.Option(help="Tool whose teeth are to be spaced.")] = None,
+    depth: Annotated[float | None, typer.Option(help="Axial depth to be judged too, mm.")] = None,
+    material: Annotated[str | None, typer.Option(help="A [[material]], or one of lobewatch materials.")] = None,
+    teeth: Annotated[int | None, typer.Option(help="Teeth of the tool.")] = None,
+    diameter: Annotated[float | None, typer.Option(help="Diameter of the tool, mm.")] = None,
+    radial: Annotated[float | None, typer.Option(help="Its radial depth, mm.")] = None,
+    direction: Annotated[Literal["up", "down"] | None, typer.Option(help="Up or down milling.")] = None,
+    as_json: Json = False,
+) -> None:
+    """Unequal pitches for a cutter at one speed: what they gain over equal pitch, or that equal is as good.
+
+    Alternating and linear pitches, as tool makers grind them, whose teeth cut at most 20 % more or less than the mean.
+    The limit of each kind's best is that of lobewatch check over all that is not known, beside equal pitch on the same
+    spindles. What is not said of the cut is taken from the programs of its tool where they agree.
+
+    Examples:
+
+      lobewatch pitch trial --tool reference --speed 6200
+      lobewatch pitch trial --speed 9000 --radial 5 --material 42CrMo4 --json
+    """
+    from lobewatch.logbook import Logbook
+    from lobewatch.logbook.asked_pitch import asked_pitch
+    from lobewatch.show.programs.describe_pitches import pitches_json, pitches_texts
+
+    said = {
+        "speed_rpm": speed,
+        "depth_mm": depth,
+        "tool": tool,
+        "material": material,
+        "teeth": teeth,
+        "tool_diameter_mm": diameter,
+        "radial_depth_mm": radial,
+        "direction": direction,
+    }
+    logbook = Logbook.open(machine)
+    if notes.is_terminal:
+        notes.print("judging pitches over all that is not known; this takes some seconds")
+    proposal = asked_pitch(logbook, said)
+    remarks = logbook.remarks
+    emit(pitches_json(proposal, remarks, depth), as_json, *pitches_texts(proposal, remarks, depth))

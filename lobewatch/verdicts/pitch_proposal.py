@@ -1,0 +1,192 @@
+"""Unequal pitches for one cut at one speed: what they gain over equal ones, over all that is not known.
+
+The closed form of the best difference between neighbours says which patterns are looked at; zero order after Altintas,
+Engin & Budak, over few draws, says how deep they may go; the multipliers of the same draws say which of each kind is
+best; and what is said of that is the judge's, draw by draw beside equal pitch.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import DataError
+from lobes import PitchPattern, equal_pitch, half_wave_deg, pitch_patterns, with_pattern
+from lobes.floquet.program_limit import DEEPEST
+from lobewatch.machine import Machine, ProgramTable
+from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.drawn_limits import drawn_limits
+from lobewatch.verdicts.draws import ProgramDraws
+from lobewatch.verdicts.hard_draws import deepest_calm
+from lobewatch.verdicts.judgement import QUANTILES, weigh
+from lobewatch.verdicts.mean_force import MeanForce
+from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
+from lobewatch.verdicts.verdict import Verdict, Word, judge, word_of
+
+HARDEST, SPREAD = 8, 40
+"""Number of draws, those that equal pitch has the lowest limits in, and step between others, in which patterns are
+compared before the best are judged ..."""
+FEEDS = 2
+"""... in so many ways of the cut, the worst ..."""
+DEEPER = 2.0
+"""... down to so many times their lowest limit by zero order."""
+TRIES, DISAPPOINTING = 3, 0.9
+"""Number of patterns of a kind that are judged, and share of the depth that few draws allow, as much of which is good
+enough: below it the draws that chatter first join the few."""
+JOINING = 8
+"""Number of draws that do."""
+WORTH = 1.05
+"""Low end of the limit over that of equal pitch from which on unequal pitches are proposed; chosen."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class JudgedPitch:
+    """Pitches of a cutter with what the judge says of the cut."""
+
+    pattern: PitchPattern
+    """Pitches."""
+    word: Word
+    """Word on the cut at its depth."""
+    limit: float
+    """Deepest stable depth in the middle of the doubt (m); inf where there is none as deep as the tool cuts."""
+    low: float
+    """1 % quantile of the limit over the doubt (m)."""
+    high: float
+    """99 % quantile of the limit over the doubt (m)."""
+    gain: float
+    """Limit over that of equal pitch, less 1, in the middle of the doubt."""
+    gain_low: float
+    """1 % quantile of the gain over the doubt: both cutters on the same spindle and material, draw by draw."""
+    gain_high: float
+    """99 % quantile of the gain over the doubt."""
+    share_worse: float
+    """Share of the doubt in which equal pitch has the higher limit."""
+
+
+@dataclass(frozen=True, eq=False)
+class PitchProposal:
+    """What unequal pitches are worth for one cut at one speed."""
+
+    verdict: Verdict
+    """Verdict on the cut with equal pitch."""
+    equal: JudgedPitch
+    """Equal pitch."""
+    unequal: tuple[JudgedPitch, ...]
+    """The best pattern of each kind, and the pitches that the cutter has, the highest low end of the limit first."""
+    half_wave_deg: float
+    """Difference of neighbouring pitches that the closed form has as the best (deg); NaN where nothing chatters."""
+
+    @property
+    def proposed(self) -> JudgedPitch | None:
+        """The pitches to choose; None where equal ones are as good."""
+        best = next(iter(self.unequal), None)
+        return best if best is not None and best.low >= WORTH * self.equal.low else None
+
+
+def propose_pitch(
+    table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed = AT_REST
+) -> PitchProposal:
+    """Pitches for a cut at its speed; limits are looked for up to 20 times its depth.
+
+    DataError where the cut cannot be judged, ValueError for less than two teeth.
+    """
+    equal = equal_pitch(table.teeth)
+    verdict = judge(_with(table, equal), assembly, machine, at_speed)
+    if verdict.word is Word.UNKNOWN or verdict.draws is None:
+        raise DataError("; ".join(str(remark) for remark in verdict.remarks))
+    table = at_speed.taught(table)
+    limits, half_wave = _limits(verdict.draws, table), half_wave_deg(table.speed_rpm, verdict.chatter_frequency)
+    search = PitchSearch(table, assembly, machine, at_speed, verdict.draws, limits)
+    unequal = search.best_of_each(half_wave) if np.isfinite(verdict.limit) else []
+    if present := machine.build_cut(table).pitch:
+        pattern = PitchPattern(tuple(np.degrees(present).round(3).tolist()), "as it is")
+        unequal.append(search.judged(pattern)[0])
+    band = verdict.limit, verdict.limit_low, verdict.limit_high
+    return PitchProposal(
+        verdict,
+        _judged(equal, verdict.word, band, limits, limits),
+        tuple(sorted(unequal, key=lambda judged: -judged.low)),
+        half_wave,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class PitchSearch:
+    """Looking for pitches of one cut."""
+
+    table: ProgramTable
+    """Cut, with the coefficients that were learnt; its own pitch does not count."""
+    assembly: Assembly
+    """Tool as tapped."""
+    machine: Machine
+    """Machine."""
+    at_speed: SpindleAtSpeed
+    """Spindle as test cuts have taught it."""
+    draws: ProgramDraws
+    """Draws of the cut with equal pitch."""
+    equal: Floats
+    """Their limits (m), the middle first."""
+
+    def best_of_each(self, half_wave: float) -> list[JudgedPitch]:
+        """The pattern of each kind with the highest low end of its limit, as far as few draws tell before the judge."""
+        kinds = itertools.groupby(pitch_patterns(self.table.teeth, half_wave), key=lambda pattern: pattern.name)
+        return [self._best(list(patterns)) for _, patterns in kinds]
+
+    def _best(self, patterns: list[PitchPattern]) -> JudgedPitch:
+        """The best of one kind."""
+        places = [*np.argsort(self.equal)[:HARDEST].tolist(), *range(0, self.equal.size, SPREAD)]
+        judged = dict[PitchPattern, JudgedPitch]()
+        for _ in range(TRIES):
+            calm = {pattern: self._calm(pattern, np.unique(places)) for pattern in patterns}
+            likely = max(patterns, key=lambda pattern: judged[pattern].low if pattern in judged else calm[pattern])
+            if likely in judged:
+                break
+            judged[likely], limits = self.judged(likely)
+            if judged[likely].low >= DISAPPOINTING * calm[likely]:
+                break
+            places += np.argsort(limits)[:JOINING].tolist()
+            patterns = [pattern for pattern in patterns if calm[pattern] > judged[likely].low]
+        return max(judged.values(), key=lambda judged: judged.low)
+
+    def _calm(self, pattern: PitchPattern, places: NDArray[np.intp]) -> float:
+        """The deepest (m) at which the draws at some places are stable."""
+        cuts, limits = self.draws.cuts[:FEEDS], self.draws.limits[:FEEDS]
+        few = replace(self.draws[places], cuts=tuple(with_pattern(cut, pattern) for cut in cuts), limits=limits)
+        speeds = few.rows.speed_rpm[:, np.newaxis]
+        mean = min(float(np.min(MeanForce.of(few.rows.making(cut)).limits(speeds)[0])) for cut in few.cuts)
+        return deepest_calm(few, min(DEEPER * mean, DEEPEST * self.table.depth_mm / 1e3))
+
+    def judged(self, pattern: PitchPattern) -> tuple[JudgedPitch, Floats]:
+        """Pitches by the judge, and the limit of each draw (m), the middle first."""
+        table = _with(self.table, pattern)
+        judgement = weigh(table, self.assembly, self.machine, self.at_speed)
+        band = judgement.middle.limit, judgement.low, judgement.high
+        word, limits = word_of(table, judgement, self.assembly), _limits(judgement.draws, table)
+        return _judged(pattern, word, band, limits, self.equal), limits
+
+
+def _with(table: ProgramTable, pattern: PitchPattern) -> ProgramTable:
+    return msgspec.structs.replace(table, pitch_deg=pattern.pitch_deg)
+
+
+def _limits(draws: ProgramDraws, table: ProgramTable) -> Floats:
+    """Limit of each draw (m), the middle first, the deepest that matters where there is none."""
+    depth = table.depth_mm / 1e3
+    limits = drawn_limits(draws, depth)
+    limits[0] = draws.limits[0]
+    return np.minimum(limits, DEEPEST * depth)
+
+
+def _judged(
+    pattern: PitchPattern, word: Word, band: tuple[float, float, float], limits: Floats, equal: Floats
+) -> JudgedPitch:
+    """Pitches from the limits of their draws and those of equal pitch (m), the middle first."""
+    gains = limits / equal - 1
+    low, high = np.quantile(gains[1:], QUANTILES)
+    return JudgedPitch(pattern, word, *band, float(gains[0]), float(low), float(high), float(np.mean(gains[1:] < 0)))

@@ -1,0 +1,117 @@
+"""`lobewatch pitch`: what is proposed holds in a simulation in time, where equal pitch will do, and mistakes."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from delayed_milling import DelayedCase, growth_per_turn
+
+from lobewatch.cli import main
+from lobewatch.tool.assembly import Assembly
+
+TWO = "teeth = 2\ntool_diameter_mm = 20\nradial_depth_mm = 20"
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+
+
+@pytest.fixture
+def ask(shop: Shop, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
+    """Asks for pitches on the machine of the shop: exit code, stdout, stderr."""
+
+    def call(*words: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["lobewatch", "pitch", str(shop.path), *words])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as left:
+            main()
+        return (int(left.value.code or 0), *capsys.readouterr())
+
+    return call
+
+
+def simulated(tool: Assembly, pitch: list[float], speed: float, depth: float) -> DelayedCase:
+    """A slot of the shop (fed along x) with the modes of a tool."""
+    sides = ((tool.x or (), 0.0), (tool.y or (), math.pi / 2))
+    modes = tuple((m.frequency, m.damping_ratio, m.stiffness, angle) for side, angle in sides for m in side)
+    whole = tuple(round(angle) for angle in pitch)
+    assert whole == pytest.approx(pitch)
+    return DelayedCase(modes, whole, 1.0, "down", 1400e6, 500e6, 0.0, speed, depth)
+
+
+@pytest.fixture
+def tapped(shop: Shop) -> Shop:
+    """With a slot of two teeth, fed along x."""
+    shop.run(("slot", 13800, 0.8), more='feed = "x"\nfeed_per_tooth_mm = 0.1')
+    shop.edit("teeth = 4\ntool_diameter_mm = 20\nradial_depth_mm = 20", TWO)
+    shop.tap_both()
+    return shop
+
+
+def test_what_is_proposed_holds_in_a_simulation(tapped: Shop, ask: Any) -> None:
+    code, text, _ = ask("--tool", "reference", "--speed", "13800", "--depth", "1.8", "--json")
+    answer = json.loads(text)
+    assert (code, answer["equal_is_as_good"], answer["remarks"]) == (0, False, [])
+    (best,) = answer["unequal"]
+    assert answer["proposed_deg"] == best["pitch_deg"]
+    assert best["gain"] == pytest.approx(best["limit_mm"] / answer["equal"]["limit_mm"] - 1, rel=1e-6)
+    assert best["gain_low"] < best["gain"] < best["gain_high"]
+    assert best["limit_low_mm"] >= 1.05 * answer["equal"]["limit_low_mm"]
+    assert (answer["equal"]["verdict"], best["verdict"]) == ("not stable", "stable")
+    tool = tapped.logbook.assembly()
+    growth = growth_per_turn(
+        [
+            simulated(tool, cutter["pitch_deg"], 13800.0, 1e-3 * cutter["limit_mm"] * share)
+            for cutter in (best, answer["equal"])
+            for share in (0.99, 1.01)
+        ]
+    )
+    assert np.sign(growth).tolist() == [-1, 1, -1, 1]
+
+
+def test_a_person_reads_pitches_gain_chips_and_where_they_hold(tapped: Shop, ask: Any) -> None:
+    code, text, _ = ask("--speed", "13800")
+    assert code == 0
+    assert text.splitlines()[1].split()[:3] == ["180", "180", "equal"]
+    assert text.splitlines()[2].split()[:3] == ["170", "190", "alternating"]
+    assert "pitch_deg = [170, 190]: the limit at 13 800 rpm is 58 % above that of equal pitch, 5" in text
+    assert "6 % more than the mean, 0.106 mm where 0.1 mm is fed per tooth" in text
+    assert "it holds for this speed" in text
+    assert "at 0.05 mm" not in text
+
+
+def test_equal_pitch_is_said_to_be_as_good_where_it_is(tapped: Shop, ask: Any) -> None:
+    answer = json.loads(ask("--speed", "24000", "--json")[1])
+    assert (answer["equal_is_as_good"], answer["proposed_deg"], answer["depth_mm"]) == (True, None, None)
+    assert all(cutter["limit_low_mm"] < 1.05 * answer["equal"]["limit_low_mm"] for cutter in answer["unequal"])
+    code, text, _ = ask("--speed", "24000", "--radial", "0.2", "--depth", "0.1")
+    assert code == 0
+    assert "equal pitch is as good at 24 000 rpm: it has no limit up to 2 mm" in text
+
+
+def test_pitches_that_the_cutter_has_are_judged_too(tapped: Shop, ask: Any) -> None:
+    tapped.edit("teeth = 2", "teeth = 2\npitch_deg = [178, 182]")
+    answer = json.loads(ask("--speed", "13800", "--json")[1])
+    (present,) = (cutter for cutter in answer["unequal"] if cutter["pattern"] == "as it is")
+    assert present["pitch_deg"] == [178, 182]
+    assert answer["equal"]["pitch_deg"] == [180, 180]
+    assert 0 < present["gain"] < answer["unequal"][0]["gain"]
+
+
+def test_what_is_no_cutter_or_no_cut_is_refused(shop: Shop, ask: Any) -> None:
+    shop.run(("slot", 6200, 0.8))
+    assert ask("--speed", "6200")[0] == 2
+    shop.tap_both()
+    for words, reason in [
+        (("--speed", "6200", "--teeth", "1"), "a cutter of one tooth has no pitch to divide"),
+        (("--speed", "100"), "is outside [speed]"),
+        (("--speed", "6200", "--radial", "25"), "is larger than tool_diameter_mm"),
+        (("--speed", "6200", "--tool", "nobody's"), "missing"),
+    ]:
+        code, out, error = ask(*words)
+        assert (code, out) == (2, "")
+        assert reason in error
+        assert error.count("\n") == 1

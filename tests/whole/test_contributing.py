@@ -1,4 +1,4 @@
-"""CONTRIBUTING.md alone is enough for a driver and a format: its code runs as it stands there."""
+"""CONTRIBUTING.md and examples/ are enough for a driver and a format: their code runs as it stands there."""
 
 from __future__ import annotations
 
@@ -30,6 +30,9 @@ def environment(tmp_path: Path) -> dict[str, str]:
     """With both packages of the page as an installer leaves them."""
     projects = re.findall(r"^```toml\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
     modules = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    driver = ROOT / "examples" / "own_driver"
+    assert projects[0] == (driver / "pyproject.toml").read_text("utf-8")
+    modules.insert(0, (driver / "lobewatch_acme.py").read_text("utf-8"))
     assert len(projects) == len(modules) == 2
     site = tmp_path / "site"
     for text, module in zip(projects, modules, strict=True):

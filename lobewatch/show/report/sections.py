@@ -30,6 +30,8 @@ from lobewatch.show.trends.describe_trend import ASSUMED, dates_rows, sentence
 from lobewatch.tool import ABOUT_DIRECTIONS
 from lobewatch.verdicts import Word
 
+MakesSections = Callable[[ReportMaterial], Sequence[Section]]
+"""What makes some sections of the report; none where there is nothing to show."""
 CHANGES = (
     ("frequency", "natural frequency (Hz)", 1.0),
     ("damping_ratio", "damping ratio (%)", 0.01),
@@ -156,7 +158,7 @@ def _mode_remark(stiffness: float) -> str:
     return "" if stiffness > 0 else "not a driving point"
 
 
-SECTIONS: tuple[Callable[[ReportMaterial], Sequence[Section]], ...] = (
+SECTIONS: tuple[MakesSections, ...] = (
     programs,
     until_when,
     notes,

@@ -14,13 +14,16 @@ _Float = NDArray[np.float64]
 ElementKind = Literal["euler-bernoulli", "timoshenko", "linear"]
 """Hermite cubics without shear; the cubics of Timoshenko theory; straight lines with shear, as BEAM188 has them."""
 
+BearingKind = Literal["springs", "rigid", "clamped"]
+"""What bearings do."""
 
-def first_frequency(spindle: Spindle, elements: int, kind: ElementKind, rigid_bearings: bool = False) -> float:
+
+def first_frequency(spindle: Spindle, elements: int, kind: ElementKind, bearings: BearingKind = "springs") -> float:
     """The lowest bending frequency (Hz) of so many elements, shared out over the segments by their length.
 
-    Bearings are springs at the nodes, or hold the deflection. Consistent mass, with rotary inertia where there is
-    shear; the straight lines have their strain from the middle alone, or they would lock. Segments are uniform, and
-    bearings stand at their ends. Raises ValueError for fewer elements than segments.
+    Bearings are springs at the nodes, or hold the deflection, clamped ones the rotation too. Consistent mass, with
+    rotary inertia where there is shear; the straight lines have their strain from the middle alone, or they would
+    lock. Segments are uniform, and bearings stand at their ends. Raises ValueError for fewer elements than segments.
 
     Source: J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, ch. 5 and 11; T. J. R. Hughes, The Finite
     Element Method, 1987, ch. 5.4 (straight lines).
@@ -31,8 +34,9 @@ def first_frequency(spindle: Spindle, elements: int, kind: ElementKind, rigid_be
     stiffness, mass = (_assembled(part) for part in _matrices(length, section, kind))
     nodes = np.concatenate(([0.0], np.cumsum(length)))
     places = [2 * int(np.argmin(np.abs(nodes - bearing.position))) for bearing in spindle.bearings]
-    if rigid_bearings:
-        free = np.setdiff1d(np.arange(2 * nodes.size), places)
+    if bearings != "springs":
+        held = places + [place + 1 for place in places] if bearings == "clamped" else places
+        free = np.setdiff1d(np.arange(2 * nodes.size), held)
         stiffness, mass = stiffness[np.ix_(free, free)], mass[np.ix_(free, free)]
     else:
         stiffness[places, places] += [bearing.stiffness for bearing in spindle.bearings]

@@ -38,7 +38,7 @@ def pinned_with_shear(spindle: Spindle) -> float:
 def test_pinned_without_shear() -> None:
     rigidity, _, mass, _ = section(beam())
     exact = math.pi**2 * math.sqrt(rigidity / mass) / LENGTH**2 / (2 * math.pi)
-    assert first_frequency(beam(), 40, "euler-bernoulli", rigid_bearings=True) == pytest.approx(exact, rel=1e-7)
+    assert first_frequency(beam(), 40, "euler-bernoulli", "rigid") == pytest.approx(exact, rel=1e-7)
 
 
 @pytest.mark.parametrize(("stiffness", "root"), [(1.0, 1.4025302030354), (100.0, 8.2756945554786)])
@@ -53,20 +53,20 @@ def test_free_on_two_springs(stiffness: float, root: float) -> None:
 def test_pinned_with_shear(kind: ElementKind, rel: float) -> None:
     spindle = beam(diameter=0.2)
     exact = pinned_with_shear(spindle)
-    assert first_frequency(spindle, 80, kind, rigid_bearings=True) == pytest.approx(exact, rel=rel)
-    assert exact < 0.95 * first_frequency(spindle, 80, "euler-bernoulli", rigid_bearings=True)
+    assert first_frequency(spindle, 80, kind, "rigid") == pytest.approx(exact, rel=rel)
+    assert exact < 0.95 * first_frequency(spindle, 80, "euler-bernoulli", "rigid")
 
 
 @pytest.mark.parametrize(("kind", "order"), [("euler-bernoulli", 4), ("timoshenko", 2), ("linear", 2)])
 def test_errors_fall_with_the_order_of_the_element(kind: ElementKind, order: int) -> None:
-    coarse, middle, fine = (first_frequency(beam(), n, kind, rigid_bearings=True) for n in (8, 16, 32))
+    coarse, middle, fine = (first_frequency(beam(), n, kind, "rigid") for n in (8, 16, 32))
     assert math.log2((coarse - middle) / (middle - fine)) == pytest.approx(order, abs=0.25)
 
 
 def test_straight_lines_do_not_lock_in_a_slender_beam() -> None:
     slender = beam(diameter=0.004)
     exact = pinned_with_shear(slender)
-    assert first_frequency(slender, 40, "linear", rigid_bearings=True) == pytest.approx(exact, rel=2e-3)
+    assert first_frequency(slender, 40, "linear", "rigid") == pytest.approx(exact, rel=2e-3)
 
 
 def test_less_than_an_element_a_segment_is_refused() -> None:
@@ -81,3 +81,9 @@ def test_elements_go_where_they_are_longest() -> None:
     both = [first_frequency(spindle, 4, "timoshenko") for spindle in (uneven, even)]
     assert both[0] == pytest.approx(both[1], rel=1e-9)
     assert np.isfinite(both[0])
+
+
+def test_clamped_in_its_bearings() -> None:
+    rigidity, _, mass, _ = section(beam())
+    exact = 22.373285448061 * math.sqrt(rigidity / mass) / LENGTH**2 / (2 * math.pi)
+    assert first_frequency(beam(), 40, "euler-bernoulli", "clamped") == pytest.approx(exact, rel=1e-5)

@@ -13,7 +13,7 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from lobewatch.commands import COMMANDS
+from lobewatch.commands import COMMANDS, GROUPS
 from lobewatch.commands.help_page import HelpCommand, HelpGroup, page_width
 
 
@@ -57,8 +57,8 @@ class _Root(HelpGroup):
     def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002  (asked by the completion of the shell)
         return list(COMMANDS)
 
-    def summaries(self, ctx: Any) -> Mapping[str, str]:  # noqa: ARG002
-        return COMMANDS
+    def groups(self, ctx: Any) -> Mapping[str, Mapping[str, str]]:  # noqa: ARG002
+        return GROUPS
 
 
 app = typer.Typer(

@@ -28,12 +28,13 @@ class HelpGroup(TyperGroup):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the page."""
-        formatter.write(_page(self, ctx, formatter.width, self.summaries(ctx)))
+        formatter.write(_page(self, ctx, formatter.width, self.groups(ctx)))
 
-    def summaries(self, ctx: Any) -> Mapping[str, str]:
-        """Summaries of its commands: the first paragraph of the help of each."""
+    def groups(self, ctx: Any) -> Mapping[str, Mapping[str, str]]:
+        """Summaries of its commands under the headings of the page: the first paragraph of the help of each."""
         commands = {name: self.get_command(ctx, name) for name in self.list_commands(ctx)}
-        return {name: (command.help or "").partition("\n\n")[0] for name, command in commands.items() if command}
+        texts = {name: (command.help or "").partition("\n\n")[0] for name, command in commands.items() if command}
+        return {"Commands": texts}
 
 
 def page_width() -> int:
@@ -41,7 +42,7 @@ def page_width() -> int:
     return min(shutil.get_terminal_size().columns, WIDEST)
 
 
-def _page(command: TyperCommand | TyperGroup, ctx: Any, width: int, commands: Mapping[str, str]) -> str:
+def _page(command: TyperCommand | TyperGroup, ctx: Any, width: int, groups: Mapping[str, Mapping[str, str]]) -> str:
     rows: dict[str, list[tuple[str, str]]] = {"argument": [], "option": []}
     for parameter in command.get_params(ctx):
         record = parameter.get_help_record(ctx)
@@ -49,9 +50,12 @@ def _page(command: TyperCommand | TyperGroup, ctx: Any, width: int, commands: Ma
             rows[parameter.param_type_name].append(record)
     usage = " ".join(["Usage:", ctx.command_path, *command.collect_usage_pieces(ctx)])
     lines = [*_wrapped(usage, width, subsequent_indent="  "), *_prose(command.help or "", width)]
-    for title, listed in (("Arguments", rows["argument"]), ("Options", rows["option"]), ("Commands", commands.items())):
+    for title, listed in (("Arguments", rows["argument"]), ("Options", rows["option"])):
         if listed:
-            lines += ["", f"{title}:", *_list(listed, width)]
+            lines += ["", f"{title}:", *_list(listed, width, _longest(dict(listed), width))]
+    longest = _longest([name for commands in groups.values() for name in commands], width)
+    for title, commands in groups.items():
+        lines += ["", f"{title}:", *_list(commands.items(), width, longest)]
     return "\n".join(lines) + "\n"
 
 
@@ -62,10 +66,15 @@ def _prose(text: str, width: int) -> Iterator[str]:
         yield from paragraph.splitlines() if paragraph.startswith(" ") else _wrapped(paragraph, width)
 
 
-def _list(rows: Collection[tuple[str, str]], width: int) -> Iterator[str]:
+def _longest(names: Collection[str], width: int) -> int:
+    """Characters of the longest name that has its text beside it; those that are longer do not count."""
+    most = min(LONGEST_NAME, width // 3)
+    return max((len(name) for name in names if len(name) <= most), default=most)
+
+
+def _list(rows: Collection[tuple[str, str]], width: int, longest: int) -> Iterator[str]:
     """Names and texts side by side; a name that is too long for its column above its text."""
-    longest = min(LONGEST_NAME, width // 3)
-    column = 4 + max((len(name) for name, _ in rows if len(name) <= longest), default=longest)
+    column = 4 + longest
     for name, text in rows:
         texts = _wrapped(text, width - column) or [""]
         if len(name) <= longest:

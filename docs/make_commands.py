@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
-from lobewatch.commands import COMMANDS
+from lobewatch.commands import GROUPS
 
 INTRODUCTION = """For whoever looks an option up: what `--help` says of each command, made from the code by
 `docs/make_commands.py`. The ten that a shop needs stand in the [README](../README.md#ten-commands)."""
@@ -20,9 +21,13 @@ def page() -> str:
     head, _, rest = text.partition("**Commands**:")
     rest = rest[rest.index("## `") :]
     head = head.replace("# All commands\n", f"# All commands\n\n{INTRODUCTION}\n", 1)
-    listed = "\n".join(f"* [`{name}`](#lobewatch-{name}): {summary}" for name, summary in COMMANDS.items())
-    examples = re.sub(r"^  (?=lobewatch )", "    ", f"{head}**Commands**:\n\n{listed}\n\n{rest}", flags=re.MULTILINE)
+    listed = "\n\n".join(f"**{group}**:\n\n{_links(commands)}" for group, commands in GROUPS.items())
+    examples = re.sub(r"^  (?=lobewatch )", "    ", f"{head}{listed}\n\n{rest}", flags=re.MULTILINE)
     return examples.rstrip() + "\n"
+
+
+def _links(commands: Mapping[str, str]) -> str:
+    return "\n".join(f"* [`{name}`](#lobewatch-{name}): {summary}" for name, summary in commands.items())
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import typer
 
 import lobewatch.commands
 from lobewatch.cli import app, main
-from lobewatch.commands import COMMANDS
+from lobewatch.commands import COMMANDS, GROUPS
 
 PAGES = ["", *COMMANDS, "emulate taps", "emulate dataq"]
 
@@ -60,6 +60,19 @@ def accept(command: Any, words: list[str]) -> None:
         if isinstance(command, typer.core.TyperGroup):
             _, below, rest = command.resolve_command(context, words)
             accept(below, rest)
+
+
+def test_the_list_of_commands_stands_under_their_groups(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "100")
+    lines = page("", monkeypatch, capsys).splitlines()
+    below = {group: lines[lines.index(f"{group}:") + 1 :] for group in GROUPS}
+    listed = {
+        group: [line.split()[0] for line in rest[: (*rest, "").index("")] if line[2] != " "]
+        for group, rest in below.items()
+    }
+    assert listed == {group: list(names) for group, names in GROUPS.items()}
 
 
 def test_the_list_of_commands_is_that_of_the_modules_and_says_what_they_say() -> None:

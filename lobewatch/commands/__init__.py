@@ -16,7 +16,8 @@ GROUPS = {
         "and now.",
         "lobes": "Stability lobes of the newest tap tests, drawn beside those of the first, and the pockets that "
         "are safe.",
-        "pitch": "Unequal pitches for a cutter at one speed: what they gain over equal pitch, or that equal is as good.",
+        "pitch": "Unequal pitches for a cutter at one speed: what they gain over equal pitch, or that equal "
+        "is as good.",
         "materials": "Materials that machine.toml may name, with their cutting coefficients, ranges and sources.",
     },
     "Decay (how a spindle ages)": {

@@ -48,12 +48,11 @@ def hours(material: ReportMaterial) -> list[Section]:
     ]
 
 
-def test_a_new_section_is_one_function(shop: Shop, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_new_section_is_one_function(shop: Shop) -> None:
     shop.tap(0, 1713.0)
     before = render_report(shop.logbook, "reference", "x")
     drawn = before.count("<figure>")
-    monkeypatch.setattr("lobewatch.show.report.report.SECTIONS", (*SECTIONS, hours))
-    html = render_report(shop.logbook, "reference", "x")
+    html = render_report(shop.logbook, "reference", "x", sections=(*SECTIONS, hours))
     added = html[html.index("<h2>Hours, &lt;all&gt;</h2>") : html.index("</main>")]
     assert html.replace(f"\n\n\n{added}", "\n") == before
     lines = added.splitlines()

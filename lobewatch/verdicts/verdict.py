@@ -190,7 +190,20 @@ def word_of(table: ProgramTable, judgement: Judgement, assembly: Assembly) -> Wo
 
 def is_sure(table: CutTable, assembly: Assembly) -> bool:
     """Whether all that gives way is known: both directions of the tool, without a question, and no thin wall."""
-    return assembly.is_sure and not (isinstance(table, ProgramTable) and table.thin)
+    return unanswered(table, assembly) is None
+
+
+def unanswered(table: CutTable, assembly: Assembly) -> tuple[str, str] | None:
+    """What is not known of what gives way, and what to do first; None where nothing is left open."""
+    if len(assembly.directions) < 2:
+        return assembly.gap
+    if isinstance(table, ProgramTable) and table.thin:
+        return "the wall that is cut is thin", "support the wall, which is thin"
+    if assembly.questions:
+        codes = dict.fromkeys(question.code for question in assembly.questions)
+        cure = "tap again" if "newest-damaged" in codes else "answer what is asked of its tap tests"
+        return f"it rests on a tap test in question ({', '.join(codes)})", cure
+    return None
 
 
 def _cause(table: ProgramTable, judgement: Judgement, assembly: Assembly) -> str:

@@ -19,8 +19,8 @@ from lobewatch.show.programs.describe_doubts import reading_lines
 from lobewatch.show.programs.describe_verdicts import verdict_json, verdict_table
 from lobewatch.show.terminal.output import remark_json, remark_lines
 from lobewatch.verdicts import Advice, Setting, Verdict, Word
-from lobewatch.verdicts.setting_search import LEFT
-from lobewatch.verdicts.verdict import Ruling, is_sure
+from lobewatch.verdicts.room import LEFT
+from lobewatch.verdicts.verdict import Ruling, is_sure, unanswered
 
 IN_LINES = ("doubt-decides", "not-checked")
 """Remarks that the lines of a program hold already."""
@@ -143,11 +143,11 @@ def _chatter(program: ProgramAdvice) -> str:
     verdict = program.verdict
     word = "period-two chatter" if verdict.kind == "flip" else "chatter"
     where = f" near {verdict.chatter_frequency:.0f} Hz" if math.isfinite(verdict.chatter_frequency) else ""
-    text = f"{word}{where}{_worst_feed(verdict)}"
+    text = f"{word}{where}{worst_feed(verdict)}"
     return f"stable at first, no longer: {text}" if program.is_no_longer_stable else text
 
 
-def _worst_feed(verdict: Verdict) -> str:
+def worst_feed(verdict: Verdict) -> str:
     """The direction of feed that is worst, where it matters."""
     limits = np.ones(1) if verdict.draws is None else verdict.draws.limits
     if np.max(limits) <= ALIKE * np.min(limits):
@@ -166,15 +166,9 @@ def _or_elsewhere(program: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:
 def _elsewhere(advice: ProgramAdvice, speeds: SpeedRange) -> str:
     """Where to go."""
     verdict, best, shallower = advice.verdict, advice.advice.best, advice.advice.here
-    assembly = verdict.assembly
-    if assembly is not None and len(assembly.directions) == 1:
-        return f"{assembly.gap[1]}: only then can a safe speed be named"
-    if verdict.program.thin:
-        return "support the wall, which is thin: only then can a safe speed be named"
-    if assembly is not None and assembly.questions:
-        cure = "answer what is asked of its tap tests"
-        cure = "tap again" if any(question.code == "newest-damaged" for question in assembly.questions) else cure
-        return f"{cure}: only then can a safe speed be named"
+    gap = None if verdict.assembly is None else unanswered(verdict.program, verdict.assembly)
+    if gap is not None:
+        return f"{gap[1]}: only then can a safe speed be named"
     reach = f"in {rpm(speeds.low_rpm)} to {rpm(speeds.high_rpm)} rpm"
     if best is None:
         return f"no safe speed {reach}; choose another tool"

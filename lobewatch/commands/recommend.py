@@ -35,7 +35,7 @@ def recommend(
     Examples:
 
       lobewatch recommend trial --tool reference --material 42CrMo4
-      lobewatch recommend trial --material 6061 --radial 4 --direction down --save "bracket, finish"
+      lobewatch recommend trial --material "AA 6061" --radial 4 --direction down --save "bracket, finish"
       lobewatch recommend trial --depth 1.5 --json
     """
     from lobewatch.logbook import Logbook

@@ -22,7 +22,6 @@ from lobewatch.tool.mean_lobes import mean_lobes
 from lobewatch.verdicts.doubt import Doubt
 from lobewatch.verdicts.mean_force import is_constant
 from lobewatch.verdicts.room import APART as ROOM
-from lobewatch.verdicts.room import DEEPER
 
 GRID = 0.002
 """Relative step of the speeds."""
@@ -90,7 +89,7 @@ def likely_depths(
     number = max(int(math.log(reach.high_rpm / reach.low_rpm) / GRID), 1)
     speeds = np.geomspace(reach.low_rpm, reach.high_rpm, number + 1)
     by_cut = np.array([mean_lobes(spindle.x, spindle.y, [cut], speeds, spindle.cross).depth for cut in cuts]) * 1e3
-    deepest, safe = reach.depths(speeds), max(DEEPER * doubt.tangential.high, 1 + spare)
+    deepest, safe = reach.depths(speeds), max(doubt.tangential.high, 1 + spare)
     by_cut = np.minimum(by_cut, MATTERS * safe * deepest)
     beside = doubt.speed + BESIDE + math.log(ROOM)
     steps, ahead = math.ceil((beside + fall / 2) / GRID), round(fall / 2 / GRID)

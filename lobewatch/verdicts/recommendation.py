@@ -38,9 +38,9 @@ class Alternative:
     """A setting beside the recommended one."""
 
     what: str
-    """What it is good for."""
+    """Name of what it is good for."""
     setting: Setting
-    """Its speed and depth."""
+    """Speed and depth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,17 +50,17 @@ class Recommendation:
     program: ProgramTable
     """Cut that is asked about, as it would stand in machine.toml; at the recommended setting where there is one."""
     either: bool = False
-    """Whether it holds for up and down milling; the program is milled in the worse direction."""
+    """Direction left open: it holds for up and down milling, and the program is milled in the worse."""
     setting: Setting | None = None
     """Recommended setting; None where there is none."""
     verdict: Verdict | None = None
     """Verdict on the program at that setting; None where there is none."""
     reason: str = ""
-    """Why there is none."""
+    """Reason why there is none."""
     cures: tuple[str, ...] = ()
-    """What would change that."""
+    """Measures that would change that."""
     alternatives: tuple[Alternative, ...] = ()
-    """At most two other settings."""
+    """Settings beside it, two at most."""
 
     def named(self, name: str) -> Self:
         """The same, its program of another name."""

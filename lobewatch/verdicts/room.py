@@ -30,13 +30,13 @@ Floats = NDArray[np.float64]
 
 
 def at_ends(draws: ProgramDraws, fall: float, stiffness_at: StiffnessAt) -> ProgramDraws:
-    """All draws at the slower speed now, then at the faster one after the fall: the ends of what must be safe."""
-    return _moved(draws, [1 / APART, APART], [0, fall], stiffness_at)
+    """All draws at the slower speed, then after the fall: the ends of what must be safe."""
+    return _moved(draws, [1 / APART, 1], [0, fall], stiffness_at)
 
 
 def all_around(draws: ProgramDraws, fall: float, stiffness_at: StiffnessAt) -> ProgramDraws:
-    """All draws at these ends, and two places between them."""
-    return _moved(draws, [1 / APART, 1, 1, APART], [0, fall / 2, fall, fall], stiffness_at)
+    """All draws at these ends, after half of the fall, and at the faster speed."""
+    return _moved(draws, [1 / APART, 1, 1, APART], [0, fall, fall / 2, 0], stiffness_at)
 
 
 def _moved(draws: ProgramDraws, speeds: list[float], falls: list[float], stiffness_at: StiffnessAt) -> ProgramDraws:

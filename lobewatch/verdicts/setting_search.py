@@ -47,6 +47,8 @@ TRIES, MOST_TRIES = 4, 12
 """Number of depths that are judged at one speed, and at all of them."""
 DISAPPOINTING = 0.95
 """Share of a depth, less than which is left where it is judged, has one more speed looked at."""
+NEARLY = 0.85
+"""Share of a depth that is wanted, where so much is likely it may be safe too."""
 REMEMBERED = 8
 """Draws of each judgement that are remembered where they chatter."""
 LESS = 0.98
@@ -91,7 +93,7 @@ class SettingSearch:
     at_speed: SpindleAtSpeed = AT_REST
     """Spindle as test cuts have taught it."""
     either: bool = False
-    """Whether it may be milled up or down: the worse counts."""
+    """Direction left open: milled up or down, the worse counts."""
     hard: dict[float, HardDraws] = field(default_factory=dict)
     """Few draws by speed (rpm), worked out anew where more of them are known to chatter."""
     chattered: set[int] = field(default_factory=set)
@@ -165,8 +167,8 @@ class SettingSearch:
         """A depth (mm) in the first window of speeds where it is safe, the lowest rank first; else where most is."""
         if self.best is None:
             return None
-        middles = sorted(self.likely.middles(depth_mm), key=rank)[:MOST_PLACES]
-        for speed in map(_rounded, [*middles, self.best.speed_rpm]):
+        middles = {*self.likely.middles(depth_mm), *self.likely.middles(NEARLY * depth_mm)}
+        for speed in map(_rounded, [*sorted(middles, key=rank)[:MOST_PLACES], self.best.speed_rpm]):
             if self.reach.holds(speed, depth_mm) and self._calm(speed) >= depth_mm:
                 setting = self._verified(speed, depth_mm)
                 if isinstance(setting, Setting):

@@ -98,7 +98,7 @@ def test_nothing_is_safe_anywhere(shop: Shop, run: Any) -> None:
 
 def test_a_tool_that_was_never_tapped_is_predicted_and_said_to_be_doubtful(shop: Shop, run: Any) -> None:
     shop.tap_both()
-    of = ("--material", "6061", "--teeth", "2", "--diameter", "18")
+    of = ("--material", "AA 6061", "--teeth", "2", "--diameter", "18")
     assert "predicted: doubtful until the tool is tapped" in run("recommend", "--tool", "long end mill", *of)[1]
     code, out, _ = run("recommend", "--tool", "new", *of)
     assert (code, "none; no tap test with tool 'new', and no prediction" in out) == (1, True)

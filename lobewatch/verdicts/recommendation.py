@@ -12,7 +12,7 @@ import numpy as np
 from acquisition import DataError
 from lobes import Direction
 from lobewatch.machine import Machine, ProgramTable
-from lobewatch.machine.settings.cut_range import MM
+from lobewatch.machine.settings.cut_range import MM, CutRange
 from lobewatch.machine.settings.setting_questions import questions_of_program
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.setting_search import Setting, SettingSearch
@@ -27,6 +27,8 @@ OTHER_CUT = (
     "a smaller radial depth",
 )
 """What makes a cut safe that is not, in words."""
+SLOWER = ("a smaller diameter", "tool_material and cutting_speed_m_min in its [[tool]], where it bears more")
+"""What makes a tool one that the spindle is slow enough for."""
 THIN = 0.1
 """Radial depth over diameter up to which less of it is no advice."""
 ITS_OWN = ("speed_rpm", "depth_mm")
@@ -85,6 +87,8 @@ def recommend(
         return Recommendation(table, either, reason=str(tool), cures=("tap it",))
     if gap := _gap(table, tool, machine):
         return Recommendation(table, either, reason=gap[0], cures=gap[1:])
+    if (too_fast := _too_fast(CutRange.of(machine, table))) is not None:
+        return Recommendation(table, either, reason=too_fast, cures=SLOWER)
     search = SettingSearch(at_speed.taught(table), tool, machine, at_speed, either)
     setting = search.best if depth_mm is None else search.fastest(depth_mm)
     others = tuple(_alternatives(search, setting, depth_mm, present_rpm))
@@ -103,6 +107,17 @@ def _gap(table: ProgramTable, tool: Assembly, machine: Machine) -> tuple[str, ..
     if asked:
         return ("; ".join(f"{doubted.claim} {doubted.why}" for doubted in asked), asked[0].remark.cure)
     return unanswered(table, tool) or ()
+
+
+def _too_fast(reach: CutRange) -> str | None:
+    """Why no speed of the spindle is one that the tool bears; None where one is."""
+    speed, limits = reach.machine.speed, reach.limits
+    if not reach.is_empty:
+        return None
+    edge = limits.cutting_speed_m_min
+    why = "" if edge is None else f" ({edge.high:.0f} m/min at its edge)"
+    slowest = f"and the spindle turns no slower than {speed.low_rpm:g} rpm"
+    return f"the tool bears no more than {reach.high_rpm:g} rpm{why}, {slowest}"
 
 
 def _entered(

@@ -55,7 +55,7 @@ def test_the_recommended_slot_is_saved_as_a_program_that_check_calls_stable(shop
 
 def test_a_cut_milled_in_either_direction_is_safe_in_both(shop: Shop, run: Any) -> None:
     shop.tap_both()
-    of = ("--radial", "12", "--material", "42CrMo4")
+    of = ("--radial", "12", "--material", "AA 6061")
     best = json.loads(run("recommend", *of, "--json")[1])["recommended"]
     assert best["direction"] == "either"
     for direction in ("up", "down"):
@@ -94,6 +94,18 @@ def test_nothing_is_safe_anywhere(shop: Shop, run: Any) -> None:
     assert (answer["recommended"], answer["reason"]) == (None, "no safe speed and depth in 3000..24000 rpm")
     assert answer["what_would_change_it"][0].startswith("a shorter stick-out")
     assert json.loads(run("check", "--program", "A", "--json")[1])["programs"][0]["advice"] is None
+
+
+def test_a_tool_that_bears_no_speed_of_the_spindle_has_none(shop: Shop, run: Any) -> None:
+    shop.tap_both()
+    code, out, _ = run("recommend", "--material", "42CrMo4")
+    reason, cures = out.splitlines()
+    assert code == 1
+    assert reason == (
+        "reference, slot of 20 mm: none; the tool bears no more than 2860 rpm (180 m/min at its edge), "
+        "and the spindle turns no slower than 3000 rpm"
+    )
+    assert cures.startswith("what would change it: a smaller diameter")
 
 
 def test_a_tool_that_was_never_tapped_is_predicted_and_said_to_be_doubtful(shop: Shop, run: Any) -> None:

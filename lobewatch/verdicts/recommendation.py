@@ -63,6 +63,8 @@ class Recommendation:
     """Measures that would change that."""
     alternatives: tuple[Alternative, ...] = ()
     """Settings beside it, two at most."""
+    feed_mm: tuple[float, float] | None = None
+    """Least and greatest feed per tooth (mm): its own, else what the tool bears; None where neither is known."""
 
     def named(self, name: str) -> Self:
         """The same, its program of another name."""
@@ -136,7 +138,9 @@ def _entered(
             reason = "; ".join(str(remark) for remark in verdict.remarks) or verdict.word.value
             return Recommendation(table, search.either, reason=reason, alternatives=others)
     program = msgspec.structs.replace(at, direction=worst.program.direction)
-    return Recommendation(program, search.either, setting, worst, alternatives=others)
+    own, borne = table.feed_per_tooth_mm, search.reach.limits.feed_per_tooth_mm
+    feed = (own, own) if own is not None else None if borne is None else (borne.low, borne.high)
+    return Recommendation(program, search.either, setting, worst, alternatives=others, feed_mm=feed)
 
 
 def _alternatives(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from lobewatch.machine.settings.cut_range import MM
 from lobewatch.machine.settings.cut_tables import ProgramTable
+from lobewatch.machine.settings.known_tool import KEYS, known_tool
 from lobewatch.machine.settings.machine_file import Machine
 
 OPTIONS = {
@@ -73,14 +75,18 @@ def present_speed(machine: Machine, tool: str) -> float | None:
 
 
 def _known(machine: Machine, said: Mapping[str, Any]) -> dict[str, Any]:
-    """What is said of a cut, and what the programs of its tool agree on."""
+    """What is said of a cut, and what the [[tool]] and the programs of its tool say, where they agree."""
     given = {key: value for key, value in said.items() if value is not None}
     _check_numbers(machine, given)
-    tool = given.get("tool") or _agreed(machine.program).get("tool")
+    tool = given.get("tool") or (_agreed(machine.program).get("tool") if machine.program else machine.tap.tool)
     known = _agreed([program for program in machine.program if program.tool == tool])
     if "material" in given or not known.keys() >= COEFFICIENTS:
         known = {key: value for key, value in known.items() if key not in COEFFICIENTS}
-    return known | given
+    if tool is None:
+        return known | given
+    of_tool = known_tool(machine, tool)
+    own = {key: value for field, key in KEYS.items() if (value := getattr(of_tool, field)) is not None}
+    return known | own | {"tool": tool} | given
 
 
 def _refuse_missing(machine: Machine, known: Mapping[str, Any], wanted: Mapping[str, str]) -> None:
@@ -89,9 +95,8 @@ def _refuse_missing(machine: Machine, known: Mapping[str, Any], wanted: Mapping[
     if known.keys() >= COEFFICIENTS:
         missing = [option for option in missing if option != OPTIONS["material"]]
     if missing:
-        tool = known.get("tool")
-        programs = [program for program in machine.program if program.tool == tool]
-        raise ValueError(f"{', '.join(missing)}: missing, and {_why_missing(tool, programs)}; give them")
+        why = _why_missing(machine, known.get("tool"))
+        raise ValueError(f"{', '.join(missing)}: missing, and {why}; give them")
 
 
 def _check_numbers(machine: Machine, given: Mapping[str, Any]) -> None:
@@ -112,7 +117,13 @@ def _agreed(programs: Sequence[ProgramTable]) -> dict[str, Any]:
     return {key: next(iter(alike)) for key, alike in values.items() if len(alike) == 1 and alike != {None}}
 
 
-def _why_missing(tool: str | None, programs: Sequence[ProgramTable]) -> str:
+def _why_missing(machine: Machine, tool: str | None) -> str:
     if tool is None:
         return "no tool is named whose programs could say them"
-    return f"the programs of tool {tool!r} do not agree on them" if programs else f"no program runs with tool {tool!r}"
+    named = {machine.tap.tool, *(table.name for table in machine.tool), *(program.tool for program in machine.program)}
+    if tool not in named:
+        near = difflib.get_close_matches(tool, named, n=1)
+        return f"machine.toml knows no tool {tool!r}" + (f" (is {near[0]!r} meant?)" if near else "")
+    if any(program.tool == tool for program in machine.program):
+        return f"the programs of tool {tool!r} do not agree on them"
+    return f"no program runs with tool {tool!r}"

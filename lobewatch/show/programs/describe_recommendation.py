@@ -31,9 +31,7 @@ def recommendation_json(answer: Recommendation, remarks: Sequence[Remark]) -> di
         "recommended": _recommended_json(answer),
         "reason": answer.reason or None,
         "what_would_change_it": list(answer.cures),
-        "alternatives": [
-            {"what": other.what, **_setting_json(other.setting, program)} for other in answer.alternatives
-        ],
+        "alternatives": [{"what": other.what, **_setting_json(other.setting, answer)} for other in answer.alternatives],
         "remarks": [remark_json(remark) for remark in [*remarks, *_notes(answer)]],
     }
 
@@ -41,12 +39,11 @@ def recommendation_json(answer: Recommendation, remarks: Sequence[Remark]) -> di
 def _recommended_json(answer: Recommendation) -> dict[str, Any] | None:
     if answer.setting is None or answer.verdict is None:
         return None
-    return _setting_json(answer.setting, answer.program) | {
+    return _setting_json(answer.setting, answer) | {
         "direction": "either" if answer.either else answer.program.direction,
         "worse_direction": answer.program.direction,
         "feed": answer.program.feed,
         "worst_feed_deg": math.degrees(answer.verdict.feed_angle),
-        "feed_per_tooth_mm": answer.program.feed_per_tooth_mm,
         "verdict": answer.verdict.word,
         "measured": answer.verdict.measured,
         "cuts": answer.verdict.cuts,
@@ -54,14 +51,23 @@ def _recommended_json(answer: Recommendation) -> dict[str, Any] | None:
     }
 
 
-def _setting_json(setting: Setting, program: ProgramTable) -> dict[str, Any]:
-    return {**(setting_json(setting) or {}), "chips_cm3_per_min": chips(setting, program, program.feed_per_tooth_mm)}
+def _setting_json(setting: Setting, answer: Recommendation) -> dict[str, Any]:
+    feed = None if answer.feed_mm is None else answer.feed_mm[1]
+    return {
+        **(setting_json(setting) or {}),
+        "cutting_speed_m_min": edge_speed(setting, answer.program),
+        "feed_per_tooth_mm": feed,
+        "chips_cm3_per_min": math.nan if feed is None else chips(setting, answer.program, feed),
+    }
 
 
-def chips(setting: Setting, program: ProgramTable, feed_mm: float | None) -> float:
-    """Chips a minute (cm3/min) at a feed per tooth (mm); NaN where that is not known."""
-    if feed_mm is None:
-        return math.nan
+def edge_speed(setting: Setting, program: ProgramTable) -> float:
+    """Speed of the edge (m/min)."""
+    return math.pi * program.tool_diameter_mm * setting.speed_rpm / 1e3
+
+
+def chips(setting: Setting, program: ProgramTable, feed_mm: float) -> float:
+    """Chips a minute (cm3/min) at a feed per tooth (mm)."""
     area = setting.depth_mm * program.radial_mm[1]
     return area * feed_mm * program.teeth * setting.speed_rpm / 1e3
 
@@ -74,7 +80,10 @@ def recommendation_lines(
     others = [(other.what, other.setting) for other in answer.alternatives]
     lines = [
         *(_answer(answer, name) if answer.setting else _none(answer, name)),
-        *(f"{what}: {_place(setting)} {spare_text(setting)}{_chips(setting, answer)}" for what, setting in others),
+        *(
+            f"{what}: {_place(setting, answer)} {spare_text(setting)}; {_chips(setting, answer)}"
+            for what, setting in others
+        ),
         *remark_lines([*remarks, *_notes(answer)]),
     ]
     if saved is not None:
@@ -88,9 +97,9 @@ def _answer(answer: Recommendation, name: str) -> Iterator[str]:
         return
     way = "up or down" if answer.either and answer.program.immersion < 1 else ""
     predicted = "" if verdict.measured else ", predicted: doubtful until the tool is tapped"
-    yield f"{name}: {_place(setting)}{f', milled {way}' if way else ''}{predicted}"
+    yield f"{name}: {_place(setting, answer)}{f', milled {way}' if way else ''}{predicted}"
     yield f"  {spare_text(setting).strip('()')}"
-    yield f"  {_chips(setting, answer).removeprefix('; ')}{worst_feed(verdict)}"
+    yield f"  {_chips(setting, answer)}{worst_feed(verdict)}"
     if verdict.cuts:
         yield f"  as {verdict.cuts} test cut{'s have' if verdict.cuts > 1 else ' has'} taught of the turning spindle"
 
@@ -101,15 +110,17 @@ def _none(answer: Recommendation, name: str) -> Iterator[str]:
         yield f"what would change it: {'; '.join(answer.cures)}"
 
 
-def _place(setting: Setting) -> str:
-    return f"{rpm(setting.speed_rpm)} rpm, {setting.depth_mm:g} mm deep"
+def _place(setting: Setting, answer: Recommendation) -> str:
+    edge = edge_speed(setting, answer.program)
+    return f"{rpm(setting.speed_rpm)} rpm ({edge:.0f} m/min), {setting.depth_mm:g} mm deep"
 
 
 def _chips(setting: Setting, answer: Recommendation) -> str:
-    feed = answer.program.feed_per_tooth_mm
-    if feed is None:
-        return f"; {chips(setting, answer.program, UNIT_FEED):.3g} cm3/min for each {UNIT_FEED:g} mm of feed a tooth"
-    return f"; {chips(setting, answer.program, feed):.3g} cm3/min at {feed:g} mm a tooth"
+    if answer.feed_mm is None:
+        return f"{chips(setting, answer.program, UNIT_FEED):.3g} cm3/min for each {UNIT_FEED:g} mm of feed a tooth"
+    texts = [(f"{chips(setting, answer.program, feed):.3g}", f"{feed:.3g}") for feed in dict.fromkeys(answer.feed_mm)]
+    volumes, feeds = (" to ".join(part) for part in zip(*texts, strict=True))
+    return f"{volumes} cm3/min at {feeds} mm a tooth"
 
 
 def _notes(answer: Recommendation) -> list[Remark]:

@@ -126,7 +126,8 @@ def test_a_tool_that_was_never_tapped_is_predicted_and_said_to_be_doubtful(shop:
         (["--radial", "-4"], "--radial -4: is not above 0"),
         (["--radial", "30"], "radial_depth_mm=30 is larger than tool_diameter_mm=20"),
         (["--speed", "50000"], "--speed 50000: is outside [speed] 3000..24000 rpm"),
-        (["--tool", "new"], "--material, --teeth, --diameter: missing, and no program runs with tool 'new'"),
+        (["--tool", "new"], "--material, --teeth, --diameter: missing, and machine.toml knows no tool 'new'; give"),
+        (["--tool", "long end mil"], "--material, --teeth, --diameter: missing, and machine.toml knows no tool"),
     ],
 )
 def test_one_error_for_what_makes_no_sense(shop: Shop, run: Any, words: list[str], text: str) -> None:

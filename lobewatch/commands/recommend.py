@@ -41,7 +41,7 @@ def recommend(
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.recommended import recommended
     from lobewatch.machine.additions.save_program import refuse_taken, save_program
-    from lobewatch.show.programs.describe_recommendation import recommendation_json, recommendation_lines
+    from lobewatch.show.programs.describe_recommendation import recommendation_json, recommendation_lines, saved_lines
 
     said = {
         "speed_rpm": speed,
@@ -65,7 +65,8 @@ def recommend(
     emit(
         recommendation_json(answer, logbook.remarks) | {"saved": saved},
         as_json,
-        *recommendation_lines(answer, logbook.remarks, logbook.folder.path, saved),
+        *recommendation_lines(answer, logbook.remarks),
+        *(saved_lines(logbook.folder.path, saved) if saved else ()),
     )
     if answer.setting is None:
         raise typer.Exit(1)

@@ -79,11 +79,12 @@ def recommend(
     either: bool = False,
     depth_mm: float | None = None,
     present_rpm: float | None = None,
+    is_set: bool = False,
 ) -> Recommendation:
     """The setting of most chips, at a depth where one is asked for; it would be called stable when it is entered.
 
     table: the cut, whose own speed and depth do not count; either: it may be milled up or down, the worse counts;
-    present_rpm: speed that it runs at now, where that is known.
+    present_rpm: speed that it runs at now, where that is known; is_set: it shall run at no other.
     """
     if isinstance(tool, DataError):
         return Recommendation(table, either, reason=str(tool), cures=("tap it",))
@@ -92,13 +93,14 @@ def recommend(
     if (too_fast := _too_fast(CutRange.of(machine, table))) is not None:
         return Recommendation(table, either, reason=too_fast, cures=SLOWER)
     search = SettingSearch(at_speed.taught(table), tool, machine, at_speed, either)
-    setting = search.best if depth_mm is None else search.fastest(depth_mm)
-    others = tuple(_alternatives(search, setting, depth_mm, present_rpm))
+    if is_set and present_rpm is not None:
+        setting = search.here(present_rpm, search.reach.deepest_mm)
+    else:
+        setting = search.best if depth_mm is None else search.fastest(depth_mm)
+    others = tuple(_alternatives(search, setting, present_rpm))
     if setting is None:
-        speeds = f"{search.reach.low_rpm:g}..{search.reach.high_rpm:g} rpm"
-        named = "speed and depth" if depth_mm is None else f"speed for {depth_mm:g} mm"
-        reason, cures = f"no safe {named} in {speeds}", _cures(search, depth_mm)
-        return Recommendation(table, either, reason=reason, cures=cures, alternatives=others)
+        reason = _no_safe(search, depth_mm, present_rpm if is_set else None)
+        return Recommendation(table, either, reason=reason, cures=_cures(search, depth_mm), alternatives=others)
     return _entered(search, table, setting, others)
 
 
@@ -143,17 +145,23 @@ def _entered(
     return Recommendation(program, search.either, setting, worst, alternatives=others, feed_mm=feed)
 
 
-def _alternatives(
-    search: SettingSearch, setting: Setting | None, depth_mm: float | None, present_rpm: float | None
-) -> Iterator[Alternative]:
+def _alternatives(search: SettingSearch, setting: Setting | None, present_rpm: float | None) -> Iterator[Alternative]:
     places = {(setting.speed_rpm, setting.depth_mm)} if setting else set[tuple[float, float]]()
-    wanted = {MOST_CHIPS: search.best if depth_mm is not None else None}
+    wanted = {MOST_CHIPS: search.best}
     if present_rpm is not None:
         wanted[HERE] = search.here(present_rpm, search.reach.deepest_mm)
     for what, other in wanted.items():
         if other is not None and (place := (other.speed_rpm, other.depth_mm)) not in places:
             places.add(place)
             yield Alternative(what, other)
+
+
+def _no_safe(search: SettingSearch, depth_mm: float | None, set_rpm: float | None) -> str:
+    """What there is not."""
+    if set_rpm is not None:
+        return f"no safe depth at {set_rpm:g} rpm"
+    named = "speed and depth" if depth_mm is None else f"speed for {depth_mm:g} mm"
+    return f"no safe {named} in {search.reach.low_rpm:g}..{search.reach.high_rpm:g} rpm"
 
 
 def _cures(search: SettingSearch, depth_mm: float | None) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import write_machine
 from lobewatch.machine.settings.cut_tables import ProgramTable
 from lobewatch.machine.settings.edit_text import TablePlace, edit_text
-from lobewatch.machine.settings.machine_file import Machine, parse_machine
+from lobewatch.machine.settings.machine_file import REFERENCE_CUT, Machine, parse_machine
 
 FIRST = ("name", "tool")
 """Keys that stand first; the others as `ProgramTable` has them."""
@@ -20,7 +20,7 @@ def refuse_taken(machine: Machine, name: str) -> None:
     """ValueError for a name that no new program can have."""
     if not name.strip():
         raise ValueError("--save: the name is empty; give the program a name")
-    if name in machine.cut_names:
+    if name in (REFERENCE_CUT, *(program.name for program in machine.listed)):
         raise ValueError(f"--save {name}: a program of that name is in machine.toml; choose another name")
 
 
@@ -32,7 +32,7 @@ def save_program(folder: MachineFolder, program: ProgramTable) -> None:
     with folder.locked():
         now = MachineFolder(folder.path)
         refuse_taken(now.machine, program.name)
-        place = TablePlace("program", len(now.machine.program))
+        place = TablePlace("program", len(now.machine.listed))
         text = edit_text(now.toml_text, place, _values(program))
         parse_machine(text, str(now.toml))
         write_machine(now.path, text)

@@ -78,8 +78,8 @@ def _known(machine: Machine, said: Mapping[str, Any]) -> dict[str, Any]:
     """What is said of a cut, and what the [[tool]] and the programs of its tool say, where they agree."""
     given = {key: value for key, value in said.items() if value is not None}
     _check_numbers(machine, given)
-    tool = given.get("tool") or (_agreed(machine.program).get("tool") if machine.program else machine.tap.tool)
-    known = _agreed([program for program in machine.program if program.tool == tool])
+    tool = given.get("tool") or (_agreed(machine.listed).get("tool") if machine.listed else machine.tap.tool)
+    known = _agreed([program for program in machine.listed if program.tool == tool])
     if "material" in given or not known.keys() >= COEFFICIENTS:
         known = {key: value for key, value in known.items() if key not in COEFFICIENTS}
     if tool is None:
@@ -120,10 +120,10 @@ def _agreed(programs: Sequence[ProgramTable]) -> dict[str, Any]:
 def _why_missing(machine: Machine, tool: str | None) -> str:
     if tool is None:
         return "no tool is named whose programs could say them"
-    named = {machine.tap.tool, *(table.name for table in machine.tool), *(program.tool for program in machine.program)}
+    named = {machine.tap.tool, *(table.name for table in machine.tool), *(program.tool for program in machine.listed)}
     if tool not in named:
         near = difflib.get_close_matches(tool, named, n=1)
         return f"machine.toml knows no tool {tool!r}" + (f" (is {near[0]!r} meant?)" if near else "")
-    if any(program.tool == tool for program in machine.program):
+    if any(program.tool == tool for program in machine.listed):
         return f"the programs of tool {tool!r} do not agree on them"
     return f"no program runs with tool {tool!r}"

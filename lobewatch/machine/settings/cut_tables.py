@@ -109,12 +109,12 @@ class CutTable(Table, frozen=True):
 
 
 class ProgramTable(CutTable, frozen=True, kw_only=True):
-    """[[program]]: one cut that the shop runs."""
+    """[[program]]: one cut that the shop runs, or one whose speed or depth, NaN then, is asked for."""
 
     name: Annotated[str, Meta(min_length=1)]
     tool: str = "reference"
-    speed_rpm: Positive
-    depth_mm: Positive
+    speed_rpm: Positive = math.nan
+    depth_mm: Positive = math.nan
     corner_radius_mm: Positive | None = None
     wear: Wear | None = None
     thin: bool = False
@@ -126,6 +126,11 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
             raise ValueError(f"depth_mm={self.depth_mm:g} is deeper than flute_length_mm={self.flute_length_mm:g}")
         if self.corner_radius_mm is not None:
             self.in_corner(self.corner_radius_mm)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether its speed or its depth is asked for."""
+        return math.isnan(self.speed_rpm) or math.isnan(self.depth_mm)
 
     @property
     def immersions(self) -> tuple[float, ...]:
@@ -150,7 +155,7 @@ class ProgramTable(CutTable, frozen=True, kw_only=True):
     @property
     def deepest_mm(self) -> float:
         """Greatest depth of cut of the tool (mm); without a known length of flutes one diameter or what it cuts now."""
-        return max(super().deepest_mm, self.depth_mm)
+        return max(super().deepest_mm, 0.0 if math.isnan(self.depth_mm) else self.depth_mm)
 
 
 class MaterialTable(Table, frozen=True):

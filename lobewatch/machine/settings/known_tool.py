@@ -56,7 +56,7 @@ class KnownTool:
 def known_tool(machine: Machine, name: str) -> KnownTool:
     """All that machine.toml says of a tool; a tool that it does not name at all has a name alone."""
     table = next((tool for tool in machine.tool if tool.name == name), None)
-    programs = [program for program in machine.program if program.tool == name]
+    programs = [program for program in machine.listed if program.tool == name]
     known: dict[str, Any] = {}
     for field, key in KEYS.items():
         values = {getattr(program, key) for program in programs}

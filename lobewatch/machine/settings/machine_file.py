@@ -47,18 +47,19 @@ class Machine(Table, frozen=True):
     notify: NotifyTable = NotifyTable()
     material: tuple[MaterialTable, ...] = ()
     reference_cut: CutTable | None = None
-    program: tuple[ProgramTable, ...] = ()
+    listed: tuple[ProgramTable, ...] = msgspec.field(default=(), name="program")
+    """Programs as they stand in the file: those that are run, and those whose speed or depth is asked for."""
     spindle: SpindleTable | None = None
     tool: tuple[ToolTable, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse programs and tools that cannot be told apart, and what lies outside the speed range."""
         self._check_tools()
-        names = [program.name for program in self.program]
-        for i, program in enumerate(self.program, 1):
+        names = [program.name for program in self.listed]
+        for i, program in enumerate(self.listed, 1):
             if program.name in (*names[: i - 1], REFERENCE_CUT):
                 raise ValueError(f"program {i}: name={program.name!r} stands twice; give each program its own")
-            if not self.speed.low_rpm <= program.speed_rpm <= self.speed.high_rpm:
+            if not (math.isnan(program.speed_rpm) or self.speed.low_rpm <= program.speed_rpm <= self.speed.high_rpm):
                 raise ValueError(
                     f"program {i}: speed_rpm={program.speed_rpm:g} is outside [speed] "
                     f"{self.speed.low_rpm:g}..{self.speed.high_rpm:g} rpm"
@@ -69,9 +70,19 @@ class Machine(Table, frozen=True):
                 raise ValueError(f"material {i}: name={name!r} stands twice; give each its own")
         if self.reference_cut:
             self.coefficients(self.reference_cut)
-        for i, program in enumerate(self.program, 1):
+        for i, program in enumerate(self.listed, 1):
             self.coefficients(program)
             self._check_pitch(f"program {i}", program)
+
+    @property
+    def program(self) -> tuple[ProgramTable, ...]:
+        """Programs that are run, with a speed and a depth."""
+        return tuple(program for program in self.listed if not program.is_open)
+
+    @property
+    def open_programs(self) -> tuple[ProgramTable, ...]:
+        """Programs whose speed or depth is asked for."""
+        return tuple(program for program in self.listed if program.is_open)
 
     def coefficients(self, table: CutTable) -> Coefficients:
         """Cutting coefficients of a cut: its own, or those of its material; ValueError for one that is not known.
@@ -239,9 +250,10 @@ def _keys(place: str) -> tuple[str, ...]:
     """Keys of the table at a place like ".program[0]"."""
     table: type[Table] = Machine
     for key in re.findall(r"\.(\w+)", place):
-        kinds = typing.get_type_hints(table, include_extras=True)[key]
+        own = dict(zip(table.__struct_encode_fields__, table.__struct_fields__, strict=True))[key]
+        kinds = typing.get_type_hints(table, include_extras=True)[own]
         table = next(kind for kind in _kinds(kinds) if isinstance(kind, type) and issubclass(kind, Table))
-    return table.__struct_fields__
+    return table.__struct_encode_fields__
 
 
 def _kinds(kind: object) -> Iterator[object]:

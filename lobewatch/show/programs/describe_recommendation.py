@@ -19,10 +19,11 @@ UNIT_FEED = 0.1
 """Feed per tooth (mm) that chips are said for where it is not known."""
 
 
-def recommendation_json(answer: Recommendation, remarks: Sequence[Remark]) -> dict[str, Any]:
+def recommendation_json(answer: Recommendation, remarks: Sequence[Remark] = ()) -> dict[str, Any]:
     """The recommended setting or the reason; remarks: on the files."""
     program = answer.program
     return {
+        "name": program.name,
         "tool": program.tool,
         "material": program.material,
         "teeth": program.teeth,
@@ -72,40 +73,36 @@ def chips(setting: Setting, program: ProgramTable, feed_mm: float) -> float:
     return area * feed_mm * program.teeth * setting.speed_rpm / 1e3
 
 
-def recommendation_lines(
-    answer: Recommendation, remarks: Sequence[Remark], folder: Path, saved: str | None
-) -> list[str]:
-    """The answer first, then what it rests on; saved: name that it was saved as."""
-    name = answer.program.name if saved is None else saved
+def recommendation_lines(answer: Recommendation, remarks: Sequence[Remark] = ()) -> list[str]:
+    """The answer first, then what it rests on; remarks: on the files."""
     others = [(other.what, other.setting) for other in answer.alternatives]
-    lines = [
-        *(_answer(answer, name) if answer.setting else _none(answer, name)),
-        *(
-            f"{what}: {_place(setting, answer)} {spare_text(setting)}; {_chips(setting, answer)}"
-            for what, setting in others
-        ),
+    return [
+        *(_answer(answer) if answer.setting else _none(answer)),
+        *(f"{what}: {_place(place, answer)} {spare_text(place)}; {_chips(place, answer)}" for what, place in others),
         *remark_lines([*remarks, *_notes(answer)]),
     ]
-    if saved is not None:
-        lines += [f"saved in {folder / 'machine.toml'} as program {saved!r}", f"next: {command('check', folder)}"]
-    return lines
 
 
-def _answer(answer: Recommendation, name: str) -> Iterator[str]:
+def saved_lines(folder: Path, name: str) -> list[str]:
+    """Where the setting was saved as a program, and what to do next."""
+    return [f"saved in {folder / 'machine.toml'} as program {name!r}", f"next: {command('check', folder)}"]
+
+
+def _answer(answer: Recommendation) -> Iterator[str]:
     setting, verdict = answer.setting, answer.verdict
     if setting is None or verdict is None:
         return
     way = "up or down" if answer.either and answer.program.immersion < 1 else ""
     predicted = "" if verdict.measured else ", predicted: doubtful until the tool is tapped"
-    yield f"{name}: {_place(setting, answer)}{f', milled {way}' if way else ''}{predicted}"
+    yield f"{answer.program.name}: {_place(setting, answer)}{f', milled {way}' if way else ''}{predicted}"
     yield f"  {spare_text(setting).strip('()')}"
     yield f"  {_chips(setting, answer)}{worst_feed(verdict)}"
     if verdict.cuts:
         yield f"  as {verdict.cuts} test cut{'s have' if verdict.cuts > 1 else ' has'} taught of the turning spindle"
 
 
-def _none(answer: Recommendation, name: str) -> Iterator[str]:
-    yield f"{name}: none; {answer.reason}"
+def _none(answer: Recommendation) -> Iterator[str]:
+    yield f"{answer.program.name}: none; {answer.reason}"
     if answer.cures:
         yield f"what would change it: {'; '.join(answer.cures)}"
 

@@ -75,6 +75,20 @@ def test_a_depth_that_is_asked_for_has_the_fastest_window_and_others_follow(shop
     assert "from the answer" not in toml(shop)
 
 
+def test_a_program_without_speed_or_depth_is_recommended_by_check(shop: Shop, run: Any) -> None:
+    shop.tap_both()
+    shop.edit("speed_rpm = 12900\n", "")
+    shop.edit("depth_mm = 0.4\n", "")
+    code, out, _ = run("check", "--json")
+    said = json.loads(out)
+    assert [program["name"] for program in said["programs"]] == ["C"]
+    a, b = (answer["recommended"] for answer in said["recommendations"])
+    assert (code, a["depth_mm"], b["speed_rpm"]) == (0, 1.5, 8700)
+    shop.edit('name = "A"\n', f'name = "A"\nspeed_rpm = {a["speed_rpm"]:g}\n')
+    shop.edit('name = "B"\n', f'name = "B"\ndepth_mm = {b["depth_mm"]:g}\n')
+    assert run("check", "--json")[0] == 0
+
+
 def test_without_y_there_is_none_and_tapping_it_would_change_that(shop: Shop, run: Any) -> None:
     shop.tap(0, 1713.0)
     code, out, _ = run("recommend")

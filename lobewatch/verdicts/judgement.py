@@ -45,15 +45,10 @@ class Judgement(NamedTuple):
         return self.middle.stable and not np.any(self.chatters)
 
 
-def weigh(
-    table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed, either: bool = False
-) -> Judgement:
-    """A program with the coefficients that were learnt, over its doubt; charts by other methods decide nothing.
-
-    either: milled up and down, the worse counts.
-    """
+def weigh(table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed) -> Judgement:
+    """A program with the coefficients that were learnt, over its doubt; charts by other methods decide nothing."""
     program, spindle = as_program(table, machine), at_speed.moved(assembly)
-    cuts = ways(table, machine, spindle, either)
+    cuts = ways(table, machine, spindle)
     middle, axes, across = worst_limit(program, spindle, cuts)
     doubt = at_speed.doubt or doubt_of(assembly, table, machine)
     draws = draw(program, middle, cuts, spindle, doubt, axes)

@@ -11,6 +11,8 @@ GROUPS = {
         "tap": "The live tap test: hit until ten hits are good, then see what has changed.",
     },
     "Judge (which cuts are safe)": {
+        "recommend": "A speed and a depth for a tool and a material, no program needed; exit code 1 where none "
+        "is safe.",
         "check": "Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.",
         "report": "One HTML file with everything in it: what has changed, which programs still hold, lobes then "
         "and now.",

@@ -39,6 +39,7 @@ def check(
     By semi-discretisation, over all that is not known: stable, doubtful, not stable or unknown. Says for each that is
     not stable what decides and where to go. f_n left: how far f_n may fall before the program chatters. A cut that is
     no program is judged alike; what is not said of it is taken from the programs of its tool where they agree.
+    A program of machine.toml without a speed or a depth is recommended what it has not.
     A number of machine.toml that is not plausible makes its programs unknown until it is corrected, or accepted.
 
     Examples:
@@ -52,6 +53,7 @@ def check(
     from lobewatch.machine import MachineFolder
     from lobewatch.machine.additions.accept_settings import accept_settings
     from lobewatch.show.programs.describe_advice import ProgramAdvice, advise_program, check_json, check_texts
+    from lobewatch.show.programs.describe_recommendation import recommendation_json, recommendation_lines
     from lobewatch.show.programs.describe_verdicts import is_safe
 
     said = {
@@ -69,7 +71,7 @@ def check(
             *(f"accepted: {line}\n" for line in accept_settings(MachineFolder(machine), accept)), sep="", end=""
         )
     logbook = Logbook.open(machine)
-    verdicts = chosen_verdicts(logbook, program or (), said)
+    verdicts, recommendations = chosen_verdicts(logbook, program or (), said)
     begin, slow, programs = monotonic(), False, list[ProgramAdvice]()
     for verdict in verdicts:
         if not slow and monotonic() - begin > PATIENCE:
@@ -77,6 +79,12 @@ def check(
             slow = True
         programs.append(advise_program(logbook, verdict))
     remarks = logbook.remarks
-    emit(check_json(programs, remarks), as_json, *check_texts(programs, remarks, logbook.machine))
-    if not all(is_safe(advice.verdict) for advice in programs):
+    emit(
+        check_json(programs, remarks)
+        | {"recommendations": [recommendation_json(answer) for answer in recommendations]},
+        as_json,
+        *(check_texts(programs, remarks, logbook.machine) if programs else ()),
+        *(line for answer in recommendations for line in recommendation_lines(answer)),
+    )
+    if not all(is_safe(advice.verdict) for advice in programs) or not all(answer.setting for answer in recommendations):
         raise typer.Exit(1)

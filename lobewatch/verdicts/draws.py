@@ -83,13 +83,15 @@ class ProgramDraws:
         places = np.flatnonzero(wanted) if np.any(wanted) else np.zeros(1, dtype=np.intp)
         return replace(self, cuts=tuple(self.cuts[place] for place in places), limits=self.limits[places])
 
-    def around(self, depth: float, fall: float = 0.0) -> Floats:
+    def around(self, depth: float, fall: float = 0.0, apart: float = 1.0) -> Floats:
         """Largest growth of the middle in each cut at a depth (m), as far as speed and frequency may be off.
 
-        fall: of the frequency, that is to come; it moves a cut as a faster speed does. Shape (cuts,).
+        fall: of the frequency, that is to come; it moves a cut as a faster speed does. apart: factor of the speed,
+        slower and faster, that counts too. Shape (cuts,).
         """
         beside = self.doubt.speed + BESIDE
-        middle = self[np.zeros(1, dtype=np.intp)].swept(np.linspace(1 - beside, (1 + beside) / (1 - fall), LOOKS))
+        ends = (1 - beside) / apart, (1 + beside) * apart / (1 - fall)
+        middle = self[np.zeros(1, dtype=np.intp)].swept(np.linspace(*ends, LOOKS))
         return np.array([np.max(replace(middle, cuts=(cut,)).growth(depth)) for cut in self.cuts])
 
     def at(self, speed: float = 1.0, frequency: float = 1.0, stiffness: float = 1.0) -> ProgramDraws:

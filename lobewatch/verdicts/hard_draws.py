@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from lobes import Cut, Program
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.aging import StiffnessAt, age
+from lobewatch.verdicts.aging import StiffnessAt
 from lobewatch.verdicts.doubt import Doubt
 from lobewatch.verdicts.draws import ProgramDraws, draw, worst_limit
 from lobewatch.verdicts.mean_force import MeanForce
+from lobewatch.verdicts.room import APART, at_ends
 
 FIRST = 24
 """Number of draws that zero order has as the first to chatter ..."""
@@ -36,7 +37,7 @@ class HardDraws:
     limit: float
     """Deepest stable depth in the middle of the doubt (m)."""
     draws: ProgramDraws
-    """Few draws, now and after the fall."""
+    """Few draws at both ends of what must be safe (`at_ends`)."""
     chattered: frozenset[int]
     """Draws that are among them since they have chattered elsewhere."""
 
@@ -61,9 +62,9 @@ def hard_draws(
     middle, axes, _ = worst_limit(program, spindle, cuts)
     drawn = draw(program, middle, cuts, spindle, doubt, axes)
     if len(cuts) > 1:
-        grown = drawn.around(program.depth, fall)
+        grown = drawn.around(program.depth, fall, APART)
         drawn = drawn.fed_where(np.isin(np.arange(grown.size), np.argsort(-grown)[:FEEDS]))
-    aged = age(drawn, np.array([0.0, fall]), stiffness_at)
+    aged = at_ends(drawn, fall, stiffness_at)
     rows = aged.rows
     mean = MeanForce.of(rows.making(drawn.cuts[0])).limits(rows.speed_rpm[:, np.newaxis])[0][:, 0]
     hard = np.max(rows.tangential[:, np.newaxis] / (rows.stiffness * rows.damping_ratio), axis=1)

@@ -45,10 +45,15 @@ class Judgement(NamedTuple):
         return self.middle.stable and not np.any(self.chatters)
 
 
-def weigh(table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed) -> Judgement:
-    """A program with the coefficients that were learnt, over its doubt; charts by other methods decide nothing."""
+def weigh(
+    table: ProgramTable, assembly: Assembly, machine: Machine, at_speed: SpindleAtSpeed, either: bool = False
+) -> Judgement:
+    """A program with the coefficients that were learnt, over its doubt; charts by other methods decide nothing.
+
+    either: milled up and down, the worse counts.
+    """
     program, spindle = as_program(table, machine), at_speed.moved(assembly)
-    cuts = ways(table, machine, spindle)
+    cuts = ways(table, machine, spindle, either)
     middle, axes, across = worst_limit(program, spindle, cuts)
     doubt = at_speed.doubt or doubt_of(assembly, table, machine)
     draws = draw(program, middle, cuts, spindle, doubt, axes)

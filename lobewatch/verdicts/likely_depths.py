@@ -21,6 +21,7 @@ from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.mean_lobes import mean_lobes
 from lobewatch.verdicts.doubt import Doubt
 from lobewatch.verdicts.mean_force import is_constant
+from lobewatch.verdicts.room import APART as ROOM
 
 GRID = 0.002
 """Relative step of the speeds."""
@@ -90,7 +91,8 @@ def likely_depths(
     by_cut = np.array([mean_lobes(spindle.x, spindle.y, [cut], speeds, spindle.cross).depth for cut in cuts]) * 1e3
     deepest, safe = reach.depths(speeds), max(doubt.tangential.high, 1 + spare)
     by_cut = np.minimum(by_cut, MATTERS * safe * deepest)
-    steps, ahead = math.ceil((doubt.speed + BESIDE + fall / 2) / GRID), round(fall / 2 / GRID)
+    beside = doubt.speed + BESIDE + math.log(ROOM)
+    steps, ahead = math.ceil((beside + fall / 2) / GRID), round(fall / 2 / GRID)
 
     def around(limits: Floats) -> Floats:
         lowest = scipy.ndimage.minimum_filter1d(limits, 2 * steps + 1, origin=-ahead, mode="nearest")

@@ -1,33 +1,33 @@
 """The one search for settings that would be called stable, with something to spare: advice, pockets, recommendations.
 
 Zero order and the multipliers of the middle say where to look (`LikelyDepths`), few draws how deep (`HardDraws`). What
-is recommended has been judged like any program: `weigh` finds it stable throughout, and the same draws are stable as
-the spindle will be when it is tapped again. Where no speed of the grid has such a depth, nothing is recommended.
+is recommended has been judged like any program: `weigh` finds it stable throughout, and the same draws are stable
+around it and as the spindle will be when it is tapped again (`room`). Where no speed of the grid has such a depth,
+nothing is recommended.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from lobes import Cut, Program
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.settings.cut_range import MM, RPM, CutRange, floored_mm
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.series import fall_in
-from lobewatch.verdicts.aging import StiffnessAt, age, softening
+from lobewatch.verdicts.aging import StiffnessAt, softening
 from lobewatch.verdicts.doubt import Doubt, doubt_of
-from lobewatch.verdicts.draws import ProgramDraws
 from lobewatch.verdicts.hard_draws import HardDraws, deepest_calm, hard_draws
 from lobewatch.verdicts.judgement import SURELY, weigh
 from lobewatch.verdicts.likely_depths import LikelyDepths, likely_depths
+from lobewatch.verdicts.room import APART, DEEPER, LEAST_FALL, all_around, frequency_left, window_rpm
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
 from lobewatch.verdicts.ways import ways
 
@@ -47,20 +47,14 @@ TRIES, MOST_TRIES = 4, 12
 """Number of depths that are judged at one speed, and at all of them."""
 DISAPPOINTING = 0.95
 """Share of a depth, less than which is left where it is judged, has one more speed looked at."""
+NEARLY = 0.85
+"""Share of a depth that is wanted, where so much is likely it may be safe too."""
 REMEMBERED = 8
 """Draws of each judgement that are remembered where they chatter."""
 LESS = 0.98
 """Share of a depth, at least as much less of which is looked at where draws chatter."""
-LATER = np.array([0.5, 1.0])
-"""Shares of the fall that a setting must stand at which it is looked at."""
 FEW = 24
 """Number of draws, the hardest, that bound a window before all of them decide."""
-EDGE, WIDEST = 0.006, 8
-"""Relative step of a window of speeds, and most steps on each side."""
-LEFT = np.arange(0, 0.1001, 0.01)
-"""Falls of the frequency that a setting is looked at with; more than the last is not told apart."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -83,7 +77,7 @@ def needed_fall(assembly: Assembly, machine: Machine) -> float:
     """Fall of the frequency that a recommended setting must stand: two tap intervals at the rate so far."""
     days = INTERVALS * machine.machine.tap_interval_days
     falls = [fall_in(series, days) for series in assembly.series.values()]
-    return max((UNKNOWN_FALL if fall is None else fall for fall in falls), default=UNKNOWN_FALL)
+    return max((UNKNOWN_FALL if fall is None else max(fall, LEAST_FALL) for fall in falls), default=UNKNOWN_FALL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +92,8 @@ class SettingSearch:
     """Machine, with its speeds, its drive and its tap interval."""
     at_speed: SpindleAtSpeed = AT_REST
     """Spindle as test cuts have taught it."""
+    either: bool = False
+    """Direction left open: milled up or down, the worse counts."""
     hard: dict[float, HardDraws] = field(default_factory=dict)
     """Few draws by speed (rpm), worked out anew where more of them are known to chatter."""
     chattered: set[int] = field(default_factory=set)
@@ -116,7 +112,7 @@ class SettingSearch:
     @cached_property
     def cuts(self) -> tuple[Cut, ...]:
         """Cuts that it makes on its way."""
-        return ways(self.table, self.machine, self.spindle)
+        return ways(self.table, self.machine, self.spindle, self.either)
 
     @cached_property
     def fall(self) -> float:
@@ -155,11 +151,11 @@ class SettingSearch:
 
     def nearest(self, depth_mm: float, speed_rpm: float) -> Setting | None:
         """A depth (mm) at the window of speeds nearest to one (rpm)."""
-        if self.best is None:
-            return None
-        middles = self.likely.middles(depth_mm)
-        near = sorted(middles, key=lambda speed: abs(math.log(speed / speed_rpm)))
-        return self._first_at(depth_mm, near[:PLACES])
+        return self._first_at(depth_mm, lambda speed: abs(math.log(speed / speed_rpm)))
+
+    def fastest(self, depth_mm: float) -> Setting | None:
+        """A depth (mm) at the fastest window of speeds."""
+        return self._first_at(depth_mm, lambda speed: -speed)
 
     def here(self, speed_rpm: float, most_mm: float) -> Setting | None:
         """The deepest at a speed (rpm), up to a depth (mm)."""
@@ -167,9 +163,12 @@ class SettingSearch:
             return None
         return self._deepest(speed_rpm, min(most_mm, self._calm(speed_rpm)))
 
-    def _first_at(self, depth_mm: float, speeds: Iterable[float]) -> Setting | None:
-        """The first of some speeds (rpm) at which a depth (mm) is safe."""
-        for speed in map(_rounded, speeds):
+    def _first_at(self, depth_mm: float, rank: Callable[[float], float]) -> Setting | None:
+        """A depth (mm) in the first window of speeds where it is safe, the lowest rank first; else where most is."""
+        if self.best is None:
+            return None
+        middles = {*self.likely.middles(depth_mm), *self.likely.middles(NEARLY * depth_mm)}
+        for speed in map(_rounded, [*sorted(middles, key=rank)[:MOST_PLACES], self.best.speed_rpm]):
             if self.reach.holds(speed, depth_mm) and self._calm(speed) >= depth_mm:
                 setting = self._verified(speed, depth_mm)
                 if isinstance(setting, Setting):
@@ -217,7 +216,7 @@ class SettingSearch:
             spindle = self.spindle, self.doubt, self.fall, self.stiffness_at
             self.hard[speed] = hard_draws(program, self.cuts, *spindle, frozenset(self.chattered))
         hard = self.hard[speed]
-        return 1e3 * hard.deepest(min(most, hard.limit / (1 + SPARE)))
+        return 1e3 * hard.deepest(DEEPER * min(most, hard.limit / (1 + SPARE))) / DEEPER
 
     def _deepest(self, speed: float, depth_mm: float) -> Setting | None:
         """The deepest setting up to a depth (mm)."""
@@ -233,49 +232,27 @@ class SettingSearch:
     def _verified(self, speed: float, depth_mm: float) -> Setting | float:
         """The setting where it is stable throughout now and when it is tapped again; else a depth (mm) that may be."""
         table, depth = msgspec.structs.replace(self.table, speed_rpm=speed, depth_mm=depth_mm), depth_mm / 1e3
-        judgement = weigh(table, self.assembly, self.machine, self.at_speed)
+        judgement = weigh(table, self.assembly, self.machine, self.at_speed, self.either)
         limit = judgement.middle.limit
         if limit < depth * (1 + SPARE):
             return 1e3 * limit / (1 + SPARE)
-        near = judgement.draws.fed_where(judgement.draws.around(SURELY * depth, self.fall) >= 0)
+        deep = DEEPER * depth
+        near = judgement.draws.fed_where(judgement.draws.around(SURELY * deep, self.fall, APART) >= 0)
         if not judgement.is_stable_throughout:
             places = 1 + np.flatnonzero(judgement.chatters)
             self.chattered.update(places[:REMEMBERED].tolist())
             calm = 1e3 * min(deepest_calm(near[places[:FEW]], depth), judgement.low)
             return min(calm, LESS * depth_mm, depth_mm - MM)
-        aged = age(near, self.fall * LATER, self.stiffness_at)
-        later = aged.growth(depth)[:, 0]
-        if np.any(later >= 0):
-            places = np.argsort(-later)[:FEW]
-            self.chattered.update((places[later[places] >= 0] % len(near.rows))[:REMEMBERED].tolist())
-            return min(1e3 * deepest_calm(aged[places], depth), depth_mm - MM)
-        hardest = near[np.argsort(np.max(later.reshape(LATER.size, -1), axis=0))[-FEW:]]
-        window, left = self._window(near, hardest, speed, depth), self._left(hardest, depth)
+        around = all_around(near, self.fall, self.stiffness_at)
+        grown = around.growth(deep)[:, 0]
+        if np.any(grown >= 0):
+            places = np.argsort(-grown)[:FEW]
+            self.chattered.update((places[grown[places] >= 0] % len(near.rows))[:REMEMBERED].tolist())
+            return min(1e3 * deepest_calm(around[places], deep) / DEEPER, depth_mm - MM)
+        hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-FEW:]]
+        window = window_rpm(near, hardest, speed, depth, self.reach)
+        left = frequency_left(hardest, depth, self.stiffness_at)
         return Setting(speed, depth_mm, window, min(limit / depth - 1, MOST_SPARE), left)
-
-    def _window(self, near: ProgramDraws, hardest: ProgramDraws, speed: float, depth: float) -> tuple[float, float]:
-        steps = np.arange(WIDEST + 1.0)
-        slow, fast = (_last_calm(near, hardest, np.power(1 + EDGE, sign * steps), depth) for sign in (-1, 1))
-        slowest, fastest = max(speed * slow, self.reach.low_rpm), min(speed * fast, self.reach.high_rpm)
-        return min(math.ceil(slowest / RPM) * RPM, speed), max(math.floor(fastest / RPM) * RPM, speed)
-
-    def _left(self, hardest: ProgramDraws, depth: float) -> float:
-        grown = age(hardest, LEFT, self.stiffness_at).growth(depth).reshape(LEFT.size, -1)
-        return float(LEFT[_calm_from_the_first(grown)])
-
-
-def _last_calm(near: ProgramDraws, hardest: ProgramDraws, ratio: Floats, depth: float) -> float:
-    """The last of these speeds, over the present one, up to which all draws are stable."""
-    last = _calm_from_the_first(hardest.swept(ratio).growth(depth).reshape(ratio.size, -1))
-    while last > 0 and np.any(near.at(speed=float(ratio[last])).growth(depth) >= 0):
-        last //= 2
-    return float(ratio[last])
-
-
-def _calm_from_the_first(grown: Floats) -> int:
-    """Row up to which all of growth (k, draws) is negative from the first on."""
-    calm = np.all(grown < 0, axis=1)
-    return calm.size - 1 if np.all(calm) else max(int(np.argmin(calm)) - 1, 0)
 
 
 def _rounded(speed: float) -> float:

@@ -19,7 +19,6 @@ from lobewatch.verdicts.draws import DRAWS, ProgramDraws, turning_draws
 from lobewatch.verdicts.judgement import Judgement, weigh
 from lobewatch.verdicts.settling import decisive_cause, settling_remark
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
-from lobewatch.verdicts.tool_remarks import outside_tool
 from lobewatch.verdicts.unsaid import unsaid
 
 
@@ -191,7 +190,20 @@ def word_of(table: ProgramTable, judgement: Judgement, assembly: Assembly) -> Wo
 
 def is_sure(table: CutTable, assembly: Assembly) -> bool:
     """Whether all that gives way is known: both directions of the tool, without a question, and no thin wall."""
-    return assembly.is_sure and not (isinstance(table, ProgramTable) and table.thin)
+    return unanswered(table, assembly) is None
+
+
+def unanswered(table: CutTable, assembly: Assembly) -> tuple[str, str] | None:
+    """What is not known of what gives way, and what to do first; None where nothing is left open."""
+    if len(assembly.directions) < 2:
+        return assembly.gap
+    if isinstance(table, ProgramTable) and table.thin:
+        return "the wall that is cut is thin", "support the wall, which is thin"
+    if assembly.questions:
+        codes = dict.fromkeys(question.code for question in assembly.questions)
+        cure = "tap again" if "newest-damaged" in codes else "answer what is asked of its tap tests"
+        return f"it rests on a tap test in question ({', '.join(codes)})", cure
+    return None
 
 
 def _cause(table: ProgramTable, judgement: Judgement, assembly: Assembly) -> str:
@@ -214,6 +226,5 @@ def _remarks(table: ProgramTable, assembly: Assembly, at_speed: SpindleAtSpeed, 
     yield from (remark for remark in assembly.remarks if remark.code in (*ABOUT_DIRECTIONS, "predicted"))
     yield from at_speed.remarks
     yield from assembly.questions
-    yield from outside_tool(table, machine)
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and feed_that_counts(machine, table) is None:
         yield Remark("drive-ignored", table.name, "[drive] does not count: feed_per_tooth_mm is missing")

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lobes import Cut
+from lobes import Cut, Direction
 from lobewatch.machine import FEED_ANGLES, Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.mean_lobes import Modes
@@ -17,19 +17,22 @@ BETWEEN = 0.5
 ALIKE = (0.02, 0.1, 0.1)
 """... and from which on it is only where f_n, zeta or K in x and y differ by more than this, relatively, or modes lie
 askew. Else no angle had a limit more than 3.5 % lower in 148 random cases."""
+BOTH: tuple[Direction, ...] = ("down", "up")
+"""Directions that a cut may be milled in; a slot is both at once."""
 STEP = math.pi / 12
 """Step of the angles between x and y (rad)."""
 
 
-def ways(table: ProgramTable, machine: Machine, spindle: Assembly) -> tuple[Cut, ...]:
-    """Cuts that a program makes on its way, in no order.
+def ways(table: ProgramTable, machine: Machine, spindle: Assembly, either: bool = False) -> tuple[Cut, ...]:
+    """Cuts that a program makes on its way, in no order; either: milled up and down, whatever the table says.
 
     In a corner the feed turns, whatever axis it follows on the straight.
     """
     differ = not are_alike(spindle.x, spindle.y) or spindle.axes.patterns[0] is not None
     return tuple(
-        replace(cut, feed_angle=angle)
+        replace(cut, feed_angle=angle, direction=direction)
         for cut in machine.engaged_cuts(table)
+        for direction in (BOTH if either and cut.immersion < 1 else (cut.direction,))
         for angle in _feed_angles(table, cut.immersion, differ)
     )
 

@@ -118,7 +118,7 @@ def lobes_at_speed(verdicts: Sequence[Verdict], machine: Machine) -> LobesAtSpee
         tool, name, at_speed = verdict.assembly, verdict.program.name, verdict.at_speed
         if tool is None or not at_speed.cuts:
             continue
-        taught, spindle = msgspec.structs.replace(machine, program=(verdict.program,)), at_speed.moved(tool)
+        taught, spindle = msgspec.structs.replace(machine, listed=(verdict.program,)), at_speed.moved(tool)
         lobes = tip_lobes(spindle.tool, spindle.x, spindle.y, taught, [name], spindle.cross)[name]
         return LobesAtSpeed(at_speed.cuts, lobes, limit_band(lobes, name, tool, taught, at_speed))
     return None

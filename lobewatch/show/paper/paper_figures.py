@@ -21,6 +21,8 @@ SIZE = (8.0, 4.4)
 """Inches."""
 PAPER: dict[str, Any] = {"color": ALARM, "marker": "D", "ls": "", "ms": 7, "mec": "white", "zorder": 5}
 """Mark of a number of the paper."""
+LIMITS = (1300.0, 2200.0)
+"""Frequencies of Figs. 5 and 6 (Hz)."""
 DEEP = 6.0
 """Depth up to which lobes are drawn, in lowest limits of the new spindle."""
 
@@ -69,6 +71,8 @@ def _response(study: PaperStudy, part: str) -> Figure:
     axes.plot(tap.frf.frequency, values(tap.frf.receptance), color=NOW, lw=1.8, label="mode with the paper's numbers")
     surrogate = f"surrogate, {len(tap.surrogate_modes)} modes"
     axes.plot(tap.surrogate_frf.frequency, values(tap.surrogate_frf.receptance), color=THEN, ls="--", label=surrogate)
+    hits = tap.tapped.in_band(LIMITS)
+    axes.plot(hits.frequency, values(hits.receptance), ".", color=GOOD, ms=5, label="ten emulated hits on it")
     if part == "Re":
         below, above = tap.extremes
         _mark(axes, tap.measured.receptance(np.array([below])).real[0] * 1e6, below, "omega_A")
@@ -76,7 +80,7 @@ def _response(study: PaperStudy, part: str) -> Figure:
     else:
         _mark(axes, tap.depth * 1e6, tap.measured.frequency, "D")
     axes.axhline(0, color="black", lw=0.6)
-    axes.set(xlabel="frequency (Hz)", ylabel=f"{part} G (µm/N)", xlim=(1300, 2200))
+    axes.set(xlabel="frequency (Hz)", ylabel=f"{part} G (µm/N)", xlim=LIMITS)
     axes.legend(loc="lower left")
     return figure
 

@@ -14,14 +14,13 @@ from rich.table import Table
 from acquisition import Remark
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.analysis import Analysis
-from lobewatch.machine import Machine
-from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.machine import Machine, SpeedRange
 from lobewatch.show.programs.describe_doubts import reading_lines
 from lobewatch.show.programs.describe_verdicts import verdict_json, verdict_table
 from lobewatch.show.terminal.output import remark_json, remark_lines
 from lobewatch.verdicts import Advice, Setting, Verdict, Word
-from lobewatch.verdicts.setting_search import LEFT
-from lobewatch.verdicts.verdict import Ruling, is_sure
+from lobewatch.verdicts.room import LEFT
+from lobewatch.verdicts.verdict import Ruling, is_sure, unanswered
 
 IN_LINES = ("doubt-decides", "not-checked")
 """Remarks that the lines of a program hold already."""
@@ -76,7 +75,7 @@ def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], ma
     verdicts = [program.verdict for program in programs]
     return [
         verdict_table(verdicts, decays),
-        *(line for program in programs for line in advice_lines(program, machine)),
+        *(line for program in programs for line in advice_lines(program, machine.speed)),
         *reading_lines(verdicts, machine),
         *remark_lines([*remarks, *(remark for program in programs for remark in program.notes)]),
         summary(programs),
@@ -124,18 +123,18 @@ def summary(programs: Sequence[ProgramAdvice]) -> str:
     return f"{len(programs)} program{'s' if len(programs) > 1 else ''}: {', '.join(texts)}"
 
 
-def advice_lines(program: ProgramAdvice, machine: Machine) -> Iterator[str]:
+def advice_lines(program: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:
     """What is wrong and what to do, a line for each thing that is called for."""
     verdict = program.verdict
     name = verdict.program.name
     if verdict.word is Word.UNKNOWN:
         yield from (str(remark) for remark in verdict.remarks if remark.code == "not-checked")
     elif verdict.word is Word.NOT_STABLE:
-        yield f"{name}: {_chatter(program)}; {_elsewhere(program, machine)}"
+        yield f"{name}: {_chatter(program)}; {_elsewhere(program, speeds)}"
     elif verdict.word is Word.DOUBTFUL:
         settles = [remark for remark in verdict.remarks if remark.code == "doubt-decides"]
         texts = [f"{remark.text}; to settle it: {remark.cure}" for remark in settles]
-        yield f"{name}: {'; '.join([*texts, *_or_elsewhere(program, machine)])}"
+        yield f"{name}: {'; '.join([*texts, *_or_elsewhere(program, speeds)])}"
     if verdict.is_beyond_drive:
         yield f"{name}: [drive] allows no more than {_floored(verdict.drive_limit)} mm at this speed"
 
@@ -144,11 +143,11 @@ def _chatter(program: ProgramAdvice) -> str:
     verdict = program.verdict
     word = "period-two chatter" if verdict.kind == "flip" else "chatter"
     where = f" near {verdict.chatter_frequency:.0f} Hz" if math.isfinite(verdict.chatter_frequency) else ""
-    text = f"{word}{where}{_worst_feed(verdict)}"
+    text = f"{word}{where}{worst_feed(verdict)}"
     return f"stable at first, no longer: {text}" if program.is_no_longer_stable else text
 
 
-def _worst_feed(verdict: Verdict) -> str:
+def worst_feed(verdict: Verdict) -> str:
     """The direction of feed that is worst, where it matters."""
     limits = np.ones(1) if verdict.draws is None else verdict.draws.limits
     if np.max(limits) <= ALIKE * np.min(limits):
@@ -157,26 +156,20 @@ def _worst_feed(verdict: Verdict) -> str:
     return f", worst fed along {({0: 'x', 90: 'y'}).get(degrees, f'{degrees} degrees from x')}"
 
 
-def _or_elsewhere(program: ProgramAdvice, machine: Machine) -> Iterator[str]:
+def _or_elsewhere(program: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:
     """What to do until it is settled; tapping what was not tapped comes first."""
     verdict = program.verdict
     if verdict.assembly is not None and is_sure(verdict.program, verdict.assembly):
-        yield f"until then {_elsewhere(program, machine)}"
+        yield f"until then {_elsewhere(program, speeds)}"
 
 
-def _elsewhere(advice: ProgramAdvice, machine: Machine) -> str:
+def _elsewhere(advice: ProgramAdvice, speeds: SpeedRange) -> str:
     """Where to go."""
     verdict, best, shallower = advice.verdict, advice.advice.best, advice.advice.here
-    assembly = verdict.assembly
-    if assembly is not None and len(assembly.directions) == 1:
-        return f"{assembly.gap[1]}: only then can a safe speed be named"
-    if verdict.program.thin:
-        return "support the wall, which is thin: only then can a safe speed be named"
-    if assembly is not None and assembly.questions:
-        cure = "answer what is asked of its tap tests"
-        cure = "tap again" if any(question.code == "newest-damaged" for question in assembly.questions) else cure
-        return f"{cure}: only then can a safe speed be named"
-    reach = _reach(CutRange.of(machine, verdict.program))
+    gap = None if verdict.assembly is None else unanswered(verdict.program, verdict.assembly)
+    if gap is not None:
+        return f"{gap[1]}: only then can a safe speed be named"
+    reach = f"in {rpm(speeds.low_rpm)} to {rpm(speeds.high_rpm)} rpm"
     if best is None:
         return f"no safe speed {reach}; choose another tool"
     if best.depth_mm == verdict.program.depth_mm:
@@ -188,13 +181,6 @@ def _elsewhere(advice: ProgramAdvice, machine: Machine) -> str:
         depth, speed = f"{shallower.depth_mm:g}", rpm(shallower.speed_rpm)
         texts.append(f"at {speed} rpm no deeper than {depth} mm {spare_text(shallower)}")
     return "; ".join(texts)
-
-
-def _reach(reach: CutRange) -> str:
-    """Speeds that were looked at."""
-    if reach.is_empty:
-        return "that the tool bears"
-    return f"in {rpm(reach.low_rpm)} to {rpm(reach.high_rpm)} rpm"
 
 
 def _is_same(best: Setting, shallower: Setting | None) -> bool:

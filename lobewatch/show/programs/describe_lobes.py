@@ -19,7 +19,7 @@ from lobewatch.show.programs.describe_doubts import at_speed_line
 from lobewatch.show.programs.describe_verdicts import programs_json, verdict_table
 from lobewatch.show.terminal.output import remark_json, remark_lines, table
 from lobewatch.verdicts import Setting
-from lobewatch.verdicts.setting_search import LEFT
+from lobewatch.verdicts.room import LEFT
 
 
 def comparison_json(comparison: LobeComparison, remarks: Sequence[Remark]) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from dsm import natural_frequencies
@@ -87,6 +88,19 @@ def test_the_words_on_claims_follow_from_the_numbers(study: PaperStudy) -> None:
     assert study.stiffness.modal[1] / study.stiffness.modal[0] > 0.98
     assert study.lobes.left_in_pocket(study.lobes.by_model) < 0.2
     assert study.lobes.errors_of_one_mode(study.lobes.one_mode, study.lobes.six_modes)[2] > 0.1
+
+
+def test_least_squares_beats_picking_on_emulated_taps(study: PaperStudy) -> None:
+    for picked, fitted in zip(study.tap.scatter_picked, study.tap.scatter_fitted, strict=True):
+        assert 0.004 < picked < 0.04
+        assert fitted < picked / 10
+
+
+def test_the_emulated_tap_is_one_of_the_surrogate(study: PaperStudy) -> None:
+    near = study.tap.tapped.in_band((1500.0, 1950.0))
+    exact = sum(mode.receptance(near.frequency) for mode in study.tap.surrogate_modes)
+    assert np.max(np.abs(near.receptance - exact)) < 0.01 * np.max(np.abs(exact))
+    assert study.tap.tapped.n_averages == 10
 
 
 def test_pockets_go_with_the_frequency(study: PaperStudy) -> None:

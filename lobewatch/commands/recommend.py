@@ -1,0 +1,72 @@
+"""lobewatch recommend."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from lobewatch.machine.folder_path import named_folder
+from lobewatch.show.terminal.output import Json, emit
+
+
+def recommend(
+    machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
+    tool: Annotated[str | None, typer.Option(help="The tool.")] = None,
+    material: Annotated[str | None, typer.Option(help="A [[material]], or one of lobewatch materials.")] = None,
+    radial: Annotated[float | None, typer.Option(help="Radial depth, mm; a slot where none is given.")] = None,
+    direction: Annotated[
+        Literal["up", "down"] | None, typer.Option(help="Up or down milling; the worse where none is given.")
+    ] = None,
+    depth: Annotated[float | None, typer.Option(help="Axial depth that shall be cut, mm.")] = None,
+    speed: Annotated[float | None, typer.Option(help="Speed that it runs at now, rpm.")] = None,
+    teeth: Annotated[int | None, typer.Option(help="Teeth of the tool.")] = None,
+    diameter: Annotated[float | None, typer.Option(help="Diameter of the tool, mm.")] = None,
+    feed_per_tooth: Annotated[float | None, typer.Option(help="Feed per tooth, mm.")] = None,
+    save: Annotated[str | None, typer.Option(help="Write it into machine.toml as a program of this name.")] = None,
+    as_json: Json = False,
+) -> None:
+    """A speed and a depth for a tool and a material, no program needed; exit code 1 where none is safe.
+
+    The most chips a minute of all that lobewatch check would call stable, with room on all sides; at --depth where
+    that is given. Tool, material and teeth that are not given are those of the tool's programs where they agree.
+
+    Examples:
+
+      lobewatch recommend trial --tool reference --material 42CrMo4
+      lobewatch recommend trial --material "AA 6061" --radial 4 --direction down --save "bracket, finish"
+      lobewatch recommend trial --depth 1.5 --json
+    """
+    from lobewatch.logbook import Logbook
+    from lobewatch.logbook.recommended import recommended
+    from lobewatch.machine.additions.save_program import refuse_taken, save_program
+    from lobewatch.show.programs.describe_recommendation import recommendation_json, recommendation_lines, saved_lines
+
+    said = {
+        "speed_rpm": speed,
+        "depth_mm": depth,
+        "tool": tool,
+        "material": material,
+        "teeth": teeth,
+        "tool_diameter_mm": diameter,
+        "radial_depth_mm": radial,
+        "direction": direction,
+        "feed_per_tooth_mm": feed_per_tooth,
+    }
+    logbook = Logbook.open(machine)
+    if save is not None:
+        refuse_taken(logbook.machine, save)
+    answer = recommended(logbook, said)
+    if save is not None and answer.setting is not None:
+        answer = answer.named(save)
+        save_program(logbook.folder, answer.program)
+    saved = save if answer.setting is not None else None
+    emit(
+        recommendation_json(answer, logbook.remarks) | {"saved": saved},
+        as_json,
+        *recommendation_lines(answer, logbook.remarks),
+        *(saved_lines(logbook.folder.path, saved) if saved else ()),
+    )
+    if answer.setting is None:
+        raise typer.Exit(1)

@@ -1,0 +1,174 @@
+"""The speed and the depth that are recommended for a cut, or why none is and what would change that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
+
+import msgspec
+import numpy as np
+
+from acquisition import DataError
+from lobes import Direction
+from lobewatch.machine import Machine, ProgramTable
+from lobewatch.machine.settings.cut_range import MM, CutRange
+from lobewatch.machine.settings.setting_questions import questions_of_program
+from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.setting_search import Setting, SettingSearch
+from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
+from lobewatch.verdicts.verdict import Verdict, Word, judge, unanswered
+
+MOST_CHIPS, HERE = "most chips", "deepest at the present speed"
+"""What an alternative is good for."""
+OTHER_CUT = (
+    "a shorter stick-out: tap it again with it",
+    "another tool: a thicker one, or with fewer teeth",
+    "a smaller radial depth",
+)
+"""What makes a cut safe that is not, in words."""
+SLOWER = ("a smaller diameter", "tool_material and cutting_speed_m_min in its [[tool]], where it bears more")
+"""What makes a tool one that the spindle is slow enough for."""
+THIN = 0.1
+"""Radial depth over diameter up to which less of it is no advice."""
+ITS_OWN = ("speed_rpm", "depth_mm")
+"""Keys of a program that do not count where a setting is asked for."""
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """A setting beside the recommended one."""
+
+    what: str
+    """Name of what it is good for."""
+    setting: Setting
+    """Speed and depth."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recommendation:
+    """An answer to somebody who asks for a speed and a depth."""
+
+    program: ProgramTable
+    """Cut that is asked about, as it would stand in machine.toml; at the recommended setting where there is one."""
+    either: bool = False
+    """Direction left open: it holds for up and down milling, and the program is milled in the worse."""
+    setting: Setting | None = None
+    """Recommended setting; None where there is none."""
+    verdict: Verdict | None = None
+    """Verdict on the program at that setting; None where there is none."""
+    reason: str = ""
+    """Reason why there is none."""
+    cures: tuple[str, ...] = ()
+    """Measures that would change that."""
+    alternatives: tuple[Alternative, ...] = ()
+    """Settings beside it, two at most."""
+    feed_mm: tuple[float, float] | None = None
+    """Least and greatest feed per tooth (mm): its own, else what the tool bears; None where neither is known."""
+
+    def named(self, name: str) -> Self:
+        """The same, its program of another name."""
+        return replace(self, program=msgspec.structs.replace(self.program, name=name))
+
+
+def recommend(
+    table: ProgramTable,
+    tool: Assembly | DataError,
+    machine: Machine,
+    at_speed: SpindleAtSpeed,
+    either: bool = False,
+    depth_mm: float | None = None,
+    present_rpm: float | None = None,
+    is_set: bool = False,
+) -> Recommendation:
+    """The setting of most chips, at a depth where one is asked for; it would be called stable when it is entered.
+
+    table: the cut, whose own speed and depth do not count; either: it may be milled up or down, the worse counts;
+    present_rpm: speed that it runs at now, where that is known; is_set: it shall run at no other.
+    """
+    if isinstance(tool, DataError):
+        return Recommendation(table, either, reason=str(tool), cures=("tap it",))
+    if gap := _gap(table, tool, machine):
+        return Recommendation(table, either, reason=gap[0], cures=gap[1:])
+    if (too_fast := _too_fast(CutRange.of(machine, table))) is not None:
+        return Recommendation(table, either, reason=too_fast, cures=SLOWER)
+    search = SettingSearch(at_speed.taught(table), tool, machine, at_speed, either)
+    if is_set and present_rpm is not None:
+        setting = search.here(present_rpm, search.reach.deepest_mm)
+    else:
+        setting = search.best if depth_mm is None else search.fastest(depth_mm)
+    others = tuple(_alternatives(search, setting, present_rpm))
+    if setting is None:
+        reason = _no_safe(search, depth_mm, present_rpm if is_set else None)
+        return Recommendation(table, either, reason=reason, cures=_cures(search, depth_mm), alternatives=others)
+    return _entered(search, table, setting, others)
+
+
+def _gap(table: ProgramTable, tool: Assembly, machine: Machine) -> tuple[str, ...]:
+    """Why nothing can be called safe at any speed and depth, and what to do; empty where it can be."""
+    asked = questions_of_program(machine, table, tool.predicted or machine.tap.position_mm > 0)
+    asked = [doubted for doubted in asked if doubted.key not in ITS_OWN]
+    if asked:
+        return ("; ".join(f"{doubted.claim} {doubted.why}" for doubted in asked), asked[0].remark.cure)
+    return unanswered(table, tool) or ()
+
+
+def _too_fast(reach: CutRange) -> str | None:
+    """Why no speed of the spindle is one that the tool bears; None where one is."""
+    speed, limits = reach.machine.speed, reach.limits
+    if not reach.is_empty:
+        return None
+    edge = limits.cutting_speed_m_min
+    why = "" if edge is None else f" ({edge.high:.0f} m/min at its edge)"
+    slowest = f"and the spindle turns no slower than {speed.low_rpm:g} rpm"
+    return f"the tool bears no more than {reach.high_rpm:g} rpm{why}, {slowest}"
+
+
+def _entered(
+    search: SettingSearch, table: ProgramTable, setting: Setting, others: tuple[Alternative, ...]
+) -> Recommendation:
+    """The setting as a program, judged like any; nothing is recommended that is refused then."""
+    at = msgspec.structs.replace(table, speed_rpm=setting.speed_rpm, depth_mm=setting.depth_mm)
+    directions: Sequence[Direction] = ("down", "up") if search.either and table.immersion < 1 else (table.direction,)
+    verdicts = [
+        judge(msgspec.structs.replace(at, direction=direction), search.assembly, search.machine, search.at_speed)
+        for direction in directions
+    ]
+    worst = min(verdicts, key=lambda verdict: verdict.limit if np.isfinite(verdict.limit) else np.inf)
+    for verdict in verdicts:
+        if verdict.word is not Word.STABLE or verdict.is_beyond_drive:
+            reason = "; ".join(str(remark) for remark in verdict.remarks) or verdict.word.value
+            return Recommendation(table, search.either, reason=reason, alternatives=others)
+    program = msgspec.structs.replace(at, direction=worst.program.direction)
+    own, borne = table.feed_per_tooth_mm, search.reach.limits.feed_per_tooth_mm
+    feed = (own, own) if own is not None else None if borne is None else (borne.low, borne.high)
+    return Recommendation(program, search.either, setting, worst, alternatives=others, feed_mm=feed)
+
+
+def _alternatives(search: SettingSearch, setting: Setting | None, present_rpm: float | None) -> Iterator[Alternative]:
+    places = {(setting.speed_rpm, setting.depth_mm)} if setting else set[tuple[float, float]]()
+    wanted = {MOST_CHIPS: search.best}
+    if present_rpm is not None:
+        wanted[HERE] = search.here(present_rpm, search.reach.deepest_mm)
+    for what, other in wanted.items():
+        if other is not None and (place := (other.speed_rpm, other.depth_mm)) not in places:
+            places.add(place)
+            yield Alternative(what, other)
+
+
+def _no_safe(search: SettingSearch, depth_mm: float | None, set_rpm: float | None) -> str:
+    """What there is not."""
+    if set_rpm is not None:
+        return f"no safe depth at {set_rpm:g} rpm"
+    named = "speed and depth" if depth_mm is None else f"speed for {depth_mm:g} mm"
+    return f"no safe {named} in {search.reach.low_rpm:g}..{search.reach.high_rpm:g} rpm"
+
+
+def _cures(search: SettingSearch, depth_mm: float | None) -> tuple[str, ...]:
+    """What would make it safe: what settles the doubt first, where that alone stands in the way."""
+    likely = search.likely
+    speed = float(likely.speeds[int(np.argmax(likely.depths))])
+    probe = msgspec.structs.replace(search.table, speed_rpm=speed, depth_mm=depth_mm or MM)
+    verdict = judge(probe, search.assembly, search.machine, search.at_speed)
+    settles = [remark.cure for remark in verdict.remarks if remark.code == "doubt-decides"]
+    return (*settles, *(OTHER_CUT if search.table.immersion > THIN else OTHER_CUT[:2]))

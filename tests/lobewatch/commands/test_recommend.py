@@ -1,0 +1,152 @@
+"""`lobewatch recommend`: one speed and depth that `check` calls stable, or none and why; --save; mistakes."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import Any
+
+import pytest
+
+from lobewatch.cli import main
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+SAVED = ("--save", "from the answer")
+
+
+@pytest.fixture
+def run(shop: Shop, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
+    """Runs a command on the machine of the shop: exit code, stdout, stderr."""
+
+    def call(name: str, *words: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["lobewatch", name, str(shop.path), *words])
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as left:
+            main()
+        return (int(left.value.code or 0), *capsys.readouterr())
+
+    return call
+
+
+def toml(shop: Shop) -> str:
+    return str((shop.path / "machine.toml").read_text("utf-8"))
+
+
+def test_the_recommended_slot_is_saved_as_a_program_that_check_calls_stable(shop: Shop, run: Any) -> None:
+    shop.tap_both()
+    before = toml(shop)
+    code, out, _ = run("recommend", "--feed-per-tooth", "0.05", *SAVED, "--json")
+    answer = json.loads(out)
+    best = answer["recommended"]
+    assert (code, answer["reason"], answer["saved"]) == (0, None, SAVED[1])
+    assert best["chips_cm3_per_min"] == pytest.approx(best["depth_mm"] * 20 * 0.05 * 4 * best["speed_rpm"] / 1000)
+    low, high = best["window_rpm"]
+    assert low <= 0.99 * best["speed_rpm"] + 10
+    assert high >= min(1.01 * best["speed_rpm"] - 10, 24000)
+    assert min(best["depth_margin"] - 0.2, best["frequency_left"] - 0.01) >= 0
+    assert set(before.splitlines()) <= set(toml(shop).splitlines())
+    (checked,) = json.loads(run("check", "--program", SAVED[1], "--json")[1])["programs"]
+    assert [checked[key] for key in ("speed_rpm", "depth_mm", "verdict")] == [
+        *(best[key] for key in ("speed_rpm", "depth_mm")),
+        "stable",
+    ]
+
+
+def test_a_cut_milled_in_either_direction_is_safe_in_both(shop: Shop, run: Any) -> None:
+    shop.tap_both()
+    of = ("--radial", "12", "--material", "AA 6061")
+    best = json.loads(run("recommend", *of, "--json")[1])["recommended"]
+    assert best["direction"] == "either"
+    for direction in ("up", "down"):
+        place = ("--speed", f"{best['speed_rpm']:g}", "--depth", f"{best['depth_mm']:g}", "--direction", direction)
+        assert run("check", *of, *place)[0] == 0
+
+
+def test_a_depth_that_is_asked_for_has_the_fastest_window_and_others_follow(shop: Shop, run: Any) -> None:
+    shop.tap_both()
+    answer = json.loads(run("recommend", "--depth", "1", "--speed", "6500", "--json")[1])
+    assert answer["recommended"]["depth_mm"] == 1
+    most, here = answer["alternatives"]
+    assert (most["what"], here["what"], here["speed_rpm"]) == ("most chips", "deepest at the present speed", 6500)
+    assert most["speed_rpm"] * most["depth_mm"] > answer["recommended"]["speed_rpm"]
+    code, out, _ = run("recommend", "--depth", "19.9", *SAVED)
+    assert (code, out.splitlines()[0].split("; ")[1]) == (1, "no safe speed for 19.9 mm in 3000..24000 rpm")
+    assert "from the answer" not in toml(shop)
+
+
+def test_a_program_without_speed_or_depth_is_recommended_by_check(shop: Shop, run: Any) -> None:
+    shop.tap_both()
+    shop.edit("speed_rpm = 12900\n", "")
+    shop.edit("depth_mm = 0.4\n", "")
+    code, out, _ = run("check", "--json")
+    said = json.loads(out)
+    assert [program["name"] for program in said["programs"]] == ["C"]
+    a, b = (answer["recommended"] for answer in said["recommendations"])
+    assert (code, a["depth_mm"], b["speed_rpm"]) == (0, 1.5, 8700)
+    shop.edit('name = "A"\n', f'name = "A"\nspeed_rpm = {a["speed_rpm"]:g}\n')
+    shop.edit('name = "B"\n', f'name = "B"\ndepth_mm = {b["depth_mm"]:g}\n')
+    assert run("check", "--json")[0] == 0
+
+
+def test_without_y_there_is_none_and_tapping_it_would_change_that(shop: Shop, run: Any) -> None:
+    shop.tap(0, 1713.0)
+    code, out, _ = run("recommend")
+    assert (code, out) == (
+        1,
+        "reference, slot of 20 mm: none; direction y was not tapped\n"
+        "what would change it: tap direction y of tool 'reference' too\n",
+    )
+
+
+def test_nothing_is_safe_anywhere(shop: Shop, run: Any) -> None:
+    taps = [shop.tap(0.1 * i, 1713.0, direction, stiffness=5e5) for i, direction in enumerate("xy")]
+    code, out, _ = run("recommend")
+    assert (code, "a tap test in question (stiffness-off-model)" in out) == (1, True)
+    shop.logbook.accept(taps, ["stiffness-off-model"])
+    answer = json.loads(run("recommend", "--json")[1])
+    assert (answer["recommended"], answer["reason"]) == (None, "no safe speed and depth in 3000..24000 rpm")
+    assert answer["what_would_change_it"][0].startswith("a shorter stick-out")
+    assert json.loads(run("check", "--program", "A", "--json")[1])["programs"][0]["advice"] is None
+
+
+def test_a_tool_that_bears_no_speed_of_the_spindle_has_none(shop: Shop, run: Any) -> None:
+    shop.tap_both()
+    code, out, _ = run("recommend", "--material", "42CrMo4")
+    reason, cures = out.splitlines()
+    assert code == 1
+    assert reason == (
+        "reference, slot of 20 mm: none; the tool bears no more than 2860 rpm (180 m/min at its edge), "
+        "and the spindle turns no slower than 3000 rpm"
+    )
+    assert cures.startswith("what would change it: a smaller diameter")
+
+
+def test_a_tool_that_was_never_tapped_is_predicted_and_said_to_be_doubtful(shop: Shop, run: Any) -> None:
+    shop.tap_both()
+    of = ("--material", "AA 6061", "--teeth", "2", "--diameter", "18")
+    assert "predicted: doubtful until the tool is tapped" in run("recommend", "--tool", "long end mill", *of)[1]
+    code, out, _ = run("recommend", "--tool", "new", *of)
+    assert (code, "none; no tap test with tool 'new', and no prediction" in out) == (1, True)
+    assert "what would change it: tap it" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--material", "42CrMo"], "material='42CrMo' is not known; is '42CrMo4' meant?"),
+        (["--save", "A"], "--save A: a program of that name is in machine.toml; choose another name"),
+        (["--depth", "21"], "--depth 21: is deeper than one diameter"),
+        (["--radial", "-4"], "--radial -4: is not above 0"),
+        (["--radial", "30"], "radial_depth_mm=30 is larger than tool_diameter_mm=20"),
+        (["--speed", "50000"], "--speed 50000: is outside [speed] 3000..24000 rpm"),
+        (["--tool", "new"], "--material, --teeth, --diameter: missing, and machine.toml knows no tool 'new'; give"),
+        (["--tool", "long end mil"], "--material, --teeth, --diameter: missing, and machine.toml knows no tool"),
+    ],
+)
+def test_one_error_for_what_makes_no_sense(shop: Shop, run: Any, words: list[str], text: str) -> None:
+    shop.tap_both()
+    before = toml(shop)
+    code, _, error = run("recommend", *words)
+    assert (code, " ".join(error.split()).removeprefix("error: ")[: len(text)]) == (2, text)
+    assert toml(shop) == before

@@ -10,6 +10,8 @@ from lobes.floquet.multipliers import largest_multipliers
 
 LIMITS = (1e-300, 1e300)
 """Magnitudes of multipliers that are told apart."""
+SINGLE = 1e-5
+"""Accuracy from which on numbers of single precision will do."""
 
 
 def growth(
@@ -19,4 +21,6 @@ def growth(
 
     numbers (r,): pieces of the tooth period; tolerance: accuracy of the result.
     """
-    return np.asarray(np.log(np.clip(np.abs(largest_multipliers(rows, depth, numbers, tolerance)), *LIMITS)))
+    kind = np.float32 if tolerance >= SINGLE else np.float64
+    multipliers = largest_multipliers(rows, depth, numbers, tolerance, kind)
+    return np.asarray(np.log(np.clip(np.abs(multipliers), *LIMITS)))

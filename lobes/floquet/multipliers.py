@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from lobes.floquet.pieces import is_free, segment_ends, segment_pieces
 from lobes.floquet.stages import gauss_stages
 from lobes.floquet.uneven_map import UnevenMap
 
-EFFORTS = ((5, 8), (12, 14), (20, 24), (40, 40), (80, 80), (80, 600))
+EFFORTS = ((10, 6), (20, 8), (12, 14), (20, 24), (40, 40), (80, 80), (80, 600))
 """Power steps and Arnoldi vectors of each attempt; what an attempt leaves in doubt goes on to the next."""
 TOLERANCE = 1e-8
 """Largest residual of a multiplier that counts as found, relative to it, unless another is asked for."""
@@ -27,7 +28,11 @@ Complexes = NDArray[np.complex128]
 
 
 def largest_multipliers(
-    rows: MillingRows, depth: Floats, numbers: NDArray[np.int64], tolerance: float = TOLERANCE
+    rows: MillingRows,
+    depth: Floats,
+    numbers: NDArray[np.int64],
+    tolerance: float = TOLERANCE,
+    kind: type[np.floating[Any]] = np.float64,
 ) -> Complexes:
     """Multiplier of largest magnitude over one tooth period, of uneven teeth over their pattern, shape (r, d).
 
@@ -36,10 +41,11 @@ def largest_multipliers(
     """
     if rows.cut.helix_lag > 0 and depth.shape[1] > 1:
         flat = np.repeat(np.arange(len(rows)), depth.shape[1])
-        return largest_multipliers(rows[flat], depth.reshape(-1, 1), numbers[flat], tolerance).reshape(depth.shape)
+        found = largest_multipliers(rows[flat], depth.reshape(-1, 1), numbers[flat], tolerance, kind)
+        return found.reshape(depth.shape)
     multipliers = np.empty(depth.shape, dtype=np.complex128)
     for which, pieces in _alike(rows, depth, numbers):
-        multipliers[which] = _multipliers(rows[which], depth[which], pieces, tolerance)
+        multipliers[which] = _multipliers(rows[which], depth[which], pieces, tolerance, kind)
     return multipliers
 
 
@@ -60,9 +66,11 @@ def _alike(
                 yield part, np.abs(key)
 
 
-def _multipliers(rows: MillingRows, depth: Floats, pieces: NDArray[np.int64], tolerance: float) -> Complexes:
+def _multipliers(
+    rows: MillingRows, depth: Floats, pieces: NDArray[np.int64], tolerance: float, kind: type[np.floating[Any]]
+) -> Complexes:
     """Multipliers (r, d) of rows whose tooth periods are divided alike."""
-    over_period = period_map(rows, depth, pieces)
+    over_period = period_map(rows, depth, pieces, kind)
     value, doubt = _attempt(over_period, depth.shape, EFFORTS[0])
     for effort in EFFORTS[1:]:
         left = np.nonzero((doubt > tolerance) & ((np.abs(value) < HUGE) | (doubt > 0.5)))
@@ -84,7 +92,8 @@ def _attempt(
 ) -> tuple[Complexes, Floats]:
     """Multipliers and residuals, each of a shape (r, d), after some power steps with some Arnoldi vectors."""
     states = over_period.states
-    state = np.broadcast_to(np.random.default_rng(0).normal(size=states), (*shape, states))
+    start = np.random.default_rng(0).normal(size=states).astype(over_period.kind)
+    state = np.broadcast_to(start, (*shape, states))
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for _ in range(effort[0]):
             state = over_period(state)
@@ -94,9 +103,9 @@ def _attempt(
 
 def _hessenberg(over_period: PeriodMap | UnevenMap, start: Floats, vectors: int) -> Floats:
     """Hessenberg matrices (..., k + 1, k) of k Arnoldi steps; zeros from where the space is exhausted."""
-    basis = np.zeros((*start.shape[:-1], vectors + 1, start.shape[-1]))
+    basis = np.zeros((*start.shape[:-1], vectors + 1, start.shape[-1]), start.dtype)
     basis[..., 0, :] = start / np.linalg.norm(start, axis=-1, keepdims=True)
-    matrix = np.zeros((*start.shape[:-1], vectors + 1, vectors))
+    matrix = np.zeros((*start.shape[:-1], vectors + 1, vectors), start.dtype)
     for k in range(vectors):
         new, earlier = over_period(basis[..., k, :]), basis[..., : k + 1, :]
         for _ in range(2):
@@ -121,7 +130,7 @@ def _largest(matrices: Floats) -> tuple[Complexes, Floats]:
     largest = np.take_along_axis(values, np.argmax(np.abs(values), axis=-1)[..., np.newaxis], axis=-1)
     vector = np.zeros_like(values)
     vector[..., -1] = 1.0
-    tiny = np.finfo(np.float64).tiny ** 0.5
+    tiny = np.finfo(matrices.dtype).tiny ** 0.5
     for j in range(values.shape[-1] - 1, 0, -1):
         row = np.einsum("...c,...c->...", square[..., j, j:], vector[..., j:]) - largest[..., 0] * vector[..., j]
         vector[..., j - 1] = -row / np.maximum(square[..., j, j - 1], tiny)

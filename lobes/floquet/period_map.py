@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,11 @@ class PeriodMap:
     """Displacements in each piece in which teeth cut, stages times p."""
 
     @property
+    def kind(self) -> np.dtype[Any]:
+        """Precision of its numbers."""
+        return self.pieces[0][1].dtype
+
+    @property
     def states(self) -> int:
         """Numbers in a state."""
         return 2 * self.modes + self.nodes * sum(cuts for cuts, _ in self.pieces)
@@ -69,7 +75,9 @@ class PeriodMap:
         return np.concatenate((z, *parts), axis=-1)
 
 
-def period_map(rows: MillingRows, depth: Floats, numbers: NDArray[np.int64]) -> PeriodMap | UnevenMap:
+def period_map(
+    rows: MillingRows, depth: Floats, numbers: NDArray[np.int64], kind: type[np.floating[Any]] = np.float64
+) -> PeriodMap | UnevenMap:
     """The map of each row at depths (r, d) in m; numbers (k,): pieces of each segment, the same in all rows.
 
     For helical teeth, whose segments depend on the depth, d is 1.
@@ -80,8 +88,7 @@ def period_map(rows: MillingRows, depth: Floats, numbers: NDArray[np.int64]) -> 
         _Segment.of(rows, depth, ends[:, k : k + 2], int(numbers[k]), bool(np.all(free[:, k])))
         for k in np.flatnonzero(numbers)
     ]
-    make = _uneven_map if rows.cut.pitch else _even_map
-    return make(rows, segments)
+    return _uneven_map(rows, segments) if rows.cut.pitch else _even_map(rows, segments, kind)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,13 +116,13 @@ class _Segment:
         return ringing(rows, self.starts.shape[1] * self.time)[:, np.newaxis]
 
 
-def _even_map(rows: MillingRows, segments: Sequence[_Segment]) -> PeriodMap:
+def _even_map(rows: MillingRows, segments: Sequence[_Segment], kind: type[np.floating[Any]]) -> PeriodMap:
     pieces = list[tuple[bool, Floats]]()
     for segment in segments:
         if segment.forces is None:
-            pieces.append((False, segment.ringing(rows)))
+            pieces.append((False, segment.ringing(rows).astype(kind)))
         else:
-            maps = PieceResponse.of(rows, segment.time).cutting(segment.forces[0])
+            maps = PieceResponse.of(rows, segment.time).rounded(kind).cutting(segment.forces[0].astype(kind))
             pieces += [(True, maps[:, :, i]) for i in range(maps.shape[2])]
     return PeriodMap(tuple(pieces), rows.direction.size, gauss_stages().node.size * rows.axes.size)
 

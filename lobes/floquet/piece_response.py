@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +73,10 @@ class PieceResponse:
             pushes=np.concatenate([np.einsum("rns,rnp->rnps", push, rows.vector) for push in (q_push, v_push)], axis=1),
         )
 
+    def rounded(self, kind: type[np.floating[Any]]) -> PieceResponse:
+        """The same in numbers of some precision."""
+        return PieceResponse(*(values.astype(kind) for values in (self.ends, self.shows, self.gives, self.pushes)))
+
     def cutting(self, force: Floats) -> Floats:
         """The maps (r, d, k, m, m) of k pieces with forces -force (d - w) at their nodes, force (r, d, k, s, p, p).
 
@@ -79,7 +84,7 @@ class PieceResponse:
         """
         inverse, push = self._closed(force)
         states, size = push.shape[-2:]
-        maps, i = np.empty((*inverse.shape[:3], states + size, states + size)), np.arange(size)
+        maps, i = np.empty((*inverse.shape[:3], states + size, states + size), inverse.dtype), np.arange(size)
         np.matmul(inverse, self.shows.reshape(-1, 1, 1, size, states), out=maps[..., states:, :states])
         np.negative(inverse, out=maps[..., states:, states:])
         maps[..., :states, :] = np.negative(push, out=push) @ maps[..., states:, :]
@@ -107,7 +112,7 @@ class PieceResponse:
         *cases, s, p, _ = force.shape
         size, states = p * s, self.ends.shape[-1]
         forces = np.ascontiguousarray(np.moveaxis(force, -3, -1))
-        loop, push = np.zeros((*cases, size, size)), np.zeros((*cases, states, size))
+        loop, push = np.zeros((*cases, size, size), force.dtype), np.zeros((*cases, states, size), force.dtype)
         for shown, pushed in zip(*np.nonzero(np.any(self.gives, axis=(0, 3, 4))), strict=True):
             gives = self.gives[:, np.newaxis, np.newaxis, shown, pushed, :, np.newaxis]
             loop.reshape(*cases, p, s, p, s)[..., shown, :, :, :] += gives * forces[..., np.newaxis, pushed, :, :]

@@ -13,6 +13,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +76,11 @@ class UnevenMap:
     """Number of modes n."""
     directions: int
     """Number of directions p."""
+
+    @property
+    def kind(self) -> np.dtype[Any]:
+        """Precision of its numbers."""
+        return self.pieces[0].matrix.dtype
 
     @property
     def cutting(self) -> int:

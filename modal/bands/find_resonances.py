@@ -175,11 +175,24 @@ def _peaks(frf: Frf, mobility: NDArray[np.complex128], noise: NDArray[np.float64
     faintest = 1e-12 * size.max()
     floor = np.maximum(NOISE_MULTIPLE * noise, max(least, faintest))
     tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:]) & (size[1:-1] >= floor[1:-1])) + 1
+    tops = tops[_may_be_clear(size, tops)]
     lowest = float(size.min())
     saddle = np.array([_higher_saddle(size, int(top), lowest) for top in tops])
     clear = saddle <= size[tops] * 10 ** (-PROMINENCE_DB / 20)
     high = tops[clear & (size[tops] - saddle > NOISE_MULTIPLE * noise[tops])]
     return [_peak(frf, mobility, size, int(top), float(noise[top])) for top in high]
+
+
+def _may_be_clear(size: NDArray[np.float64], tops: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Whether the valley before a neighbour that is higher is deep enough, for each peak."""
+    if tops.size < 2:
+        return np.ones(tops.size, dtype=bool)
+    height = size[tops]
+    valley = np.minimum.reduceat(size, tops)[:-1] > np.minimum(height[1:], height[:-1]) * 10 ** (-PROMINENCE_DB / 20)
+    shallow = np.zeros(tops.size, dtype=bool)
+    shallow[1:] |= valley & (height[:-1] > height[1:])
+    shallow[:-1] |= valley & (height[1:] > height[:-1])
+    return ~shallow
 
 
 def _higher_saddle(size: NDArray[np.float64], top: int, lowest: float) -> float:

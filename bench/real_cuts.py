@@ -48,6 +48,11 @@ SAME_SPEED = 1e-3
 """Relative difference up to which two speeds are one."""
 ON_HARMONIC = 0.02
 """Orders from a multiple of a clear comb within which chatter is false."""
+COLUMNS = (
+    *("recordings", "cut found", "speed of one axis", "axes apart", "of all axes"),
+    *("words on all axes", "not told", "on harmonics"),
+)
+"""Headings of the table."""
 NOT_FOUND = ("no-cut", "no-air", "too-short")
 """Reasons that say that no one cut was found."""
 
@@ -269,10 +274,11 @@ def words_on_air(file: list[Axis], only_air: bool) -> Iterator[str]:
 def row(source: Source, each: Tally, together: Tally) -> str:
     """Of the table."""
     words = ", ".join(f"{count} {word}" for word, count in together.words.most_common())
+    words_told = sum(together.words[word] for word in ("stable", "chatter", "flip"))
     false = each.on_harmonic + together.on_harmonic
     return (
         f"| {source.title} | {each.found} of {each.cuts} | {each.speed_text} | {each.apart} of {each.pairs} | "
-        f"{together.speed_text} | {words} | {false} |"
+        f"{together.speed_text} | {words} | {together.words.total() - words_told} of {together.cuts} | {false} |"
     )
 
 
@@ -281,8 +287,7 @@ def main() -> None:
     if len(sys.argv) != 2 or not Path(sys.argv[1]).is_dir():
         sys.exit("give the folder of the public recordings: python bench/real_cuts.py FOLDER")
     folder, began, air = Path(sys.argv[1]), time.process_time(), Counter[str]()
-    print("| recordings | cut found | speed of one axis | axes apart | of all | words on all axes | on harmonics |")
-    print("|---|---|---|---|---|---|---|")
+    print("| " + " | ".join(COLUMNS) + " |\n" + "|---" * len(COLUMNS) + "|")
     for source in (*SOURCES, *AIR):
         each, together = Tally(), Tally()
         for file in axes_of(folder, source):

@@ -23,8 +23,9 @@ from lobewatch.cuts.listening.spectrum import (
     spectrum_of,
     without_skirts,
 )
+from lobewatch.cuts.listening.speed_elsewhere import speed_elsewhere
 from lobewatch.cuts.listening.steadiness import unsteadiness
-from lobewatch.cuts.listening.true_speed import speed_elsewhere, speed_of_spectra
+from lobewatch.cuts.listening.true_speed import speed_of_spectra
 from lobewatch.machine.journal.heard_cut import CutWord
 
 CHATTERS = 5e-4
@@ -116,9 +117,9 @@ def judge_cut(
         )
         sounds.append(_judge_lines(sound, axis, teeth, immersion))
     sound = max(sounds, key=_evidence)
-    if sound.word == "stable":
+    if sound.word == "stable" or sound.lines is None or not len(sound.lines.left):
         return sound
-    elsewhere = 60 * speed_elsewhere(spectra, quiet, teeth, commanded_rpm / 60, turning)
+    elsewhere = 60 * speed_elsewhere(spectra, quiet, teeth, commanded_rpm / 60, turning, sound.lines.left)
     return sound if np.isnan(elsewhere) else _not_found(spectra[0], elsewhere)
 
 

@@ -17,7 +17,7 @@ TOLERANCE = 1.2
 WAVER = 1e-4
 """Change of every speed, relative (`steadiness.LEAST`): by so much multiples are unsure."""
 LOUDEST = 40
-"""Lines that are looked at (`true_speed.LOUDEST`) ..."""
+"""Lines that are looked at ..."""
 ANCHORS = 16
 """... and those that a comb is looked for from; chosen."""
 STEPS = 3
@@ -71,9 +71,8 @@ def comb_elsewhere(
     which all multiples have an order in common that the teeth have not: that is a part of another.
     """
     lines, best, rank = lines.loudest(LOUDEST), None, (0.0, False, 0.0)
-    steps = np.arange(1, int(np.log(2) / (2 * around)) + 1)
-    for centre in frequency * np.exp(2 * around * np.concatenate([-steps, steps])):
-        comb = plain_comb(lines, bin_, sample_rate, teeth, float(centre), around)
+    for centre in centres_elsewhere(frequency, around):
+        comb = plain_comb(lines, bin_, sample_rate, teeth, centre, around)
         if comb is None or comb.share < HALF:
             continue
         order = np.round(lines.frequency / comb.frequency).astype(int)
@@ -82,6 +81,18 @@ def comb_elsewhere(
         if common and teeth % common == 0 and ranked > rank:
             best, rank = comb, ranked
     return best
+
+
+def centres_elsewhere(frequency: float, around: float) -> list[float]:
+    """Frequencies from half to twice one (Hz), each twice `around` from the next, relative; itself left out."""
+    steps = np.arange(1, int(np.log(2) / (2 * around)) + 1)
+    return [float(centre) for centre in frequency * np.exp(2 * around * np.concatenate([-steps, steps]))]
+
+
+def refine_comb(frequency: float, lines: SpectralLines, bin_: float) -> SpindleSpeed | None:
+    """A frequency (Hz) made exact by least squares over its multiples among lines; None where there are none."""
+    comb = _refined(frequency, lines, lines.frequency[np.newaxis], bin_)
+    return _speed(comb, lines, bin_) if np.any(comb.belongs) else None
 
 
 def _images(lines: SpectralLines, sample_rate: float) -> Floats:
@@ -112,11 +123,11 @@ def _refined(frequency: float, lines: SpectralLines, images: Floats, bin_: float
     """A frequency made exact by least squares over its multiples."""
     comb = _comb(frequency, images, bin_)
     for _ in range(STEPS):
+        if not np.any(comb.belongs):
+            break
         error, order = _error(lines, bin_)[comb.belongs], comb.order[comb.belongs]
         off = float(np.sum(order * comb.beyond[comb.belongs] / error**2) / np.sum((order / error) ** 2))
         comb = _comb(comb.frequency + off, images, bin_)
-        if not np.any(comb.belongs):
-            break
     return comb
 
 

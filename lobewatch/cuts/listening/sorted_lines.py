@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.cuts.listening.lattice import SpindleSpeed
-from lobewatch.cuts.listening.spectrum import SpectralLines, Spectrum
+from lobewatch.cuts.listening.spectrum import SpectralLines, Spectrum, joined_lines, lines_of, without_skirts
 
 WIDE = 1.2
 """A line belongs to a frequency that is no further away than this (bins)."""
@@ -52,6 +53,12 @@ class SortedLines:
 def is_foreign(lines: SpectralLines, air: Spectrum) -> NDArray[np.bool_]:
     """Whether lines are there in air too."""
     return np.asarray(lines.amplitude**2 <= FOREIGN * air.loudest_near(lines.frequency, AIR_WIDE))
+
+
+def lines_of_cut(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> SpectralLines:
+    """The lines of all axes that are not there in air, without skirts."""
+    lines = [without_skirts(lines_of(spectrum), spectrum.bin) for spectrum in spectra]
+    return joined_lines([axis[~is_foreign(axis, quiet)] for axis, quiet in zip(lines, air, strict=True)])
 
 
 def is_slow(spectrum: Spectrum, turning: SpindleSpeed, teeth: int) -> bool:

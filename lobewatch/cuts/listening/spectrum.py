@@ -129,11 +129,11 @@ def joined_lines(axes: Sequence[SpectralLines]) -> SpectralLines:
     )
 
 
-def lines_of(spectrum: Spectrum) -> SpectralLines:
-    """The lines that stand clear of the noise; frequency and amplitude by a parabola through log power."""
+def lines_of(spectrum: Spectrum, clear: float = CLEAR) -> SpectralLines:
+    """The lines with `clear` times the power of the noise; frequency and amplitude by a parabola through log power."""
     power = spectrum.power
     wide = 2 * max(round(APART * spectrum.bin / spectrum.frequency[1]), 1) + 1
-    at = np.flatnonzero((power == maximum_filter1d(power, wide)) & (power > CLEAR * spectrum.noise))
+    at = np.flatnonzero((power == maximum_filter1d(power, wide)) & (power > clear * spectrum.noise))
     at = at[(at > 2 * PADDED) & (at < power.size - 1)]
     before, top, after = (np.log(np.maximum(power[at + shift], np.finfo(np.float64).tiny)) for shift in (-1, 0, 1))
     bend = before - 2 * top + after

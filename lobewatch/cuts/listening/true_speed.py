@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
+from lobewatch.cuts.listening.harmonic_sum import harmonic_sum
 from lobewatch.cuts.listening.lattice import SpindleSpeed, refine_speed
-from lobewatch.cuts.listening.plain_comb import comb_elsewhere, plain_comb
-from lobewatch.cuts.listening.sorted_lines import is_foreign
+from lobewatch.cuts.listening.plain_comb import LOUDEST, plain_comb
+from lobewatch.cuts.listening.sorted_lines import lines_of_cut
 from lobewatch.cuts.listening.spectrum import (
     Floats,
     SpectralLines,
@@ -26,14 +27,10 @@ COMB_AROUND = 0.05
 SAME = 1e-3
 """... and up to which it is the same as that of the votes, which know of side bands; it is taken where it explains as
 many lines: it has one unknown, they have one more for each family of side bands."""
-MAINS, MAINS_AROUND = (50.0, 60.0), 2e-3
-"""Frequencies of the mains (Hz), whose hum is a comb too, and how far they are off at most, relative."""
 SURE = 6
 """Lines that must agree on a speed by votes that has no plain comb, and that does not fit (`FITS`) all of them."""
 AROUND = 0.021
 """Relative distance from the speed that was set up to which votes are counted."""
-LOUDEST = 40
-"""Lines that are looked at."""
 HIGHEST = 60
 """Multiples of the frequency of the spindle by which two of them may differ."""
 SHARPNESS = 0.25
@@ -79,8 +76,20 @@ def speed_of_spectra(
     spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
 ) -> SpindleSpeed | None:
     """`find_speed` of the spectra of all axes; commanded in turns a second (Hz)."""
+    lines, voted = lines_of_cut(spectra, air), _speed_of_lines(spectra, air, teeth, commanded)
+    summed = harmonic_sum(spectra, air, lines, teeth, commanded, COMB_AROUND)
+    if voted is None or summed is None or abs(summed.frequency / voted.frequency - 1) < SAME:
+        return voted or summed
+    rival = refine_speed(summed.frequency, lines, spectra[0].bin)
+    return summed if rival.agreeing >= voted.agreeing else voted
+
+
+def _speed_of_lines(
+    spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float
+) -> SpindleSpeed | None:
+    """The speed by what stands clear of the noise."""
     lines = [without_skirts(lines_of(spectrum), spectrum.bin) for spectrum in spectra]
-    of_cut, first = _lines_of_cut(spectra, air), spectra[0]
+    of_cut, first = lines_of_cut(spectra, air), spectra[0]
     voted = true_speed(of_cut, joined_lines(lines), first, teeth, commanded)
     comb = plain_comb(of_cut, first.bin, first.sample_rate, teeth, commanded, COMB_AROUND)
     if comb is None:
@@ -89,35 +98,6 @@ def speed_of_spectra(
         is_same = voted is not None and abs(comb.frequency / voted.frequency - 1) < SAME
         return voted if is_same else comb if comb.share >= LEAST_SHARE else None
     return voted
-
-
-def speed_elsewhere(
-    spectra: Sequence[Spectrum], air: Sequence[Spectrum], teeth: int, commanded: float, heard: SpindleSpeed | None
-) -> float:
-    """Turns a second (Hz) of a clear comb further from the speed that was set; NaN without one.
-
-    heard: the speed that was found: only a comb on which as many lines agree is one then, which has one unknown only,
-    and that of half of it is none, which chatter of period two makes; the mains hum at multiples of theirs.
-    """
-    lines, first = _lines_of_cut(spectra, air), spectra[0]
-    about = first.bin, first.sample_rate, teeth
-    mains = [plain_comb(lines, *about, hum, MAINS_AROUND) for hum in MAINS if heard and not _is_same(heard, hum)]
-    combs = [comb for comb in (comb_elsewhere(lines, *about, commanded, COMB_AROUND), *mains) if comb is not None]
-    if heard is not None:
-        combs = [comb for comb in combs if comb.agreeing >= heard.agreeing]
-        combs = [comb for comb in combs if abs(2 * comb.frequency / heard.frequency - 1) >= SAME]
-    return max(combs, key=lambda comb: comb.agreeing).frequency if combs else np.nan
-
-
-def _is_same(speed: SpindleSpeed, hum: float) -> bool:
-    """Whether a spindle turns as fast as a hum (Hz), or twice: its multiples, or those of period two, are the same."""
-    return any(abs(speed.frequency / (times * hum) - 1) < MAINS_AROUND for times in (1, 2))
-
-
-def _lines_of_cut(spectra: Sequence[Spectrum], air: Sequence[Spectrum]) -> SpectralLines:
-    """The lines of all axes that are not there in air, without skirts."""
-    lines = [without_skirts(lines_of(spectrum), spectrum.bin) for spectrum in spectra]
-    return joined_lines([axis[~is_foreign(axis, quiet)] for axis, quiet in zip(lines, air, strict=True)])
 
 
 def true_speed(

@@ -19,14 +19,14 @@ _HARMONICS = np.array([3 / 8, -1 / 2, 1 / 8])
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """Driving-point dynamics: modes with viscous damping and a static residual."""
+    """Dynamics from where a hammer hits to where a sensor sits: modes with viscous damping and a static residual."""
 
     frequency: NDArray[np.float64]
     """Undamped natural frequencies (Hz), shape (n,)."""
     damping_ratio: NDArray[np.float64]
     """Viscous damping ratios (-), shape (n,)."""
     stiffness: NDArray[np.float64]
-    """Modal stiffnesses at the tapped point (N/m), shape (n,)."""
+    """Modal stiffnesses from hammer to sensor (N/m), shape (n,); negative where these move against each other."""
     residual: float = 0.0
     """Static flexibility of all other modes (m/N)."""
 

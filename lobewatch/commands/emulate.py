@@ -53,6 +53,15 @@ class EmulateOptions:
         float | None, typer.Option("--temperature", help="Swing over the year, 0 to 30 K; f_1 moves with it.")
     ] = None
     """Swing of the temperature over the year (K)."""
+    direction: Annotated[
+        Literal["x", "y", "xy"], typer.Option("--direction", help="Of hammer and sensor; xy: hit in x, sensor in y.")
+    ] = "x"
+    """Direction of hammer and sensor."""
+    askew: Annotated[
+        float | None,
+        typer.Option("--askew", help="Modes lie at this angle from x, 0 to 90 degrees, and 5 % higher square to it."),
+    ] = None
+    """Angle of the modes from x (deg); None where the spindle is round."""
     cut: Annotated[
         str | None, typer.Option("--cut", metavar="PROGRAM", help="It cuts this, and is heard on its housing.")
     ] = None
@@ -144,14 +153,18 @@ def _tapped(name: str, options: EmulateOptions, shared: Mapping[str, Any]) -> Em
     from acquisition.devices import find_driver
     from lobewatch.tap.emulated_spindle import emulate_machine
 
-    emulated = emulate_machine(driver=find_driver(name), **shared)
+    emulated = emulate_machine(driver=find_driver(name), direction=options.direction, askew=options.askew, **shared)
     truth = {"frequency_hz": emulated.frequency, "stiffness_n_per_m": emulated.stiffness}
     text = f"f_1 {emulated.frequency:.2f} Hz, K {emulated.stiffness / 1e6:.3f} N/um"
-    return Emulation(emulated.device, truth, text, "tap")
+    return Emulation(
+        emulated.device, truth, text, "tap", f" --direction {options.direction}" * (options.direction != "x")
+    )
 
 
 def _cut(name: str, options: EmulateOptions, program: str, shared: Mapping[str, Any]) -> Emulation:
     """The spindle cutting a program; shared: arguments that a tapped one takes too."""
+    if options.direction != "x" or options.askew is not None:
+        raise ValueError("--direction and --askew are those of a spindle that is tapped: leave out --cut with them")
     from acquisition.devices import find_driver
     from lobewatch.machine.settings.cut_setting import cut_setting
     from lobewatch.tap.emulated_cut import emulate_cut

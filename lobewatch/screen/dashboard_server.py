@@ -125,7 +125,7 @@ class DashboardServer(WebThread):
         try:
             wish = msgspec.json.decode(await request.read(), type=StartRequest)
         except (msgspec.DecodeError, UnicodeDecodeError):
-            raise web.HTTPBadRequest(text='the body must be {"direction": "x"} or {"direction": "y"}') from None
+            raise web.HTTPBadRequest(text='the body must be {"direction": "x"}, "y" or "xy"') from None
         test = self._tests.get(key)
         if test is None or not test.running:
             if test is not None:  # it may wait for a choice that is made by this

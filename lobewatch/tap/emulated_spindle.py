@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -21,6 +22,7 @@ from acquisition import (
     Hammering,
     SensorInput,
     Structure,
+    TapDirection,
     TapsEmulator,
     TapsSource,
 )
@@ -36,6 +38,8 @@ CHANNELS = (
     Channel("acceleration", sensitivity=1.02e-3, full_scale=5.0, calibration_date="2026-01-15"),
 )
 """A 2.2 kN hammer and a 500 g accelerometer on a 16-bit converter."""
+HIGHER = 0.05
+"""Relative distance of the frequencies along the second axis of a spindle whose modes lie askew."""
 AHEAD = 25
 """Blocks (0.5 s) that a device in step with its host may send before they are asked for."""
 PATIENCE = 0.2
@@ -62,6 +66,30 @@ def emulated_structure(spindle: Spindle, damping_ratio: float, position: float =
         damping_ratio=np.full(MODES, damping_ratio),
         stiffness=stiffness,
         residual=1 / static_stiffness(spindle, position) - float(np.sum(1 / stiffness)),
+    )
+
+
+def askew_structure(spindle: Structure, degrees: float, direction: TapDirection) -> Structure:
+    """Structure that is met in a direction where each mode of a spindle is two, along axes square to each other.
+
+    The first axis lies `degrees` from x, towards y; along the second frequencies are `HIGHER`. Across, of a hit in x
+    seen in y, both show with opposite signs. Raises ValueError for an angle that is none, or that shows nothing across.
+    """
+    if not 0 <= degrees <= 90:
+        raise ValueError(f"--askew {degrees:g}: is not an angle of 0 to 90 degrees")
+    c, s = round(math.cos(math.radians(degrees)), 12), round(math.sin(math.radians(degrees)), 12)
+    shares = {"x": (c * c, s * s), "y": (s * s, c * c), "xy": (c * s, -c * s)}[direction]
+    if not any(shares):
+        raise ValueError(
+            f"--askew {degrees:g} --direction xy: modes along x and y show nothing across; give another angle"
+        )
+    stiffer = 1.0, (1 + HIGHER) ** 2
+    seen = [(share, stiff) for share, stiff in zip(shares, stiffer, strict=True) if share]
+    return Structure(
+        frequency=np.concatenate([spindle.frequency * math.sqrt(stiff) for _, stiff in seen]),
+        damping_ratio=np.tile(spindle.damping_ratio, len(seen)),
+        stiffness=np.concatenate([spindle.stiffness * stiff / share for share, stiff in seen]),
+        residual=sum(spindle.residual * share / stiff for share, stiff in seen),
     )
 
 
@@ -118,15 +146,20 @@ def emulate_machine(
     realtime: bool = True,
     tcp: bool = False,
     spindle: Spindle | None = None,
+    direction: TapDirection = "x",
+    askew: float | None = None,
 ) -> EmulatedMachine:
     """Somebody taps the spindle of a machine, again and again, on a device of this kind.
 
-    spindle: in place of that of machine.toml, of the same damping. DataError where machine.toml has no spindle, or
-    lacks the sensors of a device that does not describe them itself.
+    spindle: in place of that of machine.toml, of the same damping. askew: angle from x (deg) at which its modes lie, as
+    `askew_structure` has it with hammer and sensor in a direction; None: a round spindle, the same in x and y.
+    DataError where machine.toml has no spindle, or lacks the sensors of a device that does not describe them itself.
     """
     if driver.emulate is None:
         raise DataError(f"{driver.title} cannot be emulated; connect one, or emulate another driver")
     structure, random = _structure(folder, spindle), np.random.default_rng(seed)
+    if askew is not None or direction == "xy":
+        structure = askew_structure(structure, askew or 0.0, direction)
     bench = Bench(
         lambda rate: HammeredStructure(structure, rate, random, Hammering()),
         emulated_inputs(folder, driver),

@@ -35,6 +35,7 @@ from lobewatch.tap.phases import Phases
 from lobewatch.tap.plug import Plug
 from lobewatch.tap.publisher import Publisher
 from lobewatch.tap.state import Outcome, ProgramWord, TapState, TapStep
+from lobewatch.verdicts.unsaid import CROSS_NOT_TAPPED
 
 
 class TapSession:
@@ -177,12 +178,15 @@ def outcome_of(logbook: Logbook, measurement: Measurement) -> Outcome:
     remarks = [*(remark for remark in measurement.remarks if remark not in questions), *joined(standing.remarks)]
     remarks += [remark for remark in logbook.remarks if remark.code not in LIGHTS]
     texts = [*_values(measurement, series), *(f"{remark.finding}." for remark in remarks)]
+    verdicts = logbook.verdicts()
     programs = [
         ProgramWord(f"{program.name} ({program.speed_rpm:g} rpm, {program.depth_mm:g} mm)", verdict.word.value)
-        for verdict in logbook.verdicts()
+        for verdict in verdicts
         if (program := verdict.program)
     ]
-    return Outcome(standing.light, texts, standing.next_step, standing.is_early, programs)
+    of_tool = [verdict.remarks for verdict in verdicts if verdict.program.tool == measurement.tool]
+    asks_across = any(remark.code == CROSS_NOT_TAPPED for remarks in of_tool for remark in remarks)
+    return Outcome(standing.light, texts, standing.next_step, standing.is_early, programs, asks_across)
 
 
 def _values(measurement: Measurement, series: SeriesStanding | None) -> list[str]:

@@ -122,6 +122,8 @@ class Outcome:
     """Whether the alarm is that of a fall short of every limit."""
     programs: Sequence[ProgramWord] = ()
     """Programs with the words on them."""
+    asks_across: bool = False
+    """Whether a tap across, hit in x and seen in y, would settle what x and y leave open of the tool."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,15 +6,17 @@ import queue
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from acquisition import TapDirection
+from acquisition import TapDirection, tap_direction
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.session import TapSession
 from lobewatch.tap.spool import interrupted_tests
 from lobewatch.tap.state import Choice, TapState, TapStep
 
 TAP_X, TAP_Y = Choice("x", "tap x"), Choice("y", "tap y")
+TAP_ACROSS = Choice("xy", "tap xy: hit in x, sensor in y")
 NEXT_TOOL, DONE = Choice("tool", "next tool"), Choice("done", "done")
 TAPS: dict[TapDirection, Choice] = {"x": TAP_X, "y": TAP_Y}
+DIRECTIONS = [choice.key for choice in (TAP_X, TAP_Y, TAP_ACROSS)]
 
 
 def first_direction(folder: MachineFolder, tool: str) -> TapDirection:
@@ -89,7 +91,7 @@ class TapVisit:
                 return
             if key == NEXT_TOOL.key:
                 self._tool, tapped = tool, set()
-            self._direction = "y" if key == TAP_Y.key else "x"
+            self._direction = tap_direction(key) if key in DIRECTIONS else "x"
             self._session = self._plan(self._tool, self._direction)
             self._show(None)
 
@@ -103,7 +105,8 @@ class TapVisit:
             choices: Sequence[Choice] = (tap, DONE)
             state = replace(state, word=TapStep.MOVE, reason=reason, outcome=None)
         else:
-            choices = (TAP_X, TAP_Y, NEXT_TOOL, DONE)
+            across = (TAP_ACROSS,) if state.outcome is not None and state.outcome.asks_across else ()
+            choices = (TAP_X, TAP_Y, *across, NEXT_TOOL, DONE)
         self._show(replace(state, revision=state.revision + 1, choices=tuple(choices)))
         return self._answers.get()
 

@@ -21,6 +21,8 @@ CORNER = 1.5
 """... as one with so many times the radius of the tool does, which stands for corners."""
 HELIX_MATTERS = 0.2
 """Radial depth over diameter below which a helix moves the limit."""
+CROSS_NOT_TAPPED = "cross-not-tapped"
+"""Code of the remark that asks for a cross tap."""
 CROSS_MATTERS = 1.04
 """Highest limit over the lowest, whatever the open axes of the modes are, from which on a cross tap is asked for."""
 
@@ -39,7 +41,7 @@ def unsaid(table: ProgramTable, machine: Machine, judgement: Judgement) -> Itera
         )
     if judgement.across > CROSS_MATTERS:
         yield Remark(
-            "cross-not-tapped",
+            CROSS_NOT_TAPPED,
             table.name,
             "x and y show the same modes, taken as askew at their worst: the axes, which direct taps leave open, move "
             f"its limit by up to {100 * (judgement.across - 1):.0f} %",

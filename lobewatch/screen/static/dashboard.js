@@ -53,7 +53,8 @@ function addStarts(item, machine, path) {
   for (const button of item.querySelectorAll(".start")) {
     const { direction } = button.dataset;
     if (running) button.textContent = "Watch the test";
-    button.hidden = running ? direction === "y" : !list.may_alter || !machine.has_port;
+    const offered = running ? direction === "x" : list.may_alter && machine.has_port;
+    button.hidden = !offered || (direction === "xy" && !("xy" in interrupted));
     if (running) button.addEventListener("click", () => location.assign(`/tap/${encodeURIComponent(key)}/`));
     else button.addEventListener("click", () => go(button, key, `${path}/start`, { direction }));
   }

@@ -50,7 +50,7 @@ LIGHTS: Mapping[str, tuple[str, str]] = {
     "alarm": ("✗", "black on #ee8238"),
     "unknown": ("?", "black on #dddddd"),
 }
-CHOICE_KEYS: Mapping[str, str] = {"x": "x", "y": "y", "tool": "n", "done": "q"}
+CHOICE_KEYS: Mapping[str, str] = {"x": "x", "y": "y", "xy": "c", "tool": "n", "done": "q"}
 """Key that stands for each choice."""
 
 

@@ -12,6 +12,7 @@ from acquisition import Circumstances, Frf, TapDirection, TapTest, from_accelera
 from lobes import shown_modes
 from lobewatch.logbook import Logbook
 from lobewatch.show.report.report import render_report
+from lobewatch.tap.session import outcome_of
 from modal import Mode, synthesize
 from tests.lobewatch.conftest import Shop
 
@@ -68,6 +69,10 @@ def test_a_cross_tap_settles_to_which_side_modes_lie(askew: Shop) -> None:
     assert len(before.assembly("reference").axes.patterns) == 2
     tap(askew, 0.02, "xy", shown_modes(PAIR, turned_by(35)).cross)
     after = askew.logbook
+    assert [outcome_of(book, book.measurement(book.taps[-1].id)).asks_across for book in (before, after)] == [
+        True,
+        False,
+    ]
     assert "cross-not-tapped" not in remark_codes(after)
     tool = after.assembly("reference")
     (pattern,) = tool.axes.patterns

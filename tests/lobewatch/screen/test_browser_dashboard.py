@@ -8,10 +8,11 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from selenium.webdriver.common.by import By
 
-from acquisition import Circumstances, TapDirection, TapTest, from_accelerance, new_tap_id
+from acquisition import Circumstances, Hit, HitFlags, TapDirection, TapTest, from_accelerance, new_tap_id, write_hit
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.screen import DashboardServer, board
@@ -129,6 +130,21 @@ def test_start_is_there_where_a_port_is_and_its_error_in_its_line(
     finally:
         toml.write_text(text, "utf-8")
     opened.complaints()
+
+
+def test_an_interrupted_test_across_is_gone_on_with_or_begun_anew(browser: Browser, tmp_path: Path) -> None:
+    machine(tmp_path / "mill", 'port = "/dev/nothing-here"')
+    folder = MachineFolder(tmp_path / "mill")
+    pulse = np.exp(-((np.arange(1000) / 30 - 5) ** 2))
+    about = Circumstances("mill", datetime.now(UTC), "reference", "xy")
+    (folder.spool / "earlier").mkdir(parents=True)
+    write_hit(folder.spool / "earlier" / "0000.h5", Hit(500 * pulse, 100 * pulse, 25600.0), about, HitFlags.OK)
+    with DashboardServer(folder.path) as server:
+        browser.open(server.url, (1280, 657))
+        browser.wait(lambda: keys(browser) == ["mill"])
+        actions = row(browser, "mill").find_element(By.CLASS_NAME, "actions")
+        assert actions.text.split("\n") == ["Report", "START x", "START y", "START xy", "Begin xy anew"]
+    browser.complaints()
 
 
 def test_a_line_opens_with_all_reasons_and_stays_open(browser: Browser, dashboard: DashboardServer) -> None:

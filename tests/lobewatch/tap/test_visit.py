@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -12,9 +13,10 @@ import pytest
 from acquisition import Circumstances, HammeredStructure, TapDirection
 from lobewatch.logbook import Logbook
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.tap import session
 from lobewatch.tap.hit_loop import TapStopped
-from lobewatch.tap.session import TapSession
-from lobewatch.tap.state import TapState, TapStep
+from lobewatch.tap.session import TapSession, outcome_of
+from lobewatch.tap.state import Outcome, TapState, TapStep
 from lobewatch.tap.visit import TapVisit, first_direction
 
 
@@ -102,6 +104,31 @@ def test_x_then_y_then_the_next_tool(visit: Callable[..., Visit], folder: Machin
     assert [(tap.tool, tap.direction) for tap in Logbook(folder).taps] == person.planned
     assert (person.visit.state.word, person.visit.state.choices) == (TapStep.DONE, ())
     assert person.visit.state.outcome is not None
+
+
+def test_a_tap_across_is_offered_where_it_would_settle_something(
+    visit: Callable[..., Visit], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def asks(*about: Any) -> Outcome:
+        return replace(outcome_of(*about), asks_across=True)
+
+    monkeypatch.setattr(session, "outcome_of", asks)
+    person = visit()
+    person.wait(lambda state: state.choices)
+    person.visit.choose("y")
+    end = person.wait(lambda state: state.choices and state.word is TapStep.DONE)
+    assert keys(end) == ["x", "y", "xy", "tool", "done"]
+    person.visit.choose("xy")
+    assert keys(person.wait(lambda state: state.choices and "direction xy" in state.title)) == [
+        "x",
+        "y",
+        "xy",
+        "tool",
+        "done",
+    ]
+    person.visit.choose("done")
+    person.end()
+    assert person.planned == [("reference", "x"), ("reference", "y"), ("reference", "xy")]
 
 
 def test_one_test_alone_asks_nothing(visit: Callable[..., Visit]) -> None:

@@ -22,7 +22,7 @@ from lobes import shown_modes
 from lobewatch.machine import FEED_ANGLES, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.draws import as_program, worst_limit
-from lobewatch.verdicts.verdict import Verdict, judge
+from lobewatch.verdicts.verdict import Verdict, Word, judge
 from lobewatch.verdicts.ways import ways
 from modal import Mode, believed, fit_modes, synthesize
 
@@ -116,15 +116,15 @@ class Saying:
 
 
 def sayings(count: int, seed: int, across: bool = False) -> list[Saying]:
-    """Of so many random spindles that have a limit."""
+    """Of so many random spindles that have a limit, with a cut that is plausible."""
     made = list[Saying]()
     for rng in np.random.default_rng(seed).spawn(4 * count):
         spindle = random_spindle(rng)
         tool = spindle.assembly(rng, across)
         limit, _, _ = worst_limit(as_program(spindle.cut, MACHINE), tool, ways(spindle.cut, MACHINE, tool))
         if 1e3 * limit.limit < DEEPEST_MM and len(made) < count:
-            half = _at(spindle.cut, 1e3 * limit.limit / 2)
-            made.append(Saying(spindle, judge(half, tool, MACHINE)))
+            verdict = judge(_at(spindle.cut, 1e3 * limit.limit / 2), tool, MACHINE)
+            made += [Saying(spindle, verdict)] if verdict.word is not Word.UNKNOWN else []
     return made
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 import sys
 
+import msgspec
 import numpy as np
 import pytest
 from random_milling import random_case
 from verdict_study import MACHINE, assembly, chattering, limit_mm, program, study, upper_limit
 
 from lobes import growth, piece_numbers
-from lobewatch.verdicts.doubt import doubt_of
+from lobewatch.machine import Wear
+from lobewatch.verdicts.doubt import WEAR, doubt_of
 from lobewatch.verdicts.draws import as_program, middle_row
 from lobewatch.verdicts.verdict import Word, judge
 from lobewatch.verdicts.ways import ways
@@ -78,3 +81,26 @@ def test_what_is_stable_in_all_of_the_doubt_with_5_percent_to_spare_is_called_st
     say(f"{share(sum(called), len(called))} called stable")
     assert len(called) >= 30
     assert np.mean(called) >= 0.95
+
+
+@pytest.mark.long
+@pytest.mark.timeout(7200)
+def test_shares_that_are_called_stable_by_wear() -> None:
+    """Of random programs of machines of at most six modes, at 50 and 70 % of their limit with new edges."""
+    words: dict[tuple[Wear, float], list[Word]] = {(wear, part): [] for wear in WEAR for part in (0.5, 0.7)}
+    for rng in np.random.default_rng(5).spawn(120):
+        milling = random_case(rng)
+        limit = limit_mm(milling) if len(milling.x + milling.y) <= 6 else math.inf
+        for (wear, part), said in words.items() if math.isfinite(limit) else ():
+            worn = msgspec.structs.replace(program(milling, part * limit), wear=wear)
+            said.append(judge(worn, assembly(milling), MACHINE).word)
+    shares = {key: float(np.mean([word is Word.STABLE for word in said])) for key, said in words.items()}
+    say(
+        f"{len(words['new', 0.5])} programs: "
+        + ", ".join(f"{wear} {part}: {shares[wear, part]:.0%}" for wear, part in shares)
+    )
+    assert len(words["new", 0.5]) >= 50
+    assert all(word is not Word.NOT_STABLE for said in words.values() for word in said)
+    assert shares["new", 0.5] >= 0.85
+    for part in (0.5, 0.7):
+        assert shares["new", part] >= shares["used", part] >= shares["worn", part]

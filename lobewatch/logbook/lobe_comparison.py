@@ -13,6 +13,7 @@ from lobes.tip_response import Tip
 from lobewatch.cuts.learning.at_speed import spindle_at_speed
 from lobewatch.logbook.logbook import Logbook
 from lobewatch.machine import Machine
+from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.measuring.model import model_frf, model_state
 from lobewatch.tool.assembly import Assembly, speed_grid
 from lobewatch.tool.charts import DEEPEST, Chart, Dynamics, Method, chart, cut_table
@@ -110,11 +111,10 @@ def _measured_frf(logbook: Logbook, assembly: Assembly, direction: str) -> Frf:
 
 def _no_pocket(now: Chart, machine: Machine) -> Remark:
     """Why nothing is recommended."""
-    speeds = machine.speed
     if len(now.assembly.directions) == 1:
         gap, cure = now.assembly.gap
         return Remark(NO_POCKET, now.name, f"no speed and depth can be called safe: {gap}", cure)
-    text = f"no safe speed and depth found in {speeds.low_rpm:g}..{speeds.high_rpm:g} rpm"
+    text = f"no safe speed and depth found in {CutRange.of(machine, now.table).words}"
     return Remark(NO_POCKET, now.name, text, "choose another tool or a narrower cut")
 
 

@@ -15,6 +15,7 @@ from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.aging import softening, tolerable_decay
 from lobewatch.verdicts.setting_search import Setting, SettingSearch
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
+from lobewatch.verdicts.tool_remarks import not_described
 from lobewatch.verdicts.verdict import Verdict, Word, is_sure
 
 
@@ -31,7 +32,7 @@ class Advice:
     """Tolerable fall of the frequency in the middle of the doubt, relative; 0 where it is not stable now, inf where
     nothing happens down to 80 %, NaN where the program could not be checked."""
     remarks: tuple[Remark, ...] = ()
-    """Remarks on what the decay rests on."""
+    """Remarks on what the decay rests on, and what would have to be known of the tool."""
 
 
 def advise(verdict: Verdict, machine: Machine) -> Advice:
@@ -45,6 +46,7 @@ def advise(verdict: Verdict, machine: Machine) -> Advice:
     if verdict.word is Word.STABLE or not is_sure(verdict.program, tool):
         return Advice(decay=decay, remarks=remarks)
     search, program = SettingSearch(verdict.program, tool, machine, verdict.at_speed), verdict.program
+    remarks = (*remarks, *not_described(program, search.reach.limits))
     elsewhere = search.nearest(program.depth_mm, program.speed_rpm)
     if elsewhere is not None:
         return Advice(elsewhere, None, decay, remarks)

@@ -54,9 +54,7 @@ class SpindleAtSpeed:
         """A cut with the coefficients that were learnt; as it stands in machine.toml where none were."""
         if self.doubt is None:
             return table
-        return msgspec.structs.replace(
-            table, material=None, tangential_n_per_mm2=self.tangential, radial_n_per_mm2=self.radial
-        )
+        return msgspec.structs.replace(table, tangential_n_per_mm2=self.tangential, radial_n_per_mm2=self.radial)
 
 
 AT_REST = SpindleAtSpeed()

@@ -31,7 +31,7 @@ def unsaid(table: ProgramTable, machine: Machine, judgement: Judgement) -> Itera
     """Remarks on what is assumed because the program does not say it."""
     if table.immersion < NARROW and table.corner_radius_mm is None and not isinstance(table.radial_depth_mm, tuple):
         yield _one_engagement(table, machine, judgement)
-    if table.helix_deg is None and min(table.immersions) < HELIX_MATTERS:
+    if machine.helix_deg(table) is None and min(table.immersions) < HELIX_MATTERS:
         yield Remark(
             "helix-not-written",
             table.name,

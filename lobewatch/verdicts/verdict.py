@@ -19,6 +19,7 @@ from lobewatch.verdicts.draws import DRAWS, ProgramDraws, turning_draws
 from lobewatch.verdicts.judgement import Judgement, weigh
 from lobewatch.verdicts.settling import decisive_cause, settling_remark
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
+from lobewatch.verdicts.tool_remarks import outside_tool
 from lobewatch.verdicts.unsaid import unsaid
 
 
@@ -226,5 +227,6 @@ def _remarks(table: ProgramTable, assembly: Assembly, at_speed: SpindleAtSpeed, 
     yield from (remark for remark in assembly.remarks if remark.code in (*ABOUT_DIRECTIONS, "predicted"))
     yield from at_speed.remarks
     yield from assembly.questions
+    yield from outside_tool(table, machine)
     if min(machine.drive.power_kw, machine.drive.torque_nm) < np.inf and feed_that_counts(machine, table) is None:
         yield Remark("drive-ignored", table.name, "[drive] does not count: feed_per_tooth_mm is missing")

@@ -45,6 +45,10 @@ class Grid:
     trust: Floats
     """True limit in the middle over that by zero order, at each speed, shape (s,)."""
 
+    def holds(self, speed: float) -> bool:
+        """Whether a speed (rpm) lies within, as far as a heard one may be off."""
+        return bool(self.speeds[0] * (1 - STEP) <= speed <= self.speeds[-1] * (1 + STEP))
+
     def evidence(self, speed: float, depth: float, word: CutWord = "stable") -> CutEvidence:
         """A cut of it."""
         return CutEvidence(self.cut, speed, depth, word, feed_angles=self.feed_angles)

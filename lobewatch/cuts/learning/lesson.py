@@ -59,6 +59,8 @@ class NextCut:
     """Cut to make; None where nothing more is to be gained, or all cuts are made."""
     left: int
     """Number of test cuts that are still to be made."""
+    reach: CutRange
+    """Speeds and depths that machine and tool bear."""
 
 
 def find_program(machine: Machine, name: str) -> ProgramTable:
@@ -80,10 +82,11 @@ def next_cut(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Se
     """The next test cut of a program of which so many shall be made at most."""
     lesson = learn_program(table, assembly, machine, cuts)
     left = max(most - len(lesson.own_cuts), 0)
-    if not left or CutRange.of(machine, table).is_empty:
-        return NextCut(lesson, None, left)
+    reach = CutRange.of(machine, table)
+    if not left or reach.is_empty:
+        return NextCut(lesson, None, left, reach)
     grid = grid_of(table, assembly, machine)
-    return NextCut(lesson, suggest(lesson.learnt, grid, lesson.own_cuts, left, lesson.doubted), left)
+    return NextCut(lesson, suggest(lesson.learnt, grid, lesson.own_cuts, left, lesson.doubted), left, reach)
 
 
 def grid_of(table: ProgramTable, assembly: Assembly, machine: Machine) -> Grid:

@@ -62,12 +62,12 @@ def suggest(
     """The next test cut; None where nothing more is to be gained.
 
     cuts: those of this very program; left: test cuts that are still to be made, this one with them; doubted: cuts that
-    are not believed. One of those is made again, once. Else, with more than one left, a cut is worth what it gains
-    itself and what the best next one is then expected to gain. A diagram by zero order proposes; what is chosen was
-    judged by semi-discretisation.
+    are not believed. One of those that lies within the grid is made again, once. Else, with more than one left, a cut
+    is worth what it gains itself and what the best next one is then expected to gain. A diagram by zero order proposes;
+    what is chosen was judged by semi-discretisation.
     """
     best, draws = best_removal_rate([cut for cut in cuts if cut not in doubted]), learnt.sample(DRAWS)
-    if (again := cut_again(cuts, doubted)) is not None:
+    if (again := cut_again(cuts, [cut for cut in doubted if grid.holds(cut.speed_rpm)])) is not None:
         return replace(_judged(grid, again.speed_rpm, again.depth, best, draws), repeats=again.id)
     chart = LimitCharts.of(draws, grid)
     most = float(np.max(chart.chips))

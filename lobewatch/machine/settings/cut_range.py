@@ -57,6 +57,15 @@ class CutRange:
         """Whether no speed lies inside."""
         return self.low_rpm > self.high_rpm
 
+    @property
+    def words(self) -> str:
+        """Speeds inside, for people."""
+        spindle = self.machine.speed
+        if self.is_empty:
+            return f"{spindle.low_rpm:g}..{spindle.high_rpm:g} rpm, of which the tool bears none"
+        is_whole = (self.low_rpm, self.high_rpm) == (spindle.low_rpm, spindle.high_rpm)
+        return f"{self.low_rpm:g}..{self.high_rpm:g} rpm{'' if is_whole else ', which the tool bears'}"
+
     def depths(self, speed_rpm: NDArray[np.float64]) -> NDArray[np.float64]:
         """Deepest cut (mm) that tool and drive allow at speeds (rpm)."""
         return np.minimum(self.deepest_mm, 1e3 * drive_limit(self.machine, self.table, speed_rpm))

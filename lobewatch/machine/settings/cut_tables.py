@@ -100,9 +100,9 @@ class CutTable(Table, frozen=True):
             raise ValueError(f"radial_depth_mm=[{least:g}, {most:g}] does not rise; give [least, greatest]")
         if most > self.tool_diameter_mm:
             raise ValueError(f"radial_depth_mm={most:g} is larger than tool_diameter_mm={self.tool_diameter_mm:g}")
-        given = {self.tangential_n_per_mm2 is None, self.radial_n_per_mm2 is None}
-        if given != {self.material is not None}:
-            raise ValueError("give either material or both tangential_n_per_mm2 and radial_n_per_mm2")
+        missing = {self.tangential_n_per_mm2 is None, self.radial_n_per_mm2 is None}
+        if len(missing) == 2 or (missing == {True} and self.material is None):
+            raise ValueError("give material, or both tangential_n_per_mm2 and radial_n_per_mm2, or all three")
         if self.feed not in (*FEED_ANGLES, "both"):
             raise ValueError(f'feed={self.feed!r} is no direction; give "x", "y" or "both"')
         pitch_of(self.pitch_deg, self.teeth)

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import Any
 
 from lobes import ToolMaterial
-from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
+from lobewatch.machine.settings.cut_tables import CutTable
 from lobewatch.machine.settings.machine_file import Machine
 
 KEYS: Mapping[str, str] = MappingProxyType(
@@ -74,14 +74,10 @@ def known_tool(machine: Machine, name: str) -> KnownTool:
     )
 
 
-def tool_of(machine: Machine, table: CutTable) -> KnownTool:
-    """The tool of a cut; of the reference cut the one that is tapped."""
-    return known_tool(machine, table.tool if isinstance(table, ProgramTable) else machine.tap.tool)
-
-
 def feed_that_counts(machine: Machine, table: CutTable) -> float | None:
     """Feed per tooth (mm) that power and torque follow from: the cut's own, else the greatest of its [[tool]]."""
-    borne = tool_of(machine, table).feed_per_tooth_mm
+    tool = machine.tool_of(table)
+    borne = None if tool is None else _range(tool.feed_per_tooth_mm)
     return table.feed_per_tooth_mm or (None if borne is None else borne[1])
 
 

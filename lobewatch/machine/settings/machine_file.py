@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import difflib
 import hashlib
 import math
-import re
 import tomllib
-import typing
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +19,7 @@ from lobewatch.machine.settings.cut_tables import FEED_ANGLES, CutTable, Drive, 
 from lobewatch.machine.settings.daq_tables import Daq
 from lobewatch.machine.settings.doubt_table import DoubtTable
 from lobewatch.machine.settings.notify_table import NotifyTable
+from lobewatch.machine.settings.readable_error import comma_hint, readable
 from lobewatch.machine.settings.setting_questions import questions_of_program
 from lobewatch.machine.settings.setup_tables import Identity, Limits, ModeChoice, SpeedRange, TapSetup
 from lobewatch.machine.settings.spindle_tables import SpindleTable
@@ -31,6 +29,8 @@ from lobewatch.machine.settings.tool_table import ToolTable
 
 REFERENCE_CUT = "reference cut"
 """Name of [reference_cut] beside the names of programs."""
+OWN = "machine.toml"
+"""Source of what a person has entered."""
 
 
 class Machine(Table, frozen=True):
@@ -72,7 +72,7 @@ class Machine(Table, frozen=True):
             self.coefficients(self.reference_cut)
         for i, program in enumerate(self.listed, 1):
             self.coefficients(program)
-            self._check_pitch(f"program {i}", program)
+            self._check_tool_of(f"program {i}", program)
 
     @property
     def program(self) -> tuple[ProgramTable, ...]:
@@ -85,20 +85,27 @@ class Machine(Table, frozen=True):
         return tuple(program for program in self.listed if program.is_open)
 
     def coefficients(self, table: CutTable) -> Coefficients:
-        """Cutting coefficients of a cut: its own, or those of its material; ValueError for one that is not known.
+        """Cutting coefficients of a cut: its own, else those of its material; ValueError for one that is not known.
 
         A material goes by any of its names; case and blanks do not count, and a [[material]] comes first.
         """
+        tangential, radial = (1e6 * (k or 0) for k in (table.tangential_n_per_mm2, table.radial_n_per_mm2))
         if table.material is None:
-            tangential, radial = (1e6 * (k or 0) for k in (table.tangential_n_per_mm2, table.radial_n_per_mm2))
-            return Coefficients("", tangential, radial, source="machine.toml")
+            return Coefficients("", tangential, radial, source=OWN)
+        known = self._material(table.material)
+        if table.tangential_n_per_mm2 is None:
+            return known
+        unpublished: dict[str, Any] = {"tangential_range": None, "ratio_range": None, "specific_forces": ()}
+        return replace(known, tangential=tangential, radial=radial, source=OWN, **unpublished)
+
+    def _material(self, name: str) -> Coefficients:
         own = {folded_name(material.name): material.build() for material in self.material}
         by_name = {**materials_by_name(), **own}
-        if (name := folded_name(table.material)) not in by_name:
+        if folded_name(name) not in by_name:
             near = nearest_name(name, by_name)
             known = f"is {near!r} meant? lobewatch materials lists those that are known; or add a [[material]]"
-            raise ValueError(f"material={table.material!r} is not known; {known}")
-        return by_name[name]
+            raise ValueError(f"material={name!r} is not known; {known}")
+        return by_name[folded_name(name)]
 
     def build_cut(self, table: CutTable) -> Cut:
         """A cut in SI units, at its greatest radial depth on the straight, the feed along x."""
@@ -109,7 +116,7 @@ class Machine(Table, frozen=True):
             direction=table.direction,
             tangential=coefficients.tangential,
             radial=coefficients.radial,
-            helix_lag=2 * math.tan(math.radians(table.helix_deg or 0.0)) / diameter,
+            helix_lag=2 * math.tan(math.radians(self.helix_deg(table) or 0.0)) / diameter,
             pitch=pitch_of(self._pitch_deg(table), table.teeth),
         )
 
@@ -118,18 +125,33 @@ class Machine(Table, frozen=True):
         cut = self.build_cut(table)
         return tuple(replace(cut, immersion=immersion) for immersion in table.immersions)
 
-    def _pitch_deg(self, table: CutTable) -> Sequence[float] | None:
-        """Pitches of a cut (deg): its own, of a program else those of its [[tool]]."""
-        if table.pitch_deg is not None or not isinstance(table, ProgramTable):
-            return table.pitch_deg
-        return next((tool.pitch_deg for tool in self.tool if tool.name == table.tool), None)
+    def helix_deg(self, table: CutTable) -> float | None:
+        """Helix angle of a cut (deg): its own, else that of its [[tool]]; None where neither says it."""
+        tool = self.tool_of(table)
+        return tool.helix_deg if table.helix_deg is None and tool else table.helix_deg
 
-    def _check_pitch(self, place: str, program: ProgramTable) -> None:
-        """Refuse the pitches of a tool with other teeth than the program says."""
+    def _pitch_deg(self, table: CutTable) -> Sequence[float] | None:
+        """Pitches of a cut (deg): its own, else those of its [[tool]]."""
+        tool = self.tool_of(table)
+        return tool.pitch_deg if table.pitch_deg is None and tool else table.pitch_deg
+
+    def tool_of(self, table: CutTable) -> ToolTable | None:
+        """The [[tool]] of a program; None where there is none, and of the reference cut, which never changes."""
+        name = table.tool if isinstance(table, ProgramTable) else None
+        return next((tool for tool in self.tool if tool.name == name), None)
+
+    def _check_tool_of(self, place: str, program: ProgramTable) -> None:
+        """Refuse what its [[tool]] cannot be: pitches of other teeth, flutes shorter than its depth."""
+        tool = self.tool_of(program)
+        if tool is None:
+            return
         try:
             pitch_of(self._pitch_deg(program), program.teeth)
         except ValueError as error:
-            raise ValueError(f"{place}: {error} (pitch_deg of tool {program.tool!r})") from error
+            raise ValueError(f"{place}: {error} (pitch_deg of tool {tool.name!r})") from error
+        if tool.flute_length_mm is not None and program.depth_mm > tool.flute_length_mm:
+            flutes = f"flute_length_mm={tool.flute_length_mm:g} of tool {tool.name!r}"
+            raise ValueError(f"{place}: depth_mm={program.depth_mm:g} is deeper than {flutes}")
 
     def _check_tools(self) -> None:
         names = [tool.name for tool in self.tool]
@@ -217,7 +239,8 @@ class Machine(Table, frozen=True):
         hashes = {}
         for program in self.program:
             asked = [doubted.claim for doubted in questions_of_program(self, program, on_model=True)]
-            decides = program, self._pitch_deg(program), self.coefficients(program), self.doubt, asked
+            tool = self._pitch_deg(program), self.helix_deg(program)
+            decides = program, tool, self.coefficients(program), self.doubt, asked
             hashes[program.name] = _hash("four words over the doubt, plausible or asked", *decides)
         return hashes
 
@@ -239,53 +262,8 @@ def parse_machine(text: str, name: str = "machine.toml") -> Machine:
         check_texts(tables)
         return msgspec.convert(tables, Machine)
     except tomllib.TOMLDecodeError as error:
-        raise DataError(f"{name}: {error}{_comma_hint(text)}") from error
+        raise DataError(f"{name}: {error}{comma_hint(text)}") from error
     except msgspec.ValidationError as error:
-        raise DataError(f"{name}: {_readable(str(error), tables)}") from error
+        raise DataError(f"{name}: {readable(str(error), tables, Machine)}") from error
     except (ValueError, ArithmeticError, RecursionError) as error:
         raise DataError(f"{name}: {error}") from error
-
-
-def _keys(place: str) -> tuple[str, ...]:
-    """Keys of the table at a place like ".program[0]"."""
-    table: type[Table] = Machine
-    for key in re.findall(r"\.(\w+)", place):
-        own = dict(zip(table.__struct_encode_fields__, table.__struct_fields__, strict=True))[key]
-        kinds = typing.get_type_hints(table, include_extras=True)[own]
-        table = next(kind for kind in _kinds(kinds) if isinstance(kind, type) and issubclass(kind, Table))
-    return table.__struct_encode_fields__
-
-
-def _kinds(kind: object) -> Iterator[object]:
-    """All that a type is made of, itself first."""
-    yield kind
-    for part in typing.get_args(kind):
-        yield from _kinds(part)
-
-
-def _comma_hint(text: str) -> str:
-    """Hint at a decimal comma, the usual cause of a text that is no TOML."""
-    match = re.search(r"=\s*(-?\d+),(\d+)\s*(#|\n|,|\})", text)
-    return f"; write {match[1]}.{match[2]} with a point" if match else ""
-
-
-def _readable(message: str, tables: Mapping[str, Any]) -> str:
-    """Message of msgspec with its place first, the value that is refused, and a key of the table for a mistyped one."""
-    text, _, place = message.partition(" - at `$")
-    place = place.rstrip("`")
-    where = re.sub(r"\.?(\w+?)s?\[(\d+)\]", lambda m: f" {m[1]} {int(m[2]) + 1}", place).strip(" .")
-    unknown = re.search(r"unknown field `(\w+)`", text)
-    if unknown:
-        near = difflib.get_close_matches(unknown[1], _keys(place), n=1)
-        text = f"unknown key {unknown[1]!r}" + (f"; is {near[0]!r} meant?" if near else "")
-    elif re.match(r"Expected `\w+` [<>]", text):
-        text += f", not {_value(tables, place)}"
-    return f"{where.replace('.', ' ')}: {text}" if where else text
-
-
-def _value(tables: Mapping[str, Any], place: str) -> object:
-    """Value at a place like ".program[0].depth_mm"."""
-    value: Any = tables
-    for key, number in re.findall(r"\.(\w+)|\[(\d+)\]", place):
-        value = value[key] if key else value[int(number)]
-    return value

@@ -114,6 +114,15 @@ RANGES: Mapping[type[Table], Mapping[str, Range]] = {
         "housing_stiffness_n_per_um": (5, 9999),
     },
     MassTable: {"position_mm": (1, 999), "mass_kg": (0.02, 199)},
+    ToolTable: {
+        "teeth": (1, 40),
+        "diameter_mm": (0.3, 299),
+        "helix_deg": (1, 70),
+        "flute_length_mm": (0.5, 499),
+        "cutting_speed_m_min": (5, 4999),
+        "feed_per_tooth_mm": (0.002, 1.9),
+        "max_speed_rpm": (300, 250_000),
+    },
     JointTable: {
         "position_mm": (1, 999),
         "stiffness_n_per_um": (20, 1e5),
@@ -234,6 +243,19 @@ def about_alike(programs: Mapping[str, ProgramTable]) -> Iterator[Doubted]:
                 yield Doubted("settings-contradict", place, key, f"{value:g}", f"{why}another tool?")
 
 
+def about_its_tool(program: ProgramTable, tool: ToolTable, place: str) -> Iterator[Doubted]:
+    """A program that does not agree with the [[tool]] that it runs with."""
+    for key, its_key in (
+        ("teeth", "teeth"),
+        ("tool_diameter_mm", "diameter_mm"),
+        ("flute_length_mm", "flute_length_mm"),
+    ):
+        value, its = getattr(program, key), getattr(tool, its_key)
+        if None not in (value, its) and value != its:
+            why = f"where {its_key} of [[tool]] {tool.name!r} is {its:g}: a radius, an inch, another tool?"
+            yield Doubted("settings-contradict", place, key, f"{value:g}", why)
+
+
 def about_spindle(spindle: SpindleTable) -> Iterator[Doubted]:
     """All parts of the model."""
     yield from out_of_range(spindle, "[spindle]")
@@ -261,7 +283,14 @@ def about_mass(mass: MassTable, place: str) -> Iterator[Doubted]:
 
 
 def about_tool(tool: ToolTable, place: str) -> Iterator[Doubted]:
-    """A [[tool]], and how slender it is."""
+    """A [[tool]]."""
+    yield from out_of_range(tool, place)
+    if tool.flute_length_mm is not None and tool.diameter_mm is not None:
+        yield from _share(place, "flute_length_mm", tool.flute_length_mm, tool.diameter_mm, FLUTE, "diameters")
+
+
+def about_shape(tool: ToolTable, place: str) -> Iterator[Doubted]:
+    """Parts of a [[tool]], and how slender it is."""
     for i, segment in enumerate(tool.segments, 1):
         yield from out_of_range(segment, f"{place} segment {i}")
     for i, mass in enumerate(tool.masses, 1):

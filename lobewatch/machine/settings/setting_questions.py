@@ -15,7 +15,9 @@ from lobewatch.machine.settings.plausible import (
     about_alike,
     about_cut,
     about_drive,
+    about_its_tool,
     about_material,
+    about_shape,
     about_spindle,
     about_stick_out,
     about_tool,
@@ -117,6 +119,10 @@ def _about_program(machine: AskedMachine, program: ProgramTable) -> Iterator[Dou
     if program in machine.program:  # of a cut that is only asked about, its geometry was just said
         same_tool = {f"program {other.name!r}": other for other in machine.program if other.tool == program.tool}
         yield from (doubted for doubted in about_alike(same_tool) if doubted.place == place)
+    for tool in machine.tool:
+        if tool.name == program.tool:
+            yield from about_tool(tool, f"tool {tool.name!r}")
+            yield from about_its_tool(program, tool, place)
     if program.tool == machine.tap.tool:
         yield from about_stick_out(machine.tap, {place: program})
 
@@ -133,4 +139,4 @@ def _about_model(machine: AskedMachine, program: ProgramTable) -> Iterator[Doubt
         yield from about_spindle(machine.spindle)
     for tool in machine.tool:
         if tool.name == program.tool:
-            yield from about_tool(tool, f"tool {tool.name!r}")
+            yield from about_shape(tool, f"tool {tool.name!r}")

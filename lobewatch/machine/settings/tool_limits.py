@@ -9,12 +9,9 @@ from enum import StrEnum
 from typing import NamedTuple
 
 from lobes import CutKind, PublishedRange, cut_kind, cutting_speed, fastest_of_all, feed_per_tooth
-from lobewatch.machine.settings.cut_tables import CutTable
-from lobewatch.machine.settings.known_tool import KnownTool, tool_of
-from lobewatch.machine.settings.machine_file import Machine
-
-OWN = "machine.toml"
-"""Source of what a person has entered."""
+from lobewatch.machine.settings.cut_tables import CutTable, ProgramTable
+from lobewatch.machine.settings.known_tool import KnownTool, known_tool
+from lobewatch.machine.settings.machine_file import OWN, Machine
 
 
 class Unknown(StrEnum):
@@ -67,6 +64,12 @@ class ToolLimits:
         """Whether no speed of the spindle is one that the tool bears."""
         return self.low_rpm > self.high_rpm
 
+    @property
+    def is_guessed(self) -> bool:
+        """Whether its speeds are no more than those of the spindle, or of the fastest tool there is."""
+        speed = self.cutting_speed_m_min
+        return speed is None or (self.tool.tool_material is None and speed.source != OWN)
+
 
 def tool_limits(machine: Machine, table: CutTable) -> ToolLimits:
     """What the tool of a cut bears in its material; the cut's own speed, depth and feed per tooth do not count.
@@ -75,7 +78,7 @@ def tool_limits(machine: Machine, table: CutTable) -> ToolLimits:
     its material and that of the tool; where the tool's is not known, up to the fastest of all tools. Source of the
     published ranges: docs/tools.md.
     """
-    tool = tool_of(machine, table)
+    tool = known_tool(machine, table.tool if isinstance(table, ProgramTable) else machine.tap.tool)
     cut = cut_kind(table.immersion)
     speed, feed = _speed(machine, table, tool, cut), _feed(machine, table, tool, cut)
     per_rpm = math.pi * table.tool_diameter_mm / 1e3

@@ -73,6 +73,8 @@ def _why(cut: Suggestion) -> str:
 def _why_none(next_cut: NextCut) -> str:
     if not next_cut.left:
         return f"{len(next_cut.lesson.own_cuts)} test cuts are made; a larger --cuts asks for more"
+    if next_cut.reach.is_empty:
+        return f"no test cut: {next_cut.reach.words}; choose another tool"
     return "no test cut is worth making: nothing more is to be gained"
 
 

@@ -14,7 +14,8 @@ from rich.table import Table
 from acquisition import Remark
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.analysis import Analysis
-from lobewatch.machine import Machine, SpeedRange
+from lobewatch.machine import Machine
+from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.show.programs.describe_doubts import reading_lines
 from lobewatch.show.programs.describe_verdicts import verdict_json, verdict_table
 from lobewatch.show.terminal.output import remark_json, remark_lines
@@ -75,7 +76,7 @@ def check_texts(programs: Sequence[ProgramAdvice], remarks: Sequence[Remark], ma
     verdicts = [program.verdict for program in programs]
     return [
         verdict_table(verdicts, decays),
-        *(line for program in programs for line in advice_lines(program, machine.speed)),
+        *(line for program in programs for line in advice_lines(program, machine)),
         *reading_lines(verdicts, machine),
         *remark_lines([*remarks, *(remark for program in programs for remark in program.notes)]),
         summary(programs),
@@ -123,18 +124,18 @@ def summary(programs: Sequence[ProgramAdvice]) -> str:
     return f"{len(programs)} program{'s' if len(programs) > 1 else ''}: {', '.join(texts)}"
 
 
-def advice_lines(program: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:
+def advice_lines(program: ProgramAdvice, machine: Machine) -> Iterator[str]:
     """What is wrong and what to do, a line for each thing that is called for."""
     verdict = program.verdict
     name = verdict.program.name
     if verdict.word is Word.UNKNOWN:
         yield from (str(remark) for remark in verdict.remarks if remark.code == "not-checked")
     elif verdict.word is Word.NOT_STABLE:
-        yield f"{name}: {_chatter(program)}; {_elsewhere(program, speeds)}"
+        yield f"{name}: {_chatter(program)}; {_elsewhere(program, machine)}"
     elif verdict.word is Word.DOUBTFUL:
         settles = [remark for remark in verdict.remarks if remark.code == "doubt-decides"]
         texts = [f"{remark.text}; to settle it: {remark.cure}" for remark in settles]
-        yield f"{name}: {'; '.join([*texts, *_or_elsewhere(program, speeds)])}"
+        yield f"{name}: {'; '.join([*texts, *_or_elsewhere(program, machine)])}"
     if verdict.is_beyond_drive:
         yield f"{name}: [drive] allows no more than {_floored(verdict.drive_limit)} mm at this speed"
 
@@ -156,20 +157,20 @@ def worst_feed(verdict: Verdict) -> str:
     return f", worst fed along {({0: 'x', 90: 'y'}).get(degrees, f'{degrees} degrees from x')}"
 
 
-def _or_elsewhere(program: ProgramAdvice, speeds: SpeedRange) -> Iterator[str]:
+def _or_elsewhere(program: ProgramAdvice, machine: Machine) -> Iterator[str]:
     """What to do until it is settled; tapping what was not tapped comes first."""
     verdict = program.verdict
     if verdict.assembly is not None and is_sure(verdict.program, verdict.assembly):
-        yield f"until then {_elsewhere(program, speeds)}"
+        yield f"until then {_elsewhere(program, machine)}"
 
 
-def _elsewhere(advice: ProgramAdvice, speeds: SpeedRange) -> str:
+def _elsewhere(advice: ProgramAdvice, machine: Machine) -> str:
     """Where to go."""
     verdict, best, shallower = advice.verdict, advice.advice.best, advice.advice.here
     gap = None if verdict.assembly is None else unanswered(verdict.program, verdict.assembly)
     if gap is not None:
         return f"{gap[1]}: only then can a safe speed be named"
-    reach = f"in {rpm(speeds.low_rpm)} to {rpm(speeds.high_rpm)} rpm"
+    reach = _reach(CutRange.of(machine, verdict.program))
     if best is None:
         return f"no safe speed {reach}; choose another tool"
     if best.depth_mm == verdict.program.depth_mm:
@@ -181,6 +182,13 @@ def _elsewhere(advice: ProgramAdvice, speeds: SpeedRange) -> str:
         depth, speed = f"{shallower.depth_mm:g}", rpm(shallower.speed_rpm)
         texts.append(f"at {speed} rpm no deeper than {depth} mm {spare_text(shallower)}")
     return "; ".join(texts)
+
+
+def _reach(reach: CutRange) -> str:
+    """Speeds that were looked at."""
+    if reach.is_empty:
+        return "that the tool bears"
+    return f"in {rpm(reach.low_rpm)} to {rpm(reach.high_rpm)} rpm"
 
 
 def _is_same(best: Setting, shallower: Setting | None) -> bool:

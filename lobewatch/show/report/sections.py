@@ -48,10 +48,9 @@ def programs(material: ReportMaterial) -> list[Section]:
     if not material.programs:
         return []
     checked = [program.verdict for program in material.programs if program.verdict.word is not Word.UNKNOWN]
-    speeds = material.machine.speed
     content = {
         "programs": [_program_row(program) for program in material.programs],
-        "lines": [_unbroken(line) for program in material.programs for line in advice_lines(program, speeds)],
+        "lines": [_unbroken(line) for program in material.programs for line in advice_lines(program, material.machine)],
         "doubt": [*map(_unbroken, reading_lines(checked, material.machine))],
         "method": checked[0].method if checked else "",
     }

@@ -406,9 +406,9 @@ def test_a_material_of_ones_own_comes_before_a_published_one() -> None:
     ("old", "new", "message"),
     [
         ('material = "ours"', 'material = "our"', "material='our' is not known; is 'ours' meant"),
-        ('material = "ours"', "", "give either material or both"),
-        ('material = "ours"', 'material = "ours"\nradial_n_per_mm2 = 1', "give either material or both"),
-        ('material = "ours"', "tangential_n_per_mm2 = 1", "give either material or both"),
+        ('material = "ours"', "", "give material, or both"),
+        ('material = "ours"', 'material = "ours"\nradial_n_per_mm2 = 1', "give material, or both"),
+        ('material = "ours"', "tangential_n_per_mm2 = 1", "give material, or both"),
         ('material = "ours"', 'material = "42CrMo5"', "'42CrMo4' meant? lobewatch materials lists those"),
         ('material = "ours"', 'material = "4140"', "is 'AISI 4140' meant"),
         ("tangential_n_per_mm2 = 800\n", "", "give either tangential_n_per_mm2 and radial_n_per_mm2"),

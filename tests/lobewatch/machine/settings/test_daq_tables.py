@@ -55,7 +55,7 @@ def test_channels_are_converted_at_the_door() -> None:
         ("input = 2", "input = 3", "daq: channel 2: input=3 is that of channel 1"),
         ("input = 2\n", "", "daq channel 1: Object missing required field `input`"),
         ('"force"', '"acceleration"', "daq channel 1: quantity='acceleration' needs sensitivity_mv_per_g"),
-        ('"force"', '"temperature"', "daq channel 1 quantity: Invalid enum value 'temperature'"),
+        ('"force"', '"temperature"', "daq channel 1 quantity: 'temperature' is none of 'force', 'acceleration'"),
         ("sensitivity_mv_per_n = 2.25\n", "", "daq channel 1: give exactly one of sensitivity_mv_per_n"),
         (
             "sensitivity_mv_per_n = 2.25",
@@ -67,7 +67,7 @@ def test_channels_are_converted_at_the_door() -> None:
         ("sensitivity_mv_per_n", "sensitivity_v_per_n", "unknown key 'sensitivity_v_per_n'; is 'sensitivity_mv_per_n'"),
         ("gain = 10", "gain = -1", "daq channel 2 gain: "),
         ("range_v = 0.5", "range_v = 0", "daq channel 2 range_v: "),
-        ('"x"', '"z"', "daq channel 2 direction: Invalid enum value 'z'"),
+        ('"x"', '"z"', "daq channel 2 direction: 'z' is none of "),
         ("2026-01-15", '"last spring"', "daq channel 2 calibration_date: "),
         ("skew_us = 6.5", "skew_us = inf", "daq channel 2 skew_us: "),
         (

@@ -93,6 +93,14 @@ def test_what_the_fresh_machine_file_shows_in_comments_is_right() -> None:
         machine.model("end mill 13")
 
 
+def test_measured_coefficients_beside_a_material_count_and_leave_it_its_group() -> None:
+    machine = parse_machine(EXAMPLE.replace("tangential_n_per_mm2", 'material = "C45"\ntangential_n_per_mm2'))
+    known = machine.coefficients(machine.program[0])
+    assert (known.tangential, known.radial, known.iso_group) == (1400e6, 500e6, "P")
+    assert known.tangential_range is None
+    assert known.source == "machine.toml"
+
+
 def test_programs_belong_to_their_tool() -> None:
     machine = parse_machine(EXAMPLE.replace('tool = "reference"\nteeth', 'tool = "T7"\nteeth', 1))
     assert "A: slot at 12 600 rpm" not in machine.cuts("reference")
@@ -132,11 +140,25 @@ def test_programs_belong_to_their_tool() -> None:
             "speed_rpm = 12600\ncorner_radius_mm = 9",
             "program 1: corner_radius_mm=9 is tighter than",
         ),
-        ("speed_rpm = 12600", 'speed_rpm = 12600\nwear = "blunt"', "program 1 wear: Invalid enum value 'blunt'"),
+        (
+            "speed_rpm = 12600",
+            'speed_rpm = 12600\nwear = "blunt"',
+            "program 1 wear: 'blunt' is none of 'new', 'used', 'worn'",
+        ),
         ('name = "long end mill"', 'name = "T"\npitch_deg = [90, 90]', "tool 1: pitch [90, 90] sums to 180 degrees"),
         ("position_mm = 166", "position_mm = 16600", "bearing 1: position_mm=16600 is off the shaft, 0 to 672 mm"),
         ("radial_depth_mm = 20 ", "radial_depth_mm = 25 ", "reference_cut: radial_depth_mm=25 is larger"),
-        ('direction = "down"', 'direction = "climb"', "direction: Invalid enum value 'climb'"),
+        ('direction = "down"', 'direction = "climb"', "direction: 'climb' is none of 'up', 'down'"),
+        (
+            "speed_rpm = 12600",
+            "speed_rpm = 12600\nhelix_deg = -30",
+            "program 1 helix_deg: Expected `float` >= 0.0, not -30; give the angle from the axis, 0 up to 90 deg",
+        ),
+        (
+            'name = "long end mill"',
+            'name = "long end mill"\ntool_material = "carbid"',
+            "tool 1 tool_material: 'carbid' is none of 'HSS', 'carbide', 'coated carbide', 'PCD', 'CBN'; is 'carb",
+        ),
         ("band_hz = [1200, 2200]", "band_hz = [2200, 1200]", "mode: band_hz=[2200.0, 1200.0] does not rise"),
         ("speed_rpm = 12600", "speed_rpm = 126000", "program 1: speed_rpm=126000 is outside [speed] 3000..24000 rpm"),
         ("high_rpm = 24000", "high_rpm = 500", "speed: low_rpm=3000 is not below high_rpm=500"),
@@ -145,7 +167,11 @@ def test_programs_belong_to_their_tool() -> None:
         ('name = "MACHINE_NAME"', 'name = ""', "machine name: "),
         ("[machine]", "[machin]", "unknown key 'machin'; is 'machine' meant?"),
         ("[machine]", "[machine", "at line 2"),
-        ('theory = "euler-bernoulli"', 'theory = "rayleigh"', "spindle theory: Invalid enum value 'rayleigh'"),
+        (
+            'theory = "euler-bernoulli"',
+            'theory = "rayleigh"',
+            "spindle theory: 'rayleigh' is none of 'euler-bernoulli', 'timoshenko'",
+        ),
         ("outer_mm = 31.5", 'material = "carbid", outer_mm = 31.5', "spindle segment 1: material='carbid' is none of"),
         ("outer_mm = 31.5", "end_bore_mm = 40, outer_mm = 31.5", "segment 1: end_bore_mm=40 is not smaller than"),
         ("outer_mm = 31.5", "mass_outer_mm = -1, outer_mm = 31.5", "spindle segment 1 mass_outer_mm: "),

@@ -31,6 +31,8 @@ radial_n_per_mm2 = 500
 tangential_edge_n_per_mm = 20
 radial_edge_n_per_mm = 30
 """
+LONG = {"tool_diameter_mm": 12, "flute_length_mm": 26}
+"""What a program says of the [[tool]] of the template."""
 Place = tuple[str | int, ...]
 
 
@@ -59,7 +61,7 @@ def full_tables() -> dict[str, Any]:
     tables["daq"]["channel"][0] |= {"gain": 1, "skew_us": 10}
     tables["spindle"]["bearings"][0] |= {"stiffness_n_per_um": 300.0}
     tables["spindle"]["bearing_stiffness_n_per_um"] = 450.0
-    tables["program"].append({**program, "name": "long", "tool": tables["tool"][0]["name"]})
+    tables["program"].append({**program, "name": "long", "tool": tables["tool"][0]["name"], **LONG})
     return tables
 
 

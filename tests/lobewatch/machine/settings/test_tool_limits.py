@@ -11,6 +11,7 @@ from acquisition import DataError
 from lobewatch.machine import CutTable, Machine, ToolLimits, Unknown, known_tool, tool_limits
 from lobewatch.machine.settings.cut_range import CutRange
 from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.machine.settings.setting_questions import all_questions
 
 HEAD = '[machine]\nname = "m"\n[speed]\nlow_rpm = 1000\nhigh_rpm = 24000\n'
 STEEL = 'material = "42CrMo4"\n'
@@ -164,6 +165,21 @@ def test_a_mistake_in_a_tool_is_told(more: str, message: str) -> None:
         machine(tool(more))
     assert message in str(caught.value)
     assert "tool 1" in str(caught.value)
+
+
+@pytest.mark.parametrize(("key", "value"), [("teeth", 5), ("diameter_mm", 9), ("flute_length_mm", 50)])
+def test_a_program_that_contradicts_its_tool_is_asked_about(key: str, value: float) -> None:
+    flutes = "flute_length_mm = 40\n"
+    read = machine(program(feed=flutes), tool(f"{key} = {value}"))
+    (asked,) = all_questions(read)
+    assert asked.code == "settings-contradict"
+    assert f"{key} of [[tool]] 'reference' is {value}" in asked.why
+    assert all_questions(machine(program(feed=flutes), tool("teeth = 4\ndiameter_mm = 18\n" + flutes))) == []
+
+
+def test_a_cut_deeper_than_the_flutes_of_its_tool_is_refused() -> None:
+    with pytest.raises(DataError, match="program 1: depth_mm=2 is deeper than flute_length_mm=1 of tool 'reference'"):
+        machine(program(), tool("flute_length_mm = 1"))
 
 
 def test_a_tool_without_a_shape_has_no_model() -> None:

@@ -1,0 +1,167 @@
+"""Nothing that a tool does not bear is advised, by `check`, `lobes` or `suggest`; a program outside is remarked."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from lobewatch.cuts.learning.lesson import next_cut
+from lobewatch.machine import tool_limits
+from lobewatch.machine.settings.cut_range import CutRange
+from lobewatch.verdicts.advice import robust_pockets
+from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
+from lobewatch.verdicts.tool_remarks import not_described, outside_tool
+
+Shop = Any
+"""Of tests/lobewatch/conftest.py."""
+CARBIDE = '[[tool]]\nname = "reference"\ntool_material = "carbide"\n'
+KT_AND_KR = "tangential_n_per_mm2 = 2000\nradial_n_per_mm2 = 500"
+COATED = CARBIDE.replace("carbide", "coated carbide")
+FASTEST = 180 / (math.pi * 0.018)
+"""Speed (rpm) of 180 m/min with 18 mm, the most that coated carbide bears in a slot of steel."""
+
+
+def steel(speed: float, depth: float = 0.5, radial: float = 18, more: str = "", tool: str = CARBIDE) -> str:
+    """A program in 42CrMo4 with a tool of 18 mm."""
+    return f"""
+[[program]]
+name = "steel"
+tool = "reference"
+teeth = 4
+tool_diameter_mm = 18
+radial_depth_mm = {radial}
+direction = "down"
+material = "42CrMo4"
+helix_deg = 30
+speed_rpm = {speed:g}
+depth_mm = {depth:g}
+{more}
+
+{tool}
+"""
+
+
+@pytest.fixture
+def mill(shop: Shop) -> Shop:
+    """A spindle that turns slowly enough for steel."""
+    shop.edit("low_rpm = 3000", "low_rpm = 1000")
+    return shop
+
+
+@pytest.fixture
+def tapped(shop: Shop) -> Shop:
+    """A spindle of 3000 rpm and more: steel leaves it few speeds."""
+    shop.tap_both()
+    return shop
+
+
+def test_an_18_mm_carbide_tool_is_nowhere_sent_to_21500_rpm_in_steel(tapped: Shop) -> None:
+    tapped.put(steel(21500, depth=2, tool=COATED))
+    logbook = tapped.logbook
+    (verdict,) = logbook.verdicts()
+    assert "outside-tool-limits" in [remark.code for remark in verdict.remarks]
+    advice = logbook.advice(verdict)
+    pockets = robust_pockets(verdict.program, verdict.assembly, logbook.machine)
+    assert "tool-not-described" not in [remark.code for remark in advice.remarks]
+    settings = [setting for setting in (advice.best, advice.here, *pockets) if setting is not None]
+    assert settings
+    for setting in settings:
+        assert 3000 <= setting.window_rpm[0] <= setting.speed_rpm <= setting.window_rpm[1] <= FASTEST
+    suggested = next_cut(verdict.program, verdict.assembly, logbook.machine, [], 5).suggested
+    assert suggested is not None
+    assert suggested.speed_rpm <= FASTEST
+
+
+def test_what_cuts_have_taught_of_the_force_leaves_the_limits_as_they_are(tapped: Shop) -> None:
+    tapped.put(steel(3100, tool=COATED))
+    machine = tapped.folder.machine
+    taught = SpindleAtSpeed(cuts=3, tangential=1500.0, radial=500.0)
+    known = msgspec.structs.replace(
+        machine.program[0], tangential_n_per_mm2=taught.tangential, radial_n_per_mm2=taught.radial
+    )
+    assert machine.coefficients(known).tangential == 1500e6
+    reaches = [CutRange.of(machine, table) for table in (machine.program[0], known)]
+    assert reaches[0].high_rpm == reaches[1].high_rpm <= FASTEST
+
+
+@pytest.mark.parametrize(
+    ("program", "words"),
+    [
+        (steel(6000, radial=3.6), "6000 rpm are 339 m/min at the edge, outside 74 to 161 m/min"),
+        (steel(1100, radial=3.6), "1100 rpm are 62.2 m/min at the edge, outside 74 to 161 m/min"),
+        (steel(6000, radial=3.6, tool=""), "which the fastest tool of 18 mm bears at the side of 42CrMo4"),
+        (steel(2000), "which carbide of 18 mm bears in a slot of 42CrMo4"),
+        (steel(2000, radial=3.6, tool=CARBIDE + "max_speed_rpm = 1900"), "more than max_speed_rpm = 1900"),
+        (
+            steel(2000, radial=3.6, more="feed_per_tooth_mm = 0.5"),
+            "feed_per_tooth_mm = 0.5 is outside 0.036 to 0.18 mm",
+        ),
+        (
+            steel(2000, radial=3.6, more="feed_per_tooth_mm = 0.01"),
+            "feed_per_tooth_mm = 0.01 is outside 0.036 to 0.18 mm",
+        ),
+    ],
+)
+def test_a_program_outside_is_remarked_with_what_is_allowed(mill: Shop, program: str, words: str) -> None:
+    mill.put(program)
+    machine = mill.folder.machine
+    (remark,) = outside_tool(machine.program[0], machine)
+    assert (remark.code, remark.about) == ("outside-tool-limits", "steel")
+    assert words in remark.text
+    assert "[[tool]] 'reference'" in remark.cure
+
+
+def test_a_program_inside_is_not(mill: Shop) -> None:
+    mill.put(steel(2000, radial=3.6, more="feed_per_tooth_mm = 0.1"))
+    machine = mill.folder.machine
+    assert list(outside_tool(machine.program[0], machine)) == []
+
+
+def test_a_tool_that_bears_no_speed_of_the_spindle_is_sent_nowhere(tapped: Shop) -> None:
+    tapped.put(steel(3000, depth=9, tool=CARBIDE.replace("carbide", "HSS")))
+    logbook = tapped.logbook
+    (verdict,) = logbook.verdicts()
+    advice = logbook.advice(verdict)
+    assert (advice.best, advice.here) == (None, None)
+    assert robust_pockets(verdict.program, verdict.assembly, logbook.machine) == []
+    following = next_cut(verdict.program, verdict.assembly, logbook.machine, [], 5)
+    assert following.suggested is None
+    assert "of which the tool bears none" in following.reach.words
+
+
+@pytest.mark.parametrize(
+    ("program", "words"),
+    [
+        (steel(2000, tool=""), "up to those of the fastest tool"),
+        (steel(2000).replace('material = "42CrMo4"', KT_AND_KR), "speeds of the spindle are advised"),
+        (steel(2000, tool=CARBIDE.replace("carbide", "PCD")), "speeds of the spindle are advised"),
+        (steel(2000), ""),
+        (steel(2000, tool=CARBIDE.replace("carbide", "PCD") + "cutting_speed_m_min = 300"), ""),
+    ],
+)
+def test_advice_asks_for_what_is_not_known_of_the_tool(mill: Shop, program: str, words: str) -> None:
+    mill.put(program)
+    machine = mill.folder.machine
+    asked = list(not_described(machine.program[0], tool_limits(machine, machine.program[0])))
+    assert [(remark.code, remark.about) for remark in asked] == [("tool-not-described", "reference")] * bool(words)
+    assert all(words in remark.text and "cutting_speed_m_min" in remark.cure for remark in asked)
+
+
+def test_flutes_and_helix_of_the_tool_hold_for_a_program_that_does_not_say_them(mill: Shop) -> None:
+    straight, twisted = (
+        steel(2000, tool=CARBIDE + more).replace("helix_deg = 30\nspeed", "speed") for more in ("", "helix_deg = 30\n")
+    )
+    lags = []
+    for program in (straight, twisted, steel(2000)):
+        mill.put(program)
+        machine = mill.folder.machine
+        lags.append(machine.build_cut(machine.program[0]).helix_lag)
+    assert lags[0] == 0
+    assert lags[1] == lags[2] > 0
+    mill.put(steel(2000, tool=CARBIDE + "flute_length_mm = 6"))
+    machine = mill.folder.machine
+    assert np.all(CutRange.of(machine, machine.program[0]).depths(np.array([2000.0])) == 6)

@@ -49,7 +49,7 @@ from .files.readers.format import Format
 from .files.tap_file import read_tap, read_tap_hits, write_hit, write_tap
 from .frf import Frf, from_accelerance
 from .hit import Hit, HitFlags
-from .hits import HitSearch, Trigger, capture_hits, ring_down
+from .hits import HitSearch, Trigger, capture_hits, free_decay, ring_down
 from .names import check_name
 from .ports import PortInfo, find_port, list_ports, no_ports_hint, usb_identity
 from .remark import Remark, joined
@@ -149,6 +149,7 @@ __all__ = [
     "find_driver",
     "find_port",
     "force_noise",
+    "free_decay",
     "from_accelerance",
     "hidden_window",
     "infer_averages",

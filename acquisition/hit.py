@@ -89,13 +89,13 @@ def flaw(value: complex) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Hit:
-    """Force and response of one hammer hit on one time axis.
+    """Force and response of one hammer hit on one time axis; the response alone where no force was measured.
 
     Raises ValueError where the records differ in length, are too short, or hold NaN, inf or values beyond 1e50.
     """
 
     force: NDArray[np.float64]
-    """Hammer force (N), shape (n,)."""
+    """Hammer force (N), shape (n,); empty where no sensor measured it."""
     acceleration: NDArray[np.float64]
     """Response (m/s^2), shape (n,)."""
     sample_rate: float
@@ -104,10 +104,10 @@ class Hit:
     """Number of samples before the trigger."""
     lost_scans: int = 0
     """Scans missing inside the record."""
-    channels: tuple[Channel, Channel] | None = None
-    """Force and response channel, where the hit came from a DAQ."""
+    channels: tuple[Channel, ...] | None = None
+    """Force and response channel, or the response channel alone, where the hit came from a DAQ."""
     codes: NDArray[np.int32] | None = None
-    """Raw ADC codes, shape (2, n), force first; None where the recording has none."""
+    """Raw ADC codes, a row a channel, force first; None where the recording has none."""
     overload: int = 0
     """Overloads that the device itself reports: bit 0 the force, bit 1 the response."""
 
@@ -119,7 +119,8 @@ class Hit:
             bad = np.flatnonzero(~(np.abs(values) <= LARGEST))
             if bad.size:
                 raise ValueError(f"{name} is {flaw(values[bad[0]])} at {bad.size} samples, first at sample {bad[0]}")
-        if self.force.shape != self.acceleration.shape or self.force.ndim != 1 or self.force.size < 8:
+        same = self.force.shape in (self.acceleration.shape, (0,))
+        if not same or self.acceleration.ndim != 1 or self.acceleration.size < 8:
             raise ValueError(
                 f"force {self.force.shape} and acceleration {self.acceleration.shape} "
                 "must be 1-D records of equal length, at least 8 samples"
@@ -131,19 +132,29 @@ class Hit:
     def from_codes(
         cls,
         codes: ArrayLike,
-        channels: tuple[Channel, Channel],
+        channels: tuple[Channel, ...],
         sample_rate: float,
         pre_trigger: int = 0,
         lost_scans: int = 0,
         overload: int = 0,
     ) -> Hit:
-        """A hit from ADC codes (2, n), force first, scaled by the sensitivities of its channels."""
+        """A hit from ADC codes, a row a channel, force first, scaled by the sensitivities of its channels."""
         raw = np.asarray(codes, dtype=np.int32)
-        force, response = channels
-        values = raw[0] * force.scale, raw[1] * response.scale
-        return cls(*values, sample_rate, pre_trigger, lost_scans, channels, raw, overload)
+        force = raw[0] * channels[0].scale if len(channels) > 1 else np.empty(0)
+        response = raw[-1] * channels[-1].scale
+        return cls(force, response, sample_rate, pre_trigger, lost_scans, channels, raw, overload)
+
+    @property
+    def has_force(self) -> bool:
+        """Whether the force was measured."""
+        return bool(self.force.size)
+
+    @property
+    def signals(self) -> NDArray[np.float64]:
+        """All that was measured, a row a channel: force (N) first, acceleration (m/s^2) last."""
+        return np.stack([self.force, self.acceleration] if self.has_force else [self.acceleration])
 
     @property
     def time(self) -> NDArray[np.float64]:
         """Time from the trigger (s), shape (n,)."""
-        return (np.arange(self.force.size) - self.pre_trigger) / self.sample_rate
+        return (np.arange(self.acceleration.size) - self.pre_trigger) / self.sample_rate

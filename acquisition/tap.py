@@ -11,6 +11,7 @@ from datetime import UTC, datetime
 from typing import Any, Self
 
 from acquisition.channel import TapDirection, tap_direction
+from acquisition.errors import DataError
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
 from acquisition.names import check_name
@@ -130,14 +131,21 @@ class TapTest:
     """UTC time to the microsecond, machine, tool, direction and four random hex digits."""
     circumstances: Circumstances
     """Circumstances: who, what, when."""
-    frf: Frf
-    """The averaged FRF."""
+    frf: Frf | None
+    """The averaged FRF; None where no force was measured."""
     hits: tuple[Hit, ...] = ()
     """All hits, also the refused ones; empty for a recorded FRF."""
     flags: tuple[HitFlags, ...] = ()
     """The verdict on each hit."""
     source: SourceFile | None = None
     """File it was read from, for a replay."""
+
+    @property
+    def known_frf(self) -> Frf:
+        """The averaged FRF; DataError where no force was measured."""
+        if self.frf is None:
+            raise DataError(f"{self.id}: no force was measured, so it has no FRF; tap with a hammer that measures it")
+        return self.frf
 
     @property
     def accepted(self) -> tuple[Hit, ...]:

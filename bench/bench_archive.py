@@ -50,7 +50,7 @@ def plain(path: Path, tap: TapTest, **packed: object) -> None:
     codes = np.stack([hit.codes for hit in tap.hits if hit.codes is not None]).astype(np.int16)
     with h5py.File(path, "w") as file:
         file.create_dataset("codes", data=codes, chunks=(1, 2, SCANS), **packed)
-        file["receptance"] = tap.frf.receptance
+        file["receptance"] = tap.known_frf.receptance
 
 
 def cost(work: Callable[[int], object], rounds: int) -> tuple[float, float]:

@@ -106,7 +106,7 @@ class ScriptedSession:
     def hit(self, flags: HitFlags = HitFlags.OK, reason: str = "") -> None:
         """One more hit."""
         good = self.state.good + (not flags)
-        taken = TakenHit(len(self.state.hits) + 1, flags, 312.0 + 7 * len(self.state.hits))
+        taken = TakenHit(len(self.state.hits) + 1, flags, f"{312 + 7 * len(self.state.hits)} N")
         self.show(
             TapStep.REFUSED if flags else TapStep.GOOD,
             verdict=flags.words,

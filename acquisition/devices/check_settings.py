@@ -24,12 +24,12 @@ def check_settings(driver: Driver, settings: DeviceSettings) -> None:
 
 def _check_sensors(driver: Driver, settings: DeviceSettings) -> None:
     quantities = sorted(sensor.channel.quantity for sensor in settings.inputs)
-    if quantities != ["acceleration", "force"]:
+    if quantities not in (["acceleration", "force"], ["acceleration"]):
         listed = ", ".join(quantities) or "nothing"
         raise ValueError(
             f'driver = "{driver.name}" needs two [[daq.channel]], one of force and one of acceleration; '
-            f"here are {listed}"
+            f'here are {listed}; with hammer = "none" in [tap] that of acceleration alone'
         )
-    first, second = settings.inputs
-    if first.number == second.number:
+    first, second = settings.inputs[0], settings.inputs[-1]
+    if first is not second and first.number == second.number:
         raise ValueError(f"channel 2: input={second.number} is that of channel 1; each sensor needs its own")

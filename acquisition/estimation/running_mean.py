@@ -18,7 +18,7 @@ PEAK_SHARE = 0.5
 
 
 class RunningMean:
-    """H1 of hits of one set-up from the sum of their spectra."""
+    """H1 of hits of one set-up from the sum of their spectra; of hits without force the hits alone."""
 
     def __init__(self) -> None:
         """No hit yet."""
@@ -59,11 +59,15 @@ class RunningMean:
 
     def add(self, hit: Hit) -> None:
         """Take a good hit in; ValueError where it has no pulse, or another length or rate than those before."""
-        if self.hits and (hit.force.size, hit.sample_rate) != (self.hits[0].force.size, self.hits[0].sample_rate):
+        size = hit.acceleration.size
+        if self.hits and (size, hit.sample_rate) != (self.hits[0].acceleration.size, self.hits[0].sample_rate):
             raise ValueError(
-                f"a hit of {hit.force.size} samples at {hit.sample_rate:g} Hz cannot join a mean of hits of "
-                f"{self.hits[0].force.size} samples at {self.hits[0].sample_rate:g} Hz; begin a new test"
+                f"a hit of {size} samples at {hit.sample_rate:g} Hz cannot join a mean of hits of "
+                f"{self.hits[0].acceleration.size} samples at {self.hits[0].sample_rate:g} Hz; begin a new test"
             )
+        if not hit.has_force:
+            self.hits = (*self.hits, hit)
+            return
         spectra = cross_spectra([hit])
         sums, hits = self._sums, (*self.hits, hit)
         sums = spectra if sums is None else (sums[0] + spectra[0], sums[1] + spectra[1], sums[2] + spectra[2])

@@ -47,10 +47,8 @@ class FileSource:
         Raises DataError where there are no hits in it.
         """
         hits = read_hits(path)
-        self.channels: tuple[Channel, ...] = hits[0].channels or (
-            _channel("force", hits),
-            _channel("acceleration", hits),
-        )
+        quantities: tuple[ChannelQuantity, ...] = ("force", "acceleration") if hits[0].has_force else ("acceleration",)
+        self.channels = hits[0].channels or tuple(_channel(quantity, hits) for quantity in quantities)
         self.sample_rate = hits[0].sample_rate
         self.identity = DeviceIdentity(f"replay of {Path(path).name}")
         self.events: deque[Event] = deque()
@@ -96,17 +94,16 @@ class FileSource:
         for hit in self._hits:
             codes = self._codes(hit)
             quiet = _quiet(hit, codes)
-            yield from _cut(np.resize(quiet, (pause, 2)).T)
+            yield from _cut(np.resize(quiet, (pause, len(self.channels))).T)
             middle = codes.shape[1] // 2
             yield from _cut(codes[:, :middle], hit.overload)
             yield from _cut(codes[:, middle:], hit.overload, hit.lost_scans)
-        yield from _cut(np.resize(quiet, (pause, 2)).T)
+        yield from _cut(np.resize(quiet, (pause, len(self.channels))).T)
 
     def _codes(self, hit: Hit) -> NDArray[np.int32]:
         if hit.codes is not None:
             return hit.codes
-        signals = (hit.force, hit.acceleration)
-        return np.stack([channel.encode(values) for channel, values in zip(self.channels, signals, strict=True)])
+        return np.stack([channel.encode(values) for channel, values in zip(self.channels, hit.signals, strict=True)])
 
 
 def _channel(quantity: ChannelQuantity, hits: list[Hit]) -> Channel:
@@ -119,7 +116,7 @@ def _channel(quantity: ChannelQuantity, hits: list[Hit]) -> Channel:
 
 
 def _quiet(hit: Hit, codes: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Scans before the pulse (four fifths of them: its foot is left out), forwards and backwards, (n, 2)."""
+    """Scans before the pulse (four fifths of them: its foot is left out), forwards and backwards, (n, channels)."""
     before = int(0.8 * samples_before(hit))
     noise = codes.T[: max(before, 1)]
     return np.concatenate([noise, noise[::-1]])

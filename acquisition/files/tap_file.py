@@ -31,7 +31,8 @@ from acquisition.regular_file import read_regular
 from acquisition.tap import Circumstances, Conditions, SourceFile, TapTest
 
 FORMAT = "lobewatch-tap"
-VERSION = 1
+VERSION, WITHOUT_FORCE = 1, 2
+"""Version of a file, and that of one without force and FRF, which older programs cannot read."""
 CHUNK = 1_000_000
 """Bytes of a replayed file that are packed together."""
 PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
@@ -48,13 +49,18 @@ def tap_content(tap: TapTest) -> bytes:
     """The bytes of the file of a tap test."""
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
-        file.attrs.update(format=FORMAT, version=VERSION, software=_software(), id=tap.id)
+        file.attrs.update(format=FORMAT, version=_version(tap.hits), software=_software(), id=tap.id)
         _write_circumstances(file, tap.circumstances)
         _write_raw(file, tap.hits, tap.flags)
-        _write_frf(file, as_written(tap).frf, np.float32 if tap.hits else np.float64)
+        if tap.frf is not None:
+            _write_frf(file, tap.frf, np.float32 if tap.hits else np.float64)
         if tap.source is not None:
             _write_source(file, tap.source)
     return sealed(memory.getvalue())
+
+
+def _version(hits: Sequence[Hit]) -> int:
+    return VERSION if not hits or hits[0].has_force else WITHOUT_FORCE
 
 
 @functools.cache
@@ -65,7 +71,7 @@ def _software() -> str:
 
 def as_written(tap: TapTest) -> TapTest:
     """The tap test as it is read from its file: where the hits are there the coherence is rounded to float32."""
-    if not tap.hits or tap.frf.coherence is None:
+    if not tap.hits or tap.frf is None or tap.frf.coherence is None:
         return tap
     return replace(tap, frf=replace(tap.frf, coherence=tap.frf.coherence.astype(np.float32)))
 
@@ -86,7 +92,7 @@ def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: H
     """One hit of a test in progress and the verdict on it, sealed; on the disk when this returns."""
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
-        file.attrs.update(format=FORMAT, version=VERSION, file=Path(path).name)
+        file.attrs.update(format=FORMAT, version=_version([hit]), file=Path(path).name)
         _write_circumstances(file, circumstances)
         _write_raw(file, [hit], [flags])
     atomic_write(Path(path), sealed(memory.getvalue()))
@@ -117,8 +123,8 @@ def _open(path: Path) -> h5py.File:
         if file.attrs.get("format") != FORMAT:
             raise DataError(f"{path}: an HDF5 file, but no tap test of lobewatch (attribute format is not {FORMAT!r})")
         newest = int(file.attrs.get("version", VERSION))
-        if newest > VERSION:
-            versions = f"a tap file of version {newest}, this lobewatch reads up to {VERSION}"
+        if newest > WITHOUT_FORCE:
+            versions = f"a tap file of version {newest}, this lobewatch reads up to {WITHOUT_FORCE}"
             raise DataError(f"{path}: {versions}; update lobewatch")
         check_unpacked(file, len(content), path)
     except (OSError, LookupError, RuntimeError) as error:
@@ -169,8 +175,15 @@ def _write_raw(file: h5py.File, hits: Sequence[Hit], flags: Sequence[HitFlags]) 
                 {field.name: getattr(channel, field.name) for field in fields(Channel)}
             )
     else:
-        samples = np.stack([[hit.force, hit.acceleration] for hit in hits])
-        _dataset(raw, "samples", samples, "N, m/s^2", chunks=(1, *samples.shape[1:]), **PACKED)
+        samples = np.stack([hit.signals for hit in hits])
+        _dataset(
+            raw,
+            "samples",
+            samples,
+            "N, m/s^2" if first.has_force else "m/s^2",
+            chunks=(1, *samples.shape[1:]),
+            **PACKED,
+        )
     raw.attrs.update(sample_rate_hz=first.sample_rate, pre_trigger_samples=first.pre_trigger)
     _dataset(raw, "lost_scans", [hit.lost_scans for hit in hits], "1")
     _dataset(raw, "overload", [hit.overload for hit in hits], "1")
@@ -187,11 +200,16 @@ def _read_raw(file: h5py.File) -> tuple[tuple[Hit, ...], tuple[HitFlags, ...]]:
     overload = raw["overload"][()].tolist() if "overload" in raw else [0] * len(lost)  # not in the first files
     flags = tuple(HitFlags.from_words(words) for words in raw["verdict"].asstr()[()])
     if "codes" in raw:
-        pair = (_read_channel(raw["channel_0"]), _read_channel(raw["channel_1"]))
-        coded = zip(raw["codes"][()], lost, overload, strict=True)
-        return tuple(Hit.from_codes(codes, pair, rate, before, n, mask) for codes, n, mask in coded), flags
+        rows = raw["codes"][()]
+        channels = tuple(_read_channel(raw[f"channel_{i}"]) for i in range(rows.shape[1]))
+        coded = zip(rows, lost, overload, strict=True)
+        return tuple(Hit.from_codes(codes, channels, rate, before, n, mask) for codes, n, mask in coded), flags
     sampled = zip(raw["samples"][()], lost, overload, strict=True)
-    return tuple(Hit(force, response, rate, before, n, overload=mask) for (force, response), n, mask in sampled), flags
+    nothing = np.empty(0)
+    return tuple(
+        Hit(signals[0] if len(signals) > 1 else nothing, signals[-1], rate, before, n, overload=mask)
+        for signals, n, mask in sampled
+    ), flags
 
 
 def _read_channel(group: h5py.Group) -> Channel:
@@ -224,7 +242,9 @@ def _write_lines(
             group[name].dims[0].attach_scale(group["frequency"])
 
 
-def _read_frf(file: h5py.File) -> Frf:
+def _read_frf(file: h5py.File) -> Frf | None:
+    if "frf" not in file and int(file.attrs.get("version", VERSION)) == WITHOUT_FORCE:
+        return None
     group = file["frf"]
     coherence = group["coherence"][()] if "coherence" in group else None
     band = group.attrs.get("usable_band_hz")

@@ -22,7 +22,7 @@ def read_tap_recording(path: Path) -> list[Hit] | Frf:
     left."""
     hits, _, flags = read_tap_hits(path)
     kept = [hit for hit, flag in zip(hits, flags, strict=True) if not flag & _BEYOND_THE_SIGNALS]
-    return kept or read_tap(path).frf
+    return kept or read_tap(path).known_frf
 
 
 def is_all_in(path: Path, hits: Sequence[Hit]) -> bool:
@@ -44,7 +44,7 @@ def _circumstances(path: Path) -> Circumstances:
 
 
 def _frf(path: Path) -> Frf:
-    return read_tap(path).frf
+    return read_tap(path).known_frf
 
 
 TAP_FILE = Format(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition.channel import Block, Channel
+from acquisition.channel import Block, Channel, ChannelQuantity
 from acquisition.errors import DataError
 from acquisition.hit import Hit
 from acquisition.hits.rest import Rest
@@ -26,21 +26,25 @@ class Trigger:
     """When a record begins and how long it is."""
 
     level: float
-    """Force that starts a record when crossed upwards (N)."""
+    """Force that starts a record when crossed upwards (N); size of the acceleration where that starts it (m/s^2)."""
     n_samples: int
     """Length of a record (samples)."""
     pre_trigger: int
     """Samples kept from before the crossing."""
     hysteresis: float = 0.5
-    """The trigger arms only after the force has stayed below this share of the level for pre_trigger samples."""
+    """The trigger arms only after the quantity has stayed below this share of the level for pre_trigger samples."""
     rest_rms: float | None = None
     """rms of the acceleration at rest (m/s^2): armed only after pre_trigger samples at rest; None arms
-    by the force alone."""
+    by the level alone."""
+    quantity: ChannelQuantity = "force"
+    """Quantity that starts a record: the acceleration where no sensor measures the force."""
+    offset: float = 0.0
+    """Value of that quantity at rest, from which the level counts (N or m/s^2): a sensor may feel gravity."""
 
     def __post_init__(self) -> None:
         """Refuse what cannot trigger."""
         if not (np.isfinite(self.level) and self.level > 0):
-            raise ValueError(f"trigger level={self.level} N is not > 0")
+            raise ValueError(f"trigger level={self.level} is not > 0")
         if not 0 < self.pre_trigger < self.n_samples:
             raise ValueError(f"pre_trigger={self.pre_trigger} samples is not between 1 and n_samples={self.n_samples}")
 
@@ -55,9 +59,19 @@ def capture_hits(source: Source, trigger: Trigger) -> Iterator[Hit]:
         yield from search.feed(block)
 
 
-def input_channels(channels: tuple[Channel, ...]) -> tuple[int, int]:
-    """Index of the force and of the acceleration channel; DataError unless there is one of each."""
+def input_channels(channels: tuple[Channel, ...], quantity: ChannelQuantity = "force") -> tuple[int, ...]:
+    """Index of the force and of the acceleration channel; of the latter alone where that triggers.
+
+    DataError unless there is one of each that is needed.
+    """
     quantities = [channel.quantity for channel in channels]
+    if quantity == "acceleration":
+        if quantities.count("acceleration") != 1:
+            raise DataError(
+                f"the DAQ has channels for {', '.join(quantities) or 'nothing'}; "
+                "one acceleration channel is needed to tap without a force sensor"
+            )
+        return (quantities.index("acceleration"),)
     if quantities.count("force") != 1 or quantities.count("acceleration") != 1:
         raise DataError(
             f"the DAQ has channels for {', '.join(quantities) or 'nothing'}; "
@@ -71,12 +85,12 @@ class HitSearch:
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate: float, trigger: Trigger) -> None:
         """Search a stream of these channels from its next scan on."""
-        self._inputs = input_channels(channels)
-        self._pair = (channels[self._inputs[0]], channels[self._inputs[1]])
+        self._inputs = input_channels(channels, trigger.quantity)
+        self._used = tuple(channels[i] for i in self._inputs)
         self._rate, self._trigger = sample_rate, trigger
-        newton_per_code = self._pair[0].scale
-        self._level, self._sign = trigger.level / abs(newton_per_code), 1 if newton_per_code > 0 else -1
-        self._codes: NDArray[np.int32] = np.empty((2, 0), np.int32)
+        self._level, self._middle = trigger.level / abs(self._used[0].scale), trigger.offset / self._used[0].scale
+        self._gap = 1 if trigger.quantity == "force" else trigger.pre_trigger
+        self._codes: NDArray[np.int32] = np.empty((len(self._inputs), 0), np.int32)
         self._added: list[NDArray[np.int32]] = []
         self._size = 0
         self._from = 0
@@ -87,7 +101,7 @@ class HitSearch:
         self._rest: Rest | None = None
         if trigger.rest_rms is not None:
             patience = max(round(PATIENCE * sample_rate / trigger.pre_trigger), 2)
-            self._rest = Rest(trigger.rest_rms / abs(self._pair[1].scale), patience)
+            self._rest = Rest(trigger.rest_rms / abs(self._used[-1].scale), patience)
         self._settled = self._rest is None
         self.too_early = 0
         """Hits passed over because the structure was not at rest."""
@@ -109,15 +123,15 @@ class HitSearch:
         self._add(block)
         while (record := self._next_record()) is not None:
             codes, lost, overload = record
-            yield Hit.from_codes(codes, self._pair, self._rate, self._trigger.pre_trigger, lost, overload)
+            yield Hit.from_codes(codes, self._used, self._rate, self._trigger.pre_trigger, lost, overload)
 
     def _add(self, block: Block) -> None:
-        force, response = self._inputs
-        overload = (block.overload >> force & 1) | (block.overload >> response & 1) << 1
+        flags = [block.overload >> i & 1 for i in self._inputs]
+        overload = flags[-1] << 1 | (flags[0] if len(flags) > 1 else 0)
         end = self._size + block.codes.shape[1]
         if overload:
             self._overloads.append((self._size, end, overload))
-        self._added.append(block.codes if self._inputs == (0, 1) else block.codes[[force, response]])
+        self._added.append(block.codes if self._inputs == (0, 1) else block.codes[list(self._inputs)])
         self._size = end
 
     def _next_record(self) -> tuple[NDArray[np.int32], int, int] | None:
@@ -141,8 +155,11 @@ class HitSearch:
         self._codes = np.concatenate([self._codes, *self._added], axis=1)
         self._added.clear()
 
-    def _force(self, start: int, end: int | None = None) -> NDArray[np.int32]:
-        return self._sign * self._codes[0, start:end]
+    def _heard(self, start: int, end: int | None = None) -> NDArray[np.float64]:
+        """Codes of what triggers, positive for a hit: the acceleration swings to either side of its rest."""
+        codes = self._codes[0, start:end] - self._middle
+        swings = self._trigger.quantity == "acceleration"
+        return np.asarray(np.abs(codes) if swings else np.sign(self._used[0].scale) * codes, dtype=np.float64)
 
     def _trigger_on_crossing(self) -> bool:
         """Find the next crossing that is preceded by rest; hits before it are passed over."""
@@ -153,7 +170,7 @@ class HitSearch:
             if crossing is None:
                 return False
             # The pulse may begin before its crossing.
-            quiet = self._codes[1, crossing - before : crossing - before // 5]
+            quiet = self._codes[-1, crossing - before : crossing - before // 5]
             if self._rest is None or self._rest.holds(quiet):
                 self._crossing = crossing
                 return True
@@ -162,15 +179,15 @@ class HitSearch:
         return False
 
     def _settle(self) -> bool:
-        """Step over stretches of pre_trigger samples to the end of the first one without force and at rest."""
+        """Step over stretches of pre_trigger samples to the end of the first one without a hit and at rest."""
         width = self._trigger.pre_trigger
         while self._rest is not None and self._from + width <= self._codes.shape[1]:
             start, self._from = self._from, self._from + width
-            force = self._force(max(start - 1, 0), self._from)
-            above = force >= self._level
+            heard = self._heard(max(start - 1, 0), self._from)
+            above = heard >= self._level
             self.too_early += int(np.count_nonzero(above[1:] & ~above[:-1]))
-            still = self._rest.wait(self._codes[1, start : self._from])
-            if still and np.max(force) < self._trigger.hysteresis * self._level:
+            still = self._rest.wait(self._codes[-1, start : self._from])
+            if still and np.max(heard) < self._trigger.hysteresis * self._level:
                 self._settled, self._quiet = True, width
                 return True
         return False
@@ -178,29 +195,29 @@ class HitSearch:
     def _find_crossing(self) -> int | None:
         """First sample at the level in a loud run that follows pre_trigger quiet samples.
 
-        Loud is above the hysteresis level. A run that is still open at the end is looked at again with the next
-        block, unless it has lasted a whole record (an offset, not a hit).
+        Loud is above the hysteresis level; what swings is loud in between, too. A run that is still open at the end is
+        looked at again with the next block, unless it has lasted a whole record (an offset, not a hit).
         """
-        force = self._force(self._from)
-        loud = np.flatnonzero(force >= self._trigger.hysteresis * self._level)
+        heard = self._heard(self._from)
+        loud = np.flatnonzero(heard >= self._trigger.hysteresis * self._level)
         if not loud.size:
-            self._quiet += force.size
-            self._from += force.size
+            self._quiet += heard.size
+            self._from += heard.size
             return None
-        starts = loud[np.diff(loud, prepend=-2) > 1]
-        ends = loud[np.diff(loud, append=force.size + 1) > 1] + 1
+        starts = loud[np.diff(loud, prepend=-self._gap - 1) > self._gap]
+        ends = loud[np.diff(loud, append=heard.size + self._gap) > self._gap] + 1
         quiet = starts - np.concatenate(([-self._quiet], ends[:-1]))
         armed = quiet >= self._trigger.pre_trigger
         for start, end in zip(starts[armed], ends[armed], strict=True):
-            above = force[start:end] >= self._level
+            above = heard[start:end] >= self._level
             if above.any():
                 return self._from + int(start) + int(np.argmax(above))
-        if ends[-1] == force.size and force.size - starts[-1] < self._trigger.n_samples:
+        if heard.size - ends[-1] < self._gap and heard.size - starts[-1] < self._trigger.n_samples:
             self._quiet = int(quiet[-1])
             self._from += int(starts[-1])
         else:
-            self._quiet = int(force.size - ends[-1])
-            self._from += force.size
+            self._quiet = int(heard.size - ends[-1])
+            self._from += heard.size
         return None
 
     def _forget(self, count: int) -> None:

@@ -44,7 +44,9 @@ class Pulse:
 
 
 def find_pulse(hit: Hit) -> Pulse | None:
-    """The highest force pulse; None where no sample stands out of the baseline by 6 times its rms."""
+    """The highest force pulse; None where no sample stands out of the baseline by 6 times its rms, or none is known."""
+    if not hit.has_force:
+        return None
     top = int(np.argmax(hit.force))
     quiet = baseline(hit.force, samples_before(hit))
     offset, rms = float(np.mean(quiet)), float(np.std(quiet))
@@ -69,15 +71,24 @@ def _length_above(foot: float, signal: NDArray[np.float64]) -> int:
 def samples_before(hit: Hit) -> int:
     """The pre-trigger, or where it is not known the samples before the force last rises above 5 % of its peak.
 
-    Each hit is looked at once.
+    Without a force: before the response first does. Each hit is looked at once.
     """
     if hit.pre_trigger:
         return hit.pre_trigger
     if hit not in _known:
-        above = hit.force[: int(np.argmax(hit.force)) + 1] - np.median(hit.force)
-        low = np.flatnonzero(above < FALLEN * above[-1])
-        _known[hit] = int(low[-1]) + 1 if low.size else 0
+        _known[hit] = _before_force(hit.force) if hit.has_force else _before_response(hit.acceleration)
     return _known[hit]
+
+
+def _before_force(force: NDArray[np.float64]) -> int:
+    above = force[: int(np.argmax(force)) + 1] - np.median(force)
+    low = np.flatnonzero(above < FALLEN * above[-1])
+    return int(low[-1]) + 1 if low.size else 0
+
+
+def _before_response(response: NDArray[np.float64]) -> int:
+    size = np.abs(response - np.median(response))
+    return int(np.argmax(size > FALLEN * np.max(size)))
 
 
 _known: WeakKeyDictionary[Hit, int] = WeakKeyDictionary()

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition.hit import Hit
-from acquisition.hits.pulse import find_pulse
+from acquisition.hits.free_decay import HIT_ENDS
+from acquisition.hits.pulse import find_pulse, samples_before
 
 FINE, COARSE = 200, 8
 """Pieces of what is looked at whose rms make the envelope: many for a fast decay, few for one that outlasts them."""
@@ -20,13 +21,11 @@ def ring_down(hit: Hit) -> float:
     The slope of the logarithm of the response's envelope over the later half of what is visible; inf where nothing
     falls, 0 where nothing rings. Raises ValueError for a hit without a pulse.
     """
-    pulse = find_pulse(hit)
-    if pulse is None:
-        raise ValueError("a hit has no force pulse; its ring-down cannot be seen")
-    quiet = hit.acceleration[: max(pulse.start, 1)]
-    ringing = hit.acceleration[min(pulse.end, hit.force.size - 1) :] - np.mean(quiet)
+    start, end = _hit_at(hit)
+    quiet = hit.acceleration[: max(start, 1)]
+    ringing = hit.acceleration[min(end, hit.acceleration.size - 1) :] - np.mean(quiet)
     noise = NOISE_RATIO * float(np.std(quiet))
-    width = max(hit.force.size // FINE, 8)
+    width = max(hit.acceleration.size // FINE, 8)
     loud = np.flatnonzero(_envelope(ringing, width) > noise)
     if not loud.size:
         return 0.0
@@ -36,6 +35,17 @@ def ring_down(hit: Hit) -> float:
     if constant > 2 * wide:  # a slow mode: pieces shorter than its period would ripple
         constant = _time_constant(visible, wide)
     return constant / hit.sample_rate
+
+
+def _hit_at(hit: Hit) -> tuple[int, int]:
+    """First sample of the hit, and the first after it."""
+    if not hit.has_force:
+        before = samples_before(hit)
+        return int(0.8 * before), before + round(HIT_ENDS * hit.sample_rate)
+    pulse = find_pulse(hit)
+    if pulse is None:
+        raise ValueError("a hit has no force pulse; its ring-down cannot be seen")
+    return pulse.start, pulse.end
 
 
 def _envelope(signal: NDArray[np.float64], width: int) -> NDArray[np.float64]:

@@ -49,7 +49,7 @@ class MassCalibration:
     """Total moving mass (kg)."""
     n_hits: int
     """Hits used."""
-    channels: tuple[Channel, Channel] | None = None
+    channels: tuple[Channel, ...] | None = None
     """Force and acceleration channel, where known."""
 
     @property

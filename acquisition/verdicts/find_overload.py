@@ -45,9 +45,9 @@ def find_overload(hit: Hit, index: int) -> Overload | None:
     with noise on top.
     """
     signal = np.asarray((hit.force, hit.acceleration)[index])
-    scale = 0.0
+    scale, row = 0.0, index if hit.has_force else 0
     if hit.codes is not None and hit.channels is not None:
-        codes, channel = hit.codes[index], hit.channels[index]
+        codes, channel = hit.codes[row], hit.channels[row]
         low, high = channel.rails_in(codes)
         for rail, beyond in ((low, codes <= low), (high, codes >= high)):
             count = int(np.count_nonzero(beyond))

@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 from acquisition.estimation.estimate_frf import estimate_frf
 from acquisition.frf import Frf
 from acquisition.hit import Hit, HitFlags
+from acquisition.hits.free_decay import HIT_ENDS, free_decay, resting_noise
 from acquisition.hits.pulse import Pulse, baseline, find_pulse, samples_before
 from acquisition.verdicts.distance_from_mean import distance_from_mean
 from acquisition.verdicts.find_overload import Overload, find_overload
 from acquisition.verdicts.mains_hum import mains_hum, sounds_like_hum
+from acquisition.verdicts.second_input import second_input
 from acquisition.verdicts.second_touch import find_second_touch
 from acquisition.verdicts.verdict import HitVerdict
 
@@ -34,12 +36,14 @@ def judge_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | Non
 
     Without `mean` and `band` the time signals alone decide. With the mean of 3 or more good hits, one without other
     faults is compared with it (INCONSISTENT); with the band that is followed (Hz), its force must reach to the end of
-    it (NARROW_BAND: 20 dB below its largest value). With either, it must reach over two lines (TOO_SOFT). Source: ISO
-    7626-5 practice; docs/hit-verdicts.md.
+    it (NARROW_BAND: 20 dB below its largest value). With either, it must reach over two lines (TOO_SOFT). A hit whose
+    force was not measured is judged by its response alone. Source: ISO 7626-5 practice; docs/hit-verdicts.md.
     """
     findings = _overloads(hit)
     if hit.lost_scans:
         findings[HitFlags.LOST_SCANS] = f"{hit.lost_scans} scans are missing in this record"
+    if not hit.has_force:
+        return HitVerdict.of(findings | ({} if findings else _by_response(hit)) | _cut_off(hit))
     if _is_swapped(hit):
         findings[HitFlags.SWAPPED_CHANNELS] = "The force rings and the response does not"
         return HitVerdict.of(findings)
@@ -56,7 +60,7 @@ def judge_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | Non
 
 def _overloads(hit: Hit) -> dict[HitFlags, str]:
     flags = (HitFlags.OVERLOAD_FORCE, HitFlags.OVERLOAD_RESPONSE)
-    overloads = {flag: find_overload(hit, i) for i, flag in enumerate(flags)}
+    overloads = {flag: find_overload(hit, i) for i, flag in enumerate(flags) if i or hit.has_force}
     texts = {flag: _overload_text(flag, overload) for flag, overload in overloads.items() if overload is not None}
     reported = {flag: "The device reports an overload" for i, flag in enumerate(flags) if hit.overload >> i & 1}
     return reported | texts
@@ -104,6 +108,20 @@ def _second(hit: Hit, pulse: Pulse) -> dict[HitFlags, str]:
         f"{abs(second.delay) / hit.sample_rate * 1e3:.2g} ms {'after' if second.delay > 0 else 'before'} the main one"
     )
     return {HitFlags.DOUBLE_HIT: f"Second peak {when} ({100 * second.share:.2g} %)"}
+
+
+def _by_response(hit: Hit) -> dict[HitFlags, str]:
+    """What the response alone tells of a hit: whether it stands out, and whether its decay was hit again."""
+    decay, noise = free_decay(hit), resting_noise(hit)
+    peak = float(np.max(np.abs(hit.acceleration - np.median(hit.acceleration))))
+    if peak < SOFT_NOISE_RATIO * noise:
+        text = f"Response of {peak:.3g} m/s^2 is below {SOFT_NOISE_RATIO:.0f} times the noise of {noise:.2g} m/s^2"
+        return {HitFlags.TOO_SOFT: text}
+    again = second_input(decay, hit.sample_rate, noise)
+    if again is None:
+        return {}
+    when = 1e3 * (again + HIT_ENDS)
+    return {HitFlags.DOUBLE_HIT: f"The decay is disturbed {when:.2g} ms after the hit, as by a second touch"}
 
 
 def _cut_off(hit: Hit) -> dict[HitFlags, str]:

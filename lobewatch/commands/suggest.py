@@ -34,7 +34,7 @@ def suggest(
 
     logbook = Logbook.open(machine)
     table = find_program(logbook.machine, program)
-    assembly = logbook.assembly(table.tool)
+    assembly = logbook.assembly(table.tool).checked()
     suggestion = next_cut(table, assembly, logbook.machine, logbook.cuts, cuts)
     remarks = [*logbook.remarks, *assembly.remarks, *lesson_remarks(suggestion.lesson)]
     emit(

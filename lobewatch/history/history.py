@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -113,7 +114,8 @@ class Row:
         if not self.frequency.is_known:
             return None
         frequency, damping_ratio, stiffness, phase = self.followed
-        return Mode(frequency, damping_ratio, stiffness, phase_deg=phase)
+        alone = 1.0 if math.isnan(stiffness) else None
+        return Mode(frequency, damping_ratio, stiffness, phase_deg=phase, relative_peak=alone)
 
 
 @dataclass(frozen=True, eq=False)

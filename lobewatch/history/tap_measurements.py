@@ -80,7 +80,8 @@ class TapMeasurements:
         newest: dict[str, Measurement] = {}
         for place in reversed(places):
             row = rows[place.number]
-            if row.bearing_stiffness.is_known and not row.questions and row.direction not in newest:
+            knows = row.bearing_stiffness.is_known and row.stiffness.is_known
+            if knows and not row.questions and row.direction not in newest:
                 newest[row.direction] = self.measurement(place, rows)
         try:
             return predict(self._folder.machine, list(newest.values()), tool)

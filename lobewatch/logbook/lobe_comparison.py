@@ -67,8 +67,7 @@ def _charted(logbook: Logbook, assembly: Assembly, cut: str, source: Dynamics, m
     cuts = machine.cuts(assembly.tool)
     if cut not in cuts:
         raise DataError(f"--cut {cut!r} is none of the cuts with tool {assembly.tool!r}: {', '.join(cuts) or 'none'}")
-    if not assembly.directions:
-        raise DataError(f"{assembly.tap_id}: {'; '.join(map(str, assembly.remarks))}")
+    assembly = assembly.checked()
     x: Tip | None = assembly.x
     y: Tip | None = assembly.y
     if source is Dynamics.FRF:
@@ -102,7 +101,7 @@ def _measured_frf(logbook: Logbook, assembly: Assembly, direction: str) -> Frf:
     """Moved as the assembly has moved the modes of an older tap test."""
     tap_id = assembly.taps[direction]
     entry = next(tap for tap in logbook.taps if tap.id == tap_id)
-    frf = logbook.folder.read(entry).frf.in_band(logbook.machine.mode.band_hz)
+    frf = logbook.folder.read(entry).known_frf.in_band(logbook.machine.mode.band_hz)
     now, then = (assembly.x, assembly.y)["xy".index(direction)], logbook.measurement(tap_id).at_tip
     moved = now[0].frequency / then[0].frequency if now else 1.0
     band = None if frf.usable_band is None else (moved * frf.usable_band[0], moved * frf.usable_band[1])

@@ -3,6 +3,7 @@ recorded with its reason, and the next one goes on."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -11,19 +12,36 @@ from functools import cache
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from acquisition import ACROSS, Frf, Remark, TapTest
+from acquisition import ACROSS, Frf, Remark, TapTest, free_decay
 from dsm import Calibration, calibrate, modal_stiffness
 from lobewatch.machine import BY_FIT, Machine
 from lobewatch.measuring.questions import frequency_jump, no_mode_in_band, other_band, stiffness_off_model
-from lobewatch.measuring.sensor_remarks import Fitted, fit_without_sensor
+from lobewatch.measuring.sensor_remarks import Fitted, fit_without_sensor, mass_stays
 from lobewatch.measuring.window_remark import about_hidden_window
-from modal import Believed, Extraction, Mode, ModeEdits, believed, edit_modes, extract, follow, modes_of, predominant
+from modal import (
+    Believed,
+    Extraction,
+    Mode,
+    ModeEdits,
+    believed,
+    decay_spectra,
+    edit_modes,
+    extract,
+    follow,
+    modes_of,
+    modes_of_decays,
+    predominant,
+)
 
 NOT_APPLIED = "hand-not-applied"
 BY_HAND = ("modes-by-hand", NOT_APPLIED)
 """Codes of the remarks on what a person said of the modes of a tap test, which they are about."""
 BEARING_STIFFNESSES = (1e5, 1e11)
 """Range that is believed of a calibrated model (N/m): from a plain bearing on a soft seat to a rigid seat."""
+WITHOUT_FORCE = "force-not-measured"
+"""Code of the remark on a tap test of free decays, which tell no stiffness."""
+HIGHEST = 0.4
+"""Share of the sample rate up to which the spectra of decays are used: beyond it filters and aliases begin."""
 LARGEST_RATIO = 2.0
 """K of one test over that of the one before of the series, or the inverse, above which nothing is calibrated.
 
@@ -93,11 +111,14 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = BY_FIT) -> TapF
     by_hand: what a person said of its modes; where that cannot be done the modes are those of the fit, and a remark
     says so.
     """
-    about, band = tap.circumstances, other_band(tap.frf, machine)
+    about, band = tap.circumstances, None if tap.frf is None else other_band(tap.frf, machine)
     remarks = () if band is None else (band,)
     named = (tap.id, about.created, about.tool, about.direction)
     with _threads().limit(limits=1):
         try:
+            if tap.frf is None:
+                fitted = _fitted_decays(tap, machine, by_hand)
+                return TapFit(*named, fitted.modes, fitted.remarks)
             fitted = fit_without_sensor(tap.frf, machine.tap.sensor, lambda frf: _fitted(frf, tap, by_hand))
             windows = about_hidden_window(tap.accepted, fitted.modes)
             return TapFit(*named, fitted.modes, (*remarks, *fitted.remarks, *windows))
@@ -109,6 +130,18 @@ def fit_tap(tap: TapTest, machine: Machine, by_hand: ModeEdits = BY_FIT) -> TapF
 def _fitted(frf: Frf, tap: TapTest, by_hand: ModeEdits) -> Fitted:
     state, remarks = _edited(extract([frf]), by_hand)
     return Fitted(state, tuple(modes_of(state, [tap.accepted])), remarks)
+
+
+def _fitted_decays(tap: TapTest, machine: Machine, by_hand: ModeEdits) -> Fitted:
+    """Modes of a tap test without force; the mass of the sensor stays in them, for what it does needs K."""
+    rate = tap.accepted[0].sample_rate
+    spectra = decay_spectra([free_decay(hit) for hit in tap.accepted], rate)
+    state, remarks = _edited(extract(spectra, (0.0, HIGHEST * rate)), by_hand)
+    text = "no force was measured: f_n and zeta are known, K is not; no stability lobes, no depths"
+    remarks = (*remarks, Remark(WITHOUT_FORCE, "", text, "tap with a hammer that measures its force"))
+    if machine.tap.sensor.mass:
+        remarks = (*remarks, mass_stays(machine.tap.sensor, "what they do needs K"))
+    return Fitted(state, tuple(modes_of_decays(state)), remarks)
 
 
 def _edited(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tuple[Remark, ...]]:
@@ -156,7 +189,8 @@ def _across(fit: TapFit, machine: Machine, last: Mode | None) -> Measurement:
         text = "cross tap not used: it was not at the tool tip ([tap] position_mm)"
         remarks.append(Remark("cross-beside-tip", "", text, "tap across at the tip"))
     named = (fit.tap_id, fit.time, fit.tool, fit.direction)
-    at_tip = None if machine.tap.position_mm else cross
+    knows_size = all(mode.has_stiffness for mode in cross)
+    at_tip = cross if knows_size and not machine.tap.position_mm else None
     said = (*remarks, *trusted.remarks)
     return Measurement(*named, modes=fit.modes, followed=followed, cross=at_tip, remarks=said)
 
@@ -205,7 +239,7 @@ def _calibrate(
         return None
     doubt = _calibration_doubt(calibration, followed, last)
     remarks += [] if doubt is None else [doubt]
-    if doubt is None and last is None:
+    if doubt is None and last is None and followed.has_stiffness:
         of_model = modal_stiffness(calibration.spindle, calibration.mode, machine.tap.position_mm / 1e3)
         remarks += filter(None, [stiffness_off_model(followed, of_model)])
     return calibration if doubt is None else None
@@ -215,7 +249,7 @@ def _calibration_doubt(calibration: Calibration, followed: Mode, last: Mode | No
     """Why a calibration is not believed; None where it is."""
     low, high = BEARING_STIFFNESSES
     before = followed.stiffness if last is None else last.stiffness
-    ratio = followed.stiffness / before
+    ratio = followed.stiffness / before if followed.has_stiffness and not math.isnan(before) else 1.0
     if not low <= calibration.bearing_stiffness <= high:
         text = f"bearing stiffness {calibration.bearing_stiffness:.3g} N/m is outside {low:g} to {high:g} N/m"
         cure = "compare [spindle] with the drawing, and [mode] model_mode with the mode that is tapped"
@@ -235,7 +269,7 @@ def _modes_at_tip(
     remarks: list[Remark],
 ) -> list[Mode]:
     """Believed modes, carried to the tip by the model where the tap was elsewhere; none where one has K < 0."""
-    if not trusted.modes:
+    if not trusted.modes or not all(mode.has_stiffness for mode in trusted.modes):
         return []
     if trusted.against:
         where = ", ".join(f"{mode.frequency:.0f}" for mode in trusted.against)

@@ -38,16 +38,24 @@ def fit_without_sensor(frf: Frf, sensor: SensorLoading, fit: Callable[[Frf], Fit
     if not sensor.mass:
         state, modes, remarks = fit(frf)
         return Fitted(state, modes, (*remarks, *_about_sensor(modes, frf, sensor)))
-    grams = f"{1e3 * sensor.mass:.3g} ± {1e3 * sensor.mass_std:.1g} g of accelerometer and cable"
     bare = without_mass(frf, sensor.mass)
     state, modes, remarks = fit(bare)
     if not _is_driving_point(modes):
-        said = Remark("sensor-mass-stays", "", f"{grams} are not taken off: not the driving point, a K is negative")
+        said = mass_stays(sensor, "not the driving point, a K is negative")
         state, modes, remarks = fit(frf)
         return Fitted(state, modes, (*remarks, said))
     modes = tuple(with_mass_doubt(mode, bare, sensor.mass_std) for mode in modes)
-    said = Remark("sensor-mass-removed", "", f"{grams} are taken off")
+    said = Remark("sensor-mass-removed", "", f"{_grams(sensor)} are taken off")
     return Fitted(state, modes, (*remarks, said, *_about_mounting(modes, bare, sensor)))
+
+
+def mass_stays(sensor: SensorLoading, why: str) -> Remark:
+    """Remark that the mass of the sensor is not taken off."""
+    return Remark("sensor-mass-stays", "", f"{_grams(sensor)} are not taken off: {why}")
+
+
+def _grams(sensor: SensorLoading) -> str:
+    return f"{1e3 * (sensor.mass or 0.0):.3g} ± {1e3 * sensor.mass_std:.1g} g of accelerometer and cable"
 
 
 def _about_sensor(modes: Sequence[Mode], frf: Frf, sensor: SensorLoading) -> Iterator[Remark]:

@@ -91,7 +91,7 @@ def _hit(hit: TakenHit) -> dict[str, Any]:
         "number": hit.number,
         "good": not hit.flags,
         "verdict": hit.flags.words,
-        "peak_force": _finite(hit.peak_force),
+        "peak": hit.peak,
         "undone": hit.undone,
     }
 

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 
 from acquisition import Block, Channel, Device, DeviceError, Event, EventKind, Remark
+from acquisition.channel import ChannelQuantity
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import checked_rate, has_clock, known_rate
 from lobewatch.tap.in_progress import TapInProgress
@@ -44,10 +45,10 @@ class Button:
 class Connection:
     """One opened device: its scans, and what it tells beside them."""
 
-    def __init__(self, device: Device) -> None:
-        """DataError unless it has one force and one acceleration channel."""
+    def __init__(self, device: Device, quantity: ChannelQuantity = "force") -> None:
+        """quantity: by which hits are seen; DataError unless there is one channel of each that is needed."""
         self._device = device
-        self.signal = LiveSignal(device)
+        self.signal = LiveSignal(device, quantity)
         """Its newest samples."""
         self._button = Button(device.sample_rate)
         self._fault = ""
@@ -110,7 +111,7 @@ class Connector:
         device = self._open_device()
         try:
             self._check_rate(device)
-            connection = Connection(device)
+            connection = Connection(device, self._folder.machine.tap.quantity)
             tap.accept_device(device.sample_rate, connection.signal.channels, description(device))
             connection.start()
         except BaseException:

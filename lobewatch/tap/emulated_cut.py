@@ -18,7 +18,7 @@ from lobewatch.cuts.learning.priors import FORCE
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.cut_setting import CutSetting
 from lobewatch.machine.settings.cut_tables import FEED_ANGLES
-from lobewatch.tap.emulated_spindle import SAMPLE_RATE, emulated_inputs, emulated_structure
+from lobewatch.tap.emulated_spindle import SAMPLE_RATE, emulated_inputs, emulated_structure, felt_by
 from lobewatch.verdicts.draws import DAMPING, FREQUENCY, STIFFNESS
 from modal import Mode
 
@@ -117,9 +117,10 @@ def emulate_cut(
     runout = runout_of(setting.cut, random)
     cut = _turning_cut(folder, setting, _at_rest(folder, setting, spindle), truth, runout)
     motion, housing = simulate_cut(cut, passage), _levelled(random_housing(random, cut.speed_rpm))
+    inputs = emulated_inputs(folder, driver)
     bench = Bench(
-        lambda rate: CutSound(motion, housing, cut.speed_rpm, rate, noise),
-        emulated_inputs(folder, driver),
+        lambda rate: felt_by(inputs, CutSound(motion, housing, cut.speed_rpm, rate, noise)),
+        inputs,
         SAMPLE_RATE,
         realtime,
         tcp,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
@@ -26,6 +26,7 @@ from acquisition import (
     TapsEmulator,
     TapsSource,
 )
+from acquisition.emulation import Signal
 from dsm import Spindle, modes_at, static_stiffness
 from lobewatch.machine.folder import MachineFolder
 
@@ -160,9 +161,10 @@ def emulate_machine(
     structure, random = _structure(folder, spindle), np.random.default_rng(seed)
     if askew is not None or direction == "xy":
         structure = askew_structure(structure, askew or 0.0, direction)
+    inputs = emulated_inputs(folder, driver)
     bench = Bench(
-        lambda rate: HammeredStructure(structure, rate, random, Hammering()),
-        emulated_inputs(folder, driver),
+        lambda rate: felt_by(inputs, HammeredStructure(structure, rate, random, Hammering())),
+        inputs,
         SAMPLE_RATE,
         realtime,
         tcp,
@@ -180,10 +182,17 @@ def _structure(folder: MachineFolder, replacement: Spindle | None) -> Structure:
     )
 
 
+def felt_by(inputs: Sequence[SensorInput], signal: Signal) -> Signal:
+    """A signal of force and acceleration as these sensors feel it, a row each."""
+    rows = [("force", "acceleration").index(sensor.channel.quantity) for sensor in inputs]
+    return lambda first_scan, n_scans: signal(first_scan, n_scans)[rows]
+
+
 def emulated_inputs(folder: MachineFolder, driver: Driver) -> tuple[SensorInput, ...]:
     """Sensors on an emulated device; DataError where machine.toml lacks those that the device does not describe."""
     if driver.sensors is not None:
-        return tuple(SensorInput(number, channel) for number, channel in enumerate(CHANNELS))
+        channels = CHANNELS[1:] if folder.machine.tap.hammer == "none" else CHANNELS
+        return tuple(SensorInput(number, channel) for number, channel in enumerate(channels))
     inputs = folder.machine.daq.settings.inputs
     if not inputs:
         raise DataError(

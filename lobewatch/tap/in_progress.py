@@ -7,6 +7,8 @@ import shutil
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from acquisition import (
     Channel,
     Circumstances,
@@ -71,11 +73,11 @@ class TapInProgress:
         """Hits as a screen lists them."""
         hits = enumerate(zip(self.hits, self.flags, self.reasons, strict=True), 1)
         return tuple(
-            TakenHit(i, flags, float(hit.force.max()), bool(flags & HitFlags.UNDONE), reason, i <= self.earlier)
+            TakenHit(i, flags, peak_text(hit), bool(flags & HitFlags.UNDONE), reason, i <= self.earlier)
             for i, (hit, flags, reason) in hits
         )
 
-    def accept_device(self, sample_rate: float, channels: tuple[Channel, Channel], description: str) -> None:
+    def accept_device(self, sample_rate: float, channels: tuple[Channel, ...], description: str) -> None:
         """Note what the hits to come are recorded with; ValueError where those before them had another set-up."""
         earlier = self.hits[-1] if self.hits else self.baseline
         if earlier is not None and (earlier.sample_rate, earlier.channels) != (sample_rate, channels):
@@ -111,7 +113,8 @@ class TapInProgress:
     def finish(self) -> TapTest:
         """The averaged tap test; ValueError where no hit is good."""
         good = [hit for hit, flags in zip(self.hits, self.flags, strict=True) if not flags]
-        return TapTest(self.id, self.circumstances, estimate_frf(good), tuple(self.hits), tuple(self.flags))
+        frf = estimate_frf(good) if good[0].has_force else None
+        return TapTest(self.id, self.circumstances, frf, tuple(self.hits), tuple(self.flags))
 
     def _append(self, number: int, hit: Hit, flags: HitFlags, reason: str) -> None:
         self.numbers.append(number)
@@ -133,6 +136,13 @@ class TapInProgress:
         if not self.hits and self.trigger is not None:
             write_set_up(self.folder, self.trigger)
         write_hit(self.folder / f"{number:04d}.h5", hit, self.circumstances, flags)
+
+
+def peak_text(hit: Hit) -> str:
+    """Largest force of a hit, or without one its largest acceleration, with the unit."""
+    if hit.has_force:
+        return f"{hit.force.max():.0f} N"
+    return f"{np.max(np.abs(hit.acceleration - np.median(hit.acceleration))):.0f} m/s²"
 
 
 def begin_tap(folder: MachineFolder, circumstances: Circumstances, resume: bool = True) -> TapInProgress:

@@ -61,7 +61,7 @@ class JudgedHits:
 
         Takes the first of them that does not fit out of the mean, and returns its index and why.
         """
-        if not FEWEST_FOR_MEAN < len(self.mean.hits) <= 2 * FEWEST_FOR_MEAN:
+        if self.mean.frf is None or not FEWEST_FOR_MEAN < len(self.mean.hits) <= 2 * FEWEST_FOR_MEAN:
             return None
         for hit in self.mean.hits[:FEWEST_FOR_MEAN]:
             verdict = guarded_verdict(partial(self._compare, hit))

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Block, Device, Hit, Source
+from acquisition.channel import ChannelQuantity
 from acquisition.hits.capture_hits import input_channels
 
 LEVEL_TIME = 0.05
@@ -23,27 +24,28 @@ def description(device: Device) -> str:
 
 
 class LiveSignal:
-    """Force and acceleration of one connected source."""
+    """Force and acceleration of one connected source, or the acceleration alone."""
 
-    def __init__(self, source: Source) -> None:
-        """DataError unless it has one force and one acceleration channel."""
-        self._rows = list(input_channels(source.channels))
-        self.channels = (source.channels[self._rows[0]], source.channels[self._rows[1]])
-        """Force and acceleration channel."""
+    def __init__(self, source: Source, quantity: ChannelQuantity = "force") -> None:
+        """quantity: by which hits are seen; DataError unless there is one channel of each that is needed."""
+        self._rows = list(input_channels(source.channels, quantity))
+        self.channels = tuple(source.channels[row] for row in self._rows)
+        """Force and acceleration channel, or the latter alone."""
         self._rate = source.sample_rate
         self._recent: deque[NDArray[np.int32]] = deque(maxlen=64)
 
     @property
-    def levels(self) -> tuple[float, float]:
-        """rms about the mean of force (N) and acceleration (m/s^2) over the newest LEVEL_TIME."""
+    def levels(self) -> tuple[float | None, float]:
+        """rms about the mean of force (N; None where none is measured) and acceleration (m/s^2) over LEVEL_TIME."""
         wanted = round(LEVEL_TIME * self._rate)
         newest: list[NDArray[np.int32]] = []
         for codes in reversed(self._recent):
             newest.insert(0, codes[self._rows])
             if sum(part.shape[1] for part in newest) >= wanted:
                 break
-        force, response = np.std(np.concatenate(newest, axis=1)[:, -wanted:], axis=1)
-        return float(force * abs(self.channels[0].scale)), float(response * abs(self.channels[1].scale))
+        steps = np.std(np.concatenate(newest, axis=1)[:, -wanted:], axis=1)
+        rms = [float(step * abs(channel.scale)) for step, channel in zip(steps, self.channels, strict=True)]
+        return rms[0] if len(rms) > 1 else None, rms[-1]
 
     def add(self, block: Block) -> None:
         """Take note of a block."""

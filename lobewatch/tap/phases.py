@@ -97,7 +97,7 @@ class Phases:
 
     def _take(self, connection: Connection) -> None:
         trigger = self._tap.trigger
-        if trigger is None or any(hit.force.size != trigger.n_samples for hit in self._tap.hits):
+        if trigger is None or any(hit.acceleration.size != trigger.n_samples for hit in self._tap.hits):
             raise self._tap.other_setup()
         self._loop.take_hits(connection, self._at_rest(trigger))
 

@@ -8,21 +8,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Frf, Hit, RunningMean, cross_spectra
+from acquisition import Frf, Hit, RunningMean, cross_spectra, free_decay
 from acquisition.estimation.estimate_frf import frf_of_spectra
 from acquisition.hits.pulse import find_pulse
+from lobewatch.measuring.measurement import HIGHEST
 from lobewatch.tap.state import Plots
+from modal import decay_spectra
 
 BINS = 400
 """Number of bins of a curve; the highest and the lowest sample of every bin are shown."""
 BEYOND_BAND = 1.25
 """Spectra are shown up to this many times the upper end of the usable band."""
+LOWEST = 50.0
+"""Frequency from which on the spectrum of a decay is shown (Hz): below it noise over its square is all."""
+HIGHEST_SHOWN = 1e-6
+"""Receptance that the highest line of a decay is shown as, for its force is not known (m/N)."""
 LEAST_COHERENT = 3
 """Under so many hits coherence says nothing."""
 
 
 def plots_of(hit: Hit, mean: RunningMean) -> Plots:
     """Curves that the screen shows after a hit, good or not."""
+    if not hit.has_force:
+        return _of_decay(hit)
     shown = _samples(hit)
     spectra = None if find_pulse(hit) is None else cross_spectra([hit])
     last = None if spectra is None else frf_of_spectra(spectra, [hit])
@@ -42,6 +50,27 @@ def plots_of(hit: Hit, mean: RunningMean) -> Plots:
         coherence=_at(_coherence(mean.frf), lines),
         force_spectrum=_at(spectrum, lines),
         usable_band=band,
+    )
+
+
+def _of_decay(hit: Hit) -> Plots:
+    """The acceleration of a hit, and the spectrum of its free decay as the receptance of an unknown force."""
+    shown = extremes([hit.acceleration], hit.acceleration.size)
+    (spectrum,) = decay_spectra(free_decay(hit), hit.sample_rate)
+    size = np.abs(spectrum.receptance)
+    low, high = np.searchsorted(spectrum.frequency, [LOWEST, HIGHEST * hit.sample_rate])
+    size *= HIGHEST_SHOWN / np.max(size[low:high])
+    lines = low + extremes([size[low:]], int(high - low))
+    return Plots(
+        time=hit.time[shown],
+        force=None,
+        acceleration=hit.acceleration[shown],
+        frequency=spectrum.frequency[lines],
+        mean=None,
+        last=size[lines],
+        coherence=None,
+        force_spectrum=None,
+        usable_band=None,
     )
 
 

@@ -41,10 +41,10 @@ WRONG = frozenset({"calibration-no-date", "calibration-in-future", "sample-rate-
 def quiet_stretch(record: Hit) -> Hit:
     """The longest part of a record without hits and their ringing; all of it where no part is quiet."""
     size = max(round(PIECE * record.sample_rate), 1)
-    count = record.force.size // size
+    count = record.acceleration.size // size
     if count < 2:
         return record
-    signals = np.stack([record.force, record.acceleration])[:, : count * size].reshape(2, count, size)
+    signals = record.signals[:, : count * size].reshape(-1, count, size)
     rms = np.std(signals, axis=2)
     floor = np.quantile(rms, 0.2, axis=1, keepdims=True)
     quiet = np.concatenate(([0], np.all(rms <= QUIET_FACTOR * floor, axis=0).astype(np.int8), [0]))
@@ -63,8 +63,8 @@ def self_check(baseline: Hit, level: float | None, free_bytes: int) -> tuple[Che
     return (
         _samples(baseline),
         *(_sensor(codes, channel) for codes, channel in zip(baseline.codes, baseline.channels, strict=True)),
-        _force_noise(float(np.std(baseline.force)), level),
-        _response_noise(float(np.std(baseline.acceleration)), baseline.channels[1]),
+        *([_force_noise(float(np.std(baseline.force)), level)] if baseline.has_force else []),
+        _response_noise(float(np.std(baseline.acceleration)), baseline.channels[-1]),
         _hum(baseline),
         _spindle(baseline),
         _disk(free_bytes),
@@ -153,7 +153,7 @@ def _hum(baseline: Hit) -> Check:
 
 def _spindle(baseline: Hit) -> Check:
     """One strong line in the response that is not of the mains."""
-    channel, signal, unit = _signals(baseline)[1]
+    channel, signal, unit = _signals(baseline)[-1]
     frequency, power = _spectrum(signal, baseline.sample_rate)
     off_mains = np.where(np.any([_mains(frequency, mains) for mains in MAINS], axis=0), 0.0, power)
     line = float(frequency[int(np.argmax(off_mains))])
@@ -167,7 +167,9 @@ def _spindle(baseline: Hit) -> Check:
 def _signals(baseline: Hit) -> list[tuple[Channel, NDArray[np.float64], str]]:
     if baseline.channels is None:
         return []
-    return [(baseline.channels[0], baseline.force, "N"), (baseline.channels[1], baseline.acceleration, "m/s^2")]
+    units = {"force": "N", "acceleration": "m/s^2"}
+    pairs = zip(baseline.channels, baseline.signals, strict=True)
+    return [(channel, signal, units[channel.quantity]) for channel, signal in pairs]
 
 
 def _disk(free: int) -> Check:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 
 from acquisition import (
+    ACROSS,
     UNSAID,
     Circumstances,
     Conditions,
@@ -201,10 +202,10 @@ def _values(measurement: Measurement, series: SeriesStanding | None) -> list[str
         sign = "+" if series.fall.value < 0 else ""
         against = f"{sign}{plus_minus(-series.fall.value, series.fall.std)} % against the first test"
     damping = plus_minus(mode.damping_ratio, zeta_std, 0.01)
-    return [
-        f"f_n {plus_minus(mode.frequency, f_std)} Hz, {against}.",
-        f"K {plus_minus(mode.stiffness, k_std, 1e6)} N/um, zeta {damping} %.",
-    ]
+    stiffness = f"K {plus_minus(mode.stiffness, k_std, 1e6)} N/um, zeta {damping} %."
+    if not mode.has_stiffness:
+        stiffness = f"zeta {damping} %; K is not known, for no force was measured."
+    return [f"f_n {plus_minus(mode.frequency, f_std)} Hz, {against}.", stiffness]
 
 
 def plan_session(
@@ -226,12 +227,14 @@ def plan_session(
     port = port or machine.daq.port
     if not port:
         raise ValueError(f"no port: give --port, or port in [daq] of {folder.toml}")
-    tool = tool or machine.tap.tool
+    tool, wanted = tool or machine.tap.tool, tap_direction(direction)
+    if wanted == ACROSS and machine.tap.hammer == "none":
+        raise ValueError("direction xy tells to which side modes lie, and needs the force: tap x and y alone")
     about = Circumstances(
         machine.machine.name,
         datetime.now(UTC),
         tool,
-        tap_direction(direction),
+        wanted,
         operator,
         folder.toml_text,
         conditions=conditions.over(machine.tap.conditions(tool)),

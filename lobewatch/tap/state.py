@@ -56,8 +56,8 @@ class TakenHit:
     """Number of the hit, from 1."""
     flags: HitFlags
     """Verdict on the hit; falsy where it is averaged."""
-    peak_force: float
-    """Largest force (N)."""
+    peak: str
+    """Largest force, or largest acceleration where no force was measured, with its unit."""
     undone: bool = False
     """Whether the operator took it back."""
     reason: str = ""
@@ -72,8 +72,8 @@ class Plots:
 
     time: NDArray[np.float64]
     """Time from the trigger of the last hit (s), shape (n,)."""
-    force: NDArray[np.float64]
-    """Force of the last hit (N), shape (n,)."""
+    force: NDArray[np.float64] | None
+    """Force of the last hit (N), shape (n,); None where none was measured."""
     acceleration: NDArray[np.float64]
     """Acceleration of the last hit (m/s^2), shape (n,)."""
     frequency: NDArray[np.float64]
@@ -81,7 +81,8 @@ class Plots:
     mean: NDArray[np.float64] | None
     """Magnitude of the receptance of the mean of the good hits (m/N), shape (m,); None before the first good one."""
     last: NDArray[np.float64] | None
-    """Magnitude of the receptance of the last hit (m/N), shape (m,); None where it had no pulse."""
+    """Magnitude of the receptance of the last hit (m/N), shape (m,); None where it had no pulse; without a force that
+    of its free decay, up to a factor."""
     coherence: NDArray[np.float64] | None
     """Coherence of the good hits (-), shape (m,); None under 3 of them."""
     force_spectrum: NDArray[np.float64] | None
@@ -157,8 +158,8 @@ class TapState:
     """Share by which the last good hit moved the mean (-); None under 2 of them."""
     settled: bool = False
     """Whether the mean has settled (a hint: the wanted number stays the rule)."""
-    levels: tuple[float, float] | None = None
-    """Root mean squares of force (N) and acceleration (m/s^2) over the last 50 ms, live."""
+    levels: tuple[float | None, float] | None = None
+    """Root mean squares of force (N; None where not measured) and acceleration (m/s^2) over the last 50 ms."""
     checks: tuple[Check, ...] = ()
     """Lines of the self-check."""
     plots: Plots | None = None

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from acquisition import Hit, HitFlags, Remark, Trigger, check_hit, ring_down
+from acquisition import Channel, Hit, HitFlags, Remark, Trigger, check_hit, ring_down
 from lobewatch.machine.settings.setup_tables import TapSetup
 
 RECORD = 0.25
@@ -32,6 +32,7 @@ HEADROOM = 2
 """Range to choose over the peaks of the hits; chosen."""
 MOST = 3
 """Trial hits at most."""
+UNITS = {"force": "N", "acceleration": "m/s^2"}
 _RANGES = HitFlags.TOO_SOFT | HitFlags.TOO_HARD | HitFlags.OVERLOAD_FORCE | HitFlags.OVERLOAD_RESPONSE
 _USABLE = HitFlags.NOT_DECAYED | _RANGES
 """Flags that a trial hit may have: to find them out is what trial hits are for."""
@@ -58,12 +59,14 @@ class Trial:
         """Trigger and record as they are known by now."""
         rate = self._baseline.sample_rate
         samples = round(self._record * rate)
-        return Trigger(self._level(), samples, round(self._setup.pre_trigger_s * rate))
+        before, quantity = round(self._setup.pre_trigger_s * rate), self._setup.quantity
+        return Trigger(self._level(), samples, before, quantity=quantity, offset=self._offset())
 
     @property
     def done(self) -> bool:
         """Whether nothing is open any more: two hits of the length that stands, or three."""
-        return len(self._hits) >= MOST or sum(hit.force.size == self.trigger.n_samples for hit in self._hits) >= 2
+        length = self.trigger.n_samples
+        return len(self._hits) >= MOST or sum(hit.acceleration.size == length for hit in self._hits) >= 2
 
     @property
     def text(self) -> str:
@@ -71,13 +74,15 @@ class Trial:
         if not self.done:
             return f"Trial hit {len(self._hits) + 1}: it chooses trigger level and record length and does not count."
         slowest = max(ring_down(hit) for hit in self._hits)
-        chosen = f"Trigger at {self.trigger.level:.3g} N, record {self._record:g} s, {_holds(self._record, slowest)}."
+        level = f"{self.trigger.level:.3g} {UNITS[self._setup.quantity]}"
+        chosen = f"Trigger at {level}, record {self._record:g} s, {_holds(self._record, slowest)}."
         return " ".join([chosen, *(f"{remark}." for remark in self.remarks)])
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """One for each channel whose range the trial hits do not fit into."""
-        remarks = (_range_remark(self._hits, i) for i in (0, 1) if self._hits)
+        channels = self._hits[0].channels or () if self._hits else ()
+        remarks = (_range_remark(self._hits, i, channel) for i, channel in enumerate(channels))
         return tuple(remark for remark in remarks if remark is not None)
 
     def add(self, hit: Hit) -> HitFlags:
@@ -94,12 +99,21 @@ class Trial:
     def _level(self) -> float:
         if self._setup.trigger_n is not None:
             return self._setup.trigger_n
-        noise = LEVEL_NOISE_RATIO * float(np.std(self._baseline.force))
+        noise = LEVEL_NOISE_RATIO * float(np.std(self._baseline.signals[0]))
         if not self._hits:
-            return max(noise, FIRST_LEVEL_SHARE * _range(self._baseline, 0))
-        peaks = [float(np.max(hit.force)) for hit in self._hits]
+            return max(noise, FIRST_LEVEL_SHARE * _range(self._baseline))
+        peaks = [_peak(hit, self._offset()) for hit in self._hits]
         level = min(max(LEVEL_SHARE * float(np.median(peaks)), noise), LEVEL_CAP * min(peaks))
         return float(f"{level:.2g}")
+
+    def _offset(self) -> float:
+        """Value at rest that the trigger level counts from: that of the acceleration, which may feel gravity."""
+        return float(np.mean(self._baseline.acceleration)) if self._setup.quantity == "acceleration" else 0.0
+
+
+def _peak(hit: Hit, offset: float) -> float:
+    """Largest value of what triggers."""
+    return float(np.max(hit.force) if hit.has_force else np.max(np.abs(hit.acceleration - offset)))
 
 
 def _long_enough(time_constant: float, before: float) -> float:
@@ -116,17 +130,19 @@ def _holds(record: float, time_constant: float) -> str:
     return f"{min(count, 99):.0f} time constants of the slowest mode{short}"
 
 
-def _range(hit: Hit, channel: int) -> float:
-    """Largest value of a channel (N or m/s^2)."""
-    if hit.channels is None:
-        return float("inf")
-    return hit.channels[channel].full_scale / abs(hit.channels[channel].sensitivity)
+def _range(hit: Hit) -> float:
+    """Largest value of the channel that triggers (N or m/s^2)."""
+    return _full(hit.channels[0]) if hit.channels else float("inf")
 
 
-def _range_remark(hits: Sequence[Hit], channel: int) -> Remark | None:
-    name, unit = (("force", "N"), ("acceleration", "m/s^2"))[channel]
-    peaks = [float(np.max(np.abs((hit.force, hit.acceleration)[channel]))) for hit in hits]
-    full = _range(hits[0], channel)
+def _full(channel: Channel) -> float:
+    return channel.full_scale / abs(channel.sensitivity)
+
+
+def _range_remark(hits: Sequence[Hit], number: int, channel: Channel) -> Remark | None:
+    name, unit = channel.quantity, UNITS[channel.quantity]
+    peaks = [float(np.max(np.abs(hit.signals[number]))) for hit in hits]
+    full = _full(channel)
     share = max(peaks) / full
     if RANGE_LOW <= share <= RANGE_HIGH:
         return None

@@ -9,11 +9,11 @@ from datetime import datetime, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import ACROSS, Remark
+from acquisition import ACROSS, DataError, Remark
 from dsm import Calibration
 from lobes import Cut, StabilityLobes
 from lobewatch.machine import Machine
-from lobewatch.measuring.measurement import Measurement
+from lobewatch.measuring.measurement import WITHOUT_FORCE, Measurement
 from lobewatch.measuring.questions import in_question, open_questions
 from lobewatch.tool.axes import ModeAxes, mode_axes
 from lobewatch.tool.cross_tap import fitting_cross
@@ -23,6 +23,7 @@ from lobewatch.tool.series import FollowedMode, Scatter, frequency_at, scatter_o
 ABOUT_DIRECTIONS = ("one-direction", "older-direction")
 """Codes of the remarks on what is known in x and y."""
 UNUSABLE = {
+    WITHOUT_FORCE: ("no force was measured, K is not known", "tap {} with a hammer that measures its force"),
     "no-lobes-driving-point": ("not a driving point", "hit and measure at one point in {} and tap again"),
     "no-lobes-beside-tip": ("not at the tool tip", "tap {} at the tip, or add a [spindle]"),
 }
@@ -89,6 +90,12 @@ class Assembly:
     def axes(self) -> ModeAxes:
         """Axes of the modes of x, then of y, and what is open of them."""
         return mode_axes(self.x or (), self.y or (), self.cross)
+
+    def checked(self) -> Assembly:
+        """Itself; DataError with the reason where no modes at the tip are known in either direction."""
+        if not self.directions:
+            raise DataError(f"{self.tap_id}: {'; '.join(map(str, self.remarks))}")
+        return self
 
     def scatter(self, direction: str) -> Scatter | None:
         """Scatter from tap test to tap test; None where there are too few."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right
 from collections.abc import Sequence
 from datetime import datetime, timedelta
@@ -26,7 +27,7 @@ class FollowedMode(NamedTuple):
     damping_ratio: float
     """Damping ratio (-)."""
     stiffness: float
-    """Modal stiffness (N/m)."""
+    """Modal stiffness (N/m); NaN where no force was measured."""
     phase_deg: float = 0.0
     """Phase of the modal constant (degrees)."""
 
@@ -45,10 +46,12 @@ class Scatter(NamedTuple):
 
 
 def scatter_of(series: Sequence[FollowedMode]) -> Scatter | None:
-    """Scatter from the steps between neighbours, so that a slow fall does not count; None below 8 tap tests."""
-    if len(series) < ENOUGH:
+    """Scatter from the steps between neighbours, so that a slow fall does not count; None below 8 tap tests that know
+    the stiffness."""
+    known = [point for point in series if math.isfinite(point.stiffness)]
+    if len(known) < ENOUGH:
         return None
-    values = np.array([point[1:] for point in series])
+    values = np.array([point[1:] for point in known])
     values[:, :3] = np.log(values[:, :3])
     steps = np.diff(values, axis=0)
     width = np.std(steps, axis=0, ddof=1) / np.sqrt(2) * scipy.special.stdtrit(len(steps) - 1, 0.975)

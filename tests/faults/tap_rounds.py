@@ -93,7 +93,7 @@ def session(path: Path, seed: int, announce: Any = lambda _: None) -> TapSession
 def digest(tap: TapTest) -> str:
     """Of all that was measured."""
     codes = (hit.codes for hit in tap.hits)
-    parts = [*(code.tobytes() for code in codes if code is not None), tap.frf.receptance.tobytes()]
+    parts = [*(code.tobytes() for code in codes if code is not None), tap.known_frf.receptance.tobytes()]
     return hashlib.sha256(b"".join(parts)).hexdigest()
 
 

@@ -92,6 +92,9 @@ def _tapped(logbook: Logbook, row: Row, number: int) -> TappedTool:
     measurement, machine = logbook.measurement(row.tap_id), logbook.machine
     if measurement.followed is None:
         raise DataError(f"{row.tap_id}: no mode is followed in the newest test of tool {row.tool!r}; tap it again")
+    if not measurement.followed.has_stiffness:
+        text = "no force was measured: K, by which modes are told apart, is not known"
+        raise DataError(f"{row.tap_id}: {text}; tap tool {row.tool!r} with a hammer that measures its force")
     if asked := open_questions(measurement.remarks):
         codes = ", ".join(remark.code for remark in asked)
         raise DataError(f"{row.tap_id}: the newest test of tool {row.tool!r} is in question ({codes}); answer first")

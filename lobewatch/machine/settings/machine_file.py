@@ -55,6 +55,7 @@ class Machine(Table, frozen=True):
     def __post_init__(self) -> None:
         """Refuse programs and tools that cannot be told apart, and what lies outside the speed range."""
         self._check_tools()
+        self._check_hammer()
         names = [program.name for program in self.listed]
         for i, program in enumerate(self.listed, 1):
             if program.name in (*names[: i - 1], REFERENCE_CUT):
@@ -152,6 +153,12 @@ class Machine(Table, frozen=True):
         if tool.flute_length_mm is not None and program.depth_mm > tool.flute_length_mm:
             flutes = f"flute_length_mm={tool.flute_length_mm:g} of tool {tool.name!r}"
             raise ValueError(f"{place}: depth_mm={program.depth_mm:g} is deeper than {flutes}")
+
+    def _check_hammer(self) -> None:
+        if self.tap.hammer == "force" and [channel.quantity for channel in self.daq.channel] == ["acceleration"]:
+            raise ValueError(
+                'daq: a [[daq.channel]] of acceleration alone; add that of the hammer, or hammer = "none" to [tap]'
+            )
 
     def _check_tools(self) -> None:
         names = [tool.name for tool in self.tool]

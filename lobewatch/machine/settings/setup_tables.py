@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta
 
 from acquisition import Conditions
+from acquisition.channel import ChannelQuantity
 from lobewatch.machine.settings.sensor_loading import MOST_GRAMS, Mounting, SensorLoading
 from lobewatch.machine.settings.toml_table import NotNegative, Positive, Table
 
@@ -24,6 +25,8 @@ class TapSetup(Table, frozen=True):
     """[tap]: how the tap test is done; record_s and trigger_n that are not given are chosen by trial hits."""
 
     tool: str = "reference"
+    hammer: Literal["force", "none"] = "force"
+    """Whether a hammer measures its force; with "none" hits are seen by the acceleration alone, and K stays unknown."""
     hits: Annotated[int, Meta(ge=3, le=1000)] = 10
     record_s: Positive | None = None
     pre_trigger_s: Positive = 0.02
@@ -39,8 +42,17 @@ class TapSetup(Table, frozen=True):
     def __post_init__(self) -> None:
         """Refuse what no spindle has."""
         self.conditions(self.tool)
+        if self.hammer == "none" and self.trigger_n is not None:
+            raise ValueError(
+                f'trigger_n={self.trigger_n:g} with hammer="none": no force triggers; leave it out, trial hits choose'
+            )
         if self.cable_mass_g and self.sensor_mass_g is None:
             raise ValueError(f"cable_mass_g={self.cable_mass_g:g} without sensor_mass_g; give both")
+
+    @property
+    def quantity(self) -> ChannelQuantity:
+        """Quantity by which hits are seen."""
+        return "acceleration" if self.hammer == "none" else "force"
 
     @property
     def sensor(self) -> SensorLoading:

@@ -72,9 +72,9 @@ export function showPlots(latest) {
   const none = curves.frequency.map(() => null);
   const time = curves.time.map((t) => t * 1000);
   const micro = (values) => values?.map((v) => (v > 0 ? v * MICRO : null)) ?? none;
-  shown = { pulse: aroundPulse(time, curves.force), frequency: [0, top(curves)] };
+  shown = { pulse: curves.force ? aroundPulse(time, curves.force) : [0, 1], frequency: [0, top(curves)] };
   shown.receptance = decades(curves);
-  charts.force.setData([time, curves.force]);
+  charts.force.setData([time, curves.force ?? time.map(() => null)]);
   charts.response.setData([time, curves.acceleration]);
   charts.frf.setData([curves.frequency, micro(curves.last), micro(curves.mean)]);
   charts.coherence.setData([curves.frequency, curves.coherence ?? none]);

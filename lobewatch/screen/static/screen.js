@@ -63,8 +63,9 @@ function showMean() {
   else put("change", good ? "One good hit: no change known yet." : "No good hit yet.");
 }
 
-// Bars over six decades, 0.001 to 1000 of the unit.
+// Bars over six decades, 0.001 to 1000 of the unit; without a force sensor that of the response alone.
 function showLevels() {
+  document.body.classList.toggle("no-force", state.levels ? state.levels[0] === null : document.body.classList.contains("no-force"));
   const units = ["N", "m/s²"];
   ["force", "response"].forEach((name, i) => {
     const value = state.levels?.[i] ?? null;
@@ -79,7 +80,7 @@ function showHits() {
     ...state.hits.toReversed().map((hit) => {
       const row = element("li", "", hit.undone ? "undone" : hit.good ? "" : "bad");
       row.append(element("span", `${hit.number}`), element("span", hit.undone ? "" : hit.good ? "✓" : "✗"));
-      row.append(element("span", hit.verdict), element("span", hit.peak_force === null ? "" : `${hit.peak_force.toFixed(0)} N`));
+      row.append(element("span", hit.verdict), element("span", hit.peak));
       return row;
     }),
   );

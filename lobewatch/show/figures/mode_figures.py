@@ -53,7 +53,7 @@ def modes_figure(state: Extraction, modes: Sequence[Mode], title: str) -> Figure
 
 def _rank(mode: Mode) -> tuple[int, float]:
     """Trusted modes first, of those the one with the highest peak."""
-    return list(Trust).index(trust_of(mode)), -(mode.frequency**2) / abs(mode.damping_ratio * mode.stiffness)
+    return list(Trust).index(trust_of(mode)), -(mode.frequency**2) * mode.peak
 
 
 def _draw_frf(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:

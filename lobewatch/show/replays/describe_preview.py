@@ -16,6 +16,7 @@ from lobewatch.logbook.replaying.of_files import NAMED, of_files
 from lobewatch.measuring.questions import open_questions
 from lobewatch.show.spindle.describe_modes import NOT_IN_FILE, fact_lines, in_order, mode_json
 from lobewatch.show.terminal.output import emit, table
+from modal import Mode
 
 ONE_BY_ONE = 6
 """Files that are told in full at most; more of them get a line each."""
@@ -43,8 +44,8 @@ def preview_json(preview: Preview) -> dict[str, Any]:
         "tool": measurement.tool,
         "direction": measurement.direction,
         "hits": [flags.words for flags in tap.flags],
-        "lines": tap.frf.frequency.size,
-        "averages": tap.frf.n_averages,
+        "lines": tap.frf.frequency.size if tap.frf else None,
+        "averages": tap.frf.n_averages if tap.frf else None,
         "modes": [mode_json(mode) for mode in measurement.modes],
         "followed": mode_json(measurement.followed) if measurement.followed else None,
         "questions": [{"code": asked.code, "text": asked.text} for asked in open_questions(measurement.remarks)],
@@ -91,10 +92,7 @@ def _in_full(preview: Preview) -> list[str]:
         *(f"  {line}" for line in fact_lines(recording.facts)),
     ]
     modes = in_order(measurement.modes, rejected=False)[:8]
-    texts = (
-        f"{mode.frequency:.4g} Hz ({100 * mode.damping_ratio:.3g} %, {mode.stiffness / 1e6:.3g} N/um)" for mode in modes
-    )
-    lines.append(f"  modes: {', '.join(texts) or 'none'}")
+    lines.append(f"  modes: {', '.join(map(_mode_text, modes)) or 'none'}")
     followed = "none" if measurement.followed is None else f"{measurement.followed.frequency:.2f} Hz"
     lines.append(f"  followed: {followed}")
     asked = open_questions(measurement.remarks)
@@ -104,6 +102,11 @@ def _in_full(preview: Preview) -> list[str]:
         *(f"  question ({question.code}): {question.text}" for question in asked),
         *([] if asked else [plausible]),
     ]
+
+
+def _mode_text(mode: Mode) -> str:
+    stiffness = f", {mode.stiffness / 1e6:.3g} N/um" if mode.has_stiffness else ""
+    return f"{mode.frequency:.4g} Hz ({100 * mode.damping_ratio:.3g} %{stiffness})"
 
 
 def _hits_text(preview: Preview) -> str:

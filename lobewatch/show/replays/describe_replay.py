@@ -95,7 +95,7 @@ def _summed_up(shown: Sequence[Row]) -> Table:
             for text, values in (
                 ("%.1f", [mode.frequency for mode in ends]),
                 ("%.2f", [100 * mode.damping_ratio for mode in ends]),
-                ("%.1f", [mode.stiffness / 1e6 for mode in ends]),
+                ("%.1f", [mode.stiffness / 1e6 for mode in ends if mode.has_stiffness]),
             )
         ]
         days = f"{tests[0].time:%Y-%m-%d}", f"{tests[-1].time:%Y-%m-%d}"

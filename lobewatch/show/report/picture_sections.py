@@ -141,8 +141,10 @@ def pockets_over_time(material: ReportMaterial) -> list[Section]:
 
 
 def frequency_response(material: ReportMaterial) -> list[Section]:
-    """Receptance of the newest test, and of the first."""
+    """Receptance of the newest test, and of the first; nothing where no force was measured."""
     first, newest = material.first, material.newest.frf
+    if newest is None:
+        return []
     band = _shown_band(newest, material.machine)
     figure = frf_figure(None if first is None else first.frf, newest, band)
     text, numbers = "Receptance: displacement over force.", response_numbers(newest.in_band(band))

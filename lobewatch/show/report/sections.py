@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -145,7 +146,7 @@ def _model_changes(history: SeriesHistory) -> list[list[str]]:
 def newest_modes(material: ReportMaterial) -> list[Section]:
     """Modes of the newest test."""
     rows = [
-        [f"{frequency:.2f}", f"{damping * 100:.3f}", f"{stiffness / 1e6:.3f}", _mode_remark(stiffness)]
+        [f"{frequency:.2f}", f"{damping * 100:.3f}", _stiffness_text(stiffness), _mode_remark(stiffness)]
         for frequency, damping, stiffness, _ in material.last.modes
     ]
     heads = ["natural frequency (Hz)", "damping ratio (%)", "stiffness (N/µm)", "remark"]
@@ -153,8 +154,12 @@ def newest_modes(material: ReportMaterial) -> list[Section]:
     return [Section("Modes of the newest test", [table], is_framed=False)]
 
 
+def _stiffness_text(stiffness: float) -> str:
+    return "not known" if math.isnan(stiffness) else f"{stiffness / 1e6:.3f}"
+
+
 def _mode_remark(stiffness: float) -> str:
-    return "" if stiffness > 0 else "not a driving point"
+    return "not a driving point" if stiffness < 0 else ""
 
 
 SECTIONS: tuple[MakesSections, ...] = (

@@ -87,7 +87,7 @@ class TapPrinter:
             if hit.earlier:
                 continue
             good = sum(not earlier.flags for earlier in state.hits[: hit.number])
-            self._console.print(f"{good:3d} / {state.wanted}  {verdict_markup(hit)}  ({hit.peak_force:.0f} N)")
+            self._console.print(f"{good:3d} / {state.wanted}  {verdict_markup(hit)}  ({hit.peak})")
         self._told = len(state.hits)
 
 

@@ -163,7 +163,7 @@ def _lines(state: TapState) -> Iterator[RenderableType]:
     for check in (check for check in state.checks if not (state.hits and check.passed)):
         yield Text(f"{'✓' if check.passed else '✗'} {check.name}: {check.text}")
     for hit in state.hits[-SHOWN_HITS:]:
-        yield Text.from_markup(f"{hit.number:3d}  {hit.peak_force:6.0f} N  {verdict_markup(hit)}")
+        yield Text.from_markup(f"{hit.number:3d}  {hit.peak:>8}  {verdict_markup(hit)}")
 
 
 def _outcome_lines(outcome: Outcome) -> Iterator[RenderableType]:
@@ -184,11 +184,16 @@ def _banner(state: TapState) -> RenderableType:
     return Panel(Align.center(text), style=style, padding=(1, 1))
 
 
+def _levels(force: float, response: float) -> str:
+    return f"force {force:.2g} N rms, response {response:.2g} m/s^2 rms"
+
+
 def _numbers(state: TapState) -> str:
     """Levels, and how far the mean has come."""
     texts = []
     if state.levels is not None:
-        texts.append(f"force {state.levels[0]:.2g} N rms, response {state.levels[1]:.2g} m/s^2 rms")
+        force, response = state.levels
+        texts.append(f"response {response:.2g} m/s^2 rms" if force is None else _levels(force, response))
     if state.mean_change is not None:
         moves = f"the last good hit moved the mean by {100 * state.mean_change:.2g} %"
         texts.append(f"{moves}; it has settled" if state.settled else moves)

@@ -85,10 +85,10 @@ def test_a_tap_test_is_read_back_to_the_bit(tap: TapTest, tmp_path: Path) -> Non
     read = read_tap(path)
     assert (read.id, read.circumstances, read.flags, read.source) == (tap.id, tap.circumstances, tap.flags, None)
     assert all(map(same_hit, read.hits, tap.hits))
-    assert tap.frf.coherence is not None
-    assert same_frf(read.frf, replace(tap.frf, coherence=tap.frf.coherence.astype(np.float32)))
-    assert same_frf(read.frf, as_written(tap).frf)
-    assert same_frf(read_frf(path), as_written(tap).frf)
+    assert tap.known_frf.coherence is not None
+    assert same_frf(read.known_frf, replace(tap.known_frf, coherence=tap.known_frf.coherence.astype(np.float32)))
+    assert same_frf(read.known_frf, as_written(tap).known_frf)
+    assert same_frf(read_frf(path), as_written(tap).known_frf)
     assert all(map(same_hit, read_hits(path), tap.hits))
     assert HitFlags.LOST_SCANS in read.flags[-1]
 
@@ -106,7 +106,7 @@ def test_the_frf_can_be_made_again_from_the_stored_codes(tap: TapTest, tmp_path:
     write_tap(tmp_path / "tap.h5", tap)
     again, flags = average_good(read_tap(tmp_path / "tap.h5").hits)
     assert flags == tap.flags
-    assert same_frf(again, tap.frf)
+    assert same_frf(again, tap.known_frf)
 
 
 def test_a_recording_without_codes_keeps_its_samples_and_its_source(tap: TapTest, tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_a_recorded_frf_has_no_hits(tmp_path: Path) -> None:
     write_tap(tmp_path / "tap.h5", TapTest("t", ABOUT, frf))
     read = read_tap(tmp_path / "tap.h5")
     assert (read.hits, read.flags) == ((), ())
-    assert same_frf(read.frf, frf)
+    assert same_frf(read.known_frf, frf)
 
 
 def test_the_file_is_plain_hdf5_with_units_and_scales(tap: TapTest, tmp_path: Path) -> None:
@@ -265,8 +265,8 @@ def test_the_five_lines_of_the_documentation_read_a_file(tap: TapTest, tmp_path:
     write_tap(tmp_path / "TAP.h5", tap)
     names: dict[str, Any] = {}
     exec(lines.replace("TAP.h5", (tmp_path / "TAP.h5").as_posix()), names)
-    np.testing.assert_array_equal(names["frequency"], tap.frf.frequency)
-    np.testing.assert_array_equal(names["receptance"], tap.frf.receptance)
+    np.testing.assert_array_equal(names["frequency"], tap.known_frf.frequency)
+    np.testing.assert_array_equal(names["receptance"], tap.known_frf.receptance)
     np.testing.assert_allclose(names["force"], [hit.force for hit in tap.hits], rtol=1e-12)
 
 

@@ -163,7 +163,7 @@ def test_an_unplugged_cable_costs_no_hit(folder: MachineFolder) -> None:
     seen = session.state.hits
     assert len(seen) >= 2
     resumed = begin_tap(folder, about(folder, days=0.1))
-    assert [float(hit.force.max()) for hit in resumed.hits] == [hit.peak_force for hit in seen]
+    assert [f"{hit.force.max():.0f} N" for hit in resumed.hits] == [hit.peak for hit in seen]
     assert resumed.flags == [hit.flags for hit in seen]
     assert begin_tap(folder, about(folder, days=0.1, direction="y")).hits == []
     assert begin_tap(folder, about(folder, days=2.0)).hits == []
@@ -249,7 +249,7 @@ def test_nothing_in_the_band_and_out_of_reach_are_reasons_not_errors(folder: Mac
 def test_an_frf_that_cannot_be_fitted_is_stored_with_the_reason_and_blocks_nothing(folder: MachineFolder) -> None:
     good = recorded(about(folder, 30.0), Mode(1700.0, 0.03, 3.5e7))
     first = recorded(about(folder), Mode(1700.0, 0.03, 3.5e7))
-    folder.commit(replace(first, frf=Frf(LINES, first.frf.receptance.conj())))
+    folder.commit(replace(first, frf=Frf(LINES, first.known_frf.receptance.conj())))
     folder.commit(good)
     _, (conjugated, fine) = up_to_date(folder)
     assert codes(conjugated) == ["no-modes", "no-mode-in-band"]
@@ -301,10 +301,10 @@ def test_modes_of_many_hits_agree_with_the_frf_they_come_from(
     live_tap(folder, 1.28e9)
     (entry,) = folder.taps()
     tap = folder.read(entry)
-    assert isinstance(tap.frf, Frf)
+    assert isinstance(tap.known_frf, Frf)
     assert len(tap.accepted) == folder.machine.tap.hits
     again, flags = average_good(tap.hits)
-    assert np.array_equal(again.receptance, tap.frf.receptance)
+    assert np.array_equal(again.receptance, tap.known_frf.receptance)
     assert replace(tap, flags=flags).accepted == tap.accepted
 
 

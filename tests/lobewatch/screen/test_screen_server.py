@@ -265,7 +265,7 @@ def test_the_state_comes_with_every_change_and_the_curves_only_when_they_are_new
         assert (shown["kind"], shown["word"], shown["reason"]) == ("refused", "DOUBLE HIT, TOO SOFT", "Second peak.")
         (hit,) = shown["hits"]
         assert (hit["number"], hit["good"], hit["verdict"]) == (1, False, "double hit, too soft")
-        assert (hit["peak_force"], hit["undone"]) == (312, False)
+        assert (hit["peak"], hit["undone"]) == ("312 N", False)
         session.show(TapStep.TAP, levels=(float("nan"), 2.0))
         again = await feed.receive(timeout=10)
         assert again.type is aiohttp.WSMsgType.TEXT
@@ -295,6 +295,7 @@ def test_the_curves_arrive_as_they_were(session: Session) -> None:
     with ScreenServer(session, token=TOKEN) as server:
         follow(server, talk)
     assert plots.mean is not None
+    assert plots.force is not None
     assert "coherence" not in found
     np.testing.assert_allclose(found["force"], plots.force, rtol=1e-6, atol=1e-30)
     np.testing.assert_allclose(found["mean"], plots.mean, rtol=1e-6)

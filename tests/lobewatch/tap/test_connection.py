@@ -168,4 +168,4 @@ def test_samples_that_end_with_the_last_hit_are_enough(
     session: TapSession = session_of(
         folder, lambda: simulated(tapper(), channels, ended=lambda: session.state.good == 10)
     )
-    assert session.run().frf.n_averages == 10
+    assert session.run().known_frf.n_averages == 10

@@ -59,7 +59,7 @@ def test_undo_takes_back_the_last_good_hits_one_by_one_and_the_last_one_too(
     assert undone == [2, 3, 12]
     assert [hit.number for hit in session.state.hits if hit.undone] == undone
     assert len(tap.accepted) == 10
-    assert np.array_equal(tap.frf.receptance, estimate_frf(tap.accepted).receptance)
+    assert np.array_equal(tap.known_frf.receptance, estimate_frf(tap.accepted).receptance)
     path = folder.path / "taps" / f"{tap.id}.h5"
     assert read_tap(path).flags == tap.flags
     assert len(read_hits(path)) == 10
@@ -102,7 +102,7 @@ def test_a_first_hit_at_another_spot_is_found_out_by_those_after_it(
     told = next(state for state in states if state.verdict == "inconsistent")
     assert (told.good, len(told.hits), told.word) == (3, 4, TapStep.WAIT)
     assert re.match(r"Hit 1 does not fit the others and counts no more\. FRF \d+% away from the mean of 3", told.reason)
-    assert np.array_equal(tap.frf.receptance, estimate_frf(tap.hits[1:]).receptance)
+    assert np.array_equal(tap.known_frf.receptance, estimate_frf(tap.hits[1:]).receptance)
 
 
 def test_a_verdict_does_not_wait_for_the_disk_and_counts_once_it_is_there(
@@ -187,7 +187,7 @@ def test_a_hit_without_which_the_mean_fails_is_refused_and_not_in_it(
     tap = session_of(folder, lambda: simulated(tapper(), channels)).run()
     assert [i for i, flags in enumerate(tap.flags, 1) if flags] == [4]
     assert tap.flags[3] == HitFlags.NOT_JUDGED
-    assert np.array_equal(tap.frf.receptance, estimate_frf(tap.accepted).receptance)
+    assert np.array_equal(tap.known_frf.receptance, estimate_frf(tap.accepted).receptance)
 
 
 def test_curves_that_cannot_be_drawn_end_no_test(

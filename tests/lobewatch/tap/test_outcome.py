@@ -141,6 +141,7 @@ def test_curves_are_thinned_and_keep_every_extreme(hits: list[Hit]) -> None:
     plots = plots_of(hits[2], mean)
     assert plots.time.size < 2600
     assert plots.frequency.size < 2000
+    assert plots.force is not None
     assert np.max(plots.force) == np.max(hits[2].force)
     assert np.min(plots.acceleration) == np.min(hits[2].acceleration)
     assert plots.mean is not None

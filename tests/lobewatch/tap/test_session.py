@@ -34,7 +34,7 @@ def test_the_words_of_a_test_and_its_result(
     states: list[TapState] = []
     session = session_of(folder, lambda: simulated(tapper(), channels), states.append)
     tap = session.run()
-    assert tap.frf.n_averages == 10
+    assert tap.known_frf.n_averages == 10
     words = [word for word, _ in groupby(state.word for state in states)]
     assert words[0] is TapStep.CHECKING
     assert words[-1] is TapStep.DONE

@@ -307,7 +307,7 @@ def results_of(folder: MachineFolder) -> list[bytes]:
     """What all results follow from."""
     found = MachineFolder(folder.path)
     taps = found.taps()
-    return [*(found.read(entry).frf.receptance.tobytes() for entry in taps), found.toml.read_bytes()]
+    return [*(found.read(entry).known_frf.receptance.tobytes() for entry in taps), found.toml.read_bytes()]
 
 
 def one_round(

@@ -29,7 +29,7 @@ def test_a_folder_of_version_1_is_read_verified_and_added_to(old: MachineFolder,
     assert verify(old.path).remarks == ()
     x, y = (old.read(entry) for entry in old.taps())
     assert (x.circumstances.direction, y.circumstances.direction) == ("x", "y")
-    assert (len(x.hits), x.circumstances.operator, x.frf.n_averages) == (2, "Kim", 2)
+    assert (len(x.hits), x.circumstances.operator, x.known_frf.n_averages) == (2, "Kim", 2)
     assert x.hits[0].force.max() == pytest.approx(500, rel=0.02)
     old.commit(make_tap(3))
     assert len(MachineFolder(old.path).taps()) == 3

@@ -18,9 +18,9 @@ from lobewatch.show.terminal.printer import TapPrinter
 from lobewatch.show.terminal.terminal_screen import TerminalScreen, picture
 from lobewatch.tap.state import Check, Choice, Outcome, ProgramWord, TakenHit, TapState, TapStep
 
-GOOD = TakenHit(1, HitFlags.OK, 231.4)
+GOOD = TakenHit(1, HitFlags.OK, "231 N")
 DOUBLE = TakenHit(
-    2, HitFlags.DOUBLE_HIT, 310.0, reason="Second peak 12 ms after the first (18 %): let it bounce [back]."
+    2, HitFlags.DOUBLE_HIT, "310 N", reason="Second peak 12 ms after the first (18 %): let it bounce [back]."
 )
 STATE = TapState(
     1, TapStep.TAP, "mill-3, tool T1, direction x", device="TAPS, 25600 Hz", good=1, hits=(GOOD,), levels=(0.1, 2.0)

@@ -9,12 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 from numpy.typing import NDArray
 
 from acquisition import Channel, HammeredStructure, Hammering, HitFlags, Structure
 from lobewatch.tap.state import Check, Choice, Outcome, Plots, ProgramWord, TakenHit, TapState, TapStep
 
 DATA = Path(__file__).parent / "data"
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 
 @pytest.fixture

@@ -31,7 +31,9 @@ def init(
     hammer: Annotated[Answer, typer.Option(help='Input, mV/N, range in V; not of TAPS/1: "0 2.25 5".')] = None,
     accelerometer: Annotated[Answer, typer.Option(help='Input, mV/g, range in V: "1 10 5".')] = None,
     fixing: Annotated[Answer, typer.Option(help='Mass (g) of the accelerometer, and how it is fixed: "4 wax".')] = None,
-    tool: Annotated[Answer, typer.Option(help='Teeth, diameter mm, helix deg, length out mm: "4 20 30 80".')] = None,
+    tool: Annotated[
+        Answer, typer.Option(help='Teeth, diameter mm, helix deg, length out mm, of what: "4 20 30 80 carbide".')
+    ] = None,
     material: Annotated[Answer, typer.Option(help='What is cut: 42CrMo4; or Kt and Kr in N/mm2: "1400 500".')] = None,
     program: Annotated[
         Answer, typer.Option(help='Speed rpm, depth, radial depth, feed per tooth: "8000 2 20".')

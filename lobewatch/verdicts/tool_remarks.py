@@ -49,7 +49,7 @@ def _speed(table: ProgramTable, limits: ToolLimits) -> str:
     if borne is None:
         return f"{table.speed_rpm:g} rpm are outside the speeds of the spindle"
     allowed = f"{_range(borne.low, borne.high)} m/min, {_bears(table, limits)}"
-    return f"{table.speed_rpm:g} rpm are {speed:.3g} m/min at the edge, outside {allowed} ({borne.source})"
+    return f"{table.speed_rpm:g} rpm are {_number(speed)} m/min at the edge, outside {allowed} ({borne.source})"
 
 
 def _bears(table: ProgramTable, limits: ToolLimits) -> str:
@@ -62,4 +62,8 @@ def _bears(table: ProgramTable, limits: ToolLimits) -> str:
 
 
 def _range(low: float, high: float) -> str:
-    return f"{low:.4g} to {high:.4g}" if low else f"0 to {high:.4g}"
+    return f"{_number(low)} to {_number(high)}"
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -140,7 +140,8 @@ def judge(
 ) -> Verdict:
     """The verdict on a program as it stands in machine.toml, or why its tool is not known."""
     if isinstance(tool, DataError):
-        return _unknown(table, (Remark("no-tap", "", str(tool)),))
+        unknown = _unknown(table, (Remark("no-tap", "", str(tool)),))
+        return replace(unknown, remarks=(*unknown.remarks, *outside_tool(table, machine)))
     if not tool.directions:
         return _unknown(table, tool.remarks, tool)
     on_model = tool.predicted or machine.tap.position_mm > 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from lobes import TOOL_MATERIALS, ToolMaterial
 from lobewatch.machine.set_up.draft import Draft
 from lobewatch.machine.set_up.question import SetUpQuestion
 from lobewatch.machine.set_up.read_answer import OPEN, is_open, number_text, read_numbers
@@ -15,22 +16,51 @@ COEFFICIENTS = ("tangential_n_per_mm2", "radial_n_per_mm2")
 """Keys that stand for a material ..."""
 TEMPLATE = (700, 250)
 """... and their values in a new machine.toml, which are nobody's."""
+_MADE_OF = f"{', '.join(TOOL_MATERIALS[:-1])} or {TOOL_MATERIALS[-1]}"
 
 
 def _tool(draft: Draft) -> str:
     cut, stick_out = draft.table("reference_cut"), draft.table("tap").get("stick_out_mm")
     values = [cut.get("teeth", 4), cut.get("tool_diameter_mm", 20), cut.get("helix_deg", 30)]
-    return " ".join(number_text(value) for value in (*values, *([stick_out] if stick_out else [])))
+    numbers = [number_text(value) for value in (*values, *([stick_out] if stick_out else []))]
+    made_of = draft.table("tool", _number(draft)).get("tool_material")
+    return " ".join([*numbers, *([made_of] if made_of else [])])
 
 
 def _set_tool(draft: Draft, answer: str) -> Draft:
-    names = ("teeth", "diameter in mm", "helix in deg", "length out of the holder in mm (may be left out)")
-    teeth, diameter, helix, *stick_out = read_numbers(answer, names, 3)
+    names = (
+        "teeth",
+        "diameter in mm",
+        "helix in deg",
+        f"length out of the holder in mm (it and {_MADE_OF} may be left out)",
+    )
+    numbers, made_of = _apart(answer)
+    teeth, diameter, helix, *stick_out = read_numbers(numbers, names, 3)
     if not teeth.is_integer():
         raise ValueError(f"{answer!r}: {teeth:g} teeth; the number of teeth comes first")
     draft = draft.set("tap", stick_out_mm=stick_out[0] if stick_out else None)
     tool: dict[str, Value] = {"teeth": int(teeth), "tool_diameter_mm": diameter, "helix_deg": helix}
-    return _in_all_cuts(draft.set("reference_cut", radial_depth_mm=diameter), tool)
+    draft = _in_all_cuts(draft.set("reference_cut", radial_depth_mm=diameter), tool)
+    number = _number(draft)
+    if made_of is None and not draft.table("tool", number):
+        return draft
+    return draft.set("tool", number, name=draft.table("tap")["tool"], tool_material=made_of)
+
+
+def _apart(answer: str) -> tuple[str, ToolMaterial | None]:
+    """Numbers of a tool, and what it is made of where that stands behind them."""
+    for material in sorted(TOOL_MATERIALS, key=len, reverse=True):
+        if answer.strip().casefold().endswith(f" {material.casefold()}"):
+            return answer.strip()[: -len(material)], material
+    return answer, None
+
+
+def _number(draft: Draft) -> int:
+    """Number of the [[tool]] that is tapped, or of a new one."""
+    number = 0
+    while (tool := draft.table("tool", number)) and tool.get("name") != draft.table("tap")["tool"]:
+        number += 1
+    return number
 
 
 def _material(draft: Draft) -> str:
@@ -81,8 +111,8 @@ def _set_program(draft: Draft, answer: str) -> Draft:
 
 TOOL = SetUpQuestion(
     "tool",
-    "The tool that is tapped: teeth, diameter (mm), helix (deg), length out of its holder (mm)?",
-    "4 20 30 80",
+    f"The tool that is tapped: teeth, diameter (mm), helix (deg), length out of its holder (mm), of {_MADE_OF}?",
+    "4 20 30 80 coated carbide",
     _tool,
     _set_tool,
 )

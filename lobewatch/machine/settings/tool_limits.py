@@ -120,7 +120,8 @@ def _feed(machine: Machine, table: CutTable, tool: KnownTool, cut: CutKind) -> B
 def _published(known: PublishedRange | None, unit: float) -> Borne | None:
     if known is None:
         return None
-    return Borne(known.low * unit, known.high * unit, "; ".join(known.sources))
+    names = dict.fromkeys(source.partition(": ")[0] for source in known.sources)
+    return Borne(known.low * unit, known.high * unit, "; ".join(names))
 
 
 def _deepest_mm(table: CutTable, tool: KnownTool) -> float:

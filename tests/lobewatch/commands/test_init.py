@@ -23,7 +23,7 @@ ANSWERS = {
     "hammer": "0 2.25 5",
     "accelerometer": "1 10.2 5",
     "fixing": "4,5 g wax",
-    "tool": "4 teeth 16 mm 30 deg 80 mm",
+    "tool": "4 teeth 16 mm 30 deg 80 mm coated carbide",
     "material": "1.7225",
     "program": "slot: 8000 2 16 0,1",
 }
@@ -53,6 +53,7 @@ def test_every_answer_is_an_option_and_stands_in_the_file(run: Run) -> None:
     assert [known["tap"][key] for key in ("sensor_mass_g", "mounting", "stick_out_mm")] == [4.5, "wax", 80]
     tool = {"teeth": 4, "tool_diameter_mm": 16, "helix_deg": 30, "direction": "down", "material": "1.7225"}
     assert known["reference_cut"] == tool | {"radial_depth_mm": 16}
+    assert known["tool"] == [{"name": "reference", "tool_material": "coated carbide"}]
     program = {"name": "slot", "tool": "reference", "speed_rpm": 8000, "depth_mm": 2, "feed_per_tooth_mm": 0.1}
     assert known["program"] == [tool | program | {"radial_depth_mm": 16}]
 
@@ -82,6 +83,7 @@ def test_where_nobody_sits_nothing_is_asked_and_the_template_is_as_it_was(run: R
         ("hammer", "0.5 2.25 5", "input 0.5 is none"),
         ("fixing", "4 tape", "what is 'tape'?"),
         ("tool", "4.5 20 30", "4.5 teeth"),
+        ("tool", "4 20 30 80 wood", "what is 'wood'?"),
         ("tool", "4 20 95", "reference_cut helix_deg"),
         ("material", "42CrMo5", "is not known; is '42CrMo4' meant?"),
         ("program", "slot: 8000 2", "2 numbers; wanted are"),
@@ -122,6 +124,8 @@ def test_one_question_is_asked_again_and_comments_and_order_stay(run: Run, tmp_p
     assert changed == [("power_kw = 15", "power_kw = 22"), ("torque_nm = 40", "torque_nm = 60")]
     assert run("init", "mill-3", "--edit", "drive", "--drive", "-").code == 0
     assert tables()["drive"] == {}
+    assert run("init", "mill-3", "--edit", "tool", "--tool", "4 16 30 hss").code == 0
+    assert tables()["tool"] == [{"name": "reference", "tool_material": "HSS"}]
 
 
 def test_a_conversation_knows_the_daq_and_takes_enter(run: Run, trial: MachineFolder, tmp_path: Path) -> None:

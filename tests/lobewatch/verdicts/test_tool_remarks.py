@@ -115,6 +115,12 @@ def test_a_program_outside_is_remarked_with_what_is_allowed(mill: Shop, program:
     assert "[[tool]] 'reference'" in remark.cure
 
 
+def test_a_tool_that_was_never_tapped_is_remarked_too(mill: Shop) -> None:
+    mill.put(steel(6000))
+    (verdict,) = mill.logbook.verdicts()
+    assert [remark.code for remark in verdict.remarks] == ["not-checked", "outside-tool-limits"]
+
+
 def test_a_program_inside_is_not(mill: Shop) -> None:
     mill.put(steel(2000, radial=3.6, more="feed_per_tooth_mm = 0.1"))
     machine = mill.folder.machine

@@ -23,6 +23,11 @@ ALIKE = 1.15
 MOST = 3
 """... the lowest of them."""
 
+BELOW = np.array([0.5, 0.7, 0.8, 0.9, 1.0])
+"""Shares of the limit of each draw at which it is looked at once more ..."""
+WIDER, MORE = 1.3, 6
+"""... in the directions of feed whose limit is at most so many times the lowest one, the lowest of them."""
+
 Floats = NDArray[np.float64]
 
 
@@ -53,6 +58,22 @@ def drawn_limits(draws: ProgramDraws, depth: float) -> Floats:
         high[ends], at_high[ends] = np.where(above, limits[ends], high[ends]), np.where(above, value, at_high[ends])
         limits[ends] = _between(low[ends], high[ends], at_low[ends], at_high[ends])
     return limits
+
+
+def settled_limits(draws: ProgramDraws, limits: Floats) -> Floats:
+    """Limits (m) as `drawn_limits` gives them, each in the direction of feed that is worst for that very draw.
+
+    For numbers of single draws, such as ratios of two cuts on the same spindle.
+    """
+    settled, finite = limits.copy(), np.flatnonzero(np.isfinite(limits))
+    if not finite.size:
+        return settled
+    tried = limits[finite, np.newaxis] * BELOW
+    near = draws.fed(WIDER * float(draws.limits[0]), MORE)[finite]
+    low, high, at_low, at_high = _brackets(tried, near.growth(tried))
+    crossing = _between(low, high, at_low, at_high)
+    settled[finite] = np.where(np.isfinite(crossing), crossing, limits[finite])
+    return settled
 
 
 def _brackets(tried: Floats, grown: Floats) -> tuple[Floats, Floats, Floats, Floats]:

@@ -19,7 +19,7 @@ from lobes import PitchPattern, equal_pitch, half_wave_deg, pitch_patterns, with
 from lobes.floquet.program_limit import DEEPEST
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
-from lobewatch.verdicts.drawn_limits import drawn_limits
+from lobewatch.verdicts.drawn_limits import drawn_limits, settled_limits
 from lobewatch.verdicts.draws import ProgramDraws
 from lobewatch.verdicts.hard_draws import deepest_calm
 from lobewatch.verdicts.judgement import QUANTILES, weigh
@@ -178,7 +178,7 @@ def _with(table: ProgramTable, pattern: PitchPattern) -> ProgramTable:
 def _limits(draws: ProgramDraws, table: ProgramTable) -> Floats:
     """Limit of each draw (m), the middle first, the deepest that matters where there is none."""
     depth = table.depth_mm / 1e3
-    limits = drawn_limits(draws, depth)
+    limits = settled_limits(draws, drawn_limits(draws, depth))
     limits[0] = draws.limits[0]
     return np.minimum(limits, DEEPEST * depth)
 

@@ -15,7 +15,9 @@ from lobes import growth, piece_numbers
 from lobewatch.machine import Wear
 from lobewatch.verdicts.doubt import WEAR, doubt_of
 from lobewatch.verdicts.draws import as_program, middle_row
-from lobewatch.verdicts.verdict import Word, judge
+from lobewatch.verdicts.judgement import weigh
+from lobewatch.verdicts.spindle_at_speed import AT_REST
+from lobewatch.verdicts.verdict import Word, judge, word_of
 from lobewatch.verdicts.ways import ways
 
 
@@ -93,7 +95,7 @@ def test_shares_that_are_called_stable_by_wear() -> None:
         limit = limit_mm(milling) if len(milling.x + milling.y) <= 6 else math.inf
         for (wear, part), said in words.items() if math.isfinite(limit) else ():
             worn = msgspec.structs.replace(program(milling, part * limit), wear=wear)
-            said.append(judge(worn, assembly(milling), MACHINE).word)
+            said.append(word_of(worn, weigh(worn, assembly(milling), MACHINE, AT_REST), assembly(milling)))
     shares = {key: float(np.mean([word is Word.STABLE for word in said])) for key, said in words.items()}
     say(
         f"{len(words['new', 0.5])} programs: "

@@ -31,6 +31,7 @@ def lobes(
 
     A --tool that was never tapped is predicted by the model with the bearings of the newest tap test. Whatever the
     method of the chart, verdicts on programs are those of lobewatch check, and it would call each pocket stable.
+    Of taps without a force sensor it lists the speeds of the pockets alone: no depth is known.
 
     Examples:
 
@@ -38,11 +39,19 @@ def lobes(
       lobewatch lobes trial --cut "bracket, slot" --method semi-discretisation --radial radial.png
     """
     from lobewatch.logbook import Logbook, compare_lobes
+    from lobewatch.logbook.lobe_comparison import speeds_alone
+    from lobewatch.show.cuts.describe_heard import speeds_json, speeds_texts
     from lobewatch.show.figures.lobe_pictures import save_pictures
     from lobewatch.show.programs.describe_lobes import comparison_json, comparison_texts
     from lobewatch.tool import Dynamics, Method
 
     logbook = Logbook.open(machine)
+    alone = None if figure or radial or waterfall else speeds_alone(logbook, tool, cut)
+    if alone is not None:
+        assembly, pockets = alone
+        remarks = [*logbook.remarks, *assembly.remarks]
+        emit(speeds_json(cut, pockets, remarks), as_json, *speeds_texts(cut, pockets, remarks))
+        return
     if notes.is_terminal:
         notes.print("looking for speeds and depths that are safe; this takes some seconds")
     comparison = compare_lobes(logbook, tool, cut, Dynamics(source), Method(method))

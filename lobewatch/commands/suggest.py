@@ -27,14 +27,24 @@ def suggest(
       lobewatch suggest mill-3 --program A
       lobewatch suggest mill-3 --program A --cuts 8 --json
     """
+    from lobewatch.cuts.learning.heard_depth import first_depth, heard_depths
     from lobewatch.cuts.learning.lesson import find_program, next_cut
     from lobewatch.logbook import Logbook
+    from lobewatch.show.cuts.describe_heard import heard_json, heard_lines, speed_table
     from lobewatch.show.cuts.describe_suggestion import learnt_texts, lesson_remarks, suggestion_json, suggestion_lines
     from lobewatch.show.terminal.output import remark_json, remark_lines
 
     logbook = Logbook.open(machine)
     table = find_program(logbook.machine, program)
-    assembly = logbook.assembly(table.tool).checked()
+    assembly = logbook.assembly(table.tool)
+    if assembly.unweighed and not assembly.directions:
+        depths, first = heard_depths(table, assembly, logbook.machine, logbook.cuts), first_depth(table)
+        remarks = [*logbook.remarks, *assembly.remarks]
+        payload = heard_json(table, depths, first) | {"remarks": [remark_json(remark) for remark in remarks]}
+        lines = heard_lines(table, depths, first, logbook.folder.path)
+        emit(payload, as_json, speed_table([heard.pocket for heard in depths]), *lines, *remark_lines(remarks))
+        return
+    assembly = assembly.checked()
     suggestion = next_cut(table, assembly, logbook.machine, logbook.cuts, cuts)
     remarks = [*logbook.remarks, *assembly.remarks, *lesson_remarks(suggestion.lesson)]
     emit(

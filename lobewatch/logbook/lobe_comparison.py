@@ -19,6 +19,7 @@ from lobewatch.tool.assembly import Assembly, speed_grid
 from lobewatch.tool.charts import DEEPEST, Chart, Dynamics, Method, chart, cut_table
 from lobewatch.verdicts.advice import robust_pockets
 from lobewatch.verdicts.setting_search import Setting
+from lobewatch.verdicts.speed_pockets import SpeedPocket, speed_pockets
 from lobewatch.verdicts.verdict import Verdict
 
 NO_POCKET = "no-safe-pocket"
@@ -48,8 +49,7 @@ def compare_lobes(logbook: Logbook, tool: str | None, cut: str, source: Dynamics
 
     DataError with the reason where there are no lobes.
     """
-    program_tool = next((program.tool for program in logbook.machine.program if program.name == cut), None)
-    assembly = logbook.assembly(program_tool if tool is None else tool)
+    assembly = _assembly_for(logbook, tool, cut)
     now = _charted(logbook, assembly, cut, source, method)
     first = logbook.first_assembly(assembly)
     then = None if first is None else _charted(logbook, first, cut, source, method)
@@ -60,6 +60,19 @@ def compare_lobes(logbook: Logbook, tool: str | None, cut: str, source: Dynamics
     remarks = [*assembly.remarks, *(replace(remark, about=cut) for remark in now.lobes.remarks)]
     remarks += [] if pockets else [_no_pocket(now, logbook.machine)]
     return LobeComparison(now, then, pockets, _shifts(then, now), same, remarks)
+
+
+def speeds_alone(logbook: Logbook, tool: str | None, cut: str) -> tuple[Assembly, list[SpeedPocket]] | None:
+    """Pockets of a cut with a tool that was tapped without force; None where lobes can be drawn, or not even that."""
+    assembly = _assembly_for(logbook, tool, cut)
+    if assembly.directions or not assembly.unweighed or cut not in logbook.machine.cuts(assembly.tool):
+        return None
+    return assembly, speed_pockets(cut_table(logbook.machine, cut), assembly, logbook.machine)
+
+
+def _assembly_for(logbook: Logbook, tool: str | None, cut: str) -> Assembly:
+    program_tool = next((program.tool for program in logbook.machine.program if program.name == cut), None)
+    return logbook.assembly(program_tool if tool is None else tool)
 
 
 def _charted(logbook: Logbook, assembly: Assembly, cut: str, source: Dynamics, method: Method) -> Chart:

@@ -19,6 +19,7 @@ from lobewatch.tool.axes import ModeAxes, mode_axes
 from lobewatch.tool.cross_tap import fitting_cross
 from lobewatch.tool.mean_lobes import Modes, mean_lobes
 from lobewatch.tool.series import FollowedMode, Scatter, frequency_at, scatter_of
+from modal import Mode
 
 ABOUT_DIRECTIONS = ("one-direction", "older-direction")
 """Codes of the remarks on what is known in x and y."""
@@ -64,6 +65,8 @@ class Assembly:
     """Why a tap test gives no modes at the tip, and what to do, by its direction."""
     cross: Modes = None
     """Modes at the tool tip hit in x and seen in y, signed; None where that was not tapped."""
+    unweighed: Mapping[str, Mode] = field(default_factory=dict)
+    """Modes followed in tap tests without force, whose stiffness is not known, by direction."""
     questions: tuple[Remark, ...] = ()
     """Questions about these tap tests that nobody has answered; until then nothing is sure."""
 
@@ -134,8 +137,13 @@ def assemble(
         cross=signed,
         series={direction: modes for direction, modes in series.items() if direction != ACROSS},
         unusable={tap.direction: _why_unusable(tap) for tap in taps if not tap.at_tip and tap.direction != ACROSS},
+        unweighed={tap.direction: mode for tap in taps if (mode := tap.followed) and _is_unweighed(tap, mode)},
         questions=tuple(in_question(tap.tap_id, asked) for tap in taps for asked in open_questions(tap.remarks)),
     )
+
+
+def _is_unweighed(tap: Measurement, mode: Mode) -> bool:
+    return tap.direction != ACROSS and not mode.has_stiffness
 
 
 def _why_unusable(tap: Measurement) -> tuple[str, str]:

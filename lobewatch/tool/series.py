@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 ENOUGH = 8
 """Number of tap tests from which on a series tells its own scatter."""
@@ -53,9 +54,20 @@ def scatter_of(series: Sequence[FollowedMode]) -> Scatter | None:
         return None
     values = np.array([point[1:] for point in known])
     values[:, :3] = np.log(values[:, :3])
+    return Scatter(*_half_widths(values).tolist())
+
+
+def frequency_scatter(series: Sequence[FollowedMode]) -> float | None:
+    """Half-width that 95 % of natural frequencies stay within of the next, relative; None below 8 tap tests."""
+    if len(series) < ENOUGH:
+        return None
+    return float(_half_widths(np.log([[point.frequency] for point in series]))[0])
+
+
+def _half_widths(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Half-widths of 95 % from the steps between neighbours; values of shape (n, k)."""
     steps = np.diff(values, axis=0)
-    width = np.std(steps, axis=0, ddof=1) / np.sqrt(2) * scipy.special.stdtrit(len(steps) - 1, 0.975)
-    return Scatter(*width.tolist())
+    return np.asarray(np.std(steps, axis=0, ddof=1) / np.sqrt(2) * scipy.special.stdtrit(len(steps) - 1, 0.975))
 
 
 def fall_in(series: Sequence[FollowedMode], days: float) -> float | None:

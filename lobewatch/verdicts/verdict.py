@@ -18,9 +18,13 @@ from lobewatch.tool.assembly import ABOUT_DIRECTIONS, Assembly
 from lobewatch.verdicts.draws import DRAWS, ProgramDraws, turning_draws
 from lobewatch.verdicts.judgement import Judgement, weigh
 from lobewatch.verdicts.settling import decisive_cause, settling_remark
+from lobewatch.verdicts.speed_pockets import pockets_remark
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
 from lobewatch.verdicts.tool_remarks import outside_tool
 from lobewatch.verdicts.unsaid import unsaid
+
+NOT_CHECKED = "not-checked"
+"""Code of the remark that says why a program could not be checked."""
 
 
 class Word(StrEnum):
@@ -143,7 +147,7 @@ def judge(
         unknown = _unknown(table, (Remark("no-tap", "", str(tool)),))
         return replace(unknown, remarks=(*unknown.remarks, *outside_tool(table, machine)))
     if not tool.directions:
-        return _unknown(table, tool.remarks, tool)
+        return _unknown(table, tool.remarks, tool, pockets_remark(table, table.name, tool, machine))
     on_model = tool.predicted or machine.tap.position_mm > 0
     if asked := questions_of_program(machine, table, on_model):
         return _unknown(table, tuple(doubted.remark for doubted in asked), tool)
@@ -176,11 +180,16 @@ def judge(
     )
 
 
-def _unknown(table: ProgramTable, reasons: tuple[Remark, ...], assembly: Assembly | None = None) -> Verdict:
+def _unknown(
+    table: ProgramTable,
+    reasons: tuple[Remark, ...],
+    assembly: Assembly | None = None,
+    further: tuple[Remark, ...] = (),
+) -> Verdict:
     """The verdict on a program that cannot be checked."""
     text = "; ".join(map(str, reasons)) or "no modes at the tool tip"
-    remark = Remark("not-checked", table.name, f"not checked: {text}")
-    return Verdict(table, Word.UNKNOWN, assembly, remarks=(remark,))
+    remark = Remark(NOT_CHECKED, table.name, f"not checked: {text}")
+    return Verdict(table, Word.UNKNOWN, assembly, remarks=(remark, *further))
 
 
 def word_of(table: ProgramTable, judgement: Judgement, assembly: Assembly) -> Word:

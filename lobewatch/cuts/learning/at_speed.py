@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from acquisition import DataError, Remark
 from lobes import StabilityLobes
 from lobewatch.cuts.learning.contradicting import contradiction_remarks
+from lobewatch.cuts.learning.heard_depth import with_heard_word
 from lobewatch.cuts.learning.lesson import Lesson, learn_program
 from lobewatch.cuts.learning.posterior import Posterior
 from lobewatch.machine import CutTable, Machine, ProgramTable
@@ -34,7 +35,10 @@ def judge_at_speed(
 ) -> Verdict:
     """The verdict on a program, or why its tool is not known; at speed as far as cuts have taught, else at rest."""
     learnt = AT_REST if isinstance(tool, DataError) else spindle_at_speed(table, tool, machine, cuts)
-    return judge(table, tool, machine, learnt)
+    verdict = judge(table, tool, machine, learnt)
+    if isinstance(tool, DataError) or tool.directions or not tool.unweighed:
+        return verdict
+    return with_heard_word(verdict, tool, machine, cuts)
 
 
 def spindle_at_speed(table: CutTable, tool: Assembly, machine: Machine, cuts: Sequence[HeardCut]) -> SpindleAtSpeed:

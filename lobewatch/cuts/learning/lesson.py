@@ -70,7 +70,7 @@ def find_program(machine: Machine, name: str) -> ProgramTable:
 
 def learn_program(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Sequence[HeardCut]) -> Lesson:
     """Learn from the cuts of a machine; those of other tools say nothing of this one."""
-    evidence = _tool_evidence(cuts, table, assembly, machine)
+    evidence = tool_evidence(cuts, table, assembly, machine)
     start = prior(middle_row(as_program(table, machine), assembly), doubt_of(assembly, table, machine))
     learnt = start.learn_from_all(evidence)
     shape = geometry(machine.build_cut(table))
@@ -99,7 +99,7 @@ def grid_of(table: ProgramTable, assembly: Assembly, machine: Machine) -> Grid:
     return Grid(cut, angles, speeds, deepest, trust)
 
 
-def _tool_evidence(
+def tool_evidence(
     cuts: Sequence[HeardCut], table: ProgramTable, assembly: Assembly, machine: Machine
 ) -> tuple[CutEvidence, ...]:
     """The cuts of the same tool that count, oldest first."""

@@ -23,7 +23,9 @@ from lobewatch.verdicts import Advice, Setting, Verdict, Word
 from lobewatch.verdicts.room import LEFT
 from lobewatch.verdicts.verdict import Ruling, is_sure, unanswered
 
-IN_LINES = ("doubt-decides", "not-checked")
+WORDED = ("not-checked", "heard-alone")
+"""Remarks that stand for a word without a limit."""
+IN_LINES = ("doubt-decides", *WORDED)
 """Remarks that the lines of a program hold already."""
 ALIKE = 1.02
 """Directions of feed whose limits differ by less are not told apart."""
@@ -128,8 +130,8 @@ def advice_lines(program: ProgramAdvice, machine: Machine) -> Iterator[str]:
     """What is wrong and what to do, a line for each thing that is called for."""
     verdict = program.verdict
     name = verdict.program.name
-    if verdict.word is Word.UNKNOWN:
-        yield from (str(remark) for remark in verdict.remarks if remark.code == "not-checked")
+    if worded := [remark for remark in verdict.remarks if remark.code in WORDED]:
+        yield from map(str, worded)
     elif verdict.word is Word.NOT_STABLE:
         yield f"{name}: {_chatter(program)}; {_elsewhere(program, machine)}"
     elif verdict.word is Word.DOUBTFUL:

@@ -61,7 +61,7 @@ def program_limit(
     cuts, system = cuts or (program.cut,), milling_system(x, y, vectors)
     limit, number = np.empty(len(cuts)), np.empty(len(cuts), dtype=np.int64)
     crossing = np.empty(len(cuts))
-    for places in _alike(cuts):
+    for places in places_alike(cuts):
         rows = _rows(system, program, [cuts[place] for place in places])
         crossings, number[places] = settled_crossings(rows, DEEPEST * program.depth)
         crossing[places] = crossings[:, 0]
@@ -85,7 +85,7 @@ def program_limit(
     )
 
 
-def _alike(cuts: Sequence[Cut]) -> list[list[int]]:
+def places_alike(cuts: Sequence[Cut]) -> list[list[int]]:
     """Places of the cuts that differ in their feed angle alone."""
     places: dict[Cut, list[int]] = {}
     for place, cut in enumerate(cuts):

@@ -21,7 +21,7 @@ from lobes import (
     program_limit,
     rows_of,
 )
-from lobes.floquet.program_limit import DEEPEST
+from lobes.floquet.program_limit import DEEPEST, places_alike
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.doubt import Doubt
@@ -63,10 +63,22 @@ class ProgramDraws:
 
         depth in m: one, several (d,) or those of each draw (draws, d). Returns shape (draws, d).
         """
-        rows, wanted = self.rows, np.atleast_2d(depth)
-        depths = np.broadcast_to(wanted, (len(rows), wanted.shape[1]))
-        number = self.finer * piece_numbers(rows, float(np.max(depths)))
-        return np.asarray(np.max([growth(rows.making(cut), depths, number) for cut in self.cuts], axis=0))
+        wanted = np.atleast_2d(depth)
+        depths = np.broadcast_to(wanted, (len(self.rows), wanted.shape[1]))
+        cut, row = np.divmod(np.arange(len(self.cuts) * len(self.rows)), len(self.rows))
+        return np.asarray(np.max(self.growth_of(cut, row, depths[row]).reshape(len(self.cuts), *depths.shape), axis=0))
+
+    def growth_of(self, cut: NDArray[np.intp], row: NDArray[np.intp], depths: Floats) -> Floats:
+        """Growth of some draws, each in one of the cuts (k,), at depths (k, d) in m, shape (k, d)."""
+        grown = np.empty(depths.shape)
+        angles = np.array([one.feed_angle for one in self.cuts])
+        for alike in places_alike(self.cuts):
+            here = np.flatnonzero(np.isin(cut, alike))
+            if here.size:
+                rows = replace(self.rows[row[here]], cut=self.cuts[alike[0]], feed_angle=angles[cut[here]])
+                number = self.finer * piece_numbers(rows, float(np.max(depths)))
+                grown[here] = growth(rows, depths[here], number)
+        return grown
 
     def __getitem__(self, places: NDArray[np.intp]) -> ProgramDraws:
         """The draws at some places."""
@@ -92,7 +104,9 @@ class ProgramDraws:
         beside = self.doubt.speed + BESIDE
         ends = (1 - beside) / apart, (1 + beside) * apart / (1 - fall)
         middle = self[np.zeros(1, dtype=np.intp)].swept(np.linspace(*ends, LOOKS))
-        return np.array([np.max(replace(middle, cuts=(cut,)).growth(depth)) for cut in self.cuts])
+        cut, row = np.divmod(np.arange(len(self.cuts) * LOOKS), LOOKS)
+        grown = middle.growth_of(cut, row, np.full((cut.size, 1), depth))
+        return np.asarray(np.max(grown.reshape(-1, LOOKS), axis=1))
 
     def at(self, speed: float = 1.0, frequency: float = 1.0, stiffness: float = 1.0) -> ProgramDraws:
         """The same draws with speed, frequencies and stiffnesses times these factors."""

@@ -21,6 +21,11 @@ QUANTILES = (0.01, 0.99)
 SURELY = 1.15
 """Factor that the limit of a cut on its way, were it as doubtful as the lowest, has to spare where it is passed over,
 unless the middle chatters in it at a depth so much larger somewhere within the doubt of the speed."""
+EACH = 1.6
+"""The same of one draw in such a cut. Of 408 judgements of random cuts, each fed in up to 24 ways, it missed 6 of the draws
+that chatter, and changed no word."""
+
+Floats = NDArray[np.float64]
 
 
 class Judgement(NamedTuple):
@@ -60,6 +65,25 @@ def weigh(
     limits = drawn_limits(draws, program.depth)[1:]
     low, high = np.quantile(limits, QUANTILES, method="closest_observation")
     below = SURELY * program.depth * middle.limit / low if np.isfinite(middle.limit) else 0.0
-    near = draws.fed_where((draws.limits <= below) | (draws.around(SURELY * program.depth) >= 0))
-    chatters = (near.growth(program.depth)[1:, 0] >= 0) | (limits <= program.depth)
+    around = draws.around(SURELY * program.depth) >= 0
+    chatters = _chatters(draws, (draws.limits <= below) | around, around, limits, program.depth)
     return Judgement(middle, float(low), float(high), draws, chatters, across)
+
+
+def _chatters(
+    draws: ProgramDraws, near: NDArray[np.bool_], around: NDArray[np.bool_], limits: Floats, depth: float
+) -> NDArray[np.bool_]:
+    """Whether each draw chatters at a depth (m) in any of the cuts that are near (cuts,), shape (DRAWS,).
+
+    limits: of the draws in the worst cut (m), shape (DRAWS,). In another cut a draw is looked at where its limit, were
+    it as far off the middle as in the worst, has less than EACH to spare, and where the middle chatters around (cuts,).
+    """
+    chatters = limits <= depth
+    softness = limits / draws.limits[0] if np.isfinite(draws.limits[0]) else np.ones(limits.size)
+    wanted = np.multiply.outer(draws.limits, softness) <= EACH * depth
+    wanted |= around[:, np.newaxis]
+    wanted[0] = True
+    cut, draw = np.nonzero(wanted & near[:, np.newaxis] & ~chatters)
+    grown = draws.growth_of(cut, draw + 1, np.full((cut.size, 1), depth))[:, 0]
+    chatters[draw[grown >= 0]] = True
+    return chatters

@@ -22,8 +22,8 @@ SURELY = 1.15
 """Factor that the limit of a cut on its way, were it as doubtful as the lowest, has to spare where it is passed over,
 unless the middle chatters in it at a depth so much larger somewhere within the doubt of the speed."""
 EACH = 1.6
-"""The same of one draw in such a cut. Of 408 judgements of random cuts, each fed in up to 24 ways, it missed 6 of the draws
-that chatter, and changed no word."""
+"""The same of one draw in such a cut. In 408 judgements of random cuts, each fed in up to 24 ways, it missed 6 of the
+draws that chatter, and changed no word."""
 
 Floats = NDArray[np.float64]
 

@@ -39,6 +39,8 @@ MARKS = {
 """Colour and mark of a program by the verdict on it."""
 SAFE = "#00664A"
 LEARNT = "#8A3D78"
+LARGE = (8.0, 4.6)
+"""Size of a diagram that stands alone (inches)."""
 LEVELS = 12
 """Steps of colour in a map."""
 BAR = "limiting depth (mm); brightest: this or more"
@@ -59,13 +61,16 @@ def lobes_figure(
     pockets: Sequence[Setting] = (),
     heard: Sequence[HeardCut] = (),
     learnt: LobesAtSpeed | None = None,
+    *,
+    size: tuple[float, float] = LARGE,
+    has_legend: bool = True,
 ) -> Figure:
     """Stability lobe diagram: the last of `depths` (m, by label) is now, those before it are first tap tests.
 
     band: how far the doubt moves the line of now; pockets: settings that are recommended; heard: test cuts of it;
-    learnt: what these have taught.
+    learnt: what these have taught; size: of the picture (inches).
     """
-    figure, (axes,) = new_axes(1, (8.0, 4.6))
+    figure, (axes,) = new_axes(1, size)
     *earlier, now = depths.items()
     finite = now[1][np.isfinite(now[1])] * 1e3
     wanted = [verdict.program.depth_mm for verdict in programs] + [pocket.depth_mm for pocket in pockets]
@@ -89,7 +94,8 @@ def lobes_figure(
     for program in programs:
         _draw_program(axes, program, labels)
     axes.set(xlabel="spindle speed (rpm)", ylabel="limiting depth (mm)")
-    figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9)
+    if has_legend:
+        figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9)
     return figure
 
 

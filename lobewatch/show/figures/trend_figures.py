@@ -20,6 +20,8 @@ from lobewatch.show.figures.style import ALARM, EVENT, NOW, THEN, new_axes
 
 Floats = NDArray[np.float64]
 
+LOW = (8.0, 2.8)
+"""Size of a picture of one value (inches)."""
 AHEAD = 0.5
 """Share of the length of the series that is drawn beyond it."""
 
@@ -65,10 +67,15 @@ def course_of(trend: Trend) -> TrendCurve | None:
     )
 
 
-def frf_figure(earliest: Frf | None, now: Frf, band: tuple[float, float]) -> Figure:
-    """Real and imaginary part of receptance and coherence, the newest and the first test."""
-    rows = 2 if now.coherence is None else 3
-    figure, axes = new_axes(rows, (8.0, 2.1 * rows))
+def frf_figure(
+    earliest: Frf | None, now: Frf, band: tuple[float, float], size: tuple[float, float] | None = None
+) -> Figure:
+    """Real and imaginary part of receptance and coherence, the newest and the first test.
+
+    size: of a picture (inches) that has room for the receptance alone.
+    """
+    rows = 2 if now.coherence is None or size is not None else 3
+    figure, axes = new_axes(rows, size or (8.0, 2.1 * rows))
     tests = [(now, "now", NOW, "-"), *([(earliest, "first", THEN, "--")] if earliest is not None else [])]
     for frf, label, colour, dashes in tests:
         inside = frf.in_band(band)
@@ -82,7 +89,8 @@ def frf_figure(earliest: Frf | None, now: Frf, band: tuple[float, float]) -> Fig
     if rows == 3:
         axes[2].set(ylabel="coherence", ylim=(min(0.9, axes[2].get_ylim()[0]), 1.005))
     axes[-1].set(xlabel="frequency (Hz)", xlim=band)
-    axes[0].legend(loc="upper right", ncols=2)
+    if earliest is not None:
+        axes[0].legend(loc="upper right", ncols=2)
     return figure
 
 
@@ -94,12 +102,13 @@ def trend_figure(
     limits: Limits | None = None,
     marks: Marks = NOTHING_ELSE,
     course: TrendCurve | None = None,
+    size: tuple[float, float] = LOW,
 ) -> Figure:
     """A value over time with its 95 % interval; with limits, where its fall calls for attention.
 
-    limits: in % of the first value of the course, else of the first value.
+    limits: in % of the first value of the course, else of the first value; size: of the picture (inches).
     """
-    figure, (axes,) = new_axes(1, (8.0, 2.8))
+    figure, (axes,) = new_axes(1, size)
     days = date2num(times)
     axes.errorbar(days, values, yerr=1.96 * np.nan_to_num(stds), fmt="o", ms=4, color=NOW, capsize=2)
     if limits is not None:

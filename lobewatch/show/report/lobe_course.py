@@ -28,6 +28,8 @@ MOST = 24
 """Tap tests shown, at most."""
 SPEEDS = 600
 """Speeds given of each diagram, at most."""
+FARTHEST = 0.5
+"""Fall of the frequencies from which on no diagram is foretold: no such spindle still cuts; chosen."""
 AHEAD = (6, 12)
 """Months after the newest test that are foretold."""
 
@@ -122,13 +124,14 @@ def _foretold_depths(cut: str, assembly: Assembly, trends: Mapping[str, Trend], 
 
 
 def _fall(trend: Trend, months: int) -> float | None:
-    """Share by which the line falls from the last point on; None where nothing is foretold for that long."""
+    """Share by which the line falls from the last point on; None where nothing is foretold for that long or so far."""
     forecast, last = trend.forecast, day(trend.points[-1].time)
     at = last + months * MONTH
     if forecast is None or trend.is_stale or not forecast.dates[0] <= at <= forecast.dates[-1]:
         return None
     change = float(np.interp(at, forecast.dates, forecast.line)) - float(forecast.fitted[-1])
-    return -math.expm1(min(change, 0.0) / 100)
+    share = -math.expm1(min(change, 0.0) / 100)
+    return share if share < FARTHEST else None
 
 
 def _aged(assembly: Assembly, direction: str, fall: float) -> list[Mode]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cached_property
 
-from acquisition import TapTest
+from acquisition import Frf, TapTest
 from lobewatch.decay import SeriesStanding
 from lobewatch.history import Row
 from lobewatch.history.left_out import left_out
@@ -16,7 +16,11 @@ from lobewatch.logbook.outlook import Outlook, outlook_of
 from lobewatch.machine import Machine
 from lobewatch.show.programs.describe_advice import ProgramAdvice, advise_program
 from lobewatch.show.report.lobe_course import LobeCourse, lobe_course
+from lobewatch.show.report.lobe_diagram import LobeDiagram, lobe_diagram
 from lobewatch.tool import Assembly
+
+BELOW, ABOVE = 0.6, 1.4
+"""Ends of the frequencies shown over those of the usable band; chosen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +64,17 @@ class ReportMaterial:
     def excluded_rows(self) -> Sequence[Row]:
         """Rows of the tap tests of the series that do not count."""
         return left_out(self.analysis.folder, self.analysis.files.excluded, self.rows)
+
+    @cached_property
+    def lobe_diagram(self) -> LobeDiagram | None:
+        """Lobes of the first cut of the tool, with the programs on them; None where it has none."""
+        return lobe_diagram(self.analysis, self.assembly, self.programs)
+
+    def response_band(self, frf: Frf) -> tuple[float, float]:
+        """Frequencies that are shown of a response (Hz)."""
+        ends = float(frf.frequency[0]), float(frf.frequency[-1])
+        low, high = self.machine.mode.band_hz or frf.usable_band or ends
+        return max(BELOW * low, ends[0]), min(ABOVE * high, ends[1])
 
     @cached_property
     def lobe_course(self) -> LobeCourse | None:

@@ -25,7 +25,13 @@ def page(template: str, **content: Any) -> str:
     room = resources.files("lobewatch.show.report")
     loader = jinja2.FunctionLoader(lambda name: room.joinpath(name).read_text(encoding="utf-8"))
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
-    environment.filters |= {"in_css": _in_css, "named": _named, "macro_name": _macro_name, "next": next}
+    environment.filters |= {
+        "in_css": _in_css,
+        "named": _named,
+        "macro_name": _macro_name,
+        "next": next,
+        "unbroken": _unbroken,
+    }
     return environment.get_template(template).render(_static() | content)
 
 
@@ -65,6 +71,11 @@ def _in_css(text: str) -> str:
 def _macro_name(part: object) -> str:
     """The macro of parts.html that shows a part of a section: the name of its class in small letters."""
     return type(part).__name__.lower()
+
+
+def _unbroken(text: str) -> str:
+    """No line ends within a number, between it and its error, or before its unit."""
+    return re.sub(r"(?<=\d) (?=\d{3}\b|%|±|mm\b|rpm\b|Hz\b)|(?<=±) ", "\N{NO-BREAK SPACE}", text)
 
 
 def _named(picture: str, name: str) -> Markup:

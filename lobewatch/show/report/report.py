@@ -67,7 +67,7 @@ def _frame(material: ReportMaterial) -> dict[str, Any]:
         "last": last.time,
         "n_taps": len(material.rows),
         "label": machine.spindle.label if machine.spindle else "",
-        "first_screen": first_screen(material.outlook, material.programs, machine),
+        "first_screen": first_screen(material),
         "tap_id": tap.id,
         "conditions": [*filter(None, [tap.circumstances.operator]), *conditions_texts(last.conditions)],
         "good": len(tap.accepted),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -27,7 +26,7 @@ from lobewatch.show.report.lists import events_and_exclusions, tap_tests, test_c
 from lobewatch.show.report.material import ReportMaterial
 from lobewatch.show.report.picture_sections import lobes_over_time, pictures
 from lobewatch.show.report.section import DataTable, Fragment, Paragraph, Section, TableCell
-from lobewatch.show.trends.describe_trend import ASSUMED, dates_rows, sentence
+from lobewatch.show.trends.describe_trend import ASSUMED, dates_rows, no_dates_text, sentence
 from lobewatch.tool import ABOUT_DIRECTIONS
 from lobewatch.verdicts import Word
 
@@ -51,8 +50,8 @@ def programs(material: ReportMaterial) -> list[Section]:
     checked = [program.verdict for program in material.programs if program.verdict.word is not Word.UNKNOWN]
     content = {
         "programs": [_program_row(program) for program in material.programs],
-        "lines": [_unbroken(line) for program in material.programs for line in advice_lines(program, material.machine)],
-        "doubt": [*map(_unbroken, reading_lines(checked, material.machine))],
+        "lines": [line for program in material.programs for line in advice_lines(program, material.machine)],
+        "doubt": reading_lines(checked, material.machine),
         "method": checked[0].method if checked else "",
     }
     return [Section("Cutting programs", [Fragment("programs.html", content)])]
@@ -79,17 +78,14 @@ def _word_cell(word: Word, text: str) -> TableCell:
     return TableCell(f"{WORDS[word].symbol} {text}", WORDS[word].kind)
 
 
-def _unbroken(text: str) -> str:
-    """No line ends within a number, or between it and its unit."""
-    return re.sub(r"(?<=\d) (?=\d{3}\b|%|mm\b|rpm\b|Hz\b)", "\N{NO-BREAK SPACE}", text)
-
-
 def until_when(material: ReportMaterial) -> list[Section]:
     """When programs stop holding; nothing where no test can be compared with."""
-    if material.series.trend is None:
+    if material.series.trend is None or material.series.is_first:
         return []
-    dates = DataTable(["what", "becomes doubtful", "is not stable"], dates_rows(material.outlook), "words")
     course = Paragraph(f"{sentence(material.series)}.")
+    if no_dates_text(material.outlook):
+        return [Section("Until when", [course])]
+    dates = DataTable(["what", "becomes doubtful", "is not stable"], dates_rows(material.outlook), "words")
     return [Section("Until when", [course, dates, Paragraph(ASSUMED, is_small=True)])]
 
 
@@ -101,11 +97,15 @@ def notes(material: ReportMaterial) -> list[Section]:
 
 
 def changes(material: ReportMaterial) -> list[Section]:
-    """What was measured first and last, and the change by the formula of the light."""
+    """What was measured first and last, and the change by the formula of the light; of an only test, what it says."""
     history = material.series.history
     rows = [*_measured_changes(history), *_model_changes(history)]
     if not rows:
         return []
+    if material.series.is_first:
+        values = DataTable(["value", f"{material.last.time:%Y-%m-%d}"], [[name, now] for name, _, now, _ in rows])
+        text = "± is the standard error of this tap test alone. All later tests are compared with it."
+        return [Section("What was measured", [values, Paragraph(text, is_small=True)])]
     first, last = (f"{row.time:%Y-%m-%d}" for row in (material.rows[0], material.last))
     limits = material.machine.limits
     reading = (

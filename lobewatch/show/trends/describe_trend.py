@@ -12,6 +12,7 @@ from rich.table import Table
 
 from dsm import PreloadLeft, plus_minus
 from lobewatch.decay import SeriesStanding
+from lobewatch.decay.forecast import ENOUGH
 from lobewatch.decay.reach import Reach, forecast_rows
 from lobewatch.decay.shapes import Shape
 from lobewatch.decay.trend import Trend, date, day, days_of
@@ -83,13 +84,25 @@ def dates_rows(outlook: Outlook) -> list[tuple[str, str, str]]:
     ]
 
 
+def no_dates_text(outlook: Outlook) -> str:
+    """Why no date can be given, in a sentence; empty where there is one, or nothing is left to foretell."""
+    fates = (reach for fate in outlook.programs.values() for reach in (fate.doubtful, fate.not_stable))
+    reaches = [*fates, *(reach for _, reach in outlook.limits)]
+    if any(reach.foretold_to is not None for reach in reaches) or all(reach.is_measured for reach in reaches):
+        return ""
+    points = max((len(series.trend.points) for series in outlook.standing.series if series.trend), default=0)
+    if points >= ENOUGH:
+        return "No dates: what was tapped lies too far back to foretell from it."
+    return f"No dates yet: a forecast needs {ENOUGH} points, there {'is' if points == 1 else 'are'} {points}."
+
+
 def sentence(series: SeriesStanding) -> str:
     """Course of the series so far, in a sentence."""
     trend = series.trend
     if trend is None:
         return f"{series.name}: unknown"
     n = len(trend.points)
-    text = f"{series.name}: {short_text(series)} after {n} point{'s' if n > 1 else ''}"
+    text = f"{series.name}: {short_text(series)}{f' after {n} points' if n > 1 else ''}"
     if trend.forecast is None:
         known = trend.readings.known.alone
         then = f"5 on an alarm (scatter of other series: {known.percent:.2f} %)" if known.freedom else "9 on an alarm"
@@ -109,9 +122,16 @@ def rate_text(trend: Trend) -> str:
 
 
 def short_text(series: SeriesStanding) -> str:
-    """How far it has fallen, with its standard error."""
+    """How far it has fallen since it started; of an only test, that there is nothing to compare it with."""
+    if series.is_first:
+        return "first test, nothing to compare it with yet"
+    return f"{change_text(series)} since it started" if series.fall.is_known else "unknown"
+
+
+def change_text(series: SeriesStanding) -> str:
+    """Change of the frequency since the series started, with its standard error."""
     fall = series.fall
-    return f"{plus_minus(-fall.value, fall.std)} % since it started" if fall.is_known else "unknown"
+    return f"{plus_minus(-fall.value, fall.std)} %" if fall.is_known else "unknown"
 
 
 def course_text(trend: Trend) -> str:

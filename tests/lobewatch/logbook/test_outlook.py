@@ -118,7 +118,7 @@ def test_a_short_history_foretells_nothing(shop: Shop) -> None:
     assert found.limits == ((5.0, NOBODY_KNOWS), (10.0, NOBODY_KNOWS))
     told = run("trend", shop.path)
     assert "history too short" in told.stdout
-    assert "after 1 point; from 8 points on there is a forecast" in told.stdout
+    assert "nothing to compare it with yet; from 8 points on there is a forecast" in told.stdout
 
 
 def test_what_foretells_nothing_hides_no_date(worn: Shop) -> None:

@@ -47,6 +47,8 @@ BREAKS = """(() => {
   return wrong.map((one) => one.textContent);
 })()"""
 """Headings after which a page may end before anything of what they stand over."""
+BOXES = "'.sides > div:first-child, .pictures svg'"
+"""Words and pictures of the first screen."""
 SAVED = """(() => {
   const saved = [], made = URL.createObjectURL;
   URL.createObjectURL = (blob) => { saved.push(blob.text()); return made.call(URL, blob); };
@@ -138,6 +140,20 @@ def reports(new_shop: Callable[[Path], Shop], tmp_path_factory: pytest.TempPathF
     rows = plant_rows(Plant(find_machines(path)).standings(now))
     fleet.write_text(render_fleet(rows, "plant", now), "utf-8")
     return [one, fleet]
+
+
+def test_the_first_screen_fits_with_its_words_and_pictures_beside_each_other(
+    browser: Browser, reports: list[Path]
+) -> None:
+    browser.open(reports[0].as_uri(), (1280, 657))
+    boxes = browser.ask(f"[...document.querySelectorAll({BOXES})].map((one) => one.getBoundingClientRect().toJSON())")
+    words, *pictures = boxes
+    assert len(pictures) == 2
+    assert all(box["bottom"] <= 657 and box["height"] > 180 for box in boxes)
+    assert all(picture["left"] > words["right"] for picture in pictures)
+    browser.resize((390, 844))
+    small = "[...document.querySelectorAll('.pictures text')].map((one) => one.getBoundingClientRect().height)"
+    assert min(browser.ask(small)) >= 10  # of a letter, in dots of the screen
 
 
 @pytest.mark.parametrize("size", [(390, 844), (768, 1024), (1280, 657)], ids=lambda size: f"{size[0]}x{size[1]}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from datetime import UTC, datetime, timedelta
 from html import unescape
@@ -16,6 +17,7 @@ from typer.testing import CliRunner, Result
 from lobewatch.cli import app
 from lobewatch.plant.plant import Plant
 from lobewatch.show.report.fleet import render_fleet, spark
+from lobewatch.show.report.gauge import WIDE, gauge
 from lobewatch.show.report.page import page
 from lobewatch.show.report.report import render_report
 
@@ -51,13 +53,14 @@ def test_a_report_says_first_what_matters_and_holds_its_numbers(worn: Shop) -> N
     logbook = worn.logbook
     now = logbook.history.rows[-1].time + timedelta(days=1)
     html = render_report(logbook, "reference", "x", now)
-    first = html[html.index('<div class="first">') : html.index("<h2")]
+    first = first_screen(html)
     standing = logbook.standing(now)
     light = {"alarm": "✗ EARLY ALARM" if standing.is_early else "✗ ALARM", "warn": "! WARNING"}[standing.light]
     for words in (light, "falling since 2026-01-", " % a month now (", "A &lt;1&gt;", "Tap next by 2026-07-14"):
         assert words in first, words
     assert standing.next_step in unescape(first)
-    assert re.search(r"<td>(not stable|doubtful) (between|not before) .*?</td><td>", first)
+    assert re.search(r'<td data-head="until when">(not stable|doubtful) (between|not before) .*?</td><td', first)
+    assert first.count("<figure>") == 2
     heads, lines = numbers(html, "natural-frequency")
     assert heads[:3] == ["what", "date", "natural frequency (Hz)"]
     tests = [line for line in lines if line[0] == "test"]
@@ -75,10 +78,56 @@ def test_a_report_says_first_what_matters_and_holds_its_numbers(worn: Shop) -> N
     assert "http" not in re.sub(r"https?://(www\.w3|matplotlib|purl|creativecommons)\.org", "", html)
 
 
-def test_a_report_of_one_tap_has_no_forecast_and_says_so(shop: Shop) -> None:
+def first_screen(html: str) -> str:
+    """What stands above the first heading of a section; any space is a plain one."""
+    return html[html.index('<div class="first">') : html.index("<h2")].replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_the_first_screen_says_each_thing_once(shop: Shop) -> None:
+    """Of x and y, alike in all: one reason, a line each with its change; what is in the tables is no reason again."""
+    shop.run(("A", 12900, 1.5), ("B", 8700, 0.4))
+    for i in range(12):
+        shop.tap_both(15 * i, math.exp(-0.01 * i + 0.0003 * (-1) ** i))
+    shop.tap(170, 1713.0 * math.exp(-0.13))
+    now = shop.logbook.history.rows[-1].time + timedelta(days=40)
+    html = render_report(shop.logbook, "reference", "x", now)
+    words = unescape(re.sub(r"<svg.*?</svg>|<[^>]+>", " ", first_screen(html), flags=re.DOTALL))
+    reasons = [remark.finding for remark in shop.logbook.standing(now).remarks]
+    assert sum("falling since" in reason or "fallen by" in reason for reason in reasons) == 4
+    assert sum(reason in words for reason in reasons) == 1
+    assert words.count("falling since") == 2  # the courses of x and y
+    assert words.count("alarm at 10 %") == words.count("overdue") == 1
+    assert all(words.count(f" {name} ") == 1 for name in ("A", "B"))
+    below = unescape(html[html.index("<h2") :])
+    assert [reason for reason in reasons if f"<li>{reason}</li>" in below] == reasons[len(reasons) :]
+
+
+def test_an_acknowledged_alarm_says_so_on_the_first_screen(worn: Shop) -> None:
+    assert run("ack", worn.path, "--operator", "Eva", "--note", "seen", "decay:reference:y").exit_code == 0
+    now = worn.logbook.history.rows[-1].time + timedelta(days=1)
+    first = first_screen(render_report(worn.logbook, "reference", "x", now))
+    assert first.count("Eva") == 1
+
+
+def test_a_gauge_tells_a_small_fall_from_a_large_one() -> None:
+    small, large = (gauge(fall, 5.0, 10.0) for fall in (0.15, 10.0))
+    assert large.length == large.alarm == 2 * large.warn
+    assert small.length == pytest.approx(large.length * 0.015)
+    assert (gauge(-1.0, 5.0, 10.0).length, gauge(99.0, 5.0, 10.0).length) == (0.0, WIDE)
+    assert large.text == "frequency -10.00 %; warning at -5 %, alarm at -10 %"
+
+
+def test_a_report_of_one_tap_makes_sense(shop: Shop) -> None:
+    """No picture without a line in it, no change from nothing, no date that nobody can tell."""
     shop.tap(0, 1713.0)
     html = render_report(shop.logbook, "reference", "x")
-    assert "history too short" in html
+    for words in ("history too short", "Until when", "-0 %", "0.00 %", "until when", "<h2>Natural frequency", "gauge("):
+        assert words not in html, words
+    assert html.count("No dates yet: a forecast needs 8 points, there is 1.") == 1
+    assert "1 tap test,\n2026-01-15." in html
+    assert "first test" in first_screen(html)
+    assert 'class="gauge"' not in html
+    assert "<h2>What was measured</h2>" in html
     assert "from 8 points on" in html
     assert "lobes-plot" not in html.replace("#lobes-plot", "").replace('"lobes-plot"', "")
 

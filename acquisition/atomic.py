@@ -16,6 +16,13 @@ def atomic_write(path: Path, content: bytes, *, lasting: bool = True) -> None:
 
     lasting: False where it may be torn or gone after a power cut, for its reader tells that and can make it anew;
     nothing is waited for then. Raises OSError with the name of the file to be.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     atomic_write(Path(folder) / "table.csv", b"1,2")
+    ...     (Path(folder) / "table.csv").read_bytes()
+    b'1,2'
     """
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:

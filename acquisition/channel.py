@@ -18,7 +18,11 @@ ACROSS: TapDirection = "xy"
 
 
 def tap_direction(text: str) -> TapDirection:
-    """A direction from its text; ValueError for what is none."""
+    """A direction from its text; ValueError for what is none.
+
+    >>> tap_direction("x"), tap_direction("xy") == ACROSS
+    ('x', True)
+    """
     directions: tuple[TapDirection, ...] = get_args(TapDirection)
     for direction in directions:
         if text == direction:
@@ -28,7 +32,14 @@ def tap_direction(text: str) -> TapDirection:
 
 @dataclass(frozen=True)
 class Channel:
-    """One sensor on one input: all that turns a voltage into a force or an acceleration."""
+    """One sensor on one input: all that turns a voltage into a force or an acceleration.
+
+    >>> hammer = Channel("force", sensitivity=2.25e-3, full_scale=5.0)
+    >>> round(hammer.scale, 4)  # N a code: 5 V / 2^15 / 2.25 mV/N
+    0.0678
+    >>> hammer.encode(np.array([100.0, 1e4])).tolist()  # N; what is beyond the rail is clipped there
+    [1475, 32767]
+    """
 
     quantity: ChannelQuantity
     """Quantity that the sensor measures."""

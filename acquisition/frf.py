@@ -18,6 +18,15 @@ class Frf:
     """One averaged frequency response function, displacement over force.
 
     Raises ValueError where shapes differ, the frequency axis does not rise, or a value is not finite or beyond 1e50.
+
+    Of a rigid mass of 2 kg, 1 / (m w^2) with the opposite sign:
+
+    >>> line = np.array([100.0, 200.0])  # Hz
+    >>> frf = Frf(line, -1 / (2.0 * (2 * np.pi * line) ** 2) + 0j, coherence=np.array([0.9, 0.99]), n_averages=10)
+    >>> frf.accelerance.real.round(6).tolist()  # 1/kg
+    [0.5, 0.5]
+    >>> frf.random_error.round(4).tolist()  # sqrt((1 - g2) / (2 n g2))
+    [0.0745, 0.0225]
     """
 
     frequency: NDArray[np.float64]
@@ -125,7 +134,14 @@ def from_accelerance(
     n_averages: int = 1,
     usable_band: tuple[float, float] | None = None,
 ) -> Frf:
-    """FRF from acceleration over force (m/s^2/N) by division with -(2 pi f)^2; a line at 0 Hz is left out."""
+    """FRF from acceleration over force (m/s^2/N) by division with -(2 pi f)^2; a line at 0 Hz is left out.
+
+    >>> frf = from_accelerance([0.0, 100.0, 200.0], [0.5, 0.5, 0.5])  # 1/kg: a mass of 2 kg
+    >>> frf.frequency.tolist(), round(float(frf.receptance[0].real) * 1e6, 3)  # Hz, um/N
+    ([100.0, 200.0], -1.267)
+    >>> round(-0.5 / (2 * np.pi * 100.0) ** 2 * 1e6, 3)
+    -1.267
+    """
     f = np.asarray(frequency, dtype=np.float64)
     keep = slice(1 if f.size and f.flat[0] == 0 else 0, None)
     receptance = np.asarray(accelerance, dtype=np.complex128)[keep] * (-1 / (2 * np.pi * f[keep]) ** 2)

@@ -16,7 +16,14 @@ LARGEST = 1e50
 
 
 class HitFlags(enum.Flag):
-    """Why a hit is refused; falsy when all is well. `str()` gives words with the cure."""
+    """Why a hit is refused; falsy when all is well. `str()` gives words with the cure.
+
+    >>> flags = HitFlags.DOUBLE_HIT | HitFlags.OVERLOAD_FORCE
+    >>> flags.words
+    'double hit, overload (force)'
+    >>> HitFlags.from_words("double hit") in flags, bool(HitFlags.OK)
+    (True, False)
+    """
 
     OK = 0
     DOUBLE_HIT = enum.auto()
@@ -92,6 +99,13 @@ class Hit:
     """Force and response of one hammer hit on one time axis; the response alone where no force was measured.
 
     Raises ValueError where the records differ in length, are too short, or hold NaN, inf or values beyond 1e50.
+
+    >>> time = np.arange(-100, 4000) / 10240.0
+    >>> force = 200 * np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)  # N
+    >>> structure = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
+    >>> hit = Hit(force, 200 * structure.response(time, 1e-3), 10240.0, pre_trigger=100)
+    >>> float(hit.time[100]), check_hit(hit) == HitFlags.OK
+    (0.0, True)
     """
 
     force: NDArray[np.float64]

@@ -8,7 +8,12 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Remark:
-    """One thing to know. Programs look at `code` and `about`; `text` and `cure` are for people and may be reworded."""
+    """One thing to know. Programs look at `code` and `about`; `text` and `cure` are for people and may be reworded.
+
+    >>> remark = Remark("swept", "A", "the spindle sweeps 40 Hz", "tap it warm")
+    >>> remark.finding, remark.code
+    ('A: the spindle sweeps 40 Hz', 'swept')
+    """
 
     code: str
     """Kind of remark: words in lower case joined by hyphens, listed in docs/remarks.md, never changed."""
@@ -30,7 +35,12 @@ class Remark:
 
 
 def joined(remarks: Iterable[Remark]) -> list[Remark]:
-    """Remarks that differ in nothing but what they are about as one, in the order of the first of each."""
+    """Remarks that differ in nothing but what they are about as one, in the order of the first of each.
+
+    >>> remarks = [Remark("small", program, "it is small") for program in ("A", "B")]
+    >>> [(remark.code, remark.about) for remark in joined(remarks)]
+    [('small', 'A, B')]
+    """
     about: dict[Remark, list[str]] = {}
     for remark in remarks:
         about.setdefault(replace(remark, about=""), []).append(remark.about)

@@ -27,7 +27,12 @@ RANGES = {
 
 @dataclass(frozen=True)
 class Conditions:
-    """What a tap test was taken under, as the shop says it and in its units; None or empty where nobody said."""
+    """What a tap test was taken under, as the shop says it and in its units; None or empty where nobody said.
+
+    >>> usual = Conditions(stick_out_mm=42.0, state="cold")
+    >>> Conditions(temperature_c=35.0, state="warm").over(usual).known
+    {'temperature_c': 35.0, 'stick_out_mm': 42.0, 'state': 'warm'}
+    """
 
     temperature_c: float | None = None
     """Temperature of the spindle (degC)."""
@@ -75,7 +80,13 @@ UNSAID = Conditions()
 
 @dataclass(frozen=True)
 class Circumstances:
-    """Who tapped what, when and where."""
+    """Who tapped what, when and where.
+
+    >>> from datetime import UTC, datetime
+    >>> tested = Circumstances("Mill 3", datetime(2026, 3, 2, 9, 30, tzinfo=UTC), tool="D16", direction="y")
+    >>> tested.conditions == UNSAID
+    True
+    """
 
     machine: str
     """Name of the machine."""
@@ -103,7 +114,11 @@ class Circumstances:
 
 @dataclass(frozen=True)
 class SourceFile:
-    """The recording that a replayed tap test was read from."""
+    """The recording that a replayed tap test was read from.
+
+    >>> SourceFile("hit.lvm", b"abc").sha256[:16]  # FIPS 180-2, appendix B.1
+    'ba7816bf8f01cfea'
+    """
 
     name: str
     """Name of the file, without folder."""
@@ -158,6 +173,11 @@ def new_tap_id(circumstances: Circumstances) -> str:
 
     Raises ValueError for a machine, tool or operator with control characters in its name: what is kept for good must
     be fit to be shown.
+
+    >>> from datetime import UTC, datetime
+    >>> identity = new_tap_id(Circumstances("Mill 3", datetime(2026, 3, 2, 9, 30, tzinfo=UTC), tool="D16"))
+    >>> identity[:-4], machine_of(identity)  # four random digits end it
+    ('20260302T093000.000000Z_Mill-3_D16_x_', 'Mill-3')
     """
     for label in ("machine", "tool", "operator"):
         check_name(getattr(circumstances, label), label)
@@ -167,10 +187,18 @@ def new_tap_id(circumstances: Circumstances) -> str:
 
 
 def named_in_id(name: str) -> str:
-    """A name as it stands in identities; empty where nothing of it can."""
+    """A name as it stands in identities; empty where nothing of it can.
+
+    >>> named_in_id("Mill 3 / old"), named_in_id("Fräse")
+    ('Mill-3-old', 'Fr-se')
+    """
     return re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-")[:24]
 
 
 def machine_of(tap_id: str) -> str:
-    """Name of the machine as it stands in an identity; empty where that is none of `new_tap_id`."""
+    """Name of the machine as it stands in an identity; empty where that is none of `new_tap_id`.
+
+    >>> machine_of("20260302T093000.000000Z_Mill-3_D16_x_1a2b"), machine_of("hit.lvm")
+    ('Mill-3', '')
+    """
     return tap_id.split("_")[1] if re.match(r"\d{8}T\d{6}\.\d{6}Z_", tap_id) else ""

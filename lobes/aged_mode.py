@@ -18,6 +18,14 @@ def aged_mode(baseline: Mode, ratio: float, rule: Rule, stiffness_ratio: float |
     `stiffness_ratio`, the ratio of modal stiffness of a recalibrated model; without one K stays, and `method` says so.
     "paper": K times `ratio`, as Gaber & Hashemi (2015) assume (K x 0.9 for f x 0.9); no stiffness_ratio. The covariance
     is scaled along. Raises ValueError for ratios <= 0 and a stiffness_ratio that does not go with the rule.
+
+    >>> new = Mode(frequency=1000.0, damping_ratio=0.03, stiffness=2e7)
+    >>> old = aged_mode(new, 0.9, "paper")
+    >>> round(old.frequency), round(old.stiffness / 1e6, 1)  # Hz, N/um
+    (900, 18.0)
+    >>> old = aged_mode(new, 0.9, "measured", stiffness_ratio=0.85)
+    >>> round(old.frequency), round(old.stiffness / 1e6, 1)
+    (900, 17.0)
     """
     if rule not in get_args(Rule):
         raise ValueError(f"rule={rule!r} is none of {', '.join(get_args(Rule))}; choose what K does when f_n falls")

@@ -30,6 +30,17 @@ def average_angle(x: Tip | None, y: Tip | None, cut: Cut, speed_rpm: ArrayLike) 
     Raises ValueError for speeds not > 0, two rigid directions, an empty list of modes, modes of negative stiffness,
     and FRFs without a common band.
     Source: Tlusty; Schmitz & Smith, Machining Dynamics, ch. 4.
+
+    Of one mode in the feed the limit at the worst speed is 2 K zeta (1 + zeta) / (Ks mu_x Nt*):
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> half = Cut(teeth=2, immersion=0.5, direction="up", tangential=700e6, radial=200e6)
+    >>> lobes = average_angle([mode], None, half, np.linspace(4000.0, 16000.0, 4001))
+    >>> round(float(lobes.depth.min()) * 1e3, 3)  # mm
+    3.627
+    >>> factor = half.specific_force * half.orientation_factors[0] * half.teeth_in_cut
+    >>> round(2 * 2e7 * 0.02 * (1 + 0.02) / factor * 1e3, 3)
+    3.627
     """
     speed = check_speeds(speed_rpm)
     tips = tip_responses(x, y, cut.teeth * float(speed.max()) / 60)

@@ -11,7 +11,14 @@ from lobes.specific_force import SpecificForce
 
 @dataclass(frozen=True)
 class Coefficients:
-    """Cutting coefficients of one material: cutting force per chip area, edge force per length of edge."""
+    """Cutting coefficients of one material: cutting force per chip area, edge force per length of edge.
+
+    >>> material = find_materials("7075-T6")[0]
+    >>> f"Ktc {material.tangential / 1e6:.0f} N/mm2, Krc {material.radial / 1e6:.0f} N/mm2"
+    'Ktc 767 N/mm2, Krc 169 N/mm2'
+    >>> material.source
+    'Chinese J. Mech. Eng. 2021, 10.1186/s10033-021-00536-9, Table 5 ref. 190'
+    """
 
     material: str
     """Material, tool and coolant, e.g. "Al 7075-T6 (carbide; dry)"."""
@@ -59,6 +66,10 @@ def tangential_and_radial(specific_force: float, force_angle: float) -> tuple[fl
     """Ktc and Krc (Pa) from Ks (Pa) and the angle beta (rad): Ktc = Ks sin(beta), Krc = Ks cos(beta).
 
     The way back is `Cut.specific_force` and `Cut.force_angle`. Raises ValueError for Ks <= 0 or beta outside (0, pi/2].
+
+    >>> ktc, krc = tangential_and_radial(750e6, np.radians(68.0))
+    >>> round(float(ktc) / 1e6, 1), round(float(krc) / 1e6, 1)  # N/mm2
+    (695.4, 281.0)
     """
     if not (np.isfinite(specific_force) and specific_force > 0):
         raise ValueError(f"specific_force={specific_force} Pa is not a finite number > 0; 1 MPa (N/mm^2) is 1e6 Pa")

@@ -47,6 +47,13 @@ class Cut:
     of depth b answers the displacement q = (x, y) with the force F = -b H(phi) (q(t) - q(t - tau)),
     H = [[(Kt c + Kr s) s, (Kt c + Kr s) c], [(-Kt s + Kr c) s, (-Kt s + Kr c) c]], s = sin phi, c = cos phi,
     tau the time since the tooth before it passed. Raises ValueError for a value that is no cut.
+
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> round(float(np.degrees(slot.exit_angle - slot.entry_angle))), slot.teeth_in_cut  # degrees, -
+    (180, 1.0)
+    >>> side = Cut(teeth=4, immersion=0.25, direction="down", tangential=700e6, radial=200e6)
+    >>> round(float(np.degrees(side.entry_angle)), 1), round(float(np.degrees(side.exit_angle)), 1)  # degrees
+    (120.0, 180.0)
     """
 
     teeth: int

@@ -22,6 +22,13 @@ class SldHistory:
 
     A history begins with arrays of no rows (n = 0): they fix the names and the row shapes. Raises ValueError for
     names that cannot be stored, arrays of different n, values that are neither numbers nor text, and depths <= 0.
+
+    >>> speeds = np.linspace(4000.0, 18000.0, 8)  # rpm
+    >>> columns, depth = {"frequency": np.empty(0)}, {"slot": np.empty((0, 8))}
+    >>> empty = SldHistory("", "lobewatch", speeds, columns, depth, {"frequency": "Hz"})
+    >>> history = empty.append({"frequency": 696.2}, {"slot": np.full(8, 1.2e-3)})
+    >>> history.columns["frequency"].tolist(), history.depth["slot"].shape
+    ([696.2], (1, 8))
     """
 
     settings_hash: str

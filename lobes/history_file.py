@@ -28,7 +28,18 @@ HEAD_SIZE = 512
 
 
 def write_history(path: str | os.PathLike[str], history: SldHistory) -> None:
-    """Write the whole file anew: complete under its name, or the old one as it was. OSError where that fails."""
+    """Write the whole file anew: complete under its name, or the old one as it was. OSError where that fails.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> speeds = np.linspace(4000.0, 18000.0, 8)  # rpm
+    >>> columns, depth = {"frequency": np.array([696.2])}, {"slot": np.full((1, 8), 1.2e-3)}
+    >>> history = SldHistory("", "lobewatch", speeds, columns, depth)
+    >>> with TemporaryDirectory() as folder:
+    ...     write_history(f"{folder}/history.h5", history)
+    ...     again = read_history(f"{folder}/history.h5")
+    >>> again.columns["frequency"].tolist()
+    [696.2]
+    """
     buffer = io.BytesIO()
     with h5py.File(buffer, "w", userblock_size=HEAD_SIZE) as file:
         file.attrs.update(

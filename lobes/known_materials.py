@@ -18,19 +18,31 @@ def cutting_coefficients() -> tuple[Coefficients, ...]:
 
 
 def folded_name(name: str) -> str:
-    """A name of a material without what is forgiven: case and blanks."""
+    """A name of a material without what is forgiven: case and blanks.
+
+    >>> folded_name("Al 7075-T6") == folded_name("AL7075-t6")
+    True
+    """
     return "".join(name.split()).casefold()
 
 
 @cache
 def materials_by_name() -> Mapping[str, Coefficients]:
-    """The coefficients by each of their names, folded."""
+    """The coefficients by each of their names, folded.
+
+    >>> materials_by_name()[folded_name("AA 7075")].names
+    ('EN AW-7075', '3.4365', 'AlZn5.5MgCu', 'AlZnMgCu1.5', 'AA 7075', 'UNS A97075')
+    """
     known = ((name, one) for one in cutting_coefficients() for name in one.names)
     return MappingProxyType({folded_name(name): one for name, one in known})
 
 
 def nearest_name(name: str, by_name: Mapping[str, Coefficients]) -> str:
-    """The known name, as it is written, that is most like one that is not; by_name: materials by folded names."""
+    """The known name, as it is written, that is most like one that is not; by_name: materials by folded names.
+
+    >>> nearest_name("AA 7057", materials_by_name())
+    'AA 7075'
+    """
     nearest = difflib.get_close_matches(folded_name(name), by_name, n=1, cutoff=0.0)[0]
     return next(known for known in by_name[nearest].names if folded_name(known) == nearest)
 
@@ -39,6 +51,11 @@ def find_materials(word: str) -> list[Coefficients]:
     """Those of a group of ISO 513 (one letter), else those that have the word in one of their names; "": all.
 
     Case and blanks do not count. Raises ValueError where there are none.
+
+    >>> sorted({material.alloy for material in find_materials("7075")})
+    ['Al 7075']
+    >>> len(find_materials("N")) >= 10  # group N of ISO 513: all that is not ferrous
+    True
     """
     folded, known = folded_name(word), cutting_coefficients()
     of_group = [one for one in known if folded and one.iso_group.casefold() == folded]

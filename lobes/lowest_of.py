@@ -15,6 +15,13 @@ def lowest_of(diagrams: Sequence[StabilityLobes]) -> StabilityLobes:
     """At each speed the limit, frequency and kind of the lowest, such as of the directions of feed of one cut.
 
     All by one method at the same speeds. The lobes and remarks of all are kept, each remark once.
+
+    >>> x, y = Mode(500.0, 0.02, 2e7), Mode(700.0, 0.02, 2e7)
+    >>> along_x = Cut(teeth=2, immersion=0.5, direction="up", tangential=700e6, radial=200e6)
+    >>> speeds = [9000.0, 12000.0, 15000.0]
+    >>> fed = [zero_order([x], [y], along_x, speeds), zero_order([y], [x], along_x, speeds)]
+    >>> [(lobes.depth * 1e3).round(2).tolist() for lobes in (*fed, lowest_of(fed))]  # mm
+    [[4.3, 12.54, 8.37], [18.35, 5.59, 22.18], [4.3, 5.59, 8.37]]
     """
     first = diagrams[0]
     lowest, speed = np.argmin([diagram.depth for diagram in diagrams], axis=0), np.arange(first.speed_rpm.size)

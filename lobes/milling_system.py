@@ -70,6 +70,12 @@ def milling_system(
     vectors: parts in x and y of what each mode of x, then of y, takes of a force and shows, shape (n, 2); a unit vector
     where its stiffness is that along its own axis. None: each lies in its direction. Raises ValueError for FRFs, for
     two rigid directions, an empty list, modes of negative stiffness, and vectors that do not fit the modes.
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> system = milling_system([mode], [mode])
+    >>> at_resonance = system.receptance(np.array(500.0))  # m/N, (2, 2): 1 / (2 i zeta K) on the diagonal
+    >>> (at_resonance * 2 * 0.02 * 2e7).round(6).tolist()
+    [[-1j, 0j], [0j, -1j]]
     """
     given = [(axis, name, modes) for axis, name, modes in ((0, "x", x), (1, "y", y)) if modes is not None]
     if not given:

@@ -49,6 +49,9 @@ def half_wave_deg(speed_rpm: float, chatter_frequency: float) -> float:
     The closed form of the best difference for an even number of teeth, after which the waves that two neighbours leave
     cancel. Source: Budak, An analytical design method for milling cutters with nonconstant pitch to increase stability,
     J. Manuf. Sci. Eng. 125 (2003) 29-34, after Altintas, Engin & Budak, J. Manuf. Sci. Eng. 121 (1999) 173-178.
+
+    >>> half_wave_deg(6000.0, 1000.0)  # degrees: ten waves a turn, each of 36
+    18.0
     """
     return 180 * speed_rpm / 60 / chatter_frequency
 
@@ -58,6 +61,10 @@ def pitch_patterns(teeth: int, half_wave: float) -> Iterator[PitchPattern]:
 
     Pitches rise by equal steps over so many teeth as divide the number of all, two of them alternate, and begin anew.
     Those beyond `MOST_UNEVEN` or `MOST_OFF_CENTRE` are left out. Raises ValueError for less than two teeth.
+
+    >>> patterns = list(pitch_patterns(4, half_wave_deg(6000.0, 1800.0)))
+    >>> [(pattern.name, pattern.pitch_deg) for pattern in (patterns[5], patterns[-1])]  # degrees
+    [('alternating', (85.0, 95.0, 85.0, 95.0)), ('linear', (75.0, 85.0, 95.0, 105.0))]
     """
     if teeth < 2:
         raise ValueError(f"teeth={teeth}: a cutter of one tooth has no pitch to divide; pitches need two teeth or more")
@@ -80,10 +87,20 @@ def _pattern(teeth: int, block: int, difference: float) -> PitchPattern:
 
 
 def equal_pitch(teeth: int) -> PitchPattern:
-    """Evenly spaced teeth."""
+    """Evenly spaced teeth.
+
+    >>> equal_pitch(4).pitch_deg
+    (90.0, 90.0, 90.0, 90.0)
+    """
     return PitchPattern((360 / teeth,) * teeth, "equal")
 
 
 def with_pattern(cut: Cut, pattern: PitchPattern) -> Cut:
-    """A cut by a cutter with these pitches."""
+    """A cut by a cutter with these pitches.
+
+    >>> side = Cut(teeth=4, immersion=0.25, direction="down", tangential=700e6, radial=200e6)
+    >>> uneven = with_pattern(side, PitchPattern((85.0, 95.0, 85.0, 95.0), "alternating"))
+    >>> uneven.repeats, np.degrees(uneven.delays).round(6).tolist()  # times in a turn, degrees
+    (2, [85.0, 95.0])
+    """
     return replace(cut, pitch=tuple(np.radians(pattern.pitch_deg).tolist()))

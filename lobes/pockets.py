@@ -52,6 +52,17 @@ def pockets(lobes: StabilityLobes, deepest: ArrayLike) -> list[Pocket]:
 
     `deepest` is what the flutes or the drive (`lobes.deepest_for_drive`) allow. A pocket that the range of speeds cuts
     through counts with what is inside. Raises ValueError for a `deepest` that is not > 0.
+
+    The fastest pocket is where the teeth come as often as the mode swings, at 60 f / N = 15000 rpm:
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> lobes = zero_order([mode], [mode], slot, np.linspace(4000.0, 18000.0, 701))
+    >>> for pocket in pockets(lobes, deepest=5e-3)[1:]:  # the first is cut by the end of the speeds
+    ...     print(f"{pocket.from_rpm:.0f} to {pocket.to_rpm:.0f} rpm: {pocket.depth * 1e3:.2f} mm")
+    4841 to 5116 rpm: 5.00 mm
+    7011 to 7860 rpm: 5.00 mm
+    12707 to 16955 rpm: 5.00 mm
     """
     order = np.argsort(lobes.speed_rpm)
     most = np.broadcast_to(np.asarray(deepest, dtype=np.float64), lobes.speed_rpm.shape)[order]
@@ -79,7 +90,12 @@ def _ends(speed: NDArray[np.float64], depth: NDArray[np.float64], peak: int) -> 
 
 
 def best_pockets(found: Sequence[Pocket], count: int = 3, by: str = "depth") -> list[Pocket]:
-    """The best pockets first, by "depth" or by "removal" (depth times speed: chip volume at one feed per tooth)."""
+    """The best pockets first, by "depth" or by "removal" (depth times speed: chip volume at one feed per tooth).
+
+    >>> few = [Pocket(5000.0, 3e-3, 4900.0, 5100.0), Pocket(15000.0, 2e-3, 14500.0, 15500.0)]
+    >>> best_pockets(few, 1)[0].speed_rpm, best_pockets(few, 1, by="removal")[0].speed_rpm  # rpm
+    (5000.0, 15000.0)
+    """
     if by not in ("depth", "removal"):
         raise ValueError(f'by={by!r} is neither "depth" nor "removal"; choose what is best')
 
@@ -94,6 +110,12 @@ def pocket_shifts(then: StabilityLobes, now: StabilityLobes, deepest: float) -> 
 
     Pocket k stands at about 60 f / (N k): all move by one ratio, which the median of the chatter frequencies tells.
     Those at an end of the range of speeds are left out: their tops lie outside.
+
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> new, old = ([Mode(f, damping_ratio=0.02, stiffness=2e7)] for f in (500.0, 450.0))  # 10 % lower
+    >>> then, now = (zero_order(m, m, slot, np.linspace(4000.0, 18000.0, 701)) for m in (new, old))
+    >>> [round(shift.speed_change, 2) for shift in pocket_shifts(then, now, deepest=5e-3)]
+    [-0.1, -0.1, -0.1]
     """
     before, after = _inside(then, deepest), _inside(now, deepest)
     if not before or not after:

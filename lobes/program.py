@@ -19,7 +19,14 @@ SHARES = (0.25, 0.5, 0.75, 1.0)
 
 @dataclass(frozen=True)
 class Program:
-    """A cut at a speed and an axial depth. Raises ValueError where one is not > 0."""
+    """A cut at a speed and an axial depth. Raises ValueError where one is not > 0.
+
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> Program(slot, speed_rpm=12000.0, depth=-0.002)
+    Traceback (most recent call last):
+        ...
+    ValueError: depth=-0.002 m is not a finite depth > 0; 1 mm is 1e-3
+    """
 
     cut: Cut
     """Cutter, immersion and material."""

@@ -35,6 +35,12 @@ def radial_lobes(limits: Callable[[Cut], StabilityLobes], cut: Cut, immersion: A
         radial_lobes(lambda cut: stability_boundary(x, y, cut, speeds, 0.02), cut, np.linspace(0.05, 1, 20))
 
     Raises ValueError for immersions that are none.
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> chart = radial_lobes(lambda cut: zero_order([mode], [mode], cut, [9000.0]), slot, [0.25, 0.5, 1.0])
+    >>> (chart.depth * 1e3).round(2).tolist()  # mm, by radial depth
+    [[6.76], [3.29], [1.28]]
     """
     shares = np.atleast_1d(np.asarray(immersion, dtype=np.float64))
     if shares.ndim != 1 or shares.size == 0:

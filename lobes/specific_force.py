@@ -10,7 +10,17 @@ MM = 1e-3
 
 @dataclass(frozen=True)
 class SpecificForce:
-    """Specific cutting force as a publication gives it."""
+    """Specific cutting force as a publication gives it.
+
+    Kienzle's force per width kc1.1 h^(1 - mc) is Ktc h + Kte around one chip thickness:
+
+    >>> steel = SpecificForce(at_1_mm=1500e6, exponent=0.25, source="")
+    >>> ktc, kte = steel.tangential(0.1e-3), steel.tangential_edge(0.1e-3)
+    >>> round(ktc / 1e6), round(kte / 1e3, 1)  # N/mm2, N/mm
+    (2001, 66.7)
+    >>> round((ktc * 0.1e-3 + kte) / 1e3, 1), round(1500 * 0.1**0.75, 1)  # N/mm
+    (266.7, 266.7)
+    """
 
     at_1_mm: float
     """kc1.1, the force per area of a chip 1 mm thick and 1 mm wide (Pa)."""

@@ -46,6 +46,14 @@ class StabilityLobes:
     """Limiting axial depth of cut over spindle speed.
 
     Raises ValueError where shapes differ, a speed or a depth is not > 0, or a depth is NaN.
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> lobes = zero_order([mode], [mode], slot, np.linspace(4000.0, 18000.0, 701))
+    >>> (lobes.depth_at([9000.0, 15000.0]) * 1e3).round(3).tolist()  # mm
+    [1.278, 18.766]
+    >>> lobes.is_stable([9000.0, 15000.0], 0.5e-3).tolist()
+    [True, True]
     """
 
     speed_rpm: NDArray[np.float64]

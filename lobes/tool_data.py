@@ -44,12 +44,22 @@ class PublishedRange:
 
 
 def cut_kind(immersion: float) -> CutKind:
-    """Kind of a cut by its radial depth over diameter (-)."""
+    """Kind of a cut by its radial depth over diameter (-).
+
+    >>> cut_kind(1.0), cut_kind(0.1)
+    ('slot', 'side')
+    """
     return "slot" if immersion >= SLOT_FROM else "side"
 
 
 def cutting_speed(material: Coefficients, tool: ToolMaterial, cut: CutKind) -> PublishedRange | None:
-    """Speeds of the edge (m/s) that are published; None where none are."""
+    """Speeds of the edge (m/s) that are published; None where none are.
+
+    >>> aluminium = materials_by_name()[folded_name("AA 7075")]
+    >>> speed = cutting_speed(aluminium, "carbide", "side")
+    >>> f"{speed.low * 60:.0f} to {speed.high * 60:.0f} m/min"
+    '148 to 1250 m/min'
+    """
     rows = _rows_of("cutting_speeds.csv", material, tool, cut)
     ranges = [(float(row["low_m_per_min"]) / 60, float(row["high_m_per_min"]) / 60) for row in rows]
     return _joined(ranges, rows)
@@ -59,6 +69,11 @@ def feed_per_tooth(material: Coefficients, tool: ToolMaterial, cut: CutKind, dia
     """Feeds per tooth (m) that are published for tools of a diameter (m); None where none are.
 
     Between the diameters of a source on a line, below them in proportion to the diameter, above them as at the last.
+
+    >>> aluminium = materials_by_name()[folded_name("AA 7075")]
+    >>> feed = feed_per_tooth(aluminium, "carbide", "side", diameter=12e-3)
+    >>> f"{feed.low * 1e3:.3f} to {feed.high * 1e3:.3f} mm"
+    '0.075 to 0.150 mm'
     """
     rows = _rows_of("feeds_per_tooth.csv", material, tool, cut)
     sources = dict.fromkeys(row["source"] for row in rows)
@@ -66,7 +81,12 @@ def feed_per_tooth(material: Coefficients, tool: ToolMaterial, cut: CutKind, dia
 
 
 def fastest_of_all(material: Coefficients, cut: CutKind) -> PublishedRange | None:
-    """Speeds of the edge (m/s) up to the highest that is published of any tool material; None where none are."""
+    """Speeds of the edge (m/s) up to the highest that is published of any tool material; None where none are.
+
+    >>> aluminium = materials_by_name()[folded_name("AA 7075")]
+    >>> round(fastest_of_all(aluminium, "side").high * 60)  # m/min
+    1250
+    """
     known = [speed for tool in TOOL_MATERIALS if (speed := cutting_speed(material, tool, cut))]
     if not known:
         return None

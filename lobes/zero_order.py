@@ -41,6 +41,18 @@ def zero_order(
     its own lines. A depth of inf means no chatter there. Raises ValueError as `average_angle` does, and for a cross FRF
     without both directions.
     Source: Altintas & Budak, Analytical prediction of stability lobes in milling, CIRP Annals 44 (1995) 357-362.
+
+    In a slot the eigenvalues of H0 are N (Kr +- i Kt) / 4, and with them L in closed form where x and y are alike:
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> lobes = zero_order([mode], [mode], slot, np.linspace(4000.0, 16000.0, 1001))
+    >>> lowest = lobes.minimum
+    >>> f"{lowest.depth * 1e3:.3f} mm at {lowest.chatter_frequency:.0f} Hz"
+    '1.123 mm at 501 Hz'
+    >>> L = [2 / 4 * (200e6 + sign * 700e6j) * mode.receptance(np.linspace(400.0, 600.0, 2001)) for sign in (1, -1)]
+    >>> f"{-1e3 / (2 * np.real(L).min()):.3f} mm"
+    '1.123 mm'
     """
     speed = check_speeds(speed_rpm)
     tips = tip_responses(x, y, cut.teeth * float(speed.max()) / 60)

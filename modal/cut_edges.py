@@ -25,6 +25,10 @@ def cut_edges(frf: Frf, modes: Sequence[Mode], band: tuple[float, float] | None 
     There |mobility| falls from the edge inwards below 1/sqrt(2) of its value and is more real than imaginary, as it
     is between the half-power points of a mode; on the line of a mass or a spring it is imaginary. Its real part
     falls with it, which it does not between a peak and an antiresonance. Raises ValueError as `usable_lines`.
+
+    >>> frf = synthesize([Mode(500.0, 0.02, 2e7)], np.arange(505.0, 1001.0))  # begins on the flank of a peak
+    >>> cut_edges(frf, [])
+    [505.0]
     """
     lines = usable_lines(frf, band)
     f, mobility = lines.frequency, lines.mobility

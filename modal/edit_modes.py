@@ -36,6 +36,11 @@ def edit_modes(state: Extraction, edits: ModeEdits) -> Extraction:
     All modes of a band are fitted anew together then, and the others with their tails. Raises ValueError for a
     frequency outside the lines, one without a mode within 1 % to leave out, one near which no further mode fits, and
     one where nothing of a held damping is to be seen.
+
+    >>> frf = synthesize([Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 5e7)], np.arange(1.0, 1501.0))
+    >>> edited = edit_modes(extract([frf]), ModeEdits(drop=(900.0,)))
+    >>> [round(mode.frequency, 1) for mode in modes_of(edited)]  # Hz
+    [500.0]
     """
     if not edits:
         return state

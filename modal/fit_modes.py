@@ -44,12 +44,23 @@ def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[
 
     Raises ValueError for fewer than 8 usable lines, an FRF of zeros, one with its phase conjugated, one without
     phase, and hits that have other lines than the FRF or no pulse.
+
+    >>> frf = synthesize([Mode(500.0, 0.02, 2e7), Mode(520.0, 0.02, 4e7)], np.arange(1.0, 1501.0))
+    >>> for mode in fit_modes(frf, band=(100.0, 1000.0)):
+    ...     print(f"{mode.frequency:.2f} Hz, {mode.damping_ratio:.4f}, {mode.stiffness / 1e6:.2f} N/um")
+    500.00 Hz, 0.0200, 20.00 N/um
+    520.00 Hz, 0.0200, 40.00 N/um
     """
     return modes_of(extract([frf], band), [hits])
 
 
 def modes_of(state: Extraction, hits: Sequence[Sequence[Hit]] = ()) -> list[Mode]:
-    """Modes of an extraction, by rising frequency; hits: for each of its FRFs those that it was averaged from."""
+    """Modes of an extraction, by rising frequency; hits: for each of its FRFs those that it was averaged from.
+
+    >>> state = extract([synthesize([Mode(500.0, 0.02, 2e7)], np.arange(1.0, 1501.0))])
+    >>> [f"{mode.frequency:.1f} Hz" for mode in modes_of(state)]
+    ['500.0 Hz']
+    """
     if hits and len(hits) != len(state.frfs):
         raise ValueError(f"hits of {len(hits)} FRFs for {len(state.frfs)}; give a list of hits for each, maybe empty")
     without = [left_out(hits_of_frf, frf) for hits_of_frf, frf in zip(hits, state.frfs, strict=False)]

@@ -26,5 +26,11 @@ def fit_points(
 
     Raises ValueError as `fit_modes`, for no FRF, for FRFs with different lines, and for another number of lists of
     hits than FRFs.
+
+    >>> line = np.arange(1.0, 1001.0)
+    >>> tip, nose = synthesize([Mode(500.0, 0.02, 2e7)], line), synthesize([Mode(500.0, 0.02, -4e7)], line)
+    >>> (mode,) = fit_points([tip, nose])
+    >>> f"{mode.frequency:.1f} Hz, K = {mode.stiffness / 1e6:.1f} N/um, shape {mode.shape.round(3).tolist()}"
+    '500.0 Hz, K = 20.0 N/um, shape [1.0, -0.5]'
     """
     return modes_of(extract(frfs, band), hits)

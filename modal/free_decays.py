@@ -26,6 +26,12 @@ def fit_decays(decays: ArrayLike, sample_rate: float, band: tuple[float, float] 
     and `modes_of_decays` one after the other. sample_rate in Hz.
 
     Raises ValueError as `fit_modes`, and for decays of zeros, values that are not finite, or fewer than 32 samples.
+
+    >>> time = np.arange(2048) / 10240.0  # s
+    >>> decay = np.exp(-0.02 * 2 * np.pi * 500.0 * time) * np.cos(2 * np.pi * 500.0 * np.sqrt(1 - 0.02**2) * time)
+    >>> (mode,) = fit_decays([300.0 * decay, 200.0 * decay, 250.0 * decay], 10240.0)  # m/s^2, Hz
+    >>> f"{mode.frequency:.2f} Hz, {mode.damping_ratio:.4f}, K {mode.stiffness}"
+    '500.00 Hz, 0.0200, K nan'
     """
     return modes_of_decays(extract(decay_spectra(decays, sample_rate), band))
 
@@ -39,6 +45,12 @@ def decay_spectra(decays: ArrayLike, sample_rate: float) -> list[Frf]:
     smooth over the lines of a mode, and does not move its pole either.
 
     Source: Ewins, Modal Testing, ch. 2 and 4; Brown, Allemang, Zimmerman & Mergeay (1979), SAE paper 790221.
+
+    >>> time = np.arange(2048) / 10240.0  # s
+    >>> decay = np.exp(-0.02 * 2 * np.pi * 500.0 * time) * np.sin(2 * np.pi * 500.0 * time)
+    >>> (spectrum,) = decay_spectra([300.0 * decay], 10240.0)
+    >>> float(spectrum.frequency[abs(spectrum.accelerance).argmax()]), spectrum.measured_as  # Hz
+    (500.0, 'accelerance')
     """
     records = np.atleast_2d(np.asarray(decays, dtype=np.float64))
     if records.ndim != 2 or records.shape[1] < 32:

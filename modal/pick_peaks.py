@@ -24,6 +24,11 @@ def pick_peaks(frf: Frf, band: tuple[float, float] | None = None) -> list[Mode]:
     Source: Gaber & Hashemi (2015), eqs. (28)-(29).
 
     Raises ValueError as `fit_modes`.
+
+    >>> frf = synthesize([Mode(500.0, 0.02, 2e7)], np.arange(300.0, 700.0, 0.1))
+    >>> (picked,) = pick_peaks(frf)
+    >>> f"{picked.frequency:.1f} Hz, {picked.damping_ratio:.4f}, {picked.stiffness / 1e6:.2f} N/um"
+    '499.9 Hz, 0.0200, 19.99 N/um'
     """
     lines = usable_lines(frf, band)
     picked = [_pick(lines, resonance) for resonance in find_resonances(lines)]

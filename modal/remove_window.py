@@ -28,6 +28,10 @@ def remove_window(mode: Mode, time_constant: float, delay: float = 0.0) -> Mode:
     decays no faster than the window.
     Source: Fladung & Rost (1997), Application and correction of the exponential window for FRFs, Mechanical Systems
     and Signal Processing 11, 23.
+
+    >>> windowed = Mode(500.0, 0.02 + 1 / (2 * np.pi * 500.0 * 0.1), 2e7)  # exp(-t / 0.1 s) over the response
+    >>> round(remove_window(windowed, 0.1).damping_ratio, 4)
+    0.02
     """
     if not (np.isfinite(time_constant) and time_constant > 0):
         raise ValueError(f"time_constant={time_constant} s is not a finite number > 0")
@@ -65,6 +69,11 @@ def with_windowed_noise(mode: Mode, time_constant: float, record: float) -> Mode
     short one. A fit takes them all for independent. What the scatter of the hits says holds anyhow.
 
     Source: Harris (1978), On the use of windows for harmonic analysis, Proc. IEEE 66, 51 (noise bandwidth).
+
+    >>> mode = Mode(500.0, 0.02, 2e7, covariance=np.diag([0.1, 0.001, 1e5]) ** 2)
+    >>> widened = with_windowed_noise(mode, time_constant=0.05, record=0.8)  # s
+    >>> (widened.fit_error / mode.fit_error).round(2).tolist()  # sqrt(record / time constant) = 4
+    [4.0, 4.0, 4.0]
     """
     if mode.covariance is None:
         return mode

@@ -23,7 +23,15 @@ def driver_names() -> tuple[str, ...]:
 
 
 def find_driver(name: str) -> Driver:
-    """The driver of this name; DataError where there is none, or where its package cannot be loaded."""
+    """The driver of this name; DataError where there is none, or where its package cannot be loaded.
+
+    >>> find_driver("taps").title
+    'a TAPS/1 device'
+    >>> find_driver("tap")
+    Traceback (most recent call last):
+        ...
+    acquisition.errors.DataError: driver='tap' is none of taps, dataq, lines, audio, nidaqmx, mcc172, ...
+    """
     driver = _find(name)
     if isinstance(driver, Remark):
         raise DataError(str(driver))

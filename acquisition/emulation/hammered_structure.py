@@ -19,7 +19,14 @@ _HARMONICS = np.array([3 / 8, -1 / 2, 1 / 8])
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """Dynamics from where a hammer hits to where a sensor sits: modes with viscous damping and a static residual."""
+    """Dynamics from where a hammer hits to where a sensor sits: modes with viscous damping and a static residual.
+
+    >>> spindle = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
+    >>> time = np.arange(4096) / 10240.0
+    >>> response = spindle.response(time, width=1e-3)  # m/s^2 after a pulse of 1 N
+    >>> bool(abs(response[time > 0.3]).max() < 1e-3 * abs(response).max())
+    True
+    """
 
     frequency: NDArray[np.float64]
     """Undamped natural frequencies (Hz), shape (n,)."""
@@ -31,7 +38,7 @@ class Structure:
     """Static flexibility of all other modes (m/N)."""
 
     def response(self, time: NDArray[np.floating[Any]], width: float) -> NDArray[np.float64]:
-        """Acceleration (m/s^2) at times (s) after the start of a pulse of 1 N and this width T (s)."""
+        """Acceleration (m/s^2) at times (n,) in s after the start of a pulse sin^4(pi t/T) of 1 N, T its width (s)."""
         w = 2 * np.pi * self.frequency
         nu = 2 * np.pi / width * np.arange(3)
         decay = self.damping_ratio * w

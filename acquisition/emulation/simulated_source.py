@@ -24,7 +24,13 @@ def quantise(signal: NDArray[np.float64], channels: tuple[Channel, ...]) -> NDAr
 
 
 class SimulatedSource:
-    """Scans of a signal function, as fast as they are asked for."""
+    """Scans of a signal function, as fast as they are asked for.
+
+    >>> sensors = (Channel("force", 2.25e-3, 5.0),)
+    >>> quiet = SimulatedSource(lambda first, n: np.zeros((1, n)), sensors, 10240.0, n_scans=1000)
+    >>> [block.codes.shape for block in quiet.blocks()]  # channels, scans
+    [(1, 512), (1, 512)]
+    """
 
     identity = DeviceIdentity("simulation")
     follows_clock = False

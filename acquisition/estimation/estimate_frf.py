@@ -30,6 +30,15 @@ def estimate_frf(hits: Sequence[Hit], estimator: Estimator = "H1") -> Frf:
     Lines that no hit excites, beyond the usable band, have receptance 0 and coherence 0.
 
     Raises ValueError for no hits, hits of different length or rate, and hits without a pulse.
+
+    >>> time = np.arange(-100, 4000) / 10240.0
+    >>> force = 200 * np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)  # N
+    >>> structure = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
+    >>> hit = Hit(force, 200 * structure.response(time, 1e-3), 10240.0, pre_trigger=100)
+    >>> frf = estimate_frf([hit])
+    >>> peak = abs(frf.in_band((300.0, 700.0)).receptance).max()
+    >>> round(float(peak) * 1e6, 2), 1 / (2 * 0.02 * 2e7) * 1e6  # um/N; 1 / (2 zeta K)
+    (1.25, 1.25)
     """
     if estimator not in get_args(Estimator):
         raise ValueError(f"estimator={estimator!r} is none of {', '.join(get_args(Estimator))}")
@@ -56,7 +65,14 @@ def _quotient(dividend: NDArray[Any], power: NDArray[np.float64], excited: NDArr
 
 
 def cross_spectra(hits: Sequence[Hit]) -> Spectra:
-    """Mean auto-spectra S_ff (N^2), S_xx ((m/s^2)^2) and cross-spectrum S_fx of the hits, each (n // 2 + 1,)."""
+    """Mean auto-spectra S_ff (N^2), S_xx ((m/s^2)^2) and cross-spectrum S_fx of the hits, each (n // 2 + 1,).
+
+    >>> force = np.zeros(1000)
+    >>> force[100:110] = 200.0  # N
+    >>> s_ff, s_xx, s_fx = cross_spectra([Hit(force, force / 2.0, 10000.0, pre_trigger=100)])  # of a mass of 2 kg
+    >>> round(float((s_fx[10] / s_ff[10]).real), 6)  # 1/kg
+    0.5
+    """
     if not hits:
         raise ValueError("there is no hit to average; at least one is needed")
     shapes = {(hit.force.size, hit.sample_rate) for hit in hits}

@@ -29,6 +29,18 @@ def look(path: Path | str, said: Description = NOTHING) -> Recording:
     """A recorded file as it is understood, what is missing or wrong in it told as its `complaint`.
 
     DataError for a file that is damaged or of no format that is known.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> line = np.arange(400.0, 500.0)
+    >>> with TemporaryDirectory() as folder:
+    ...     table = np.column_stack([line, 0 * line, 0 * line - 1e-6])
+    ...     np.savetxt(f"{folder}/frf.csv", table, delimiter=",", header="frequency [Hz],real,imag", comments="")
+    ...     unclear = look(f"{folder}/frf.csv")
+    ...     clear = look(f"{folder}/frf.csv", Description(unit="m/N"))
+    >>> print(unclear.complaint)
+    it does not say: the unit of real (--unit, such as m/N, um/N, g/N)
+    >>> clear.complaint, clear.frf.frequency.size
+    ('', 100)
     """
     path = Path(path)
     file_format = format_of(path)
@@ -63,7 +75,20 @@ def _force_contents(path: Path, skip: int | None) -> Contents:
 
 
 def read_hits(path: Path | str, said: Description = NOTHING) -> list[Hit]:
-    """The hits in a recorded file of any known format; DataError where there are none."""
+    """The hits in a recorded file of any known format; DataError where there are none.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> time = np.arange(-100, 4000) / 10240.0
+    >>> force = 200 * np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)  # N
+    >>> structure = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
+    >>> with TemporaryDirectory() as folder:
+    ...     table = np.column_stack([time, force, 200 * structure.response(time, 1e-3) / STANDARD_GRAVITY])
+    ...     names = "time [s],force [N],response [g]"
+    ...     np.savetxt(f"{folder}/hit.csv", table, delimiter=",", header=names, comments="")
+    ...     (hit,) = read_hits(f"{folder}/hit.csv")
+    >>> f"{hit.sample_rate:.0f} Hz, {hit.force.max():.0f} N, {abs(hit.acceleration).max():.1f} m/s^2"
+    '10240 Hz, 199 N, 102.1 m/s^2'
+    """
     recording = read_recording(path, said)
     if isinstance(recording, Frf):
         raise DataError(f"{path}: holds an FRF, not the hits it was made from")
@@ -71,7 +96,18 @@ def read_hits(path: Path | str, said: Description = NOTHING) -> list[Hit]:
 
 
 def read_frf(path: Path | str, said: Description = NOTHING) -> Frf:
-    """The FRF that a recorded file holds, or that estimated (H1) from its good hits."""
+    """The FRF that a recorded file holds, or that estimated (H1) from its good hits.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> line = np.arange(400.0, 500.0)
+    >>> with TemporaryDirectory() as folder:
+    ...     table = np.column_stack([line, 0 * line, 0 * line - 1.0])
+    ...     names = "frequency [Hz],real [um/N],imag [um/N]"
+    ...     np.savetxt(f"{folder}/frf.csv", table, delimiter=",", header=names, comments="")
+    ...     frf = read_frf(f"{folder}/frf.csv")
+    >>> complex(frf.receptance[0])  # m/N
+    -1e-06j
+    """
     path = Path(path)
     file_format = format_of(path)
     if file_format.read_frf is not None:

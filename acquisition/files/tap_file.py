@@ -39,7 +39,18 @@ PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletch
 
 
 def write_tap(path: Path | str, tap: TapTest) -> bytes:
-    """Write a tap test, sealed; returns the bytes of the file, on the disk when this returns."""
+    """Write a tap test, sealed; returns the bytes of the file, on the disk when this returns.
+
+    >>> from datetime import UTC, datetime
+    >>> from tempfile import TemporaryDirectory
+    >>> tested = Circumstances("Mill 3", datetime(2026, 3, 2, 9, 30, tzinfo=UTC), tool="D16")
+    >>> frf = from_accelerance(np.arange(100.0, 200.0), np.full(100, 0.5))
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = write_tap(f"{folder}/tap.h5", TapTest(new_tap_id(tested), tested, frf))
+    ...     again = read_tap(f"{folder}/tap.h5")
+    >>> again.circumstances.tool, again.frf.frequency.size
+    ('D16', 100)
+    """
     content = tap_content(tap)
     atomic_write(Path(path), content)
     return content

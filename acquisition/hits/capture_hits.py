@@ -53,6 +53,16 @@ def capture_hits(source: Source, trigger: Trigger) -> Iterator[Hit]:
     """Hits of a started source, one after the other, unchecked; scans that were lost inside one are counted in it.
 
     Nothing is interpolated: a record with a gap has its samples closed up and `lost_scans` > 0.
+
+    >>> spindle = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
+    >>> careful = Hammering(double_hits=0.0, overloads=0.0)
+    >>> tapped = HammeredStructure(spindle, 10240.0, np.random.default_rng(1), careful)
+    >>> sensors = Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1e-3, 5.0)
+    >>> source = SimulatedSource(tapped, sensors, 10240.0, n_scans=20480)  # 2 s
+    >>> source.start()
+    >>> hits = list(capture_hits(source, Trigger(level=20.0, n_samples=2048, pre_trigger=100)))
+    >>> len(hits), [check_hit(hit) == HitFlags.OK for hit in hits]
+    (4, [True, True, True, True])
     """
     search = HitSearch(source.channels, source.sample_rate, trigger)
     for block in source.blocks():

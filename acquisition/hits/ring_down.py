@@ -20,6 +20,15 @@ def ring_down(hit: Hit) -> float:
 
     The slope of the logarithm of the response's envelope over the later half of what is visible; inf where nothing
     falls, 0 where nothing rings. Raises ValueError for a hit without a pulse.
+
+    >>> time = np.arange(-100, 4000) / 10240.0
+    >>> force = 200 * np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)  # N
+    >>> structure = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
+    >>> response = 200 * structure.response(time, 1e-3)
+    >>> noise = np.random.default_rng(1).normal(0.0, 0.1, time.size)
+    >>> tau = ring_down(Hit(force, response + noise, 10240.0, pre_trigger=100))
+    >>> round(tau * 1e3), round(1e3 / (0.02 * 2 * np.pi * 500.0))  # ms; 1 / (zeta w)
+    (16, 16)
     """
     start, end = _hit_at(hit)
     quiet = hit.acceleration[: max(start, 1)]

@@ -17,9 +17,9 @@ NO_PORTS = {
 """Cure by sys.platform."""
 
 
-def no_ports_hint(platform: str = sys.platform) -> str:
-    """What to do where no serial port exists, one sentence."""
-    cure = NO_PORTS.get(platform, "plug the DAQ in")
+def no_ports_hint(platform: str | None = None) -> str:
+    """What to do where no serial port exists, one sentence; platform as `sys.platform` names it, None: this one."""
+    cure = NO_PORTS.get(platform or sys.platform, "plug the DAQ in")
     return (
         f"No serial port on this computer: {cure}; try another cable, some carry no data. "
         "A DATAQ device shows none until its LED blinks yellow (CDC mode)."

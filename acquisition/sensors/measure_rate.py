@@ -29,7 +29,11 @@ BINS = 20
 
 @dataclass(frozen=True)
 class MeasuredRate:
-    """The rate of a stream of scans."""
+    """The rate of a stream of scans.
+
+    >>> MeasuredRate(rate=25600.2, std=0.5, n_scans=128000, seconds=5.0).is_sure
+    True
+    """
 
     rate: float
     """Scans a second (Hz)."""
@@ -56,6 +60,11 @@ def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float
 
     Raises ValueError for seconds that are not > 0, DeviceError where fewer than 10 blocks arrive or the stream ends
     before, and what the source raises.
+
+    >>> fast = SimulatedSource(lambda first, n: np.zeros((1, n)), (Channel("force", 2.25e-3, 5.0),), 10240.0, 10**6)
+    >>> ticks = iter(np.arange(10**6) * 0.05)  # s: a clock by which a block of 512 scans comes every 50 ms
+    >>> round(measure_rate(fast, seconds=5.0, clock=lambda: next(ticks)).rate)  # Hz
+    10240
     """
     if not (np.isfinite(seconds) and seconds > 0):
         raise ValueError(f"seconds={seconds} is not > 0; the rate of a device takes about 5 s")
@@ -82,7 +91,14 @@ def measure_rate(source: Source, seconds: float = 5.0, clock: Callable[[], float
 
 def check_rate(measured: MeasuredRate, nominal: float) -> None:
     """DeviceError where the measured rate differs by more than 0.2 % from the nominal one (Hz); where it is not sure,
-    by two standard errors more. DeviceError, too, where the standard error exceeds 0.2 %."""
+    by two standard errors more. DeviceError, too, where the standard error exceeds 0.2 %.
+
+    >>> check_rate(MeasuredRate(25600.2, 0.5, 128000, 5.0), nominal=25600.0)
+    >>> check_rate(MeasuredRate(24000.0, 0.5, 120000, 5.0), nominal=25600.0)
+    Traceback (most recent call last):
+        ...
+    acquisition.errors.DeviceError: the DAQ delivers 24000.00 ± 0.50 scans a second, not 25600: every ...
+    """
     if measured.std > LARGEST_STD * measured.rate:
         raise DeviceError(
             f"the DAQ's rate cannot be measured: its samples arrive too unevenly ({measured.rate:.6g} Hz "

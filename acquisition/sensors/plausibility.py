@@ -42,7 +42,13 @@ _MISTAKES: Mapping[float, tuple[str, str]] = {
 
 
 def unit_mistake(ratio: float) -> Remark | None:
-    """The unit mistake that explains F/(m a) of a known mass, within 15 %; None where none does."""
+    """The unit mistake that explains F/(m a) of a known mass, within 15 %; None where none does.
+
+    >>> print(unit_mistake(STANDARD_GRAVITY).text)
+    the ratio 9.807 is near 9.81
+    >>> unit_mistake(1.05) is None
+    True
+    """
     for factor, (value, question) in _MISTAKES.items():
         if abs(ratio / factor - 1) < NEAR:
             return Remark("unit-mistake", "", f"the ratio {ratio:.4g} is near {value}", question)
@@ -50,7 +56,14 @@ def unit_mistake(ratio: float) -> Remark | None:
 
 
 def channel_doubts(channel: Channel) -> tuple[Remark, ...]:
-    """What speaks against a channel's sensitivity and range; nothing where both are of this world."""
+    """What speaks against a channel's sensitivity and range; nothing where both are of this world.
+
+    >>> millivolts = Channel("acceleration", sensitivity=10.2, full_scale=5.0)  # taken for volts
+    >>> [doubt.code for doubt in channel_doubts(millivolts)]
+    ['sensitivity-not-believed']
+    >>> channel_doubts(Channel("acceleration", sensitivity=10.2e-3 / 9.81, full_scale=5.0))
+    ()
+    """
     low, high, unit, usual = SENSITIVITIES[channel.quantity]
     per = "N" if channel.quantity == "force" else "m/s^2"
     doubts = []
@@ -75,7 +88,11 @@ def _slip(value: float, low: float, high: float) -> str:
 
 
 def stiffness_doubt(stiffness: float) -> Remark | None:
-    """A modal stiffness (N/m) outside what machine tools have; None inside."""
+    """A modal stiffness (N/m) outside what machine tools have; None inside.
+
+    >>> stiffness_doubt(2e7) is None, stiffness_doubt(20.0).code  # N/m; 20 N/um is 2e7
+    (True, 'stiffness-not-believed')
+    """
     low, high = STIFFNESSES
     if low <= abs(stiffness) <= high:
         return None
@@ -88,7 +105,13 @@ def stiffness_doubt(stiffness: float) -> Remark | None:
 
 
 def calibration_doubt(channel: Channel, today: date, interval_months: float = 12.0) -> Remark | None:
-    """A sensor's calibration that is not known, longer ago than the interval, or of a day that cannot be; else None."""
+    """A sensor's calibration that is not known, longer ago than the interval, or of a day that cannot be; else None.
+
+    >>> from datetime import date
+    >>> sensor = Channel("force", 2.25e-3, 5.0, serial_number="4711", calibration_date="2024-02-01")
+    >>> calibration_doubt(sensor, date(2026, 3, 2)).code, calibration_doubt(sensor, date(2024, 6, 1))
+    ('calibration-old', None)
+    """
     if not channel.calibration_date:
         return Remark(
             "calibration-unknown", channel.quantity, "date of calibration not known", "enter it beside the sensitivity"

@@ -35,7 +35,17 @@ BUFFER_SECONDS = 1.0
 
 
 class TapsEmulator(EmulatorThread):
-    """Serves one signal function as a DAQ; a context manager whose `port` can be opened like a real one."""
+    """Serves one signal function as a DAQ; a context manager whose `port` can be opened like a real one.
+
+    >>> spindle = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
+    >>> tapped = HammeredStructure(spindle, 10240.0, np.random.default_rng(1))
+    >>> sensors = Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1e-3, 5.0)
+    >>> with TapsEmulator(tapped, sensors, 10240.0, realtime=False) as device, TapsSource(device.port) as source:
+    ...     source.start()
+    ...     block = next(source.blocks())
+    >>> block.first_scan, block.codes.shape[0]
+    (0, 2)
+    """
 
     def __init__(
         self,

@@ -38,6 +38,15 @@ def judge_hit(hit: Hit, mean: Frf | None = None, band: tuple[float, float] | Non
     faults is compared with it (INCONSISTENT); with the band that is followed (Hz), its force must reach to the end of
     it (NARROW_BAND: 20 dB below its largest value). With either, it must reach over two lines (TOO_SOFT). A hit whose
     force was not measured is judged by its response alone. Source: ISO 7626-5 practice; docs/hit-verdicts.md.
+
+    >>> time = np.arange(-100, 4000) / 10240.0
+    >>> pulse = np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)
+    >>> structure = Structure(np.array([500.0]), np.array([0.02]), np.array([2e7]))
+    >>> hit = Hit(200 * pulse, 200 * structure.response(time, 1e-3), 10240.0, 100)
+    >>> judge_hit(hit).flags == HitFlags.OK
+    True
+    >>> print(judge_hit(hit, band=(200.0, 4000.0)).text)
+    The force reaches to 2220 Hz (-20 dB) of the 4000 Hz wanted: use a harder hammer tip.
     """
     findings = _overloads(hit)
     if hit.lost_scans:

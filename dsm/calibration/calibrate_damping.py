@@ -132,6 +132,13 @@ def calibrate_damping(
     is more than any such damper can give: one that is too strong holds the bearing still and damps nothing. ValueError
     for a damping ratio outside 0 to 1, for damping given to a part of the bearings only, for a group with no bearing or
     a rigid one, and a shaft that is not held.
+
+    >>> spindle = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])
+    >>> damped = calibrate_damping(spindle, 0.03, damping_ratio_std=0.003)
+    >>> f"{damped.bearing_damping:.0f} +- {damped.bearing_damping_std:.0f} N s/m"
+    '2655 +- 265 N s/m'
+    >>> damped_modes(damped.spindle, 1).damping_ratio.round(6).tolist()
+    [0.03]
     """
     _check(damping_ratio, damping_ratio_std, mode)
     chosen = calibrated_bearings(spindle, group)

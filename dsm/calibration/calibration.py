@@ -18,7 +18,14 @@ from dsm.spindle.spindle import Spindle
 
 
 class UnreachableFrequencyError(ValueError):
-    """No bearing stiffness puts the mode at the measured frequency."""
+    """No bearing stiffness puts the mode at the measured frequency.
+
+    >>> spindle = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])
+    >>> calibrate(spindle, 5000.0)
+    Traceback (most recent call last):
+        ...
+    dsm.calibration.calibration.UnreachableFrequencyError: no bearing stiffness puts mode 1 at 5000 Hz: ...
+    """
 
     def __init__(self, message: str, reachable: tuple[float, float]) -> None:
         """Keep the limits beside the message."""
@@ -33,6 +40,13 @@ class Calibration:
 
     "Before" is the spindle as given, "after" the recalibrated one; stiffnesses are those at the tool tip, worked out
     when they are asked for. Printed, it is a report.
+
+    >>> new = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])
+    >>> now = calibrate(new, 0.95 * natural_frequencies(new, 1)[0])
+    >>> round(now.energy_share, 2)  # of the bearings in the strain energy of the mode: why it answers to them
+    0.88
+    >>> round(now.static_stiffness_after / now.static_stiffness_before, 2)  # left at the tip
+    0.98
     """
 
     frequency: float

@@ -75,6 +75,17 @@ def fit_stiffness(
     Raises ValueError for bad frequencies and groups, UnreachableFrequencyError (a ValueError) where no factor from 1e-6
     to 1e6 puts a mode where it was measured, StiffnessFitError (an ArithmeticError, with the best estimate) where no
     minimum is found.
+
+    Front and rear bearings that have lost differently, from three modes:
+
+    >>> shaft = [Segment(0.12, 0.03), Segment(0.2, 0.07), Segment(0.15, 0.05)]
+    >>> new = Spindle(shaft, [Bearing(0.15, 2.5e8, group="front"), Bearing(0.4, 2.5e8, group="rear")])
+    >>> worn = Spindle(shaft, [Bearing(0.15, 1.5e8), Bearing(0.4, 2e8)])
+    >>> fit = fit_stiffness(new, natural_frequencies(worn, 3), frequency_std=[1.0, 1.0, 1.0])
+    >>> fit.groups, fit.factor.round(4).tolist(), fit.remarks
+    (('front', 'rear'), [0.6, 0.8], ())
+    >>> [plus_minus(k, std, 1e6, "N/um") for k, std in zip(fit.stiffness, fit.stiffness_std, strict=True)]
+    ['150.00 ± 0.41 N/um', '200.00 ± 0.46 N/um']
     """
     spindles = (spindle,) if isinstance(spindle, Spindle) else tuple(spindle)
     for model in spindles:

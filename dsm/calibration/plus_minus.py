@@ -12,6 +12,11 @@ def plus_minus(value: float, std: float | None, scale: float = 1.0, unit: str = 
     """Value and standard error with two digits of the error, e.g. "1326.8 ± 5.3 N/um (0.40 %)"; "-" without a value.
 
     Both are divided by `scale` first. Without an error where there is none (None, NaN, infinite) or next to none.
+
+    >>> plus_minus(1326.8e6, 5.3e6, scale=1e6, unit="N/um", percent=True)
+    '1326.8 ± 5.3 N/um (0.4 %)'
+    >>> plus_minus(696.2, None, unit="Hz")
+    '696.2 Hz'
     """
     if not math.isfinite(value):
         return "-"

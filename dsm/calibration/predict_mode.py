@@ -43,6 +43,14 @@ def predict_mode(fit: StiffnessFit, spindle: Spindle, mode: int = 1, position: f
     the change from one end of each principal axis of the factors' covariance to the other, added in squares, and what
     the tolerance of the drawing adds: diameters that it shares with the fitted spindles act on both. Raises ValueError
     as modes_at.
+
+    >>> bearings = [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)]
+    >>> tapped = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], bearings)
+    >>> fit = fit_stiffness(tapped, [0.95 * natural_frequencies(tapped, 1)[0]], frequency_std=[2.0])
+    >>> other = Spindle([Segment(0.1, 0.04), Segment(0.4, 0.06)], bearings)  # with a tool that was never tapped
+    >>> mode = predict_mode(fit, other)
+    >>> f"{mode.frequency:.0f} +- {mode.frequency_std:.0f} Hz, K = {mode.stiffness / 1e6:.1f} N/um"
+    '921 +- 2 Hz, K = 33.2 N/um'
     """
 
     def of(shaft: Spindle) -> _Float:

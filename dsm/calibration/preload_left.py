@@ -33,6 +33,12 @@ def preload_left(bearings: Iterable[Bearing], factor: float) -> PreloadLeft | No
     where its axial ones are those of makers' catalogues, 0.39 to 0.52 at 15 degrees and 0.35 to 0.41 at 25, they lie
     between these. Nothing finer is known without the geometry of the bearings. None without bearings or where one has
     rollers.
+
+    >>> left = preload_left([Bearing(0.1, 2.5e8), Bearing(0.35, 2.5e8)], 0.8)
+    >>> f"{left.low:.2f} to {left.high:.2f} of the preload"
+    '0.44 to 0.50 of the preload'
+    >>> preload_left([Bearing(0.1, 2.5e8, rolling_elements="rollers")], 0.8) is None
+    True
     """
     kinds = {bearing.rolling_elements for bearing in bearings}
     if kinds != {"balls"}:

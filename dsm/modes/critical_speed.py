@@ -22,6 +22,15 @@ def critical_speed(spindle: Spindle, mode: int = 1) -> float:
 
     Raises ValueError for a mode below 1 and for a shaft that is not held, ArithmeticError where there is none up to
     32 times the frequency at rest.
+
+    >>> ends = [Bearing(0.0, np.inf), Bearing(0.5, np.inf)]
+    >>> shaft = Spindle([Segment(0.5, 0.05)], ends)
+    >>> round(critical_speed(shaft)), round(60 * natural_frequencies(shaft, 1)[0])  # rpm
+    (24373, 24373)
+    >>> disk = LumpedMass(0.1, mass=3.0, diametral_inertia=0.005, polar_inertia=0.01)  # kg, kg m^2: gyroscopic moments
+    >>> laden = Spindle([Segment(0.5, 0.05)], ends, masses=[disk])
+    >>> round(critical_speed(laden)), round(60 * natural_frequencies(laden, 1)[0])
+    (21819, 21250)
     """
 
     if mode < 1:

@@ -32,6 +32,14 @@ def damped_modes(spindle: Spindle, count: int, loss_factor: float = 0.0) -> Damp
 
     Raises ValueError for a count below 1, a shaft that is not held and a loss factor below 0, ArithmeticError for a
     mode that does not oscillate any more.
+
+    A loss factor alone gives every mode half of it as damping ratio, sin(atan(eta) / 2):
+
+    >>> spindle = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])
+    >>> damped_modes(spindle, 3, loss_factor=0.04).damping_ratio.round(5).tolist()
+    [0.01999, 0.01999, 0.01999]
+    >>> round(float(np.sin(np.arctan(0.04) / 2)), 5)
+    0.01999
     """
     target = given_damping(spindle.bearings, loss_factor)
     shaft = DampedShaft.of(spindle, count)

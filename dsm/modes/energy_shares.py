@@ -43,6 +43,13 @@ def energy_shares(spindle: Spindle, count: int) -> EnergyShares:
 
     Raises ValueError for a count below 1 and a shaft that is not held,
     ArithmeticError where rounding spoils the count of modes.
+
+    >>> spindle = Spindle([Segment(0.1, 0.03), Segment(0.4, 0.06)], [Bearing(0.15, 2.5e8), Bearing(0.4, 2.5e8)])
+    >>> shares = energy_shares(spindle, 1)
+    >>> shares.bearings.round(2).tolist()  # front and rear, of the first mode
+    [[0.15, 0.71]]
+    >>> round(float(shares.segments.sum() + shares.bearings.sum()), 6)
+    1.0
     """
     require_support(spindle)
     modes = find_modes(spindle, count)

@@ -17,6 +17,11 @@ def mode_shapes(spindle: Spindle, count: int, places: ArrayLike | None = None) -
     None: at segment ends, bearings, masses and joints. Exact everywhere, inside long segments too; a joint has two
     sides, and at its place the values are those of the side away from the tool tip. With theory="timoshenko" the slope
     is the rotation of the cross-section. Raises ValueError for a place off the shaft, and as natural_frequencies.
+
+    >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
+    >>> modes = mode_shapes(shaft, 1, [0.125, 0.25, 0.375])
+    >>> abs(modes.deflection[0] / modes.deflection[0, 1]).round(3).tolist()  # sin(pi z / L)
+    [0.707, 1.0, 0.707]
     """
     modes = find_modes(spindle, count)
     return modes if places is None else modes.at(_on_shaft(spindle, places))

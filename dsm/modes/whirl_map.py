@@ -48,6 +48,13 @@ def whirl_map(spindle: Spindle, speed_rpm: ArrayLike, count: int) -> WhirlMap:
 
     Raises ValueError for speeds below 0 or not finite, a count below 1 and a shaft that is not held, ArithmeticError
     where rounding spoils the count of modes.
+
+    >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
+    >>> whirl = whirl_map(shaft, [0.0, 12000.0], count=1)
+    >>> whirl.rotating_forward.round(1).tolist()  # Hz, seen from the shaft: |f - 200|
+    [[406.2, 206.2]]
+    >>> whirl.rotating_backward.round(1).tolist()  # f + 200
+    [[406.2, 606.2]]
     """
     require_support(spindle)
     speed = _speeds(speed_rpm)

@@ -23,6 +23,16 @@ def couple_tool(side: SpindleSide, tool: Spindle) -> _Complex:
     Annals 49 (2000), here in stiffnesses, so that nothing is lost at low frequencies.
 
     Raises ValueError for a tool with bearings or of another beam theory.
+
+    A tool on a spindle whose side was worked out once is the whole shaft:
+
+    >>> whole = Spindle([Segment(0.1, 0.02), Segment(0.3, 0.05)], [Bearing(0.15, 2e8), Bearing(0.38, 2e8)])
+    >>> frequency = np.array([100.0, 500.0, 1000.0])
+    >>> side = spindle_side(whole, frequency, position=0.1)
+    >>> tool = Spindle([Segment(0.06, 0.02)], [])
+    >>> tip = couple_tool(side, tool)
+    >>> np.allclose(tip, receptance(change_tool(whole, 0.1, tool), frequency), rtol=1e-9)
+    True
     """
     check_tool(tool, side.theory)
     model = assemble(tool, float(np.max(side.frequency, initial=0.0)))

@@ -21,8 +21,15 @@ def linearized_stiffness(coefficients: ArrayLike, wbar: float) -> tuple[NDArray[
     smaller terms, and c_0 itself at wbar = 0, where the paper's form of K has no value. So static_stiffness needs no
     linearisation; this one is there to show what it costs.
 
-    Raises ValueError for coefficients that are not finite or have no last axis, or a wbar that is no finite number
-    >= 0.
+    Raises ValueError for coefficients that are not finite or have no last axis, and for a wbar that is negative or
+    not finite.
+
+    >>> k, m = linearized_stiffness([3e7, -2.0, -1e-9], 0.0)  # c_0 in N/m, c_1 in kg, c_2 in kg s^2
+    >>> float(k), float(m)  # N/m, kg: at rest c_0 and -c_1
+    (30000000.0, 2.0)
+    >>> k, m = linearized_stiffness([3e7, -2.0, -1e-9], 4000.0)  # rad/s
+    >>> round(float(k)), round(float(m), 3)  # c_0 - c_2 wbar^4 and -c_1 - 2 c_2 wbar^2
+    (30256000, 2.032)
     """
     c = np.asarray(coefficients, dtype=np.float64)
     if c.ndim == 0 or c.shape[-1] == 0:

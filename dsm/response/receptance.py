@@ -26,6 +26,15 @@ def receptance(
 
     Raises ValueError for frequencies that are negative or not finite, a loss factor below 0, a position off the
     shaft, and 0 Hz for a shaft that is not held.
+
+    At resonance it is 1 / (eta K), for eta = 2 zeta; the other modes are hardly seen there:
+
+    >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
+    >>> peak = receptance(shaft, natural_frequencies(shaft, 1), position=0.25, loss_factor=0.04)
+    >>> round(float(abs(peak[0])) * 1e6, 3)  # um/N
+    0.996
+    >>> round(1 / (0.04 * modal_stiffness(shaft, 1, 0.25)) * 1e6, 3)
+    0.996
     """
     f = frequency_axis(frequency)
     if np.any(f == 0):

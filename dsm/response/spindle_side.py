@@ -41,6 +41,11 @@ def spindle_side(spindle: Spindle, frequency: ArrayLike, position: float, loss_f
     frequency: (n,) Hz. loss_factor: as for receptance. A bearing, a mass or a joint where the spindle is cut counts as
     part of it; all that is nearer to the tip falls away. Raises ValueError as receptance does, for a cut off the shaft,
     and where a rigid bearing holds the shaft at the cut.
+
+    >>> whole = Spindle([Segment(0.1, 0.02), Segment(0.3, 0.05)], [Bearing(0.15, 2e8), Bearing(0.38, 2e8)])
+    >>> side = spindle_side(whole, np.array([100.0, 500.0]), position=0.1)  # where the tool is cut off
+    >>> (side.force_over_deflection.real / 1e6).round(1).tolist()  # N/um
+    [176.5, 160.3]
     """
     f = frequency_axis(frequency)
     rest, joint = cut_spindle(spindle, position)

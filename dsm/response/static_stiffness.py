@@ -19,6 +19,14 @@ def static_stiffness(spindle: Spindle, position: float = 0.0, linearized_at: flo
     bearings are. linearized_at: a frequency (Hz) at which K(w) is replaced by K_stat - w^2 M
     instead, as eqs. (30)-(36) of Gaber & Hashemi, Shock and Vibration, 2015, do; what they miss grows with its fourth
     power. Raises ValueError for a position off the shaft, a shaft that is not held, and a frequency below 0.
+
+    In the middle between two knife edges it is 48 E I / L^3:
+
+    >>> shaft = Spindle([Segment(0.5, 0.05)], [Bearing(0.0, np.inf), Bearing(0.5, np.inf)])
+    >>> round(static_stiffness(shaft, position=0.25) / 1e6, 2)  # N/um
+    24.74
+    >>> round(48 * 210e9 * np.pi * 0.05**4 / 64 / 0.5**3 / 1e6, 2)
+    24.74
     """
     require_support(spindle)
     if not (math.isfinite(linearized_at) and linearized_at >= 0):

@@ -15,6 +15,11 @@ def change_tool(spindle: Spindle, position: float, tool: Spindle) -> Spindle:
     joint where the spindle is cut stays with it; all that is nearer to the old tip falls away. Segments of the tool
     without a material of their own keep that of the tool. Raises ValueError for a cut off the shaft, a tool with
     bearings, and one of another beam theory.
+
+    >>> long_tool = Spindle([Segment(0.1, 0.02), Segment(0.3, 0.05)], [Bearing(0.15, 2e8), Bearing(0.38, 2e8)])
+    >>> short_tool = change_tool(long_tool, 0.1, Spindle([Segment(0.06, 0.02)], []))
+    >>> round(short_tool.length, 2), [round(bearing.position, 2) for bearing in short_tool.bearings]  # m
+    (0.36, [0.11, 0.34])
     """
     check_tool(tool, spindle.theory)
     rest, joint = cut_spindle(spindle, position)

@@ -17,7 +17,16 @@ Number = TypeVar("Number", float, NDArray[np.float64])
 
 @dataclass(frozen=True)
 class Material:
-    """An elastic material. Raises ValueError for constants that no such material has."""
+    """An elastic material. Raises ValueError for constants that no such material has.
+
+    >>> steel = Material(youngs_modulus=210e9, density=7850.0, shear_modulus=80.77e9)
+    >>> round(steel.poisson_ratio, 2)
+    0.3
+    >>> Material(youngs_modulus=210e9, density=7850.0, shear_modulus=60e9)
+    Traceback (most recent call last):
+        ...
+    ValueError: shear_modulus=6e+10 Pa gives Poisson's ratio 0.75 with youngs_modulus=2.1e+11 Pa; it ...
+    """
 
     youngs_modulus: float
     """Young's modulus E (Pa)."""

@@ -11,7 +11,14 @@ from dsm.spindle.material import Material, Number
 
 @dataclass(frozen=True)
 class Segment:
-    """A round piece of the shaft, uniform or conical; checked where it becomes part of a Spindle."""
+    """A round piece of the shaft, uniform or conical; checked where it becomes part of a Spindle.
+
+    >>> Segment(0.3, 0.06, bore_diameter=0.02).second_moment  # m^4; pi (D^4 - d^4) / 64
+    6.283185307179585e-07
+    >>> cone = Segment(0.1, 0.03, end_outer_diameter=0.05)  # 30 mm towards the tool tip
+    >>> cone.diameters_at(0.5)  # m, outer and bore in the middle
+    (0.04, 0.0)
+    """
 
     length: float
     """Length along the shaft (m)."""

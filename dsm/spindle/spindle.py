@@ -25,6 +25,17 @@ class Spindle:
     """A spindle with holder and tool, segment after segment from the tool tip (z = 0) on.
 
     Raises ValueError, naming the part (1 is the first of its kind), for what is no shaft or does not fit it.
+
+    >>> spindle = Spindle(
+    ...     segments=[Segment(0.1, 0.02), Segment(0.3, 0.06, bore_diameter=0.02)],
+    ...     bearings=[Bearing(0.15, 2e8), Bearing(0.35, 1e8)],
+    ... )
+    >>> f"{spindle.length:.1f} m, {spindle.mass:.2f} kg"
+    '0.4 m, 6.17 kg'
+    >>> Spindle([Segment(0.1, 0.02)], [Bearing(0.15, 2e8)])
+    Traceback (most recent call last):
+        ...
+    ValueError: bearing 1: position=0.15 m is off the shaft, 0 to 0.1 m
     """
 
     segments: Sequence[Segment]

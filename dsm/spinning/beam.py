@@ -42,6 +42,13 @@ class SpinningBeam:
     """Segments in a row from z = 0 on, springs, and dofs that are held; free where nothing is said.
 
     Raises ValueError, naming the segment or spring (1 is the first), for numbers out of range or places off the beam.
+
+    >>> clamp = [(0.0, dof) for dof in ("u", "v", "u'", "v'")]
+    >>> cantilever = SpinningBeam([SpinningSegment(0.5, 1e4, 1e4, 15.0)], held=clamp)
+    >>> spinning_frequencies(cantilever, 1, 0.0).round(2).tolist()  # Hz
+    [57.79]
+    >>> round(1.87510407**2 / (2 * np.pi * 0.5**2) * (1e4 / 15.0) ** 0.5, 2)  # cos x cosh x = -1
+    57.79
     """
 
     segments: Sequence[SpinningSegment]

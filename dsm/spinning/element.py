@@ -36,6 +36,14 @@ def spinning_element(
     (docs/paper.md), but also defined at speed 0, at frequency 0 and where the two are equal. Beams longer than the
     series allows are taken in equal parts whose inner dofs are eliminated; infinite only at the natural frequencies
     of the beam clamped at both ends. Raises ValueError for numbers out of range.
+
+    At rest, and at 0 Hz, it is the stiffness of a beam, 12 E I / L^3 for its ends against each other:
+
+    >>> element = spinning_element(1e4, 1e4, mass_per_length=15.0, length=0.5, frequency=[0.0], speed_rpm=0.0)
+    >>> element.shape
+    (1, 8, 8)
+    >>> round(float(element[0, 0, 0]) / (12 * 1e4 / 0.5**3), 9)
+    1.0
     """
     numbers = {"rigidity_xx": rigidity_xx, "rigidity_yy": rigidity_yy, "mass_per_length": mass_per_length}
     for name, value in {**numbers, "length": length}.items():

@@ -20,6 +20,13 @@ def growth(
     """Logarithm of the largest multiplier's magnitude at depths (r, d) in m, shape (r, d); negative where stable.
 
     numbers (r,): pieces of the tooth period; tolerance: accuracy of the result.
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> rows = rows_of(milling_system([mode], [mode]), slot, np.array([12000.0]))
+    >>> depths = np.array([[1e-9, 2e-3]])  # m
+    >>> growth(rows, depths, piece_numbers(rows, 2e-3)).round(3).tolist()  # -zeta w T = -0.157 without a cut
+    [[-0.157, -0.042]]
     """
     kind = np.float32 if tolerance >= SINGLE else np.float64
     multipliers = largest_multipliers(rows, depth, numbers, tolerance, kind)

@@ -100,7 +100,14 @@ def joined_rows(first: MillingRows, second: MillingRows) -> MillingRows:
 
 
 def rows_of(system: MillingSystem, cut: Cut, speed_rpm: Floats) -> MillingRows:
-    """One system and cut at many speeds (rpm), shape (r,)."""
+    """One system and cut at many speeds (rpm), shape (r,).
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> rows = rows_of(milling_system([mode], None), slot, np.array([6000.0, 12000.0]))
+    >>> (rows.tooth_period * 1e3).tolist()  # ms
+    [5.0, 2.5]
+    """
     ones = np.ones((speed_rpm.size, 1))
     return MillingRows(
         cut=cut,

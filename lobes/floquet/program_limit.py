@@ -57,6 +57,12 @@ def program_limit(
 
     cuts: differ in feed angle and immersion alone; None: its cut. vectors: directions (n, 2) of the modes of x, then of
     y, where they lie askew (`milling_system`). Raises ValueError for bad modes or vectors.
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> limit = program_limit(Program(slot, speed_rpm=9000.0, depth=1e-3), [mode], [mode])
+    >>> f"{limit.stable}, up to {limit.limit * 1e3:.2f} mm, then {limit.kind} at {limit.chatter_frequency:.0f} Hz"
+    'True, up to 1.25 mm, then hopf at 498 Hz'
     """
     cuts, system = cuts or (program.cut,), milling_system(x, y, vectors)
     limit, number = np.empty(len(cuts)), np.empty(len(cuts), dtype=np.int64)

@@ -40,6 +40,14 @@ def stability_boundary(
     Raises ValueError for bad speeds, depths, modes or vectors, ArithmeticError where a limit does not settle.
     Source: Insperger & Stepan, Semi-Discretization for Time-Delay Systems, Springer 2011, with a high order
     (`lobes.floquet.period_map`).
+
+    Little immersion has flips between the lobes of a mean force, above 60 f / (N (k + 1/2)), 10000 rpm here:
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=1e6)
+    >>> thin = Cut(teeth=2, immersion=0.1, direction="up", tangential=700e6, radial=200e6)
+    >>> lobes = stability_boundary([mode], None, thin, [9000.0, 9500.0, 9900.0, 10500.0, 12000.0], max_depth=0.05)
+    >>> [f"{depth * 1e3:.2f} mm, {kind}" for depth, kind in zip(lobes.depth, lobes.kind, strict=True)]
+    ['1.11 mm, hopf', '1.53 mm, hopf', '2.12 mm, hopf', '0.96 mm, flip', '5.30 mm, flip']
     """
     system, speed = milling_system(x, y, vectors), check_speeds(speed_rpm)
     if not (np.isfinite(max_depth) and max_depth > 0):

@@ -36,6 +36,13 @@ def extract(frfs: Sequence[Frf], band: tuple[float, float] | None = None) -> Ext
     """Find and fit all modes of these FRFs between band[0] and band[1] (Hz), with poles that are common to all.
 
     One FRF, or several on the same lines, the driving point first. Raises ValueError as `fit_points`.
+
+    >>> frf = synthesize([Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 5e7)], np.arange(1.0, 1501.0))
+    >>> state = extract([frf])
+    >>> [f"{band.fit.frequency[0]:.1f} Hz" for band in state.bands]
+    ['500.0 Hz', '900.0 Hz']
+    >>> float(abs(state.receptance - frf.receptance).max() / abs(frf.receptance).max()) < 1e-6
+    True
     """
     with one_thread():
         return _extract(tuple(usable_lines(frf, band) for frf in _with_common_band(frfs)))

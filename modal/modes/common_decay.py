@@ -20,6 +20,12 @@ def common_decay(modes: Sequence[Mode]) -> float | None:
 
     Structures damp their modes by about equal damping ratios, so that decay rates grow with frequency. Under a window
     exp(-t/tau) that is shorter than their decay all rates are 1/tau, and damping ratios fall as 1/f.
+
+    >>> windowed = [Mode(f, 1 / (0.05 * 2 * np.pi * f), 2e7) for f in (500.0, 900.0, 1300.0, 1900.0)]  # zeta w = 1/tau
+    >>> round(1 / common_decay(windowed), 4)  # s: the time constant of the window
+    0.05
+    >>> common_decay([Mode(f, 0.02, 2e7) for f in (500.0, 900.0, 1300.0, 1900.0)]) is None
+    True
     """
     if len(modes) < FEWEST:
         return None

@@ -40,6 +40,11 @@ def common_delay(modes: Sequence[Mode]) -> CommonDelay | None:
 
     A response that is sampled later than the force leads by 2 pi f skew on every line; complex modes follow no such
     line. Three modes at least.
+
+    >>> late = 20e-6  # s: a converter that takes its channels one after the other
+    >>> modes = [Mode(f, 0.02, 2e7, phase_deg=360.0 * f * late) for f in (500.0, 900.0, 1300.0)]
+    >>> round(common_delay(modes).skew * 1e6, 2)  # us
+    20.0
     """
     if len(modes) < FEWEST:
         return None

@@ -42,6 +42,13 @@ def follow(last: Mode, modes: Sequence[Mode]) -> Followed:
     in units of a likely change (of the stiffness where both know it), and of 1 - MAC where both modes have shapes over
     the same points. A mode that is alike
     but for its frequency is the same up to 15 %, the fall of a spindle that must be seen.
+
+    >>> last = Mode(700.0, 0.03, 2e7)
+    >>> now = [Mode(650.0, 0.03, 1.8e7), Mode(905.0, 0.02, 6e7)]
+    >>> follow(last, now).mode.frequency  # Hz
+    650.0
+    >>> follow(last, now[1:]).mode is None
+    True
     """
     near = sorted((m for m in modes if m.is_driving_point), key=lambda mode: _distance(last, mode))
     if not near or not _is_same(last, near[0]):

@@ -10,6 +10,11 @@ def mac(a: ArrayLike, b: ArrayLike) -> float:
     """Modal assurance criterion |a^H b|^2 / (a^H a b^H b) of two shapes (p,): 1 for the same shape, 0 for none of it.
 
     Raises ValueError for shapes of different length, and of zeros. Source: Allemang & Brown (1982), IMAC 1.
+
+    >>> mac([1.0, 0.5, -0.2], [2.0, 1.0, -0.4])  # the same shape, another scale
+    1.0
+    >>> mac([1.0, 0.0], [0.0, 1.0])
+    0.0
     """
     x, y = np.asarray(a), np.asarray(b)
     if x.shape != y.shape or x.ndim != 1:

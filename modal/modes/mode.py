@@ -25,6 +25,12 @@ class Mode:
     where the mode moves against the hammer, and says so (`is_driving_point`).
 
     Source: Ewins, Modal Testing, ch. 2.6 (complex modes); docs/modal.md says what K means for one.
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> round(mode.peak * 1e6, 3)  # um/N; 1 / (2 zeta K)
+    1.25
+    >>> mode.receptance(np.array([500.0])) * 2 * 0.02 * 2e7  # 1 / (2 i zeta K) at resonance
+    array([0.-1.j])
     """
 
     frequency: float

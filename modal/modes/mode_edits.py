@@ -11,7 +11,15 @@ import numpy as np
 
 @dataclass(frozen=True)
 class ModeEdits:
-    """Modes that are added, left out, or held by hand; ValueError for values that no mode has, or that stand twice."""
+    """Modes that are added, left out, or held by hand; ValueError for values that no mode has, or that stand twice.
+
+    >>> ModeEdits(add=(298.0,), fix=((1500.0, 0.03),))
+    ModeEdits(add=(298.0,), drop=(), fix=((1500.0, 0.03),))
+    >>> ModeEdits(fix=((1500.0, 1.5),))
+    Traceback (most recent call last):
+        ...
+    ValueError: fix 1500:1.5: the damping ratio is not between 0 and 1; 3 % is 0.03
+    """
 
     add: tuple[float, ...] = ()
     """Frequencies near which a further mode is fitted (Hz)."""
@@ -66,7 +74,11 @@ def _under_window(frequency: float, zeta: float, time_constant: float) -> tuple[
 def parse_edits(
     add: Sequence[str] | None = None, drop: Sequence[str] | None = None, fix: Sequence[str] | None = None
 ) -> ModeEdits:
-    """Edits from "298" (Hz) and "1500:0.03" (Hz and damping ratio); ValueError for any other text."""
+    """Edits from "298" (Hz) and "1500:0.03" (Hz and damping ratio); ValueError for any other text.
+
+    >>> parse_edits(add=["298"], fix=["1500:0.03"])
+    ModeEdits(add=(298.0,), drop=(), fix=((1500.0, 0.03),))
+    """
     pairs = [
         _numbers("fix", text, "the frequency in Hz and the damping ratio, as in 1500:0.03", 2) for text in fix or ()
     ]

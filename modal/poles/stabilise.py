@@ -58,6 +58,12 @@ def stabilise(frequency: Array, receptance: ComplexArray, weight: Array, orders:
 
     Source: Peeters et al. (2004), The PolyMAX frequency-domain method, Shock and Vibration 11, 395; Richardson &
     Formenti (1982), Parameter estimation from FRF measurements using rational fraction polynomials, IMAC 1.
+
+    >>> line = np.linspace(400.0, 600.0, 201)  # Hz
+    >>> receptance = Mode(500.0, 0.02, 2e7).receptance(line)[np.newaxis]  # m/N, (1, 201)
+    >>> chart = stabilise(line, receptance, np.ones((1, 201)), orders=1)
+    >>> chart.order.tolist(), chart.frequency.round(2).tolist(), chart.damping_ratio.round(4).tolist()  # -, Hz, -
+    ([1], [500.0], [0.02])
     """
     orders = min(orders, (2 * frequency.size - 2 * EXTRA) // 6)
     thinned = slice(None, None, -(-frequency.size // MOST_LINES))

@@ -33,7 +33,14 @@ class Believed:
 
 
 def believed(modes: Sequence[Mode]) -> Believed:
-    """Leave out drift, peaks cut by the edge of the lines, stiffness of no machine, and what trust_of rejects."""
+    """Leave out drift, peaks cut by the edge of the lines, stiffness of no machine, and what trust_of rejects.
+
+    >>> frf = synthesize([Mode(500.0, 0.02, 2e7), Mode(900.0, 0.03, 5e7)], np.arange(1.0, 1501.0))
+    >>> [round(mode.frequency) for mode in believed(fit_modes(frf)).modes]  # Hz
+    [500, 900]
+    >>> believed([Mode(500.0, 0.02, 2.0)]).remarks[0].code  # N/um taken for N/m
+    'stiffness-not-believed'
+    """
     judged = [(mode, _doubt(mode)) for mode in modes]
     plausible = [mode for mode, doubt in judged if doubt is None]
     largest = max((mode.peak for mode in plausible), default=0.0)

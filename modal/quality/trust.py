@@ -40,13 +40,23 @@ class Trust(enum.StrEnum):
 
 
 def trust_of(mode: Mode) -> Trust:
-    """The worst verdict of all rules, from figures and codes alone; the table of docs/modal.md says why each."""
+    """The worst verdict of all rules, from figures and codes alone; the table of docs/modal.md says why each.
+
+    >>> trust_of(Mode(500.0, 0.02, 2e7, misfit=1.0, misfit_share=0.01))
+    <Trust.TRUSTED: 'trusted'>
+    >>> trust_of(Mode(500.0, 0.02, 2e7, misfit=30.0, misfit_share=0.5))
+    <Trust.REJECTED: 'rejected'>
+    """
     verdicts = {verdict for _, verdict in trust_rules(mode)}
     return next((trust for trust in (Trust.REJECTED, Trust.DOUBTFUL) if trust in verdicts), Trust.TRUSTED)
 
 
 def trust_rules(mode: Mode) -> Iterator[tuple[str, Trust]]:
-    """What speaks against a mode, as codes of remarks, each with the verdict that it alone would bring."""
+    """What speaks against a mode, as codes of remarks, each with the verdict that it alone would bring.
+
+    >>> list(trust_rules(Mode(500.0, 0.02, 2e7, misfit=30.0, misfit_share=0.5)))
+    [('misfit', <Trust.REJECTED: 'rejected'>)]
+    """
     for code, value, doubtful, rejected in _limits(mode):
         if value > doubtful:
             yield code, Trust.REJECTED if value > rejected else Trust.DOUBTFUL

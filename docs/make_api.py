@@ -1,0 +1,80 @@
+"""docs/api/ from the docstrings, by pdoc: `.venv/bin/python docs/make_api.py`."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pdoc.doc
+import pdoc.doc_types
+import pdoc.render
+
+ROOMS = ("decay", "history", "logbook", "machine", "measuring", "plant", "tool", "verdicts")
+MODULES = ("acquisition", "modal", "dsm", "lobes", "lobewatch", *(f"lobewatch.{room}" for room in ROOMS))
+"""What has a page: the packages, and the rooms of lobewatch whose names are given by an `__init__.pyi`."""
+
+
+TEMPLATES = Path(__file__).with_name("templates")
+
+
+class Annotation(str):
+    """A type as it stands in the source, public names with their package: the same on every Python, and linked."""
+
+    __slots__ = ()
+    __repr__ = str.__str__
+
+
+def public_names() -> dict[str, str]:
+    """Package and name of each public name."""
+    return {name: f"{module}.{name}" for module in reversed(MODULES) for name in import_module(module).__all__}
+
+
+def pages() -> dict[str, str]:
+    """HTML of each page by its path in docs/api."""
+    modules = {name: pdoc.doc.Module(_resolved(name)) for name in MODULES}
+    _annotate_as_written(public_names())
+    pdoc.render.configure(docformat="markdown", show_source=False, search=False, template_directory=TEMPLATES)
+    made = {f"{name.replace('.', '/')}.html": pdoc.render.html_module(modules[name], modules) for name in modules}
+    made["index.html"] = pdoc.render.html_index(modules)
+    made["style.css"] = pdoc.render.env.get_template("style.css.jinja2").render()
+    return {path: _without_indentation(text) for path, text in made.items()}
+
+
+def _without_indentation(html: str) -> str:
+    parts = re.split(r"(<pre.*?</pre>)", html, flags=re.DOTALL)
+    return "".join(part if place % 2 else re.sub(r"\s*\n\s*", "\n", part) for place, part in enumerate(parts)) + "\n"
+
+
+def _resolved(name: str) -> Any:
+    """A package whose lazy names are all there."""
+    module = import_module(name)
+    for public in module.__all__:
+        setattr(module, public, getattr(module, public))
+    return module
+
+
+def _annotate_as_written(qualified: Mapping[str, str]) -> None:
+    def full(name: re.Match[str]) -> str:
+        return qualified.get(name[0], name[0])
+
+    def written(annotation: Any, *_: Any) -> Any:
+        is_text = isinstance(annotation, str)
+        return Annotation(re.sub(r"(?<![\w.'\"])[A-Za-z_]\w*", full, annotation)) if is_text else annotation
+
+    for module in (pdoc.doc, pdoc.doc_types):
+        module.safe_eval_type = written  # type: ignore[attr-defined]
+
+
+def write(folder: Path) -> None:
+    """Write all pages into a folder, which is made where it is not there."""
+    for path, html in pages().items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(html, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    write(Path(sys.argv[1]) if sys.argv[1:] else Path(__file__).with_name("api"))

@@ -120,7 +120,7 @@ def test_the_object_of_a_program(shop: Shop, check: Check) -> None:
     shop.tap_both()
     said = check("--json")
     counts = {key: value for key, value in said.json.items() if key not in ("programs", "remarks")}
-    assert counts == {"unstable": 1, "doubtful": 0, "not_checked": 0, "beyond_drive": 0}
+    assert counts == {"unstable": 1, "doubtful": 0, "not_checked": 0, "beyond_drive": 0, "recommendations": []}
     found = said.programs["A"]
     assert found.keys() >= {
         *("name", "speed_rpm", "depth_mm", "feed", "tap_id", "stable", "verdict", "verdict_at_first"),
@@ -552,7 +552,7 @@ def test_a_machine_without_programs_judges_a_cut_that_is_said_in_full(
     shop.put("")
     shop.tap_both()
     said = check("--speed", "8700")
-    assert "--depth, --tool, --material, --teeth, --diameter, --radial, --direction: missing" in said.err
+    assert "--depth, --material, --teeth, --diameter, --radial, --direction: missing" in said.err
     cut = ("--tool", "reference", "--material", "aisi 4140", "--teeth", "4", "--diameter", "20", "--radial", "20")
     said = check("--speed", "8700", "--depth", "0.05", *cut, "--direction", "up", "--json")
     assert (said.code, [one["verdict"] for one in said.json["programs"]]) == (0, ["stable"])

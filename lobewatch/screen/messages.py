@@ -26,6 +26,8 @@ def state_message(state: TapState) -> str:
             "kind": state.word.name.lower().replace("_", "-"),
             "word": state.shown_word,
             "title": state.title,
+            "direction": state.direction,
+            "has_plots": state.plots is not None,
             "device": ", ".join(filter(None, (state.device, state.resumed))),
             "reason": state.reason,
             "good": state.good,

@@ -60,7 +60,7 @@ class TapSession:
         self._accept = check_codes(accept)
         self._folder, self._about, self._resume, self._guided = folder, circumstances, resume, guided
         about = f"{circumstances.machine}, tool {circumstances.tool}, direction {circumstances.direction}"
-        first = TapState(0, TapStep.CHECKING, about, wanted=folder.machine.tap.hits)
+        first = TapState(0, TapStep.CHECKING, about, circumstances.direction, wanted=folder.machine.tap.hits)
         self._publisher, self._wishes = Publisher(first, clock), Wishes()
         self._connector = Connector(folder, open_device, self._publisher, sleep)
         self._measurement: Measurement | None = None

@@ -137,6 +137,8 @@ class TapState:
     """Word that can be read from 3 m."""
     title: str
     """Machine, tool and direction."""
+    direction: str = ""
+    """Direction to be tapped: "x", "y" or "xy"; empty where it does not matter."""
     resumed: str = ""
     """Interrupted test that is gone on with, how many good hits it had, and damaged files that were set aside; empty
     for a new one."""

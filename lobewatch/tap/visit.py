@@ -103,7 +103,7 @@ class TapVisit:
             tap = TAPS[missing[0]]
             reason = f"{self._direction} is saved. Turn hammer and accelerometer to {missing[0]}, then: {tap.text}."
             choices: Sequence[Choice] = (tap, DONE)
-            state = replace(state, word=TapStep.MOVE, reason=reason, outcome=None)
+            state = replace(state, word=TapStep.MOVE, direction=missing[0], reason=reason, outcome=None)
         else:
             across = (TAP_ACROSS,) if state.outcome is not None and state.outcome.asks_across else ()
             choices = (TAP_X, TAP_Y, *across, NEXT_TOOL, DONE)

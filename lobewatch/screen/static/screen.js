@@ -25,6 +25,7 @@ function showState(next) {
   put("wanted", String(state.wanted));
   put("reason", state.reason);
   showWord(state.kind, state.word.replaceAll(", ", "\n"));
+  showGuide();
   showMean();
   showLevels();
   if (JSON.stringify(state.hits) !== JSON.stringify(before?.hits)) showHits();
@@ -53,6 +54,16 @@ function announce(before) {
   }
   if (changed && state.kind === "done") play("done");
   if (changed && ["no-device", "failed"].includes(state.kind)) play("lost");
+}
+
+// Until there is a curve: where hammer and sensor go. Across, the sensor alone is turned.
+function showGuide() {
+  const direction = state.direction || "x";
+  const across = direction === "xy";
+  at("plots").hidden = !(at("guide").hidden = state.has_plots && state.kind !== "move");
+  at("guide").dataset.direction = direction;
+  put("sensor-along", across ? "y" : direction);
+  put("hammer-along", across ? "along x, across the sensor" : `opposite, along ${direction}, in the line of the sensor`);
 }
 
 function showMean() {

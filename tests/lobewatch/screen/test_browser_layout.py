@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ from lobewatch.tap.state import TapStep
 
 SIZES = ((1280, 800), (1920, 1080), (820, 1180))
 ESSENTIALS = ("text", "good", "reason", "undo", "mute", "stop", "frf", "coherence", "force", "change", "taken")
+AXE = Path(__file__).parents[2] / "data" / "axe_core" / "axe.min.js"
 Browser = Any
 """Chromium on one page: Browser of conftest.py."""
 Session = Any
@@ -90,6 +92,40 @@ def test_the_curves_are_drawn(browser: Browser, session: Session, server: Screen
     session.hit()
     browser.see("text", "GOOD")
     browser.wait(lambda: browser.ask(blue) > 200)
+
+
+def middle(browser: Browser, part: str) -> tuple[float, float]:
+    """Where a part of the drawing is (dots, y upwards)."""
+    script = f"(({{ x, y, width, height }}) => [x + width / 2, -y - height / 2])({part}.getBoundingClientRect())"
+    x, y = browser.ask(script.replace(part, f"document.querySelector('#guide {part}')"))
+    return x, y
+
+
+@pytest.mark.parametrize(("direction", "along"), [("x", (0, 0)), ("y", (1, 1)), ("xy", (1, 0))])
+def test_until_the_first_hit_a_drawing_shows_where_sensor_and_hammer_go(
+    browser: Browser, session: Session, server: ScreenServer, direction: str, along: tuple[int, int]
+) -> None:
+    """The sensor on the side of the negative axis, the hammer on that of the positive one; no empty curve beside it."""
+    browser.open(server.url, (1280, 657))
+    session.show(TapStep.TAP, direction=direction)
+    browser.see("text", "TAP")
+    browser.wait(lambda: browser.part("guide").get_attribute("data-direction") == direction)
+    assert not browser.part("plots").is_displayed()
+    tool = middle(browser, ".flutes")
+    for name, sign, axis in zip(("sensor", "hammer"), (-1, 1), along, strict=True):
+        away = [place - at for place, at in zip(middle(browser, f".{name}-place .{name}"), tool, strict=True)]
+        assert sign * away[axis] > 30, name
+        assert abs(away[1 - axis]) < 0.6 * abs(away[axis]), name
+    assert browser.part("sensor-along").text == direction[-1]
+    assert browser.ask("document.documentElement.scrollHeight") == 657
+    browser.driver.execute_script(AXE.read_text("utf-8"))
+    broken = browser.driver.execute_async_script("axe.run().then(arguments[0])")["violations"]
+    assert [(rule["id"], rule["nodes"][0]["html"]) for rule in broken] == []
+    session.hit(HitFlags.DOUBLE_HIT)
+    browser.see("text", "DOUBLE HIT")
+    browser.wait(lambda: browser.part("plots").is_displayed() and not browser.part("guide").is_displayed())
+    session.pause(TapStep.MOVE, ("y", "tap y"), reason="Turn both.")
+    browser.wait(lambda: browser.part("guide").is_displayed() and not browser.part("plots").is_displayed())
 
 
 def test_curves_are_legible_on_a_low_screen(browser: Browser, session: Session, server: ScreenServer) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -10,7 +10,6 @@ import msgspec
 import numpy as np
 
 from acquisition import DataError
-from lobes import Direction
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.settings.cut_range import MM, CutRange
 from lobewatch.machine.settings.setting_questions import questions_of_program
@@ -127,22 +126,17 @@ def _too_fast(reach: CutRange) -> str | None:
 def _entered(
     search: SettingSearch, table: ProgramTable, setting: Setting, others: tuple[Alternative, ...]
 ) -> Recommendation:
-    """The setting as a program, judged like any; nothing is recommended that is refused then."""
-    at = msgspec.structs.replace(table, speed_rpm=setting.speed_rpm, depth_mm=setting.depth_mm)
-    directions: Sequence[Direction] = ("down", "up") if search.either and table.immersion < 1 else (table.direction,)
-    verdicts = [
-        judge(msgspec.structs.replace(at, direction=direction), search.assembly, search.machine, search.at_speed)
-        for direction in directions
-    ]
-    worst = min(verdicts, key=lambda verdict: verdict.limit if np.isfinite(verdict.limit) else np.inf)
-    for verdict in verdicts:
-        if verdict.word is not Word.STABLE or verdict.is_beyond_drive:
-            reason = "; ".join(str(remark) for remark in verdict.remarks) or verdict.word.value
-            return Recommendation(table, search.either, reason=reason, alternatives=others)
-    program = msgspec.structs.replace(at, direction=worst.program.direction)
+    """The setting as a program, with the verdict that it has then: nothing is recommended that is refused."""
+    judgement = search.judged[setting.speed_rpm, setting.depth_mm]
+    at = {"speed_rpm": setting.speed_rpm, "depth_mm": setting.depth_mm, "direction": judgement.draws.cuts[0].direction}
+    program = msgspec.structs.replace(table, **at)
+    verdict = judge(program, search.assembly, search.machine, search.at_speed, judgement)
+    if verdict.word is not Word.STABLE or verdict.is_beyond_drive:
+        reason = "; ".join(str(remark) for remark in verdict.remarks) or verdict.word.value
+        return Recommendation(table, search.either, reason=reason, alternatives=others)
     own, borne = table.feed_per_tooth_mm, search.reach.limits.feed_per_tooth_mm
     feed = (own, own) if own is not None else None if borne is None else (borne.low, borne.high)
-    return Recommendation(program, search.either, setting, worst, alternatives=others, feed_mm=feed)
+    return Recommendation(program, search.either, setting, verdict, alternatives=others, feed_mm=feed)
 
 
 def _alternatives(search: SettingSearch, setting: Setting | None, present_rpm: float | None) -> Iterator[Alternative]:

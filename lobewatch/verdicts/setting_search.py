@@ -25,7 +25,7 @@ from lobewatch.tool.series import fall_in
 from lobewatch.verdicts.aging import StiffnessAt, softening
 from lobewatch.verdicts.doubt import Doubt, doubt_of
 from lobewatch.verdicts.hard_draws import HardDraws, deepest_calm, hard_draws
-from lobewatch.verdicts.judgement import SURELY, weigh
+from lobewatch.verdicts.judgement import SURELY, Judgement, weigh
 from lobewatch.verdicts.likely_depths import LikelyDepths, likely_depths
 from lobewatch.verdicts.room import APART, DEEPER, LEAST_FALL, all_around, frequency_left, window_rpm
 from lobewatch.verdicts.spindle_at_speed import AT_REST, SpindleAtSpeed
@@ -98,6 +98,8 @@ class SettingSearch:
     """Few draws by speed (rpm), worked out anew where more of them are known to chatter."""
     chattered: set[int] = field(default_factory=set)
     """Draws that have chattered where few others made it seem safe."""
+    judged: dict[tuple[float, float], Judgement] = field(default_factory=dict)
+    """What `weigh` says of the settings that were found, by speed (rpm) and depth (mm)."""
 
     @cached_property
     def spindle(self) -> Assembly:
@@ -170,7 +172,7 @@ class SettingSearch:
         middles = {*self.likely.middles(depth_mm), *self.likely.middles(NEARLY * depth_mm)}
         for speed in map(_rounded, [*sorted(middles, key=rank)[:MOST_PLACES], self.best.speed_rpm]):
             if self.reach.holds(speed, depth_mm) and self._calm(speed) >= depth_mm:
-                setting = self._verified(speed, depth_mm)
+                setting = self.verified(speed, depth_mm)
                 if isinstance(setting, Setting):
                     return setting
         return None
@@ -190,7 +192,7 @@ class SettingSearch:
             speed = self._most_chips(depths)
             if not depths.get(speed):
                 return
-            setting = self._verified(speed, depths[speed])
+            setting = self.verified(speed, depths[speed])
             if isinstance(setting, Setting):
                 del depths[speed]
                 yield setting
@@ -223,13 +225,13 @@ class SettingSearch:
         for _ in range(TRIES):
             if (depth_mm := floored_mm(depth_mm)) < MM:
                 return None
-            setting = self._verified(speed, depth_mm)
+            setting = self.verified(speed, depth_mm)
             if isinstance(setting, Setting):
                 return setting
             depth_mm = setting
         return None
 
-    def _verified(self, speed: float, depth_mm: float) -> Setting | float:
+    def verified(self, speed: float, depth_mm: float) -> Setting | float:
         """The setting where it is stable throughout now and when it is tapped again; else a depth (mm) that may be."""
         table, depth = msgspec.structs.replace(self.table, speed_rpm=speed, depth_mm=depth_mm), depth_mm / 1e3
         judgement = weigh(table, self.assembly, self.machine, self.at_speed, self.either)
@@ -252,6 +254,7 @@ class SettingSearch:
         hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-FEW:]]
         window = window_rpm(near, hardest, speed, depth, self.reach)
         left = frequency_left(hardest, depth, self.stiffness_at)
+        self.judged[speed, depth_mm] = judgement
         return Setting(speed, depth_mm, window, min(limit / depth - 1, MOST_SPARE), left)
 
 

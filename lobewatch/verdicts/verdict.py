@@ -140,9 +140,16 @@ class Verdict:
 
 
 def judge(
-    table: ProgramTable, tool: Assembly | DataError, machine: Machine, at_speed: SpindleAtSpeed = AT_REST
+    table: ProgramTable,
+    tool: Assembly | DataError,
+    machine: Machine,
+    at_speed: SpindleAtSpeed = AT_REST,
+    judgement: Judgement | None = None,
 ) -> Verdict:
-    """The verdict on a program as it stands in machine.toml, or why its tool is not known."""
+    """The verdict on a program as it stands in machine.toml, or why its tool is not known.
+
+    judgement: that of `weigh`, where it is known already.
+    """
     if isinstance(tool, DataError):
         unknown = _unknown(table, (Remark("no-tap", "", str(tool)),))
         return replace(unknown, remarks=(*unknown.remarks, *outside_tool(table, machine)))
@@ -152,7 +159,7 @@ def judge(
     if asked := questions_of_program(machine, table, on_model):
         return _unknown(table, tuple(doubted.remark for doubted in asked), tool)
     table = at_speed.taught(table)
-    judgement, depth = weigh(table, tool, machine, at_speed), table.depth_mm / 1e3
+    judgement, depth = judgement or weigh(table, tool, machine, at_speed), table.depth_mm / 1e3
     middle, word, cause = judgement.middle, word_of(table, judgement, tool), ""
     remarks = [*_remarks(table, tool, at_speed, machine), *unsaid(table, machine, judgement)]
     if word is Word.DOUBTFUL:

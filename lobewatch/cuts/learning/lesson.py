@@ -86,7 +86,8 @@ def next_cut(table: ProgramTable, assembly: Assembly, machine: Machine, cuts: Se
     if not left or reach.is_empty:
         return NextCut(lesson, None, left, reach)
     grid = grid_of(table, assembly, machine)
-    return NextCut(lesson, suggest(lesson.learnt, grid, lesson.own_cuts, left, lesson.doubted), left, reach)
+    cut = suggest(lesson.learnt, grid, lesson.own_cuts, left, lesson.doubted, table.depth_mm / 1e3)
+    return NextCut(lesson, cut, left, reach)
 
 
 def grid_of(table: ProgramTable, assembly: Assembly, machine: Machine) -> Grid:

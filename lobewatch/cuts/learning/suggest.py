@@ -21,6 +21,8 @@ DRAWS = 300
 """Number of draws that chances are worked out from."""
 NEARBY = (1.0, 0.85, 0.7, 0.5, 0.35)
 """Shares of a depth that are looked at in turn where zero order is not exact; chosen."""
+CAREFUL, DEEPER = 0.2, 1.5
+"""Greatest chance of chatter of a first test cut that is deeper than so many times the depth of its program."""
 GAINED = 0.005
 """Share of the best removal rate so far below which an expected gain is none; chosen."""
 LEAST_RATE = 1e-3
@@ -58,13 +60,15 @@ def suggest(
     cuts: Sequence[CutEvidence],
     left: int = 1,
     doubted: Collection[CutEvidence] = (),
+    programmed: float = 0.0,
 ) -> Suggestion | None:
     """The next test cut; None where nothing more is to be gained.
 
     cuts: those of this very program; left: test cuts that are still to be made, this one with them; doubted: cuts that
     are not believed. One of those that lies within the grid is made again, once. Else, with more than one left, a cut
     is worth what it gains itself and what the best next one is then expected to gain. A diagram by zero order proposes;
-    what is chosen was judged by semi-discretisation.
+    what is chosen was judged by semi-discretisation. programmed: depth of the program (m); the first cut is about as
+    deep, or chatters hardly.
     """
     best, draws = best_removal_rate([cut for cut in cuts if cut not in doubted]), learnt.sample(DRAWS)
     if (again := cut_again(cuts, [cut for cut in doubted if grid.holds(cut.speed_rpm)])) is not None:
@@ -72,24 +76,27 @@ def suggest(
     chart = LimitCharts.of(draws, grid)
     most = float(np.max(chart.chips))
     least = GAINED * max(best, LEAST_RATE * most)
+    careful_from = np.inf if cuts else DEEPER * programmed
     places = [place for place in chart.candidates(best) if not is_taken(float(grid.speeds[place[0]]), place[1], cuts)]
     worth = {place: chart.worth(place[0], place[1], best, left) for place in places}
     for row, depth in sorted(worth, key=lambda place: -worth[place]):
         if worth[row, depth] < least:
             return None
-        suggestion = _likely_stable(grid, float(grid.speeds[row]), depth, best, draws)
+        suggestion = _likely_stable(grid, float(grid.speeds[row]), depth, best, draws, careful_from)
         if suggestion is not None:
             return suggestion
     return None
 
 
-def _likely_stable(grid: Grid, speed: float, depth: float, best: float, draws: Draws) -> Suggestion | None:
-    """The cut, or one not as deep where it is more likely to chatter than not."""
-    for share in (1.0,) if is_constant(grid.cut) else NEARBY:
+def _likely_stable(
+    grid: Grid, speed: float, depth: float, best: float, draws: Draws, careful_from: float
+) -> Suggestion | None:
+    """The cut, or one not as deep where it is more likely to chatter than not; deeper than careful_from (m) hardly."""
+    for share in (1.0,) if is_constant(grid.cut) and depth <= careful_from else NEARBY:
         deep = floor_depth(share * depth)
         if deep > 0:
             suggestion = _judged(grid, speed, deep, best, draws)
-            if suggestion.chance < 1 - LIKELY:
+            if suggestion.chance < 1 - LIKELY and (deep <= careful_from or suggestion.chance <= CAREFUL):
                 return suggestion
     return None
 

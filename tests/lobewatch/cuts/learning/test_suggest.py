@@ -31,6 +31,21 @@ def test_a_suggested_cut_can_be_set_and_is_more_likely_stable_than_not(mill: Mil
         assert found.settles in learnt.intervals
 
 
+def test_the_first_cut_is_about_as_deep_as_the_program_or_hardly_chatters_and_then_cuts_are_bolder(mill: Mill) -> None:
+    careful = suggest(mill.prior, mill.grid, (), 5)
+    assert careful is not None
+    assert careful.chance <= 0.2
+    heard = mill.hear(careful.speed_rpm, careful.depth)
+    bold = suggest(mill.prior, mill.grid, (heard,), 4)
+    assert bold is not None
+    assert bold.chance > 0.2
+    programmed = bold.depth / 1.5
+    first = suggest(mill.prior, mill.grid, (), 5, programmed=programmed)
+    assert first is not None
+    assert first.chance <= 0.2 or first.depth <= 1.5 * programmed
+    assert suggest(mill.prior, mill.grid, (), 5, programmed=mill.grid.deepest[0]) != careful
+
+
 def test_cuts_lead_to_more_chips_and_end_where_nothing_is_to_be_gained(mill: Mill) -> None:
     mill.force = 0.9
     learnt, grid, cuts = mill.prior, mill.grid, list[CutEvidence]()

@@ -1,0 +1,172 @@
+"""Whether advice, pockets and recommendations say one thing, and that nearly the best that the judge lets pass.
+
+Random machines and programs. The best is looked for here on a dense grid of speeds and depths, each judged by the
+judge of the search; only what cannot pass it (the middle or a few draws chatter) is left out unjudged.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from random_milling import RandomMilling, random_case
+from verdict_study import MACHINE, assembly, limit_mm, program
+
+from lobes import growth, milling_system, piece_numbers, rows_of
+from lobewatch.machine import ProgramTable
+from lobewatch.machine.settings.cut_range import MM
+from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.advice import advise, robust_pockets
+from lobewatch.verdicts.draws import as_program, draw, worst_limit
+from lobewatch.verdicts.recommendation import recommend
+from lobewatch.verdicts.room import DEEPER, at_ends
+from lobewatch.verdicts.setting_search import SPARE, Setting, SettingSearch
+from lobewatch.verdicts.spindle_at_speed import AT_REST
+from lobewatch.verdicts.verdict import Word, judge
+
+STEP = 0.01
+"""Relative step of the speeds of the dense grid."""
+HARDEST = 24
+"""Draws with the largest force on the softest mode: they say first that a setting cannot pass."""
+DEEPER_STEP = 0.02
+"""Least relative step of its depths."""
+
+
+@dataclass
+class Answers:
+    """Counts, and shares of the best."""
+
+    cuts: int = 0
+    settings: int = 0
+    """Different settings that were named."""
+    contradictions: list[str] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+    """Settings that are not called stable when they are entered."""
+    shares: list[float] = field(default_factory=list)
+    """Chips of the best that was found over those of the best on the dense grid."""
+    seconds: list[float] = field(default_factory=list)
+    """CPU time of each recommendation."""
+
+
+def answers(count: int, seed: int, most_modes: int = 12, dense: bool = True) -> Answers:
+    """Of `count` random machines, those without any limit left out."""
+    counts = Answers()
+    for number, rng in enumerate(np.random.default_rng(seed).spawn(count)):
+        milling = random_case(rng)
+        limit = limit_mm(milling) if len(milling.x + milling.y) <= most_modes else math.inf
+        if not math.isfinite(limit):
+            continue
+        table, tool = program(milling, max(MM, limit * rng.uniform(0.3, 2.5))), assembly(milling)
+        ask_everywhere(counts, f"{seed}.{number}", table, tool)
+        if dense:
+            counts.shares.append(share_of_best(SettingSearch(table, tool, MACHINE)))
+            sys.stdout.write(
+                f"{number} {_about(milling)} {counts.seconds[-1]:.1f} s, {counts.shares[-1]:.3f} of best\n"
+            )
+            sys.stdout.flush()
+    return counts
+
+
+def ask_everywhere(counts: Answers, name: str, table: ProgramTable, tool: Assembly) -> None:
+    """Ask `check`, `lobes` and `recommend` of one cut."""
+    verdict = judge(table, tool, MACHINE)
+    advice, pockets = advise(verdict, MACHINE), robust_pockets(table, tool, MACHINE)
+    begin = time.process_time()
+    free = recommend(table, tool, MACHINE, AT_REST).setting
+    counts.seconds.append(time.process_time() - begin)
+    at_depth = recommend(table, tool, MACHINE, AT_REST, depth_mm=table.depth_mm).setting
+    counts.cuts += 1
+    for what, is_so in {
+        "pockets and recommendation": bool(pockets) == (free is not None),
+        "first pocket and recommendation": not pockets or pockets[0] == free,
+        "advice and recommendation": verdict.word is Word.STABLE or (advice.best is None) == (free is None),
+        "advice and recommendation at its depth": verdict.word is Word.STABLE
+        or _has_depth(advice.best, table) == (at_depth is not None),
+    }.items():
+        counts.contradictions += [] if is_so else [f"{name}: {what}"]
+    named = {(s.speed_rpm, s.depth_mm) for s in (free, at_depth, advice.best, advice.here, *pockets) if s is not None}
+    counts.settings += len(named)
+    for speed, depth in sorted(named):
+        if judge(_at(table, speed, depth), tool, MACHINE).word is not Word.STABLE:
+            counts.refused.append(f"{name}: {speed:g} rpm, {depth:g} mm")
+
+
+def share_of_best(search: SettingSearch) -> float:
+    """Chips of the best that the search finds over the most on the grid; 1 where neither finds anything."""
+    chips = 0.0 if search.best is None else search.best.speed_rpm * search.best.depth_mm
+    most = max([chips, *_deeper(search, chips)])
+    return 1.0 if most == 0 else chips / most
+
+
+def _deeper(search: SettingSearch, chips: float) -> Iterator[float]:
+    """Chips of settings of the grid with ever more of them than so many (rpm mm)."""
+    speeds, most = search.reach.speeds(STEP)[::-1], chips
+    thinkable = _middle_is_calm(search, speeds, chips)
+    for speed in speeds[thinkable].tolist():
+        deepest = float(search.reach.depths(np.array([speed]))[0])
+        depth = (math.floor(most / speed / MM) + 1) * MM
+        while depth <= deepest and _may_pass(search, speed, depth):
+            if not isinstance(search.verified(speed, round(depth, 6)), Setting):
+                break
+            most = speed * depth
+            yield most
+            depth += max(MM, math.floor(DEEPER_STEP * depth / MM) * MM)
+
+
+def _middle_is_calm(search: SettingSearch, speeds: np.ndarray, chips: float) -> np.ndarray:
+    """Whether the middle is stable at speeds (rpm) at the depth that so many chips ask for, with all to spare."""
+    depths = (np.floor(chips / speeds / MM) + 1) * MM * (1 + SPARE) / 1e3
+    calm = np.ones(speeds.size, dtype=bool)
+    for vectors in search.spindle.axes.patterns:
+        system = milling_system(search.spindle.x, search.spindle.y, vectors)
+        for cut in search.cuts:
+            rows = rows_of(system, cut, speeds[calm])
+            grown = growth(rows, depths[calm, np.newaxis], piece_numbers(rows, float(np.max(depths))))[:, 0]
+            calm[calm] = grown < 0
+            if not np.any(calm):
+                return calm
+    return calm
+
+
+def _may_pass(search: SettingSearch, speed: float, depth_mm: float) -> bool:
+    """Whether the middle and the hardest draws let a setting pass."""
+    at = as_program(_at(search.table, speed, depth_mm), MACHINE)
+    limit, axes, _ = worst_limit(at, search.spindle, search.cuts)
+    if limit.limit < (1 + SPARE) * at.depth:
+        return False
+    drawn = draw(at, limit, search.cuts, search.spindle, search.doubt, axes).fed(np.inf, 2)
+    force = drawn.rows.tangential[:, np.newaxis] / (drawn.rows.stiffness * drawn.rows.damping_ratio)
+    hardest = drawn[np.argsort(-np.max(force, axis=1))[:HARDEST]]
+    return not np.any(at_ends(hardest, search.fall, search.stiffness_at).growth(DEEPER * at.depth) >= 0)
+
+
+def _at(table: ProgramTable, speed: float, depth_mm: float) -> ProgramTable:
+    fields = {name: getattr(table, name) for name in table.__struct_fields__}
+    return ProgramTable(**fields | {"speed_rpm": speed, "depth_mm": depth_mm})
+
+
+def _has_depth(setting: Setting | None, table: ProgramTable) -> bool:
+    return setting is not None and setting.depth_mm == table.depth_mm
+
+
+def _about(milling: RandomMilling) -> str:
+    return f"{len(milling.x)}+{len(milling.y)} modes, {milling.teeth} teeth, a/D {milling.immersion}"
+
+
+def summary(counts: Answers) -> str:
+    """One line for docs/long-tests.md."""
+    shares = np.array(counts.shares or [np.nan])
+    return (
+        f"{counts.cuts} cuts, {counts.settings} settings, {len(counts.contradictions)} contradictions, "
+        f"{len(counts.refused)} refused; found over best: 95 % in {np.mean(shares >= 0.95):.0%}, "
+        f"least {np.min(shares):.2f}; CPU median {np.median(counts.seconds):.2f}, most {np.max(counts.seconds):.2f} s\n"
+        + "\n".join([*counts.contradictions, *counts.refused])
+    )
+
+
+if __name__ == "__main__":
+    sys.stdout.write(summary(answers(int(sys.argv[2]), int(sys.argv[1]))) + "\n")

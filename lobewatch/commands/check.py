@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from lobewatch.commands.number_option import number
 from lobewatch.machine.folder_path import named_folder
 from lobewatch.show.terminal.output import Json, emit, notes
 
@@ -20,13 +21,15 @@ def check(
     program: Annotated[
         list[str] | None, typer.Option(help="Only this program; may be repeated. All where none is named.")
     ] = None,
-    speed: Annotated[float | None, typer.Option(help="Of a cut that is no program: spindle speed, rpm.")] = None,
-    depth: Annotated[float | None, typer.Option(help="Its axial depth, mm.")] = None,
+    speed: Annotated[
+        float | None, typer.Option(parser=number, help="Of a cut that is no program: spindle speed, rpm.")
+    ] = None,
+    depth: Annotated[float | None, typer.Option(parser=number, help="Its axial depth, mm.")] = None,
     tool: Annotated[str | None, typer.Option(help="Its tool.")] = None,
     material: Annotated[str | None, typer.Option(help="A [[material]], or one of lobewatch materials.")] = None,
     teeth: Annotated[int | None, typer.Option(help="Teeth of the tool.")] = None,
-    diameter: Annotated[float | None, typer.Option(help="Diameter of the tool, mm.")] = None,
-    radial: Annotated[float | None, typer.Option(help="Its radial depth, mm.")] = None,
+    diameter: Annotated[float | None, typer.Option(parser=number, help="Diameter of the tool, mm.")] = None,
+    radial: Annotated[float | None, typer.Option(parser=number, help="Its radial depth, mm.")] = None,
     direction: Annotated[Literal["up", "down"] | None, typer.Option(help="Up or down milling.")] = None,
     accept: Annotated[
         list[str] | None,

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from lobewatch.commands.number_option import number
 from lobewatch.machine.folder_path import named_folder
 from lobewatch.show.terminal.output import Json, emit
 
@@ -15,15 +16,17 @@ def recommend(
     machine: Annotated[Path, typer.Argument(parser=named_folder, help="Machine folder with at least one tap test.")],
     tool: Annotated[str | None, typer.Option(help="The tool.")] = None,
     material: Annotated[str | None, typer.Option(help="A [[material]], or one of lobewatch materials.")] = None,
-    radial: Annotated[float | None, typer.Option(help="Radial depth, mm; a slot where none is given.")] = None,
+    radial: Annotated[
+        float | None, typer.Option(parser=number, help="Radial depth, mm; a slot where none is given.")
+    ] = None,
     direction: Annotated[
         Literal["up", "down"] | None, typer.Option(help="Up or down milling; the worse where none is given.")
     ] = None,
-    depth: Annotated[float | None, typer.Option(help="Axial depth that shall be cut, mm.")] = None,
-    speed: Annotated[float | None, typer.Option(help="Speed that it runs at now, rpm.")] = None,
+    depth: Annotated[float | None, typer.Option(parser=number, help="Axial depth that shall be cut, mm.")] = None,
+    speed: Annotated[float | None, typer.Option(parser=number, help="Speed that it runs at now, rpm.")] = None,
     teeth: Annotated[int | None, typer.Option(help="Teeth of the tool.")] = None,
-    diameter: Annotated[float | None, typer.Option(help="Diameter of the tool, mm.")] = None,
-    feed_per_tooth: Annotated[float | None, typer.Option(help="Feed per tooth, mm.")] = None,
+    diameter: Annotated[float | None, typer.Option(parser=number, help="Diameter of the tool, mm.")] = None,
+    feed_per_tooth: Annotated[float | None, typer.Option(parser=number, help="Feed per tooth, mm.")] = None,
     save: Annotated[str | None, typer.Option(help="Write it into machine.toml as a program of this name.")] = None,
     as_json: Json = False,
 ) -> None:

@@ -9,13 +9,14 @@ from typing import Self
 import msgspec
 import numpy as np
 
-from acquisition import DataError
+from acquisition import DataError, Remark
 from lobewatch.machine import Machine, ProgramTable
 from lobewatch.machine.settings.cut_range import MM, CutRange
 from lobewatch.machine.settings.setting_questions import questions_of_program
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.setting_search import Setting, SettingSearch
 from lobewatch.verdicts.spindle_at_speed import SpindleAtSpeed
+from lobewatch.verdicts.tool_remarks import not_described
 from lobewatch.verdicts.verdict import Verdict, Word, judge, unanswered
 
 MOST_CHIPS, HERE = "most chips", "deepest at the present speed"
@@ -64,6 +65,8 @@ class Recommendation:
     """Settings beside it, two at most."""
     feed_mm: tuple[float, float] | None = None
     """Least and greatest feed per tooth (mm): its own, else what the tool bears; None where neither is known."""
+    remarks: tuple[Remark, ...] = ()
+    """Remarks on what it rests on, and on what is not known of the tool."""
 
     def named(self, name: str) -> Self:
         """The same, its program of another name."""
@@ -136,7 +139,8 @@ def _entered(
         return Recommendation(table, search.either, reason=reason, alternatives=others)
     own, borne = table.feed_per_tooth_mm, search.reach.limits.feed_per_tooth_mm
     feed = (own, own) if own is not None else None if borne is None else (borne.low, borne.high)
-    return Recommendation(program, search.either, setting, verdict, alternatives=others, feed_mm=feed)
+    remarks = (*verdict.remarks, *not_described(table, search.reach.limits))
+    return Recommendation(program, search.either, setting, verdict, "", (), others, feed, remarks)
 
 
 def _alternatives(search: SettingSearch, setting: Setting | None, present_rpm: float | None) -> Iterator[Alternative]:
@@ -155,7 +159,7 @@ def _no_safe(search: SettingSearch, depth_mm: float | None, set_rpm: float | Non
     if set_rpm is not None:
         return f"no safe depth at {set_rpm:g} rpm"
     named = "speed and depth" if depth_mm is None else f"speed for {depth_mm:g} mm"
-    return f"no safe {named} in {search.reach.low_rpm:g}..{search.reach.high_rpm:g} rpm"
+    return f"no safe {named} in {search.reach.words}"
 
 
 def _cures(search: SettingSearch, depth_mm: float | None) -> tuple[str, ...]:

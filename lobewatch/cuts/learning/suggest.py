@@ -23,6 +23,8 @@ NEARBY = (1.0, 0.85, 0.7, 0.5, 0.35)
 """Shares of a depth that are looked at in turn where zero order is not exact; chosen."""
 CAREFUL, DEEPER = 0.2, 1.5
 """Greatest chance of chatter of a first test cut that is deeper than so many times the depth of its program."""
+CAREFULLY = (1.0, 0.95, 0.9, 0.85, 0.8, 0.75, 0.7, 0.6, 0.5, 0.35)
+"""Shares of a depth that are looked at in turn for such a first cut; chosen."""
 GAINED = 0.005
 """Share of the best removal rate so far below which an expected gain is none; chosen."""
 LEAST_RATE = 1e-3
@@ -92,7 +94,8 @@ def _likely_stable(
     grid: Grid, speed: float, depth: float, best: float, draws: Draws, careful_from: float
 ) -> Suggestion | None:
     """The cut, or one not as deep where it is more likely to chatter than not; deeper than careful_from (m) hardly."""
-    for share in (1.0,) if is_constant(grid.cut) and depth <= careful_from else NEARBY:
+    nearby = (1.0,) if is_constant(grid.cut) else NEARBY
+    for share in nearby if depth <= careful_from else CAREFULLY:
         deep = floor_depth(share * depth)
         if deep > 0:
             suggestion = _judged(grid, speed, deep, best, draws)

@@ -94,4 +94,8 @@ class SpeedRange(Table, frozen=True):
     def __post_init__(self) -> None:
         """Refuse an empty range."""
         if not self.low_rpm < self.high_rpm:
-            raise ValueError(f"low_rpm={self.low_rpm:g} is not below high_rpm={self.high_rpm:g}")
+            around = (
+                f"of a spindle of one speed give what is around it, {0.99 * self.low_rpm:g} and {1.01 * self.low_rpm:g}"
+            )
+            cure = around if self.low_rpm == self.high_rpm else "give the lowest, then the highest"
+            raise ValueError(f"low_rpm={self.low_rpm:g} is not below high_rpm={self.high_rpm:g}; {cure}")

@@ -122,6 +122,4 @@ def _chips(setting: Setting, answer: Recommendation) -> str:
 
 def _notes(answer: Recommendation) -> list[Remark]:
     """Remarks that are said apart from its lines."""
-    return (
-        [] if answer.verdict is None else [remark for remark in answer.verdict.remarks if remark.code not in IN_LINES]
-    )
+    return [remark for remark in answer.remarks if remark.code not in IN_LINES]

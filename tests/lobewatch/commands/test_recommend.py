@@ -89,6 +89,20 @@ def test_a_program_without_speed_or_depth_is_recommended_by_check(shop: Shop, ru
     assert run("check", "--json")[0] == 0
 
 
+def test_a_spindle_of_one_speed_is_a_narrow_range_and_a_reversed_one_is_refused(shop: Shop, run: Any) -> None:
+    shop.tap_both()
+    shop.run(("A", 6500, 0.5))
+    shop.edit("low_rpm = 3000\nhigh_rpm = 24000", "low_rpm = 6500\nhigh_rpm = 6500")
+    code, _, error = run("recommend")
+    assert (code, "give what is around it, 6435 and 6565" in " ".join(error.split())) == (2, True)
+    shop.edit("low_rpm = 6500\nhigh_rpm = 6500", "low_rpm = 6565\nhigh_rpm = 6435")
+    code, _, error = run("recommend")
+    assert (code, "is not below high_rpm=6435; give the lowest, then" in " ".join(error.split())) == (2, True)
+    shop.edit("low_rpm = 6565\nhigh_rpm = 6435", "low_rpm = 6435\nhigh_rpm = 6565")
+    best = json.loads(run("recommend", "--json")[1])["recommended"]
+    assert 6435 <= best["speed_rpm"] <= 6565
+
+
 def test_without_y_there_is_none_and_tapping_it_would_change_that(shop: Shop, run: Any) -> None:
     shop.tap(0, 1713.0)
     code, out, _ = run("recommend")
@@ -150,3 +164,9 @@ def test_one_error_for_what_makes_no_sense(shop: Shop, run: Any, words: list[str
     code, _, error = run("recommend", *words)
     assert (code, " ".join(error.split()).removeprefix("error: ")[: len(text)]) == (2, text)
     assert toml(shop) == before
+
+
+def test_a_decimal_comma_is_told_to_be_a_point(run: Any) -> None:
+    for command in ("recommend", "check"):
+        code, _, error = run(command, "--depth", "1,5")
+        assert (code, "'1,5' is no number; write 1.5 with a point" in " ".join(error.split())) == (2, True)

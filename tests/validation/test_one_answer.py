@@ -1,0 +1,35 @@
+"""Whether `check`, `lobes` and `recommend` say one thing: docs/long-tests.md has the last figures."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from one_answer_study import answers, summary
+
+
+def test_advice_pockets_and_recommendation_are_one_answer_that_holds_when_it_is_entered() -> None:
+    counts = answers(count=16, seed=5, most_modes=3, dense=False)
+    assert counts.cuts >= 2
+    assert counts.contradictions == []
+    assert counts.refused == []
+    assert counts.settings >= counts.cuts
+
+
+@pytest.mark.long
+@pytest.mark.timeout(14400)
+def test_of_1000_random_cuts_no_two_answers_contradict_each_other_and_none_is_refused() -> None:
+    counts = answers(count=1000, seed=6, dense=False)
+    sys.stdout.write(summary(counts))
+    assert counts.cuts >= 600
+    assert counts.contradictions == []
+    assert counts.refused == []
+
+
+@pytest.mark.long
+@pytest.mark.timeout(14400)
+def test_what_is_recommended_is_nearly_the_best_of_a_dense_grid() -> None:
+    counts = answers(count=60, seed=7)
+    sys.stdout.write(summary(counts))
+    assert np.mean(np.array(counts.shares) >= 0.95) >= 0.9

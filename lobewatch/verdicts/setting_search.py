@@ -99,7 +99,7 @@ class SettingSearch:
     chattered: set[int] = field(default_factory=set)
     """Draws that have chattered where few others made it seem safe."""
     judged: dict[tuple[float, float], Judgement] = field(default_factory=dict)
-    """What `weigh` says of the settings that were found, by speed (rpm) and depth (mm)."""
+    """Judgements of the settings that were found, by speed (rpm) and depth (mm)."""
 
     @cached_property
     def spindle(self) -> Assembly:

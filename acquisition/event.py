@@ -10,8 +10,11 @@ class EventKind(enum.IntEnum):
     """What has happened."""
 
     BUTTON = 1
+    """A button at the device was pressed: it undoes the last hit."""
     CABLE = 2
+    """The cable of a channel is not plugged in."""
     SENSOR_BIAS = 3
+    """A sensor has no supply, or does not take it: its bias voltage is out of range."""
 
 
 @dataclass(frozen=True)

@@ -136,6 +136,8 @@ def from_accelerance(
 ) -> Frf:
     """FRF from acceleration over force (m/s^2/N) by division with -(2 pi f)^2; a line at 0 Hz is left out.
 
+    frequency (Hz), accelerance and coherence have shape (n,). Raises ValueError as `Frf`.
+
     >>> frf = from_accelerance([0.0, 100.0, 200.0], [0.5, 0.5, 0.5])  # 1/kg: a mass of 2 kg
     >>> frf.frequency.tolist(), round(float(frf.receptance[0].real) * 1e6, 3)  # Hz, um/N
     ([100.0, 200.0], -1.267)

@@ -26,19 +26,33 @@ class HitFlags(enum.Flag):
     """
 
     OK = 0
+    """Nothing is wrong."""
     DOUBLE_HIT = enum.auto()
+    """The hammer has touched twice."""
     OVERLOAD_FORCE = enum.auto()
+    """The force stands at a rail of its converter."""
     OVERLOAD_RESPONSE = enum.auto()
+    """The response stands at a rail of its converter."""
     TOO_SOFT = enum.auto()
+    """The peak of the force is near the noise, or below 2 % of its range."""
     NOT_DECAYED = enum.auto()
+    """The response still rings when the record ends."""
     LOST_SCANS = enum.auto()
+    """Scans are missing inside the record."""
     NO_HIT = enum.auto()
+    """No pulse stands out of the noise."""
     SWAPPED_CHANNELS = enum.auto()
+    """The pulse is on the channel of the response."""
     TOO_HARD = enum.auto()
+    """The peak of the force is above 90 % of its range, not clipped."""
     NARROW_BAND = enum.auto()
+    """The force does not reach to the end of the band that is followed."""
     INCONSISTENT = enum.auto()
+    """The FRF of this hit is not that of the good ones."""
     UNDONE = enum.auto()
+    """The operator has taken it back."""
     NOT_JUDGED = enum.auto()
+    """It could not be judged."""
 
     @property
     def words(self) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pdoc.doc
+import pdoc.doc_ast
 import pdoc.doc_types
 import pdoc.render
 
@@ -35,7 +36,7 @@ def public_names() -> dict[str, str]:
 
 def pages() -> dict[str, str]:
     """HTML of each page by its path in docs/api."""
-    modules = {name: pdoc.doc.Module(_resolved(name)) for name in MODULES}
+    modules = {name: _with_constants(pdoc.doc.Module(_resolved(name))) for name in MODULES}
     _annotate_as_written(public_names())
     pdoc.render.configure(docformat="markdown", show_source=False, search=False, template_directory=TEMPLATES)
     made = {f"{name.replace('.', '/')}.html": pdoc.render.html_module(modules[name], modules) for name in modules}
@@ -54,6 +55,17 @@ def _resolved(name: str) -> Any:
     module = import_module(name)
     for public in module.__all__:
         setattr(module, public, getattr(module, public))
+    return module
+
+
+def _with_constants(module: pdoc.doc.Module) -> pdoc.doc.Module:
+    """A package whose constants have the docstrings that stand where they are bound."""
+    rooms = [room for name, room in sorted(sys.modules.items()) if name.startswith(module.modulename)]
+    for constant in module.variables:
+        value = vars(module.obj)[constant.name]
+        homes = (room for room in rooms if vars(room).get(constant.name) is value)
+        texts = (pdoc.doc_ast.walk_tree(home).var_docstrings.get(constant.name, "") for home in homes)
+        constant.docstring = next(filter(None, texts), "")
     return module
 
 

@@ -45,7 +45,10 @@ def deepest_for_drive(
     power: float = float("inf"),
     torque: float = float("inf"),
 ) -> NDArray[np.float64]:
-    """Deepest axial depth (m) that a power (W) and a torque (N m) of the spindle allow at each speed (rpm).
+    """Deepest axial depth (m) that a power (W) and a torque (N m) of the spindle allow at each speed (rpm), shape (n,).
+
+    diameter, feed_per_tooth (m) and edge (N/m) as for `mean_torque`; power = 2 pi n M. Raises ValueError as that, and
+    for a power or a torque that is not > 0.
 
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
     >>> depth = deepest_for_drive(slot, [6000.0, 12000.0], 12e-3, 0.1e-3, power=1000.0, torque=1.0)

@@ -13,7 +13,10 @@ from lobes.milling_tests import milling_tests
 
 
 def cutting_coefficients() -> tuple[Coefficients, ...]:
-    """Those measured by milling, then the materials listed by name with those of published specific forces."""
+    """All coefficients that are known: those measured by milling, then the materials listed by name.
+
+    These have theirs from published specific cutting forces. Each names its source.
+    """
     return (*milling_tests(), *listed_materials())
 
 
@@ -28,7 +31,7 @@ def folded_name(name: str) -> str:
 
 @cache
 def materials_by_name() -> Mapping[str, Coefficients]:
-    """The coefficients by each of their names, folded.
+    """The coefficients by each of their names, as `folded_name` writes them.
 
     >>> materials_by_name()[folded_name("AA 7075")].names
     ('EN AW-7075', '3.4365', 'AlZn5.5MgCu', 'AlZnMgCu1.5', 'AA 7075', 'UNS A97075')

@@ -87,7 +87,7 @@ def _pattern(teeth: int, block: int, difference: float) -> PitchPattern:
 
 
 def equal_pitch(teeth: int) -> PitchPattern:
-    """Evenly spaced teeth.
+    """Evenly spaced teeth, each 360 / teeth degrees behind the one before it.
 
     >>> equal_pitch(4).pitch_deg
     (90.0, 90.0, 90.0, 90.0)

@@ -92,6 +92,8 @@ def _ends(speed: NDArray[np.float64], depth: NDArray[np.float64], peak: int) -> 
 def best_pockets(found: Sequence[Pocket], count: int = 3, by: str = "depth") -> list[Pocket]:
     """The best pockets first, by "depth" or by "removal" (depth times speed: chip volume at one feed per tooth).
 
+    Raises ValueError for any other `by`.
+
     >>> few = [Pocket(5000.0, 3e-3, 4900.0, 5100.0), Pocket(15000.0, 2e-3, 14500.0, 15500.0)]
     >>> best_pockets(few, 1)[0].speed_rpm, best_pockets(few, 1, by="removal")[0].speed_rpm  # rpm
     (5000.0, 15000.0)

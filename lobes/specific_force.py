@@ -10,7 +10,9 @@ MM = 1e-3
 
 @dataclass(frozen=True)
 class SpecificForce:
-    """Specific cutting force as a publication gives it.
+    """Specific cutting force as a publication gives it, kc = kc1.1 h^-mc with the chip thickness h in mm.
+
+    Source: Kienzle (1952), VDI-Z 94, 299.
 
     Kienzle's force per width kc1.1 h^(1 - mc) is Ktc h + Kte around one chip thickness:
 

@@ -23,6 +23,7 @@ ToolMaterial = Literal["HSS", "carbide", "coated carbide", "PCD", "CBN"]
 CutKind = Literal["slot", "side"]
 """Slot, or cut at the side of what is there."""
 TOOL_MATERIALS: tuple[ToolMaterial, ...] = get_args(ToolMaterial)
+"""All materials of edges."""
 SLOT_FROM = 0.4
 """Radial depth over diameter from which on a cut counts as a slot, as in the tables of Tungaloy."""
 LEAST = 0.25
@@ -44,7 +45,7 @@ class PublishedRange:
 
 
 def cut_kind(immersion: float) -> CutKind:
-    """Kind of a cut by its radial depth over diameter (-).
+    """Kind of a cut by its radial depth over diameter (-): a slot from 0.4 on, as in the tables of Tungaloy.
 
     >>> cut_kind(1.0), cut_kind(0.1)
     ('slot', 'side')
@@ -53,7 +54,9 @@ def cut_kind(immersion: float) -> CutKind:
 
 
 def cutting_speed(material: Coefficients, tool: ToolMaterial, cut: CutKind) -> PublishedRange | None:
-    """Speeds of the edge (m/s) that are published; None where none are.
+    """Speeds of the edge (m/s) that are published for a group of materials and a tool; None where none are.
+
+    Source: those that the range names, in the .csv beside this module.
 
     >>> aluminium = materials_by_name()[folded_name("AA 7075")]
     >>> speed = cutting_speed(aluminium, "carbide", "side")

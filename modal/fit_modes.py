@@ -57,6 +57,8 @@ def fit_modes(frf: Frf, band: tuple[float, float] | None = None, hits: Sequence[
 def modes_of(state: Extraction, hits: Sequence[Sequence[Hit]] = ()) -> list[Mode]:
     """Modes of an extraction, by rising frequency; hits: for each of its FRFs those that it was averaged from.
 
+    Raises ValueError for another number of lists of hits than FRFs, and for hits that have other lines or no pulse.
+
     >>> state = extract([synthesize([Mode(500.0, 0.02, 2e7)], np.arange(1.0, 1501.0))])
     >>> [f"{mode.frequency:.1f} Hz" for mode in modes_of(state)]
     ['500.0 Hz']

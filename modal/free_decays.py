@@ -44,6 +44,8 @@ def decay_spectra(decays: ArrayLike, sample_rate: float) -> list[Frf]:
     are fitted together with common poles and never averaged. What is left of the force after the first sample is
     smooth over the lines of a mode, and does not move its pole either.
 
+    sample_rate in Hz. Raises ValueError for fewer than 32 samples, values that are not finite, and decays of one value.
+
     Source: Ewins, Modal Testing, ch. 2 and 4; Brown, Allemang, Zimmerman & Mergeay (1979), SAE paper 790221.
 
     >>> time = np.arange(2048) / 10240.0  # s

@@ -67,11 +67,15 @@ class DataqSource:
         """
         check_inputs(inputs)
         self.channels = tuple(sensor.channel for sensor in inputs)
+        """What is on each input."""
         self.loss_detection = "digital word" + " and clock" * digital_clock if digital_word else "none"
+        """How lost scans are found."""
         self.events: deque[Event] = deque()
         """It tells of no events."""
         self.status = DataqStatus.STOPPED
+        """What it is doing."""
         self.overflows = 0
+        """How often its buffer ran over."""
         self._decoder = ScanDecoder(len(inputs), digital_word, digital_clock)
         self._next_scan = self._overruns = 0
         self._has_sent = False

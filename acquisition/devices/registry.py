@@ -17,7 +17,7 @@ GROUP = "lobewatch.drivers"
 
 
 def driver_names() -> tuple[str, ...]:
-    """Ours first; nothing is loaded."""
+    """Names of all drivers that are installed, ours first; nothing is loaded."""
     ours = [driver.name for driver in BUILT_IN]
     return (*ours, *sorted({point.name for point in entry_points(group=GROUP)}.difference(ours)))
 

@@ -33,8 +33,11 @@ class SimulatedSource:
     """
 
     identity = DeviceIdentity("simulation")
+    """What it says it is."""
     follows_clock = False
+    """Its scans come as fast as they are asked for."""
     loss_detection = ""
+    """No scans can be lost."""
 
     def __init__(
         self,
@@ -44,9 +47,11 @@ class SimulatedSource:
         n_scans: int,
         block: int = 512,
     ) -> None:
-        """A stream of n_scans scans, cut into blocks."""
+        """A stream of n_scans scans of (first_scan, n) -> N and m/s^2, shape (n_channels, n), cut into blocks."""
         self.channels = channels
+        """What is on each input."""
         self.sample_rate = sample_rate
+        """Scans a second (Hz)."""
         self.events: deque[Event] = deque()
         """Put in what shall happen."""
         self._signal, self._n_scans, self._block = signal, n_scans, block

@@ -67,6 +67,9 @@ def _quotient(dividend: NDArray[Any], power: NDArray[np.float64], excited: NDArr
 def cross_spectra(hits: Sequence[Hit]) -> Spectra:
     """Mean auto-spectra S_ff (N^2), S_xx ((m/s^2)^2) and cross-spectrum S_fx of the hits, each (n // 2 + 1,).
 
+    S_fx (N m/s^2) is the mean of conj(F) X, F the force tapered to zero after its pulse. Raises ValueError as
+    `estimate_frf`. Source: Bendat & Piersol, Random Data, ch. 6.
+
     >>> force = np.zeros(1000)
     >>> force[100:110] = 200.0  # N
     >>> s_ff, s_xx, s_fx = cross_spectra([Hit(force, force / 2.0, 10000.0, pre_trigger=100)])  # of a mass of 2 kg

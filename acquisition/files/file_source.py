@@ -38,8 +38,11 @@ class FileSource:
     """
 
     follows_clock = False
+    """Its scans come at no rate that could be measured."""
     loss_detection = ""
+    """No scans can be lost."""
     fault = ""
+    """Nothing is ever wrong."""
 
     def __init__(self, path: Path | str, realtime: bool = True) -> None:
         """Read a file that `read_hits` can read; realtime=False hands it over as fast as it is asked for.
@@ -49,9 +52,13 @@ class FileSource:
         hits = read_hits(path)
         quantities: tuple[ChannelQuantity, ...] = ("force", "acceleration") if hits[0].has_force else ("acceleration",)
         self.channels = hits[0].channels or tuple(_channel(quantity, hits) for quantity in quantities)
+        """Channels of the recording."""
         self.sample_rate = hits[0].sample_rate
+        """Scans a second (Hz)."""
         self.identity = DeviceIdentity(f"replay of {Path(path).name}")
+        """Name of the file."""
         self.events: deque[Event] = deque()
+        """It tells of no events."""
         self._hits, self._realtime = hits, realtime
         self._stopped = threading.Event()
 

@@ -98,6 +98,8 @@ def read_hits(path: Path | str, said: Description = NOTHING) -> list[Hit]:
 def read_frf(path: Path | str, said: Description = NOTHING) -> Frf:
     """The FRF that a recorded file holds, or that estimated (H1) from its good hits.
 
+    DataError where it holds neither, or no good hit.
+
     >>> from tempfile import TemporaryDirectory
     >>> line = np.arange(400.0, 500.0)
     >>> with TemporaryDirectory() as folder:

@@ -39,7 +39,7 @@ PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletch
 
 
 def write_tap(path: Path | str, tap: TapTest) -> bytes:
-    """Write a tap test, sealed; returns the bytes of the file, on the disk when this returns.
+    """Write a tap test, sealed; returns the bytes of the file, on the disk when this returns. OSError where that fails.
 
     >>> from datetime import UTC, datetime
     >>> from tempfile import TemporaryDirectory
@@ -100,7 +100,7 @@ def read_tap(path: Path | str) -> TapTest:
 
 
 def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: HitFlags) -> None:
-    """One hit of a test in progress and the verdict on it, sealed; on the disk when this returns."""
+    """One hit of a test in progress and the verdict on it, sealed; on the disk when this returns, else OSError."""
     memory = io.BytesIO()
     with h5py.File(memory, "w") as file:
         file.attrs.update(format=FORMAT, version=_version([hit]), file=Path(path).name)
@@ -110,7 +110,7 @@ def write_hit(path: Path | str, hit: Hit, circumstances: Circumstances, flags: H
 
 
 def read_tap_hits(path: Path | str) -> tuple[tuple[Hit, ...], Circumstances, tuple[HitFlags, ...]]:
-    """The hits of a tap file or of a hit file, their circumstances, and the verdicts of then."""
+    """The hits of a tap file or of a hit file, their circumstances, and the verdicts of then; DataError as read_tap."""
     with _open(Path(path)) as file:
         hits, flags = _read_raw(file)
         return hits, _read_circumstances(file), flags

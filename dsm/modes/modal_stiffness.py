@@ -10,6 +10,7 @@ def modal_stiffness(spindle: Spindle, mode: int = 1, position: float = 0.0) -> f
     """Modal stiffness K of a mode (1 is the lowest) at `position` from the tool tip (m), in N/m; see modes_at.
 
     This, and not the static stiffness, is what the height of a peak of the measured FRF gives: |H| = 1/(2 zeta K).
+    Raises ValueError for a mode below 1, and as modes_at.
 
     Of a shaft on two knife edges half the mass moves with its middle:
 

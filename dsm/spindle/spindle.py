@@ -15,6 +15,7 @@ from dsm.spindle.places import SAME_PLACE
 from dsm.spindle.segment import Segment, ring_area
 
 Theory = Literal["euler-bernoulli", "timoshenko"]
+"""Beam theory; "timoshenko" adds shear, rotary inertia and gyroscopic moments."""
 
 MAX_SEGMENTS = 500
 """More are refused: the work grows with their third power."""

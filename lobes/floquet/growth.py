@@ -19,7 +19,8 @@ def growth(
 ) -> NDArray[np.float64]:
     """Logarithm of the largest multiplier's magnitude at depths (r, d) in m, shape (r, d); negative where stable.
 
-    numbers (r,): pieces of the tooth period; tolerance: accuracy of the result.
+    numbers (r,): pieces of the tooth period (`piece_numbers`); tolerance: accuracy of the result.
+    Source: as `spectral_radius`, whose logarithm it is.
 
     >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
     >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)

@@ -25,10 +25,13 @@ class Light(StrEnum):
     """The light of a machine, worst first."""
 
     ALARM = "alarm"
+    """Beyond a limit: a fall, a decay, or a program that is not stable any more."""
     UNKNOWN = "unknown"
     """Damaged, unreadable or never tapped: nothing can be said."""
     WARN = "warn"
+    """In want of attention: a smaller fall, a doubt, damage, a test that is due."""
     GOOD = "good"
+    """Nothing is known to be wrong."""
 
 
 LIGHTS = {

@@ -36,11 +36,22 @@ class Logbook:
 
     It holds what the disk said when it was first asked; `commit` and `replay` add to it, `is_current` tells whether
     somebody else has. Questions are answered by `Analysis`, all through `ask`.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from lobewatch.machine import make_machine_folder
+    >>> with TemporaryDirectory() as parent:
+    ...     toml = make_machine_folder(Path(parent) / "mill-3", "surrogate_machine.toml")
+    ...     logbook = Logbook.open(toml.parent)
+    ...     standing = logbook.standing()
+    >>> standing.light.value, [reason.code for reason in standing.reasons]
+    ('unknown', ['never-tapped'])
     """
 
     def __init__(self, folder: MachineFolder) -> None:
         """Nothing is read yet."""
         self.folder = folder
+        """Folder of the machine."""
         self.files = UsableTaps(folder)
         """What the folder holds, and what was done to the machine."""
         self.fits: dict[str, TapFit] = {}

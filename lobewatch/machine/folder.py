@@ -37,6 +37,7 @@ class MachineFolder:
     def __init__(self, path: Path | str) -> None:
         """DataError where this is no machine folder, or one whose name no file or page could hold."""
         self.path = named_folder(path)
+        """Path of the folder."""
         if path_text(path) != str(path):
             raise DataError(f"{path_text(path)}: the name of the folder is no UTF-8; rename it")
         if not self.toml.exists() and tap_files(self.path):

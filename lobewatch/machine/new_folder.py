@@ -15,6 +15,14 @@ def make_machine_folder(folder: Path, template: str) -> Path:
     """A machine folder from a template of sim_data, named after itself; DataError where there is one already.
 
     ValueError for a folder whose name holds control characters.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as parent:
+    ...     toml = make_machine_folder(Path(parent) / "mill-3", "surrogate_machine.toml")
+    ...     machine = MachineFolder(toml.parent).machine
+    >>> machine.machine.name, [program.name for program in machine.program]
+    ('mill-3', ['A: slot at 12 600 rpm', 'B: slot at 6 200 rpm', 'C: slot at 16 000 rpm'])
     """
     return write_machine(folder, new_machine_text(folder, template))
 

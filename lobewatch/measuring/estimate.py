@@ -7,7 +7,13 @@ from typing import NamedTuple
 
 
 class Estimate(NamedTuple):
-    """A value and its standard error, in any unit."""
+    """A value and its standard error, in any unit.
+
+    >>> first, now = Estimate(700.0, 0.5), Estimate(665.0, 0.5)  # Hz
+    >>> change = now.change_since(first)
+    >>> f"{change.value:.2f} +- {change.std:.2f} %"
+    '-5.00 +- 0.10 %'
+    """
 
     value: float
     """Value; NaN where it is not known."""

@@ -33,6 +33,17 @@ def calibrate_model(
 
     Standard errors (Hz), modes and groups may be left out; what is given stands for each frequency. Raises what
     dsm.calibrate, dsm.fit_stiffness and dsm.calibrate_damping raise.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from lobewatch.machine import MachineFolder, make_machine_folder
+    >>> with TemporaryDirectory() as parent:
+    ...     toml = make_machine_folder(Path(parent) / "mill-3", "surrogate_machine.toml")
+    ...     machine = MachineFolder(toml.parent).machine
+    >>> f = natural_frequencies(machine.model("reference"), 1)[0]
+    >>> now = calibrate_model(machine, [0.95 * f], [1.0])
+    >>> f"{now.stiffness.factor:.3f} of the bearing stiffness"
+    '0.715 of the bearing stiffness'
     """
     spindle = machine.model(machine.tap.tool)
     stiffness: Calibration | StiffnessFit

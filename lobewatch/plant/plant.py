@@ -80,6 +80,7 @@ class Plant:
     def __init__(self, machines: Mapping[str, Path]) -> None:
         """machines: by name of their folders. Nothing is read yet."""
         self.machines = machines
+        """Folder of each machine, by its key."""
         self._summaries: dict[str, _ReadSummary] = {}
         self._damage: dict[str, tuple[Remark, ...]] = {}
         self._outdated: set[str] = set()

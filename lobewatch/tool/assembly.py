@@ -183,7 +183,17 @@ def _about_directions(
 
 
 def speed_grid(machine: Machine) -> NDArray[np.float64]:
-    """The common speeds of all diagrams of a machine (rpm), shape ([speed] steps,)."""
+    """The common speeds of all diagrams of a machine (rpm), shape ([speed] steps,).
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> from lobewatch.machine import MachineFolder, make_machine_folder
+    >>> with TemporaryDirectory() as parent:
+    ...     toml = make_machine_folder(Path(parent) / "mill-3", "surrogate_machine.toml")
+    ...     speeds = speed_grid(MachineFolder(toml.parent).machine)
+    >>> speeds[[0, -1]].tolist(), speeds.size  # rpm
+    ([3000.0, 24000.0], 1151)
+    """
     return np.linspace(machine.speed.low_rpm, machine.speed.high_rpm, machine.speed.steps)
 
 

@@ -25,15 +25,20 @@ class Method(StrEnum):
     """Method by which limits are found."""
 
     ZERO_ORDER = "zero-order"
+    """`lobes.zero_order`."""
     AVERAGE_ANGLE = "average-angle"
+    """`lobes.average_angle`."""
     SEMI_DISCRETISATION = "semi-discretisation"
+    """`lobes.stability_boundary`."""
 
 
 class Dynamics(StrEnum):
     """Dynamics that lobes are computed from."""
 
     MODES = "modes"
+    """Fitted modes."""
     FRF = "frf"
+    """The measured FRF itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +76,14 @@ def cut_table(machine: Machine, name: str) -> CutTable:
 def chart(
     method: Method, x: Tip | None, y: Tip | None, cuts: Sequence[Cut], speed_rpm: NDArray[np.float64]
 ) -> StabilityLobes:
-    """The lowest lobes of a cut in its directions of feed over speeds (rpm), fewer of them by semi-discretisation."""
+    """The lowest lobes of a cut in its directions of feed over speeds (rpm), fewer of them by semi-discretisation.
+
+    >>> mode = Mode(frequency=500.0, damping_ratio=0.02, stiffness=2e7)
+    >>> slot = Cut(teeth=2, immersion=1.0, direction="up", tangential=700e6, radial=200e6)
+    >>> lobes = chart(Method.ZERO_ORDER, [mode], [mode], [slot], np.array([9000.0, 15000.0]))
+    >>> (lobes.depth * 1e3).round(2).tolist()  # mm
+    [1.28, 18.77]
+    """
     return lowest_of([_chart(method, x, y, cut, speed_rpm) for cut in cuts])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -64,3 +65,9 @@ def test_the_pages_are_those_of_the_code(tmp_path: Path) -> None:
     assert sorted(made) == sorted(written)
     stale = [name for name, text in made.items() if text != written[name]]
     assert stale == [], "run: .venv/bin/python docs/make_api.py"
+
+
+@pytest.mark.parametrize("page", sorted(API.rglob("*.html")), ids=lambda page: page.stem)
+def test_no_public_name_and_no_member_is_without_words(page: Path) -> None:
+    silent = re.findall(r'class="headerlink" href="#(.+)"></a>\n(?!<div class="docstring">)', page.read_text("utf-8"))
+    assert [name for name in silent if not name.endswith(".__init__")] == []

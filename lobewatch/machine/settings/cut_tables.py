@@ -52,20 +52,37 @@ def engagements_between(least: float, most: float) -> tuple[float, ...]:
 
 
 class CutTable(Table, frozen=True):
-    """[reference_cut], and what it shares with a program."""
+    """[reference_cut], and what it shares with a program.
+
+    >>> pocket = CutTable(4, (2.0, 8.0), 16.0, "down", material="AA 7075")  # radial depth 2 to 8 mm
+    >>> pocket.immersion, pocket.feeds
+    (0.5, ('x', 'y'))
+    """
 
     teeth: Annotated[int, Meta(ge=1)]
+    """Number of teeth."""
     radial_depth_mm: Positive | Range
+    """Radial depth (mm), or the least and the greatest that it meets."""
     tool_diameter_mm: Positive
+    """Diameter of the tool (mm)."""
     direction: Direction
+    """Direction of milling, "up" (conventional) or "down" (climb)."""
     material: str | None = None
+    """Name of the material, of the list or of a [[material]]."""
     tangential_n_per_mm2: Positive | None = None
+    """Tangential cutting coefficient Kt (N/mm2); None: that of the material."""
     radial_n_per_mm2: NotNegative | None = None
+    """Radial cutting coefficient Kr (N/mm2); None: that of the material."""
     helix_deg: Annotated[float, Meta(ge=0, lt=90)] | None = None
+    """Helix angle (deg); None for straight teeth."""
     feed_per_tooth_mm: Positive | None = None
+    """Feed per tooth (mm); None: no torque is known."""
     flute_length_mm: Positive | None = None
+    """Length of the flutes (mm)."""
     pitch_deg: tuple[float, ...] | None = None
+    """Angles from tooth to tooth (deg); None for evenly spaced ones."""
     feed: str = "both"
+    """Axis of the machine that it is fed along, "x", "y" or "both"."""
 
     @property
     def feeds(self) -> tuple[str, ...]:
@@ -109,15 +126,29 @@ class CutTable(Table, frozen=True):
 
 
 class ProgramTable(CutTable, frozen=True, kw_only=True):
-    """[[program]]: one cut that the shop runs, or one whose speed or depth, NaN then, is asked for."""
+    """[[program]]: one cut that the shop runs, or one whose speed or depth, NaN then, is asked for.
+
+    >>> program = ProgramTable(4, 8.0, 16.0, "down", material="AA 7075", name="A", speed_rpm=12000.0)
+    >>> program.is_open  # its depth is asked for
+    True
+    >>> round(program.in_corner(20.0), 3)  # radial depth over diameter in a corner of 20 mm, 0.5 on the straight
+    0.667
+    """
 
     name: Annotated[str, Meta(min_length=1)]
+    """Name, of its own among all programs."""
     tool: str = "reference"
+    """Name of its tool."""
     speed_rpm: Positive = math.nan
+    """Spindle speed (rpm); NaN where it is asked for."""
     depth_mm: Positive = math.nan
+    """Axial depth (mm); NaN where it is asked for."""
     corner_radius_mm: Positive | None = None
+    """Radius of the tightest corner on its path (mm); None for a straight one."""
     wear: Wear | None = None
+    """Wear of the tool that it may be run with; None: that of [doubt]."""
     thin: bool = False
+    """Whether the wall that is cut gives way: then it is never called stable."""
 
     def __post_init__(self) -> None:
         """Refuse a cut deeper than the flutes."""

@@ -91,15 +91,25 @@ class Daq(Table, frozen=True):
     """[daq]: the port is remembered here by hand, never written by the program."""
 
     port: str = ""
+    """Port of the device; empty: it is looked for."""
     driver: str = "taps"
+    """Name of the driver."""
     sample_rate_hz: Positive | None = None
+    """Scans a second (Hz); None leaves it to the driver."""
     loss_detection: bool = True
+    """Whether lost scans are to be found."""
     digital_clock: bool = False
+    """Whether a square wave on digital input 0 shows the loss of whole scans."""
     accept_measured_rate: bool = False
+    """Whether to work with the measured rate of a device whose rate is not the nominal one."""
     calibration_interval_months: Positive = 12.0
+    """Time after which a sensor is due to be calibrated again (months)."""
     anti_alias: bool | None = None
+    """Whether a filter keeps out what lies above half the sample rate; None: nobody said so."""
     printing: PrintingTable | None = None
+    """Format that a board prints in, with driver = "lines"."""
     channel: tuple[ChannelTable, ...] = ()
+    """Sensors of a device that does not describe them itself."""
 
     def __post_init__(self) -> None:
         """Refuse a driver that is not known, and what it does not take."""

@@ -34,23 +34,49 @@ OWN = "machine.toml"
 
 
 class Machine(Table, frozen=True):
-    """All tables of machine.toml."""
+    """All tables of machine.toml.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as parent:
+    ...     toml = make_machine_folder(Path(parent) / "mill-3", "surrogate_machine.toml")
+    ...     machine = MachineFolder(toml.parent).machine
+    >>> program = machine.program[0]
+    >>> cut = machine.build_cut(program)  # in SI units
+    >>> cut.teeth, f"Kt {cut.tangential / 1e6:.0f} N/mm2"
+    (4, 'Kt 1400 N/mm2')
+    >>> machine.model(program.tool).bearings[0].position  # m
+    0.166
+    """
 
     machine: Identity
+    """Identity of the machine: [machine]."""
     tap: TapSetup = TapSetup()
+    """Way in which it is tapped: [tap]."""
     daq: Daq = Daq()
+    """Device and its sensors: [daq]."""
     mode: ModeChoice = ModeChoice()
+    """Mode that is followed: [mode]."""
     limits: Limits = Limits()
+    """Falls from which it warns and alarms: [limits]."""
     speed: SpeedRange = SpeedRange()
+    """Speeds of the diagrams: [speed]."""
     drive: Drive = Drive()
+    """Power and torque of the spindle: [drive]."""
     doubt: DoubtTable = DoubtTable()
+    """Widths of what is not known: [doubt]."""
     notify: NotifyTable = NotifyTable()
+    """Where alarms are sent: [notify]."""
     material: tuple[MaterialTable, ...] = ()
+    """Materials of the shop: each [[material]]."""
     reference_cut: CutTable | None = None
+    """Cut that is watched beside the programs: [reference_cut]."""
     listed: tuple[ProgramTable, ...] = msgspec.field(default=(), name="program")
     """Programs as they stand in the file: those that are run, and those whose speed or depth is asked for."""
     spindle: SpindleTable | None = None
+    """Shaft and bearings of the model: [spindle]; None without one."""
     tool: tuple[ToolTable, ...] = ()
+    """Tools: each [[tool]]."""
 
     def __post_init__(self) -> None:
         """Refuse programs and tools that cannot be told apart, and what lies outside the speed range."""

@@ -25,19 +25,31 @@ class TapSetup(Table, frozen=True):
     """[tap]: how the tap test is done; record_s and trigger_n that are not given are chosen by trial hits."""
 
     tool: str = "reference"
+    """Name of the tool that is tapped."""
     hammer: Literal["force", "none"] = "force"
     """Whether a hammer measures its force; with "none" hits are seen by the acceleration alone, and K stays unknown."""
     hits: Annotated[int, Meta(ge=3, le=1000)] = 10
+    """Number of good hits."""
     record_s: Positive | None = None
+    """Length of a record (s); None: chosen by trial hits."""
     pre_trigger_s: Positive = 0.02
+    """Part of a record before the hit (s)."""
     trigger_n: Positive | None = None
+    """Force that starts a record (N); None: chosen by trial hits."""
     position_mm: NotNegative = 0.0
+    """Place of the hammer, from the tool tip (mm)."""
     stick_out_mm: float | None = None
+    """Stick-out of the tool (mm)."""
     drawbar_kn: float | None = None
+    """Force of the drawbar (kN)."""
     state: str = ""
+    """State of the machine, in a word or two of the shop's."""
     sensor_mass_g: Annotated[float, Meta(ge=0, le=MOST_GRAMS)] | None = None
+    """Mass of the accelerometer that rides on the tool, with its magnet (g); None where nobody said so."""
     cable_mass_g: NotNegative = 0.0
+    """Mass of the cable that it carries (g)."""
     mounting: Mounting | None = None
+    """Mounting of the accelerometer."""
 
     def __post_init__(self) -> None:
         """Refuse what no spindle has."""
@@ -81,15 +93,20 @@ class Limits(Table, frozen=True):
     """[limits]: fall of the frequency that calls for attention; the defaults are the paper's."""
 
     frequency_warn_percent: Positive = 5.0
+    """Fall from which it warns (%)."""
     frequency_alarm_percent: Positive = 10.0
+    """Fall from which it alarms (%)."""
 
 
 class SpeedRange(Table, frozen=True):
     """[speed]: the range of the lobe diagrams."""
 
     low_rpm: Positive = 1000.0
+    """Slowest speed (rpm)."""
     high_rpm: Positive = 24000.0
+    """Fastest speed (rpm)."""
     steps: Annotated[int, Meta(ge=50, le=100_000)] = 1151
+    """Number of speeds of a diagram."""
 
     def __post_init__(self) -> None:
         """Refuse an empty range."""

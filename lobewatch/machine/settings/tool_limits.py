@@ -77,6 +77,15 @@ def tool_limits(machine: Machine, table: CutTable) -> ToolLimits:
     Slot or side by the radial depth on the straight. Speeds: [[tool]] cutting_speed_m_min, else what is published for
     its material and that of the tool; where the tool's is not known, up to the fastest of all tools. Source of the
     published ranges: docs/tools.md.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as parent:
+    ...     toml = make_machine_folder(Path(parent) / "mill-3", "surrogate_machine.toml")
+    ...     machine = MachineFolder(toml.parent).machine
+    >>> limits = tool_limits(machine, machine.program[0])
+    >>> limits.cut, f"{limits.low_rpm:.0f} to {limits.high_rpm:.0f} rpm", [key.value for key in limits.unknown]
+    ('slot', '3000 to 24000 rpm', ['tool_material', 'material'])
     """
     tool = known_tool(machine, table.tool if isinstance(table, ProgramTable) else machine.tap.tool)
     cut = cut_kind(table.immersion)

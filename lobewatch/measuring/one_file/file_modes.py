@@ -88,6 +88,17 @@ def modes_of_file(
 
     Raises ValueError for a window whose hit is not known or comes before it, averages that no coherence belongs to,
     verdicts that cannot be accepted, and what `edit_modes` refuses.
+
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> modes = synthesize([Mode(500.0, 0.02, 2e7)], np.arange(100.0, 1000.0))
+    >>> with TemporaryDirectory() as folder:
+    ...     table = np.column_stack([modes.frequency, modes.receptance.real, modes.receptance.imag])
+    ...     names = "frequency [Hz],real [m/N],imag [m/N]"
+    ...     np.savetxt(f"{folder}/frf.csv", table, delimiter=",", header=names, comments="")
+    ...     read = modes_of_file(Path(folder) / "frf.csv")
+    >>> [f"{mode.frequency:.1f} Hz, K = {mode.stiffness / 1e6:.1f} N/um" for mode in read.fitted]
+    ['500.0 Hz, K = 20.0 N/um']
     """
     file_frf = read_file_frf(path, accept, description or Description(), window)
     frf = file_frf.frf

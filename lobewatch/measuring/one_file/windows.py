@@ -32,7 +32,11 @@ MOST_LEFT = 0.005
 
 @dataclass(frozen=True)
 class Window:
-    """exp(-(t - start)/time_constant) from its start on; ValueError for a time constant that is not > 0."""
+    """exp(-(t - start)/time_constant) from its start on; ValueError for a time constant that is not > 0.
+
+    >>> Window(time_constant=0.1, start=0.0, hit_at=0.02).delay([])  # s from its start to the hit
+    0.02
+    """
 
     time_constant: float
     """Time constant of its fall (s); NaN: as the file names it."""

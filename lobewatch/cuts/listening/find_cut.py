@@ -15,6 +15,9 @@ BLOCK = 0.04
 """Length of the pieces that are compared (s), two turns at least; each begins in the middle of the one before it."""
 LOUDER = 0.2
 """A cut is so much louder than air, in log10 of the power."""
+CLEARER = 1.0
+"""Step of the power of pieces, over that of their loudness, from which on the power says what is a cut (log10): chatter
+of few lines is ten times louder than air that rushes, and fills less of the spectrum; chosen."""
 QUIETEST = 0.1
 """Share of a recording that is air, at least; or air is the quietest part."""
 QUIET_PIECES = 5
@@ -101,21 +104,38 @@ def find_cuts(signal: Floats, sample_rate: float, turn: float) -> list[CutParts]
     sounds = np.any(np.ptp(pieces, axis=2) > 0, axis=0)
     if np.count_nonzero(sounds) < 2 * QUIET_PIECES:
         return [CutParts("no-cut")]
-    level = np.zeros(sounds.size)
-    level[sounds] = np.max([_loudness(axis[sounds], sample_rate) for axis in pieces], axis=0)
-    is_loud = level > _threshold(level[sounds])
+    is_loud = np.zeros(sounds.size, dtype=np.bool_)
+    is_loud[sounds] = _loud_pieces([_power_above(axis[sounds], sample_rate) for axis in pieces])
     loud = _stretches(is_loud)
     joined = _join(loud, JOINED * sample_rate / step)
     stretches = [(first, last) for first, last in joined if (last - first) * step > KNOCK * sample_rate]
     if not stretches:
         return [CutParts("no-cut")]
-    air = _longest_air(_stretches(is_loud | ~sounds), level.size, step)
+    air = _longest_air(_stretches(is_loud | ~sounds), sounds.size, step)
     power = np.log10(np.sum(np.var(pieces, axis=2), axis=0) + np.finfo(np.float64).tiny)
     cuts = [_parts(axes, power, stretch, air, sample_rate, size) for stretch in stretches]
     longest = max(cuts, key=lambda parts: parts.end - parts.begin)
     least = BURST * (longest.end - longest.begin)
     kept = [parts for parts in cuts if parts.reason != "too-short" and parts.end - parts.begin > least]
     return kept or [longest]
+
+
+def _loud_pieces(axes: Sequence[Floats]) -> NDArray[np.bool_]:
+    """Which pieces are loud: by their loudness, or by their power where that steps by `CLEARER` more.
+
+    axes: power of the pieces of each axis at each frequency, shape (pieces, frequencies).
+    """
+    loudness = np.max([_loudness(power) for power in axes], axis=0)
+    power = np.log10(np.sum([np.sum(power, axis=1) for power in axes], axis=0))
+    is_loud, is_strong = (level > _threshold(level) for level in (loudness, power))
+    is_clearer = _step(power, is_strong) > _step(loudness, is_loud) + CLEARER
+    return np.asarray(is_strong if is_clearer else is_loud)
+
+
+def _step(level: Floats, is_loud: NDArray[np.bool_]) -> float:
+    """By how much what is loud is louder than what is not, in the mean."""
+    is_split = np.any(is_loud) and not np.all(is_loud)
+    return float(np.mean(level[is_loud]) - np.mean(level[~is_loud])) if is_split else 0.0
 
 
 def _threshold(level: Floats) -> float:
@@ -169,15 +189,19 @@ def _fault(axes: Floats, parts: CutParts, sample_rate: float, step: int) -> str:
     return "knock" if any(_has_knock(axis[parts.cut], step) for axis in axes) else ""
 
 
-def _loudness(pieces: Floats, sample_rate: float) -> Floats:
-    """log10 of the power of each piece over that of the quietest part, in the mean over the frequencies above `LOWEST`.
-
-    Mean over frequency, not of logarithms: a light cut is heard in few lines. pieces: shape (pieces, size).
-    """
+def _power_above(pieces: Floats, sample_rate: float) -> Floats:
+    """The power of pieces at the frequencies above `LOWEST`; pieces: shape (pieces, size)."""
     size = pieces.shape[1]
     pieces = (pieces - np.mean(pieces, axis=1, keepdims=True)) * np.hanning(size)
     power = np.abs(np.fft.rfft(pieces, axis=1)[:, int(LOWEST * size / sample_rate) + 1 :]) ** 2
-    power += np.finfo(np.float64).tiny
+    return np.asarray(power + np.finfo(np.float64).tiny)
+
+
+def _loudness(power: Floats) -> Floats:
+    """log10 of the power of each piece over that of the quietest part, in the mean over the frequencies.
+
+    Mean over frequency, not of logarithms: a light cut is heard in few lines. power: shape (pieces, frequencies).
+    """
     smooth = scipy.ndimage.uniform_filter1d(power, SMOOTHED, axis=0)
     beside = QUIET_PIECES // 2
     quiet = int(

@@ -147,3 +147,13 @@ def test_a_piece_with_four_times_the_peak_of_those_around_is_a_knock(peak: float
     signal = cut + np.random.default_rng(1).normal(scale=0.01, size=time.size)
     signal[round(1.0 * RATE)] = peak
     assert parts_of(signal).reason == reason
+
+
+def test_a_cut_of_one_loud_tone_in_air_that_rushes_louder_than_it_is_found_by_its_power() -> None:
+    """As of a microphone: by what there is more of over all frequencies air alone would be the cut."""
+    random, time = np.random.default_rng(0), np.arange(round(5 * RATE)) / RATE
+    inside = (time >= 1.0) & (time < 4.0)
+    signal = random.normal(size=time.size) * np.where(inside, 0.3, 1.0) + inside * 12 * np.sin(2 * np.pi * 900 * time)
+    parts = parts_of(signal)
+    assert parts.reason == ""
+    assert (parts.begin, parts.end) == pytest.approx((1.0, 4.0), abs=PIECE)

@@ -39,10 +39,10 @@ def save_program(folder: MachineFolder, program: ProgramTable) -> None:
 
 
 def _values(program: ProgramTable) -> dict[str, Any]:
-    """What differs from the defaults."""
+    """Name and tool, and what differs from the defaults."""
     given = {
         field.name: getattr(program, field.name)
         for field in msgspec.structs.fields(program)
-        if getattr(program, field.name) != field.default
+        if field.name in FIRST or getattr(program, field.name) != field.default
     }
     return {key: given[key] for key in (*FIRST, *given) if key in given}

@@ -62,7 +62,7 @@ def answers(count: int, seed: int, most_modes: int = 12, dense: bool = True) -> 
             continue
         table, tool = program(milling, max(MM, limit * rng.uniform(0.3, 2.5))), assembly(milling)
         ask_everywhere(counts, f"{seed}.{number}", table, tool)
-        if dense:
+        if dense and len(counts.shares) < counts.cuts:
             counts.shares.append(share_of_best(SettingSearch(table, tool, MACHINE)))
             sys.stdout.write(
                 f"{number} {_about(milling)} {counts.seconds[-1]:.1f} s, {counts.shares[-1]:.3f} of best\n"
@@ -74,6 +74,8 @@ def answers(count: int, seed: int, most_modes: int = 12, dense: bool = True) -> 
 def ask_everywhere(counts: Answers, name: str, table: ProgramTable, tool: Assembly) -> None:
     """Ask `check`, `lobes` and `recommend` of one cut."""
     verdict = judge(table, tool, MACHINE)
+    if verdict.word is Word.UNKNOWN:
+        return  # its depth is not plausible: `check` asks about it first
     advice, pockets = advise(verdict, MACHINE), robust_pockets(table, tool, MACHINE)
     begin = time.process_time()
     free = recommend(table, tool, MACHINE, AT_REST).setting

@@ -7,6 +7,10 @@ import sys
 import numpy as np
 import pytest
 from one_answer_study import answers, summary
+from random_milling import random_case
+from verdict_study import MACHINE, program
+
+from lobewatch.machine.settings.cut_range import CutRange
 
 
 @pytest.mark.parametrize("seed", [31, 32])
@@ -34,3 +38,10 @@ def test_what_is_recommended_is_nearly_the_best_of_a_dense_grid() -> None:
     counts = answers(count=60, seed=7)
     sys.stdout.write(summary(counts))
     assert np.mean(np.array(counts.shares) >= 0.95) >= 0.9
+
+
+def test_no_depth_is_named_that_would_be_asked_about() -> None:
+    """Beyond two diameters `check` asks whether a depth is right, and calls it unknown until then."""
+    table = program(random_case(np.random.default_rng(34).spawn(16)[4]), 54.85)
+    assert table.depth_mm > 3 * table.tool_diameter_mm
+    assert CutRange.of(MACHINE, table).deepest_mm == 2 * table.tool_diameter_mm

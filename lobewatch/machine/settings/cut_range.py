@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lobewatch.machine.settings.cut_tables import CutTable
 from lobewatch.machine.settings.drive import drive_limit
 from lobewatch.machine.settings.machine_file import Machine
+from lobewatch.machine.settings.plausible import DEPTH
 from lobewatch.machine.settings.tool_limits import ToolLimits, tool_limits
 
 RPM, MM = 10.0, 0.05
@@ -49,8 +50,8 @@ class CutRange:
 
     @property
     def deepest_mm(self) -> float:
-        """Greatest depth of cut of the tool (mm)."""
-        return self.limits.deepest_mm
+        """Greatest depth of cut of the tool (mm), and none that would be asked about."""
+        return min(self.limits.deepest_mm, DEPTH[1] * self.table.tool_diameter_mm)
 
     @property
     def is_empty(self) -> bool:

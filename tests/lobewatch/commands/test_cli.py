@@ -248,7 +248,7 @@ def test_lobes_and_report(run: Run, trial: MachineFolder, device: TapsEmulator) 
     refused(run("lobes", "trial", "--figure", "lobes.xyz"), "lobes.xyz", ".svg, .png or .pdf")
     assert run("report", "trial", "--out", "r.html").out == "report: r.html\n"
     html = Path("r.html").read_text(encoding="utf-8")
-    assert html.count("<svg") == 5
+    assert html.count("<svg") == 8
     assert "http" not in html.replace("http://www.w3.org", "").replace("https://matplotlib.org", "").replace(
         "http://purl.org", ""
     ).replace("http://creativecommons.org", "")

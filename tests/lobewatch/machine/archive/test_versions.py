@@ -48,7 +48,7 @@ def test_a_newer_version_is_refused_in_a_sentence(folder: MachineFolder) -> None
     path = folder.path / "taps" / "tap_1.h5"
     with h5py.File(path, "r+") as file:
         file.attrs["version"] = 9
-    with pytest.raises(DataError, match="a tap file of version 9, this lobewatch reads up to 1; update lobewatch"):
+    with pytest.raises(DataError, match="a tap file of version 9, this lobewatch reads up to 2; update lobewatch"):
         read_tap(path)
 
 
@@ -57,7 +57,7 @@ def test_a_tap_of_a_newer_version_is_left_out_and_said(folder: MachineFolder, mo
 
     def newer(path: Path) -> TapTest:
         if path.name == "tap_1.h5":
-            raise DataError(f"{path}: a tap file of version 9, this lobewatch reads up to 1; update lobewatch")
+            raise DataError(f"{path}: a tap file of version 9, this lobewatch reads up to 2; update lobewatch")
         return read(path)
 
     monkeypatch.setattr("lobewatch.machine.folder.read_tap", newer)

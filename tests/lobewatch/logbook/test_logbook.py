@@ -193,7 +193,8 @@ def test_one_program_has_one_word_in_every_place(shop: Shop, path: Path, program
     stored = HistoryCache(logbook.folder).read(logbook.files).rows[-1]
     assert [one.word for one in (stored.rulings or {}).values()] == [word]
     html = render_report(logbook, "reference", "x")
-    assert f"{name}: {word}" in html[: html.index("<table>")]
+    first = html[: html.index("<h2")]
+    assert re.search(rf'<th scope="row">{name}</th><td class="{WORDS[word].kind}"[^>]*>. {word}</td>', first)
     assert f"<td>{checked['limit_mm']:.2f}" in html
     assert re.search(rf'<td>{name}</td><td class="{WORDS[word].kind}">. {word}</td>', html)
     (remark,) = logbook.standing(START).remarks

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 ORDER = 32
 """Samples that the next one is predicted from: two for each mode, and more of them for noise."""
@@ -41,7 +41,7 @@ def second_input(decay: Signal, sample_rate: float, noise: float) -> float | Non
     level = np.sqrt(np.convolve(error**2, np.full(span, 1 / span), "valid"))
     if scale == 0 or level.size <= rise:
         return None
-    by_chance = MARGIN * scale * np.sqrt(chdtri(span, FALSE_ALARM / level.size) / span)
+    by_chance = MARGIN * scale * np.sqrt(scipy.special.chdtri(span, FALSE_ALARM / level.size) / span)
     before = np.maximum.accumulate(level)[:-rise]
     above = np.flatnonzero(level[rise:] > np.maximum(by_chance, RISE * before))
     return float(above[0] + rise + ORDER) / sample_rate if above.size else None

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import binom
 
 from lobewatch.cuts.listening.lattice import STRAY, SpindleSpeed
 from lobewatch.cuts.listening.sorted_lines import MULTIPLES
@@ -156,7 +156,7 @@ def _chance(comb: Comb, lines: SpectralLines, images: Floats, bin_: float, teeth
     near = min(2 * TOLERANCE * bin_ / spacing * len(images), 1.0)
     tried = max(around * float(np.max(images)) / (TOLERANCE * bin_), 1.0)
     apart = np.unique(np.round(lines.frequency / (2 * TOLERANCE * bin_))).size
-    return float(tried * binom.sf(orders.size - 1, apart, near))
+    return float(tried * scipy.stats.binom.sf(orders.size - 1, apart, near))
 
 
 def _speed(comb: Comb, lines: SpectralLines, bin_: float) -> SpindleSpeed:

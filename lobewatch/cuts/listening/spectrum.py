@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len, rfft
-from scipy.ndimage import maximum_filter1d
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +51,7 @@ class Spectrum:
     def loudest_near(self, frequency: Floats, bins: float) -> Floats:
         """Largest power within so many bins of frequencies (Hz)."""
         wide = 2 * max(round(bins * self.bin / self.frequency[1]), 1) + 1
-        return np.asarray(np.interp(frequency, self.frequency, maximum_filter1d(self.power, wide)))
+        return np.asarray(np.interp(frequency, self.frequency, scipy.ndimage.maximum_filter1d(self.power, wide)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +91,8 @@ def spectrum_of(signal: Floats, sample_rate: float) -> Spectrum:
     """The spectrum of a part of a recording; signal in m/s^2, shape (n,)."""
     phase = 2 * np.pi * (np.arange(signal.size) + 0.5) / signal.size
     window = sum(share * np.cos(k * phase) for k, share in enumerate(WINDOW))
-    size = next_fast_len(PADDED * signal.size, real=True)
-    power = (2 * np.abs(rfft((signal - np.mean(signal)) * window, size)) / np.sum(window)) ** 2
+    size = scipy.fft.next_fast_len(PADDED * signal.size, real=True)
+    power = (2 * np.abs(scipy.fft.rfft((signal - np.mean(signal)) * window, size)) / np.sum(window)) ** 2
     step = sample_rate / size
     return Spectrum(np.arange(power.size) * step, power, _noise(power), sample_rate / signal.size, sample_rate)
 
@@ -133,7 +132,7 @@ def lines_of(spectrum: Spectrum, clear: float = CLEAR) -> SpectralLines:
     """The lines with `clear` times the power of the noise; frequency and amplitude by a parabola through log power."""
     power = spectrum.power
     wide = 2 * max(round(APART * spectrum.bin / spectrum.frequency[1]), 1) + 1
-    at = np.flatnonzero((power == maximum_filter1d(power, wide)) & (power > clear * spectrum.noise))
+    at = np.flatnonzero((power == scipy.ndimage.maximum_filter1d(power, wide)) & (power > clear * spectrum.noise))
     at = at[(at > 2 * PADDED) & (at < power.size - 1)]
     before, top, after = (np.log(np.maximum(power[at + shift], np.finfo(np.float64).tiny)) for shift in (-1, 0, 1))
     bend = before - 2 * top + after

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
 
 from lobewatch.cuts.listening.harmonic_sum import harmonic_sum
 from lobewatch.cuts.listening.lattice import SpindleSpeed, refine_speed
@@ -139,7 +139,7 @@ def _spaced(lines: SpectralLines, frequency: float, teeth: int, bin_: float) -> 
 
 def _peaks(votes: Floats) -> NDArray[np.intp]:
     """Where there are more votes than beside, the most first."""
-    places = np.flatnonzero((maximum_filter1d(votes, BESIDE) == votes) & (votes > 0))
+    places = np.flatnonzero((scipy.ndimage.maximum_filter1d(votes, BESIDE) == votes) & (votes > 0))
     return places[np.argsort(-votes[places])[:PEAKS]]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import sys
 from collections.abc import Iterator
@@ -67,7 +68,7 @@ class FolderLock:
     def held(self, patience: float) -> Iterator[None]:
         """Keep other programs from writing here; BusyError where one does for longer than `patience` (s).
 
-        OSError where this folder can only be read, or nothing can be locked there.
+        OSError where this folder is not there, can only be read, or nothing can be locked there.
         """
         self._acquire(patience)
         try:
@@ -79,6 +80,8 @@ class FolderLock:
             self._lock.release()
 
     def _acquire(self, patience: float) -> None:
+        if not self._folder.is_dir():  # FileLock would make it: below a drive that is away, say
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(self._folder))
         try:
             self._lock.acquire(patience, POLL_TIME)
         except Timeout as error:

@@ -84,6 +84,16 @@ def test_one_that_has_not_said_its_name_holds_it_all_the_same(folder: MachineFol
             folder.locked(patience=0).__enter__()
 
 
+def test_a_folder_that_is_away_is_not_made_again(folder: MachineFolder) -> None:
+    away = folder.path.rename(folder.path.with_name("away"))
+    with pytest.raises(FileNotFoundError, match=r"m'$"):
+        folder.locked().__enter__()
+    assert not folder.path.exists()
+    away.rename(folder.path)
+    with folder.locked():
+        assert (folder.path / HOLDER).exists()
+
+
 def test_held_twice_it_is_held_until_the_outer_end(folder: MachineFolder) -> None:
     with folder.locked():
         with folder.locked():

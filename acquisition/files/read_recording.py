@@ -118,9 +118,12 @@ def read_frf(path: Path | str, said: Description = NOTHING) -> Frf:
     if isinstance(recording, Frf):
         return recording
     try:
-        return average_good(recording)[0]
+        frf = average_good(recording)[0]
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
+    if frf is None:
+        raise DataError(f"{path}: it holds no force, and so no FRF")
+    return frf
 
 
 def read_recording(path: Path | str, said: Description = NOTHING) -> list[Hit] | Frf:
@@ -148,8 +151,8 @@ def _facts(hits: Sequence[Hit], frf: Frf | None) -> list[Fact]:
     if frf is not None:
         span = f"{frf.frequency.size}, {frf.frequency[0]:.4g} to {frf.frequency[-1]:.6g} Hz"
         return [Fact("lines", span, "file"), Fact("unit", f"m/N, from {frf.measured_as}", "file")]
-    unit = Fact("unit", "m/s^2 (acceleration)", "file")
-    return [Fact("sample rate", f"{hits[0].sample_rate:.8g} Hz", "file"), Fact("force", "N", "file"), unit]
+    unit, force = Fact("unit", "m/s^2 (acceleration)", "file"), Fact("force", "N", "file")
+    return [Fact("sample rate", f"{hits[0].sample_rate:.8g} Hz", "file"), *([force] if hits[0].has_force else []), unit]
 
 
 def _labelled(recording: Recording, about: Circumstances) -> Recording:

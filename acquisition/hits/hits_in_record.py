@@ -37,20 +37,24 @@ def hits_in_record(record: Hit) -> list[Hit]:
         return [record]
     before = min(round(BEFORE * record.sample_rate), int(starts[0]))
     begins = starts - before
-    lengths = np.diff(begins, append=record.force.size)
+    lengths = np.diff(begins, append=record.acceleration.size)
     n = int(np.min(lengths[:-1]))
     if lengths[-1] < SHORTEST * n:
         begins = begins[:-1]
-    n = min(n, int(np.min(record.force.size - begins)))
-    return [
-        replace(record, force=record.force[a : a + n], acceleration=record.acceleration[a : a + n], pre_trigger=before)
-        for a in begins
-    ]
+    n = min(n, int(np.min(record.acceleration.size - begins)))
+    return [_part(record, int(a), n, before) for a in begins]
+
+
+def _part(record: Hit, begin: int, size: int, before: int) -> Hit:
+    inside = slice(begin, begin + size)
+    force = record.force[inside] if record.has_force else record.force
+    return replace(record, force=force, acceleration=record.acceleration[inside], pre_trigger=before)
 
 
 def _starts(record: Hit) -> NDArray[np.intp]:
-    """Samples at which the force rises at the beginning of a hit."""
-    force, rate = record.force - np.median(record.force), record.sample_rate
+    """Samples at which the force rises at the beginning of a hit, or without one the response."""
+    force, rate = record.signals[0] - np.median(record.signals[0]), record.sample_rate
+    force = force if record.has_force else np.abs(force)
     noise = 1.4826 * float(np.median(np.abs(force)))
     loud = np.flatnonzero(force > max(LEVEL * float(np.max(force)), NOISE_RATIO * noise))
     rises = loud[np.diff(loud, prepend=-force.size) > APART * rate]

@@ -11,8 +11,10 @@ from acquisition.hit import Hit, HitFlags
 from acquisition.verdicts.judge_hit import judge_hit
 
 
-def average_good(hits: Sequence[Hit]) -> tuple[Frf, tuple[HitFlags, ...]]:
-    """H1 FRF of the good hits, and the verdict on each; DataError with the reasons where no hit is good.
+def average_good(hits: Sequence[Hit]) -> tuple[Frf | None, tuple[HitFlags, ...]]:
+    """H1 FRF of the good hits, None without their force, and the verdict on each.
+
+    DataError with the reasons where no hit is good.
 
     >>> time = np.arange(-100, 4000) / 10240.0
     >>> pulse = np.where((time >= 0) & (time <= 1e-3), np.sin(np.pi * time / 1e-3) ** 4, 0.0)
@@ -28,4 +30,4 @@ def average_good(hits: Sequence[Hit]) -> tuple[Frf, tuple[HitFlags, ...]]:
     if not good:
         reasons = "; ".join(f"hit {i}: {verdict.flags.words}. {verdict.text}" for i, verdict in enumerate(verdicts, 1))
         raise DataError(f"no good hit of {len(hits)}: {reasons}")
-    return estimate_frf(good), tuple(verdict.flags for verdict in verdicts)
+    return estimate_frf(good) if good[0].has_force else None, tuple(verdict.flags for verdict in verdicts)

@@ -28,7 +28,7 @@ def init(
     speeds: Annotated[Answer, typer.Option(help='Lowest and highest spindle speed, rpm: "1000 18000".')] = None,
     drive: Annotated[Answer, typer.Option(help='Power in kW and torque in N m: "15 40".')] = None,
     daq: Annotated[Answer, typer.Option(help='Port of the DAQ, and its driver: "/dev/ttyUSB0 dataq".')] = None,
-    hammer: Annotated[Answer, typer.Option(help='Input, mV/N, range in V; not of TAPS/1: "0 2.25 5".')] = None,
+    hammer: Annotated[Answer, typer.Option(help='Input, mV/N, range in V; not of TAPS/1: "0 2.25 5"; or none.')] = None,
     accelerometer: Annotated[Answer, typer.Option(help='Input, mV/g, range in V: "1 10 5".')] = None,
     fixing: Annotated[Answer, typer.Option(help='Mass (g) of the accelerometer, and how it is fixed: "4 wax".')] = None,
     tool: Annotated[

@@ -135,7 +135,8 @@ def _fitted(frf: Frf, tap: TapTest, by_hand: ModeEdits) -> Fitted:
 def _fitted_decays(tap: TapTest, machine: Machine, by_hand: ModeEdits) -> Fitted:
     """Modes of a tap test without force; the mass of the sensor stays in them, for what it does needs K."""
     rate = tap.accepted[0].sample_rate
-    spectra = decay_spectra([free_decay(hit) for hit in tap.accepted], rate)
+    decays = [free_decay(hit) for hit in tap.accepted]
+    spectra = decay_spectra([decay[: min(map(len, decays))] for decay in decays], rate)
     state, remarks = _edited(extract(spectra, (0.0, HIGHEST * rate)), by_hand)
     text = "no force was measured: f_n and zeta are known, K is not; no stability lobes, no depths"
     remarks = (*remarks, Remark(WITHOUT_FORCE, "", text, "tap with a hammer that measures its force"))

@@ -10,6 +10,7 @@ from acquisition import DeviceError, Hit, HitVerdict, Trigger
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.tap.connection import Connection, Connector
 from lobewatch.tap.guarded_verdict import guarded_verdict
+from lobewatch.tap.hearing import hearing_check
 from lobewatch.tap.hit_loop import HitLoop
 from lobewatch.tap.judged_hits import JudgedHits
 from lobewatch.tap.live_signal import resting_rms
@@ -62,9 +63,16 @@ class Phases:
             *self._publisher.state.checks,
             *_guarded_checks(self._tap.baseline, trigger.level if trigger else None, free),
             calibration,
+            *self._hearing(self._tap.baseline),
         )
         failed = [f"{check.name}: {check.text}." for check in checks if not check.passed]
         self._publisher.show(checks=checks, reason=" ".join(failed))
+
+    def _hearing(self, baseline: Hit) -> tuple[Check, ...]:
+        """What the sensor can hear, where it is all there is."""
+        if baseline.has_force:
+            return ()
+        return (hearing_check(baseline, self._folder.machine, self._tap.circumstances.tool),)
 
     def _try(self, connection: Connection) -> None:
         """Trial hits, where machine.toml leaves something open."""

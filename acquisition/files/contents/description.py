@@ -8,7 +8,7 @@ from pathlib import Path
 
 from acquisition.tap import UNSAID, Conditions
 
-_LABELS = ("date", "date_pattern", "tool", "direction", "conditions", "sensor")
+_LABELS = ("date", "date_pattern", "tool", "direction", "conditions", "sensor", "without_force")
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,8 @@ class Description:
     """Full scale of each channel in its unit, where values are shares of it."""
     sensitivity: tuple[str, ...] = ()
     """Sensitivity of each channel in volts: "2.25 mV/N", "10.2 mV/g"."""
+    without_force: bool = False
+    """Whether no force was measured: the response is all that is looked for."""
     sensor: str = "accelerometer"
     """Kind of sensor that a cut was heard by: accelerometer or microphone."""
     date: datetime | None = None

@@ -40,7 +40,7 @@ def settle_hits(contents: Contents, description: Description, ledger: Ledger) ->
         ledger.facts += of_one.facts if not hits else []
         parts = hits_in_record(hit)
         if len(parts) > 1:
-            ledger.know("hits", f"{len(parts)} in one record, each of {parts[0].force.size} samples")
+            ledger.know("hits", f"{len(parts)} in one record, each of {parts[0].acceleration.size} samples")
         hits += parts
     return hits
 
@@ -53,17 +53,16 @@ def _hit(signals: Sequence[Signal], description: Description, ledger: Ledger) ->
         rate_of(signals, (), description, ledger)
         return None
     signals = scaled
-    forces, responses = _by_kind(signals, ledger)
+    forces, responses = _by_kind(signals, description, ledger)
     rate = rate_of(signals, [*forces, *responses], description, ledger)
-    force = forces[0] if len(forces) == 1 else None
     response = chosen(responses, description.response, "responses", ledger) if responses else None
-    to_newton = force_unit(forces[0], description, ledger) if forces else None
+    force = _force(forces, description, ledger)
     unit = response_unit(response or responses[0], description, ledger) if responses else None
     _doubt_gravity(responses, ledger)
-    if force is None or response is None or unit is None or to_newton is None or not ledger.is_clean:
+    if force is None or response is None or unit is None or not ledger.is_clean:
         return None
     try:
-        hit = hit_of_motion(force.values * to_newton, response.values * unit[1], rate, unit[0])
+        hit = hit_of_motion(force, response.values * unit[1], rate, unit[0])
     except ValueError as error:
         ledger.faults.append(str(error))
         return None
@@ -72,22 +71,33 @@ def _hit(signals: Sequence[Signal], description: Description, ledger: Ledger) ->
     return hit
 
 
-def _by_kind(signals: Sequence[Signal], ledger: Ledger) -> tuple[list[Signal], list[Signal]]:
+def _force(forces: Sequence[Signal], description: Description, ledger: Ledger) -> NDArray[np.float64] | None:
+    """Force (N), empty where none was measured; None where it is missing, or its unit."""
+    if description.without_force:
+        return np.empty(0)
+    if len(forces) != 1:
+        return None
+    to_newton = force_unit(forces[0], description, ledger)
+    return None if to_newton is None else np.asarray(forces[0].values * to_newton)
+
+
+def _by_kind(signals: Sequence[Signal], description: Description, ledger: Ledger) -> tuple[list[Signal], list[Signal]]:
     """Forces and responses; what neither unit nor name tells is asked about."""
+    needs_force = not description.without_force
     forces = [signal for signal in signals if kind_of(signal) == "force"]
     responses = [signal for signal in signals if kind_of(signal) == "response"]
     unclear = [channel for channel in signals if not kind_of(channel) and channel.role in ("", "real", "magnitude")]
     channels = [channel for channel in signals if channel.role != "time"]
     names = names_of(channels)
-    if len(channels) < 2:
+    if len(channels) < 1 + needs_force:
         ledger.faults.append(
             f"it holds {names or 'nothing'} over time; a hit needs a force and a response (--force FILE)"
         )
         return [], []
-    if unclear and (not forces or not responses):
+    if unclear and ((needs_force and not forces) or not responses):
         ledger.ask(f"what its columns are ({names_of(signals)})", COLUMNS_HIT)
         return forces, responses
-    if len(forces) != 1:
+    if needs_force and len(forces) != 1:
         count = "no force channel" if not forces else f"{len(forces)} force channels"
         ledger.faults.append(f"{count} among {names}; one is needed")
     if not responses:

@@ -16,8 +16,8 @@ from lobewatch.machine.settings.sensor_loading import Mounting
 
 SENSITIVITY = {"force": "sensitivity_mv_per_n", "acceleration": "sensitivity_mv_per_g"}
 """Key of the sensitivity of a sensor, by its quantity."""
-NUMBERS = {"force": 0, "acceleration": 1}
-"""Number of a sensor in [[daq.channel]]."""
+WITHOUT = "none"
+"""Answer of whoever has no force sensor."""
 
 
 def _port(draft: Draft) -> str:
@@ -48,6 +48,11 @@ def _set_port(draft: Draft, answer: str) -> Draft:
     return draft.set("daq", port=port, driver=None if driver == "taps" else driver)
 
 
+def _number(quantity: str, draft: Draft) -> int:
+    """Number of a sensor in [[daq.channel]]: the hammer comes first, where it has one."""
+    return int(quantity == "acceleration" and not draft.without_force)
+
+
 def _known_by_daq(quantity: str, draft: Draft) -> str:
     if draft.needs_sensors:
         return ""
@@ -56,7 +61,9 @@ def _known_by_daq(quantity: str, draft: Draft) -> str:
 
 
 def _sensor(quantity: str, draft: Draft) -> str:
-    channel = draft.table("daq.channel", NUMBERS[quantity])
+    if quantity == "force" and draft.without_force:
+        return WITHOUT
+    channel = draft.table("daq.channel", _number(quantity, draft))
     if channel.get("quantity") != quantity:
         return ""
     return " ".join(number_text(channel[key]) for key in ("input", SENSITIVITY[quantity], "range_v"))
@@ -67,7 +74,7 @@ def _set_sensor(quantity: str, draft: Draft, answer: str) -> Draft:
     number, sensitivity, reach = read_numbers(answer, ("input of the DAQ", f"sensitivity in {unit}", "range in V"))
     if not number.is_integer():
         raise ValueError(f"{answer!r}: input {number:g} is none; inputs are counted 0, 1, 2 ...")
-    if len(draft.table("daq").get("channel", ())) < NUMBERS[quantity]:
+    if len(draft.table("daq").get("channel", ())) < _number(quantity, draft):
         raise ValueError("the hammer comes first: answer --hammer too")
     values: dict[str, Value] = {
         "input": int(number),
@@ -75,7 +82,14 @@ def _set_sensor(quantity: str, draft: Draft, answer: str) -> Draft:
         SENSITIVITY[quantity]: sensitivity,
         "range_v": reach,
     }
-    return draft.set("daq.channel", NUMBERS[quantity], **values)
+    return draft.set("daq.channel", _number(quantity, draft), **values)
+
+
+def _set_hammer(draft: Draft, answer: str) -> Draft:
+    """A hammer with its sensor, or none."""
+    if answer.strip().casefold() == WITHOUT:
+        return draft.set("tap", hammer=WITHOUT, trigger_n=None)
+    return _set_sensor("force", draft.set("tap", hammer=None), answer)
 
 
 def _fixing(draft: Draft) -> str:
@@ -98,10 +112,10 @@ def _set_fixing(draft: Draft, answer: str) -> Draft:
 DAQ = SetUpQuestion("daq", "On which port is the DAQ?", "/dev/ttyACM0, COM3, /dev/ttyUSB0 dataq", _port, _set_port)
 HAMMER = SetUpQuestion(
     "hammer",
-    "Hammer: input of the DAQ, sensitivity (mV/N, on its calibration sheet), range (V)?",
+    "Hammer: input of the DAQ, sensitivity (mV/N, on its calibration sheet), range (V)? Or none: no force sensor.",
     "0 2.25 5",
     partial(_sensor, "force"),
-    partial(_set_sensor, "force"),
+    _set_hammer,
     partial(_known_by_daq, "force"),
 )
 ACCELEROMETER = SetUpQuestion(

@@ -50,7 +50,12 @@ class Draft:
     @property
     def lacks_sensors(self) -> bool:
         """Whether sensors are needed that were not told of yet."""
-        return self.needs_sensors and len(self.table("daq").get("channel", ())) < 2
+        return self.needs_sensors and len(self.table("daq").get("channel", ())) < (1 if self.without_force else 2)
+
+    @property
+    def without_force(self) -> bool:
+        """Whether no hammer measures its force."""
+        return self.table("tap").get("hammer") == "none"
 
     def checked(self) -> Self:
         """The same; DataError where it is no machine file."""

@@ -53,6 +53,7 @@ RANGES: Mapping[type[Table], Mapping[str, Range]] = {
         "drawbar_kn": (0.5, 150),
         "sensor_mass_g": (0.1, 99),
         "cable_mass_g": (0.1, 99),
+        "sensor_band_hz": (100, 99_000),
     },
     Daq: {"sample_rate_hz": (1000, 999_999), "calibration_interval_months": (1, 120)},
     ChannelTable: {

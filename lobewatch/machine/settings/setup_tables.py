@@ -50,6 +50,8 @@ class TapSetup(Table, frozen=True):
     """Mass of the cable that it carries (g)."""
     mounting: Mounting | None = None
     """Mounting of the accelerometer."""
+    sensor_band_hz: Positive | None = None
+    """Highest frequency that the accelerometer passes, from its data sheet; None: that of the sample rate."""
 
     def __post_init__(self) -> None:
         """Refuse what no spindle has."""

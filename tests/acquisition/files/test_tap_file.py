@@ -56,6 +56,7 @@ def tap(tapper: Callable[..., HammeredStructure], channels: tuple[Channel, Chann
     hits = tuple(capture_hits(source, Trigger(20.0, 6400, 512)))
     hits = (*hits[:-1], replace(hits[-1], lost_scans=7))
     frf, flags = average_good(hits)
+    assert frf is not None
     assert 2 < frf.n_averages < len(hits) - 1
     return TapTest(new_tap_id(ABOUT), ABOUT, frf, hits, flags)
 
@@ -106,6 +107,7 @@ def test_the_frf_can_be_made_again_from_the_stored_codes(tap: TapTest, tmp_path:
     write_tap(tmp_path / "tap.h5", tap)
     again, flags = average_good(read_tap(tmp_path / "tap.h5").hits)
     assert flags == tap.flags
+    assert again is not None
     assert same_frf(again, tap.known_frf)
 
 

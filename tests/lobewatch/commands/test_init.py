@@ -184,3 +184,17 @@ def test_from_an_empty_folder_to_a_verdict_on_a_tapped_tool_in_three_commands(
     said = run("check", "mill-3")
     assert (said.code, said.out.splitlines()[-1]) == (0, "1 program: 1 stable")
     assert [tap.direction for tap in MachineFolder("mill-3").taps()] == ["x", "y"]
+
+
+def test_without_a_force_sensor_the_accelerometer_is_the_only_channel(run: Run) -> None:
+    run("init", "mill-3", "--yes", *options(ANSWERS | {"hammer": "none", "accelerometer": "1 10.2 5"}))
+    made = tables()
+    assert made["tap"]["hammer"] == "none"
+    assert [channel["quantity"] for channel in made["daq"]["channel"]] == ["acceleration"]
+    assert MachineFolder(Path("mill-3")).machine.tap.hammer == "none"
+
+
+def test_a_hammer_that_is_told_again_takes_none_back(run: Run) -> None:
+    run("init", "mill-3", "--yes", *options({"name": "Mill 3", "daq": "/dev/ttyNOPE", "hammer": "none"}))
+    assert tables()["tap"]["hammer"] == "none"
+    assert "channel" not in tables()["daq"]

@@ -304,6 +304,7 @@ def test_modes_of_many_hits_agree_with_the_frf_they_come_from(
     assert isinstance(tap.known_frf, Frf)
     assert len(tap.accepted) == folder.machine.tap.hits
     again, flags = average_good(tap.hits)
+    assert again is not None
     assert np.array_equal(again.receptance, tap.known_frf.receptance)
     assert replace(tap, flags=flags).accepted == tap.accepted
 

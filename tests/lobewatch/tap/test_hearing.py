@@ -1,0 +1,65 @@
+"""What an accelerometer alone can hear, said before the test."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from acquisition import Hit
+from lobewatch.machine import Machine
+from lobewatch.machine.folder import MachineFolder
+from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.machine.settings.setup_tables import ModeChoice
+from lobewatch.tap.hearing import GOOD_ERROR, hearing_check, least_ringing
+from modal import fit_decays
+
+
+def machine_of(folder: MachineFolder, tap: str = "") -> Machine:
+    text = re.sub(r"^trigger_n .*\n", "", folder.toml.read_text("utf-8"), flags=re.MULTILINE)
+    text = text.replace("[tap]\n", f'[tap]\nhammer = "none"\n{tap}\n')
+    return parse_machine(text)
+
+
+def at_rest(rate: float, noise: float = 0.1) -> Hit:
+    return Hit(np.empty(0), np.random.default_rng(1).normal(scale=noise, size=4000), rate)
+
+
+@pytest.mark.parametrize("rate", [3200.0, 4000.0])
+def test_a_slow_sensor_does_not_hear_the_mode_of_the_model(rate: float, folder: MachineFolder) -> None:
+    check = hearing_check(at_rest(rate), machine_of(folder), "reference")
+    assert not check.passed
+    assert f"modes up to {0.4 * rate:.0f} Hz" in check.text
+    assert "1713 Hz, by the model, lies beyond" in check.text
+
+
+def test_the_band_of_a_data_sheet_counts_before_that_of_the_sample_rate(folder: MachineFolder) -> None:
+    check = hearing_check(at_rest(25600.0), machine_of(folder, "sensor_band_hz = 1600"), "reference")
+    assert not check.passed
+    assert "modes up to 1600 Hz" in check.text
+    assert hearing_check(at_rest(25600.0), machine_of(folder, "sensor_band_hz = 2000"), "reference").passed
+
+
+def test_without_a_model_the_band_that_is_followed_counts_and_without_both_that_is_said(folder: MachineFolder) -> None:
+    machine = machine_of(folder)
+    band = hearing_check(at_rest(3200.0), machine, "no such tool")
+    assert not band.passed
+    assert "2200 Hz, the end of [mode] band_hz" in band.text
+    nobody = hearing_check(at_rest(3200.0), replace(machine, mode=ModeChoice()), "no such tool")
+    assert nobody.passed
+    assert "nobody says" in nobody.text
+
+
+def test_hits_of_the_amplitude_that_is_told_give_that_error() -> None:
+    rate, frequency, damping, noise = 3200.0, 500.0, 0.03, 0.5
+    size, time = least_ringing(frequency, damping, noise, rate), np.arange(512) / rate
+    w, found = 2 * np.pi * frequency, []
+    for seed in range(30):
+        random = np.random.default_rng(seed)
+        phases = random.uniform(0, 6, (10, 1))
+        decays = size * np.exp(-damping * w * time) * np.cos(w * np.sqrt(1 - damping**2) * time + phases)
+        modes = fit_decays(decays + random.normal(scale=noise, size=decays.shape), rate, (50.0, 1280.0))
+        found.append(min((mode.frequency for mode in modes), key=lambda near: abs(near - frequency)))
+    assert 0.4 * GOOD_ERROR < np.std(found) / frequency < 1.8 * GOOD_ERROR

@@ -49,22 +49,27 @@ def _set_port(draft: Draft, answer: str) -> Draft:
 
 
 def _number(quantity: str, draft: Draft) -> int:
-    """Number of a sensor in [[daq.channel]]: the hammer comes first, where it has one."""
-    return int(quantity == "acceleration" and not draft.without_force)
+    """Number of a sensor in [[daq.channel]], that of the next one where it is not there yet."""
+    quantities = [channel.get("quantity") for channel in draft.table("daq").get("channel", ())]
+    return quantities.index(quantity) if quantity in quantities else len(quantities)
 
 
 def _known_by_daq(quantity: str, draft: Draft) -> str:
-    if draft.needs_sensors:
+    if draft.needs_sensors or (quantity == "force" and _names_no_hammer(draft)):
         return ""
     says = draft.daq.sensor_text(quantity)
     return f"{says}, says the DAQ" if says else "the DAQ will say it itself"
 
 
+def _names_no_hammer(draft: Draft) -> bool:
+    return bool(draft.daq.channels) and not draft.daq.sensor_text("force")
+
+
 def _sensor(quantity: str, draft: Draft) -> str:
-    if quantity == "force" and draft.without_force:
+    if quantity == "force" and (draft.without_force or _names_no_hammer(draft)):
         return WITHOUT
     channel = draft.table("daq.channel", _number(quantity, draft))
-    if channel.get("quantity") != quantity:
+    if not channel:
         return ""
     return " ".join(number_text(channel[key]) for key in ("input", SENSITIVITY[quantity], "range_v"))
 
@@ -74,8 +79,6 @@ def _set_sensor(quantity: str, draft: Draft, answer: str) -> Draft:
     number, sensitivity, reach = read_numbers(answer, ("input of the DAQ", f"sensitivity in {unit}", "range in V"))
     if not number.is_integer():
         raise ValueError(f"{answer!r}: input {number:g} is none; inputs are counted 0, 1, 2 ...")
-    if len(draft.table("daq").get("channel", ())) < _number(quantity, draft):
-        raise ValueError("the hammer comes first: answer --hammer too")
     values: dict[str, Value] = {
         "input": int(number),
         "quantity": quantity,

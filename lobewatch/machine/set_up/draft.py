@@ -48,9 +48,12 @@ class Draft:
         return find_driver(self.table("daq").get("driver", "taps")).sensors is None
 
     @property
-    def lacks_sensors(self) -> bool:
-        """Whether sensors are needed that were not told of yet."""
-        return self.needs_sensors and len(self.table("daq").get("channel", ())) < (1 if self.without_force else 2)
+    def lacks_sensors(self) -> list[str]:
+        """Sensors that are needed and were not told of yet, by the names of their questions."""
+        wanted = {} if self.without_force else {"hammer": "force"}
+        wanted["accelerometer"] = "acceleration"
+        known = [channel.get("quantity") for channel in self.table("daq").get("channel", ())]
+        return [name for name, quantity in wanted.items() if self.needs_sensors and quantity not in known]
 
     @property
     def without_force(self) -> bool:

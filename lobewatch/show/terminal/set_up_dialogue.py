@@ -16,18 +16,13 @@ from lobewatch.show.terminal.output import notes
 def answer_questions(draft: Draft, answers: Mapping[str, str]) -> Draft:
     """A draft with the answers of options, by the names of the questions; ValueError that names the option."""
     for question in QUESTIONS:
-        answer = answers.get(question.name)
-        if answer is not None:
-            try:
-                draft = question.answer(draft, answer).checked()
-            except ValueError as error:
-                raise ValueError(f"--{question.name} {error}") from error
+        if question.name in answers:
+            draft = _by_option(draft, question, answers)
             if question is DAQ and draft.daq.problem:
                 _say(f"note: {draft.daq.problem}")
     if draft.lacks_sensors:
-        missing = [name for name in ("hammer", "accelerometer") if name not in answers]
         raise ValueError(
-            f"--{missing[0] if missing else 'hammer'}: missing; a {draft.daq.driver} DAQ does not know its sensors: "
+            f"--{draft.lacks_sensors[0]}: missing; a {draft.daq.driver} DAQ does not know its sensors: "
             "give their input, sensitivity and range"
         )
     return draft
@@ -43,13 +38,20 @@ def ask_questions(draft: Draft, questions: Sequence[SetUpQuestion], answers: Map
     for question in questions:
         number = QUESTIONS.index(question) + 1
         already = question.already(draft)
-        if already:
+        if question.name in answers:
+            draft = _by_option(draft, question, answers)
+        elif already:
             _say(f"\n{number}/{len(QUESTIONS)} {question.name}: {already}")
-        elif question.name in answers:
-            draft = question.answer(draft, answers[question.name]).checked()
         else:
             draft = _ask(_with_daqs(draft) if question is DAQ else draft, question, number)
     return draft
+
+
+def _by_option(draft: Draft, question: SetUpQuestion, answers: Mapping[str, str]) -> Draft:
+    try:
+        return question.answer(draft, answers[question.name]).checked()
+    except ValueError as error:
+        raise ValueError(f"--{question.name} {error}") from error
 
 
 def _ask(draft: Draft, question: SetUpQuestion, number: int) -> Draft:

@@ -195,6 +195,36 @@ def test_without_a_force_sensor_the_accelerometer_is_the_only_channel(run: Run) 
 
 
 def test_a_hammer_that_is_told_again_takes_none_back(run: Run) -> None:
-    run("init", "mill-3", "--yes", *options({"name": "Mill 3", "daq": "/dev/ttyNOPE", "hammer": "none"}))
+    run("init", "mill-3", "--yes", *options(ANSWERS | {"hammer": "none"}))
+    assert run("init", "mill-3", "--edit", "hammer", "--hammer", "0 2.25 5").code == 0
+    made = tables()
+    assert "hammer" not in made["tap"]
+    assert [channel["quantity"] for channel in made["daq"]["channel"]] == ["acceleration", "force"]
+
+
+def test_an_accelerometer_is_told_again_beside_a_hammer_that_is_not_used_any_more(run: Run) -> None:
+    run("init", "mill-3", "--yes", *options(ANSWERS))
+    assert run("init", "mill-3", "--edit", "hammer", "--hammer", "none").code == 0
+    assert run("init", "mill-3", "--edit", "accelerometer", "--accelerometer", "1 100 5").code == 0
+    made = tables()
+    assert made["tap"]["hammer"] == "none"
+    assert [channel.get("sensitivity_mv_per_g") for channel in made["daq"]["channel"]] == [None, 100]
+
+
+def test_at_a_terminal_an_option_counts_where_the_daq_names_its_sensors(run: Run, tmp_path: Path) -> None:
+    run("init", "mill-3", "--yes", "--name", "Mill 3")
+    with Terminal(tmp_path, "init", "mill-3", "--edit", "hammer", "--hammer", "none") as person:
+        assert person.end() == 0
     assert tables()["tap"]["hammer"] == "none"
-    assert "channel" not in tables()["daq"]
+
+
+def test_of_a_daq_without_a_force_sensor_the_hammer_is_asked_about(trial: MachineFolder, tmp_path: Path) -> None:
+    edited = trial.toml.read_text("utf-8").replace("[tap]\n", '[tap]\nhammer = "none"\n').replace("trigger_n", "# ")
+    trial.toml.write_text(edited, "utf-8")
+    device = emulate_machine(MachineFolder(trial.path), find_driver("taps"), realtime=False).device
+    with device, Terminal(tmp_path, "init", "mill-3") as person:
+        for answer in ("", "1000 18000", "-", device.port):
+            person.answer(answer)
+        assert "Or none: no force sensor" in person.answer("0 2.25 5")
+        assert "names its own sensors" in person.answer("")
+        assert "accelerometer: 10 mV/g, says the DAQ" in person.answer("-")

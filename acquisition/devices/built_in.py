@@ -97,12 +97,10 @@ def _check_lines(settings: DeviceSettings) -> None:
 def _emulate_lines(bench: Bench) -> EmulatorThread:
     from acquisition.lines import LinesEmulator
 
-    force, acceleration = (sensor.channel for sensor in bench.inputs)
-    sensitivities = force.sensitivity, acceleration.sensitivity
-    rate = min(bench.sample_rate, LINES_RATE)
-    return LinesEmulator(
-        bench.signal_at(rate), sensitivities, force.full_scale, rate, realtime=bench.realtime, tcp=bench.tcp
-    )
+    channels = [sensor.channel for sensor in bench.inputs]
+    sensitivities = tuple(channel.sensitivity for channel in channels)
+    rate, full_scale = min(bench.sample_rate, LINES_RATE), channels[0].full_scale
+    return LinesEmulator(bench.signal_at(rate), sensitivities, full_scale, rate, realtime=bench.realtime, tcp=bench.tcp)
 
 
 def _by_library(name: str, title: str, extra: str) -> Driver:

@@ -1,4 +1,4 @@
-"""A board made of software that prints counter, force and acceleration."""
+"""A board made of software that prints a counter and what its sensors feel."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class LinesEmulator(EmulatorThread):
     def __init__(
         self,
         signal: Signal,
-        sensitivities: tuple[float, float],
+        sensitivities: tuple[float, ...],
         full_scale: float,
         sample_rate: float,
         *,
@@ -42,7 +42,7 @@ class LinesEmulator(EmulatorThread):
         printing: Printing | None = None,
         traits: LinesTraits | None = None,
     ) -> None:
-        """signal: N and m/s^2; sensitivities: V per N and per m/s^2; full_scale: of both (V); sample_rate (Hz)."""
+        """signal: N or m/s^2, a row a sensor; sensitivities: V per that; full_scale: of all (V); sample_rate (Hz)."""
         super().__init__(tcp)
         self._signal, self._rate, self._realtime, self._printing = signal, sample_rate, realtime, printing or Printing()
         self._traits = traits or LinesTraits()

@@ -1,7 +1,7 @@
 """Simple binary frames, such as SerialPlot's custom frames: start bytes, a payload of fixed size, a checksum.
 
-The payload is a scan: the counter (u16), where there is one, and two values (i16), little-endian. The checksum is the
-lowest byte of the sum of the payload's bytes (SerialPlot, "custom frame format").
+The payload is a scan: the counter (u16), where there is one, and a value (i16) a sensor, little-endian. The checksum is
+the lowest byte of the sum of the payload's bytes (SerialPlot, "custom frame format").
 """
 
 from __future__ import annotations
@@ -25,38 +25,30 @@ class FrameFormat:
     checksum: bool = True
     """Whether a checksum follows."""
 
-    @property
-    def payload(self) -> int:
-        """Size of the payload (bytes)."""
-        return 6 if self.counter else 4
-
-    @property
-    def size(self) -> int:
-        """Size of a frame (bytes)."""
-        return len(self.start) + self.payload + self.checksum
-
 
 class SimpleFrameDecoder:
-    """Finds rows of two or three numbers in a stream of frames."""
+    """Finds rows of numbers in a stream of frames."""
 
-    def __init__(self, form: FrameFormat) -> None:
-        """Nothing has come yet; what stands before the first whole frame is not counted."""
+    def __init__(self, form: FrameFormat, values: int = 2) -> None:
+        """values: in a frame, beside the counter. What stands before the first whole frame is not counted."""
         self._form, self._rest, self._broken, self._begun = form, b"", 0, False
+        self._payload = 2 * (values + form.counter)
+        self._size = len(form.start) + self._payload + form.checksum
 
     def feed(self, data: bytes) -> Iterator[Printed]:
         """The rows that are complete; bytes between frames, and a wrong checksum, are a broken frame."""
         form, received, place = self._form, self._rest + data, 0
         rows: list[tuple[int, ...]] = []
-        while (begin := received.find(form.start, place)) >= 0 and len(received) - begin >= form.size:
-            payload = received[begin + len(form.start) :][: form.payload]
-            good = not form.checksum or received[begin + form.size - 1] == sum(payload) & 0xFF
+        while (begin := received.find(form.start, place)) >= 0 and len(received) - begin >= self._size:
+            payload = received[begin + len(form.start) :][: self._payload]
+            good = not form.checksum or received[begin + self._size - 1] == sum(payload) & 0xFF
             if self._begun and (begin > place or not good):
                 if rows:
                     yield self._printed(rows)
                 rows, self._broken = [], self._broken + 1
             if good:
                 rows.append(_scan(payload, form.counter))
-            self._begun, place = self._begun or good, begin + (form.size if good else 1)
+            self._begun, place = self._begun or good, begin + (self._size if good else 1)
         self._rest = received[place:]
         if rows:
             yield self._printed(rows)

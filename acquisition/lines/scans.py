@@ -27,7 +27,7 @@ class Run:
     """Consecutive scans."""
 
     values: NDArray[np.float64]
-    """Force and acceleration as printed, shape (2, n_scans)."""
+    """Values as printed, a row a sensor, shape (n_sensors, n_scans)."""
     lost_before: int = 0
     """Scans lost before them: by the counter, else the broken lines or frames, which is the least there can be."""
 
@@ -35,15 +35,16 @@ class Run:
 class ScanCounter:
     """Takes the counter off, where there is one, and tells by it what is lost."""
 
-    def __init__(self) -> None:
-        """No scan has come yet."""
+    def __init__(self, values: int = 2) -> None:
+        """values: in a row, beside the counter. No scan has come yet."""
+        self._values = values
         self._last: int | None = None
         self._largest = 0
 
     def runs(self, printed: Printed) -> Iterator[Run]:
-        """Runs of consecutive scans in rows of force and acceleration, or of counter, force and acceleration."""
-        values = printed.rows[:, -2:].T
-        if printed.rows.shape[1] == 2:
+        """Runs of consecutive scans in rows of values, or of a counter and values."""
+        values = printed.rows[:, -self._values :].T
+        if printed.rows.shape[1] == self._values:
             yield Run(values, printed.broken_before)
             return
         counts = printed.rows[:, 0].astype(np.int64)

@@ -30,9 +30,10 @@ SILENCE = 3.0
 class LinesSource:
     """Listens; the board prints by itself and is never written to. A context manager.
 
-    The order is force, acceleration, with a counter before them where three numbers come. The numbers are volts, or,
-    where adc_bits is given, codes of a converter from 0 to 2^adc_bits - 1 whose middle is 0 V. What cannot be known:
-    whole lines that are lost where no counter is printed, and whether both sensors were sampled at once.
+    The order is that of the inputs, with a counter before them where one number more comes than there are inputs. The
+    numbers are volts, or, where adc_bits is given, codes of a converter from 0 to 2^adc_bits - 1 whose middle is 0 V.
+    What cannot be known: whole lines that are lost where no counter is printed, and whether both sensors were sampled
+    at once.
     """
 
     follows_clock = True
@@ -75,9 +76,9 @@ class LinesSource:
         """Count scans from the next whole line on."""
         while self._link.read(0.0):
             pass
-        frame = self._printing.frame
-        self._decoder = SimpleFrameDecoder(frame) if frame else LineDecoder()
-        self._counter = ScanCounter()
+        frame, values = self._printing.frame, len(self.channels)
+        self._decoder = SimpleFrameDecoder(frame, values) if frame else LineDecoder((values, values + 1))
+        self._counter = ScanCounter(values)
         self._running = True
 
     def stop(self) -> None:
@@ -101,9 +102,10 @@ class LinesSource:
                 yield Block(scan, self._codes(run.values), lost_before=lost)
                 scan, heard = scan + run.values.shape[1], time.monotonic()
             if time.monotonic() - heard > SILENCE:
+                wanted = "force,acceleration" if len(self.channels) > 1 else "acceleration"
                 raise DeviceError(
                     f"the board on {self._link.port} has printed no samples for {SILENCE:g} s",
-                    "check its program and baud_rate: it must print counter,force,acceleration or force,acceleration",
+                    f"check its program and baud_rate: it must print counter,{wanted} or {wanted}",
                 )
 
     def _codes(self, values: NDArray[np.float64]) -> NDArray[np.int32]:
@@ -125,6 +127,7 @@ def check_lines(inputs: Sequence[SensorInput], sample_rate: float | None) -> flo
             'sample_rate_hz is missing: a board with driver = "lines" does not tell its rate; give the number of '
             "lines a second that it was made for: it is measured against the clock"
         )
-    if sorted(sensor.number for sensor in inputs) != [0, 1]:
-        raise ValueError("input: the numbers after the counter are the inputs 0 and 1; correct [[daq.channel]]")
+    if sorted(sensor.number for sensor in inputs) != list(range(len(inputs))):
+        last = "the inputs 0 and 1" if len(inputs) > 1 else "input 0, and there is one alone"
+        raise ValueError(f"input: the numbers after the counter are {last}; correct [[daq.channel]]")
     return sample_rate

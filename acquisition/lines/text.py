@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 
 import numpy as np
 
@@ -15,11 +15,11 @@ LONGEST = 200
 
 
 class LineDecoder:
-    """Finds rows of two or three numbers in a stream of text."""
+    """Finds rows of numbers in a stream of text."""
 
-    def __init__(self) -> None:
-        """Nothing has come yet; what stands before the first line end is not counted."""
-        self._rest, self._begun, self._columns, self._broken = b"", False, 0, 0
+    def __init__(self, counts: Container[int] = (2, 3)) -> None:
+        """counts: of numbers that a line may have. What stands before the first line end is not counted."""
+        self._rest, self._begun, self._columns, self._broken, self._counts = b"", False, 0, 0, counts
 
     def feed(self, data: bytes) -> Iterator[Printed]:
         """The rows that are complete."""
@@ -30,6 +30,7 @@ class LineDecoder:
         rows: list[list[float]] = []
         for line in lines:
             row = _numbers(line)
+            row = row if len(row) in self._counts else []
             self._columns = self._columns or len(row)
             if row and len(row) == self._columns:
                 rows.append(row)
@@ -46,10 +47,10 @@ class LineDecoder:
 
 
 def _numbers(line: bytes) -> list[float]:
-    """Two or three finite numbers of a line; none where it holds anything else."""
+    """Finite numbers of a line; none where it holds anything else."""
     words = [word for word in line.strip().translate(SEPARATORS).split(b",") if word]
     try:
         numbers = [float(word) for word in words]
     except ValueError:
         return []
-    return numbers if len(numbers) in (2, 3) and np.isfinite(numbers).all() else []
+    return numbers if np.isfinite(numbers).all() else []

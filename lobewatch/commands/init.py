@@ -27,7 +27,9 @@ def init(
     name: Annotated[Answer, typer.Option(help="Name of the machine.")] = None,
     speeds: Annotated[Answer, typer.Option(help='Lowest and highest spindle speed, rpm: "1000 18000".')] = None,
     drive: Annotated[Answer, typer.Option(help='Power in kW and torque in N m: "15 40".')] = None,
-    daq: Annotated[Answer, typer.Option(help='Port of the DAQ, and its driver: "/dev/ttyUSB0 dataq".')] = None,
+    daq: Annotated[
+        Answer, typer.Option(help='Port of the DAQ, driver, rate: "COM3", "COM3 dataq", "COM3 lines 3200".')
+    ] = None,
     hammer: Annotated[Answer, typer.Option(help='Input, mV/N, range in V; not of TAPS/1: "0 2.25 5"; or none.')] = None,
     accelerometer: Annotated[Answer, typer.Option(help='Input, mV/g, range in V: "1 10 5".')] = None,
     fixing: Annotated[Answer, typer.Option(help='Mass (g) of the accelerometer, and how it is fixed: "4 wax".')] = None,

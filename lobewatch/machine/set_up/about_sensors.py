@@ -6,7 +6,7 @@ from dataclasses import replace
 from functools import partial
 from typing import get_args
 
-from acquisition import driver_names
+from acquisition import DeviceSettings, driver_names, find_driver
 from lobewatch.machine.set_up.daq_look import look_at
 from lobewatch.machine.set_up.draft import Draft
 from lobewatch.machine.set_up.question import SetUpQuestion
@@ -22,15 +22,15 @@ WITHOUT = "none"
 
 def _port(draft: Draft) -> str:
     daq = draft.table("daq")
-    driver = f" {daq['driver']}" if "driver" in daq else ""
     if port := daq.get("port"):
-        return f"{port}{driver}"
+        rate = [number_text(daq["sample_rate_hz"])] if "sample_rate_hz" in daq else []
+        return " ".join([port, *([daq["driver"], *rate] if "driver" in daq else [])])
     answering = [look.port for look in draft.looks.values() if look.text]
     return answering[0] if answering else OPEN
 
 
 def _set_port(draft: Draft, answer: str) -> Draft:
-    """Port, with the driver behind it where nobody answers there, or the number of one that was listed."""
+    """Port, with driver and rate behind it where nobody answers there, or the number of one that was listed."""
     if is_open(answer):
         return draft.set("daq", port=None, driver=None)
     answering = [look.port for look in draft.looks.values() if look.text]
@@ -39,13 +39,18 @@ def _set_port(draft: Draft, answer: str) -> Draft:
         if not 1 <= number <= len(answering):
             raise ValueError(f"{answer}: no DAQ of this number is listed; give the port, as in /dev/ttyACM0")
         answer = answering[number - 1]
-    port, _, driver = answer.strip().partition(" ")
+    port, driver, rate = [*answer.split(maxsplit=2), "", ""][:3]
     if driver and driver not in driver_names():
         raise ValueError(f"driver {driver!r} is not known; there are {', '.join(driver_names())}")
     look = draft.looks.get(port) or look_at(port)
     draft = replace(draft, looks={**draft.looks, port: look})
     driver = driver or look.driver
-    return draft.set("daq", port=port, driver=None if driver == "taps" else driver)
+    draft = draft.set("daq", port=port, driver=None if driver == "taps" else driver)
+    if rate:
+        draft = draft.set("daq", sample_rate_hz=read_numbers(rate, ("samples a second",))[0])
+    if find_driver(driver).prints:
+        find_driver(driver).check(DeviceSettings(draft.table("daq").get("sample_rate_hz")))
+    return draft
 
 
 def _number(quantity: str, draft: Draft) -> int:
@@ -112,7 +117,13 @@ def _set_fixing(draft: Draft, answer: str) -> Draft:
     return draft.set("tap", sensor_mass_g=mass[0] if mass else None, mounting=mountings[0] if mountings else None)
 
 
-DAQ = SetUpQuestion("daq", "On which port is the DAQ?", "/dev/ttyACM0, COM3, /dev/ttyUSB0 dataq", _port, _set_port)
+DAQ = SetUpQuestion(
+    "daq",
+    "On which port is the DAQ?",
+    "/dev/ttyACM0, COM3, /dev/ttyUSB0 dataq, /dev/ttyACM0 lines 3200",
+    _port,
+    _set_port,
+)
 HAMMER = SetUpQuestion(
     "hammer",
     "Hammer: input of the DAQ, sensitivity (mV/N, on its calibration sheet), range (V)? Or none: no force sensor.",

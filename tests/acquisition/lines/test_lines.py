@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from acquisition import Block, Channel, DeviceError, DeviceSettings, SensorInput, find_driver, probe_port
 from acquisition.devices import check_settings
 from acquisition.devices.built_in import BUILT_IN
+from acquisition.emulation import Signal
 from acquisition.lines import FrameFormat, LinesEmulator, LinesSource, LinesTraits, Printing
 from acquisition.lines.frames import SimpleFrameDecoder
 from acquisition.lines.scans import Printed, ScanCounter
@@ -34,12 +35,21 @@ def ramp(first: int, count: int) -> NDArray[np.float64]:
     return np.array([scans * 0.5 - 500.0, 300.0 - scans * 0.25])
 
 
+def falling(first: int, count: int) -> NDArray[np.float64]:
+    """The m/s^2 of `ramp` alone."""
+    return ramp(first, count)[1:]
+
+
 @contextmanager
-def printed(printing: Printing | None = None, traits: LinesTraits | None = None) -> Iterator[LinesSource]:
-    """A source that listens to an emulated board, as fast as it prints."""
-    sensitivities = FORCE.sensitivity, ACCELERATION.sensitivity
-    board = LinesEmulator(ramp, sensitivities, 5.0, RATE, realtime=False, printing=printing, traits=traits)
-    with board, LinesSource(board.port, INPUTS, RATE, printing) as source:
+def printed(
+    printing: Printing | None = None, traits: LinesTraits | None = None, alone: bool = False
+) -> Iterator[LinesSource]:
+    """A source that listens to an emulated board, as fast as it prints; alone: of an acceleration and no force."""
+    inputs = (SensorInput(0, ACCELERATION),) if alone else INPUTS
+    sensitivities = tuple(sensor.channel.sensitivity for sensor in inputs)
+    signal = falling if alone else ramp
+    board = LinesEmulator(signal, sensitivities, 5.0, RATE, realtime=False, printing=printing, traits=traits)
+    with board, LinesSource(board.port, inputs, RATE, printing) as source:
         source.start()
         yield source
         source.stop()
@@ -78,10 +88,31 @@ def test_what_is_printed_is_what_is_felt(printing: Printing | None, traits: Line
     assert sum(block.lost_before for block in blocks) == 0
 
 
+@pytest.mark.parametrize(
+    ("printing", "traits"),
+    [
+        (None, None),
+        (None, LinesTraits(counter_bits=0)),
+        (Printing(frame=FRAME), None),
+        (Printing(frame=FrameFormat(b"\x02\x03")), None),
+    ],
+    ids=["counter", "no counter", "frames", "frames without counter"],
+)
+def test_an_acceleration_alone_is_read(printing: Printing | None, traits: LinesTraits | None) -> None:
+    with printed(printing, traits, alone=True) as source:
+        blocks = take(source, 3000)
+        (channel,) = source.channels
+    values = np.concatenate([block.codes for block in blocks], axis=1)[0] * channel.scale
+    first = round(float(np.mean((300.0 - values[:200]) * 4 - np.arange(200))))  # the ramp says which scan it is
+    assert np.abs(values - falling(first, values.size)).max() <= 0.51 * 5 / 2**15 / ACCELERATION.sensitivity + 1e-3
+    assert sum(block.lost_before for block in blocks) == 0
+
+
+@pytest.mark.parametrize("alone", [False, True], ids=["force too", "acceleration alone"])
 @pytest.mark.parametrize("printing", [None, Printing(frame=FRAME)], ids=["lines", "frames"])
 @pytest.mark.parametrize("traits", [LinesTraits(drop_every=700), LinesTraits(garble_every=700)], ids=["lost", "broken"])
-def test_a_counter_tells_what_is_lost(printing: Printing | None, traits: LinesTraits) -> None:
-    with printed(printing, traits) as source:
+def test_a_counter_tells_what_is_lost(printing: Printing | None, traits: LinesTraits, alone: bool) -> None:
+    with printed(printing, traits, alone) as source:
         blocks = take(source, 7000)
     gaps = [block.lost_before for block in blocks if block.lost_before]
     assert gaps == [1] * len(gaps)
@@ -136,12 +167,16 @@ def test_a_counter_that_begins_anew_is_no_loss(bits: int) -> None:
     assert [gap for gap in lost if gap] == [1, 2]
 
 
-def test_ports_names_a_board_that_prints_by_listening_alone() -> None:
-    sensitivities = FORCE.sensitivity, ACCELERATION.sensitivity
-    with LinesEmulator(ramp, sensitivities, 5.0, RATE) as board:
+@pytest.mark.parametrize(
+    ("signal", "bits", "numbers"),
+    [(ramp, 16, "3 numbers"), (ramp, 0, "2 numbers"), (falling, 16, "2 numbers"), (falling, 0, "1 number")],
+)
+def test_ports_names_a_board_that_prints_by_listening_alone(signal: Signal, bits: int, numbers: str) -> None:
+    sensitivities = (FORCE.sensitivity, ACCELERATION.sensitivity)[-len(signal(0, 1)) :]
+    with LinesEmulator(signal, sensitivities, 5.0, RATE, traits=LinesTraits(counter_bits=bits)) as board:
         answer = probe_port(board.port, BUILT_IN)
     assert answer is not None
-    assert (answer.driver, answer.identity.model) == ("lines", "a board that prints 3 numbers a line")
+    assert (answer.driver, answer.identity.model) == ("lines", f"a board that prints {numbers} a line")
 
 
 @contextmanager
@@ -181,6 +216,7 @@ def test_an_unplugged_board_is_a_device_error() -> None:
     [
         ("lines", DeviceSettings(None, INPUTS), "sample_rate_hz is missing: a board with driver"),
         ("lines", DeviceSettings(RATE, (INPUTS[0], SensorInput(2, ACCELERATION))), "are the inputs 0 and 1"),
+        ("lines", DeviceSettings(RATE, (SensorInput(1, ACCELERATION),)), "are input 0, and there is one alone"),
         ("dataq", DeviceSettings(RATE, INPUTS, printing=Printing()), r"\[daq.printing\] is for driver = .lines."),
     ],
 )

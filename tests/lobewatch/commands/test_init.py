@@ -211,6 +211,16 @@ def test_an_accelerometer_is_told_again_beside_a_hammer_that_is_not_used_any_mor
     assert [channel.get("sensitivity_mv_per_g") for channel in made["daq"]["channel"]] == [None, 100]
 
 
+def test_a_board_that_prints_lines_is_told_with_its_rate(run: Run) -> None:
+    board = ANSWERS | {"daq": "/dev/ttyNOPE lines 3200", "hammer": "none", "accelerometer": "0 100 1.6"}
+    assert run("init", "mill-3", "--yes", *options(board)).code == 0
+    assert MachineFolder(Path("mill-3")).machine.daq.sample_rate_hz == 3200
+    assert run("init", "mill-3", "--edit", "daq", "--daq", "/dev/ttyNO lines").code == 0
+    assert tables()["daq"]["sample_rate_hz"] == 3200
+    said = run("init", "mill-4", "--yes", "--daq", "/dev/ttyNOPE lines")
+    refused(said, "--daq sample_rate_hz is missing", "give the number of lines a second")
+
+
 def test_at_a_terminal_an_option_counts_where_the_daq_names_its_sensors(run: Run, tmp_path: Path) -> None:
     run("init", "mill-3", "--yes", "--name", "Mill 3")
     with Terminal(tmp_path, "init", "mill-3", "--edit", "hammer", "--hammer", "none") as person:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from acquisition import HammeredStructure, Hammering, MeasuredRate, Structure
+from acquisition.emulation import Signal
 from acquisition.lines import LinesEmulator
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
@@ -38,18 +39,37 @@ range_v = 5
 [daq.printing]
 baud_rate = 921600
 """
+ALONE = """[daq]
+driver = "lines"
+sample_rate_hz = 10000
+
+[[daq.channel]]
+input = 0
+quantity = "acceleration"
+sensitivity_mv_per_g = 10
+range_v = 5
+"""
+PER_N, PER_ACCELERATION = 2.25e-3, 10e-3 / 9.80665
 
 
+@pytest.mark.parametrize("force", [True, False], ids=["force too", "acceleration alone"])
 def test_a_whole_tap_test(
-    structure: Structure, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    force: bool,
+    structure: Structure,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
     make_machine_folder(Path("trial"), "new_machine.toml")
     toml = Path("trial/machine.toml")
-    toml.write_text(toml.read_text("utf-8").replace("[daq]\n", DAQ, 1), "utf-8")
+    text = toml.read_text("utf-8").replace("[daq]\n", DAQ if force else ALONE, 1)
+    toml.write_text(text if force else text.replace("[tap]\n", '[tap]\nhammer = "none"\n'), "utf-8")
     folder = MachineFolder("trial")
-    signal = HammeredStructure(structure, RATE, np.random.default_rng(1), Hammering())
-    with LinesEmulator(signal, (2.25e-3, 10e-3 / 9.80665), 5.0, RATE, realtime=False) as board:
+    hammered = HammeredStructure(structure, RATE, np.random.default_rng(1), Hammering())
+    signal: Signal = hammered if force else lambda first, count: hammered(first, count)[1:]
+    sensitivities = (PER_N, PER_ACCELERATION) if force else (PER_ACCELERATION,)
+    with LinesEmulator(signal, sensitivities, 5.0, RATE, realtime=False) as board:
         with open_source(folder.machine.daq, board.port) as device:
             use_rate(folder, device, MeasuredRate(RATE, 1.0, 50_000, 5.0))
         monkeypatch.setattr(
@@ -61,5 +81,6 @@ def test_a_whole_tap_test(
     assert (end.value.code or 0) == 0, printed.err
     followed = json.loads(printed.out)["followed"]
     assert followed["frequency_hz"] == pytest.approx(1722.0, abs=max(0.5, 4 * followed["frequency_hz_std"]))
+    assert (followed["stiffness_n_per_m"] is not None) == force
     (entry,) = folder.taps()
     assert "loss detection: broken lines" in folder.read(entry).circumstances.device

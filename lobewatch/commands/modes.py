@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -41,6 +41,9 @@ def modes(
     averages: Annotated[
         int | None,
         typer.Option(help="Hits that an FRF was averaged from; else inferred from its coherence."),
+    ] = None,
+    hammer: Annotated[
+        Literal["none"] | None, typer.Option(help="No force was measured: f_n and zeta alone, from the response.")
     ] = None,
     *,
     file_options: FileOptions,
@@ -78,6 +81,7 @@ def modes(
       lobewatch modes acceleration.lvm
       lobewatch modes tap.h5 --band 1200 2200 --figure modes.png
       lobewatch modes frf.csv --window 0.05 --hit-at 0.01
+      lobewatch modes decays.csv --hammer none
       lobewatch modes h.mat --response 2 --unit g/N
       lobewatch modes frf.csv --add 298 --fix 1500:0.03 --figure stable.png
       lobewatch modes mill-3 20261102T0914 --drop 412
@@ -94,7 +98,7 @@ def modes(
     taken_off = Window.said(window, window_start, hit_at)
     if tap:
         others = {"band": band, "window": taken_off, "averages": averages, "accept": accept, "conjugate": conjugate}
-        refuse_file_options(file_options, sensor_mass=sensor_mass, **others)
+        refuse_file_options(file_options, sensor_mass=sensor_mass, hammer=hammer, **others)
         logbook, choice = Logbook.open(file), choice_of(edits, by_fit)
         with nullcontext() if choice is None else telling(logbook):
             file_modes = modes_of_tap(logbook, tap, choice)
@@ -102,7 +106,8 @@ def modes(
         text = "--by-fit takes back what is kept of a tap test" if by_fit else f"{file} is a folder"
         raise ValueError(f"{text}; name a tap test: lobewatch modes MACHINE TAP (lobewatch history lists them)")
     else:
-        said, sensor = file_options.description(averages=averages), SensorLoading.of(sensor_mass)
+        said = file_options.description(averages=averages, without_force=hammer == "none")
+        sensor = SensorLoading.of(sensor_mass)
         how = partial(modes_of_file, window=taken_off, conjugate=conjugate, accept=accept or (), sensor=sensor)
         file_modes = how(file, band, description=said, by_hand=edits)
     if figure is not None:

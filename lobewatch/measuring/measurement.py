@@ -12,11 +12,12 @@ from functools import cache
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from acquisition import ACROSS, Frf, Remark, TapTest, free_decay
+from acquisition import ACROSS, Frf, Remark, TapTest
 from dsm import Calibration, calibrate, modal_stiffness
 from lobewatch.machine import BY_FIT, Machine
+from lobewatch.measuring.decays import about_decays, extract_decays
 from lobewatch.measuring.questions import frequency_jump, no_mode_in_band, other_band, stiffness_off_model
-from lobewatch.measuring.sensor_remarks import Fitted, fit_without_sensor, mass_stays
+from lobewatch.measuring.sensor_remarks import Fitted, fit_without_sensor
 from lobewatch.measuring.window_remark import about_hidden_window
 from modal import (
     Believed,
@@ -24,7 +25,6 @@ from modal import (
     Mode,
     ModeEdits,
     believed,
-    decay_spectra,
     edit_modes,
     extract,
     follow,
@@ -38,10 +38,6 @@ BY_HAND = ("modes-by-hand", NOT_APPLIED)
 """Codes of the remarks on what a person said of the modes of a tap test, which they are about."""
 BEARING_STIFFNESSES = (1e5, 1e11)
 """Range that is believed of a calibrated model (N/m): from a plain bearing on a soft seat to a rigid seat."""
-WITHOUT_FORCE = "force-not-measured"
-"""Code of the remark on a tap test of free decays, which tell no stiffness."""
-HIGHEST = 0.4
-"""Share of the sample rate up to which the spectra of decays are used: beyond it filters and aliases begin."""
 LARGEST_RATIO = 2.0
 """K of one test over that of the one before of the series, or the inverse, above which nothing is calibrated.
 
@@ -133,16 +129,9 @@ def _fitted(frf: Frf, tap: TapTest, by_hand: ModeEdits) -> Fitted:
 
 
 def _fitted_decays(tap: TapTest, machine: Machine, by_hand: ModeEdits) -> Fitted:
-    """Modes of a tap test without force; the mass of the sensor stays in them, for what it does needs K."""
-    rate = tap.accepted[0].sample_rate
-    decays = [free_decay(hit) for hit in tap.accepted]
-    spectra = decay_spectra([decay[: min(map(len, decays))] for decay in decays], rate)
-    state, remarks = _edited(extract(spectra, (0.0, HIGHEST * rate)), by_hand)
-    text = "no force was measured: f_n and zeta are known, K is not; no stability lobes, no depths"
-    remarks = (*remarks, Remark(WITHOUT_FORCE, "", text, "tap with a hammer that measures its force"))
-    if machine.tap.sensor.mass:
-        remarks = (*remarks, mass_stays(machine.tap.sensor, "what they do needs K"))
-    return Fitted(state, tuple(modes_of_decays(state)), remarks)
+    """Modes of a tap test without force."""
+    state, remarks = _edited(extract_decays(tap.accepted), by_hand)
+    return Fitted(state, tuple(modes_of_decays(state)), (*remarks, *about_decays(machine.tap.sensor)))
 
 
 def _edited(state: Extraction, by_hand: ModeEdits) -> tuple[Extraction, tuple[Remark, ...]]:

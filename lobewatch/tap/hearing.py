@@ -9,7 +9,7 @@ import numpy as np
 from acquisition import DataError, Hit
 from dsm import natural_frequencies
 from lobewatch.machine import Machine
-from lobewatch.measuring.measurement import HIGHEST
+from lobewatch.measuring.decays import HIGHEST
 from lobewatch.tap.state import Check
 
 HITS = 10

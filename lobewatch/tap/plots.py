@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from acquisition import Frf, Hit, RunningMean, cross_spectra, free_decay
 from acquisition.estimation.estimate_frf import frf_of_spectra
 from acquisition.hits.pulse import find_pulse
-from lobewatch.measuring.measurement import HIGHEST
+from lobewatch.measuring.decays import HIGHEST
 from lobewatch.tap.state import Plots
 from modal import decay_spectra
 

@@ -13,7 +13,8 @@ from acquisition import ACROSS, DataError, Remark
 from dsm import Calibration
 from lobes import Cut, StabilityLobes
 from lobewatch.machine import Machine
-from lobewatch.measuring.measurement import WITHOUT_FORCE, Measurement
+from lobewatch.measuring.decays import WITHOUT_FORCE
+from lobewatch.measuring.measurement import Measurement
 from lobewatch.measuring.questions import in_question, open_questions
 from lobewatch.tool.axes import ModeAxes, mode_axes
 from lobewatch.tool.cross_tap import fitting_cross

@@ -22,6 +22,8 @@ from acquisition.hits.hits_in_record import hits_in_record
 
 COLUMNS_HIT = '--columns "time [s],force [N],acceleration [g]", in their order, or each with =NAME'
 """How hits are named."""
+NO_SENSOR = "hammer none where no force was measured"
+"""What is said where there is no force."""
 FEW_DIGITS = Fact("note", "its time is printed with few digits: whether samples are missing cannot be seen", "file")
 SAME_RATE = 1e-4
 """Relative difference of two sample rates that are taken for one: that of a rate with five digits."""
@@ -91,7 +93,8 @@ def _by_kind(signals: Sequence[Signal], description: Description, ledger: Ledger
     names = names_of(channels)
     if len(channels) < 1 + needs_force:
         ledger.faults.append(
-            f"it holds {names or 'nothing'} over time; a hit needs a force and a response (--force FILE)"
+            f"it holds {names or 'nothing'} over time; a hit needs "
+            + (f"a force and a response (--force FILE; {NO_SENSOR})" if needs_force else "a response")
         )
         return [], []
     if unclear and ((needs_force and not forces) or not responses):
@@ -99,7 +102,7 @@ def _by_kind(signals: Sequence[Signal], description: Description, ledger: Ledger
         return forces, responses
     if needs_force and len(forces) != 1:
         count = "no force channel" if not forces else f"{len(forces)} force channels"
-        ledger.faults.append(f"{count} among {names}; one is needed")
+        ledger.faults.append(f"{count} among {names}; one is needed{'' if forces else f' ({NO_SENSOR})'}")
     if not responses:
         ledger.faults.append(f"no channel of a response among {names}")
     return forces, responses

@@ -1,4 +1,4 @@
-"""The FRF of a recorded file, and the hits behind it."""
+"""The FRF of a recorded file, and the hits behind it, or the hits alone where no force was measured."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ ACCEPTABLE = (
 class FileFrf:
     """An FRF with the hits behind it."""
 
-    frf: Frf
-    """FRF as it was read, or the average of the hits."""
+    frf: Frf | None
+    """FRF as it was read, or the average of the hits; None where no force was measured."""
     hits: tuple[Hit, ...] = ()
     """Hits that it was averaged from; none where the file holds only an FRF."""
     time_constant: float | None = None
@@ -72,12 +72,15 @@ def _average(path: Path, hits: Sequence[Hit], accepted: HitFlags, description: D
     refused = sum(bool(verdict) and not verdict & ~accepted for verdict in verdicts)
     if refused:
         text = f"{refused} of {len(hits)} hits are averaged though they were refused"
-        return FileFrf(estimate_frf(good), tuple(good), remarks=(Remark("hits-accepted", "", text),))
+        frf = estimate_frf(good) if good[0].has_force else None
+        return FileFrf(frf, tuple(good), remarks=(Remark("hits-accepted", "", text),))
+    if good and not good[0].has_force:
+        return FileFrf(None, tuple(good))
     try:
         return FileFrf(read_frf(path, description), tuple(good))
     except DataError:
         ringing = [hit for hit, verdict in zip(hits, verdicts, strict=True) if verdict == HitFlags.NOT_DECAYED]
-        if not ringing:
+        if not ringing or not hits[0].has_force:
             raise
         return _average_ringing(ringing)
 

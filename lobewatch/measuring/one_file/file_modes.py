@@ -8,12 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import Description, Fact, Frf, Remark, windowed_receptance, without_mass
+from acquisition import DataError, Description, Fact, Frf, Remark, windowed_receptance, without_mass
 from dsm import plus_minus
 from lobewatch.machine import BY_FIT
 from lobewatch.machine.settings.sensor_loading import SensorLoading
+from lobewatch.measuring.decays import about_decays, extract_decays
 from lobewatch.measuring.measurement import about_hand
-from lobewatch.measuring.one_file.file_frf import read_file_frf
+from lobewatch.measuring.one_file.file_frf import FileFrf, read_file_frf
 from lobewatch.measuring.one_file.windows import (
     Window,
     refit_ringing_modes,
@@ -32,6 +33,7 @@ from modal import (
     edit_modes,
     extract,
     modes_of,
+    modes_of_decays,
     peaks_beyond,
     pick_peaks,
 )
@@ -48,8 +50,8 @@ class FileModes:
 
     path: Path
     """Path that it was read from."""
-    frf: Frf
-    """Average of its hits, or the FRF that it holds."""
+    frf: Frf | None
+    """Average of its hits, or the FRF that it holds; None where no force was measured."""
     extraction: Extraction
     """Bands and models that the modes were extracted with."""
     as_recorded: tuple[Mode, ...]
@@ -84,7 +86,8 @@ def modes_of_file(
     description: what the file does not say; the hits that an FRF was averaged from are inferred where nobody says. What
     still rings when the record ends gets an exponential window, which is corrected: all hits where none is good
     otherwise, else the modes that do. by_hand: modes that a person adds, leaves out, or holds at what they are without
-    any window. sensor: accelerometer whose mass is taken off.
+    any window. sensor: accelerometer whose mass is taken off. Hits without force tell no stiffness, and are taken as
+    they are: no window, no mass taken off.
 
     Raises ValueError for a window whose hit is not known or comes before it, averages that no coherence belongs to,
     verdicts that cannot be accepted, and what `edit_modes` refuses.
@@ -102,6 +105,10 @@ def modes_of_file(
     """
     file_frf = read_file_frf(path, accept, description or Description(), window)
     frf = file_frf.frf
+    if frf is None:
+        if window is not None or conjugate:
+            raise ValueError("--window, --hit-at and --conjugate are of hits with their force; leave them out")
+        return _modes_of_decays(path, file_frf, band, by_hand, sensor)
     frf = replace(frf, receptance=frf.receptance.conj()) if conjugate else frf
     hits = () if conjugate else file_frf.hits
     window = window_to_correct(file_frf.named_window, window)
@@ -139,6 +146,19 @@ def modes_of_file(
         facts=file_frf.facts,
         by_hand=by_hand,
     )
+
+
+def _modes_of_decays(
+    path: Path, decays: FileFrf, band: tuple[float, float] | None, by_hand: ModeEdits, sensor: SensorLoading
+) -> FileModes:
+    """Modes of hits whose force nobody measured; DataError where a window that the file names adds damping to them."""
+    if decays.named_window is not None:
+        raise DataError(f"{path}: the response is under a window, which adds damping; export it without")
+    state = edit_modes(extract_decays(decays.hits, band), by_hand)
+    modes = tuple(modes_of_decays(state))
+    said = (*([about_hand(by_hand)] if by_hand else []), *about_decays(sensor))
+    remarks = (*decays.remarks, *said, *_remarks(modes, state.frf, band))
+    return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand)
 
 
 def _remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | None) -> Iterator[Remark]:

@@ -36,8 +36,8 @@ MARKS = {Trust.TRUSTED: "", Trust.DOUBTFUL: " ?", Trust.REJECTED: " -"}
 
 def modes_figure(state: Extraction, modes: Sequence[Mode], title: str) -> Figure:
     """|Accelerance| measured, fitted and what is left; LSCF poles of every order, with those named that are stable but
-    no modes; circle and phase of each mode."""
-    circles = sorted(modes, key=_rank)[:MOST_CIRCLES]
+    no modes; circle and phase of each mode. Of free decays the spectrum of the first one, and no circles."""
+    circles = sorted((mode for mode in modes if mode.has_stiffness), key=_rank)[:MOST_CIRCLES]
     rows = -(-len(circles) // COLUMNS)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(9.0, 6.0 + 2.4 * rows), layout="constrained")
@@ -80,7 +80,9 @@ def _draw_frf(axes: Axes, state: Extraction, modes: Sequence[Mode]) -> None:
             fontsize=8,
         )
     low, high = axes.get_ylim()
-    axes.set(ylabel="|accelerance| (m/s²/N)", xlim=(f[0], f[-1]), ylim=(low * (low / high) ** LEGEND, high))
+    is_frf = all(mode.has_stiffness for mode in modes)
+    axes.set_ylabel("|accelerance| (m/s²/N)" if is_frf else "|spectrum of a decay| (m/s)")
+    axes.set(xlim=(f[0], f[-1]), ylim=(low * (low / high) ** LEGEND, high))
     axes.tick_params(labelbottom=False)
     axes.legend(loc="lower right", ncols=3)
 

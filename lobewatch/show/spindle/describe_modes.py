@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
@@ -75,7 +76,7 @@ def mode_table(modes: Sequence[Mode]) -> Table:
     for mode in modes:
         values = (mode.frequency, mode.damping_ratio, mode.stiffness)
         cells = [
-            plus_minus(value, std, scale, percent=scale == 1e6 or not with_phase)
+            "not known" if math.isnan(value) else plus_minus(value, std, scale, percent=scale == 1e6 or not with_phase)
             for value, std, scale in zip(values, mode.standard_error, (1.0, 0.01, 1e6), strict=True)
         ]
         rows.add_row(*cells, *([_phase(mode)] if with_phase else []), _notes(mode))
@@ -95,7 +96,8 @@ def _notes(mode: Mode) -> str:
 def mode_lines(modes: Sequence[Mode]) -> list[str]:
     """Lines below a table of modes: where ± comes from, and correlated errors."""
     hits = max((mode.n_hits for mode in modes), default=0)
-    lines = [f"± is the standard error over the {hits} hits (jackknife, {hits - 1} degrees of freedom)"] if hits else []
+    how = "jackknife" if all(mode.has_stiffness for mode in modes) else "by how each moves the fit"
+    lines = [f"± is the standard error over the {hits} hits ({how}, {hits - 1} degrees of freedom)"] if hits else []
     for (i, j), names in (((0, 1), "f_n and zeta"), ((0, 2), "f_n and K"), ((1, 2), "zeta and K")):
         of = [(mode.correlation[i, j], mode.frequency) for mode in modes]
         high = [f"{value:+.2f} ({at:.0f} Hz)" for value, at in of if abs(value) > HIGH_CORRELATION]
@@ -169,8 +171,8 @@ def file_modes_json(file_modes: FileModes) -> dict[str, Any]:
     """The modes of one file."""
     return {
         "file": str(file_modes.path),
-        "n_averages": file_modes.frf.n_averages,
-        "usable_band_hz": file_modes.frf.usable_band,
+        "n_averages": None if file_modes.frf is None else file_modes.frf.n_averages,
+        "usable_band_hz": None if file_modes.frf is None else file_modes.frf.usable_band,
         "facts": [asdict(fact) for fact in file_modes.facts],
         "by_hand": asdict(file_modes.by_hand),
         "modes": [mode_json(mode) for mode in file_modes.fitted],
@@ -181,21 +183,34 @@ def file_modes_json(file_modes: FileModes) -> dict[str, Any]:
 
 def file_modes_texts(file_modes: FileModes, *, everything: bool = False) -> list[str | Table]:
     """The modes of one file for people; those that are rejected, and each single remark, where everything is wanted."""
-    frf, shown = file_modes.frf, in_order(file_modes.fitted, rejected=everything)
-    usable = "" if frf.usable_band is None else f", usable {frf.usable_band[0]:.0f} to {frf.usable_band[1]:.0f} Hz"
-    lines = f"{frf.frequency.size} lines {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
+    shown = in_order(file_modes.fitted, rejected=everything)
     remarks = remark_lines if everything else short_remark_lines
     return [
-        f"{file_modes.path.name}: {frf.n_averages} hit(s) averaged, {lines}{usable}",
+        f"{file_modes.path.name}: {_measured(file_modes)}",
         *fact_lines(file_modes.facts, NOT_IN_FILE),
         mode_table(shown),
         summary(file_modes.fitted, everything=everything),
         *reasons(shown),
         *mode_lines(shown if everything else [mode for mode in shown if trust_of(mode) is Trust.TRUSTED]),
         *remarks(shown, file_modes.remarks),
-        "peak picking (eqs. 28, 29), for comparison:",
-        picked_table(file_modes.picked, file_modes.as_recorded),
+        *_peak_picking(file_modes),
     ]
+
+
+def _measured(file_modes: FileModes) -> str:
+    state = file_modes.extraction
+    frf = file_modes.frf or state.frf
+    lines = f"{frf.frequency.size} lines {frf.frequency[0]:g} to {frf.frequency[-1]:g} Hz"
+    usable = "" if frf.usable_band is None else f", usable {frf.usable_band[0]:.0f} to {frf.usable_band[1]:.0f} Hz"
+    what = f"{frf.n_averages} hit(s) averaged" if file_modes.frf else f"{len(state.frfs)} free decay(s) fitted together"
+    return f"{what}, {lines}{usable}"
+
+
+def _peak_picking(file_modes: FileModes) -> list[str | Table]:
+    if file_modes.frf is None:
+        return []
+    picked = picked_table(file_modes.picked, file_modes.as_recorded)
+    return ["peak picking (eqs. 28, 29), for comparison:", picked]
 
 
 def fact_lines(facts: Iterable[Fact], origins: Sequence[str] = tuple(ORIGINS)) -> list[str]:

@@ -26,6 +26,8 @@ class Outlook:
     """Falls that the frequency of the newest tap tests may take, by program, where anything can be foretold."""
     programs: Mapping[str, Fate]
     """Fate of each program, by its name."""
+    unknown: frozenset[str]
+    """Names of the programs on which there is no word now, for whatever reason: none can change."""
     limits: Limits
     """When the worst of its series has fallen by each limit of machine.toml."""
 
@@ -57,6 +59,7 @@ def outlook_of(analysis: Analysis, now: datetime) -> Outlook:
         standing,
         {name: ruling.critical for name, ruling in rulings.items() if ruling.critical is not None},
         {table.name: _fate(rulings[table.name], table.tool, standing) for table in machine.program if rulings},
+        frozenset(name for name, ruling in rulings.items() if ruling.word is Word.UNKNOWN),
         tuple((percent, _limit(standing, percent)) for percent in percents if standing.series),
     )
 

@@ -25,6 +25,8 @@ ASSUMED = (
     " visible, and one time in three or four a fall that slows down or grows exponentially."
 )
 """What stands below every table of dates."""
+UNKNOWN_NOW = "unknown now, see check"
+"""In place of the dates of a program on which there is no word."""
 WIDE, HIGH = 60, 12
 """Characters of the plot itself."""
 POINT, LINE = "o", "."
@@ -76,8 +78,12 @@ def trend_texts(outlook: Outlook, series: SeriesStanding, preload: PreloadLeft |
 def dates_rows(outlook: Outlook) -> list[tuple[str, str, str]]:
     """Name, when it becomes doubtful, when it is not stable: each program, and the fixed limits."""
     now = outlook.standing.time
-    fates = ((name, fate.doubtful, fate.not_stable) for name, fate in outlook.programs.items())
-    programs = [(name, reach_text(doubtful, now), reach_text(not_stable, now)) for name, doubtful, not_stable in fates]
+    programs = [
+        (name, reach_text(fate.doubtful, now), reach_text(fate.not_stable, now))
+        if name not in outlook.unknown
+        else (name, UNKNOWN_NOW, UNKNOWN_NOW)
+        for name, fate in outlook.programs.items()
+    ]
     return programs + [
         (f"-{percent:g} % (fixed limit, as in the paper)", "", reach_text(reach, now))
         for percent, reach in outlook.limits

@@ -21,7 +21,7 @@ from lobewatch.decay.trend import date, day
 from lobewatch.logbook import Logbook
 from lobewatch.logbook.outlook import outlook
 from lobewatch.show.history.describe_measurement import measurement_json, measurement_texts
-from lobewatch.show.trends.describe_trend import reach_text
+from lobewatch.show.trends.describe_trend import dates_rows, reach_text
 from lobewatch.verdicts import Word
 from lobewatch.verdicts.aging import softening, tolerable_decay
 from lobewatch.verdicts.critical import critical_fall
@@ -311,3 +311,10 @@ def test_the_error_of_the_critical_fall_is_its_scatter_over_damping_and_stiffnes
         falls.append(tolerable_decay(replace(drawn, rows=rows), 1.5e-3, stiffness_at))
     assert np.all(np.isfinite(falls))
     assert critical_fall(found).error == pytest.approx(np.std(falls), rel=0.3)
+
+
+def test_a_program_without_a_word_is_not_put_down_to_the_history(worn: Shop) -> None:
+    worn.run(("A", 12900, 1.5), tool="D99")
+    rows = {name: cells for name, *cells in dates_rows(outlook(worn.logbook))}
+    assert rows["A"] == ["unknown now, see check"] * 2
+    assert rows["-10 % (fixed limit, as in the paper)"][1] != "history too short or too old"

@@ -146,11 +146,11 @@ def _range_remark(hits: Sequence[Hit], number: int, channel: Channel) -> Remark 
     share = max(peaks) / full
     if RANGE_LOW <= share <= RANGE_HIGH:
         return None
-    too_large = share < RANGE_LOW
+    too_large, percent = share < RANGE_LOW, float(f"{100 * share:.2g}")
     wanted = HEADROOM * (float(np.median(peaks)) if too_large else max(peaks))
     return Remark(
         "range-too-large" if too_large else "range-too-small",
         name,
-        f"the hits reach {100 * share:.2g} % of the range of {full:.3g} {unit}",
+        f"the hits reach {percent:g} % of the range of {full:.3g} {unit}",
         f"choose a range or a sensor of about {wanted:.2g} {unit}{'' if too_large else ', or hit softer'}",
     )

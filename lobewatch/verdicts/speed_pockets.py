@@ -64,7 +64,7 @@ def speed_pockets(table: CutTable, assembly: Assembly, machine: Machine) -> list
     lowest = lobes.minimum.depth
     if not math.isfinite(lowest):
         return []
-    told = [
+    candidates = [
         SpeedPocket(
             min(max(pocket.speed_rpm, low), high),
             (max(pocket.from_rpm * (1 + width), low), min(pocket.to_rpm * (1 - width), high)),
@@ -72,7 +72,7 @@ def speed_pockets(table: CutTable, assembly: Assembly, machine: Machine) -> list
         )
         for pocket in best_pockets(pockets(lobes, MOST_GAIN * lowest), speeds.size, "removal")
     ]
-    return [pocket for pocket in told if pocket.holds(pocket.speed_rpm)][:COUNT]
+    return [pocket for pocket in candidates if pocket.holds(pocket.speed_rpm)][:COUNT]
 
 
 def _weighed(mode: Mode) -> Mode:
@@ -88,17 +88,16 @@ def _doubt(assembly: Assembly, direction: str, machine: Machine) -> float:
     return math.hypot(error if math.isfinite(error) else 0.0, scatter if given is None else given / 100)
 
 
-def pockets_text(found: Sequence[SpeedPocket]) -> str:
-    """Speeds of pockets, for people."""
-    return ", ".join(
-        f"{pocket.speed_rpm:.0f} rpm ({pocket.window_rpm[0]:.0f}..{pocket.window_rpm[1]:.0f})" for pocket in found
-    )
+def pockets_text(best: Sequence[SpeedPocket]) -> str:
+    """Speeds of pockets, for people; windows rounded inwards."""
+    windows = ((pocket.speed_rpm, *pocket.window_rpm) for pocket in best)
+    return ", ".join(f"{speed:.0f} rpm ({math.ceil(low)}..{math.floor(high)})" for speed, low, high in windows)
 
 
 def pockets_remark(table: CutTable, name: str, assembly: Assembly, machine: Machine) -> tuple[Remark, ...]:
     """Remark on the pockets of a cut whose depths are not known; none where none are found."""
-    found = speed_pockets(table, assembly, machine)
-    if not found:
+    best = speed_pockets(table, assembly, machine)
+    if not best:
         return ()
-    text = f"its pockets by f_n and damping: {pockets_text(found)}; how deep, test cuts tell"
+    text = f"its pockets by f_n and damping: {pockets_text(best)}; how deep, test cuts tell"
     return (Remark("speeds-alone", name, text, "lobewatch suggest leads to a depth in five test cuts"),)

@@ -29,6 +29,8 @@ STEP = 1e-3
 """Relative step of the speeds."""
 COUNT = 3
 """Number of pockets that are told."""
+SPEEDS_ALONE = "speeds-alone"
+"""Code of the remark on them."""
 
 
 @dataclass(frozen=True)
@@ -99,5 +101,5 @@ def pockets_remark(table: CutTable, name: str, assembly: Assembly, machine: Mach
     best = speed_pockets(table, assembly, machine)
     if not best:
         return ()
-    text = f"its pockets by f_n and damping: {pockets_text(best)}; how deep, test cuts tell"
-    return (Remark("speeds-alone", name, text, "lobewatch suggest leads to a depth in five test cuts"),)
+    text = f"pockets by f_n and damping: {pockets_text(best)}; how deep, test cuts tell"
+    return (Remark(SPEEDS_ALONE, name, text, "lobewatch suggest leads to a depth in five test cuts"),)

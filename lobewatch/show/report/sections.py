@@ -29,6 +29,7 @@ from lobewatch.show.report.section import DataTable, Fragment, Paragraph, Sectio
 from lobewatch.show.trends.describe_trend import ASSUMED, dates_rows, no_dates_text, sentence
 from lobewatch.tool import ABOUT_DIRECTIONS
 from lobewatch.verdicts import Word
+from lobewatch.verdicts.speed_pockets import SPEEDS_ALONE
 
 MakesSections = Callable[[ReportMaterial], Sequence[Section]]
 """What makes some sections of the report; none where there is nothing to show."""
@@ -48,9 +49,14 @@ def programs(material: ReportMaterial) -> list[Section]:
     if not material.programs:
         return []
     checked = [program.verdict for program in material.programs if program.verdict.word is not Word.UNKNOWN]
+    remarks = [remark for program in material.programs for remark in program.verdict.remarks]
+    speeds = [str(remark) for remark in joined(remark for remark in remarks if remark.code == SPEEDS_ALONE)]
     content = {
         "programs": [_program_row(program) for program in material.programs],
-        "lines": [line for program in material.programs for line in advice_lines(program, material.machine)],
+        "lines": [
+            *(line for program in material.programs for line in advice_lines(program, material.machine)),
+            *speeds,
+        ],
         "doubt": reading_lines(checked, material.machine),
         "method": checked[0].method if checked else "",
     }

@@ -142,6 +142,14 @@ def test_a_program_is_at_best_doubtful(
         assert CliRunner().invoke(app, [command, str(without_force.path)]).exit_code in (0, 1)
 
 
+def test_the_report_names_the_pockets(without_force: Shop) -> None:
+    assert CliRunner().invoke(app, ["report", str(without_force.path)]).exit_code in (0, 1)
+    page = (without_force.path / "report.html").read_text("utf-8")
+    (program,) = run(without_force, "check")["programs"]
+    (pockets,) = (remark["text"] for remark in program["remarks"] if remark["code"] == "speeds-alone")
+    assert pockets in page.replace("\u00a0", " ")
+
+
 def test_a_program_of_another_cutter_learns_nothing(without_force: Shop) -> None:
     observe(without_force, 2.0, "stable")
     without_force.edit("teeth = 4", "teeth = 3")

@@ -104,12 +104,11 @@ def modes_of_file(
     ['500.0 Hz, K = 20.0 N/um']
     """
     file_frf = read_file_frf(path, accept, description or Description(), window)
-    frf = file_frf.frf
-    if frf is None:
+    if file_frf.frf is None:
         if window is not None or conjugate:
             raise ValueError("--window, --hit-at and --conjugate are of hits with their force; leave them out")
         return _modes_of_decays(path, file_frf, band, by_hand, sensor)
-    frf = replace(frf, receptance=frf.receptance.conj()) if conjugate else frf
+    frf = replace(file_frf.frf, receptance=file_frf.frf.receptance.conj()) if conjugate else file_frf.frf
     hits = () if conjugate else file_frf.hits
     window = window_to_correct(file_frf.named_window, window)
     delay = None if window is None else window.delay(file_frf.hits)
@@ -124,12 +123,10 @@ def modes_of_file(
     extraction, modes, said = fit_without_sensor(frf, sensor, fit)
     mass, fitted = extraction.frf.mass_removed, modes
     frf = without_mass(frf, mass)
-    windowed: tuple[Remark, ...] = ()
     if window is not None and delay is not None:
-        record = 1 / float(np.mean(np.diff(frf.frequency)))
-        fitted, windowed = remove_given_window(modes, window.time_constant, delay, record)
+        fitted, windowed = remove_given_window(modes, window.time_constant, delay, 1 / _mean_step(frf))
     elif file_frf.time_constant is not None:
-        fitted = tuple(remove_own_window(modes, file_frf.time_constant))
+        fitted, windowed = tuple(remove_own_window(modes, file_frf.time_constant)), ()
     else:
         windowed = tuple(about_hidden_window(hits, modes))
         if not accept:
@@ -159,6 +156,10 @@ def _modes_of_decays(
     said = (*([about_hand(by_hand)] if by_hand else []), *about_decays(sensor))
     remarks = (*decays.remarks, *said, *_remarks(modes, state.frf, band))
     return FileModes(path, None, state, modes, modes, (), remarks, decays.facts, by_hand)
+
+
+def _mean_step(frf: Frf) -> float:
+    return float(np.mean(np.diff(frf.frequency)))
 
 
 def _remarks(modes: Sequence[Mode], frf: Frf, band: tuple[float, float] | None) -> Iterator[Remark]:

@@ -156,6 +156,7 @@ def test_coherence_of_an_frf_counts_where_its_averages_are_known(
     np.savetxt(file, table, header="Freq(Hz) Real(m/N) Imag(m/N) Coherence", comments="")
     inferred = modes_of_file(file)
     assert "averages-inferred" in codes(inferred.remarks)
+    assert inferred.frf is not None
     assert inferred.frf.n_averages == pytest.approx(10, abs=3)
     code, said = run(monkeypatch, capsys, str(file), "--averages", "10", "--json")
     assert code == 0

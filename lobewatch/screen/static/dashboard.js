@@ -26,6 +26,14 @@ function fallText({ fall, fall_std: std, series }) {
   return `${series}: frequency ${fall >= 0 ? "fallen" : "risen"} by ${Math.abs(fall).toFixed(digits)}${error} % since the first tests`;
 }
 
+// How far it has fallen, with a bar whose line is the last limit: 0.15 % looks unlike 10 %.
+function showSize(place, { fall, fall_std: std, limits }) {
+  if (fall === null || std === 0 || !limits.length) return;
+  place.textContent = `${fall >= 0 ? "-" : "+"}${Math.abs(fall).toFixed(2)} %`;
+  place.style.setProperty("--share", Math.min(Math.max(fall / limits.at(-1), 0), 1.25));
+  place.title = `frequency since the first tests; alarm at -${limits.at(-1)} %`;
+}
+
 function dueText({ last_tap: last, days_left: left }) {
   if (!last) return "";
   const days = left < 0 ? Math.ceil(-left) : Math.floor(left);
@@ -75,6 +83,7 @@ function row(machine) {
   part("light").dataset.light = machine.light;
   part("light").classList.toggle("early", machine.is_early);
   part("light").textContent = machine.word;
+  showSize(part("size"), machine);
   part("name").textContent = machine.name;
   part("reason").textContent = machine.why || fallText(machine);
   part("fall").textContent = fallText(machine);

@@ -11,8 +11,10 @@ from typing import Any
 from lobewatch.decay.light import Light
 from lobewatch.show.plant.describe_plant import COLUMNS
 from lobewatch.show.report.figure_data import Numbers
+from lobewatch.show.report.gauge import gauge
 from lobewatch.show.report.page import page, write_page
 from lobewatch.show.terminal.light_words import light_kind
+from lobewatch.verdicts.verdict import Word
 
 WIDE, HIGH = 140, 32
 """Size of a small course, in its own units."""
@@ -45,7 +47,8 @@ def _machine(row: Mapping[str, Any]) -> dict[str, Any]:
         "never tapped" if left is None else f"in {math.floor(left)} d" if left >= 0 else f"{math.ceil(-left)} d overdue"
     )
     fall, std = row["fall"], row["fall_std"]
-    fallen = "-" if fall is None else f"{-fall:+z.2f} %" + ("" if std is None else f" ± {std:.2f}")
+    has_changed = fall is not None and std != 0
+    fallen = f"{-fall:+z.2f} %" + ("" if std is None else f" ± {std:.2f}") if has_changed else "nothing to compare with"
     return {
         "name": row["name"],
         "key": row["key"],
@@ -54,13 +57,23 @@ def _machine(row: Mapping[str, Any]) -> dict[str, Any]:
         "reasons": row["reasons"] or ["all is well"],
         "next_step": row["next_step"],
         "fallen": fallen,
+        "gauge": gauge(fall, *row["limits"]) if has_changed else None,
         "series": row["series"],
         "spark": spark(row["points"]),
-        "until": row["limit"] or "not known",
-        "programs": row["programs"],
-        "last": last.partition("T")[0],
-        "due": due,
+        "until": row["limit"],
+        "programs": programs_text(row["programs"]),
+        "due": f"{due}, last {last.partition('T')[0]}" if last else due,
     }
+
+
+def programs_text(words: Mapping[str, str]) -> str:
+    """The programs that may not be run, by the word on them, and how many are stable."""
+    named: dict[str, list[str]] = {}
+    for program, word in words.items():
+        named.setdefault(word, []).append(program)
+    stable = named.pop(Word.STABLE, [])
+    texts = [f"{word}: {', '.join(programs)}" for word, programs in named.items()]
+    return "; ".join([*texts, *([f"{len(stable)} stable"] if stable else [])]) or "-"
 
 
 def spark(points: Sequence[tuple[float, float]]) -> str:

@@ -20,6 +20,13 @@
   }
   for (const button of document.querySelectorAll("button[data-numbers]")) button.addEventListener("click", () => save(button));
 
+  // On a narrow screen each row is a card, and each cell says what it is.
+  for (const table of document.querySelectorAll("table")) {
+    const heads = [...table.querySelectorAll("thead th")].map((head) => head.textContent);
+    for (const row of table.tBodies[0].rows) [...row.cells].forEach((cell, i) => { cell.dataset.head = heads[i]; });
+    table.classList.add("cards");
+  }
+
   const slider = document.getElementById("lobes-when");
   if (!slider) return;
   document.getElementById("lobes-course").hidden = false;

@@ -63,16 +63,23 @@ def trend_csv(series: SeriesStanding) -> str:
 
 
 def trend_texts(outlook: Outlook, series: SeriesStanding, preload: PreloadLeft | None) -> list[str | Table]:
-    """Chart, sentence and table."""
+    """Chart, sentence and table; where no date can be given, why."""
     trend = series.trend
     if trend is None:
         return [f"{series.name}: no tap test that others can be compared with"]
+    further = [f"{side.name}: {short_text(side)}" for side in outlook.standing.series if side is not series]
+    left = [] if preload is None else [str(preload)]
+    return [*chart_lines(trend), sentence(series), *left, *_dates(outlook), *further]
+
+
+def _dates(outlook: Outlook) -> list[str | Table]:
+    why_none = no_dates_text(outlook)
+    if why_none:
+        return [why_none]
     dates = table("~what", "~becomes doubtful", "~is not stable")
     for line in dates_rows(outlook):
         dates.add_row(*line)
-    further = [f"{side.name}: {short_text(side)}" for side in outlook.standing.series if side is not series]
-    left = [] if preload is None else [str(preload)]
-    return [*chart_lines(trend), sentence(series), *left, dates, ASSUMED, *further]
+    return [dates, ASSUMED]
 
 
 def dates_rows(outlook: Outlook) -> list[tuple[str, str, str]]:
@@ -111,8 +118,8 @@ def sentence(series: SeriesStanding) -> str:
     text = f"{series.name}: {short_text(series)}{f' after {n} points' if n > 1 else ''}"
     if trend.forecast is None:
         known = trend.readings.known.alone
-        then = f"5 on an alarm (scatter of other series: {known.percent:.2f} %)" if known.freedom else "9 on an alarm"
-        return f"{text}; from 8 points on there is a forecast, from {then}"
+        least = f"5 points on (scatter of other series: {known.percent:.2f} %)" if known.freedom else "9 points on"
+        return f"{text}; an alarm can ring from {least}"
     return f"{text}; {course_text(trend)}; scatter {trend.spread:.2f} %, score {_score(trend)}; {rate_text(trend)}"
 
 

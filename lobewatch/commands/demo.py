@@ -33,7 +33,7 @@ def demo(
 
     Every test goes through a real serial port (a pseudo-terminal), byte by byte: ten good hits, FRF, HDF5, modes,
     bearing stiffness, stability lobes, history. Before each the tool is remounted, which moves f_1 a little. What was
-    emulated in that very test is printed beside what was found.
+    emulated in that very test is printed beside what was found. The report is as of the day of the last test.
 
     Examples:
 
@@ -69,7 +69,7 @@ def demo(
         compared = compare_with_truth(logbook, taken)
         forecasts = forecast_levels(logbook, Wear.of(folder, taps, Story(story)))
         with telling(logbook):
-            report = write_report(logbook)
+            report = write_report(logbook, now=taken[-1].plan.date)
     emit(demo_json(compared, forecasts, report), as_json, *demo_texts(compared, forecasts, mounting.scatter, report))
 
 

@@ -340,6 +340,8 @@ def test_the_demo_finds_the_truth_of_every_tap(run: Run) -> None:
         score = (np.asarray(columns[name], float) - truth) / np.asarray(columns[f"{name}_std"], float)
         assert 0.5 < np.sqrt(np.mean(score**2)) < 2, f"standard errors of {name} are not of the size of the errors"
     html = Path(said["report"]).read_text(encoding="utf-8")
+    assert "As of 2024-12-15." in html
+    assert "Tap next by 2025-01-14." in html
     fallen = dict(re.findall(r'<th scope="row">reference, ([xy])</th><td [^>]*>-(\d+\.\d+)\s±', html))
     for direction, newest in zip("xy", said["taps"][-2:], strict=True):
         truths = np.log([tap["truth"]["frequency_hz"] for tap in said["taps"] if tap["direction"] == direction])

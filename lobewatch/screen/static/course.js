@@ -20,5 +20,6 @@ export function drawCourse(svg, { points, limits, fall }) {
   const at = points.map(([day, percent]) => `${x(day).toFixed(1)} ${y(percent).toFixed(1)}`);
   const line = at.length > 1 ? at.join("L") : `${WIDTH / 2 - EDGE} ${y(points[0][1])}h${2 * EDGE}`;
   part("path", { d: `M${line}` });
+  svg.setAttribute("role", "img");
   svg.setAttribute("aria-label", `frequency ${points.at(-1)[1].toFixed(2)} % since the start, limit ${limit} %`);
 }

@@ -28,8 +28,9 @@ function fallText({ fall, fall_std: std, series }) {
 
 // How far it has fallen, with a bar whose line is the last limit: 0.15 % looks unlike 10 %.
 function showSize(place, { fall, fall_std: std, limits }) {
-  if (fall === null || std === 0 || !limits.length) return;
-  place.textContent = `${fall >= 0 ? "-" : "+"}${Math.abs(fall).toFixed(2)} %`;
+  if (fall === null || std === 0) return;
+  const change = -Math.round(100 * fall) / 100 + 0; // + 0: no -0
+  place.textContent = `${change < 0 ? "" : "+"}${change.toFixed(2)} %`;
   place.style.setProperty("--share", Math.min(Math.max(fall / limits.at(-1), 0), 1.25));
   place.title = `frequency since the first tests; alarm at -${limits.at(-1)} %`;
 }

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -33,6 +34,7 @@ AudioContext.prototype.createOscillator = function () {
   return tone;
 };
 """
+AXE = Path(__file__).parents[2] / "data" / "axe_core" / "axe.min.js"
 Session = Any
 """ScriptedSession of tests/conftest.py."""
 
@@ -49,8 +51,9 @@ class Browser:
         self.driver = webdriver.Chrome(options=options, service=Service(DRIVER))
         self.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": COUNT_TONES})
 
-    def open(self, url: str, size: tuple[int, int] = (1280, 800)) -> None:
+    def open(self, url: str, size: tuple[int, int] = (1280, 800), scheme: str = "light") -> None:
         """A page in a window of this size, with nothing remembered."""
+        self.prefer(scheme)
         self.driver.execute_cdp_cmd(
             "Storage.clearDataForOrigin", {"origin": url.partition("/#")[0], "storageTypes": "all"}
         )
@@ -63,6 +66,11 @@ class Browser:
     def resize(self, size: tuple[int, int]) -> None:
         metrics = {"width": size[0], "height": size[1], "deviceScaleFactor": 1, "mobile": False}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+
+    def prefer(self, scheme: str, media: str = "") -> None:
+        """What the system says of the screen: "light" or "dark"; media "print": as it would be printed."""
+        wish = {"name": "prefers-color-scheme", "value": scheme}
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": media, "features": [wish]})
 
     def part(self, name: str) -> WebElement:
         return self.driver.find_element(By.ID, name)
@@ -79,6 +87,13 @@ class Browser:
 
     def ask(self, script: str) -> Any:
         return self.driver.execute_script(f"return {script}")
+
+    def broken_rules(self) -> list[tuple[str, str]]:
+        """Rules of accessibility that the page breaks, contrast among them, each with an element that does."""
+        self.driver.execute_script(AXE.read_text("utf-8"))
+        answer = self.driver.execute_async_script("axe.run().then(arguments[0])")
+        assert "color-contrast" in [rule["id"] for rule in answer["passes"]]
+        return [(rule["id"], rule["nodes"][0]["html"]) for rule in answer["violations"]]
 
     def log(self, kind: str) -> list[dict[str, Any]]:
         """New entries of a log of the browser."""

@@ -20,6 +20,9 @@ from modal import Mode, synthesize
 
 Browser = Any
 """Chromium on one page: Browser of conftest.py."""
+BAR = """const { backgroundSize, backgroundPosition } = getComputedStyle(arguments[0], "::after");
+return [backgroundSize, backgroundPosition];"""
+"""Widths and places of what the bar below a light is made of: the fall, the line of the alarm, what is below them."""
 LINES = [4.0 * line for line in range(1, 1000)]
 
 
@@ -83,6 +86,29 @@ def test_twelve_machines_fit_one_desktop_screen(browser: Browser, dashboard: Das
     assert course.get_attribute("aria-label") == "frequency -7.26 % since the start, limit -10 %"
     line, path = (course.find_element(By.TAG_NAME, name).rect for name in ("line", "path"))
     assert path["y"] < path["y"] + path["height"] < line["y"]
+
+
+def test_a_bar_shows_how_far_each_has_fallen_on_the_way_to_its_alarm(
+    browser: Browser, dashboard: DashboardServer
+) -> None:
+    """7 of 10 %, where the line of the alarm stands at 80 %; no bar where there is nothing to compare with."""
+    browser.open(dashboard.url, (1280, 657))
+    browser.wait(lambda: len(keys(browser)) == 12)
+    sizes = {key: row(browser, key).find_element(By.CLASS_NAME, "size") for key in keys(browser)}
+    assert {key: size.text for key, size in sizes.items() if size.is_displayed()} == {"worn": "-7.00 %"}
+    fallen, limit = (layers.split(", ") for layers in browser.driver.execute_script(BAR, sizes["worn"]))
+    assert fallen[0] == "56% 100%"
+    assert limit[1] == "80% 0px"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_the_dashboard_breaks_no_rule_of_accessibility(
+    browser: Browser, dashboard: DashboardServer, scheme: str
+) -> None:
+    browser.open(dashboard.url, scheme=scheme)
+    browser.wait(lambda: len(keys(browser)) == 12)
+    row(browser, "worn").find_element(By.TAG_NAME, "summary").click()
+    assert browser.broken_rules() == []
 
 
 @pytest.mark.parametrize("size", [(768, 1024), (390, 800)])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,7 +12,8 @@ from lobewatch.tap.state import TapStep
 
 SIZES = ((1280, 800), (1920, 1080), (820, 1180))
 ESSENTIALS = ("text", "good", "reason", "undo", "mute", "stop", "frf", "coherence", "force", "change", "taken")
-AXE = Path(__file__).parents[2] / "data" / "axe_core" / "axe.min.js"
+COLOURS = "['color', 'backgroundColor'].map((name) => getComputedStyle(document.querySelector('%s'))[name])"
+"""Of a part of the page: its letters and what is below them."""
 Browser = Any
 """Chromium on one page: Browser of conftest.py."""
 Session = Any
@@ -43,15 +43,38 @@ def test_everything_needed_is_in_sight_without_scrolling(
     assert browser.part("text").rect["height"] >= 0.09 * size[1]
 
 
-def test_text_has_a_contrast_of_seven_to_one(browser: Browser, session: Session, server: ScreenServer) -> None:
-    browser.open(server.url)
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_has_a_contrast_of_seven_to_one(
+    browser: Browser, session: Session, server: ScreenServer, scheme: str
+) -> None:
+    browser.open(server.url, scheme=scheme)
     for word in TapStep:
         session.show(word)
         browser.see("text", word.value)
-        colours = browser.ask(
-            "['color', 'backgroundColor'].map((name) => getComputedStyle(document.getElementById('now'))[name])"
-        )
+        colours = browser.ask(COLOURS % "#now")
         assert contrast(*colours) >= 7, (word, colours)
+
+
+def test_a_dark_screen_breaks_no_rule_of_accessibility_before_between_and_after_the_hits(
+    browser: Browser, session: Session, server: ScreenServer
+) -> None:
+    browser.open(server.url, scheme="dark")
+    session.check()
+    browser.see("checks", "noise floor")
+    assert browser.broken_rules() == []
+    session.hit()
+    session.hit(HitFlags.DOUBLE_HIT, "Let the hammer bounce back.")
+    browser.see("text", "DOUBLE HIT")
+    assert browser.broken_rules() == []
+    for _ in range(8):
+        session.hit()
+    session.undo()
+    session.finish()
+    browser.see("text", "DONE")
+    assert browser.broken_rules() == []
+    ink, paper = browser.ask(COLOURS % "body")
+    assert contrast(ink, paper) >= 7
+    assert contrast(paper, "rgb(0, 0, 0)") < 1.5  # it is dark
 
 
 def contrast(*colours: str) -> float:
@@ -118,9 +141,7 @@ def test_until_the_first_hit_a_drawing_shows_where_sensor_and_hammer_go(
         assert abs(away[1 - axis]) < 0.6 * abs(away[axis]), name
     assert browser.part("sensor-along").text == direction[-1]
     assert browser.ask("document.documentElement.scrollHeight") == 657
-    browser.driver.execute_script(AXE.read_text("utf-8"))
-    broken = browser.driver.execute_async_script("axe.run().then(arguments[0])")["violations"]
-    assert [(rule["id"], rule["nodes"][0]["html"]) for rule in broken] == []
+    assert browser.broken_rules() == []
     session.hit(HitFlags.DOUBLE_HIT)
     browser.see("text", "DOUBLE HIT")
     browser.wait(lambda: browser.part("plots").is_displayed() and not browser.part("guide").is_displayed())

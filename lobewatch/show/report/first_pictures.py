@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from matplotlib.figure import Figure
+
 from lobewatch.show.figures.style import svg
 from lobewatch.show.figures.trend_figures import frf_figure
 from lobewatch.show.report.material import ReportMaterial
@@ -28,12 +30,18 @@ def first_pictures(material: ReportMaterial) -> Iterator[FirstPicture]:
     points, diagram = value_over_time(material, FREQUENCY), material.lobe_diagram
     if points is not None:
         ahead = ", and where it goes" if points.course is not None else ""
-        yield FirstPicture(f"Natural frequency in {material.last.direction}{ahead}", svg(points.figure(SMALL)))
+        caption = f"Natural frequency in {material.last.direction} (Hz){ahead}"
+        yield FirstPicture(caption, _with_its_caption(points.figure(SMALL)))
     elif (frf := material.newest.frf) is not None:
         figure = frf_figure(None, frf, material.response_band(frf), SMALL)
         yield FirstPicture("Receptance at the tool tip", svg(figure))
     if diagram is not None:
         then = "; dashed: at first" if len(diagram.depths) > 1 else ""
-        yield FirstPicture(
-            f"Lobes of the {diagram.cut}: chatter above the line{then}", svg(diagram.figure(SMALL, has_legend=False))
-        )
+        caption = f"Depth (mm), {diagram.cut}: chatter above the line{then}"
+        yield FirstPicture(caption, _with_its_caption(diagram.figure(SMALL, has_legend=False)))
+
+
+def _with_its_caption(figure: Figure) -> str:
+    """The <svg> element; the ordinate has its name in the caption, for letters on a phone are large."""
+    figure.axes[0].set_ylabel("")
+    return svg(figure)

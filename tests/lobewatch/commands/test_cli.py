@@ -248,6 +248,11 @@ def test_lobes_and_report(run: Run, trial: MachineFolder, device: TapsEmulator) 
     refused(run("lobes", "trial", "--figure", "lobes.xyz"), "lobes.xyz", ".svg, .png or .pdf")
     assert run("report", "trial", "--out", "r.html").out == "report: r.html\n"
     html = Path("r.html").read_text(encoding="utf-8")
+    gauge, *pictures = re.findall(r'<svg [^>]*aria-label="(.*?)"', html)
+    assert re.fullmatch(r"frequency [+-]\d\.\d\d %; warning at -5 %, alarm at -10 %", gauge)
+    first_screen = ["Natural frequency in x (Hz)", "Depth (mm), reference cut: chatter above the line"]
+    values = ["Natural frequency", "Bearing stiffness"]
+    assert pictures == [*first_screen, *values, "Stability lobes", "Pockets over time", "Frequency response"]
     assert html.count("<svg") == 8
     assert "http" not in html.replace("http://www.w3.org", "").replace("https://matplotlib.org", "").replace(
         "http://purl.org", ""

@@ -54,8 +54,8 @@ def first_match(process: subprocess.Popen[str], pattern: str) -> str:
     """What a pattern finds in the output of a command."""
     assert process.stdout is not None
     for line in process.stdout:
-        if found := re.search(pattern, line):
-            return found[1]
+        if match := re.search(pattern, line):
+            return match[1]
     raise RuntimeError(f"nothing said {pattern}")
 
 

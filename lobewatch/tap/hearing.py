@@ -27,31 +27,31 @@ def hearing_check(baseline: Hit, machine: Machine, tool: str) -> Check:
 
     baseline: a record at rest.
     """
-    rate = baseline.sample_rate
-    highest = min(HIGHEST * rate, machine.tap.sensor_band_hz or math.inf)
-    noise = float(np.std(baseline.acceleration))
+    rate, band = baseline.sample_rate, machine.tap.sensor_band_hz or math.inf
+    highest, noise = min(HIGHEST * rate, band), float(np.std(baseline.acceleration))
     heard = f"modes up to {highest:.0f} Hz are heard, noise {noise:.2g} m/s^2 rms"
     frequency, where = _expected(machine, tool)
     if frequency is None:
-        return Check("band", True, f"{heard}; whether the mode of this machine lies there nobody says")
+        return Check("band", True, f"{heard}; whether the mode of this machine lies there nobody says", tells=True)
     if frequency > highest:
         cure = "its decay is not seen; take a faster sensor, or a higher sample rate"
         return Check("band", False, f"{heard}; {frequency:.0f} Hz, {where}, lies beyond: {cure}")
-    least = least_ringing(frequency, _damping(machine), noise, rate)
+    least = least_ringing(frequency, _damping(machine), noise / math.sqrt(min(rate / 2, band)))
     error = f"{HITS} hits that ring at {least:.2g} m/s^2 tell it to {100 * GOOD_ERROR:g} %"
-    return Check("band", True, f"{heard}; {frequency:.0f} Hz, {where}: {error}")
+    return Check("band", True, f"{heard}; {frequency:.0f} Hz, {where}: {error}", tells=True)
 
 
-def least_ringing(frequency: float, damping_ratio: float, noise: float, sample_rate: float) -> float:
+def least_ringing(frequency: float, damping_ratio: float, density: float) -> float:
     """Amplitude (m/s^2) of free decays, ten of them, whose frequency white noise leaves known to GOOD_ERROR.
 
-    OF_THE_FIT times the Cramer-Rao bound of A exp(-a t) cos(w t + phase) in noise of rms s at rate r:
-    var(w) = 16 s^2 a^3 / (A^2 r).
+    density: of the noise (m/s^2 per square root of Hz), its rms over the square root of the band that it fills.
+    OF_THE_FIT times the Cramer-Rao bound of A exp(-a t) cos(w t + phase) in noise of density n:
+    var(w) = 8 n^2 a^3 / A^2.
     Source: Kay, Fundamentals of Statistical Signal Processing (1993), ch. 3, for this signal.
     """
     decay = damping_ratio * 2 * math.pi * frequency
-    bound = 4 * noise * decay**1.5 / math.sqrt(sample_rate * HITS)
-    return float(OF_THE_FIT * bound / (GOOD_ERROR * 2 * math.pi * frequency))
+    bound = density * math.sqrt(8 * decay**3 / HITS)
+    return OF_THE_FIT * bound / (GOOD_ERROR * 2 * math.pi * frequency)
 
 
 def _expected(machine: Machine, tool: str) -> tuple[float | None, str]:

@@ -46,6 +46,8 @@ class Check:
     """Whether all is well; a failed check warns and does not stop the test."""
     text: str
     """Finding with its unit, and the cure where it failed."""
+    tells: bool = False
+    """Whether the finding is worth a line where all is well, too."""
 
 
 @dataclass(frozen=True)

@@ -108,7 +108,7 @@ def test_95_percent_intervals_hold_the_truth() -> None:
 
 @pytest.mark.long
 @pytest.mark.timeout(1200)
-@pytest.mark.parametrize(("hits", "tests"), [(1, 500), (3, 500)])
+@pytest.mark.parametrize(("hits", "tests"), [(1, 500), (3, 500), (10, 500)])
 def test_95_percent_intervals_of_tap_tests_without_force_hold_the_truth(hits: int, tests: int) -> None:
     held = []
     for seed in range(tests):

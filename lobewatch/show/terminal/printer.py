@@ -72,8 +72,9 @@ class TapPrinter:
         if state.device != before.device:
             self._console.print(f"{state.device}. TAP the tool, again and again.", markup=False)
         for check in state.checks:
-            if not check.passed and check not in before.checks:
-                self._console.print(f"[bold yellow]![/] {escape(check.name)}: {escape(check.text)}")
+            if (check.tells or not check.passed) and check not in before.checks:
+                symbol = "[bold green]✓[/]" if check.passed else "[bold yellow]![/]"
+                self._console.print(f"{symbol} {escape(check.name)}: {escape(check.text)}")
         if state.resumed != before.resumed:
             self._console.print(state.resumed)
         with_hit = state.word in (TapStep.GOOD, TapStep.REFUSED) and not state.trial

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from acquisition import Hit
+from acquisition import STANDARD_GRAVITY, Hit
 from lobewatch.machine import Machine
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.settings.machine_file import parse_machine
 from lobewatch.machine.settings.setup_tables import ModeChoice
 from lobewatch.tap.hearing import GOOD_ERROR, hearing_check, least_ringing
 from modal import fit_decays
+
+ROOT = Path(__file__).parents[3]
 
 
 def machine_of(folder: MachineFolder, tap: str = "") -> Machine:
@@ -52,9 +55,26 @@ def test_without_a_model_the_band_that_is_followed_counts_and_without_both_that_
     assert "nobody says" in nobody.text
 
 
+@pytest.mark.parametrize(
+    ("density", "least"), [(290e-6, (1.1, 1.5, 2.3)), (430e-6, (1.7, 2.2, 3.4)), (22.5e-6, (0.089, 0.11, 0.18))]
+)
+def test_sensors_of_data_sheets_need_what_the_page_says(density: float, least: tuple[float, ...]) -> None:
+    for frequency, amplitude in zip((300.0, 500.0, 1200.0), least, strict=True):
+        assert least_ringing(frequency, 0.03, density * STANDARD_GRAVITY) == pytest.approx(amplitude, rel=0.05)
+        assert f"{amplitude:g}" in (ROOT / "docs/without-force.md").read_text("utf-8")
+
+
+def test_noise_that_a_filter_keeps_to_a_narrower_band_is_denser_there(folder: MachineFolder) -> None:
+    needed = [
+        float(re.findall(r"ring at ([\d.]+) m/s", hearing_check(at_rest(25600.0), machine, "reference").text)[0])
+        for machine in (machine_of(folder), machine_of(folder, "sensor_band_hz = 3200"))
+    ]
+    assert needed[1] / needed[0] == pytest.approx(2.0, rel=0.05)
+
+
 def test_hits_of_the_amplitude_that_is_told_give_that_error() -> None:
     rate, frequency, damping, noise = 3200.0, 500.0, 0.03, 0.5
-    size, time = least_ringing(frequency, damping, noise, rate), np.arange(512) / rate
+    size, time = least_ringing(frequency, damping, noise / np.sqrt(rate / 2)), np.arange(512) / rate
     w, found = 2 * np.pi * frequency, []
     for seed in range(30):
         random = np.random.default_rng(seed)

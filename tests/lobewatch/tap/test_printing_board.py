@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from acquisition import HammeredStructure, Hammering, MeasuredRate, Structure
+from acquisition import STANDARD_GRAVITY, HammeredStructure, Hammering, MeasuredRate, Structure
 from acquisition.emulation import Signal
 from acquisition.lines import LinesEmulator
 from lobewatch.cli import main
@@ -49,6 +50,16 @@ quantity = "acceleration"
 sensitivity_mv_per_g = 10
 range_v = 5
 """
+ADXL345 = """[daq]
+driver = "lines"
+sample_rate_hz = 3200
+
+[[daq.channel]]
+input = 0
+quantity = "acceleration"
+sensitivity_mv_per_g = 100
+range_v = 1.6
+"""
 PER_N, PER_ACCELERATION = 2.25e-3, 10e-3 / 9.80665
 
 
@@ -84,3 +95,35 @@ def test_a_whole_tap_test(
     assert (followed["stiffness_n_per_m"] is not None) == force
     (entry,) = folder.taps()
     assert "loss detection: broken lines" in folder.read(entry).circumstances.device
+
+
+def test_a_digital_sensor_of_five_dollars(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The z-axis of an ADXL345 by its data sheet: 430 ug per root Hz up to 1600 Hz, steps of 7.8 mg, gravity."""
+    monkeypatch.chdir(tmp_path)
+    make_machine_folder(Path("trial"), "new_machine.toml")
+    toml, rate, step = Path("trial/machine.toml"), 3200.0, 7.8e-3 * STANDARD_GRAVITY
+    text = toml.read_text("utf-8").replace("[daq]\n", ADXL345, 1)
+    toml.write_text(text.replace("[tap]\n", '[tap]\nhammer = "none"\nrecord_s = 0.25\n'), "utf-8")
+    truth = Structure(np.array([500.0]), np.array([0.03]), np.array([2e7]))
+    hitting = Hammering((20.0, 80.0), response_noise=430e-6 * STANDARD_GRAVITY * 40)
+    hammered = HammeredStructure(truth, rate, np.random.default_rng(1), hitting)
+
+    def signal(first: int, count: int) -> NDArray[np.float64]:
+        return np.asarray(np.round((hammered(first, count)[1:] + STANDARD_GRAVITY) / step) * step)
+
+    folder = MachineFolder("trial")
+    with LinesEmulator(signal, (0.1 / STANDARD_GRAVITY,), 1.6, rate, realtime=False) as board:
+        with open_source(folder.machine.daq, board.port) as device:
+            use_rate(folder, device, MeasuredRate(rate, 1.0, 16_000, 5.0))
+        monkeypatch.setattr(sys, "argv", ["lobewatch", "tap", "trial", "--port", board.port, "--json"])
+        with pytest.raises(SystemExit) as end:
+            main()
+    printed = capsys.readouterr()
+    assert (end.value.code or 0) == 0, printed.err
+    assert "modes up to 1280 Hz are heard, noise 0.17 m/s^2 rms" in printed.err
+    followed = json.loads(printed.out)["followed"]
+    error = followed["frequency_hz_std"]
+    assert followed["frequency_hz"] == pytest.approx(500.0, abs=2.3 * error)  # 95 % of ten hits
+    assert 0.02 < error < 0.2

@@ -234,6 +234,15 @@ def test_what_a_trial_hit_says_is_a_line_of_its_own_as_it_is_in_no_list() -> Non
     assert log.splitlines() == ["Bounce back.", "  1 / 10  ✓ GOOD  (231 N)"]
 
 
+def test_a_log_has_the_checks_that_tell_something_though_all_is_well() -> None:
+    console = Console(file=io.StringIO(), width=200)
+    printer = TapPrinter(Session(), console)
+    checks = Check("band", True, "modes up to 1280 Hz are heard", tells=True), Check("disk", True, "full of room")
+    for _ in range(2):
+        printer.show(replace(STATE, checks=checks, hits=()))
+    assert console.file.getvalue().splitlines() == ["✓ band: modes up to 1280 Hz are heard"]  # type: ignore[attr-defined]
+
+
 def test_a_word_ahead_of_its_hit_rings_once_and_the_next_hit_again(terminal: int) -> None:
     screen, file = screen_of(Session())
     word = replace(STATE, word=TapStep.GOOD)

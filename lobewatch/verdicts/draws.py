@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -71,7 +72,7 @@ class ProgramDraws:
     def growth_of(self, cut: NDArray[np.intp], row: NDArray[np.intp], depths: Floats) -> Floats:
         """Growth of some draws, each in one of the cuts (k,), at depths (k, d) in m, shape (k, d)."""
         grown = np.empty(depths.shape)
-        angles = np.array([one.feed_angle for one in self.cuts])
+        angles = np.array([each.feed_angle for each in self.cuts])
         for alike in places_alike(self.cuts):
             here = np.flatnonzero(np.isin(cut, alike))
             if here.size:
@@ -157,6 +158,16 @@ def worst_limit(program: Program, assembly: Assembly, cuts: Sequence[Cut]) -> Wo
     deepest = DEEPEST * program.depth
     depths = [min(limit.limit, deepest) for limit in limits]
     return WorstLimit(limits[worst], patterns[worst], max(depths) / min(depths))
+
+
+def likely_axes(program: Program, assembly: Assembly, cuts: Sequence[Cut], doubt: Doubt) -> Floats | None:
+    """Axes that are likely to have the lowest limit: those in which the program grows most at its depth."""
+    patterns = assembly.axes.patterns
+    if len(patterns) == 1:
+        return patterns[0]
+    rows = reduce(joined_rows, (middle_row(program, assembly, axes) for axes in patterns))
+    middles = ProgramDraws(rows, tuple(cuts), np.full(len(cuts), np.inf), 1, doubt)
+    return patterns[int(np.argmax(middles.growth(program.depth)))]
 
 
 def draw(

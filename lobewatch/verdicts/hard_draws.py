@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lobes import Cut, Program
+from lobes import Cut, Program, program_limit
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.aging import StiffnessAt
 from lobewatch.verdicts.doubt import Doubt
-from lobewatch.verdicts.draws import ProgramDraws, draw, worst_limit
+from lobewatch.verdicts.draws import ProgramDraws, draw, likely_axes
 from lobewatch.verdicts.mean_force import MeanForce
 from lobewatch.verdicts.room import APART, at_ends
 
@@ -37,29 +37,24 @@ class HardDraws:
     limit: float
     """Deepest stable depth in the middle of the doubt (m)."""
     draws: ProgramDraws
-    """Few draws at both ends of what must be safe (`at_ends`)."""
-    chattered: frozenset[int]
-    """Draws that are among them since they have chattered elsewhere."""
+    """All draws at both ends of what must be safe (`at_ends`)."""
+    first: NDArray[np.intp]
+    """Places of the few that are likely the first to chatter."""
+    chattered: frozenset[int] = frozenset()
+    """Draws that count too since they have chattered elsewhere."""
 
     def deepest(self, most: float) -> float:
-        """The deepest up to a depth (m) at which, and below which, all of them are stable (m)."""
-        return deepest_calm(self.draws, most)
+        """The deepest up to a depth (m) at which, and below which, all that count are stable (m)."""
+        more = np.add.outer([0, len(self.draws.rows) // 2], sorted(self.chattered)).ravel().astype(np.intp)
+        return deepest_calm(self.draws[np.union1d(self.first, more)], most)
 
 
 def hard_draws(
-    program: Program,
-    cuts: Sequence[Cut],
-    spindle: Assembly,
-    doubt: Doubt,
-    fall: float,
-    stiffness_at: StiffnessAt,
-    chattered: frozenset[int] = frozenset(),
+    program: Program, cuts: Sequence[Cut], spindle: Assembly, doubt: Doubt, fall: float, stiffness_at: StiffnessAt
 ) -> HardDraws:
-    """Those of a program (SI), with all cuts on its way, at its speed; its depth is the scale of what is looked at.
-
-    chattered: draws that are among them, whatever zero order says.
-    """
-    middle, axes, _ = worst_limit(program, spindle, cuts)
+    """Those of a program (SI), with all cuts on its way, at its speed; its depth is the scale of what is looked at."""
+    axes = likely_axes(program, spindle, cuts, doubt)
+    middle = program_limit(program, spindle.x, spindle.y, cuts, axes)
     drawn = draw(program, middle, cuts, spindle, doubt, axes)
     if len(cuts) > 1:
         grown = drawn.around(program.depth, fall, APART)
@@ -68,9 +63,7 @@ def hard_draws(
     rows = aged.rows
     mean = MeanForce.of(rows.making(drawn.cuts[0])).limits(rows.speed_rpm[:, np.newaxis])[0][:, 0]
     hard = np.max(rows.tangential[:, np.newaxis] / (rows.stiffness * rows.damping_ratio), axis=1)
-    more = np.add.outer([0, len(drawn.rows)], sorted(chattered)).ravel().astype(np.intp)
-    few = np.unique(np.concatenate((np.argsort(mean)[:FIRST], np.argsort(-hard)[:HARDEST], more)))
-    return HardDraws(middle.limit, aged[few], chattered)
+    return HardDraws(middle.limit, aged, np.union1d(np.argsort(mean)[:FIRST], np.argsort(-hard)[:HARDEST]))
 
 
 def deepest_calm(draws: ProgramDraws, most: float) -> float:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
 
@@ -95,7 +95,7 @@ class SettingSearch:
     either: bool = False
     """Direction left open: milled up or down, the worse counts."""
     hard: dict[float, HardDraws] = field(default_factory=dict)
-    """Few draws by speed (rpm), worked out anew where more of them are known to chatter."""
+    """Few draws by speed (rpm), with those that were known to chatter when they were asked last."""
     chattered: set[int] = field(default_factory=set)
     """Draws that have chattered where few others made it seem safe."""
     judged: dict[tuple[float, float], Judgement] = field(default_factory=dict)
@@ -212,12 +212,11 @@ class SettingSearch:
     def _calm(self, speed: float) -> float:
         """The deepest (mm) at a speed (rpm) at which few draws are stable now and later, with depth to spare."""
         most = float(self.reach.depths(np.array([speed]))[0]) / 1e3
-        if speed not in self.hard or self.hard[speed].chattered != self.chattered:
+        if speed not in self.hard:
             likely = float(np.interp(speed, self.likely.speeds, self.likely.depths)) / 1e3
             program = Program(self.machine.build_cut(self.table), speed, max(likely, MM / 1e3))
-            spindle = self.spindle, self.doubt, self.fall, self.stiffness_at
-            self.hard[speed] = hard_draws(program, self.cuts, *spindle, frozenset(self.chattered))
-        hard = self.hard[speed]
+            self.hard[speed] = hard_draws(program, self.cuts, self.spindle, self.doubt, self.fall, self.stiffness_at)
+        hard = self.hard[speed] = replace(self.hard[speed], chattered=frozenset(self.chattered))
         return 1e3 * hard.deepest(DEEPER * min(most, hard.limit / (1 + SPARE))) / DEEPER
 
     def _deepest(self, speed: float, depth_mm: float) -> Setting | None:

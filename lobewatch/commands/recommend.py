@@ -60,9 +60,8 @@ def recommend(
     logbook = Logbook.open(machine)
     if save is not None:
         refuse_taken(logbook.machine, save)
-    answer = recommended(logbook, said)
+    answer = recommended(logbook, said, save)
     if save is not None and answer.setting is not None:
-        answer = answer.named(save)
         save_program(logbook.folder, answer.program)
     saved = save if answer.setting is not None else None
     emit(

@@ -19,14 +19,15 @@ from lobewatch.verdicts.recommendation import Recommendation, recommend
 from lobewatch.verdicts.spindle_at_speed import AT_REST
 
 
-def recommended(logbook: Logbook, said: Mapping[str, Any]) -> Recommendation:
+def recommended(logbook: Logbook, said: Mapping[str, Any], name: str | None = None) -> Recommendation:
     """Of the cut that is said (see `wanted_cut`), on all that tap tests and test cuts say of its tool.
 
-    said: its depth_mm is asked for, its speed_rpm is that of now. ValueError for a cut that is none, DataError where
-    there is no tap test.
+    said: its depth_mm is asked for, its speed_rpm is that of now; name: that of its program. ValueError for a cut that
+    is none, DataError where there is no tap test.
     """
     machine = logbook.machine
     table, either = wanted_cut(machine, said)
+    table = msgspec.structs.replace(table, name=name or table.name)
     logbook.newest()
     now = said.get("speed_rpm") or present_speed(machine, table.tool)
     return _recommended(logbook, table, either, said.get("depth_mm"), now)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass
 
 import msgspec
 import numpy as np
@@ -28,7 +27,9 @@ OTHER_CUT = (
 )
 """What makes a cut safe that is not, in words."""
 SLOWER = ("a smaller diameter", "tool_material and cutting_speed_m_min in its [[tool]], where it bears more")
-"""What makes a tool one that the spindle is slow enough for."""
+"""What makes a tool one that the spindle is slow enough for ..."""
+FASTER = ("a tool or a holder that may turn faster", "max_speed_rpm in its [[tool]], where it is wrong")
+"""... where max_speed_rpm holds it down."""
 THIN = 0.1
 """Radial depth over diameter up to which less of it is no advice."""
 ITS_OWN = ("speed_rpm", "depth_mm")
@@ -68,10 +69,6 @@ class Recommendation:
     remarks: tuple[Remark, ...] = ()
     """Remarks on what it rests on, and on what is not known of the tool."""
 
-    def named(self, name: str) -> Self:
-        """The same, its program of another name."""
-        return replace(self, program=msgspec.structs.replace(self.program, name=name))
-
 
 def recommend(
     table: ProgramTable,
@@ -92,8 +89,8 @@ def recommend(
         return Recommendation(table, either, reason=str(tool), cures=("tap it",))
     if gap := _gap(table, tool, machine):
         return Recommendation(table, either, reason=gap[0], cures=gap[1:])
-    if (too_fast := _too_fast(CutRange.of(machine, table))) is not None:
-        return Recommendation(table, either, reason=too_fast, cures=SLOWER)
+    if too_fast := _too_fast(CutRange.of(machine, table)):
+        return Recommendation(table, either, reason=too_fast[0], cures=too_fast[1:])
     search = SettingSearch(at_speed.taught(table), tool, machine, at_speed, either)
     if is_set and present_rpm is not None:
         setting = search.here(present_rpm, search.reach.deepest_mm)
@@ -115,15 +112,16 @@ def _gap(table: ProgramTable, tool: Assembly, machine: Machine) -> tuple[str, ..
     return unanswered(table, tool) or ()
 
 
-def _too_fast(reach: CutRange) -> str | None:
-    """Why no speed of the spindle is one that the tool bears; None where one is."""
+def _too_fast(reach: CutRange) -> tuple[str, ...]:
+    """Why no speed of the spindle is one that the tool bears, and what would change it; empty where one is."""
     speed, limits = reach.machine.speed, reach.limits
     if not reach.is_empty:
-        return None
+        return ()
     edge = limits.cutting_speed_m_min
-    why = "" if edge is None else f" ({edge.high:.0f} m/min at its edge)"
+    edge_text = "" if edge is None else f" ({edge.high:.0f} m/min at its edge)"
+    why, cures = (" (its max_speed_rpm)", FASTER) if limits.is_capped else (edge_text, SLOWER)
     slowest = f"and the spindle turns no slower than {speed.low_rpm:g} rpm"
-    return f"the tool bears no more than {reach.high_rpm:g} rpm{why}, {slowest}"
+    return (f"the tool bears no more than {reach.high_rpm:g} rpm{why}, {slowest}", *cures)
 
 
 def _entered(

@@ -20,7 +20,9 @@ def outside_tool(table: ProgramTable, machine: Machine) -> Iterator[Remark]:
     limits = tool_limits(machine, table)
     if not limits.low_rpm <= table.speed_rpm <= limits.high_rpm:
         cure = "choose another tool" if limits.is_empty else f"turn at {_range(limits.low_rpm, limits.high_rpm)} rpm"
-        yield _remark(table, _speed(table, limits), f"{cure}, or enter what its maker says as cutting_speed_m_min")
+        is_over = table.speed_rpm > limits.tool.max_speed_rpm
+        own = "correct max_speed_rpm" if is_over else "enter what its maker says as cutting_speed_m_min"
+        yield _remark(table, _speed(table, limits), f"{cure}, or {own}")
     feed, borne = table.feed_per_tooth_mm, limits.feed_per_tooth_mm
     if feed is not None and borne is not None and not borne.low <= feed <= borne.high:
         text = f"feed_per_tooth_mm = {feed:g} is outside {_range(borne.low, borne.high)} mm, {_bears(table, limits)}"

@@ -65,6 +65,11 @@ class ToolLimits:
         return self.low_rpm > self.high_rpm
 
     @property
+    def is_capped(self) -> bool:
+        """Whether max_speed_rpm of its [[tool]] is what holds its fastest speed down, and not its edge."""
+        return self.high_rpm == self.tool.max_speed_rpm
+
+    @property
     def is_guessed(self) -> bool:
         """Whether its speeds are no more than those of the spindle, or of the fastest tool there is."""
         speed = self.cutting_speed_m_min

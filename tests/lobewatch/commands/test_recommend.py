@@ -134,6 +134,11 @@ def test_a_tool_that_bears_no_speed_of_the_spindle_has_none(shop: Shop, run: Any
         "and the spindle turns no slower than 3000 rpm"
     )
     assert cures.startswith("what would change it: a smaller diameter")
+    shop.edit("# The spindle of", '[[tool]]\nname = "reference"\nmax_speed_rpm = 2500\n\n# The spindle of')
+    _, out, _ = run("recommend", "--material", "42CrMo4")
+    reason, cures = out.splitlines()
+    assert "the tool bears no more than 2500 rpm (its max_speed_rpm), and the spindle" in reason
+    assert "max_speed_rpm in its [[tool]]" in cures
 
 
 def test_a_tool_that_was_never_tapped_is_predicted_and_said_to_be_doubtful(shop: Shop, run: Any) -> None:

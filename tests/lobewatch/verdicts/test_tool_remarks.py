@@ -113,6 +113,9 @@ def test_a_program_outside_is_remarked_with_what_is_allowed(mill: Shop, program:
     assert (remark.code, remark.about) == ("outside-tool-limits", "steel")
     assert words in remark.text
     assert "[[tool]] 'reference'" in remark.cure
+    keys = ("feed_per_tooth_mm", "max_speed_rpm")
+    (key,) = [key for key in keys if key in remark.text] or ["cutting_speed_m_min"]
+    assert [key for key in (*keys, "cutting_speed_m_min") if key in remark.cure] == [key]
 
 
 def test_a_tool_that_was_never_tapped_is_remarked_too(mill: Shop) -> None:

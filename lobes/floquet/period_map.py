@@ -80,7 +80,7 @@ def period_map(
 ) -> PeriodMap | UnevenMap:
     """The map of each row at depths (r, d) in m; numbers (k,): pieces of each segment, the same in all rows.
 
-    For helical teeth, whose segments depend on the depth, d is 1.
+    For helical teeth, whose segments depend on the depth, d is 1. kind: precision; that of uneven teeth is double.
     """
     ends = segment_ends(rows.cut, depth[:, 0])
     free = is_free(rows.cut, ends, depth[:, 0])

@@ -1,0 +1,41 @@
+"""Growth is as exact near zero as is asked for, in single and in double precision: verdicts hang on its sign."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_milling import random_case
+
+from lobes import Cut, MillingRows, growth, milling_system, piece_numbers, rows_of
+from lobes.floquet import largest_multipliers
+from modal import Mode
+
+DEPTHS = np.geomspace(0.05e-3, 8e-3, 16)[np.newaxis]
+NEAR = 0.2
+"""Growth around zero that counts."""
+HARD = (278, 658, 838, 918, 1092, 1436, 1451)
+"""Of 1500 programs some of those in which residuals of the multipliers say least of their errors."""
+
+
+def program(seed: int) -> MillingRows:
+    """Two to twelve modes, 1 to 8 teeth, most of them helical; every third at a radial depth of 0.03 diameters."""
+    case = random_case(np.random.default_rng(seed))
+    case = case if seed % 3 else replace(case, immersion=0.03)
+    x, y = ([Mode(*mode) for mode in modes] for modes in (case.x, case.y))
+    cut = Cut(case.teeth, case.immersion, case.direction, case.tangential, case.radial, case.helix_lag)
+    return rows_of(milling_system(x, y), cut, np.array([case.speed_rpm]))
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
+def test_growth_near_zero_is_within_the_tolerance(tolerance: float) -> None:
+    near = 0
+    for seed in (*range(40), *HARD):
+        rows = program(seed)
+        numbers = piece_numbers(rows, float(DEPTHS.max()))
+        exact = np.log(np.abs(largest_multipliers(rows, DEPTHS, numbers, 1e-10)))
+        error = np.abs(growth(rows, DEPTHS, numbers, tolerance) - exact)[np.abs(exact) < NEAR]
+        assert np.all(error < tolerance), seed
+        near += error.size
+    assert near > 300

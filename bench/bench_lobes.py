@@ -64,9 +64,8 @@ def textbook(x: Modes, y: Modes, speeds: Floats, depths: Floats, exponentials: i
     """As the listings of Insperger & Stepan: dense products, all eigenvalues, expm wherever it is written or once."""
     system = milling_system(x, y)
     n, p = system.frequency.size, system.axes.size
-    shape = np.zeros((p, n))
-    shape[system.direction, np.arange(n)] = system.shape
-    forces = interval_forces(CUT, M)[:, system.axes[:, np.newaxis], system.axes]
+    shape = (system.shape[:, np.newaxis] * system.vector).T
+    forces = interval_forces(CUT, M)[0][:, system.axes[:, np.newaxis], system.axes]
     one, A, B = np.eye(2 * n), np.diag(np.ones(n), n), np.zeros((2 * n, p))
     A[n:, n:] = -2 * np.diag(system.damping_ratio * system.frequency)
     stiff = np.diag(system.frequency**2)
@@ -93,7 +92,7 @@ def textbook(x: Modes, y: Modes, speeds: Floats, depths: Floats, exponentials: i
 def batched(speeds: Floats, depths: Floats, m: int) -> Floats:
     """Many points at once: power steps, then Arnoldi, with the period map applied and never built."""
     h = np.repeat(60 / (CUT.teeth * speeds * m), depths.size)
-    pull = np.tile(depths, speeds.size) * interval_forces(CUT, m)[:, 0, :1] * OMEGA**2 / STIFFNESS
+    pull = np.tile(depths, speeds.size) * interval_forces(CUT, m)[0, :, 0, :1] * OMEGA**2 / STIFFNESS
     radius, doubt = np.empty(h.size), np.full(h.size, np.inf)
     for effort in EFFORTS:
         left = np.flatnonzero(doubt > TOLERANCE)

@@ -48,10 +48,7 @@ SAME_SPEED = 1e-3
 """Relative difference up to which two speeds are one."""
 ON_HARMONIC = 0.02
 """Orders from a multiple of a clear comb within which chatter is false."""
-COLUMNS = (
-    *("recordings", "cut found", "speed of one axis", "axes apart", "of all axes"),
-    *("words on all axes", "not told", "on harmonics"),
-)
+COLUMNS = "recordings, cut found, speed of one axis, axes apart, of all axes, words on all axes, not told, on harmonics"
 """Headings of the table."""
 NOT_FOUND = ("no-cut", "no-air", "too-short")
 """Reasons that say that no one cut was found."""
@@ -183,10 +180,8 @@ def _descriptions(source: Source) -> Iterator[Description]:
             response = number if len(places) > 1 else None
             yield Description(**vars(source.options) | {"response": response})
         else:
-            kept = [
-                "acceleration [m/s^2]" if i == place else "-" if c == "*" else c for i, c in enumerate(source.columns)
-            ]
-            yield Description(columns=tuple(kept))
+            rest = ["-" if column == "*" else column for column in source.columns]
+            yield Description(columns=(*rest[:place], "acceleration [m/s^2]", *rest[place + 1 :]))
 
 
 def loud_part(signal: Floats, rate: float) -> tuple[int, int]:
@@ -287,7 +282,8 @@ def main() -> None:
     if len(sys.argv) != 2 or not Path(sys.argv[1]).is_dir():
         sys.exit("give the folder of the public recordings: python bench/real_cuts.py FOLDER")
     folder, began, air = Path(sys.argv[1]), time.process_time(), Counter[str]()
-    print("| " + " | ".join(COLUMNS) + " |\n" + "|---" * len(COLUMNS) + "|")
+    names = COLUMNS.split(", ")
+    print("| " + " | ".join(names) + " |\n" + "|---" * len(names) + "|")
     for source in (*SOURCES, *AIR):
         each, together = Tally(), Tally()
         for file in axes_of(folder, source):

@@ -121,20 +121,27 @@ def _hessenberg(over_period: PeriodMap | UnevenMap, start: Floats, vectors: int)
 def _largest(matrices: Floats) -> tuple[Complexes, Floats]:
     """Largest Ritz value of each Hessenberg matrix (..., k + 1, k), and its residual relative to it.
 
+    The residual is that of any that may be larger by as much: two that are nearly one look smaller until they part.
     A period that grows beyond what a number can hold has the multiplier inf.
     """
     finite = np.all(np.isfinite(matrices), axis=(-1, -2))
     matrices = np.where(finite[..., np.newaxis, np.newaxis], matrices, 0.0)
-    square = matrices[..., :-1, :]
-    values = np.linalg.eigvals(square).astype(np.complex128)
-    largest = np.take_along_axis(values, np.argmax(np.abs(values), axis=-1)[..., np.newaxis], axis=-1)
-    vector = np.zeros_like(values)
+    values = np.linalg.eigvals(matrices[..., :-1, :]).astype(np.complex128)
+    size, residual = np.abs(values), _residuals(matrices, values)
+    place = np.argmax(size, axis=-1)[..., np.newaxis]
+    most = np.take_along_axis(size, place, axis=-1)
+    doubt = np.max(np.where(size + residual >= most, residual, 0.0), axis=-1)
+    largest = np.take_along_axis(values, place, axis=-1)[..., 0]
+    return np.where(finite, largest, np.inf), doubt / np.maximum(most[..., 0], np.finfo(matrices.dtype).tiny ** 0.5)
+
+
+def _residuals(matrices: Floats, values: Complexes) -> Floats:
+    """Residuals of Ritz values (..., k) of Hessenberg matrices (..., k + 1, k), by their vectors of norm 1."""
+    square, tiny = matrices[..., :-1, :], np.finfo(matrices.dtype).tiny ** 0.5
+    vector = np.zeros((*values.shape, values.shape[-1]), dtype=values.dtype)
     vector[..., -1] = 1.0
-    tiny = np.finfo(matrices.dtype).tiny ** 0.5
     for j in range(values.shape[-1] - 1, 0, -1):
-        row = np.einsum("...c,...c->...", square[..., j, j:], vector[..., j:]) - largest[..., 0] * vector[..., j]
-        vector[..., j - 1] = -row / np.maximum(square[..., j, j - 1], tiny)
+        row = (vector[..., j:] @ square[..., j, j:, np.newaxis])[..., 0] - values * vector[..., j]
+        vector[..., j - 1] = -row / np.maximum(square[..., j, j - 1], tiny)[..., np.newaxis]
         vector /= np.max(np.abs(vector), axis=-1, keepdims=True)
-    residual = matrices[..., -1, -1] * np.abs(vector[..., -1]) / np.linalg.norm(vector, axis=-1)
-    multiplier = np.where(finite, largest[..., 0], np.inf)
-    return multiplier, residual / np.maximum(np.abs(largest[..., 0]), tiny)
+    return np.asarray(matrices[..., -1, -1, np.newaxis] * np.abs(vector[..., -1]) / np.linalg.norm(vector, axis=-1))

@@ -18,7 +18,8 @@ WHY: Mapping[str, str] = {
     "lost-scans": "scans were lost in it; lower the sample rate or use another cable or port",
     "speed-not-found": "no spindle speed within 5 % of the one that was set fits its lines; correct the speed",
     "on-spindle-lines": "the lines of run-out are louder than tooth passing: chatter of two tooth periods of an even "
-    "number of teeth, or chatter that has locked to the spindle, sounds alike; cut at a speed 3 % away",
+    "number of teeth, or chatter that has locked to the spindle, sounds alike; cut at a speed 3 % away, and give "
+    "pitch_deg where the teeth are unevenly spaced",
     "faint": "lines beside those of the spindle, too faint to be called chatter; cut longer or a little deeper",
     "unexplained-tone": "a tone that neither the spindle, nor its teeth, nor air explains, without the side bands that "
     "a cut gives to chatter; cut a little deeper, and listen for it without the cut",

@@ -78,8 +78,8 @@ PALE = 3.0
 """Difference of such a dot (of 255) that no eye sees."""
 
 
-class January(datetime):
-    """A clock that stands five weeks after the last test of the demo; what it makes are plain times."""
+class December(datetime):
+    """A clock that stands five days after the last test of the demo; what it makes are plain times."""
 
     def __new__(cls, *parts: Any, **named: Any) -> Any:
         """A plain time: nothing that encodes times knows another kind."""
@@ -88,7 +88,7 @@ class January(datetime):
     @classmethod
     def now(cls, tz: tzinfo | None = None) -> Any:
         """The same whenever it is asked."""
-        return cls(2026, 1, 20, 9, tzinfo=tz)
+        return cls(2025, 12, 20, 9, tzinfo=tz)
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +98,7 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
         for name in [module.name for module in pkgutil.walk_packages(lobewatch.__path__, "lobewatch.")]:
             module = importlib.import_module(name)
             if getattr(module, "datetime", None) is datetime:
-                patch.setattr(module, "datetime", January)
+                patch.setattr(module, "datetime", December)
         patch.setattr(section, "svg", svg_and_png)
         patch.setenv("TZ", "UTC")
         time.tzset()

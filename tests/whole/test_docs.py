@@ -8,9 +8,10 @@ import shutil
 import sys
 import tomllib
 from collections.abc import Iterator
+from datetime import datetime, tzinfo
 from importlib import import_module
 from pathlib import Path
-from typing import Literal, get_origin
+from typing import Any, Literal, get_origin
 
 import pytest
 import typer
@@ -20,9 +21,23 @@ import dsm
 import lobes
 import modal
 from lobewatch.cli import app, main
+from lobewatch.tap.stories import demo as stories
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+class December(datetime):
+    """The clock by which README was written; what it makes are plain times."""
+
+    def __new__(cls, *parts: Any, **named: Any) -> Any:
+        """A plain time: nothing that encodes times knows another kind."""
+        return datetime(*parts, **named)  # noqa: DTZ001
+
+    @classmethod
+    def now(cls, tz: tzinfo | None = None) -> Any:
+        """Always the same."""
+        return cls(2025, 12, 20, tzinfo=tz)
 
 
 def commands(group: typer.core.TyperGroup, prefix: str = "") -> Iterator[tuple[str, set[str]]]:
@@ -89,6 +104,7 @@ def test_the_demo_in_readme_is_what_the_commands_print(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr(stories, "datetime", December)
     for command in ("python3 run.py", "python3 run.py check lobewatch-demo"):
         monkeypatch.setattr(sys, "argv", ["lobewatch", *(command.split()[2:] or ["demo"])])
         with pytest.raises(SystemExit):

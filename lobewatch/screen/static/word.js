@@ -1,9 +1,15 @@
 // The word in its panel, and the parts of a page by their ids.
 export const at = (id) => document.getElementById(id);
-export const put = (id, text) => { if (at(id).textContent !== text) at(id).textContent = text; };
+// No line ends within a date (a word joiner behind its hyphens) or before a unit.
+const unbroken = (text) => text?.replace(/(\d{4}-)(\d\d-)(?=\d\d)/g, "$1\u2060$2\u2060").replace(/(?<=\d) (?=%|±|mm\b|rpm\b|Hz\b|N\b)/g, "\u00a0");
+
+export function put(id, text) {
+  const whole = unbroken(text);
+  if (at(id).textContent !== whole) at(id).textContent = whole;
+}
 
 export function element(tag, text, className = "") {
-  return Object.assign(document.createElement(tag), { textContent: text, className });
+  return Object.assign(document.createElement(tag), { textContent: unbroken(text), className });
 }
 
 export function showWord(kind, lines) {

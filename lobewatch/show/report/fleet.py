@@ -48,7 +48,8 @@ def _machine(row: Mapping[str, Any]) -> dict[str, Any]:
     )
     fall, std = row["fall"], row["fall_std"]
     has_changed = fall is not None and std != 0
-    fallen = f"{-fall:+z.2f} %" + ("" if std is None else f" ± {std:.2f}") if has_changed else "nothing to compare with"
+    error = "" if std is None else f" ± {std:.2f}"
+    fallen = f"{-fall:+z.2f}{error} %" if has_changed else "nothing to compare with"
     return {
         "name": row["name"],
         "key": row["key"],

@@ -22,16 +22,14 @@ def write_report(
     path: Path | None = None,
     tool: str = "",
     direction: str = "",
-    now: datetime | None = None,
     sections: Sequence[MakesSections] = SECTIONS,
 ) -> Path:
     """Write the report of one series, that of the newest test where none is named; DataError without a tap test.
 
-    path None: report.html in the machine folder. now: None for the clock's. sections: what makes those below its first
-    screen, in their order.
+    path None: report.html in the machine folder. sections: what makes those below its first screen, in their order.
     """
     newest = logbook.newest()
-    html = render_report(logbook, tool or newest.tool, direction or newest.direction, now, sections)
+    html = render_report(logbook, tool or newest.tool, direction or newest.direction, sections=sections)
     path = path or logbook.folder.path / "report.html"
     write_page(path, html)
     return path

@@ -29,6 +29,8 @@ from lobewatch.tap.stories.story import Story, Wear
 
 SCATTERS = Mounting()
 """Tests that differ by their scatter alone."""
+DAY, HOUR = 15, 9
+"""Day of the month, and hour, of the tests of a month."""
 DIRECTIONS: dict[TapDirection, int] = {"x": 0, "y": 30}
 """Directions of the tests of a month, with the minute of the hour at which each is taken."""
 
@@ -94,22 +96,33 @@ def plan_taps(
     scatter: float,
     story: Story = Story.STEADY,
     mounting: Mounting = SCATTERS,
+    now: datetime | None = None,
 ) -> list[PlannedTap]:
-    """Tap tests in x and y every month of a story; the tool is remounted before each test.
+    """Tap tests in x and y every month of a story up to now; the tool is remounted before each test.
 
     scatter: standard deviation of f_1 from test to test, as a share of it (-), in place of that of `mounting`: every
-    test has bearings whose stiffness puts f_1 where remounting has moved it. DataError without [spindle].
+    test has bearings whose stiffness puts f_1 where remounting has moved it. now: the last two are those of its month,
+    or of the month before where that day is still to come; None for the clock's. DataError without [spindle].
     """
     wear, mounting = Wear.of(folder, months, story), mounting._replace(scatter=scatter)
     shifts, warmth = mounting.shifts(months, len(DIRECTIONS), random), mounting.temperatures(months)
+    last = _last_month(now or datetime.now(UTC))
     plans = []
     for month in range(months):
+        year, index = divmod(last - months + 1 + month, 12)
         spindle = wear.spindle(month)
         under = UNSAID if warmth is None else Conditions(temperature_c=round(float(warmth[month]), 1))
         for (direction, minute), shift in zip(DIRECTIONS.items(), shifts[month].tolist(), strict=True):
-            date = datetime(2024 + month // 12, month % 12 + 1, 15, 9, minute, tzinfo=UTC)
+            date = datetime(year, index + 1, DAY, HOUR, minute, tzinfo=UTC)
             plans.append(_plan(folder, date, direction, remounted(spindle, shift), under))
     return plans
+
+
+def _last_month(now: datetime) -> int:
+    """The newest month whose tests are past, counted from the year 0."""
+    now = now.astimezone(UTC)
+    tested = now.replace(day=DAY, hour=HOUR, minute=max(DIRECTIONS.values()), second=0, microsecond=0)
+    return 12 * now.year + now.month - 1 - (now < tested)
 
 
 def age_spindle(

@@ -8,6 +8,7 @@ import io
 import json
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,8 @@ Browser = Any
 """Chromium on one page: Browser of conftest.py."""
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
+DEMO = Path(__file__).parents[2] / "data" / "demo"
+STYLE = files("lobewatch.show.report") / "static" / "report.css"
 MARKS = ("0, 158, 115", "160, 0, 0")
 """Colours of rings and crosses."""
 PIXELS = """(() => { const canvas = document.querySelector('#lobes-plot canvas');
@@ -172,6 +175,17 @@ def test_the_first_screen_fits_with_its_words_and_pictures_beside_each_other(
     browser.resize((390, 844))
     small = "[...document.querySelectorAll('.pictures text')].map((one) => one.getBoundingClientRect().height)"
     assert min(browser.ask(small)) >= 10  # of a letter, in dots of the screen
+
+
+def test_the_words_of_the_demo_fit_the_first_screen(browser: Browser, tmp_path: Path) -> None:
+    """Two directions, and three programs of long names with dates; its pictures are as high as those of any report."""
+    words = (DEMO / "report.txt").read_text("utf-8")
+    page = tmp_path / "report.html"
+    page.write_text(words.replace("</head>", f"<style>{STYLE.read_text('utf-8')}</style></head>", 1), "utf-8")
+    browser.open(page.as_uri(), (1280, 657))
+    assert browser.ask("document.querySelectorAll('.first tbody tr').length") == 5
+    assert browser.ask("document.querySelector('.first').getBoundingClientRect().bottom") < 657
+    assert "overdue" not in browser.ask("document.querySelector('.first').textContent")
 
 
 @pytest.mark.parametrize("size", [(390, 844), (768, 1024), (1280, 657)], ids=lambda size: f"{size[0]}x{size[1]}")

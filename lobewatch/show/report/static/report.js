@@ -27,6 +27,13 @@
     table.classList.add("cards");
   }
 
+  // No line ends within a date: a word joiner stands behind its hyphens.
+  const texts = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT);
+  while (texts.nextNode()) {
+    const { currentNode: node } = texts;
+    if (node.parentNode.localName !== "script") node.data = node.data.replace(/(\d{4}-)(\d\d-)(?=\d\d)/g, "$1\u2060$2\u2060");
+  }
+
   const slider = document.getElementById("lobes-when");
   if (!slider) return;
   document.getElementById("lobes-course").hidden = false;

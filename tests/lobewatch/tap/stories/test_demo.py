@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime, timedelta
 from itertools import islice, pairwise
 
 import numpy as np
@@ -15,10 +16,11 @@ from lobewatch.tap.emulated_spindle import AHEAD, device_in_step, emulator, with
 from lobewatch.tap.stories.demo import PlannedTap, plan_taps
 
 MONTHS = 24
+NOW = datetime(2025, 12, 15, 9, 30, tzinfo=UTC)
 
 
 def plan(folder: MachineFolder, scatter: float, seed: int = 1) -> list[PlannedTap]:
-    return plan_taps(folder, MONTHS, np.random.default_rng(seed), scatter)
+    return plan_taps(folder, MONTHS, np.random.default_rng(seed), scatter, now=NOW)
 
 
 def frequencies(taps: list[PlannedTap]) -> NDArray[np.float64]:
@@ -34,7 +36,15 @@ def test_every_month_has_a_tap_in_x_and_half_an_hour_later_one_in_y(folder: Mach
         *("2024-01-15 09:00", "2024-01-15 09:30"),
         "2024-02-15 09:00",
     ]
-    assert f"{dates[-1]:%Y-%m-%d %H:%M}" == "2025-12-15 09:30"
+    assert dates[-1] == NOW
+
+
+@pytest.mark.parametrize("months", [2, 120])
+def test_the_last_month_is_the_newest_whose_tests_are_past(folder: MachineFolder, months: int) -> None:
+    for now, last in ((NOW, NOW), (NOW - timedelta(seconds=1), datetime(2025, 11, 15, 9, 30, tzinfo=UTC))):
+        dates = [tap.date for tap in plan_taps(folder, months, np.random.default_rng(1), 0.0, now=now)]
+        assert len({(date.year, date.month) for date in dates}) == months
+        assert max(dates) == last
 
 
 def test_without_scatter_both_directions_fall_by_ten_percent_alike(folder: MachineFolder) -> None:

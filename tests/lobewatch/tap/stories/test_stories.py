@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -20,13 +20,14 @@ from lobewatch.tap.stories.mounting import Mounting, mounted_spindle
 from lobewatch.tap.stories.story import Story, Wear
 
 MONTHS = 24
+NOW = datetime(2025, 12, 20, tzinfo=UTC)
 
 
 def planned(
     folder: MachineFolder, story: Story, seed: int = 1, scatter: float = 0.001, **more: Any
 ) -> list[PlannedTap]:
     """The tests in x."""
-    taps = plan_taps(folder, MONTHS, np.random.default_rng(seed), scatter, story, Mounting(**more))
+    taps = plan_taps(folder, MONTHS, np.random.default_rng(seed), scatter, story, Mounting(**more), NOW)
     return [tap for tap in taps if tap.direction == "x"]
 
 
@@ -144,7 +145,6 @@ def test_the_truth_is_looked_up_by_the_story(folder: MachineFolder) -> None:
         (["--story", "sudden"], "'sudden'"),
         (["--bad-clampings", "51"], "--bad-clampings 51 is not between 0 and 50 %"),
         (["--temperature", "-1"], "--temperature -1 is not between 0 and 30 K"),
-        (["--story", "replaced", "--taps", "31"], "at most, not 31"),
     ],
 )
 def test_a_story_that_cannot_be_is_refused(folder: MachineFolder, options: list[str], said: str) -> None:

@@ -20,18 +20,18 @@
   }
   for (const button of document.querySelectorAll("button[data-numbers]")) button.addEventListener("click", () => save(button));
 
-  // On a narrow screen each row is a card, and each cell says what it is.
-  for (const table of document.querySelectorAll("table")) {
-    const heads = [...table.querySelectorAll("thead th")].map((head) => head.textContent);
-    for (const row of table.tBodies[0].rows) [...row.cells].forEach((cell, i) => { cell.dataset.head = heads[i]; });
-    table.classList.add("cards");
-  }
-
   // No line ends within a date: a word joiner stands behind its hyphens.
   const texts = document.createTreeWalker(document.querySelector("main"), NodeFilter.SHOW_TEXT);
   while (texts.nextNode()) {
     const { currentNode: node } = texts;
     if (node.parentNode.localName !== "script") node.data = node.data.replace(/(\d{4}-)(\d\d-)(?=\d\d)/g, "$1\u2060$2\u2060");
+  }
+
+  // On a narrow screen each row is a card, and each cell says what it is.
+  for (const table of document.querySelectorAll("table")) {
+    const heads = [...table.querySelectorAll("thead th")].map((head) => head.textContent);
+    for (const row of table.tBodies[0].rows) [...row.cells].forEach((cell, i) => { cell.dataset.head = heads[i]; });
+    table.classList.add("cards");
   }
 
   const slider = document.getElementById("lobes-when");

@@ -3,6 +3,7 @@
 
     python3 run.py               the demo
     python3 run.py test [...]    the tests (--long: the long ones too); the rest goes to pytest
+    python3 run.py bench         the benchmarks, in an environment with their peers (.venv-bench)
     python3 run.py ARGS          lobewatch ARGS
 
 Needs nothing but Python's standard library; runs far enough under an old Python (2.7 too) to say which one is needed.
@@ -17,9 +18,17 @@ import sys
 NEEDED = (3, 11)
 ROOT = os.path.dirname(os.path.abspath(__file__))
 VENV = os.path.join(ROOT, ".venv")
-SCRIPTS = os.path.join(VENV, "Scripts" if os.name == "nt" else "bin")
-PYTHON = os.path.join(SCRIPTS, "python.exe" if os.name == "nt" else "python")
-LOCKS = {"": "requirements.lock", "[dev]": "requirements-dev.lock"}
+LOCKS = {"": "requirements.lock", "[dev]": "requirements-dev.lock", "[bench]": "requirements-bench.lock"}
+
+
+def place(extras):
+    """Folder of the environment: what benchmarks are compared with has one of its own."""
+    return VENV + "-bench" if extras == "[bench]" else VENV
+
+
+def python(extras):
+    """Python of the environment."""
+    return os.path.join(place(extras), *(("Scripts", "python.exe") if os.name == "nt" else ("bin", "python")))
 
 
 def stamp(extras):
@@ -31,26 +40,27 @@ def stamp(extras):
     return digest.hexdigest() + extras
 
 
-def installer():
+def installer(extras):
     """Command that installs into the environment: pip of this Python, else uv; None where there is neither."""
     pip = [sys.executable, "-m", "pip"]
     if subprocess.call(pip + ["--version"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) == 0:
-        return pip + ["--python", PYTHON, "--disable-pip-version-check", "install", "--quiet"]
+        return pip + ["--python", python(extras), "--disable-pip-version-check", "install", "--quiet"]
     uv = shutil.which("uv")
-    return [uv, "pip", "install", "--quiet", "--python", PYTHON] if uv else None
+    return [uv, "pip", "install", "--quiet", "--python", python(extras)] if uv else None
 
 
 def make_environment(extras):
-    """Make .venv with the locked packages and lobewatch in it, unless it is there; extras is "" or "[dev]"."""
-    if os.path.realpath(sys.prefix) == os.path.realpath(VENV):
+    """Make the environment with the locked packages and lobewatch in it, unless it is there; extras: one of LOCKS."""
+    folder = place(extras)
+    if os.path.realpath(sys.prefix) == os.path.realpath(folder):
         return  # started by the environment itself, which cannot make itself anew
-    marker = os.path.join(VENV, "lobewatch-stamp")
+    marker = os.path.join(folder, "lobewatch-stamp")
     if os.path.exists(marker):
         with open(marker) as file:
             present = file.read()
         if present in (stamp(extras), stamp("[dev]")):
             return
-    command = installer()
+    command = installer(extras)
     if command is None:
         sys.exit(
             "lobewatch needs pip or uv to install its packages: "
@@ -58,9 +68,9 @@ def make_environment(extras):
         )
     import venv
 
-    sys.stderr.write("Setting up %s (once; a minute or two) ...\n" % VENV)
-    venv.create(VENV, with_pip=False, clear=True)
-    locked = ["--require-hashes", "-r", os.path.join(ROOT, LOCKS[extras])]
+    sys.stderr.write("Setting up %s (once; a minute or two) ...\n" % folder)
+    venv.create(folder, with_pip=False, clear=True)
+    locked = ["--require-hashes", "--no-deps", "-r", os.path.join(ROOT, LOCKS[extras])]
     steps = [["--upgrade", "pip"], ["--no-deps", "--editable", ROOT]]
     if subprocess.call(command + locked):
         sys.stderr.write("The locked packages do not fit here (see above): taking what pyproject.toml allows.\n")
@@ -79,7 +89,7 @@ def tests(arguments):
     whole = [] if chosen else ["-n", "auto", "--dist", "worksteal"]
     every = ["-m", "long or not long", "--timeout", "3600"] if "--long" in arguments else []
     judged = ["--cov"] if every and whole else []
-    return [PYTHON, "-m", "pytest"] + whole + every + judged + chosen
+    return [python("[dev]"), "-m", "pytest"] + whole + every + judged + chosen
 
 
 def main():
@@ -87,13 +97,17 @@ def main():
     if sys.version_info < NEEDED:
         sys.exit("lobewatch needs Python %d.%d or newer; this is %s." % (NEEDED + (sys.version.split()[0],)))
     arguments = sys.argv[1:] or ["demo"]
-    testing = arguments[0] == "test"
-    make_environment("[dev]" if testing else "")
-    if testing:
+    extras = {"test": "[dev]", "bench": "[bench]"}.get(arguments[0], "")
+    make_environment(extras)
+    if extras:
         os.chdir(ROOT)
-    command = tests(arguments[1:]) if testing else [PYTHON, "-m", "lobewatch.cli"] + arguments
+    commands = {
+        "": [python(extras), "-m", "lobewatch.cli"] + arguments,
+        "[dev]": tests(arguments[1:]),
+        "[bench]": [python(extras), os.path.join("bench", "performance.py")] + arguments[1:],
+    }
     try:
-        sys.exit(subprocess.call(command))
+        sys.exit(subprocess.call(commands[extras]))
     except KeyboardInterrupt:
         sys.exit(130)
 

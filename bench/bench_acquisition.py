@@ -21,7 +21,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -29,6 +29,7 @@ from tempfile import TemporaryDirectory
 import aiohttp
 import numpy as np
 from numpy.typing import NDArray
+from race import Race
 from threadpoolctl import threadpool_limits
 
 from acquisition import Channel, Circumstances, Hit, TapsEmulator, TapsSource, Trigger, check_hit, estimate_frf
@@ -200,9 +201,45 @@ def decode(megabytes: float = 64.0) -> None:
     print(f"decoding: {len(stream) / seconds / 1e6:.0f} MB/s")
 
 
+def ten_records() -> list[NDArray[np.float64]]:
+    """Force and acceleration of ten hits, each of shape (2, n)."""
+    first = CROSSING - TRIGGER.pre_trigger
+    return [one_period(seed)[:, first : first + TRIGGER.n_samples] for seed in range(AVERAGED)]
+
+
+def races() -> Iterator[Race]:
+    """Beside pyFRF, and beside the transforms that no way can do without."""
+    records, size = ten_records(), f"{AVERAGED} hits x 2 x {TRIGGER.n_samples}"
+    hits, batch = [Hit(f, a, RATE, TRIGGER.pre_trigger) for f, a in records], np.stack(records)
+
+    def bare() -> object:
+        return np.fft.rfft(batch)
+
+    yield Race(f"H1 and coherence of {size}", lambda: estimate_frf(hits), "numpy's rfft alone", bare)
+
+    def judged() -> object:
+        return [check_hit(Hit(f, a, RATE)) for f, a in records]
+
+    yield Race(f"verdicts on {size} of a file", judged, "numpy's rfft alone", bare)
+    import pyFRF
+
+    whole = pyFRF.FRF(int(RATE), exc_type="f", resp_type="a", fft_len=TRIGGER.n_samples)
+
+    def theirs() -> object:
+        frf = pyFRF.FRF(int(RATE), batch[:, 0], batch[:, 1], exc_type="f", resp_type="a", frf_estimator="H1")
+        return frf.get_H1(), frf.get_coherence()
+
+    yield Race(f"H1 and coherence of {size}", lambda: estimate_frf(hits), "pyFRF", theirs)
+
+    def checked() -> object:
+        return [whole.is_data_ok(f, a) for f, a in records]
+
+    yield Race(f"verdicts on {size} of a file", judged, "pyFRF's two checks", checked)
+
+
 def average() -> None:
     """Averaged H1 and coherence of ten hits, beside the bare batched rfft of their samples and beside pyFRF."""
-    records = [one_period(seed)[:, CROSSING - 1024 : CROSSING - 1024 + TRIGGER.n_samples] for seed in range(AVERAGED)]
+    records = ten_records()
     hits = [Hit(force, response, RATE, TRIGGER.pre_trigger) for force, response in records]
     batch = np.stack(records)
     ways: dict[str, Callable[[], object]] = {

@@ -13,14 +13,16 @@ import platform
 import statistics
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
+from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import h5py
 import numpy as np
+from race import Race
 from threadpoolctl import threadpool_limits
 
 from acquisition import Channel, Circumstances, Hit, HitFlags, TapTest, estimate_frf
@@ -29,6 +31,8 @@ from lobewatch.machine.new_folder import make_machine_folder
 
 HITS, SCANS, RATE = 10, 65_536, 102_400.0
 CHANNELS = (Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0))
+PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
+"""As a tap file is."""
 
 
 def tap_test() -> TapTest:
@@ -49,8 +53,21 @@ def plain(path: Path, tap: TapTest, **packed: object) -> None:
     """The codes and the FRF by h5py alone: no temporary name, no checksum, no sync."""
     codes = np.stack([hit.codes for hit in tap.hits if hit.codes is not None]).astype(np.int16)
     with h5py.File(path, "w") as file:
-        file.create_dataset("codes", data=codes, chunks=(1, 2, SCANS), **packed)
+        file.create_dataset("codes", data=codes, chunks=(1, 2, codes.shape[2]), **packed)
         file["receptance"] = tap.known_frf.receptance
+
+
+def races() -> Iterator[Race]:
+    """Beside h5py."""
+    with TemporaryDirectory() as scratch:
+        make_machine_folder(Path(scratch, "m"), "new_machine.toml")
+        folder, tap, file, numbers = MachineFolder(Path(scratch, "m")), tap_test(), Path(scratch, "plain.h5"), count()
+        yield Race(
+            f"a tap test of {HITS} hits x 2 x {SCANS} stored for good",
+            lambda: folder.commit(replace(tap, id=f"tap_{next(numbers)}")),
+            "h5py, the same codes and FRF packed alike",
+            lambda: plain(file, tap, **PACKED),
+        )
 
 
 def cost(work: Callable[[int], object], rounds: int) -> tuple[float, float]:
@@ -73,10 +90,9 @@ def main() -> None:
         make_machine_folder(Path(scratch, "m"), "new_machine.toml")
         folder, tap, file = MachineFolder(Path(scratch, "m")), tap_test(), Path(scratch, "plain.h5")
         folder.commit(tap)
-        packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
         rows = {
             "h5py, codes and FRF as they are": cost(lambda _: plain(file, tap), rounds),
-            "h5py, packed as a tap file is": cost(lambda _: plain(file, tap, **packed), rounds),
+            "h5py, packed as a tap file is": cost(lambda _: plain(file, tap, **PACKED), rounds),
             "lobewatch commit": cost(lambda n: folder.commit(replace(tap, id=f"tap_{n}")), rounds),
         }
         size = (folder.path / "taps" / "tap_0.h5").stat().st_size

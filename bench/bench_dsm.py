@@ -18,8 +18,9 @@ import argparse
 import os
 import platform
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -27,6 +28,7 @@ from typing import Any
 import numpy as np
 import scipy
 from dsm_peers import Complex, FiniteElements, Float, RossRotor, import_ross, refine
+from race import Race
 from scipy.linalg.lapack import dsyevd, dsytrf, dsytrs
 from threadpoolctl import threadpool_limits
 
@@ -243,6 +245,38 @@ def bench_whirl(bench: Bench, given: Spindle) -> None:
     table = Table(f"Whirl map, {given.theory}: {MODES} forward and backward frequencies at {speeds.size} speeds")
     fresh = never_seen(given, Bench(5, 0, 0, 0))
     table.row("this model, each certified, cold", bench.seconds(lambda: whirl_map(fresh(), speeds, MODES), 5))
+
+
+def races() -> Iterator[Race]:
+    """Beside finite elements and ROSS."""
+    given, f = spindle("euler-bernoulli"), np.linspace(100.0, 4000.0, 1000)
+    coarse, (fine, parts) = (
+        FiniteElements(given),
+        refine(given, MEASURED, calibrate(given, MEASURED).bearing_stiffness, REFINED),
+    )
+    question, ours = f"bearings calibrated to {MEASURED:g} Hz", partial(calibrate, given, MEASURED)
+    for elements, name in ((coarse, "1 element"), (fine, f"{parts} elements")):
+        peer = f"{name} a segment, eigh and brentq"
+        yield Race(question, ours, peer, partial(elements.calibrate, MEASURED))
+    factors = np.geomspace(0.1, 10.0, 1000)
+    yield Race(
+        f"tip receptance, {factors.size} bearings x 200 frequencies",
+        lambda: receptance_map(given, f[::5], factors, loss_factor=LOSS_FACTOR),
+        "its own receptance, one after the other",
+        lambda: [receptance(scaled(given, factor), f[::5], loss_factor=LOSS_FACTOR) for factor in factors[::20]],
+        part=1 / 20,
+    )
+    if (package := import_ross()) is None:
+        raise ModuleNotFoundError(name="ross")
+    ross = RossRotor(package, given)
+    yield Race(f"{MODES} natural frequencies", lambda: natural_frequencies(given, MODES), "ROSS", ross.frequencies)
+    yield Race(
+        f"tip receptance at {f.size} frequencies",
+        lambda: receptance(given, f, loss_factor=LOSS_FACTOR),
+        "ROSS, 1 element a segment",
+        lambda: ross.tip_receptance(f[::40]),
+        part=1 / 40,
+    )
 
 
 def main() -> None:

@@ -18,11 +18,13 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from race import Race
 from scipy.linalg import expm
 from threadpoolctl import threadpool_limits
 
@@ -253,6 +255,26 @@ def mean_force() -> None:
     for name, (x, y) in (("FRFs of 2000 lines", tips), ("modes", modes)):
         best = min(cpu_time(zero_order, x, y, cut, speeds) for _ in range(20 * ROUNDS))
         print(f"zero_order, {name} in x and y, 20 lobes, {speeds.size} speeds: {best * 1e3:.1f} ms")
+
+
+def races() -> Iterator[Race]:
+    """Beside first-order semi-discretisation."""
+    some = SPEEDS[::SPARSE], DEPTHS[::20]
+    part = some[0].size * some[1].size / (SPEEDS.size * DEPTHS.size)
+    for x, y, name in ((X, None, "one mode"), (*FOUR, "two modes each in x and y")):
+        question = f"a chart of {SPEEDS.size} x {DEPTHS.size} points, {name}"
+        ours = partial(spectral_radius, x, y, CUT, SPEEDS, DEPTHS)
+        for count, text in ((3, "three expm"), (1, "one expm")):
+            peer = f"textbook loop, m = {M}, {text} an interval"
+            yield Race(question, ours, peer, partial(textbook, x, y, *some, count), part=part)
+    peer = f"numpy, a thousand points at once, m = {M}"
+    yield Race(
+        f"a chart of {SPEEDS.size} x {DEPTHS.size} points, one mode",
+        partial(spectral_radius, X, None, CUT, SPEEDS, DEPTHS),
+        peer,
+        partial(batched, SPEEDS[::20], DEPTHS, M),
+        part=1 / 20,
+    )
 
 
 def main() -> None:

@@ -18,17 +18,20 @@ import io
 import sys
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from race import Race
 from scipy.io import loadmat
 from sdypy import EMA
 from threadpoolctl import threadpool_limits
 
-from acquisition import Frf, from_accelerance
+from acquisition import Description, Frf, from_accelerance
+from lobewatch.measuring.one_file.file_frf import read_file_frf
 from modal import Mode, fit_modes, fit_points, synthesize
 
 TRUE = [
@@ -44,12 +47,18 @@ NOISE = 1e-5
 ROUNDS = 7
 MEASURED_FILES, POINTS = 10, 5
 """Files of a folder that are timed, and FRFs that are fitted with common poles."""
+BEAM = Path(__file__).parents[1] / "tests" / "data" / "ladisk_beam" / "acceleration.lvm"
+"""A hit on a steel beam, measured at the University of Ljubljana."""
 STANDARD_GRAVITY = 9.80665
 Values = NDArray[np.float64]
 
 
 def measured(seed: int) -> Frf:
-    exact = synthesize(TRUE, LINES).accelerance
+    return noisy(TRUE, seed)
+
+
+def noisy(modes: Sequence[Mode], seed: int) -> Frf:
+    exact = synthesize(modes, LINES).accelerance
     noise = np.random.default_rng(seed).normal(size=(2, LINES.size)) / np.sqrt(2)
     return from_accelerance(LINES, exact + NOISE * np.max(np.abs(exact)) * (noise[0] + 1j * noise[1]))
 
@@ -58,9 +67,11 @@ def ours(frf: Frf) -> Values:
     return np.array([(m.frequency, m.damping_ratio, m.stiffness) for m in fit_modes(frf)])
 
 
-def theirs(frf: Frf, frequencies: list[float]) -> Values:
+def theirs(frfs: Sequence[Frf], frequencies: list[float]) -> Values:
+    """Of the first FRF; poles are those of all."""
+    (frf, *_) = frfs
     model = EMA.Model(
-        frf.accelerance[None],
+        np.stack([one.accelerance for one in frfs]),
         frf.frequency,
         lower=0.01 * frf.frequency[-1],
         upper=frf.frequency[-1],
@@ -101,7 +112,7 @@ def time_measured(folder: Path) -> None:
         mine.append(time.process_time() - start)
         with contextlib.suppress(np.linalg.LinAlgError, ValueError):
             start = time.process_time()
-            theirs(frf, [mode.frequency for mode in modes])
+            theirs([frf], [mode.frequency for mode in modes])
             other.append(time.process_time() - start)
     start = time.process_time()
     fit_points(frfs[:POINTS])
@@ -110,6 +121,36 @@ def time_measured(folder: Path) -> None:
     print(f"{'lobewatch fit_modes':32}{np.median(mine):10.3f}{max(mine):10.3f}")
     print(f"{'sdypy-EMA, order 60':32}{np.median(other):10.3f}{max(other):10.3f}   of the {len(other)} that it can fit")
     print(f"{f'lobewatch fit_points, {POINTS} FRFs':32}{together:10.3f}")
+
+
+def five_points() -> list[Frf]:
+    """The same structure, answering in five places."""
+    frfs = []
+    for place in range(POINTS):
+        shapes = np.cos(np.arange(1, len(TRUE) + 1) * (0.3 + 0.5 * place))
+        answering = [
+            replace(mode, stiffness=mode.stiffness / shape) for mode, shape in zip(TRUE, shapes.tolist(), strict=True)
+        ]
+        frfs.append(noisy(answering, place))
+    return frfs
+
+
+def races() -> Iterator[Race]:
+    """Beside sdypy-EMA."""
+    peer, true = "sdypy-EMA of order 60", [mode.frequency for mode in TRUE]
+    frf, beam, points = measured(0), read_file_frf(BEAM, (), Description()).frf, five_points()
+    seen = [mode.frequency for mode in fit_modes(beam)]
+    size = f"{LINES.size} lines, {len(TRUE)} modes"
+    yield Race(f"an FRF of {size}", lambda: ours(frf), peer, lambda: theirs([frf], true))
+    yield Race(
+        f"a measured beam, {beam.frequency.size} lines, {len(seen)} modes",
+        lambda: ours(beam),
+        peer,
+        lambda: theirs([beam], seen),
+    )
+    yield Race(
+        f"{POINTS} FRFs with common poles, {size}", lambda: fit_points(points), peer, lambda: theirs(points, true)
+    )
 
 
 def cpu(extract: Callable[[Frf], Values], frf: Frf) -> tuple[float, Values]:
@@ -123,7 +164,7 @@ def main() -> None:
     frequencies = [mode.frequency for mode in TRUE]
     methods = {
         "lobewatch fit_modes": ours,
-        f"sdypy-EMA {version('sdypy-EMA')}, order 60": lambda frf: theirs(frf, frequencies),
+        f"sdypy-EMA {version('sdypy-EMA')}, order 60": lambda frf: theirs([frf], frequencies),
     }
     times: dict[str, list[float]] = {name: [] for name in methods}
     errors: dict[str, list[Values]] = {name: [] for name in methods}

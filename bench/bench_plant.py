@@ -49,7 +49,7 @@ PLANT = 500
 def make_plant(path: Path, machines: int, taps: int) -> None:
     """Machines of so many tap tests each, x and y in turn, the newest of today; their histories as if worked out."""
     first = path / "mill-000"
-    _make_machine(first, taps)
+    make_machine(first, taps)
     summarise_folder(first, datetime.now(UTC))  # so that its history has the word on each program
     history = Logbook.open(first).history
     for number in range(machines):
@@ -85,7 +85,7 @@ def _link(source: str, target: str) -> str:
     return shutil.copy2(source, target)
 
 
-def _make_machine(path: Path, taps: int) -> None:
+def make_machine(path: Path, taps: int) -> None:
     make_machine_folder(path, "surrogate_machine.toml")
     folder, text = MachineFolder(path), (path / "machine.toml").read_text("utf-8")
     (path / "taps").mkdir()

@@ -18,7 +18,7 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
 from functools import partial
 from itertools import pairwise
@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 from bench_lobes import textbook
 from numpy.typing import NDArray
+from race import Race
 
 from acquisition import (
     Channel,
@@ -36,6 +37,7 @@ from acquisition import (
     Frf,
     HammeredStructure,
     Hammering,
+    Hit,
     SimulatedSource,
     Structure,
     TapDirection,
@@ -147,13 +149,16 @@ def _modes(library: Any, files: Sequence[Path]) -> None:
             model.get_constants()
 
 
+def _words(machine: Path, files: Path, jobs: str) -> list[str]:
+    return ["replay", str(machine), str(files), "--date-pattern", "%Y-%m-%d", "--jobs", jobs]
+
+
 def _replayed(machine: Path, files: Path, jobs: str) -> None:
-    words = ["replay", str(machine), str(files), "--date-pattern", "%Y-%m-%d", "--jobs", jobs]
     code = (
         "import resource, sys; from lobewatch.cli import main\n"
         "try: main()\nfinally: print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024, 'MB', file=sys.stderr)"
     )
-    subprocess.run([sys.executable, "-c", code, *words], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([sys.executable, "-c", code, *_words(machine, files, jobs)], check=True, stdout=subprocess.DEVNULL)
 
 
 def archive(path: Path, count: int = 10_000) -> None:
@@ -235,7 +240,31 @@ def newest_of(path: Path, to: Path) -> Path:
     return to
 
 
-def ten_hits() -> None:
+def races() -> Iterator[Race]:
+    """Beside sdypy-EMA."""
+    from sdypy import EMA
+
+    with tempfile.TemporaryDirectory() as work:
+        text_files(Path(work) / "files", PEERS)
+        files = sorted((Path(work) / "files").iterdir())
+
+        def ours() -> None:
+            machine = Path(tempfile.mkdtemp(dir=work)) / "m"
+            make_machine_folder(machine, "surrogate_machine.toml")
+            command = [sys.executable, "-m", "lobewatch.cli", *_words(machine, Path(work) / "files", "1")]
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+
+        yield Race(
+            f"{PEERS} recorded FRFs of {LONG.size} lines: `replay`, its start included",
+            ours,
+            "numpy's loadtxt and sdypy-EMA of order 60; nothing kept or judged",
+            lambda: _modes(EMA, files),
+            rounds=3,
+        )
+
+
+def hammered_hits() -> tuple[Hit, ...]:
+    """Ten hits of 2 x 16384 on three modes."""
     structure = Structure(
         np.array([1000.0, 1713.0, 2900.0]), np.array([0.02, 0.03, 0.025]), np.array([2e7, 3.5e7, 9e7]), 2e-9
     )
@@ -244,7 +273,11 @@ def ten_hits() -> None:
     )
     channels = Channel("force", 2.25e-3, 5.0), Channel("acceleration", 1.02e-3, 5.0)
     found = capture_hits(SimulatedSource(hammered, channels, 51200.0, 3_000_000), Trigger(20.0, 16384, 512))
-    hits = tuple(hit for hit, _ in zip(found, range(10), strict=False))
+    return tuple(hit for hit, _ in zip(found, range(10), strict=False))
+
+
+def ten_hits() -> None:
+    hits = hammered_hits()
     average, flags = average_good(hits)
     about = Circumstances("m", BEGIN, "reference")
     tap, machine = TapTest(new_tap_id(about), about, average, hits, flags), parse_machine('[machine]\nname = "m"\n')

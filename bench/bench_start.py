@@ -11,7 +11,12 @@ import statistics
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
+
+from bench_plant import make_machine
+from race import Race
 
 COMMANDS = (
     "--version",
@@ -23,6 +28,41 @@ COMMANDS = (
     "tap --help",
 )
 """As typed; chek is a mistake, FOLDER a new one each time."""
+
+
+GREETING = """
+import typer
+app = typer.Typer()
+@app.command()
+def greet(name: str) -> None:
+    print(name)
+app()
+"""
+"""A program with one command."""
+IMPORTS = "import h5py, numpy, typer"
+
+
+def races() -> Iterator[Race]:
+    """Beside programs that do nothing with the same libraries."""
+    start = partial(subprocess.run, stdout=subprocess.DEVNULL, check=True)
+    lobewatch = [sys.executable, "-m", "lobewatch.cli"]
+    yield Race(
+        "`lobewatch --help`",
+        lambda: start([*lobewatch, "--help"]),
+        "typer, a program of one command",
+        lambda: start([sys.executable, "-c", GREETING, "--help"]),
+    )
+    with tempfile.TemporaryDirectory() as scratch:
+        machine = Path(scratch, "mill")
+        make_machine(machine, 24)
+        start([*lobewatch, "check", str(machine)])
+        for command in ("history", "trend", "check"):
+            yield Race(
+                f"`lobewatch {command}`, 24 tap tests and 3 programs, all worked out",
+                partial(start, [*lobewatch, command, str(machine)]),
+                f"`{IMPORTS}`",
+                lambda: start([sys.executable, "-c", IMPORTS]),
+            )
 
 
 def cpu_seconds(command: list[str]) -> float:

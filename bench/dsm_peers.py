@@ -152,11 +152,14 @@ class RossRotor:
 
     def frequencies(self) -> Float:
         """Natural frequencies (Hz) of bending, stretching and twisting, by its dense solver, the faster one here."""
-        self.runs += 1  # another speed (rad/s), as good as zero: the result of the same one would be remembered
+        self.runs += (
+            1  # another speed (rad/s), as good as zero: the result of the same one would be remembered, as below
+        )
         found = self.rotor.run_modal(1e-9 * self.runs, num_modes=48, sparse=False).wn
         return np.asarray(np.sort(found) / (2 * np.pi))
 
     def tip_receptance(self, frequency: Float) -> Complex:
         """Undamped deflection over force at the tip (m/N); ROSS works out that between all degrees of freedom."""
-        response = self.rotor.run_freq_response(speed_range=2 * np.pi * frequency)
+        self.runs += 1
+        response = self.rotor.run_freq_response(speed_range=2 * np.pi * frequency * (1 + 1e-12 * self.runs))
         return np.asarray(response.freq_resp[0, 0])

@@ -12,7 +12,8 @@ from packaging.utils import canonicalize_name
 from packaging.version import Version
 
 ROOT = Path(__file__).parents[2]
-LOCKS = ("requirements.lock", "requirements-dev.lock")
+LOCKS = {"requirements.lock": "", "requirements-dev.lock": "dev", "requirements-bench.lock": "bench"}
+"""Extras by locks."""
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
 
@@ -36,7 +37,7 @@ def locked(lock: str) -> dict[str, set[Version]]:
 
 @pytest.mark.parametrize("lock", LOCKS)
 def test_every_dependency_is_locked_to_a_version_that_it_allows(lock: str) -> None:
-    wanted = PROJECT["dependencies"] + (PROJECT["optional-dependencies"]["dev"] if "dev" in lock else [])
+    wanted = PROJECT["dependencies"] + PROJECT["optional-dependencies"].get(LOCKS[lock], [])
     versions = locked(lock)
     for requirement in map(Requirement, wanted):
         found = versions.get(canonicalize_name(requirement.name))
@@ -45,8 +46,9 @@ def test_every_dependency_is_locked_to_a_version_that_it_allows(lock: str) -> No
 
 
 def test_what_runs_is_what_is_tested() -> None:
-    runtime, tested = (locked(lock) for lock in LOCKS)
-    assert runtime == {name: tested[name] for name in runtime}
+    runtime, *others = (locked(lock) for lock in LOCKS)
+    for other in others:
+        assert runtime == {name: other[name] for name in runtime}
 
 
 @pytest.mark.parametrize("lock", LOCKS)

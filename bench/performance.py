@@ -1,0 +1,164 @@
+"""All benchmarks that have a peer: writes docs/performance.md, and says what got slower than it stated.
+
+    python3 run.py bench [--quick]         (in an environment with the peers; a quarter of an hour)
+
+CPU time, one BLAS thread, lobewatch and its peer in turns. What a race needs and is not installed is said, and the race
+is left out. --quick: a round each, nothing is written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import platform
+import sys
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import msgspec
+from race import Race, Result, run
+from threadpoolctl import threadpool_limits
+
+ROOT = Path(__file__).parents[1]
+PAGE, STATED = ROOT / "docs" / "performance.md", Path(__file__).with_name("performance.json")
+"""Page, and what it states."""
+BENCHES = {
+    "Modes": "bench_modal",
+    "Hits": "bench_acquisition",
+    "Tap files": "bench_archive",
+    "Recordings": "bench_replay",
+    "Spindle model": "bench_dsm",
+    "Lobes": "bench_lobes",
+    "Commands": "bench_start",
+    "One tap test from its hits to the verdicts": "bench_chain",
+}
+"""Modules with races, by headings of the page."""
+PACKAGES = ("numpy", "scipy", "h5py", "typer", "pyFRF", "sdypy-EMA", "ross-rotordynamics")
+"""Packages whose versions are stated."""
+WORSE = 0.75
+"""Ratio over the stated one below which it is worse: from run to run ratios move by a quarter."""
+HEAD = """# How fast lobewatch is
+
+Written by `python3 run.py bench`: CPU time of lobewatch and of what else answers the question, in turns in one run, one
+BLAS thread; medians, and the ratio (theirs over ours: above 1 lobewatch is the faster one) with the smallest and the
+largest of all rounds.
+
+{about}
+
+"""
+TAIL = """
+Peers are told what they cannot find: sdypy-EMA the frequencies, finite elements how coarse they may be; none gives
+errors. What else was measured, and why it takes what it takes: [spindle model](performance-dsm.md),
+[lobes](performance-lobes.md), [modes](performance-modal.md), [acquisition](performance-acquisition.md),
+[replay and archive](performance-replay.md), [a plant](plant.md).
+"""
+
+
+class Stated(msgspec.Struct):
+    """One run."""
+
+    about: str
+    """Machine and versions."""
+    results: dict[str, list[Result]]
+    """Results by headings."""
+
+
+def races(heading: str) -> Iterator[Race]:
+    """Races of a bench; without those whose peer is not installed, which is said."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield from importlib.import_module(BENCHES[heading]).races()
+    except ImportError as error:
+        print(f"{heading}: left out from here on, {error.name} is not installed", file=sys.stderr)
+
+
+def about() -> str:
+    """Machine and versions."""
+    names = []
+    for name in PACKAGES:
+        try:
+            names.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            continue
+    computer = f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} at the beginning"
+    return f"Python {platform.python_version()}, {', '.join(names)}; {platform.system()}, {computer}."
+
+
+def page(stated: Stated) -> str:
+    """The page of a run."""
+    parts = [HEAD.format(about=stated.about)]
+    for heading, results in stated.results.items():
+        rows = "\n".join(_row(result) for result in results)
+        parts.append(
+            f"## {heading}\n\n| what | lobewatch | peer | its time | times |\n|---|---|---|---|---|\n{rows}\n\n"
+        )
+    return "".join(parts).rstrip("\n") + "\n" + TAIL
+
+
+def _row(result: Result) -> str:
+    span = f" ({_times(result.least)} to {_times(result.most)})" if result.least < result.most else ""
+    cells = (result.question, _time(result.ours_s), result.peer, _time(result.theirs_s))
+    return f"| {' | '.join(cells)} | **{_times(result.times)}**{span} |"
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.2g}" if ratio < 100 else f"{ratio:.0f}"
+
+
+def _time(seconds: float) -> str:
+    for unit, size in (("s", 1.0), ("ms", 1e-3)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{1e6 * seconds:.3g} us"
+
+
+def worse(results: Iterable[Result], stated: Iterable[Result]) -> Iterator[str]:
+    """What is slower beside its peer than was stated, a line each."""
+    before = {(result.question, result.peer): result.times for result in stated}
+    for result in results:
+        was = before.get((result.question, result.peer))
+        if was is not None and result.times < WORSE * was:
+            times = f"{_times(result.times)} times as fast as {result.peer}, stated {_times(was)}"
+            yield f"got slower: {result.question}: {times}"
+
+
+def read_stated(file: Path) -> Stated:
+    """The run that the page shows; an empty one where there is none yet."""
+    return msgspec.json.decode(file.read_bytes(), type=Stated) if file.exists() else Stated("", {})
+
+
+def measured(headings: Sequence[str], quick: bool) -> dict[str, list[Result]]:
+    """Results by headings, each said as soon as it is there."""
+    results: dict[str, list[Result]] = {}
+    for heading in headings:
+        for race in races(heading):
+            result = run(race, quick)
+            results.setdefault(heading, []).append(result)
+            print(f"{_times(result.times):>6} x  {result.question}, beside {result.peer}", flush=True)
+    return results
+
+
+def main() -> None:
+    """Run all races."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--quick", action="store_true", help="a round each, nothing is written")
+    parser.add_argument("headings", nargs="*", metavar="HEADING", help="these only, nothing is written")
+    wanted = parser.parse_args()
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # of the commands that are started
+    run_of, before = about(), read_stated(STATED)
+    with threadpool_limits(1):
+        results = measured(wanted.headings or list(BENCHES), wanted.quick)
+    stated = [result for part in before.results.values() for result in part]
+    print("\n".join(worse((result for part in results.values() for result in part), stated)))
+    if not wanted.quick and not wanted.headings:
+        now = Stated(run_of, results)
+        STATED.write_bytes(msgspec.json.format(msgspec.json.encode(now), indent=1))
+        PAGE.write_text(page(now), "utf-8")
+
+
+if __name__ == "__main__":
+    main()

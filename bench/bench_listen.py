@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from race import Race
 from scipy.signal import welch
 from threadpoolctl import threadpool_limits
 
@@ -59,6 +61,18 @@ def seconds(work: Callable[[], object]) -> float:
         work()
         times.append(time.process_time())
     return float(np.median([after - before for before, after in pairwise(times)]))
+
+
+def races() -> Iterator[Race]:
+    """Beside Welch's spectrum."""
+    for name, axes, speed in recordings():
+        if name in ("one cut, chatter, three axes", "seven cuts"):
+            yield Race(
+                f"{SECONDS:g} s at {RATE / 1e3:g} kHz told: {name}",
+                partial(listen_to, CutRecording(axes, RATE, TEETH, 0.5, speed)),
+                "Welch's spectrum by scipy, which tells nothing",
+                partial(welch, axes, RATE, nperseg=SAMPLES),
+            )
 
 
 def main() -> None:

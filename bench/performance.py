@@ -32,6 +32,7 @@ BENCHES = {
     "Recordings": "bench_replay",
     "Spindle model": "bench_dsm",
     "Lobes": "bench_lobes",
+    "Cuts": "bench_listen",
     "Commands": "bench_start",
     "One tap test from its hits to the verdicts": "bench_chain",
 }
@@ -53,7 +54,7 @@ TAIL = """
 Peers are told what they cannot find: sdypy-EMA the frequencies, finite elements how coarse they may be; none gives
 errors. What else was measured, and why it takes what it takes: [spindle model](performance-dsm.md),
 [lobes](performance-lobes.md), [modes](performance-modal.md), [acquisition](performance-acquisition.md),
-[replay and archive](performance-replay.md), [a plant](plant.md).
+[replay and archive](performance-replay.md), [cuts](performance-listen.md), [a plant](plant.md).
 """
 
 

@@ -30,8 +30,7 @@ from scipy.io import loadmat
 from sdypy import EMA
 from threadpoolctl import threadpool_limits
 
-from acquisition import Description, Frf, from_accelerance
-from lobewatch.measuring.one_file.file_frf import read_file_frf
+from acquisition import Frf, estimate_frf, from_accelerance, read_hits
 from modal import Mode, fit_modes, fit_points, synthesize
 
 TRUE = [
@@ -138,7 +137,7 @@ def five_points() -> list[Frf]:
 def races() -> Iterator[Race]:
     """Beside sdypy-EMA."""
     peer, true = "sdypy-EMA of order 60", [mode.frequency for mode in TRUE]
-    frf, beam, points = measured(0), read_file_frf(BEAM, (), Description()).frf, five_points()
+    frf, beam, points = measured(0), estimate_frf(read_hits(BEAM)), five_points()
     seen = [mode.frequency for mode in fit_modes(beam)]
     size = f"{LINES.size} lines, {len(TRUE)} modes"
     yield Race(f"an FRF of {size}", lambda: ours(frf), peer, lambda: theirs([frf], true))

@@ -11,7 +11,9 @@ from modal.bands.systematic import leaves_rounding
 EVIDENCE = 4.0
 """Twice the gain of log likelihood from which noise is taken to grow with the FRF; chance brings it once in 44."""
 STEPS = 12
-"""Steps of Fisher scoring; it settles in some five."""
+"""Most steps of Fisher scoring; it settles in some five."""
+SETTLED = 1e-6
+"""Relative change of its shares after which it has settled."""
 LEAST_SHARE = 1e-4
 """Share that the floor has at least of the variance at the mean squared height."""
 
@@ -35,29 +37,31 @@ def _rises(left: ComplexArray, band: FittedBand, given: Array) -> Array:
     left: what the fit leaves of the receptances (m/N); given: weights, all of shape (p, n).
     """
     height = np.abs((band.data.own - left) * given) ** 2
-    rows = zip(np.abs(left * given) ** 2, height, given > 0, strict=True)
-    variance = np.array([_variance(*row) for row in rows])
+    variance = _variance(np.abs(left * given) ** 2, height, given > 0)
     return np.asarray(np.sqrt(np.maximum(variance / np.mean(variance), LEAST_SHARE**2)))
 
 
 def _variance(left: Array, height: Array, counts: NDArray[np.bool_]) -> Array:
-    """Likeliest variance by line, floor + slope height, or equal where that is as likely, shape (n,).
+    """Likeliest variance by line, floor + slope height, or equal where that is as likely; of each FRF, shape (p, n).
 
-    left, height: squares of the residual and of the model; counts: the lines that it is told from.
+    left, height: squares of the residual and of the model; counts: the lines that it is told from, all (p, n).
     """
-    columns = np.stack([np.ones(left.size), height / np.mean(height)])
-    known, squares = columns[:, counts], left[counts]
-    if not np.any(squares):
-        return np.zeros(left.size)
-    equal = share = np.array([np.mean(squares), 0.0])
+    columns = np.stack([np.ones(left.shape), height / np.mean(height, axis=1, keepdims=True)], axis=1)
+    known, squares = columns * counts[:, np.newaxis], left * counts
+    mean = np.sum(squares, axis=1) / np.sum(counts, axis=1)
+    equal = share = np.stack([np.where(mean > 0, mean, 1.0), np.zeros(mean.size)], axis=1)[:, np.newaxis]
     for _ in range(STEPS):
-        scaled = known / (share @ known)
-        share = np.maximum(np.linalg.pinv(scaled @ scaled.T) @ scaled @ (squares / (share @ known)), 0.0)
-        share[0] = max(share[0], LEAST_SHARE * share[1])
-    gain = 2 * (_log_likelihood(squares, share @ known) - _log_likelihood(squares, equal @ known))
-    return np.asarray((share if gain > EVIDENCE else equal) @ columns)
+        before, variance = share, share @ columns
+        scaled = known / variance
+        share = np.maximum((squares[:, np.newaxis] / variance) @ scaled.mT @ np.linalg.pinv(scaled @ scaled.mT), 0.0)
+        share[..., 0] = np.maximum(share[..., 0], LEAST_SHARE * share[..., 1])
+        if np.all(np.abs(share - before) <= SETTLED * before):
+            break
+    likely, even = (_log_likelihood(squares, (values @ columns)[:, 0], counts) for values in (share, equal))
+    share = np.where((2 * (likely - even) > EVIDENCE)[:, np.newaxis, np.newaxis], share, equal)
+    return np.asarray(np.where(mean[:, np.newaxis] > 0, (share @ columns)[:, 0], 0.0))
 
 
-def _log_likelihood(left: Array, variance: Array) -> float:
-    """Log likelihood of these variances by the squares of complex normal residuals."""
-    return float(-np.sum(np.log(variance) + left / variance))
+def _log_likelihood(left: Array, variance: Array, counts: NDArray[np.bool_]) -> Array:
+    """Log likelihood of these variances by the squares of complex normal residuals, of each FRF, shape (p,)."""
+    return np.asarray(-np.sum((np.log(variance) + left / variance) * counts, axis=1))

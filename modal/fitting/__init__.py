@@ -2,8 +2,8 @@
 
 from modal.fitting.band_fit import BandFit
 from modal.fitting.fit_band import fit_band, values_nearby, with_real_constants
-from modal.fitting.projected_band import beyond_terms
-from modal.fitting.residual_terms import LEAST_TERMS, MOST_TERMS, gain_of_a_term
+from modal.fitting.projected_band import beyond_terms, gain_of_a_term
+from modal.fitting.residual_terms import LEAST_TERMS, MOST_TERMS
 
 __all__ = [
     "LEAST_TERMS",

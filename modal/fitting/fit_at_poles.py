@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -37,8 +38,8 @@ class FitAtPoles:
     """Weighted data that is left, (p, 2 n)."""
     unknowns: int
     """Modal constants and residual terms of all FRFs, real and imaginary parts."""
-    slope: Array
-    """Slope of the models by frequencies (in zeta f) and damping ratios (in shares of themselves), (p, 2 n, 2 m)."""
+    work_out_slope: Callable[[], Array]
+    """Function that gives `slope`, which a step that leads nowhere does not need."""
 
     @cached_property
     def cost(self) -> float:
@@ -63,15 +64,36 @@ class FitAtPoles:
         return self.left.reshape(-1)
 
     @cached_property
+    def slope(self) -> Array:
+        """Slope of the models by what may move, frequencies in zeta f, damping ratios in shares of themselves,
+        (p, k, 2 n)."""
+        return self.work_out_slope()
+
+    @cached_property
     def _follow(self) -> Array:
-        """What the constants take up of the slopes, in their bases, (p, c, k)."""
-        return np.asarray(self.q.mT @ self.slope[..., self.free])
+        """What the constants take up of the slopes, in their bases, (p, k, c)."""
+        return np.asarray(self.slope @ self.q)
+
+    @cached_property
+    def by_frf(self) -> Array:
+        """Slope of the residual by the scaled poles, the constants following (Kaufman), FRF by FRF, (p, k, 2 n)."""
+        taken = self._follow @ self.q.mT
+        return np.asarray(np.subtract(taken, self.slope, out=taken))
+
+    @cached_property
+    def gram(self) -> Array:
+        """Products of these slopes with each other, (k, k)."""
+        return np.asarray(np.sum(self.by_frf @ self.by_frf.mT, axis=0))
+
+    @cached_property
+    def gradient(self) -> Array:
+        """Half the slope of the cost by the scaled poles, (k,)."""
+        return np.asarray(np.sum(self.by_frf @ self.left[..., np.newaxis], axis=0)[:, 0])
 
     @cached_property
     def jacobian(self) -> Array:
-        """Slope of the residual by the scaled poles, the constants following (Kaufman), (2 n p, k)."""
-        by_frf = self.q @ self._follow - self.slope[..., self.free]
-        return np.asarray(by_frf.reshape(self.left.size, by_frf.shape[-1]))
+        """Slope of the residual of all FRFs, (2 n p, k)."""
+        return np.asarray(self.by_frf.swapaxes(1, 2).reshape(self.left.size, -1))
 
     @property
     def constant(self) -> ComplexArray:
@@ -95,6 +117,17 @@ class FitAtPoles:
             raise np.linalg.LinAlgError("an unknown cannot be told from the others")
         return norm, (right.T / singular) @ left.T
 
+    def gain(self, rows: Array) -> float:
+        """Fall of the cost, to first order, with a further linear unknown for each row of each FRF, (p, rows, 2 n)."""
+        norm, inverse = self._solution
+        new = rows - rows @ self.q @ self.q.mT
+        taken = (new @ (self.by_frf.mT / norm @ inverse)).reshape(-1, norm.size)
+        size = -taken @ taken.T
+        p, each = len(new), np.arange(len(new))
+        size.reshape(p, -1, p, rows.shape[1])[each, :, each] += new @ new.mT
+        fall = (new @ self.left[..., np.newaxis]).ravel() - taken @ (inverse.T @ (self.gradient / norm))
+        return float(fall @ np.linalg.lstsq(size, fall, rcond=None)[0])
+
     @cached_property
     def _turned(self) -> Array:
         """Constants along themselves and across, from the bases, (p, 2, m, c); c = 2 m."""
@@ -105,7 +138,7 @@ class FitAtPoles:
     @cached_property
     def _by_poles(self) -> Array:
         """Errors by steps of the scaled poles, (2 m + 2 p m, k)."""
-        by_poles = -(self._turned @ self._follow[:, np.newaxis]).swapaxes(0, 1)
+        by_poles = -(self._turned @ self._follow.mT[:, np.newaxis]).swapaxes(0, 1)
         return np.concatenate([self.spread(np.diag(self.scale)), by_poles.reshape(self.linear.size, self.scale.size)])
 
     @cached_property

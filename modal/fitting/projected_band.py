@@ -6,11 +6,12 @@ Source: Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, 413; Kaufman (1975), BI
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from modal.fitting.band_fit import split
+from modal.fitting.band_fit import BandFit, split
 from modal.fitting.fit_at_poles import Array, ComplexArray, FitAtPoles
 from modal.fitting.residual_terms import residual_powers
 
@@ -29,18 +30,35 @@ class ProjectedBand:
     held: NDArray[np.bool_]
     """Modes whose poles stay where they are, (m,)."""
 
+    @cached_property
+    def _free(self) -> NDArray[np.bool_]:
+        """Whether each frequency and damping ratio may move, (2 m,)."""
+        return np.tile(~self.held, 2)
+
+    @cached_property
+    def _both(self) -> Array:
+        """Weights of real, then of imaginary parts, (p, 1, 2 n)."""
+        return np.tile(self.weight, 2)[:, np.newaxis]
+
     def at(self, poles: Array, is_complex: bool) -> FitAtPoles:
         """The best modal constants at these poles, (2, m)."""
-        curves, weight = _curves(self.frequency, poles), self.weight[:, np.newaxis]
-        turns = [curves.turn * curves.curve] if is_complex else []
-        columns: ComplexArray = np.concatenate([curves.curve, *turns])
-        q, triangle = np.linalg.qr(_without(self.bases, split(weight * columns)).mT)
+        curves = _curves(self.frequency, poles)
+        columns = np.concatenate([curves.curve, curves.turn * curves.curve]) if is_complex else curves.curve
+        q, triangle = np.linalg.qr(self._weighted(split(columns)).mT)
         part, inverse = self.data @ q, np.linalg.inv(triangle)
         left = (self.data - part @ q.mT)[:, 0]
         linear = (part @ inverse.mT)[:, 0]
-        slope = _without(self.bases, split(weight * _slope(curves, linear[..., np.newaxis]))).mT
         unknowns = linear.size + 2 * self.bases.shape[0] * self.bases.shape[2]
-        return FitAtPoles(poles, np.tile(~self.held, 2), q, inverse, linear, left, unknowns, slope)
+        slope = partial(self._slope, curves, linear)
+        return FitAtPoles(poles, self._free, q, inverse, linear, left, unknowns, slope)
+
+    def _slope(self, curves: _Curves, linear: Array) -> Array:
+        slope = self._weighted(_slope(curves, linear[..., np.newaxis]))
+        return slope if np.all(self._free) else slope[:, self._free]
+
+    def _weighted(self, rows: Array) -> Array:
+        """What residual terms leave of rows, (k, 2 n) or (p, k, 2 n), times the weights of each FRF, (p, k, 2 n)."""
+        return _without(self.bases, self._both * rows)
 
 
 def projected_band(
@@ -54,6 +72,13 @@ def projected_band(
 def beyond_terms(frequency: Array, receptance: ComplexArray, weight: Array, terms: int) -> Array:
     """What residual terms leave of weighted receptances, (p, 2 n); arguments as `projected_band`."""
     return _without(_bases(frequency, weight, terms), split(weight * receptance)[:, np.newaxis])[:, 0]
+
+
+def gain_of_a_term(fit: BandFit, frequency: Array, weight: Array, terms: int) -> float:
+    """Fall of the sum of squares, to first order, that one residual term more than these in each FRF would bring."""
+    power = residual_powers(frequency, terms + 1)[-1]
+    rows = np.tile(weight, 2)[:, np.newaxis] * split(np.stack([power, 1j * power]))
+    return fit.with_phases.gain(_without(_bases(frequency, weight, terms), rows))
 
 
 def _bases(frequency: Array, weight: Array, terms: int) -> Array:
@@ -83,21 +108,26 @@ def _curves(frequency: Array, poles: Array) -> _Curves:
     return _Curves(r, zeta, root, 1 / (1 - r**2 + 2j * zeta * r), turn)
 
 
-def _slope(c: _Curves, linear: Array) -> ComplexArray:
-    """Of modes by scaled frequency and damping, (p, 2 m, n), for the parts of their constants, (p, m or 2 m, 1)."""
+def _slope(c: _Curves, linear: Array) -> Array:
+    """Of modes by scaled frequency and damping, (p, 2 m, 2 n), for the parts of their constants, (p, m or 2 m, 1).
+
+    Only the constants differ from FRF to FRF: the curves that they multiply are worked out once.
+    """
     m = c.zeta.size
-    real, imaginary = linear[:, :m], linear[:, m:]
-    steps = c.zeta * c.curve**2 * (real + imaginary * c.turn if imaginary.size else real)
+    steps = c.zeta * c.curve**2
     by_damping = -2j * c.r * steps
     by_frequency = -c.zeta * by_damping - 2 * c.r**2 * steps
-    if imaginary.size:
-        off = imaginary * (c.zeta / c.root * c.curve)
-        by_frequency -= 1j * c.r * off
-        by_damping += (1 + c.turn * c.zeta / c.root) * off
-    return np.concatenate([by_frequency, by_damping], axis=1)
+    slope = np.tile(linear[:, :m], (2, 1)) * split(np.concatenate([by_frequency, by_damping]))
+    if linear.shape[1] > m:
+        off = c.zeta / c.root * c.curve
+        by_frequency = by_frequency * c.turn - 1j * c.r * off
+        by_damping = by_damping * c.turn + (1 + c.turn * c.zeta / c.root) * off
+        slope += np.tile(linear[:, m:], (2, 1)) * split(np.concatenate([by_frequency, by_damping]))
+    return slope
 
 
 def _without(bases: Array, values: Array) -> Array:
     """Values (p, k, 2 n) less their part in orthonormal bases (p, n, terms) of real and of imaginary parts."""
     parts = values.reshape(len(bases), -1, bases.shape[1])
-    return np.asarray(parts - parts @ bases @ bases.mT).reshape(values.shape)
+    taken = parts @ bases @ bases.mT
+    return np.subtract(parts, taken, out=taken).reshape(values.shape)

@@ -9,6 +9,8 @@ import socket
 from pathlib import Path
 from typing import Protocol
 
+from acquisition.errors import DataError
+
 
 class Wire(Protocol):
     """Bytes both ways."""
@@ -31,11 +33,17 @@ class PtyWire:
     """A pseudo-terminal in raw mode."""
 
     def __init__(self, link: Path | None = None) -> None:
-        """Open it, and make link lead to it; the host's end stays open here too, so that a host may come and go."""
+        """Open it, and make link lead to it; the host's end stays open here too, so that a host may come and go.
+
+        DataError where there is none.
+        """
         import pty
         import tty
 
-        self._master, self._slave = pty.openpty()
+        try:
+            self._master, self._slave = pty.openpty()
+        except OSError as error:
+            raise DataError(f"no pseudo-terminal can be had here ({error}); go through TCP, with --tcp") from error
         self._open = [self._slave, self._master]
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)

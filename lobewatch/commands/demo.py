@@ -25,13 +25,15 @@ def demo(
     temperature: Annotated[
         float | None, typer.Option(help="Recorded, and swings by so much over the year: 0 to 30 K; f_1 with it.")
     ] = None,
+    tcp: Annotated[bool, typer.Option("--tcp", help="Through a TCP port of this computer.")] = False,
     as_json: Json = False,
 ) -> None:
     """A simulated spindle ages over 24 months, tapped in x and y; a forecast beside the truth, a report.
 
-    Every test goes through a real serial port (a pseudo-terminal), byte by byte: ten good hits, FRF, HDF5, modes,
-    bearing stiffness, stability lobes, history. Before each the tool is remounted, which moves f_1 a little. What was
-    emulated in that very test is printed beside what was found. The months end with this one, or the one before it.
+    Every test goes through a real serial port (a pseudo-terminal; TCP where there is none), byte by byte: ten good
+    hits, FRF, HDF5, modes, bearing stiffness, stability lobes, history. Before each the tool is remounted, which moves
+    f_1 a little. What was emulated in that very test is printed beside what was found. The months end with this one,
+    or the one before it.
 
     Examples:
 
@@ -56,7 +58,7 @@ def demo(
     make_machine_folder(path, "surrogate_machine.toml")
     folder = MachineFolder(path)
     with Progress(console=notes, transient=True, disable=not notes.is_terminal) as progress:
-        tests = age_spindle(folder, taps, seed, mounting.scatter, Story(story), mounting)
+        tests = age_spindle(folder, taps, seed, mounting.scatter, Story(story), mounting, tcp=tcp)
         taken = list(progress.track(tests, total=2 * taps, description="tap tests"))
         progress.add_task("history", total=None)
         logbook = Logbook(folder)

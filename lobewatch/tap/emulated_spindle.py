@@ -106,7 +106,9 @@ def emulator(structure: Structure, random: np.random.Generator, *, realtime: boo
 
 
 @contextmanager
-def device_in_step(structure: Structure, random: np.random.Generator) -> Iterator[Callable[[], TapsSource]]:
+def device_in_step(
+    structure: Structure, random: np.random.Generator, *, tcp: bool = False
+) -> Iterator[Callable[[], TapsSource]]:
     """Somebody taps this structure on a TAPS/1 device that runs hardly ahead of its host; yields what opens it.
 
     The reader of a port takes all that comes while a hit is judged, and most of it would be thrown away: samples that
@@ -118,7 +120,7 @@ def device_in_step(structure: Structure, random: np.random.Generator) -> Iterato
         room.acquire(timeout=PATIENCE)
         return hammered(first_scan, n_scans)
 
-    with TapsEmulator(signal, CHANNELS, SAMPLE_RATE, realtime=False) as device:
+    with TapsEmulator(signal, CHANNELS, SAMPLE_RATE, realtime=False, tcp=tcp) as device:
         yield lambda: _SourceInStep(device.port, room)
 
 

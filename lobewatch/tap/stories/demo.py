@@ -132,15 +132,17 @@ def age_spindle(
     scatter: float,
     story: Story = Story.STEADY,
     mounting: Mounting = SCATTERS,
+    *,
+    tcp: bool = False,
 ) -> Iterator[TakenTap]:
-    """Take the tap tests of `plan_taps`, each through a real serial port (a pseudo-terminal)."""
+    """Take the tap tests of `plan_taps`, each through a real port: a pseudo-terminal, or TCP on loopback."""
     random = np.random.default_rng(seed)
     plans = plan_taps(folder, months, random, scatter, story, mounting)
     replaced = Wear.of(folder, months, story).replaced_at
     for number, (plan, hammering) in enumerate(zip(plans, random.spawn(len(plans)), strict=True)):
         if replaced is not None and number == len(DIRECTIONS) * replaced:
             add_event(folder, "bearings replaced", plan.date - timedelta(days=1), new_baseline=True)
-        yield TakenTap(plan, _take(folder, plan, hammering))
+        yield TakenTap(plan, _take(folder, plan, hammering, tcp))
 
 
 def compare_with_truth(logbook: Logbook, taken: Iterable[TakenTap]) -> list[DemoTap]:
@@ -160,13 +162,13 @@ def _plan(
     return PlannedTap(date, direction, structure, SpindleState(*map(float, truth)), under)
 
 
-def _take(folder: MachineFolder, plan: PlannedTap, random: np.random.Generator) -> str:
+def _take(folder: MachineFolder, plan: PlannedTap, random: np.random.Generator, tcp: bool) -> str:
     """Take and commit one tap test as a session without a person does; its id."""
     machine, toml = folder.machine, folder.toml_text
     where = machine.machine.name, plan.date, machine.tap.tool, plan.direction
     about = Circumstances(*where, "the demo", toml, conditions=plan.conditions)
     publisher = Publisher(TapState(0, TapStep.CHECKING, "", wanted=machine.tap.hits), time.monotonic)
-    with device_in_step(plan.structure, random) as open_device, threadpool_limits(limits=1), folder.locked():
+    with device_in_step(plan.structure, random, tcp=tcp) as open_device, threadpool_limits(limits=1), folder.locked():
         hits = JudgedHits(begin_tap(folder, about, resume=False), machine)
         loop = HitLoop(hits, publisher, Wishes(), guided=False)
         Phases(folder, hits, loop, publisher, guided=False).run(Connector(folder, open_device, publisher, time.sleep))

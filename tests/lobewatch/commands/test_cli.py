@@ -372,6 +372,19 @@ def test_the_demo_finds_the_truth_of_every_tap(run: Run) -> None:
     refused(run("demo", "--out", "lobewatch-demo"), "is there already")
 
 
+def test_the_demo_over_tcp_needs_no_pseudo_terminal_and_finds_the_same(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    by_pty = run("demo", "--taps", 2, "--json").json["taps"]
+
+    def none_left() -> None:
+        raise OSError("out of pty devices")
+
+    monkeypatch.setattr("pty.openpty", none_left)
+    assert run("demo", "--taps", 2, "--tcp", "--json").json["taps"] == by_pty
+    refused(run("demo", "--taps", 2), "no pseudo-terminal", "out of pty devices", "--tcp")
+
+
 @pytest.mark.parametrize("scatter", ["-0.1", "5.1", "nan"])
 def test_a_scatter_that_cannot_be_is_refused_before_anything_is_made(run: Run, scatter: str) -> None:
     refused(run("demo", "--scatter", scatter), f"--scatter {scatter}", "between 0 and 5 %")

@@ -43,6 +43,8 @@ class CutSignal:
     """Whether the device has told that its input was overloaded."""
     sensor: str = "accelerometer"
     """Kind of sensor: accelerometer or microphone."""
+    speed_rpm: NDArray[np.float64] | None = None
+    """Spindle speed by a tachometer at each sample (rpm), NaN where it gave none, shape (n,); None without one."""
 
     @property
     def seconds(self) -> float:
@@ -66,7 +68,8 @@ class CutSignal:
         """From one time to another (s)."""
         inside = slice(max(round(begin * self.sample_rate), 0), max(round(end * self.sample_rate), 0))
         codes = None if self.codes is None else self.codes[inside]
-        return replace(self, acceleration=self.acceleration[..., inside], codes=codes)
+        speed = None if self.speed_rpm is None else self.speed_rpm[inside]
+        return replace(self, acceleration=self.acceleration[..., inside], codes=codes, speed_rpm=speed)
 
 
 def _at_extremes(values: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -104,6 +107,8 @@ def write_cut_signal(path: Path, signal: CutSignal, about: Mapping[str, Any]) ->
             file["codes"].attrs.update(settings)
         else:
             _dataset(file, "acceleration", signal.acceleration, "m/s^2")
+        if signal.speed_rpm is not None:
+            _dataset(file, "speed", signal.speed_rpm, "rpm")
     content = sealed(memory.getvalue())
     atomic_write(path, content)
     return content
@@ -129,7 +134,9 @@ def _read(file: h5py.File) -> CutSignal:
     overload = bool(file.attrs["overload"])
     if "acceleration" in file:
         sensor = str(file.attrs.get("sensor", "accelerometer"))
-        return CutSignal(file["acceleration"][()], rate, lost_scans=lost, overload=overload, sensor=sensor)
+        speed = file["speed"][()] if "speed" in file else None
+        signal = CutSignal(file["acceleration"][()], rate, lost_scans=lost, overload=overload, sensor=sensor)
+        return replace(signal, speed_rpm=speed)
     codes = file["codes"]
     settings = {name: codes.attrs[name] for name in (field.name for field in fields(Channel))}
     channel = Channel(

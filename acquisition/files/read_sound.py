@@ -33,4 +33,5 @@ def read_sound(path: Path | str, said: Description = NOTHING) -> CutSignal:
         raise DataError(f"{path}: {ledger.complaint()}")
     if not np.all(np.isfinite(sound[0])):
         raise DataError(f"{path}: holds values that are no numbers; export it again")
-    return CutSignal(*sound, sensor=said.sensor)
+    values, rate, speed = sound
+    return CutSignal(values, rate, sensor=said.sensor, speed_rpm=speed)

@@ -29,6 +29,10 @@ def listen(
     sensor: Annotated[str, typer.Option(help="Of a --file: accelerometer, or microphone, which needs no unit.")] = (
         "accelerometer"
     ),
+    tacho: Annotated[
+        str, typer.Option(help="Of a --file: column of the spindle's speed, in rpm or Hz, or of a tachometer's pulses.")
+    ] = "",
+    pulses: Annotated[int | None, typer.Option(min=1, help="Of the tachometer in a turn; 1 where not given.")] = None,
     port: Annotated[str, typer.Option(help="Serial port of the DAQ; [daq] port where not given.")] = "",
     seconds: Annotated[float, typer.Option(min=2, help="How long a cut is waited for.")] = 120.0,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what is heard; store nothing.")] = False,
@@ -54,6 +58,7 @@ def listen(
       lobewatch listen mill-3 --program A --speed 12000 --depth 2 --file cut.wav --full-scale 500 --unit m/s^2
       lobewatch listen mill-3 --cut "reference cut" --speed 12000 --depth 2
       lobewatch listen mill-3 --program A --file cut.flac --sensor microphone
+      lobewatch listen mill-3 --program A --file cut.csv --tacho "Channel 4" --pulses 2
     """
     from lobewatch.logbook import Logbook
     from lobewatch.logbook.cut_comparison import keep_listened
@@ -61,7 +66,7 @@ def listen(
     from lobewatch.notify.telling import telling
     from lobewatch.show.cuts.describe_listened import cuts_json, cuts_texts
     from lobewatch.show.history.describe_cut import kept_cut_remarks
-    from lobewatch.tap.listening.hear_cut import checked_sensor, cut_pictures, hear_cut, judge_live
+    from lobewatch.tap.listening.hear_cut import checked_sensor, checked_tacho, cut_pictures, hear_cut, judge_live
 
     logbook = Logbook.open(machine)
     setting = choose_cut(logbook.machine, program, cut, speed, depth)
@@ -69,7 +74,7 @@ def listen(
         logbook.folder.refuse_damage()
     if screen and file is not None:
         raise ValueError("--screen follows a device; what a --file says stands here")
-    description = file_options.description(sensor=checked_sensor(sensor, file))
+    description = file_options.description(sensor=checked_sensor(sensor, file), **checked_tacho(tacho, pulses, file))
     with contextlib.ExitStack() as screens, cut_pictures(logbook, setting) as pictures:
         if screen:
             from lobewatch.screen import CutScreenServer  # brings aiohttp, which nobody needs without a screen

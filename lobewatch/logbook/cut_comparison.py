@@ -99,6 +99,7 @@ def compare_cuts(logbook: Logbook, setting: CutSetting, signal: CutSignal) -> li
         setting.speed_rpm,
         signal.clipped,
         signal.lost_scans,
+        signal.speed_rpm,
     )
     tool = logbook.ask(Analysis.assembly_or_reason, setting.tool)
     assembly = None if isinstance(tool, DataError) or not tool.directions else tool

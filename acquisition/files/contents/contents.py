@@ -11,7 +11,20 @@ from typing import Any, Literal
 from numpy.typing import NDArray
 
 Role = Literal[
-    "time", "frequency", "force", "response", "frf", "real", "imag", "magnitude", "phase", "coherence", "ignored", ""
+    "time",
+    "frequency",
+    "force",
+    "response",
+    "speed",
+    "tacho",
+    "frf",
+    "real",
+    "imag",
+    "magnitude",
+    "phase",
+    "coherence",
+    "ignored",
+    "",
 ]
 
 

@@ -48,6 +48,10 @@ class Description:
     """Whether no force was measured: the response is all that is looked for."""
     sensor: str = "accelerometer"
     """Kind of sensor that a cut was heard by: accelerometer or microphone."""
+    tacho: str = ""
+    """Name or number of the column of the spindle's speed: that itself where its unit is rpm or Hz, else pulses."""
+    pulses: int | None = None
+    """Pulses of the tachometer in a turn; None: 1."""
     date: datetime | None = None
     """Time of recording; local time where it has no zone."""
     date_pattern: str = ""

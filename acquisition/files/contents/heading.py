@@ -22,6 +22,7 @@ _BY_NAME: tuple[tuple[str, Role], ...] = (
     (r"(frf|receptance|mobility|accelerance|h1\b|h2\b)", "frf"),
     (r"(force|hammer|kraft)", "force"),
     (r"(acc|resp|vel|disp|beschl)", "response"),
+    (r"tacho", "tacho"),
 )
 ROLES: dict[str, tuple[Role, str]] = {
     "time": ("time", ""),
@@ -41,6 +42,8 @@ ROLES: dict[str, tuple[Role, str]] = {
     "db": ("magnitude", ""),
     "phase": ("phase", ""),
     "coherence": ("coherence", ""),
+    "speed": ("speed", ""),
+    "tacho": ("tacho", ""),
     "-": ("ignored", ""),
 }
 """What `--columns` may call a column -> its role and quantity."""
@@ -73,6 +76,8 @@ def role_of(name: str, unit: str) -> Role:
     by_name = next((role for pattern, role in _BY_NAME if re.match(pattern, name.strip().lower())), "")
     parsed = unit_of(unit)
     quantity = parsed.quantity if parsed else ""
+    if quantity == "frequency" and by_name != "frequency" and parsed == unit_of("rpm"):
+        return "speed"
     of_frf = by_name in ("real", "imag", "magnitude", "phase", "coherence", "frf")
     if quantity in ("time", "frequency", "force") and not (len(name) > 1 and by_name in ("time", "frequency")):
         return quantity

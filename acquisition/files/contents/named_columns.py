@@ -43,16 +43,23 @@ def named_columns(signals: Sequence[Signal], columns: Sequence[str], ledger: Led
 def _signal(signals: Sequence[Signal], name: str, number: int, ledger: Ledger) -> Signal | None:
     if not name and number < len(signals):
         return signals[number]
+    if name:
+        return column_called(signals, name, "--columns", ledger)
+    ledger.faults.append(f"--columns: no column {number + 1} in the file, which holds {names_of(signals)}")
+    return None
+
+
+def column_called(signals: Sequence[Signal], name: str, option: str, ledger: Ledger) -> Signal | None:
+    """That of a name, heading, unit or number; None where there is none or are several, which the ledger says."""
     meant = _called(signals, name)
     if len(meant) == 1:
         return meant[0]
     names = names_of(signals)
-    wanted = f"nothing called {name!r}" if name else f"no column {number + 1}"
     if meant:
         numbers = ", ".join(f"{i}" for i, signal in enumerate(signals, 1) if signal in meant)
-        ledger.faults.append(f"--columns: {len(meant)} columns are called {name!r}; say which by its number, {numbers}")
+        ledger.faults.append(f"{option}: {len(meant)} columns are called {name!r}; say which by its number, {numbers}")
     else:
-        ledger.faults.append(f"--columns: {wanted} in the file, which holds {names}")
+        ledger.faults.append(f"{option}: nothing called {name!r} in the file, which holds {names}")
     return None
 
 

@@ -11,6 +11,7 @@ from acquisition.files.contents.ledger import Ledger
 from acquisition.files.contents.named_columns import named_columns, names_of
 from acquisition.files.contents.sensitivity import in_sensor_units
 from acquisition.files.contents.settle_hits import in_their_unit, kind_of, rate_of
+from acquisition.files.contents.settle_speed import settle_speed, speed_column
 from acquisition.files.contents.settle_unit import chosen, response_unit
 
 COLUMNS_SOUND = '--columns "time [s],acceleration [m/s^2]", in their order, or each with =NAME'
@@ -21,13 +22,16 @@ MICROPHONE = "microphone"
 
 def settle_sound(
     contents: Contents, description: Description, ledger: Ledger
-) -> tuple[NDArray[np.float64], float] | None:
-    """What heard a cut, and its sample rate (Hz); None where the ledger says what is missing or wrong.
+) -> tuple[NDArray[np.float64], float, NDArray[np.float64] | None] | None:
+    """What heard a cut, its sample rate (Hz), and the speed of the spindle where the file has it (rpm, shape (n,)).
+
+    None where the ledger says what is missing or wrong.
 
     Acceleration in m/s^2, a microphone in what the file holds: shape (n,), or (responses, n) where there are several
     and nobody says which is meant.
     """
-    signals = named_columns(contents.signals, description.columns, ledger) if description.columns else contents.signals
+    named = named_columns(contents.signals, description.columns, ledger) if description.columns else contents.signals
+    signals, turning = speed_column(named, description, ledger)
     is_microphone = description.sensor == MICROPHONE
     in_units = (
         list(signals) if is_microphone and not description.full_scale else in_their_unit(signals, description, ledger)
@@ -49,8 +53,14 @@ def settle_sound(
         ledger.faults.append(f"{responses[0].name} moves; leave --sensor microphone out")
     if not settled or not ledger.is_clean:
         return None
+    speed = None
+    if turning is not None:
+        rate_of(scaled, [*settled, turning], description, ledger)
+        speed = settle_speed(turning, rate, description, ledger) if ledger.is_clean else None
+        if not ledger.is_clean:
+            return None
     values = np.stack([signal.values * factor for signal, factor in zip(settled, factors, strict=True)])
-    return np.asarray(values if len(settled) > 1 else values[0], dtype=np.float64), rate
+    return np.asarray(values if len(settled) > 1 else values[0], dtype=np.float64), rate, speed
 
 
 def _factor(signal: Signal, description: Description, ledger: Ledger) -> float:

@@ -61,6 +61,7 @@ _NAMES: dict[str, tuple[float, Dimension]] = {
     "us": (1e-6, _TIME),
     "Hz": (1.0, (0, -1, 0)),
     "kHz": (1e3, (0, -1, 0)),
+    "rpm": (1 / 60, (0, -1, 0)),
     "rad": (1 / (2 * math.pi), _NONE),
     "N": (1.0, _FORCE),
     "newton": (1.0, _FORCE),
@@ -77,6 +78,8 @@ _NAMES: dict[str, tuple[float, Dimension]] = {
 _LOWER = {name.lower(): value for name, value in _NAMES.items() if name != "mN"}
 """Mega and milli differ in case only: MN is not known, and mN only as it is written."""
 _TOKEN = re.compile(r"\s*(?:([A-Za-z]+)(?:\^?(-?\d+))?|(\d+(?:\.\d+)?(?:[eE]-?\d+)?)|([*/()])(?:\^(-?\d+))?)")
+_TURNS = re.compile(r"(1|r|u|rev|turns?) ?/ ?min|min ?\^?-1", re.IGNORECASE)
+"""Turns a minute as they are written: minutes are no unit otherwise ("x_min" is the least)."""
 _PLAIN = str.maketrans({"µ": "u", "μ": "u", "²": "^2", "³": "^3", "·": "*", "⋅": "*", "_": "/"})
 
 
@@ -93,9 +96,10 @@ class Unit:
 def unit_of(text: str) -> Unit | None:
     """The unit in a text such as "um/N", "(m/s²)/N", "m_s2", "1/kg"; None where it is not known.
 
-    Hz and rad/s are frequency, in Hz; g is standard gravity.
+    Hz, rad/s and rpm are frequency, in Hz; g is standard gravity.
     """
     plain = re.sub(r"_?\bper\b_?|_per_", "/", text.strip()).translate(_PLAIN).replace("**", "^")
+    plain = "rpm" if _TURNS.fullmatch(plain) else plain
     try:
         tokens = _tokens(plain)
         value, dimension = _product(tokens)

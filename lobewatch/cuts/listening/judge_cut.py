@@ -6,6 +6,7 @@ The thresholds here and beside were chosen on simulated cuts, with other random 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from lobewatch.cuts.listening.chatter_lines import ChatterLines, chatter_lines, has_side_bands
 from lobewatch.cuts.listening.find_cut import UNPLACED, CutParts
 from lobewatch.cuts.listening.lattice import SpindleSpeed
+from lobewatch.cuts.listening.measured_speed import measured_speed
 from lobewatch.cuts.listening.sorted_lines import TOOTH_HARMONICS, SortedLines, is_slow, sort_lines
 from lobewatch.cuts.listening.spectrum import (
     Floats,
@@ -76,6 +78,8 @@ class HeardSound:
     """Frequency of a tone that nothing explains (Hz); NaN where that is not the reason."""
     axis: int = 0
     """Which of several axes the word rests on, from 0."""
+    measured_rpm: float | None = None
+    """Speed by the tachometer in the cut (rpm), NaN where it gave none there; None without a tachometer."""
 
     @property
     def speed_rpm(self) -> float:
@@ -84,11 +88,18 @@ class HeardSound:
 
 
 def judge_cut(
-    cut: Floats, air: Floats, sample_rate: float, teeth: int, immersion: float, commanded_rpm: float
+    cut: Floats,
+    air: Floats,
+    sample_rate: float,
+    teeth: int,
+    immersion: float,
+    commanded_rpm: float,
+    measured_rpm: float | None = None,
 ) -> HeardSound:
     """The word on the steady part of a cut; cut and air in any unit, shape (n,) or (axes, n), sample_rate in Hz.
 
-    air: the same spindle turning without a cut; immersion: radial depth over diameter; commanded_rpm as it was set. All
+    air: the same spindle turning without a cut; immersion: radial depth over diameter; commanded_rpm as it was set;
+    measured_rpm by a tachometer, which the lines must not contradict ("tacho-contradicts"); None without one. All
     axes have one speed, and the word is that of the loudest evidence: of the axis with the loudest chatter, else of
     that with the loudest cut. Reasons why it cannot be told: "speed-not-found", "on-spindle-lines" (period two of an
     even number of teeth, or chatter locked to the spindle), "faint", "unexplained-tone" (a line without side
@@ -104,9 +115,10 @@ def judge_cut(
     ('stable', 6000)
     """
     spectra, quiet = spectra_of(cut, sample_rate), spectra_of(air, sample_rate)
-    turning = speed_of_spectra(spectra, quiet, teeth, commanded_rpm / 60)
-    if turning is None:
-        return _not_found(spectra[0], 60 * speed_elsewhere(spectra, quiet, teeth, commanded_rpm / 60, None))
+    is_measured = measured_rpm is not None and bool(np.isfinite(measured_rpm))
+    turning = _speed_or_reason(spectra, quiet, teeth, commanded_rpm / 60, measured_rpm if is_measured else None)
+    if isinstance(turning, HeardSound):
+        return turning
     sounds = []
     for number, axis in enumerate(np.atleast_2d(cut)):
         lines = without_skirts(lines_of(spectra[number]), spectra[number].bin)
@@ -117,10 +129,23 @@ def judge_cut(
         )
         sounds.append(_judge_lines(sound, axis, teeth, immersion))
     sound = max(sounds, key=_evidence)
-    if sound.word == "stable" or sound.lines is None or not len(sound.lines.left):
+    if is_measured or sound.word == "stable" or sound.lines is None or not len(sound.lines.left):
         return sound
     elsewhere = 60 * speed_elsewhere(spectra, quiet, teeth, commanded_rpm / 60, turning, sound.lines.left)
     return sound if np.isnan(elsewhere) else _not_found(spectra[0], elsewhere)
+
+
+def _speed_or_reason(
+    spectra: Sequence[Spectrum], quiet: Sequence[Spectrum], teeth: int, commanded: float, measured_rpm: float | None
+) -> SpindleSpeed | HeardSound:
+    """The speed of the spindle, or the sound of a cut in which it is not known; commanded in Hz."""
+    if measured_rpm is None:
+        turning = speed_of_spectra(spectra, quiet, teeth, commanded)
+        return turning or _not_found(spectra[0], 60 * speed_elsewhere(spectra, quiet, teeth, commanded, None))
+    turning, other = measured_speed(spectra, quiet, teeth, commanded, measured_rpm / 60)
+    if np.isfinite(other):
+        return HeardSound("cannot tell", "tacho-contradicts", spectrum=spectra[0], elsewhere_rpm=60 * other)
+    return turning or _not_found(spectra[0], np.nan)
 
 
 def _not_found(spectrum: Spectrum, elsewhere: float) -> HeardSound:

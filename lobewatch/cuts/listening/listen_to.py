@@ -30,6 +30,8 @@ class CutRecording(NamedTuple):
     """Overload of the sensor or its input, shape (n,); None: nowhere."""
     lost_scans: int = 0
     """Number of scans that are missing."""
+    measured_rpm: Floats | None = None
+    """Spindle speed by a tachometer at each sample (rpm), NaN where it gave none, shape (n,); None without one."""
 
 
 def listen_to(recording: CutRecording) -> list[HeardSound]:
@@ -47,6 +49,7 @@ def _heard(recording: CutRecording, parts: CutParts) -> HeardSound:
     reason = _fault(recording, parts)
     if reason:
         return HeardSound("cannot tell", reason, parts)
+    measured = None if recording.measured_rpm is None else _mean(recording.measured_rpm[parts.cut])
     axes = np.atleast_2d(np.asarray(recording.signal, dtype=np.float64))
     sound = judge_cut(
         axes[:, parts.cut],
@@ -55,8 +58,15 @@ def _heard(recording: CutRecording, parts: CutParts) -> HeardSound:
         recording.teeth,
         recording.immersion,
         recording.commanded_rpm,
+        measured,
     )
-    return replace(sound, parts=parts)
+    return replace(sound, parts=parts, measured_rpm=measured)
+
+
+def _mean(speed: Floats) -> float:
+    """Over the time in which it is known; NaN where it is known in less than half of it."""
+    known = speed[np.isfinite(speed)]
+    return float(np.mean(known)) if 2 * known.size > speed.size else np.nan
 
 
 def _fault(recording: CutRecording, parts: CutParts) -> str:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from lobewatch.cuts.listening.measured_speed import is_multiple
 from lobewatch.cuts.listening.sorted_lines import TOOTH_HARMONICS
 from lobewatch.logbook.cut_comparison import CutComparison
 
@@ -17,6 +18,7 @@ WHY: Mapping[str, str] = {
     "overload": "the accelerometer or its input was overloaded; choose a larger range or another place",
     "lost-scans": "scans were lost in it; lower the sample rate or use another cable or port",
     "speed-not-found": "no spindle speed within 5 % of the one that was set fits its lines; correct the speed",
+    "tacho-contradicts": "the tachometer turns at another speed than the lines of the cut",
     "on-spindle-lines": "the lines of run-out are louder than tooth passing: chatter of two tooth periods of an even "
     "number of teeth, or chatter that has locked to the spindle, sounds alike; cut at a speed 3 % away, and give "
     "pitch_deg where the teeth are unevenly spaced",
@@ -62,6 +64,8 @@ def _why(comparison: CutComparison) -> str:
     reason, tone = comparison.heard.reason, comparison.heard.tone
     if reason == "speed-not-found" and math.isfinite(comparison.heard.elsewhere_rpm):
         return f"{WHY[reason]}; these lines fit {comparison.heard.elsewhere_rpm:.0f} rpm"
+    if reason == "tacho-contradicts":
+        return f"{WHY[reason]}: {_other_speed(comparison)}"
     if reason == "slow-sampling":
         return f"{WHY[reason]}: {SLOWEST * comparison.tooth_frequency:.0f} Hz or more"
     if reason == "unexplained-tone":
@@ -69,6 +73,17 @@ def _why(comparison: CutComparison) -> str:
         away = "" if mode is None else f", {abs(mode - tone):.1f} Hz from the mode at {mode:.1f} Hz"
         return f"at {tone:.1f} Hz{away}: {WHY[reason]}"
     return WHY[reason]
+
+
+def _other_speed(comparison: CutComparison) -> str:
+    """Both speeds, and what is to be looked at."""
+    heard, set_rpm = comparison.heard, comparison.setting.speed_rpm
+    measured, lines = heard.measured_rpm or math.nan, heard.elsewhere_rpm
+    both = f"{measured:.1f} rpm, not the {lines:.1f} rpm that {'was set' if lines == set_rpm else 'the lines fit'}"
+    if not is_multiple(measured / lines):
+        return f"{both}; correct --speed, or name the column that is meant"
+    size = "small" if measured > lines else "large"
+    return f"{both}; --pulses is {round(max(measured / lines, lines / measured))} times too {size}, or correct --speed"
 
 
 def _energy(ratio: float) -> str:
@@ -96,6 +111,9 @@ def listened_texts(comparison: CutComparison) -> list[str]:
             f"{comparison.speed_rpm:.1f} rpm ({off:+.2f} % of {comparison.setting.speed_rpm:g}), tooth passing "
             f"{comparison.tooth_frequency:.1f} Hz; listened to {_seconds(comparison):.2f} s"
         )
+    if heard.measured_rpm is not None:
+        is_silent = math.isnan(heard.measured_rpm)
+        texts.append(f"tachometer: {'no speed in the cut' if is_silent else f'{heard.measured_rpm:.1f} rpm'}")
     if math.isfinite(heard.ratio):
         texts.append(_energy(heard.ratio))
     if chatter is not None:
@@ -146,6 +164,7 @@ def listened_json(comparison: CutComparison) -> dict[str, Any]:
         "speed_rpm": heard.speed_rpm,
         "speed_rpm_std": None if heard.turning is None else 60 * heard.turning.error,
         "commanded_rpm": comparison.setting.speed_rpm,
+        "measured_rpm": heard.measured_rpm,
         "depth_mm": 1e3 * comparison.setting.depth,
         "tooth_frequency_hz": comparison.tooth_frequency,
         "energy_ratio": heard.ratio,

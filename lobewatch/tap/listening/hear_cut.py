@@ -6,7 +6,7 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 from acquisition import Description
 from acquisition.errors import failure_text
@@ -62,6 +62,14 @@ def checked_sensor(sensor: str, file: Path | None) -> str:
     if sensor == "microphone" and file is None:
         raise ValueError("--sensor microphone is for a --file; a device hears by its accelerometer")
     return sensor
+
+
+def checked_tacho(tacho: str, pulses: int | None, file: Path | None) -> dict[str, Any]:
+    """Fields of a description of a tachometer; ValueError at a device, which has none."""
+    if file is None and (tacho or pulses is not None):
+        given = f"--tacho {tacho}" if tacho else f"--pulses {pulses}"
+        raise ValueError(f"{given} is for a --file; of a device only the accelerometer is heard")
+    return {"tacho": tacho, "pulses": pulses}
 
 
 @contextlib.contextmanager

@@ -137,3 +137,82 @@ def test_a_signal_that_stands_at_its_rail_is_clipped_with_and_without_codes() ->
     clipped = CutSignal(flat, 25600.0).clipped
     assert np.array_equal(clipped, np.abs(flat) == 0.8) or np.mean(clipped) > 0.3
     assert not np.any(CutSignal(WAVE, 25600.0).clipped)
+
+
+SPEED = np.where(np.arange(WAVE.size) % 128 < 30, 5.0, 0.0)
+"""A pulse a turn at 12 000 rpm and 25.6 kHz."""
+
+
+def turning(path: Path, heading: str, values: np.ndarray) -> Path:
+    rows = (f"{i / 25600:.9f},{a:.6f},{v:g}" for i, (a, v) in enumerate(zip(WAVE, values, strict=True)))
+    path.write_text("\n".join([f"time [s],acceleration [m/s^2],{heading}", *rows]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("heading", ["spindle [rpm]", "speed [1/min]", "n (U/min)", "speed_rpm"])
+def test_a_column_in_turns_a_minute_is_the_speed(tmp_path: Path, heading: str) -> None:
+    sound = read_sound(turning(tmp_path / "cut.csv", heading, np.where(np.arange(WAVE.size) < 100, 0.0, -5990.0)))
+    assert sound.acceleration.shape == WAVE.shape
+    assert sound.speed_rpm is not None
+    assert np.all(np.isnan(sound.speed_rpm[:100]))
+    assert np.allclose(sound.speed_rpm[100:], 5990.0)
+    part = sound.part(0.01, 0.02).speed_rpm
+    assert part is not None
+    assert part.shape == (256,)
+
+
+def test_pulses_and_turns_a_second_are_told_by_the_unit(tmp_path: Path) -> None:
+    pulses = turning(tmp_path / "tacho.csv", "Tacho [V]", SPEED)
+    for said in (Description(), Description(tacho="3"), Description(tacho="Tacho", pulses=1)):
+        speed = read_sound(pulses, said).speed_rpm
+        assert speed is not None
+        assert np.nanmean(speed) == pytest.approx(12_000.0)
+    halved = read_sound(pulses, Description(pulses=2)).speed_rpm
+    assert halved is not None
+    assert np.nanmean(halved) == pytest.approx(6000.0)
+    turns = read_sound(turning(tmp_path / "hz.csv", "channel 4 [Hz]", 0 * WAVE + 100.0), Description(tacho="channel 4"))
+    assert turns.speed_rpm is not None
+    assert np.allclose(turns.speed_rpm, 6000.0)
+    named = Description(columns=("time [s]", "acceleration [m/s^2]", "speed [rpm]"))
+    speed = read_sound(turning(tmp_path / "bare.csv", "x", 0 * WAVE + 5990.0), named).speed_rpm
+    assert speed is not None
+    assert np.allclose(speed, 5990.0)
+
+
+def test_a_channel_of_a_sound_file_is_the_tachometer_and_needs_no_full_scale(tmp_path: Path) -> None:
+    path = tmp_path / "cut.wav"
+    scipy.io.wavfile.write(path, 25600, np.stack([WAVE * 32000, SPEED * 6000], axis=1).astype(np.int16))
+    sound = read_sound(path, Description(sensor="microphone", tacho="2"))
+    assert sound.acceleration.shape == WAVE.shape
+    assert sound.speed_rpm is not None
+    assert np.nanmean(sound.speed_rpm) == pytest.approx(12_000.0)
+    heard = read_sound(path, Description(full_scale=(500.0,), unit="m/s^2", tacho="channel 2"))
+    assert np.allclose(heard.acceleration, WAVE * 500 * 32000 / 32768, atol=0.02)
+    write_cut_signal(tmp_path / "c1.h5", sound, {"id": "c1"})
+    kept = read_sound(tmp_path / "c1.h5").speed_rpm
+    assert kept is not None
+    assert np.array_equal(kept, sound.speed_rpm, equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    ("heading", "values", "said", "text"),
+    [
+        ("Tacho [V]", 0 * WAVE + 4.9, Description(), "Tacho: 0 pulses in 0.0781 s, less than two turns of 1"),
+        ("Tacho [V]", WAVE, Description(tacho="4"), "--tacho: nothing called '4' in the file, which holds time"),
+        ("n [rpm]", 0 * WAVE, Description(), "n: stands at 0 rpm all along"),
+        ("n [rpm]", 0 * WAVE + 6000, Description(pulses=2), "--pulses 2: n is the speed itself"),
+        ("other", SPEED, Description(pulses=2), "--pulses 2: no column is a tachometer; name it with --tacho"),
+        (
+            "n",
+            SPEED,
+            Description(columns=("time [s]", "acceleration [m/s^2]", "speed")),
+            'the unit of the speed in n (--columns "speed [rpm]=n")',
+        ),
+    ],
+)
+def test_a_tachometer_that_says_nothing_is_refused(
+    tmp_path: Path, heading: str, values: np.ndarray, said: Description, text: str
+) -> None:
+    with pytest.raises(DataError) as refused:
+        read_sound(turning(tmp_path / "cut.csv", heading, values), said)
+    assert text in str(refused.value)

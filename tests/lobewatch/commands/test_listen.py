@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +121,32 @@ def test_a_tone_that_nothing_explains_is_told_with_its_distance_from_the_modes(s
     assert f"at 1712.3 Hz, {abs(nearest - 1712.3):.1f} Hz from the mode at {nearest:.1f} Hz" in said
 
 
+def with_tacho(path: Path, chatter: float | None = None) -> Path:
+    """The recording with two pulses a turn of a tachometer beside it."""
+    heading, *rows = recording(path, chatter).read_text().splitlines()
+    pulses = np.where(np.arange(len(rows)) / RATE * 2 * TURN % 1 < 0.2, 4.8, 0.1)
+    path.write_text("\n".join([f"{heading},S4", *(f"{row},{v}" for row, v in zip(rows, pulses, strict=True))]) + "\n")
+    return path
+
+
+def test_a_tachometer_is_followed_kept_and_contradicted(shop: Shop, tmp_path: Path) -> None:
+    file = with_tacho(tmp_path / "cut.csv", 1712.3)
+    arguments = ("--program", "A", "--speed", 9000, "--file", file, "--tacho", "S4")
+    followed = json.loads(run(shop, *arguments, "--pulses", 2, "--json").stdout)
+    assert (followed["word"], followed["id"]) == ("chatter", "c1")
+    assert followed["measured_rpm"] == pytest.approx(12077.0, rel=1e-4)
+    kept = run(shop, "--program", "A", "--speed", 9000, "--file", shop.path / "cuts" / "c1.h5", "--dry-run").stdout
+    assert "chatter at 1712" in kept
+    assert re.search(r"tachometer: 1207[67]\.\d rpm", kept)
+    (line, *_) = run(shop, "--program", "A", "--speed", 12000, *arguments[4:], "--dry-run").stdout.splitlines()
+    assert line.startswith("cannot tell (tacho-contradicts): the tachometer turns at another speed than the lines")
+    both, _, cure = line.partition("; ")
+    assert re.search(r"of the cut: 2415[34]\.\d rpm, not the 12077.0 rpm that the lines fit$", both)
+    assert cure == "--pulses is 2 times too small, or correct --speed"
+    untold = json.loads(run(shop, *arguments[:6], "--columns", "time [s],acceleration [m/s^2],-", "--json").stdout)
+    assert (untold["reason"], untold["measured_rpm"]) == ("speed-not-found", None)
+
+
 def test_a_microphone_is_said_and_kept_as_one(shop: Shop, tmp_path: Path) -> None:
     values = read_sound(recording(tmp_path / "cut.csv", 1712.3)).acceleration
     scipy.io.wavfile.write(tmp_path / "cut.wav", int(RATE), (values / 200).astype(np.float32))
@@ -165,6 +192,7 @@ def test_nobody_listens_in_vain_where_nothing_can_be_written(shop: Shop, tmp_pat
             "--sensor ear: none of accelerometer, microphone",
         ),
         (("--program", "A", "--port", "x", "--sensor", "microphone"), "--sensor microphone is for a --file"),
+        (("--program", "A", "--port", "x", "--pulses", "2"), "--pulses 2 is for a --file; of a device only"),
         (("--program", "A", "--file", "none.csv", "--screen"), "--screen follows a device"),
     ],
 )

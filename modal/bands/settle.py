@@ -30,14 +30,15 @@ def settle(state: Extraction) -> Extraction:
 def _again(state: Extraction, band: FittedBand) -> FittedBand | None:
     """A band fitted to what the modes of all others leave now; the same where that has not changed."""
     data = state.data(band.lines, without=band)
-    is_settled = _change(band, data) < SETTLED * np.sqrt(band.fit.sum_of_squares)
-    return band if is_settled and np.array_equal(data.weight, band.data.weight) else fit_again(band, data)
+    return band if np.array_equal(data.weight, band.data.weight) and _is_settled(band, data) else fit_again(band, data)
 
 
-def _change(band: FittedBand, data: BandLines) -> float:
-    """Change (norm) of the weighted data of a band that its residual terms do not take up."""
-    off = data.own - band.data.own
-    return float(np.linalg.norm(beyond_terms(data.frequency, off, data.weight, band.terms)))
+def _is_settled(band: FittedBand, data: BandLines) -> bool:
+    """Whether the weighted data of a band has not changed by more than its residual terms take up."""
+    off, most = data.own - band.data.own, SETTLED * np.sqrt(band.fit.sum_of_squares)
+    if np.linalg.norm(off * data.weight) < most:
+        return True
+    return bool(np.linalg.norm(beyond_terms(data.frequency, off, data.weight, band.terms)) < most)
 
 
 def _with(state: Extraction, old: FittedBand, new: FittedBand | None) -> Extraction:

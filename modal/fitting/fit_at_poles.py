@@ -45,7 +45,7 @@ class FitAtPoles:
     def cost(self) -> float:
         """Sum of squares; infinite for what are no poles."""
         cost = float(self.residual @ self.residual)
-        is_legal = np.all(self.poles > 0) and np.all(self.poles[1] < 1)
+        is_legal = np.min(self.poles) > 0 and np.max(self.poles[1]) < 1
         return cost if is_legal and np.isfinite(cost) else np.inf
 
     @property

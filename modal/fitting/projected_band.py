@@ -5,6 +5,7 @@ Source: Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, 413; Kaufman (1975), BI
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -14,6 +15,9 @@ from numpy.typing import NDArray
 from modal.fitting.band_fit import BandFit, split
 from modal.fitting.fit_at_poles import Array, ComplexArray, FitAtPoles
 from modal.fitting.residual_terms import residual_powers
+
+APART = 1e-2
+"""Share of itself that each curve has beyond all others where normal equations lose no more than four digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +48,8 @@ class ProjectedBand:
         """The best modal constants at these poles, (2, m)."""
         curves = _curves(self.frequency, poles)
         columns = np.concatenate([curves.curve, curves.turn * curves.curve]) if is_complex else curves.curve
-        q, triangle = np.linalg.qr(self._weighted(split(columns)).mT)
-        part, inverse = self.data @ q, np.linalg.inv(triangle)
+        q, inverse = _orthonormal(self._weighted(split(columns)))
+        part = self.data @ q
         left = (self.data - part @ q.mT)[:, 0]
         linear = (part @ inverse.mT)[:, 0]
         unknowns = linear.size + 2 * self.bases.shape[0] * self.bases.shape[2]
@@ -84,6 +88,22 @@ def gain_of_a_term(fit: BandFit, frequency: Array, weight: Array, terms: int) ->
 def _bases(frequency: Array, weight: Array, terms: int) -> Array:
     columns = weight[:, np.newaxis] * residual_powers(frequency, terms)
     return np.asarray(np.linalg.qr(columns.mT)[0])
+
+
+def _orthonormal(rows: Array) -> tuple[Array, Array]:
+    """Orthonormal columns, (p, 2 n, c), that span rows (p, c, 2 n), and the inverse of their triangle, (p, c, c).
+
+    By Cholesky, in half the time, where no row is all but a sum of the others, so that this is as exact.
+    """
+    gram = rows @ rows.mT
+    with contextlib.suppress(np.linalg.LinAlgError):
+        lower = np.linalg.cholesky(gram)
+        apart = np.diagonal(lower, axis1=1, axis2=2) ** 2 > APART**2 * np.diagonal(gram, axis1=1, axis2=2)
+        if np.all(apart):
+            inverse = np.linalg.inv(lower).mT
+            return rows.mT @ inverse, inverse
+    q, triangle = np.linalg.qr(rows.mT)
+    return q, np.linalg.inv(triangle)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Concatenate, ParamSpec, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self, TypeVar
 
 from acquisition import UNSAID, Conditions, Description, Remark, TapTest
 from lobewatch.decay.standing import Standing
@@ -15,7 +15,6 @@ from lobewatch.history.kept_rows import of_older_versions
 from lobewatch.history.tap_measurements import TapMeasurements
 from lobewatch.history.usable_taps import UsableTaps
 from lobewatch.logbook.analysis import Analysis
-from lobewatch.logbook.replaying.store import ReplayOutcome, store_recordings
 from lobewatch.machine import DamagedTapError, Machine, MachineFolder, ProgramTable, TapEntry
 from lobewatch.machine.additions.keep_modes import keep_modes
 from lobewatch.machine.archive.verify import enter_explained
@@ -26,6 +25,9 @@ from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.advice import Advice
 from lobewatch.verdicts.verdict import Ruling, Verdict
 from modal import ModeEdits
+
+if TYPE_CHECKING:
+    from lobewatch.logbook.replaying.store import ReplayOutcome
 
 P = ParamSpec("P")
 Answer = TypeVar("Answer")
@@ -192,6 +194,8 @@ class Logbook:
 
     def replay_all(self, files: Sequence[Path], said: Description, **how: Any) -> ReplayOutcome:
         """Store recorded files, each once; how: workers, keep_going and progress of `store_recordings`."""
+        from lobewatch.logbook.replaying.store import store_recordings  # with all formats of recorded files
+
         with self.folder.locked():
             enter_explained(self.folder)  # else what an interrupted replay has stored would be stored twice
             outcome = store_recordings(self.folder, files, said, **how)

@@ -22,6 +22,8 @@ BLOCK_TIME = 0.02
 """Length of a block (s)."""
 CODE_SPAN = 2.0**31
 """Codes of 32 bits from 0 to full scale; devices of 24 bits fill the upper ones."""
+NO_SUCH_RATE = -9997
+"""PortAudio's error for a rate that a device does not have."""
 LEAST_AGREEMENT = 0.2
 """Share by which range_v may differ from the calibration in the name; more is a mistake."""
 
@@ -38,14 +40,16 @@ def open_audio(port: str, inputs: Sequence[SensorInput], sample_rate: float | No
     entry = _find(library.query_devices(), port.removeprefix("audio:"))
     numbers = tuple(sensor.number for sensor in inputs)
     only_inputs(numbers, entry["max_input_channels"], entry["name"])
-    rate = sample_rate or RATE
+    rate, calibration = sample_rate or RATE, calibration_in(entry["name"])
+    channels = tuple(_channel(sensor.channel, sensor.number, calibration) for sensor in inputs)
     try:
         library.check_input_settings(entry["index"], max(numbers) + 1, "int32", samplerate=rate)
+        reader = AudioReader(library, entry["index"], numbers, rate, [channel.full_scale for channel in channels])
     except library.PortAudioError as error:
-        raise ValueError(f"sample_rate_hz={rate:g}: {entry['name']} has no such rate ({error}); try 48000") from error
-    calibration = calibration_in(entry["name"])
-    channels = tuple(_channel(sensor.channel, sensor.number, calibration) for sensor in inputs)
-    reader = AudioReader(library, entry["index"], numbers, rate, [channel.full_scale for channel in channels])
+        if error.args[1:2] == (NO_SUCH_RATE,):
+            text = f"sample_rate_hz={rate:g}: {entry['name']} has no such rate ({error}); try 48000"
+            raise ValueError(text) from error
+        raise DeviceError(f"{port} cannot be opened ({error})", "check that no other program uses it") from error
     return LibraryDevice(port, reader, _address(entry).identity, channels, rate, "callback status")
 
 

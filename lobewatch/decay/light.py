@@ -54,6 +54,7 @@ LIGHTS = {
     "no-mode-in-band": Light.WARN,
     "no-mode-to-follow": Light.WARN,
     "other-band": Light.WARN,
+    "stiffness-jump": Light.WARN,
     "stiffness-off-model": Light.WARN,
     **dict.fromkeys(CLOCK_QUESTIONS, Light.WARN),
     "tap-in-future": Light.WARN,

@@ -16,7 +16,13 @@ from acquisition import ACROSS, Frf, Remark, TapTest
 from dsm import Calibration, calibrate, modal_stiffness
 from lobewatch.machine import BY_FIT, Machine
 from lobewatch.measuring.decays import about_decays, extract_decays
-from lobewatch.measuring.questions import frequency_jump, no_mode_in_band, other_band, stiffness_off_model
+from lobewatch.measuring.questions import (
+    frequency_jump,
+    no_mode_in_band,
+    other_band,
+    stiffness_jump,
+    stiffness_off_model,
+)
 from lobewatch.measuring.sensor_remarks import Fitted, fit_without_sensor
 from lobewatch.measuring.window_remark import about_hidden_window
 from modal import (
@@ -210,6 +216,7 @@ def _continue(last: Mode, now: Mode, candidates: Sequence[Mode], remarks: list[R
     if jump is not None:
         remarks.append(jump)
         return now
+    remarks += [] if next_mode.mode is None else filter(None, [stiffness_jump(last, next_mode.mode)])
     cure = "for a rebuilt spindle lay [mode] band_hz around its new mode" if next_mode.mode is None else ""
     remarks += [replace(remark, cure=cure or remark.cure) for remark in next_mode.remarks]
     return next_mode.mode

@@ -16,13 +16,26 @@ from lobewatch.machine import Machine, MachineFolder, TapEntry
 from lobewatch.measuring.clock import AHEAD, BEHIND, CLOCK_QUESTIONS, RELEASED, TOO_OLD, about_clock, is_ahead
 from modal import Mode
 
-ABOUT_MODES = ("frequency-jump", "no-mode-in-band", "other-band", "no-mode-to-follow", "stiffness-off-model")
+ABOUT_MODES = (
+    "frequency-jump",
+    "no-mode-in-band",
+    "other-band",
+    "no-mode-to-follow",
+    "stiffness-jump",
+    "stiffness-off-model",
+)
 QUESTIONS = (*ABOUT_MODES, *CLOCK_QUESTIONS)
 """Codes of the remarks that ask a person: until each is accepted the test sets no reference, and nothing is good."""
 ACCEPTED = "accepted"
 """Code of the remark that tells of an answer."""
 LARGEST_JUMP = 0.15
 """Relative change of the frequency against the newest test of the series that is asked about, up or down; chosen."""
+LARGEST_STEP = 1.5
+"""K of the mode followed over that of the newest test of the series, or the inverse, above which it is asked about;
+chosen.
+
+The same for K / f_n^2, so that a fall of f_n by itself never asks, whether its stiffness or its mass makes it. Tests
+scatter by a tenth; gains are mostly switched by 2 and more."""
 LARGEST_MISFIT = 4.0
 """K of the first test of a series over that of the model there, or the inverse, above which it is asked about.
 
@@ -41,6 +54,17 @@ def frequency_jump(last: Mode, now: Mode) -> Remark | None:
     text = f"f_n {now.frequency:.1f} Hz is {100 * change:+.0f} % off the newest test of the series"
     text += f" ({last.frequency:.1f} Hz): is this the machine, the tool and the direction it is said to be?"
     return Remark("frequency-jump", f"{now.frequency:.0f} Hz", text)
+
+
+def stiffness_jump(last: Mode, now: Mode) -> Remark | None:
+    """Question about a stiffness that changes while the frequency does not go with it; None where there is none."""
+    stiffer, faster = now.stiffness / last.stiffness, now.frequency / last.frequency
+    if not all(max(ratio, 1 / ratio) > LARGEST_STEP for ratio in (stiffer, stiffer / faster**2)):
+        return None
+    text = f"K {now.stiffness / 1e6:.3g} N/um is {stiffer:.2g} times that of the newest test of the series"
+    text += f" ({last.stiffness / 1e6:.3g} N/um), f_n moved by {round(100 * (faster - 1), 1) + 0.0:g} %"
+    text += ": has a gain, a range or a sensitivity changed, or the place that is tapped?"
+    return Remark("stiffness-jump", f"{now.frequency:.0f} Hz", text)
 
 
 def stiffness_off_model(first: Mode, model: float) -> Remark | None:

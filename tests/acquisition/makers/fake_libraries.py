@@ -58,7 +58,8 @@ def fake_sounddevice(
     """Devices with these names, of two inputs but for HDMI (none) and Mono (one); the rates are 44.1 and 48 kHz."""
 
     class PortAudioError(Exception):
-        pass
+        def __str__(self) -> str:
+            return f"{self.args[0]} [PaErrorCode {self.args[1]}]"
 
     devices: list[dict[str, Any]] = [
         {"name": name, "index": k, "max_input_channels": {"HDMI": 0, "Mono": 1}.get(name[:4], 2)}
@@ -69,9 +70,11 @@ def fake_sounddevice(
         device: int, channels: int, dtype: str, extra_settings: None = None, samplerate: float | None = None
     ) -> None:
         if channels > devices[device]["max_input_channels"]:
-            raise PortAudioError("Invalid number of channels [PaErrorCode -9998]")
+            raise PortAudioError("Invalid number of channels", -9998)
         if samplerate not in (44100.0, 48000.0):
-            raise PortAudioError("Invalid sample rate [PaErrorCode -9997]")
+            raise PortAudioError("Invalid sample rate", -9997)
+        if "no 32 bits" in wiring.faults:
+            raise PortAudioError("Sample format not supported", -9994)
         assert dtype == "int32"
 
     class InputStream:
@@ -79,6 +82,8 @@ def fake_sounddevice(
             self, samplerate: float, blocksize: int, device: int, channels: int, dtype: str, *, callback: Any
         ) -> None:
             assert dtype == "int32"
+            if "busy" in wiring.faults:
+                raise PortAudioError("Error opening InputStream: Device unavailable", -9985)
             self.samplerate = actual_rate or samplerate
             self._read = wiring.stream(samplerate, channels)
             self._size, self._callback, self._running = blocksize, callback, False
@@ -236,7 +241,7 @@ def fake_daqhats(wiring: Wiring) -> ModuleType:
             )
 
         def a_in_scan_start(self, mask: int, samples: int, options: int) -> None:
-            if self._active:
+            if self._active or "busy" in wiring.faults:
                 raise HatError(0, "A scan is already active.")
             assert (mask, samples, options) == (3, 0, 16)
             self._active, self._read = True, wiring.stream(self._rate, 2)
@@ -366,6 +371,8 @@ def fake_ljm(wiring: Wiring) -> dict[str, ModuleType]:
     def open_s(_kind: str, _connection: str, identifier: str) -> int:
         if identifier != "470012345":
             raise LJMError("LJM library error code 1227 LJME_DEVICE_NOT_FOUND")
+        if "busy" in wiring.faults:
+            raise LJMError("LJM library error code 1230 LJME_DEVICE_CURRENTLY_CLAIMED_BY_ANOTHER_PROCESS")
         state["opened"] += 1
         return int(state["opened"])
 

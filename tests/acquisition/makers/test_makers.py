@@ -54,10 +54,13 @@ KINDS = {
 }
 
 
-def inputs(range_v: float, numbers: tuple[int, int] = (0, 1), iepe: bool = True) -> tuple[SensorInput, ...]:
-    force = Channel("force", 2.25e-3, range_v)
-    acceleration = Channel("acceleration", 1.02e-3, range_v)
-    return SensorInput(numbers[0], force, iepe), SensorInput(numbers[1], acceleration, iepe)
+def inputs(
+    range_v: float, numbers: tuple[int, int] = (0, 1), iepe: bool = True, alone: bool = False
+) -> tuple[SensorInput, ...]:
+    """alone: the acceleration and no force."""
+    force = SensorInput(numbers[0], Channel("force", 2.25e-3, range_v), iepe)
+    acceleration = SensorInput(numbers[1], Channel("acceleration", 1.02e-3, range_v), iepe)
+    return (acceleration,) if alone else (force, acceleration)
 
 
 @pytest.fixture
@@ -213,11 +216,39 @@ def test_what_cannot_be_opened_is_one_clear_error(
         plugged(name, **wrong)
 
 
-@pytest.mark.parametrize(("name", "reason"), [("nidaqmx", "reserved"), ("uldaq", "Device in use")])
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("audio", r"audio:485B39 cannot be opened \(.*Device unavailable.*check that no other program uses it"),
+        ("nidaqmx", "reserved"),
+        ("mcc172", r"has failed \(Addr 0: A scan is already active.*no other program uses it"),
+        ("uldaq", "Device in use"),
+        ("ljm", "CLAIMED_BY_ANOTHER_PROCESS"),
+    ],
+)
 def test_a_device_in_use_is_told(name: str, reason: str, plugged: Any, wiring: Wiring) -> None:
     wiring.faults.add("busy")
     with pytest.raises(DeviceError, match=reason):
-        plugged(name)
+        plugged(name).start()
+
+
+def test_a_sound_device_that_gives_no_numbers_of_32_bits(plugged: Any, wiring: Wiring) -> None:
+    wiring.faults.add("no 32 bits")
+    with pytest.raises(DeviceError, match=r"audio:485B39 cannot be opened \(Sample format not supported"):
+        plugged("audio")
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_an_acceleration_alone_is_read(name: str, plugged: Any) -> None:
+    with plugged(name, alone=True) as device:
+        device.start()
+        blocks = list(islice(device.blocks(), 3))
+        device.stop()
+    codes = np.concatenate([block.codes for block in blocks], axis=1)
+    (channel,) = device.channels
+    assert channel.quantity == "acceleration"
+    volts = codes[0] * channel.scale * channel.sensitivity
+    np.testing.assert_allclose(volts, ramp(0.0)(0, volts.size)[1], atol=0.51 * channel.full_scale / 2**15)
 
 
 def test_sound_devices_that_are_not_what_was_asked(monkeypatch: pytest.MonkeyPatch, wiring: Wiring) -> None:

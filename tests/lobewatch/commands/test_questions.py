@@ -111,6 +111,39 @@ def test_k_of_the_first_tap_is_compared_with_the_model(shop: Shop, ratio: float,
     assert ["stiffness-off-model" in [one.code for one in row.questions] for row in rows] == [asked, asked]
 
 
+@pytest.mark.parametrize(
+    ("stiffer", "slower", "asked"),
+    [
+        (2.0, 1.0, True),
+        (0.5, 1.0, True),
+        (0.5, 0.95, True),
+        (1 / 1.6, 0.98, True),
+        (1.3, 1.0, False),
+        (0.75, 1.0, False),
+        (1.0, 0.87, False),
+        (0.87**2, 0.87, False),
+        (1 / 1.6, 0.87, False),
+    ],
+)
+def test_a_gain_that_is_another_is_asked_about_and_a_fall_is_not(
+    shop: Shop, stiffer: float, slower: float, asked: bool
+) -> None:
+    shop.tap_both()
+    shop.tap(30, 1713.0 * slower, stiffness=3.5e7 * stiffer)
+    questions = [question.code for question in shop.logbook.history.rows[-1].questions]
+    assert questions == (["stiffness-jump"] if asked else [])
+
+
+def test_a_limit_from_a_gain_that_is_another_is_no_stable_program(shop: Shop) -> None:
+    shop.edit(SPINDLE, SAFE + SPINDLE)
+    shop.tap_both()
+    assert words(shop) == {Word.STABLE}
+    for day, direction in ((30.0, "x"), (30.1, "y")):
+        shop.tap(day, 1713.0 if direction == "x" else 1690.0, direction, stiffness=2 * 3.5e7)
+    assert words(shop) == {Word.DOUBTFUL}
+    assert "stiffness-jump" in str(run("check", shop.path).output)
+
+
 def test_a_beam_between_the_taps_of_a_mill_is_asked_about(shop: Shop, beam: Path) -> None:
     shop.edit("band_hz", "# band_hz")
     shop.tap_both()

@@ -24,12 +24,21 @@ def check_settings(driver: Driver, settings: DeviceSettings) -> None:
 
 def _check_sensors(driver: Driver, settings: DeviceSettings) -> None:
     quantities = sorted(sensor.channel.quantity for sensor in settings.inputs)
-    if quantities not in (["acceleration", "force"], ["acceleration"]):
+    if quantities.count("acceleration") == 0 or quantities.count("force") > 1:
         listed = ", ".join(quantities) or "nothing"
         raise ValueError(
             f'driver = "{driver.name}" needs two [[daq.channel]], one of force and one of acceleration; '
             f'here are {listed}; with hammer = "none" in [tap] that of acceleration alone'
         )
-    first, second = settings.inputs[0], settings.inputs[-1]
-    if first is not second and first.number == second.number:
-        raise ValueError(f"channel 2: input={second.number} is that of channel 1; each sensor needs its own")
+    directions = [sensor.channel.direction for sensor in settings.inputs if sensor.channel.quantity == "acceleration"]
+    named = sorted(filter(None, directions))
+    if len(directions) > 1 and (not named or len(set(named)) < len(named)):
+        raise ValueError(
+            f"{len(directions)} channels of acceleration: each that is tapped along needs its own "
+            'direction = "x" or "y" in [[daq.channel]]'
+        )
+    numbers = [sensor.number for sensor in settings.inputs]
+    for second, number in enumerate(numbers):
+        if (first := numbers.index(number)) < second:
+            text = f"channel {second + 1}: input={number} is that of channel {first + 1}; each sensor needs its own"
+            raise ValueError(text)

@@ -69,33 +69,37 @@ def capture_hits(source: Source, trigger: Trigger) -> Iterator[Hit]:
         yield from search.feed(block)
 
 
-def input_channels(channels: tuple[Channel, ...], quantity: ChannelQuantity = "force") -> tuple[int, ...]:
+def input_channels(
+    channels: tuple[Channel, ...], quantity: ChannelQuantity = "force", direction: str = ""
+) -> tuple[int, ...]:
     """Index of the force and of the acceleration channel; of the latter alone where that triggers.
 
+    direction: the one that is tapped; of several accelerations, as of a sensor with three axes, that of this direction.
     DataError unless there is one of each that is needed.
     """
-    quantities = [channel.quantity for channel in channels]
+    forces = [i for i, channel in enumerate(channels) if channel.quantity == "force"]
+    responses = [i for i, channel in enumerate(channels) if channel.quantity == "acceleration"]
+    several = len(responses) > 1
+    if several:
+        responses = [i for i in responses if channels[i].direction and channels[i].direction == direction]
+    if len(responses) == 1 and (quantity == "acceleration" or len(forces) == 1):
+        return (*forces, *responses) if quantity == "force" else (*responses,)
+    listed = ", ".join(f"{channel.quantity} {channel.direction}".strip() for channel in channels) or "nothing"
+    needed = "one force and one acceleration channel are needed"
     if quantity == "acceleration":
-        if quantities.count("acceleration") != 1:
-            raise DataError(
-                f"the DAQ has channels for {', '.join(quantities) or 'nothing'}; "
-                "one acceleration channel is needed to tap without a force sensor"
-            )
-        return (quantities.index("acceleration"),)
-    if quantities.count("force") != 1 or quantities.count("acceleration") != 1:
-        raise DataError(
-            f"the DAQ has channels for {', '.join(quantities) or 'nothing'}; "
-            "one force and one acceleration channel are needed"
-        )
-    return quantities.index("force"), quantities.index("acceleration")
+        needed = "one acceleration channel is needed to tap without a force sensor"
+    which = f', of several that with direction = "{direction or "x"}"' if several else ""
+    raise DataError(f"the DAQ has channels for {listed}; {needed}{which}")
 
 
 class HitSearch:
     """The scans not yet done with, and where in them the search stands (positions count scans received)."""
 
-    def __init__(self, channels: tuple[Channel, ...], sample_rate: float, trigger: Trigger) -> None:
-        """Search a stream of these channels from its next scan on."""
-        self._inputs = input_channels(channels, trigger.quantity)
+    def __init__(
+        self, channels: tuple[Channel, ...], sample_rate: float, trigger: Trigger, direction: str = ""
+    ) -> None:
+        """Search a stream of these channels from its next scan on; direction: as for `input_channels`."""
+        self._inputs = input_channels(channels, trigger.quantity, direction)
         self._used = tuple(channels[i] for i in self._inputs)
         self._rate, self._trigger = sample_rate, trigger
         self._level, self._middle = trigger.level / abs(self._used[0].scale), trigger.offset / self._used[0].scale
@@ -141,7 +145,8 @@ class HitSearch:
         end = self._size + block.codes.shape[1]
         if overload:
             self._overloads.append((self._size, end, overload))
-        self._added.append(block.codes if self._inputs == (0, 1) else block.codes[list(self._inputs)])
+        is_all = self._inputs == tuple(range(len(block.codes)))
+        self._added.append(block.codes if is_all else block.codes[list(self._inputs)])
         self._size = end
 
     def _next_record(self) -> tuple[NDArray[np.int32], int, int] | None:

@@ -12,8 +12,8 @@ LISTEN_TIME = 1.0
 """Time for which is listened (s)."""
 FEWEST = 20
 """Lines of as many numbers without a broken one between them that make a board of it."""
-MOST = 3
-"""Numbers in a line: counter, force and acceleration, or fewer."""
+MOST = 5
+"""Numbers in a line: counter, force and three axes of acceleration, or fewer."""
 
 
 def probe_lines(link: SerialLink) -> DeviceIdentity | None:

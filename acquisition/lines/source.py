@@ -102,7 +102,7 @@ class LinesSource:
                 yield Block(scan, self._codes(run.values), lost_before=lost)
                 scan, heard = scan + run.values.shape[1], time.monotonic()
             if time.monotonic() - heard > SILENCE:
-                wanted = "force,acceleration" if len(self.channels) > 1 else "acceleration"
+                wanted = ",".join(self.channels[self._rows.index(row)].quantity for row in sorted(self._rows))
                 raise DeviceError(
                     f"the board on {self._link.port} has printed no samples for {SILENCE:g} s",
                     f"check its program and baud_rate: it must print counter,{wanted} or {wanted}",
@@ -128,6 +128,7 @@ def check_lines(inputs: Sequence[SensorInput], sample_rate: float | None) -> flo
             "lines a second that it was made for: it is measured against the clock"
         )
     if sorted(sensor.number for sensor in inputs) != list(range(len(inputs))):
-        last = "the inputs 0 and 1" if len(inputs) > 1 else "input 0, and there is one alone"
+        before = ", ".join(map(str, range(len(inputs) - 1)))
+        last = f"the inputs {before} and {len(inputs) - 1}" if before else "input 0, and there is one alone"
         raise ValueError(f"input: the numbers after the counter are {last}; correct [[daq.channel]]")
     return sample_rate

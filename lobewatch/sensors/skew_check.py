@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition import Channel, Device, MeasuredSkew, SensorPlace, measure_skew
+from acquisition import Channel, DataError, Device, MeasuredSkew, SensorPlace, measure_skew
 from lobewatch.machine.folder import MachineFolder
 from lobewatch.machine.known_devices import checked_rate
 from lobewatch.tap.plug import sensor_place
@@ -32,6 +32,10 @@ class SkewCheck:
 
 def check_skew(folder: MachineFolder, port: str, device: Device, tell: Callable[[str], None]) -> SkewCheck:
     """Record a signal that is fed to both inputs of a connected device; tell: what to do, for a person."""
+    if len(device.channels) != 2:
+        raise DataError(
+            f"a skew is that of two inputs; the DAQ has {len(device.channels)}: name two in [[daq.channel]]"
+        )
     rate = checked_rate(folder, device)
     tell(f"recording {SKEW_SECONDS:g} s: both inputs joined with a T-piece, noise or taps on them")
     blocks = []

@@ -45,10 +45,12 @@ class Button:
 class Connection:
     """One opened device: its scans, and what it tells beside them."""
 
-    def __init__(self, device: Device, quantity: ChannelQuantity = "force") -> None:
-        """quantity: by which hits are seen; DataError unless there is one channel of each that is needed."""
+    def __init__(self, device: Device, quantity: ChannelQuantity = "force", direction: str = "") -> None:
+        """quantity: by which hits are seen; direction: the one that is tapped; DataError as `input_channels`."""
         self._device = device
-        self.signal = LiveSignal(device, quantity)
+        self.direction = direction
+        """Direction that is tapped, by which one of several accelerations is chosen."""
+        self.signal = LiveSignal(device, quantity, direction)
         """Its newest samples."""
         self._button = Button(device.sample_rate)
         self._fault = ""
@@ -111,7 +113,7 @@ class Connector:
         device = self._open_device()
         try:
             self._check_rate(device)
-            connection = Connection(device, self._folder.machine.tap.quantity)
+            connection = Connection(device, self._folder.machine.tap.quantity, tap.circumstances.direction)
             tap.accept_device(device.sample_rate, connection.signal.channels, description(device))
             connection.start()
         except BaseException:

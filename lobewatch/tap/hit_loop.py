@@ -82,7 +82,7 @@ class HitLoop:
 
     def hits(self, connection: Connection, trigger: Trigger) -> Iterator[Hit | None]:
         """Hits as they come, and None after every block; the word follows the trigger."""
-        search = HitSearch(connection.channels, connection.sample_rate, trigger)
+        search = HitSearch(connection.channels, connection.sample_rate, trigger, connection.direction)
         early = 0
         for block in self.blocks(connection):
             yield from search.feed(block)

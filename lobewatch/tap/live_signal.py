@@ -26,9 +26,9 @@ def description(device: Device) -> str:
 class LiveSignal:
     """Force and acceleration of one connected source, or the acceleration alone."""
 
-    def __init__(self, source: Source, quantity: ChannelQuantity = "force") -> None:
-        """quantity: by which hits are seen; DataError unless there is one channel of each that is needed."""
-        self._rows = list(input_channels(source.channels, quantity))
+    def __init__(self, source: Source, quantity: ChannelQuantity = "force", direction: str = "") -> None:
+        """quantity: by which hits are seen; direction: the one that is tapped; DataError as `input_channels`."""
+        self._rows = list(input_channels(source.channels, quantity, direction))
         self.channels = tuple(source.channels[row] for row in self._rows)
         """Force and acceleration channel, or the latter alone."""
         self._rate = source.sample_rate

@@ -181,7 +181,7 @@ class Machine(Table, frozen=True):
             raise ValueError(f"{place}: depth_mm={program.depth_mm:g} is deeper than {flutes}")
 
     def _check_hammer(self) -> None:
-        if self.tap.hammer == "force" and [channel.quantity for channel in self.daq.channel] == ["acceleration"]:
+        if self.tap.hammer == "force" and {channel.quantity for channel in self.daq.channel} == {"acceleration"}:
             raise ValueError(
                 'daq: a [[daq.channel]] of acceleration alone; add that of the hammer, or hammer = "none" to [tap]'
             )

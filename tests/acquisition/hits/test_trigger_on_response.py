@@ -46,6 +46,17 @@ def test_a_level_that_gravity_alone_reaches_counts_from_rest() -> None:
     assert list(capture_hits(source, below)) == []
 
 
+def test_of_several_accelerations_that_of_the_direction_is_taken() -> None:
+    x, y = (Channel("acceleration", 1e-2, 5.0, direction=name) for name in ("x", "y"))
+    axes = (x, y, SENSOR)
+    assert input_channels(axes, "acceleration", "x") == (0,)
+    assert input_channels((HAMMER, *axes), "force", "y") == (0, 2)
+    with pytest.raises(DataError, match=r'acceleration x, acceleration y, acceleration; .* direction = "x"$'):
+        input_channels(axes, "acceleration")
+    with pytest.raises(DataError, match=r'direction = "y"$'):
+        input_channels((x, SENSOR), "acceleration", "y")
+
+
 def test_the_force_is_left_out_where_the_response_triggers() -> None:
     assert input_channels((HAMMER, SENSOR), "acceleration") == (1,)
     with pytest.raises(DataError, match="channels for force; one acceleration channel is needed"):

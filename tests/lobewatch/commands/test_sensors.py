@@ -217,4 +217,6 @@ def test_wrong_use(sensors: Sensors, folder: MachineFolder) -> None:
     code, _, err = sensors(silence, (FORCE, ACCELERATION), "--skew", "--mass-kg", 1)
     assert code == 2
     assert "error: --mass-kg and --skew need different cabling" in err
+    code, _, err = sensors(lambda _, n: np.zeros((1, n)), (ACCELERATION,), "--skew")
+    assert (code, "a skew is that of two inputs; the DAQ has 1" in err) == (2, True)
     assert "mass=-1.0 kg is not > 0" in sensors(hung_mass(MASS), (FORCE, ACCELERATION), "--mass-kg", -1)[2]

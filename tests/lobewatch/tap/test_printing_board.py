@@ -60,6 +60,21 @@ quantity = "acceleration"
 sensitivity_mv_per_g = 100
 range_v = 1.6
 """
+THREE_AXES = """[daq]
+driver = "lines"
+sample_rate_hz = 3200
+
+""" + "".join(
+    f"""[[daq.channel]]
+input = {number}
+quantity = "acceleration"
+sensitivity_mv_per_g = 100
+range_v = 1.6
+{direction}
+
+"""
+    for number, direction in enumerate(('direction = "x"', 'direction = "y"', ""))
+)
 PER_N, PER_ACCELERATION = 2.25e-3, 10e-3 / 9.80665
 
 
@@ -127,3 +142,41 @@ def test_a_digital_sensor_of_five_dollars(
     error = followed["frequency_hz_std"]
     assert followed["frequency_hz"] == pytest.approx(500.0, abs=2.3 * error)  # 95 % of ten hits
     assert 0.02 < error < 0.2
+
+
+@pytest.mark.parametrize(("direction", "frequency"), [("x", 500.0), ("y", 430.0)])
+def test_of_three_axes_that_of_the_direction_is_read(
+    direction: str,
+    frequency: float,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    make_machine_folder(Path("trial"), "new_machine.toml")
+    toml, rate = Path("trial/machine.toml"), 3200.0
+    text = toml.read_text("utf-8").replace("[daq]\n", THREE_AXES, 1)
+    toml.write_text(text.replace("[tap]\n", '[tap]\nhammer = "none"\n'), "utf-8")
+    hitting = Hammering((20.0, 80.0), double_hits=0.0, overloads=0.0, response_noise=0.2)
+    modes = [Structure(np.array([f]), np.array([0.03]), np.array([2e7])) for f in (500.0, 430.0, 300.0)]
+    axes = [HammeredStructure(mode, rate, np.random.default_rng(1), hitting) for mode in modes]
+
+    def signal(first: int, count: int) -> NDArray[np.float64]:
+        return np.stack([axis(first, count)[1] for axis in axes])
+
+    folder = MachineFolder("trial")
+    with LinesEmulator(signal, (0.1 / STANDARD_GRAVITY,) * 3, 1.6, rate, realtime=False) as board:
+        with open_source(folder.machine.daq, board.port) as device:
+            use_rate(folder, device, MeasuredRate(rate, 1.0, 16_000, 5.0))
+        words = ["lobewatch", "tap", "trial", "--port", board.port, "--direction", direction, "--json"]
+        monkeypatch.setattr(sys, "argv", words)
+        with pytest.raises(SystemExit) as end:
+            main()
+    printed = capsys.readouterr()
+    assert (end.value.code or 0) == 0, printed.err
+    followed = json.loads(printed.out)["followed"]
+    assert followed["frequency_hz"] == pytest.approx(frequency, abs=4 * followed["frequency_hz_std"])
+    (entry,) = folder.taps()
+    channels = folder.read(entry).hits[0].channels
+    assert channels is not None
+    assert [channel.direction for channel in channels] == [direction]

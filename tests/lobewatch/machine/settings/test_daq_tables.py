@@ -102,6 +102,33 @@ def test_a_dataq_device_needs_its_sensors_and_a_taps_device_its_loss_detection()
         parse_machine(clock.replace("digital_clock", "loss_detection = false\ndigital_clock"))
 
 
+AXIS = '[[daq.channel]]\ninput = {}\nquantity = "acceleration"\nsensitivity_mv_per_g = 100\nrange_v = 1.6\n{}\n'
+BOARD = HEAD + '[tap]\nhammer = "none"\n[daq]\ndriver = "lines"\nsample_rate_hz = 3200\n'
+
+
+@pytest.mark.parametrize(
+    ("axes", "message"),
+    [
+        ([(0, ""), (1, ""), (2, "")], "3 channels of acceleration: each that is tapped along needs its own direction"),
+        ([(0, 'direction = "x"'), (1, 'direction = "x"')], "2 channels of acceleration: each that is tapped along"),
+        ([(0, 'direction = "x"'), (1, ""), (1, "")], "channel 3: input=1 is that of channel 2"),
+        ([(0, 'direction = "x"'), (1, ""), (3, "")], "the numbers after the counter are the inputs 0, 1 and 2"),
+    ],
+)
+def test_axes_that_cannot_be_told_apart_are_refused(axes: list[tuple[int, str]], message: str) -> None:
+    with pytest.raises(DataError, match=message):
+        parse_machine(BOARD + "".join(AXIS.format(*axis) for axis in axes))
+
+
+def test_three_axes_are_read_and_need_the_hammer_to_be_none() -> None:
+    text = BOARD + "".join(
+        AXIS.format(i, f'direction = "{name}"' if name else "") for i, name in enumerate(("x", "y", ""))
+    )
+    assert [channel.direction for channel in parse_machine(text).daq.channel] == ["x", "y", ""]
+    with pytest.raises(DataError, match="of acceleration alone; add that of the hammer"):
+        parse_machine(text.replace('hammer = "none"', ""))
+
+
 def test_the_driver_of_a_package_checks_its_own_settings(monkeypatch: pytest.MonkeyPatch) -> None:
     dummy = HEAD + '[daq]\ndriver = "dummy"\n'
     with pytest.raises(DataError, match=r"daq: driver='dummy' is none of taps, dataq, .*ljm; correct the name"):

@@ -124,12 +124,17 @@ def _find(devices: Sequence[dict[str, Any]], wanted: str) -> dict[str, Any]:
 
 
 def _channel(channel: Channel, number: int, calibration: NameCalibration | None) -> Channel:
-    """A channel of 24 bits with the full scale of the calibration where the name has it, else range_v."""
+    """A channel of 24 bits with the full scale of the calibration where the name has it, else range_v.
+
+    An accelerometer that is a sound device has no volts: those of its sensitivity stand for its m/s^2.
+    """
     if calibration is None:
         return replace(channel, adc_bits=24)
-    if number >= len(calibration.full_scales):
-        raise ValueError(f"input={number}: a {calibration.model} measures acceleration itself, and no force")
     scale = calibration.full_scales[number]
+    if calibration.is_accelerometer:
+        if channel.quantity == "force":
+            raise ValueError(f"input={number}: a {calibration.model} measures acceleration itself, and no force")
+        scale *= abs(channel.sensitivity)
     if abs(channel.full_scale / scale - 1) > LEAST_AGREEMENT:
         raise ValueError(
             f"range_v={channel.full_scale:g}: the calibration of {calibration.model} says {scale:.4g} V for input "

@@ -25,7 +25,9 @@ class NameCalibration:
     date: str
     """Date of the calibration (ISO 8601)."""
     full_scales: tuple[float, ...]
-    """Full scale of each input (V); empty for a device that measures acceleration itself."""
+    """Full scale of each input (V; m/s^2 of a device that measures acceleration itself)."""
+    is_accelerometer: bool
+    """Whether it measures acceleration itself."""
 
 
 def calibration_in(name: str) -> NameCalibration | None:
@@ -35,7 +37,8 @@ def calibration_in(name: str) -> NameCalibration | None:
         return None
     kind, counts = match["format"], match["counts"]
     half = len(counts) // 2
-    factor = {"2": 1, "3": 20}.get(kind, 0)
-    scales = tuple(2.0**23 / (factor * int(part)) for part in (counts[:half], counts[half:])) if factor else ()
+    factor = 20 if kind == "3" else 1
+    scales = tuple(2.0**23 / (factor * int(part)) for part in (counts[:half], counts[half:]))
     year, month, day = (int(match["date"][k : k + 2]) for k in (0, 2, 4))
-    return NameCalibration(match["model"], match["serial"], f"20{year:02d}-{month:02d}-{day:02d}", scales)
+    date = f"20{year:02d}-{month:02d}-{day:02d}"
+    return NameCalibration(match["model"], match["serial"], date, scales, kind == "1")

@@ -268,6 +268,24 @@ def test_sound_devices_that_are_not_what_was_asked(monkeypatch: pytest.MonkeyPat
         audio.open("audio:USB", settings)
 
 
+def test_an_accelerometer_that_is_a_sound_device_has_no_force(monkeypatch: pytest.MonkeyPatch, wiring: Wiring) -> None:
+    """53 134 counts per m/s^2; 10 mV for each is 1.578765 V of full scale."""
+    audio, scale = find_driver("audio"), 2**23 / 53134 * 0.01
+    name = "333D01 10165435313412345190301"
+    monkeypatch.setitem(sys.modules, "sounddevice", fake_sounddevice(wiring, (name,), scale))
+    wiring.inputs, wiring.volts_at = (0,), lambda _rate: lambda _first, count: np.full((1, count), 20.0 * 0.01)
+    sensor = SensorInput(0, Channel("acceleration", 0.01, 1.6))
+    with audio.open("audio:333D01", DeviceSettings(48000.0, (sensor,))) as device:
+        assert device.channels[0].full_scale == pytest.approx(scale)
+        device.start()
+        block = next(iter(device.blocks()))
+    np.testing.assert_allclose(block.codes[0] * device.channels[0].scale, 20.0, rtol=1e-6)
+    with pytest.raises(ValueError, match="333D01 measures acceleration itself, and no force"):
+        audio.open("audio:333D01", DeviceSettings(48000.0, inputs(10.0)))
+    with pytest.raises(ValueError, match=r"range_v=5: the calibration of 333D01 says 1\.579 V for input 0"):
+        audio.open("audio:333D01", DeviceSettings(48000.0, (SensorInput(0, Channel("acceleration", 0.01, 5.0)),)))
+
+
 def test_calibrations_in_names() -> None:
     """Numbers worked out by hand from the format."""
     normal = calibration_in(f"Microphone (2- {NAME})")
@@ -279,7 +297,9 @@ def test_calibrations_in_names() -> None:
     assert sensitive.full_scales == pytest.approx((0.4957806, 0.4934475), rel=1e-6)
     accelerometer = calibration_in("333D01 10165435313412345190301: USB Audio (hw:2,0)")
     assert accelerometer is not None
-    assert (accelerometer.model, accelerometer.full_scales) == ("333D01", ())
+    assert (accelerometer.model, accelerometer.is_accelerometer) == ("333D01", True)
+    assert accelerometer.full_scales == pytest.approx((157.8765, 679.5146), rel=1e-6)
+    assert not normal.is_accelerometer
     assert calibration_in("Scarlett 2i2 USB") is None
 
 

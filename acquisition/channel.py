@@ -72,6 +72,11 @@ class Channel:
             raise ValueError(f"{self.quantity} skew={self.skew} s is not a finite number")
 
     @property
+    def name(self) -> str:
+        """Quantity, and direction where it is known."""
+        return f"{self.quantity} {self.direction}".strip()
+
+    @property
     def scale(self) -> float:
         """Engineering units (N or m/s^2) per ADC code."""
         return float(self.full_scale / 2 ** (self.adc_bits - 1) / self.sensitivity)

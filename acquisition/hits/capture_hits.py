@@ -84,7 +84,7 @@ def input_channels(
         responses = [i for i in responses if channels[i].direction and channels[i].direction == direction]
     if len(responses) == 1 and (quantity == "acceleration" or len(forces) == 1):
         return (*forces, *responses) if quantity == "force" else (*responses,)
-    listed = ", ".join(f"{channel.quantity} {channel.direction}".strip() for channel in channels) or "nothing"
+    listed = ", ".join(channel.name for channel in channels) or "nothing"
     needed = "one force and one acceleration channel are needed"
     if quantity == "acceleration":
         needed = "one acceleration channel is needed to tap without a force sensor"

@@ -71,13 +71,11 @@ def channel_doubts(channel: Channel) -> tuple[Remark, ...]:
     if not low / SPREAD <= sensitivity <= high * SPREAD:
         text = f"a sensitivity of {channel.sensitivity:g} V per {per} is not believed ({usual})"
         doubts.append(
-            Remark("sensitivity-not-believed", channel.quantity, text, _slip(sensitivity, low / SPREAD, high * SPREAD))
+            Remark("sensitivity-not-believed", channel.name, text, _slip(sensitivity, low / SPREAD, high * SPREAD))
         )
     if not FULL_SCALES[0] <= channel.full_scale <= FULL_SCALES[1]:
         text = f"a range of ±{channel.full_scale:g} V is not believed (converters have 0.01 to 100 V)"
-        doubts.append(
-            Remark("input-range-not-believed", channel.quantity, text, _slip(channel.full_scale, *FULL_SCALES))
-        )
+        doubts.append(Remark("input-range-not-believed", channel.name, text, _slip(channel.full_scale, *FULL_SCALES)))
     return tuple(doubts)
 
 
@@ -114,18 +112,18 @@ def calibration_doubt(channel: Channel, today: date, interval_months: float = 12
     """
     if not channel.calibration_date:
         return Remark(
-            "calibration-unknown", channel.quantity, "date of calibration not known", "enter it beside the sensitivity"
+            "calibration-unknown", channel.name, "date of calibration not known", "enter it beside the sensitivity"
         )
     try:
         calibrated = date.fromisoformat(channel.calibration_date[:10])
     except ValueError:
         text = f"calibration date {channel.calibration_date!r} is no date"
-        return Remark("calibration-no-date", channel.quantity, text, "give YYYY-MM-DD")
+        return Remark("calibration-no-date", channel.name, text, "give YYYY-MM-DD")
     if calibrated > today:
         text = f"calibration date {calibrated} lies in the future (today is {today})"
-        return Remark("calibration-in-future", channel.quantity, text, "correct it, or the clock of this computer")
+        return Remark("calibration-in-future", channel.name, text, "correct it, or the clock of this computer")
     months = (today - calibrated).days / DAYS_PER_MONTH
     if months <= interval_months:
         return None
     text = f"calibrated {calibrated}, {months:.0f} months ago (interval {interval_months:g})"
-    return Remark("calibration-old", channel.quantity, text, "check it with a known mass or have it calibrated")
+    return Remark("calibration-old", channel.name, text, "check it with a known mass or have it calibrated")

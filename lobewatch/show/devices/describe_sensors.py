@@ -45,6 +45,7 @@ def list_texts(sensors: SensorList) -> list[str | Table]:
 def _channel_json(channel: Channel) -> dict[str, Any]:
     return {
         "quantity": channel.quantity,
+        "direction": channel.direction,
         "sensitivity_v_per_si": channel.sensitivity,
         "full_scale_v": channel.full_scale,
         "full_scale_si": channel.full_scale / abs(channel.sensitivity),
@@ -61,7 +62,7 @@ def _channel_table(channels: tuple[Channel, ...]) -> Table:
         unit, si = ("N", 1.0) if channel.quantity == "force" else ("g", STANDARD_GRAVITY)
         rows.add_row(
             str(i),
-            channel.quantity,
+            channel.name,
             f"{channel.sensitivity * 1e3 * si:.4g} mV/{unit}",
             f"±{channel.full_scale / abs(channel.sensitivity) / si:.4g} {unit}",
             f"±{channel.full_scale:g} V",

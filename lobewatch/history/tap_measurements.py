@@ -78,11 +78,14 @@ class TapMeasurements:
 
     def _prediction(self, tool: str, places: Sequence[Place], rows: Sequence[Row]) -> Assembly:
         newest: dict[str, Measurement] = {}
-        for place in reversed(places):
+        calibrated = [place for place in reversed(places) if rows[place.number].bearing_stiffness.is_known]
+        for place in calibrated:
             row = rows[place.number]
-            knows = row.bearing_stiffness.is_known and row.stiffness.is_known
-            if knows and not row.questions and row.direction not in newest:
+            if row.stiffness.is_known and not row.questions and row.direction not in newest:
                 newest[row.direction] = self.measurement(place, rows)
+        if calibrated and not any(rows[place.number].stiffness.is_known for place in calibrated):
+            text = "no force was measured, K is not known; tap with a hammer that measures its force"
+            raise NotTappedError(f"no tap test with tool {tool!r}, and no prediction: {text}")
         try:
             return predict(self._folder.machine, list(newest.values()), tool)
         except DataError as error:

@@ -106,6 +106,9 @@ def test_what_needs_a_stiffness_refuses_with_the_reason(tapped: TapSession, with
     lobes = CliRunner().invoke(app, ["lobes", path, "--figure", str(without_force.path / "lobes.png")])
     assert isinstance(lobes.exception, DataError)
     assert "no force was measured" in str(lobes.exception)
+    other = CliRunner().invoke(app, ["lobes", path, "--tool", "long end mill"])
+    assert isinstance(other.exception, DataError)
+    assert "no prediction: no force was measured" in str(other.exception)
     check = json.loads(CliRunner().invoke(app, ["check", path, "--json"]).stdout)
     assert {program["verdict"] for program in check["programs"]} == {"unknown"}
     assert all("no force was measured" in str(program["remarks"]) for program in check["programs"])

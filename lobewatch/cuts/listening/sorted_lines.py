@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from lobewatch.cuts.listening.fold_frequency import fold_frequency
 from lobewatch.cuts.listening.lattice import SpindleSpeed
 from lobewatch.cuts.listening.spectrum import SpectralLines, Spectrum, joined_lines, lines_of, without_skirts
+from lobewatch.cuts.listening.steadiness import MOST
 
 WIDE = 1.2
 """A line belongs to a frequency that is no further away than this (bins)."""
@@ -30,6 +31,9 @@ SLACK = 1e-3
 """... and so much further off, relative: from few lines the speed is no better known."""
 LOUDER = 1.5
 """Amplitude of a folded multiple over that of the loudest multiple, at most."""
+WAVERING = 0.05
+"""Energy of all that is left over that of the multiples up to which lines as near to these as `steadiness.MOST` are of
+a speed that wavers; chosen, with a stable cut that a microphone has heard in sight."""
 SURE = 3.0
 """Standard errors of the spindle frequency within which its multiples may lie; chosen."""
 
@@ -86,7 +90,18 @@ def sort_lines(
     back &= ~(comb | foreign)
     kept = comb & (order > 1)
     tooth = (order[kept] % teeth).astype(np.int64)
-    return SortedLines(lines[kept], tooth, lines[foreign], lines[back], lines[~(comb | foreign | back)])
+    left = _without_wavering(lines[~(comb | foreign | back)], lines[kept], spectrum, turning)
+    return SortedLines(lines[kept], tooth, lines[foreign], lines[back], left)
+
+
+def _without_wavering(
+    left: SpectralLines, comb: SpectralLines, spectrum: Spectrum, turning: SpindleSpeed
+) -> SpectralLines:
+    """What is left but for faint lines that are multiples of a speed that wavers faster than is seen in its lines."""
+    if left.energy > WAVERING * comb.energy:
+        return left
+    away = fold_frequency(left.frequency, turning.frequency)
+    return left[away > MOST * left.frequency + WIDE * spectrum.bin]
 
 
 def _near_folded(

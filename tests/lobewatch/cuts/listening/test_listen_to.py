@@ -344,3 +344,20 @@ def test_lines_are_drawn_by_what_they_are() -> None:
     assert np.min(np.abs(kinds["air"].frequency - 3333.3)) < 0.1
     assert set(line_kinds(listen(recorded(a_cut())))) == {"turns", "tooth", "air"}
     assert line_kinds(listen(recorded(np.zeros(round(CUT * RATE))))) == {}
+
+
+@pytest.mark.parametrize(("rate", "change"), [(5.0, 1e-3), (7.0, 1.5e-3), (9.0, 1e-3)])
+def test_a_speed_that_wavers_several_times_a_second_is_no_chatter(rate: float, change: float) -> None:
+    """Its high multiples are several faint lines, which lie a tooth passing or a turn apart."""
+    time = np.arange(round(CUT * RATE)) / RATE
+    turns = TURN * (time + change * np.sin(2 * np.pi * rate * time) / (2 * np.pi * rate))
+    loud = {4 * k: 20.0 / k for k in range(1, 5)} | {36: 1.0, 39: 0.7, 40: 2.5, 41: 0.7, 44: 1.0}
+    cut = np.sum([a * np.sin(2 * np.pi * order * turns + order) for order, a in loud.items()], axis=0)
+    assert listen(recorded(cut)).word == "stable"
+
+
+def test_loud_lines_near_multiples_are_chatter_all_the_same() -> None:
+    """0.1 % beside the 28th, with the energy of the comb: no speed that wavers leaves its multiples so faint."""
+    heard = listen(recorded(a_cut(chatter=28.03 * TURN, loud=30.0)))
+    assert heard.word == "chatter"
+    assert heard.chatter is not None

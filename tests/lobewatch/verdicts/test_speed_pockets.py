@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from datetime import timedelta
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from lobewatch.machine import ProgramTable
 from lobewatch.tool import lobes_of
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.speed_pockets import speed_pockets
+from tests.lobewatch.commands.test_listen import recording
 from tests.lobewatch.conftest import Shop
 from tests.modal.test_uncertainty import tap
 
@@ -140,6 +142,24 @@ def test_a_program_is_at_best_doubtful(
     assert ("heard-alone" in codes) == (verdict != "unknown")
     for command in ("status", "report", "trend") if verdict == "doubtful" else ():
         assert CliRunner().invoke(app, [command, str(without_force.path)]).exit_code in (0, 1)
+
+
+@pytest.mark.parametrize(("chatter", "verdict"), [(None, "doubtful"), (1712.3, "not stable")])
+def test_a_cut_that_the_accelerometer_heard_counts_like_one_by_ear(
+    chatter: float | None, verdict: str, without_force: Shop, tmp_path: Path
+) -> None:
+    without_force.edit("speed_rpm = 12800", "speed_rpm = 12077")
+    words = [
+        "listen",
+        str(without_force.path),
+        "--program",
+        "A",
+        "--file",
+        str(recording(tmp_path / "cut.csv", chatter)),
+    ]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    (program,) = run(without_force, "check")["programs"]
+    assert program["verdict"] == verdict
 
 
 def test_the_report_names_the_pockets(without_force: Shop) -> None:

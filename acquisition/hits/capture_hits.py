@@ -74,21 +74,21 @@ def input_channels(
 ) -> tuple[int, ...]:
     """Index of the force and of the acceleration channel; of the latter alone where that triggers.
 
-    direction: the one that is tapped; of several accelerations, as of a sensor with three axes, that of this direction.
-    DataError unless there is one of each that is needed.
+    direction: the one that is tapped; of several accelerations, as of a sensor with three axes, that of this direction
+    (of a tap across, "xy", that of y). DataError unless there is one of each that is needed.
     """
     forces = [i for i, channel in enumerate(channels) if channel.quantity == "force"]
     responses = [i for i, channel in enumerate(channels) if channel.quantity == "acceleration"]
-    several = len(responses) > 1
+    several, seen = len(responses) > 1, direction[-1:] or "x"
     if several:
-        responses = [i for i in responses if channels[i].direction and channels[i].direction == direction]
+        responses = [i for i in responses if direction and channels[i].direction == seen]
     if len(responses) == 1 and (quantity == "acceleration" or len(forces) == 1):
         return (*forces, *responses) if quantity == "force" else (*responses,)
     listed = ", ".join(channel.name for channel in channels) or "nothing"
     needed = "one force and one acceleration channel are needed"
     if quantity == "acceleration":
         needed = "one acceleration channel is needed to tap without a force sensor"
-    which = f', of several that with direction = "{direction or "x"}"' if several else ""
+    which = f', of several that with direction = "{seen}"' if several else ""
     raise DataError(f"the DAQ has channels for {listed}; {needed}{which}")
 
 

@@ -51,6 +51,7 @@ def test_of_several_accelerations_that_of_the_direction_is_taken() -> None:
     axes = (x, y, SENSOR)
     assert input_channels(axes, "acceleration", "x") == (0,)
     assert input_channels((HAMMER, *axes), "force", "y") == (0, 2)
+    assert input_channels((HAMMER, *axes), "force", "xy") == (0, 2)  # hit in x, seen in y
     with pytest.raises(DataError, match=r'acceleration x, acceleration y, acceleration; .* direction = "x"$'):
         input_channels(axes, "acceleration")
     with pytest.raises(DataError, match=r'direction = "y"$'):

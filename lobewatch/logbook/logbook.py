@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, Self, TypeVar
+from typing import Any, Concatenate, ParamSpec, Self, TypeVar
 
 from acquisition import UNSAID, Conditions, Description, Remark, TapTest
 from lobewatch.decay.standing import Standing
@@ -14,6 +14,7 @@ from lobewatch.history.history_cache import HistoryCache
 from lobewatch.history.kept_rows import of_older_versions
 from lobewatch.history.tap_measurements import TapMeasurements
 from lobewatch.history.usable_taps import UsableTaps
+from lobewatch.logbook import replaying
 from lobewatch.logbook.analysis import Analysis
 from lobewatch.machine import DamagedTapError, Machine, MachineFolder, ProgramTable, TapEntry
 from lobewatch.machine.additions.keep_modes import keep_modes
@@ -25,9 +26,6 @@ from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.advice import Advice
 from lobewatch.verdicts.verdict import Ruling, Verdict
 from modal import ModeEdits
-
-if TYPE_CHECKING:
-    from lobewatch.logbook.replaying.store import ReplayOutcome
 
 P = ParamSpec("P")
 Answer = TypeVar("Answer")
@@ -192,13 +190,11 @@ class Logbook:
         self.files.refuse_excluded(tap_id)
         return self.measurement(tap_id)
 
-    def replay_all(self, files: Sequence[Path], said: Description, **how: Any) -> ReplayOutcome:
+    def replay_all(self, files: Sequence[Path], said: Description, **how: Any) -> replaying.ReplayOutcome:
         """Store recorded files, each once; how: workers, keep_going and progress of `store_recordings`."""
-        from lobewatch.logbook.replaying.store import store_recordings  # with all formats of recorded files
-
         with self.folder.locked():
             enter_explained(self.folder)  # else what an interrupted replay has stored would be stored twice
-            outcome = store_recordings(self.folder, files, said, **how)
+            outcome = replaying.store_recordings(self.folder, files, said, **how)
             self.fits |= outcome.fits
             self._forget()
         return outcome

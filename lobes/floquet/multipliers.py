@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,9 @@ from lobes.floquet.pieces import is_free, segment_ends, segment_pieces
 from lobes.floquet.stages import gauss_stages
 from lobes.floquet.uneven_map import UnevenMap
 
-EFFORTS = ((10, 6), (20, 8), (12, 14), (20, 24), (40, 40), (80, 80), (80, 600))
-"""Power steps and Arnoldi vectors of each attempt; what an attempt leaves in doubt goes on to the next."""
+EFFORTS = ((10, 6), (0, 12), (0, 24), (40, 40), (80, 80), (80, 600))
+"""Power steps and Arnoldi vectors of each attempt; what is left in doubt goes on to the next, with the vectors that it
+has where that takes no power steps."""
 TOLERANCE = 1e-8
 """Largest residual of a multiplier that counts as found, relative to it, unless another is asked for."""
 HUGE = 1e6
@@ -70,14 +72,17 @@ def _multipliers(
     rows: MillingRows, depth: Floats, pieces: NDArray[np.int64], tolerance: float, kind: type[np.floating[Any]]
 ) -> Complexes:
     """Multipliers (r, d) of rows whose tooth periods are divided alike."""
-    over_period = period_map(rows, depth, pieces, kind)
-    value, doubt = _attempt(over_period, depth.shape, EFFORTS[0])
-    for effort in EFFORTS[1:]:
-        left = np.nonzero((doubt > tolerance) & ((np.abs(value) < HUGE) | (doubt > 0.5)))
+    space = _Space.of(period_map(rows, depth, pieces, kind), depth.shape, EFFORTS[0][0]).grown(EFFORTS[0][1])
+    value, doubt = _largest(space.matrix)
+    place = np.indices(depth.shape)
+    for steps, vectors in EFFORTS[1:]:
+        size, error = np.abs(value[*place]), doubt[*place]
+        left = np.nonzero((error > tolerance) & ((size < HUGE) | (error > 0.5)))
         if not left[0].size:
             return value
-        again = _attempt(over_period[left[0], left[1]], (left[0].size, 1), effort)
-        value[left], doubt[left] = again[0][:, 0], again[1][:, 0]
+        space, place = space[left], place[:, *left, np.newaxis]
+        space = (_Space.of(space.over_period, place[0].shape, steps) if steps else space).grown(vectors)
+        value[*place], doubt[*place] = _largest(space.matrix)
     row, column = np.unravel_index(np.argmax(np.where(np.abs(value) < HUGE, doubt, 0.0)), doubt.shape)
     if doubt[row, column] <= tolerance:
         return value
@@ -87,27 +92,49 @@ def _multipliers(
     )
 
 
-def _attempt(
-    over_period: PeriodMap | UnevenMap, shape: tuple[int, ...], effort: tuple[int, int]
-) -> tuple[Complexes, Floats]:
-    """Multipliers and residuals, each of a shape (r, d), after some power steps with some Arnoldi vectors."""
-    states = over_period.states
-    start = np.random.default_rng(0).normal(size=states).astype(over_period.kind)
-    state = np.broadcast_to(start, (*shape, states))
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        for _ in range(effort[0]):
-            state = over_period(state)
-            state = state / np.linalg.norm(state, axis=-1, keepdims=True)
-        return _largest(_hessenberg(over_period, state, min(effort[1], states)))
+@dataclass(frozen=True, eq=False)
+class _Space:
+    """Krylov spaces of cases (r, d), as Arnoldi spans them."""
 
+    over_period: PeriodMap | UnevenMap
+    """Map of each."""
+    basis: Floats
+    """Vectors of norm 1 at right angles, shape (r, d, k + 1, states)."""
+    matrix: Floats
+    """Hessenberg matrices, shape (r, d, k + 1, k); zeros from where a space is exhausted."""
 
-def _hessenberg(over_period: PeriodMap | UnevenMap, start: Floats, vectors: int) -> Floats:
-    """Hessenberg matrices (..., k + 1, k) of k Arnoldi steps; zeros from where the space is exhausted."""
-    basis = np.zeros((*start.shape[:-1], vectors + 1, start.shape[-1]), start.dtype)
-    basis[..., 0, :] = start / np.linalg.norm(start, axis=-1, keepdims=True)
-    matrix = np.zeros((*start.shape[:-1], vectors + 1, vectors), start.dtype)
-    for k in range(vectors):
-        new, earlier = over_period(basis[..., k, :]), basis[..., : k + 1, :]
+    @classmethod
+    def of(cls, over_period: PeriodMap | UnevenMap, shape: tuple[int, ...], steps: int) -> _Space:
+        """The first vectors (k = 0): a random one after some power steps."""
+        start = np.random.default_rng(0).normal(size=over_period.states).astype(over_period.kind)
+        state = np.broadcast_to(start / np.linalg.norm(start), (*shape, start.size))
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            for _ in range(steps):
+                state = over_period(state)
+                state = state / np.linalg.norm(state, axis=-1, keepdims=True)
+        return cls(over_period, state[..., np.newaxis, :], np.zeros((*shape, 1, 0), start.dtype))
+
+    def __getitem__(self, which: tuple[NDArray[np.intp], ...]) -> _Space:
+        """Some of the cases, c of them, as (c, 1)."""
+        row, column = which
+        return _Space(
+            self.over_period[row, column], self.basis[which][:, np.newaxis], self.matrix[which][:, np.newaxis]
+        )
+
+    def grown(self, vectors: int) -> _Space:
+        """The spaces of so many vectors, of as many as there are numbers in a state at most."""
+        more = min(vectors, self.basis.shape[-1]) - self.matrix.shape[-1]
+        beside = ((0, 0),) * (self.matrix.ndim - 2)
+        basis = np.pad(self.basis, (*beside, (0, more), (0, 0)))
+        matrix = np.pad(self.matrix, (*beside, (0, more), (0, more)))
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            for k in range(self.matrix.shape[-1], matrix.shape[-1]):
+                self._add(basis, matrix, k)
+        return replace(self, basis=basis, matrix=matrix)
+
+    def _add(self, basis: Floats, matrix: Floats, k: int) -> None:
+        """Vector k + 1 and column k, in place."""
+        new, earlier = self.over_period(basis[..., k, :]), basis[..., : k + 1, :]
         for _ in range(2):
             overlap = (earlier @ new[..., np.newaxis])[..., 0]
             matrix[..., : k + 1, k] += overlap
@@ -115,7 +142,6 @@ def _hessenberg(over_period: PeriodMap | UnevenMap, start: Floats, vectors: int)
         length = np.linalg.norm(new, axis=-1)
         matrix[..., k + 1, k] = length
         basis[..., k + 1, :] = new / np.where(length > 0, length, 1.0)[..., np.newaxis]
-    return matrix
 
 
 def _largest(matrices: Floats) -> tuple[Complexes, Floats]:

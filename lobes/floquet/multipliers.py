@@ -152,22 +152,11 @@ def _largest(matrices: Floats) -> tuple[Complexes, Floats]:
     """
     finite = np.all(np.isfinite(matrices), axis=(-1, -2))
     matrices = np.where(finite[..., np.newaxis, np.newaxis], matrices, 0.0)
-    values = np.linalg.eigvals(matrices[..., :-1, :]).astype(np.complex128)
-    size, residual = np.abs(values), _residuals(matrices, values)
+    values, vectors = np.linalg.eig(matrices[..., :-1, :])
+    values = values.astype(np.complex128)
+    size, residual = np.abs(values), matrices[..., -1, -1, np.newaxis] * np.abs(vectors[..., -1, :])
     place = np.argmax(size, axis=-1)[..., np.newaxis]
     most = np.take_along_axis(size, place, axis=-1)
     doubt = np.max(np.where(size + residual >= most, residual, 0.0), axis=-1)
     largest = np.take_along_axis(values, place, axis=-1)[..., 0]
     return np.where(finite, largest, np.inf), doubt / np.maximum(most[..., 0], np.finfo(matrices.dtype).tiny ** 0.5)
-
-
-def _residuals(matrices: Floats, values: Complexes) -> Floats:
-    """Residuals of Ritz values (..., k) of Hessenberg matrices (..., k + 1, k), by their vectors of norm 1."""
-    square, tiny = matrices[..., :-1, :], np.finfo(matrices.dtype).tiny ** 0.5
-    vector = np.zeros((*values.shape, values.shape[-1]), dtype=values.dtype)
-    vector[..., -1] = 1.0
-    for j in range(values.shape[-1] - 1, 0, -1):
-        row = (vector[..., j:] @ square[..., j, j:, np.newaxis])[..., 0] - values * vector[..., j]
-        vector[..., j - 1] = -row / np.maximum(square[..., j, j - 1], tiny)[..., np.newaxis]
-        vector /= np.max(np.abs(vector), axis=-1, keepdims=True)
-    return np.asarray(matrices[..., -1, -1, np.newaxis] * np.abs(vector[..., -1]) / np.linalg.norm(vector, axis=-1))

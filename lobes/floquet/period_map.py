@@ -151,7 +151,8 @@ def _forces(rows: MillingRows, starts: Floats, angle: Floats, depth: Floats) -> 
 
     Shape (delays, r, d, k, s, p, p).
     """
-    apart = slice(None) if rows.cut.helix_lag > 0 else slice(1)  # straight teeth: the angles are those of the first row
+    is_alike = rows.cut.helix_lag == 0 or bool(np.all(depth[:, 0] == depth[0, 0]))
+    apart = slice(1) if is_alike else slice(None)  # the angles are those of the first row
     at = starts[apart, :, np.newaxis] + angle[apart, np.newaxis, np.newaxis] * gauss_stages().node
     shares = force_shares(rows.cut, at, depth[apart, :1])
     matrix = np.einsum("rc,grkscij->grksij", np.stack((rows.tangential, rows.radial), axis=1), shares)

@@ -7,18 +7,26 @@ from collections.abc import Collection, Sequence
 
 from lobewatch.cuts.learning.cut_evidence import CutEvidence
 
-SPEED, DEPTH = 0.01, 0.10
-"""Relative distances in speed, and towards less depth, up to which a chattering cut takes the place; chosen."""
+SPEED, DEPTH = 0.01, 0.04
+"""Relative distances in speed, and towards less depth, up to which a chattering cut takes the place; chosen: what is
+less deep than an edge (`likelihood.EDGE`) the spindles that are learnt tell by themselves ..."""
+DOUBTED_DEPTH = 0.10
+"""... but not where they do not believe it."""
 SAME_SPEED, SAME_DEPTH = 0.002, 0.01
 """Relative distances up to which a cut is another one again."""
 
 
-def is_taken(speed_rpm: float, depth: float, cuts: Sequence[CutEvidence]) -> bool:
-    """Whether chatter was written down at a place (rpm, m) or hardly deeper, and none is stable there since."""
+def is_taken(
+    speed_rpm: float, depth: float, cuts: Sequence[CutEvidence], doubted: Collection[CutEvidence] = ()
+) -> bool:
+    """Whether chatter was written down at a place (rpm, m) or hardly deeper, and none is stable there since.
+
+    doubted: cuts that are not believed, which take more.
+    """
     return any(
         cut.chatters
         and abs(math.log(speed_rpm / cut.speed_rpm)) < SPEED
-        and depth > (1 - DEPTH) * cut.depth
+        and depth > (1 - (DOUBTED_DEPTH if cut in doubted else DEPTH)) * cut.depth
         and not any(_is_again(cut, later) and not later.chatters for later in cuts[place + 1 :])
         for place, cut in enumerate(cuts)
     )

@@ -79,7 +79,8 @@ def suggest(
     most = float(np.max(chart.chips))
     least = GAINED * max(best, LEAST_RATE * most)
     careful_from = np.inf if cuts else DEEPER * programmed
-    places = [place for place in chart.candidates(best) if not is_taken(float(grid.speeds[place[0]]), place[1], cuts)]
+    speeds = grid.speeds.tolist()
+    places = [(row, deep) for row, deep in chart.candidates(best) if not is_taken(speeds[row], deep, cuts, doubted)]
     worth = {place: chart.worth(place[0], place[1], best, left) for place in places}
     for row, depth in sorted(worth, key=lambda place: -worth[place]):
         if worth[row, depth] < least:

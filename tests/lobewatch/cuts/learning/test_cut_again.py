@@ -21,9 +21,18 @@ STABLE = replace(CHATTER, word="stable", frequency=math.nan, id="c3")
     (9000, 12.1e-3, True), (9000, 20e-3, True), (9080, 12.2e-3, True), (8920, 11.2e-3, True),
     (9000, 10.9e-3, False), (9100, 12.2e-3, False), (8900, 20e-3, False),
 ])  # fmt: skip
-def test_chatter_takes_its_place_a_tenth_above_it_and_all_below(speed: float, depth: float, taken: bool) -> None:
-    assert is_taken(speed, depth, [CHATTER]) is taken
-    assert not is_taken(speed, depth, [STABLE])
+def test_chatter_that_is_not_believed_takes_its_place_a_tenth_above_it_and_all_below(
+    speed: float, depth: float, taken: bool
+) -> None:
+    assert is_taken(speed, depth, [CHATTER], [CHATTER]) is taken
+    assert not is_taken(speed, depth, [STABLE], [STABLE])
+
+
+@pytest.mark.parametrize(("depth", "taken"), [(12.1e-3, True), (11.8e-3, True), (11.6e-3, False), (20e-3, True)])
+def test_chatter_that_is_believed_takes_4_percent_above_it(depth: float, taken: bool) -> None:
+    assert is_taken(8920, depth, [CHATTER]) is taken
+    assert not is_taken(8920, depth, [STABLE])
+    assert not is_taken(8900, depth, [CHATTER])
 
 
 def test_a_place_is_free_again_where_the_same_cut_was_stable_later_and_not_before() -> None:

@@ -200,11 +200,10 @@ def test_chatter_beyond_a_pocket_that_sounds_as_at_its_limit_speaks_for_the_trut
 @pytest.mark.long
 @pytest.mark.timeout(3000)
 def test_five_cuts_find_most_of_what_a_hidden_spindle_can_do() -> None:
-    """0.93 is wanted in the median, and not reached: what a prior costs that is wider than the truths."""
     spindles = [Hidden(number) for number in range(200)]
     five_cuts(spindles)
     share = [one.share[-1] for one in spindles]
-    assert np.median(share) >= 0.91
+    assert np.median(share) >= 0.93
     assert np.quantile(share, 0.1) >= 0.82
     assert np.mean([sum(cut.chatters for cut in one.cuts) for one in spindles]) <= 2.5
     for names in (["tangential"], ["frequency_x", "frequency_y"]):

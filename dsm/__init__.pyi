@@ -8,7 +8,7 @@ from .calibration.calibrate import calibrate
 from .calibration.calibrate_damping import DampingCalibration, UnreachableDampingError, calibrate_damping
 from .calibration.calibration import Calibration, UnreachableFrequencyError
 from .calibration.fit_stiffness import fit_stiffness
-from .calibration.plus_minus import plus_minus
+from .calibration.plus_minus import plus_minus, rounded
 from .calibration.predict_mode import PredictedMode, predict_mode
 from .calibration.preload_left import PreloadLeft, preload_left
 from .calibration.receptance_map import receptance_map
@@ -81,6 +81,7 @@ __all__ = [
     "preload_left",
     "receptance",
     "receptance_map",
+    "rounded",
     "spindle_side",
     "spinning_element",
     "spinning_frequencies",

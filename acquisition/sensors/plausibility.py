@@ -94,10 +94,11 @@ def stiffness_doubt(stiffness: float) -> Remark | None:
     low, high = STIFFNESSES
     if low <= abs(stiffness) <= high:
         return None
+    shown = f"{stiffness:.0f} N/m" if abs(stiffness) < low else f"{stiffness / 1e6:.0f} N/um"
     return Remark(
         "stiffness-not-believed",
         "",
-        f"K = {stiffness:.3g} N/m is outside {low:g} to {high:g} N/m",
+        f"K = {shown} is outside {low / 1e6:g} to {high / 1e6:.0f} N/um",
         "check the units of both sensitivities (g or m/s^2, mV or V, lbf or N) with a known mass",
     )
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from decimal import Decimal
+from typing import TypeGuard
 
 SMALLEST = 1e-7
 """Share of its value below which an error is not shown: a fit of computed data has such."""
@@ -18,14 +20,38 @@ def plus_minus(value: float, std: float | None, scale: float = 1.0, unit: str = 
     >>> plus_minus(696.2, None, unit="Hz")
     '696.2 Hz'
     """
+    shown, behind = rounded(value, std, scale), f" {unit}" if unit and math.isfinite(value) else ""
+    if not math.isfinite(value) or not _has_error(std, value):
+        return f"{shown}{behind}"
+    error, relative = std / scale, 100 * std / abs(value) if value else math.inf
+    share = f" ({relative:.2g} %)" if relative < 99.5 else f" ({relative:.0f} %)"
+    return f"{shown} ± {error:.{_decimals(error)}f}{behind}{share if percent else ''}"
+
+
+def rounded(value: float, std: float | None = None, scale: float = 1.0, digits: int = 6) -> str:
+    """Value with as many digits as its standard error leaves, e.g. "1326.8" of 1326.812 ± 5.3; "-" without a value.
+
+    Both are divided by `scale` first. Without an error so many digits, eight where it is next to none; no exponent.
+
+    >>> rounded(1326.812e6, 5.3e6, scale=1e6)
+    '1326.8'
+    >>> rounded(1.125e13, scale=1e6)
+    '11250000'
+    """
     if not math.isfinite(value):
         return "-"
-    shown, behind = value / scale + 0.0, f" {unit}" if unit else ""
-    if std is None or not math.isfinite(std):
-        return f"{shown:.6g}{behind}"
-    if std <= SMALLEST * abs(value):
-        return f"{shown:.8g}{behind}"
-    error = std / scale
-    decimals = max(1 - math.floor(math.log10(error)), 0)
-    share = f" ({100 * std / abs(value):.2g} %)" if percent else ""
-    return f"{round(shown, decimals) + 0.0:.{decimals}f} ± {error:.{decimals}f}{behind}{share}"
+    shown = value / scale + 0.0
+    if _has_error(std, value):
+        decimals = _decimals(std / scale)
+        return f"{round(shown, decimals) + 0.0:.{decimals}f}"
+    text = f"{shown:.{digits if std is None or not math.isfinite(std) else 8}g}"
+    return f"{Decimal(text):f}" if "e" in text else text
+
+
+def _has_error(std: float | None, value: float) -> TypeGuard[float]:
+    return std is not None and math.isfinite(std) and std > SMALLEST * abs(value)
+
+
+def _decimals(error: float) -> int:
+    """Decimals that show two digits of an error, none where it is large."""
+    return max(1 - math.floor(math.log10(error)), 0)

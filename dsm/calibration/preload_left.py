@@ -21,9 +21,10 @@ class PreloadLeft(NamedTuple):
 
     def __str__(self) -> str:
         """For people."""
+        low, high = (f"{100 * end:.2g}" if end < 0.995 else f"{100 * end:.0f}" for end in self)
         steep, flat = (1 / exponent for exponent in RADIAL_EXPONENTS)
-        law = f"(k/k0)^{steep:.1f} and (k/k0)^{flat:.1f} of radial stiffness"
-        return f"preload left: {self.low:.2g} to {self.high:.2g} of that at the start, if balls roll: {law}, no finer"
+        law = f"stiffness to the power of {flat:.1f} to {steep:.1f}"
+        return f"preload left: {low} to {high} % of that at the start, if the bearings have balls (by {law}); no finer"
 
 
 def preload_left(bearings: Iterable[Bearing], factor: float) -> PreloadLeft | None:

@@ -74,7 +74,7 @@ def status(
         counted = ", ".join(f"{lights.count(light)} {light.value}" for light in Light if light in lights)
         count = f"{len(rows)} machine{'s' if len(rows) > 1 else ''}: {counted}"
         without_points = [{name: value for name, value in row.items() if name not in FOR_THE_PAGE} for row in shown]
-        emit({"machines": without_points}, as_json, "" if as_json else plant_text(shown, results.width), count)
+        emit({"machines": without_points}, as_json, "" if as_json else plant_text(shown), count)
     if prometheus is not None:
         from acquisition.atomic import atomic_write
         from lobewatch.notify.prometheus import prometheus_text

@@ -24,6 +24,6 @@ def extract_decays(hits: Sequence[Hit], band: tuple[float, float] | None = None)
 
 def about_decays(sensor: SensorLoading) -> list[Remark]:
     """Remarks on what free decays do not tell; the mass of the sensor stays in them, for what it does needs K."""
-    text = "no force was measured: f_n and zeta are known, K is not; no stability lobes, no depths"
+    text = "no force was measured: frequency and damping are known, stiffness is not; no stability lobes, no depths"
     remark = Remark(WITHOUT_FORCE, "", text, "tap with a hammer that measures its force")
     return [remark, *([mass_stays(sensor, "what they do needs K")] if sensor.mass else [])]

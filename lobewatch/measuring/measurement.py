@@ -13,7 +13,7 @@ import numpy as np
 from threadpoolctl import ThreadpoolController
 
 from acquisition import ACROSS, Frf, Remark, TapTest
-from dsm import Calibration, calibrate, modal_stiffness
+from dsm import Calibration, calibrate, modal_stiffness, rounded
 from lobewatch.machine import BY_FIT, Machine
 from lobewatch.measuring.decays import about_decays, extract_decays
 from lobewatch.measuring.questions import (
@@ -248,10 +248,12 @@ def _calibration_doubt(calibration: Calibration, followed: Mode, last: Mode | No
     before = followed.stiffness if last is None else last.stiffness
     ratio = followed.stiffness / before if followed.has_stiffness and not math.isnan(before) else 1.0
     if not low <= calibration.bearing_stiffness <= high:
-        text = f"bearing stiffness {calibration.bearing_stiffness:.3g} N/m is outside {low:g} to {high:g} N/m"
+        stiffness = rounded(calibration.bearing_stiffness, scale=1e6, digits=3)
+        text = f"bearing stiffness {stiffness} N/um is outside {low / 1e6:g} to {high / 1e6:.0f} N/um"
         cure = "compare [spindle] with the drawing, and [mode] model_mode with the mode that is tapped"
     elif not 1 / LARGEST_RATIO <= ratio <= LARGEST_RATIO:
-        text = f"K was {before:.3g} N/m in the test before, is {followed.stiffness:.3g} now, {ratio:.2g} times as much"
+        then, now = (rounded(stiffness, scale=1e6, digits=3) for stiffness in (before, followed.stiffness))
+        text = f"stiffness was {then} N/um in the test before, is {now} now, {ratio:.2g} times as much"
         cure = "tap again; compare the sensitivities of hammer and accelerometer, and where it was tapped"
     else:
         return None

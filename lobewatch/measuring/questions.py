@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import Frf, Remark
+from dsm import rounded
 from lobewatch.machine import Machine, MachineFolder, TapEntry
 from lobewatch.measuring.clock import AHEAD, BEHIND, CLOCK_QUESTIONS, RELEASED, TOO_OLD, about_clock, is_ahead
 from modal import Mode
@@ -51,7 +52,7 @@ def frequency_jump(last: Mode, now: Mode) -> Remark | None:
     change = now.frequency / last.frequency - 1
     if abs(change) <= LARGEST_JUMP:
         return None
-    text = f"f_n {now.frequency:.1f} Hz is {100 * change:+.0f} % off the newest test of the series"
+    text = f"frequency {now.frequency:.1f} Hz is {100 * change:+.0f} % off the newest test of the series"
     text += f" ({last.frequency:.1f} Hz): is this the machine, the tool and the direction it is said to be?"
     return Remark("frequency-jump", f"{now.frequency:.0f} Hz", text)
 
@@ -75,7 +76,8 @@ def stiffness_off_model(first: Mode, model: float) -> Remark | None:
     ratio = first.stiffness / model
     if 1 / LARGEST_MISFIT <= ratio <= LARGEST_MISFIT:
         return None
-    text = f"K {first.stiffness / 1e6:.3g} N/um is {ratio:.2g} times that of the model, {model / 1e6:.3g} N/um"
+    here, there = (rounded(stiffness, scale=1e6, digits=3) for stiffness in (first.stiffness, model))
+    text = f"stiffness {here} N/um is {ratio:.2g} times that of the model, {there} N/um"
     text += ": is this the machine of [spindle], are the sensitivities of hammer and accelerometer right?"
     return Remark("stiffness-off-model", f"{first.frequency:.0f} Hz", text)
 

@@ -79,8 +79,8 @@ def _about_unknown_mass(modes: Sequence[Mode], frf: Frf) -> Iterator[Remark]:
     felt = [pair for pair in loadings if -pair[1].frequency > pair[0].interval()[0, 1] / pair[0].frequency - 1]
     if felt:
         mode, loading = min(felt, key=lambda pair: pair[1].frequency)
-        changes = f"f_n by {100 * loading.frequency:+.1f} % and K by {100 * loading.stiffness:+.0f} %"
-        text = f"an accelerometer of {1e3 * USUAL_MASS:g} g would change {changes}, more than the interval of f_n"
+        changes = f"the frequency by {100 * loading.frequency:+.1f} % and stiffness by {100 * loading.stiffness:+.0f} %"
+        text = f"an accelerometer of {1e3 * USUAL_MASS:g} g would change {changes}, more than its interval"
         cure = "enter [tap] sensor_mass_g (0 where nothing rides on the structure), or --sensor-mass for a file"
         yield Remark("sensor-mass-unknown", f"{mode.frequency:.0f} Hz", f"{text}: its mass is not known", cure)
 

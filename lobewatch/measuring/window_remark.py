@@ -15,9 +15,9 @@ def about_hidden_window(hits: Sequence[Hit], modes: Sequence[Mode]) -> Iterator[
     if hits:
         tau, sign = hidden_window(hits), "the noise at the end of the records is lower than before the hits"
     else:
-        rate, sign = common_decay(trusted), "all modes decay alike, zeta falls as 1/f"
+        rate, sign = common_decay(trusted), "all modes decay alike, damping falls as 1/f"
         tau = None if rate is None else 1 / rate
     if tau is not None:
-        lost = "zeta is too large, and K by what it had lost by the hit"
+        lost = "damping is too large, and stiffness by what it had lost by the hit"
         text = f"{sign}, as under an exponential window of {tau:.2g} s: {lost}"
         yield Remark("window-suspected", "", text, "look it up, and name it with --window, or export without")

@@ -202,10 +202,10 @@ def _values(measurement: Measurement, series: SeriesStanding | None) -> list[str
         sign = "+" if series.fall.value < 0 else ""
         against = f"{sign}{plus_minus(-series.fall.value, series.fall.std)} % against the first test"
     damping = plus_minus(mode.damping_ratio, zeta_std, 0.01)
-    stiffness = f"K {plus_minus(mode.stiffness, k_std, 1e6)} N/um, zeta {damping} %."
+    stiffness = f"stiffness {plus_minus(mode.stiffness, k_std, 1e6)} N/um, damping {damping} %."
     if not mode.has_stiffness:
-        stiffness = f"zeta {damping} %; K is not known, for no force was measured."
-    return [f"f_n {plus_minus(mode.frequency, f_std)} Hz, {against}.", stiffness]
+        stiffness = f"damping {damping} %; stiffness is not known, for no force was measured."
+    return [f"frequency {plus_minus(mode.frequency, f_std)} Hz, {against}.", stiffness]
 
 
 def plan_session(

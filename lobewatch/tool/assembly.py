@@ -179,7 +179,7 @@ def _about_directions(
     days = round((newest.time - across.time) / timedelta(days=1))
     text = f"direction {across.direction} is that of {across.time:%Y-%m-%d}, {days} day{'s' if days > 1 else ''} older"
     if moved is not None:
-        text += f", its f_n moved by {100 * (moved - 1):+.1f} % as that of {newest.direction} since"
+        text += f", its frequency moved by {100 * (moved - 1):+.1f} % as that of {newest.direction} since"
     return (Remark("older-direction", newest.tool, text, f"tap direction {across.direction} again"),)
 
 

@@ -59,7 +59,7 @@ class MountedTools:
             return
         self._drawbar[tap.tool] = now
         if before not in (None, now):
-            text = f"drawbar force {now:g} kN, {before:g} kN before: f_n may have changed with it"
+            text = f"drawbar force {now:g} kN, {before:g} kN before: the frequency may have changed with it"
             yield Remark("drawbar-changed", tap.tool, text, "where it was not meant, have the drawbar looked at")
 
     def _about_hours(self, tap: TapEntry) -> Iterator[Remark]:

@@ -34,8 +34,8 @@ def softening(assembly: Assembly) -> tuple[StiffnessAt, Remark]:
     clause = "K does not (no model)"
     if ratios.size > 1:
         fall, change = 100 * FALLS[ratios.size - 1], 100 * (ratios[-1] - 1)
-        clause = f"K changes as in the model ({change:+.1f} % when f_n has fallen by {fall:.0f} %)"
-    text = f"decay left: all modes fall alike, zeta does not change, {clause}"
+        clause = f"stiffness changes as in the model ({change:+.1f} % when the frequency has fallen by {fall:.0f} %)"
+    text = f"fall left: all modes fall alike, damping does not change, {clause}"
 
     def stiffness_at(fall: float) -> float:
         return float(np.interp(fall, FALLS[: ratios.size], ratios))

@@ -101,5 +101,5 @@ def pockets_remark(table: CutTable, name: str, assembly: Assembly, machine: Mach
     best = speed_pockets(table, assembly, machine)
     if not best:
         return ()
-    text = f"pockets by f_n and damping: {pockets_text(best)}; how deep, test cuts tell"
+    text = f"pockets by frequency and damping: {pockets_text(best)}; how deep, test cuts tell"
     return (Remark(SPEEDS_ALONE, name, text, "lobewatch suggest leads to a depth in five test cuts"),)

@@ -36,7 +36,7 @@ from lobewatch.tap.emulated_cut import emulate_cut
 DATA = Path(__file__).parents[1] / "data"
 SEEN = DATA / "demo"
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-ARBITRARY = re.compile(r"(?<=_[xy]_)[0-9a-f]{4}\b|(?<=\"worst_feed_deg\": )[0-9.]+|(?<=by lobewatch )[0-9.]+\d")
+ARBITRARY = re.compile(r"(?<=[xy]_)[0-9a-f]{4}\b|(?<=\"worst_feed_deg\": )[0-9.]+|(?<=by lobewatch )[0-9.]+\d")
 """Ends of identities, which of two directions of feed with the same limit is named (rounding decides), the version."""
 SAME = 3e-5
 """Relative difference that another processor makes at most: 6e-6 was seen."""
@@ -62,6 +62,8 @@ QUESTIONS = {
     "report": "report DEMO",
 }
 """Commands by the name of what they print, in this order."""
+TEXTS = [name for name, command in QUESTIONS.items() if "--json" not in command and not command.startswith("report")]
+"""Those whose answers are text for people."""
 MEANT = {
     "DEMO": "lobewatch-demo",
     "LONG": "long end mill",
@@ -121,7 +123,7 @@ def answer(command: str) -> str:
     """What a command prints; on the port of the emulated cut where it asks for one."""
     with port_of_a_cut() if "PORT" in command else nullcontext("") as port:
         words = [(MEANT | {"PORT": port}).get(word, word) for word in command.split()]
-        told = CliRunner(env={"COLUMNS": "100"}).invoke(app, words)
+        told = CliRunner(env={"COLUMNS": "80"}).invoke(app, words)
     assert told.exit_code in (0, 1), told.output
     return told.stdout
 
@@ -144,6 +146,14 @@ def test_the_answer_is_the_one_that_was_looked_at(demo: dict[str, str], name: st
     assert NUMBER.split(demo[name]) == NUMBER.split(expected), f"what is new: {new}"
     found, wanted = ([*map(float, NUMBER.findall(text))] for text in (demo[name], expected))
     assert found == pytest.approx(wanted, rel=SAME, abs=1e-12), f"what is new: {new}"
+
+
+@pytest.mark.timeout(300)
+def test_tables_fit_eighty_columns_and_no_number_has_an_exponent(demo: dict[str, str]) -> None:
+    lines = {name: [line for line in demo[name].splitlines() if re.search(r"\S {2,}\S", line)] for name in TEXTS}
+    assert {name for name, rows in lines.items() if len(rows) > 1} >= {"demo", "check", "trend", "lobes", "history"}
+    assert [line for rows in lines.values() for line in rows if len(line) > 80] == []
+    assert [line for name in TEXTS for line in demo[name].splitlines() if re.search(r"\d[eE][-+]?\d", line)] == []
 
 
 @pytest.mark.timeout(300)

@@ -73,7 +73,7 @@ def contradiction_remarks(learnt: Posterior, contradicting: Sequence[Contradicti
     yield from map(_contradiction_remark, contradicting)
     if learnt.is_far_off:
         between = f"between {USUAL[0]:g} and {USUAL[1]:g} times it"
-        text = f"f_n at speed is further from that at rest than {between}, as test cuts sound"
+        text = f"the frequency at speed is further from that at rest than {between}, as test cuts sound"
         yield Remark("frequency-far-off", about, text, "tap again, warm, with this very tool and stick-out")
 
 

@@ -49,7 +49,7 @@ def speeds_json(cut: str, pockets: Sequence[SpeedPocket], remarks: Sequence[Rema
 
 def speeds_texts(cut: str, pockets: Sequence[SpeedPocket], remarks: Sequence[Remark]) -> list[str | Table]:
     """The same for people."""
-    heading = f"{cut}: pockets by f_n and damping, the largest removal rate first; how deep, test cuts tell"
+    heading = f"{cut}: pockets by frequency and damping, the largest removal rate first; how deep, test cuts tell"
     return [heading, speed_table(pockets), *remark_lines(remarks)]
 
 

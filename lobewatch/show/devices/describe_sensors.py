@@ -57,7 +57,7 @@ def _channel_json(channel: Channel) -> dict[str, Any]:
 
 
 def _channel_table(channels: tuple[Channel, ...]) -> Table:
-    rows = table("channel", "<quantity", "sensitivity", "range", "input", "bits", "skew (us)", "<serial", "<calibrated")
+    rows = table("no", "<quantity", "sensitivity", "range", "input", "bits", "skew\n(us)", "~serial", "<calibrated")
     for i, channel in enumerate(channels):
         unit, si = ("N", 1.0) if channel.quantity == "force" else ("g", STANDARD_GRAVITY)
         rows.add_row(

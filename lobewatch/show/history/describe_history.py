@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from datetime import UTC, datetime
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 from rich.cells import cell_len, set_cell_size
 
 from acquisition import Conditions
+from dsm import rounded
 from lobewatch.history import Row
 from lobewatch.logbook import Logbook
 from lobewatch.machine import TapEntry
@@ -21,7 +22,14 @@ from lobewatch.show.terminal.csv_text import csv_text
 
 VALUES = {"frequency_hz": "frequency", "damping_ratio": "damping_ratio", "stiffness_n_per_m": "stiffness"}
 """Field of a row by its name in CSV and JSON."""
-HEADINGS = ["time", "what", "tool", "in", "f_n (Hz)", "zeta (%)", "K (N/um)", "identity, programs and remarks"]
+HEADINGS = (
+    ("time", "what", "tool", "in", "frequency", "damping", "stiffness", "name"),
+    ("", "", "", "", "(Hz)", "(%)", "(N/um)", ""),
+)
+NUMBERS = 4, 5, 6
+"""Columns of numbers."""
+SHORTEST = 6
+"""Characters of the shortest name of a tap test, an end of its identity: "x_ecbf"."""
 UNDER = tuple(field.name for field in fields(Conditions))
 COLUMNS = ("time", "kind", "id", "tool", "direction")
 CONDITION_WORDS = {
@@ -83,27 +91,53 @@ def history_csv(logbook: Logbook) -> str:
 
 
 def history_lines(logbook: Logbook) -> list[str]:
-    """For people, in local time: a line for each tap test and event below the headings."""
-    rows = [HEADINGS, *(_cells(line) for line in _lines(logbook))]
+    """For people, in local time: a line for each tap test and event below the headings, what is said of it below it."""
+    lines = _lines(logbook)
+    taps = [line["id"] for line in lines if "direction" in line]
+    names = dict(zip(taps, short_names(taps), strict=True))
+    rows = [*HEADINGS, *((*_cells(line), names.get(line["id"], line.get("name", ""))) for line in lines)]
     widths = [max(map(cell_len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(map(set_cell_size, row, [*widths[:-1], cell_len(row[-1])])) for row in rows]
+    shown = ["  ".join(_placed(row, widths)).rstrip() for row in rows]
+    texts = ["", "", *map(_said, lines)]
+    return [part for row, text in zip(shown, texts, strict=True) for part in (row, f"  {text}") if part.strip()]
+
+
+def short_names(ids: Sequence[str]) -> list[str]:
+    """The shortest end of each identity that no other contains, of six characters at least.
+
+    Commands take it in place of the identity.
+    """
+    joined = "\n".join(ids)
+    return [
+        next((name[-size:] for size in range(SHORTEST, len(name)) if joined.count(name[-size:]) == 1), name)
+        for name in ids
+    ]
+
+
+def _placed(row: Sequence[str], widths: Sequence[int]) -> Iterator[str]:
+    """Cells as wide as their columns, numbers to the right."""
+    for place, (cell, width) in enumerate(zip(row, widths, strict=True)):
+        yield " " * (width - cell_len(cell)) + cell if place in NUMBERS else set_cell_size(cell, width)
 
 
 def _cells(line: Mapping[str, Any]) -> list[str]:
     when = f"{datetime.fromisoformat(line['time']).astimezone():%Y-%m-%d %H:%M}"
     numbers = [_number(line, name, scale) for name, scale in zip(VALUES, (1.0, 0.01, 1e6), strict=True)]
-    return [when, line["kind"], line.get("tool", ""), line.get("direction", ""), *numbers, _said(line)]
+    return [when, line["kind"].removeprefix("new "), line.get("tool", ""), line.get("direction", ""), *numbers]
 
 
 def _lines(logbook: Logbook) -> list[dict[str, Any]]:
     """Tap tests, excluded ones, events, acknowledgements and test cuts, oldest first."""
     history = history_json(logbook)
-    events = [event | {"kind": "new baseline" if event["new_baseline"] else "event"} for event in history["events"]]
+    events = [
+        event | {"kind": "new baseline" if event["new_baseline"] else "event", "name": event["id"]}
+        for event in history["events"]
+    ]
     excluded = [tap | {"kind": "excluded"} for tap in history["excluded"]]
     taps = [tap | {"kind": kind} for kind, name in (("tap", "taps"), ("kept", "kept")) for tap in history[name]]
     cuts = [_cut_line(cut) for cut in history["cuts"]]
     words = [
-        {"kind": "ack", "id": word.alarm, "time": _utc(word.time), "text": str(word)}
+        {"kind": "ack", "id": word.alarm, "time": _utc(word.time), "text": f"{word.alarm}: {word}"}
         for word in logbook.files.acknowledgements
     ]
     return sorted([*events, *excluded, *taps, *cuts, *words], key=lambda line: line["time"])
@@ -113,7 +147,7 @@ def _cut_line(cut: Mapping[str, Any]) -> dict[str, Any]:
     """A test cut as the table shows it."""
     kind = "excluded" if cut["excluded"] else "cut"
     shown = {name: cut[name] for name in ("id", "time", "tool", "text")}
-    return {**shown, "kind": kind, "reason": cut["excluded"], "conditions": {}}
+    return {**shown, "kind": kind, "name": cut["id"], "reason": cut["excluded"], "conditions": {}}
 
 
 def _tap_json(row: Row, logbook: Logbook) -> dict[str, Any]:
@@ -146,18 +180,18 @@ def _cell(value: Any) -> Any:
 
 def _number(line: Mapping[str, Any], name: str, scale: float) -> str:
     value = line.get(name, math.nan)
-    return f"{value / scale:.5g}" if math.isfinite(value) else ""
+    return rounded(value, line[f"{name}_std"], scale) if math.isfinite(value) else ""
 
 
 def _said(line: Mapping[str, Any]) -> str:
-    """Its text or reason, conditions, what is asked, and the verdicts of then; of a tap test the identity too."""
+    """Its text or reason, conditions, what is asked, and the verdicts of then."""
     if "text" in line:
-        return f"{line['id']}: {line['text']}{'; ' + line['reason'] if line.get('reason') else ''}"
+        return f"{line['text']}{'; ' + line['reason'] if line.get('reason') else ''}"
     under = conditions_texts(Conditions.of(line["conditions"]))
     if line["kind"] == "excluded":
-        return "; ".join([f"{line['id']}: {line['reason']}", *under])
+        return "; ".join([line["reason"], *under])
     words = [f"{name}: {word}" for name, word in line["verdicts"].items()]
-    return "; ".join([line["id"], *under, *(f"question {code}" for code in line["questions"]), *words])
+    return "; ".join([*under, *(f"question {code}" for code in line["questions"]), *words])
 
 
 def conditions_texts(conditions: Conditions) -> list[str]:

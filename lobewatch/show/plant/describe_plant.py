@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 import math
-import textwrap
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
-from rich.cells import cell_len
+from rich.cells import cell_len, set_cell_size
 
 from lobewatch.show.terminal.csv_text import csv_text
 from lobewatch.show.terminal.output import printable
 
 COLUMNS = ("key", "name", "light", "fall", "fall_std", "series", "last_tap", "days_left", "note", "next_step")
 """Keys of a row of the dashboard, in the order of the CSV."""
-HEADINGS = ("folder", "machine", "light", "fallen (%)", "last tap", "limit ahead", "why", "next")
-NARROWEST = 24
-"""Width of the last two columns at least, which are broken to fit."""
+HEADINGS = ("machine", "light", "fallen (%)", "last tap", "limit ahead")
 
 
-def plant_text(rows: Sequence[Mapping[str, Any]], width: int) -> str:
-    """A line a machine, with its worst reason; more where texts do not fit into the width."""
+def plant_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """A line a machine, with its worst reason and the next step below it."""
     lines = [HEADINGS, *map(_cells, rows)]
-    widths = [max(cell_len(line[i]) for line in lines) for i in range(len(HEADINGS) - 2)]
-    left = max((width - sum(widths) - 2 * len(widths) - 2) // 2, NARROWEST)
-    return "\n".join(text for line in lines for text in _broken(line, [*widths, left, left]))
+    widths = [max(map(cell_len, column)) for column in zip(*lines, strict=True)]
+    shown = ["  ".join(map(set_cell_size, line, widths)).rstrip() for line in lines]
+    texts = [[], *map(_texts, rows)]
+    return "\n".join(part for line, below in zip(shown, texts, strict=True) for part in (line, *below))
 
 
 def plant_csv(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -34,26 +32,27 @@ def plant_csv(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _cells(row: Mapping[str, Any]) -> tuple[str, ...]:
-    first, *further = row["reasons"] or [""]
-    why = f"{first} (and {len(further)} more)" if further else first
     light = f"{'early ' if row['is_early'] else ''}{row['light'].value}"
-    cells = row["key"], row["name"], light, _fallen(row), _due(row), row["limit"], why, row["next_step"]
-    return tuple(printable(cell).replace("\n", " ").replace("\t", " ") for cell in cells)
+    return _one_line(row["key"]), light, _fallen(row), _due(row), row["limit"]
 
 
-def _broken(cells: Sequence[str], widths: Sequence[int]) -> Iterator[str]:
-    why, step = (textwrap.wrap(text, widths[-1], break_long_words=False, break_on_hyphens=False) for text in cells[-2:])
-    for i in range(max(len(why), len(step), 1)):
-        parts = [
-            *(cells[:-2] if i == 0 else [""] * (len(cells) - 2)),
-            *(lines[i] if i < len(lines) else "" for lines in (why, step)),
-        ]
-        yield "  ".join(part + " " * (wide - cell_len(part)) for part, wide in zip(parts, widths, strict=True)).rstrip()
+def _texts(row: Mapping[str, Any]) -> list[str]:
+    """Its name where the folder has another, the worst reason, and what to do."""
+    first, *further = row["reasons"] or [row["why"]]
+    why = first + (f" (and {len(further)} more)" if further else "")
+    named = row["name"] if row["name"] != row["key"] else ""
+    return [f"  {_one_line(text)}" for text in (": ".join(filter(None, (named, why))), row["next_step"]) if text]
+
+
+def _one_line(text: str) -> str:
+    return printable(text).replace("\n", " ").replace("\t", " ")
 
 
 def _fallen(row: Mapping[str, Any]) -> str:
     if row["fall"] is None:
         return ""
+    if row["fall_std"] == 0:
+        return "first test"
     return f"{row['fall']:.2f}" + ("" if row["fall_std"] is None else f" ± {row['fall_std']:.2f}")
 
 

@@ -229,5 +229,5 @@ def spare_text(setting: Setting) -> str:
 
 def _left(fall: float) -> str:
     if fall <= 0:
-        return f"f_n may fall by less than {100 * LEFT[1]:g} %"
-    return f"f_n may fall by {100 * fall:.3g} %" + (" or more" if fall >= LEFT[-1] else "")
+        return f"the frequency may fall by less than {100 * LEFT[1]:g} %"
+    return f"the frequency may fall by {100 * fall:.3g} %" + (" or more" if fall >= LEFT[-1] else "")

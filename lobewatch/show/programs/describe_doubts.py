@@ -19,7 +19,8 @@ PAGE = "docs/lobes.md"
 """Page that says where the sizes come from."""
 AT_REST = (
     "The words hold for the spindle as tapped, at rest, and low..high for 98 % of the doubt. turning: chance of "
-    "chatter once it turns and cuts, where f_n, zeta, K and the cutting force may differ; plausible, not measured."
+    "chatter once it turns and cuts, where frequency, damping, stiffness and cutting force may differ; plausible, not "
+    "measured."
 )
 """Sentences that a table of verdicts is read by."""
 GIVEN = "machine.toml"
@@ -30,12 +31,12 @@ NOTHING = 5e-5
 NAMES = {
     "tangential": "Kt",
     "ratio": "Kr/Kt",
-    "frequency_x": "f_n in x",
-    "frequency_y": "f_n in y",
-    "damping_x": "zeta in x",
-    "damping_y": "zeta in y",
-    "stiffness_x": "K in x",
-    "stiffness_y": "K in y",
+    "frequency_x": "frequency in x",
+    "frequency_y": "frequency in y",
+    "damping_x": "damping in x",
+    "damping_y": "damping in y",
+    "stiffness_x": "stiffness in x",
+    "stiffness_y": "stiffness in y",
 }
 """Terms of what test cuts teach, by the name of the factor; further modes of a direction: `term`."""
 
@@ -158,7 +159,7 @@ def _coefficients(verdict: Verdict, doubt: Doubt, machine: Machine) -> Iterator[
 
 def _sizes(widths: Floats) -> str:
     """Half-widths of frequency, damping ratio, stiffness and phase; those that are next to nothing are left out."""
-    named = zip(("f_n", "zeta", "K"), widths[:3].tolist(), strict=True)
+    named = zip(("frequency", "damping", "stiffness"), widths[:3].tolist(), strict=True)
     texts = [f"{name} {_half(width)}" for name, width in named if width > NOTHING]
     texts += [f"phase ±{DEGREE * widths[3]:.2g} deg"] if widths[3] > NOTHING else []
     return ", ".join(texts) or "nothing"

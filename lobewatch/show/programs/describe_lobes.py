@@ -82,7 +82,7 @@ def _limit_line(comparison: LobeComparison) -> str:
 
 def pocket_table(pockets: Sequence[Setting]) -> Table:
     """Settings that can be recommended, a line each."""
-    rows = table("pocket: speed (rpm)", "window (rpm)", "depth (mm)", "depth to spare", "f_n may fall by")
+    rows = table("pocket: speed (rpm)", "window (rpm)", "depth (mm)", "depth to spare", "fall left")
     for pocket in pockets:
         low, high = pocket.window_rpm
         left = f"{100 * pocket.frequency_left:.0f} %{' or more' if pocket.frequency_left >= LEFT[-1] else ''}"

@@ -42,19 +42,20 @@ def material_json(known: Coefficients) -> dict[str, Any]:
 
 def material_texts(known: Sequence[Coefficients]) -> Iterator[str | Table]:
     """A table of them, what its numbers are, and the sources of a few."""
-    rows = table("<material", "<ISO", "Kt (N/mm²)", "low..high", "Kr/Kt", "low..high", "Kte (N/mm)", "~also")
+    in_short = len(known) > FEW
+    heads = "~material", "<ISO", "Kt\n(N/mm²)", "low..high", "Kr/Kt"
+    rows = table(*heads, *([] if in_short else ["low..high", "Kte\n(N/mm)", "~also"]))
     for one in known:
         force = f"{one.tangential / 1e6:.0f}", _range(one.tangential_range, 1e6, 0)
         ratio = f"{one.radial / one.tangential:.2f}", _range(one.ratio_range, 1.0, 2)
         edge = "-" if math.isnan(one.tangential_edge) else f"{one.tangential_edge / 1e3:.0f}"
-        rows.add_row(
-            escape(one.material), one.iso_group or "-", *force, *ratio, edge, escape(", ".join(one.equivalents))
-        )
+        cells = escape(one.material), one.iso_group or "-", *force, *ratio, edge, escape(", ".join(one.equivalents))
+        rows.add_row(*(cells[: len(heads)] if in_short else cells))
     yield rows
-    if len(known) <= FEW:
+    if not in_short:
         yield from (f"{one.material}: {'; '.join(filter(None, (one.note, one.source)))}" for one in known)
     else:
-        yield "sources: lobewatch materials NAME, or --json"
+        yield "range of Kr/Kt, force at the edge, other names, sources: lobewatch materials NAME, or --json"
     if any(one.specific_forces for one in known):
         thin, thick = (f"{chip * 1e3:g}" for chip in CHIPS)
         yield (

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 from typing import Any
 
 from rich.table import Table
@@ -11,7 +13,7 @@ from rich.table import Table
 from acquisition import Remark
 from lobes.floquet.program_limit import DEEPEST
 from lobewatch.show.programs.describe_advice import rpm
-from lobewatch.show.terminal.output import remark_json, remark_lines, table
+from lobewatch.show.terminal.output import SHORTEST, remark_json, remark_lines, table
 from lobewatch.verdicts.pitch_proposal import WORTH, JudgedPitch, PitchProposal
 
 IN_LINES = ("doubt-decides",)
@@ -69,26 +71,33 @@ def _remarks(proposal: PitchProposal, remarks: Sequence[Remark]) -> list[Remark]
 
 
 def _pitches_table(proposal: PitchProposal, depth_mm: float | None) -> Table:
-    """A line each, equal pitch first."""
+    """Each pattern in as many lines as its angles need, two at least, equal pitch first."""
     words = [] if depth_mm is None else [f"<at {depth_mm:g} mm"]
-    rows = table("<pitch (deg)", "<pattern", "limit (mm) low..high", "over equal pitch", "chips", "off centre", *words)
+    heads = "<pitch\n(deg)", "<pattern", "limit (mm)\nlow..high", "over\nequal", "largest\nchip", "off\naxis"
+    rows = table(*heads, *words)
     for judged in (proposal.equal, *proposal.unequal):
-        least, most = judged.pattern.chips
-        limit = f"{_mm(judged.limit)} ({_mm(judged.low)}..{_mm(judged.high)})"
-        chips = "even" if most - least < 1e-6 else f"{least:.2f} to {most:.2f}"
-        gain = "" if judged is proposal.equal else _gain_text(judged)
-        angles = " ".join(f"{angle:.4g}" for angle in judged.pattern.pitch_deg)
-        balance, word = f"{100 * judged.pattern.off_centre:.1f} %", [judged.word] if words else []
-        rows.add_row(angles, judged.pattern.name, limit, gain, chips, balance, *word)
+        columns = [*_columns(judged, judged is proposal.equal), *([[judged.word.value]] if words else [])]
+        for line in zip_longest(*columns, fillvalue=""):
+            rows.add_row(*line)
     return rows
+
+
+def _columns(judged: JudgedPitch, is_equal: bool) -> Iterator[list[str]]:
+    """Lines of each column but that of the word."""
+    yield textwrap.wrap(" ".join(f"{angle:.4g}" for angle in judged.pattern.pitch_deg), SHORTEST)
+    yield [judged.pattern.name]
+    yield [_mm(judged.limit), f"({_mm(judged.low)}..{_mm(judged.high)})"]
+    yield [""] if is_equal else _gain_texts(judged)
+    yield [f"{judged.pattern.chips[1]:.2f}"]
+    yield [f"{100 * judged.pattern.off_centre:.1f} %"]
 
 
 def _mm(depth: float) -> str:
     return f"{1e3 * depth:.2f}" if math.isfinite(depth) else "none"
 
 
-def _gain_text(judged: JudgedPitch) -> str:
-    return f"{100 * judged.gain:+.0f} % ({100 * judged.gain_low:+.0f}..{100 * judged.gain_high:+.0f} %)"
+def _gain_texts(judged: JudgedPitch) -> list[str]:
+    return [f"{100 * judged.gain:+.0f} %", f"({100 * judged.gain_low:+.0f}..{100 * judged.gain_high:+.0f} %)"]
 
 
 def _proposal_lines(proposal: PitchProposal) -> Iterator[str]:

@@ -36,7 +36,9 @@ WORDS: Mapping[Word, Look] = {
     Word.UNKNOWN: Look("?", "doubt", "bold"),
 }
 """The four words, everywhere: each is its own text."""
-HEADINGS = ("~program", "speed\n(rpm)", "depth\n(mm)", "limit (mm)\nlow..high", "turning", "f_n\nleft", "~verdict")
+LEFT = "fall\nleft"
+"""Heading of how far the frequency may fall."""
+HEADINGS = ("~program", "speed\n(rpm)", "depth\n(mm)", "limit (mm)\nlow..high", "turning", LEFT, "~verdict")
 
 
 def verdict_json(verdict: Verdict) -> dict[str, Any]:
@@ -69,7 +71,7 @@ def verdict_json(verdict: Verdict) -> dict[str, Any]:
 
 def verdict_table(verdicts: Sequence[Verdict], left: Sequence[str] = ()) -> Table:
     """Programs, a line each; left: how far the frequency of each may fall, a column where it is given."""
-    rows = table(*(heading for heading in HEADINGS if left or heading != "f_n\nleft"))
+    rows = table(*(heading for heading in HEADINGS if left or heading != LEFT))
     for i, verdict in enumerate(verdicts):
         program = verdict.program
         numbers = (f"{program.speed_rpm:g}", f"{program.depth_mm:g}", limits_text(verdict), turning_text(verdict))

@@ -11,6 +11,7 @@ from rich.table import Table
 
 from acquisition import DataError, Fact
 from acquisition.files.contents.ledger import Origin
+from dsm import rounded
 from lobewatch.logbook.preview import Preview
 from lobewatch.logbook.replaying.of_files import NAMED, of_files
 from lobewatch.measuring.questions import open_questions
@@ -59,7 +60,7 @@ def preview_texts(previews: Sequence[Preview]) -> list[str | Table]:
             *(line for preview in previews if not preview.refused for line in _in_full(preview)),
             *_refused(previews),
         ]
-    rows = table("<date", "<series", "hits", "f_n (Hz)", "<", "~file")
+    rows = table("<date", "<series", "hits", "frequency (Hz)", "<", "~file")
     for preview in previews:
         rows.add_row(*_row(preview))
     return [rows, *_below(previews)]
@@ -105,8 +106,9 @@ def _in_full(preview: Preview) -> list[str]:
 
 
 def _mode_text(mode: Mode) -> str:
-    stiffness = f", {mode.stiffness / 1e6:.3g} N/um" if mode.has_stiffness else ""
-    return f"{mode.frequency:.4g} Hz ({100 * mode.damping_ratio:.3g} %{stiffness})"
+    f_std, zeta_std, k_std = mode.standard_error.tolist()
+    stiffness = f", {rounded(mode.stiffness, k_std, 1e6)} N/um" if mode.has_stiffness else ""
+    return f"{rounded(mode.frequency, f_std)} Hz ({rounded(mode.damping_ratio, zeta_std, 0.01)} %{stiffness})"
 
 
 def _hits_text(preview: Preview) -> str:

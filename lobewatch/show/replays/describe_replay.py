@@ -86,7 +86,7 @@ def _summed_up(shown: Sequence[Row]) -> Table:
     series: dict[tuple[str, str], list[Row]] = {}
     for row in shown:
         series.setdefault((row.tool, row.direction), []).append(row)
-    rows = table("<tool", "<direction", "tests", "<from", "<to", "f_n (Hz)", "zeta (%)", "K (N/um)")
+    rows = table("<tool", "<direction", "tests", "<from", "<to", "~frequency (Hz)", "~damping (%)", "~stiffness (N/um)")
     for (tool, direction), tests in series.items():
         modes = [row.mode for row in tests if row.mode is not None]
         ends = (modes[0], modes[-1]) if modes else ()

@@ -55,7 +55,7 @@ def _machine(row: Mapping[str, Any]) -> dict[str, Any]:
         "key": row["key"],
         "light": row["word"],
         "kind": light_kind(row["light"], row["is_early"]),
-        "reasons": row["reasons"] or ["all is well"],
+        "reasons": row["reasons"] or [row["why"] or ("all is well" if row["light"] is Light.GOOD else "-")],
         "next_step": row["next_step"],
         "fallen": fallen,
         "gauge": gauge(fall, *row["limits"]) if has_changed else None,

@@ -77,7 +77,7 @@ def event_line(event: MaintenanceEvent) -> str:
 
 
 def _excluded_line(row: Row, reason: str) -> str:
-    value = f", f_n {row.frequency.value:.1f} Hz" if row.frequency.is_known else ""
+    value = f", {row.frequency.value:.1f} Hz" if row.frequency.is_known else ""
     return f"{row.time.astimezone():%Y-%m-%d}: tap test excluded ({reason}){value}"
 
 
@@ -104,7 +104,7 @@ def test_cuts(material: ReportMaterial) -> list[Section]:
 def tap_tests(material: ReportMaterial) -> list[Section]:
     """Date, tool, direction, values, words of then; the same as numbers, oldest first."""
     history = material.analysis.history.current
-    heads = ["when", "tool", "in", "f_n (Hz)", "ζ (%)", "K (N/µm)", "bearings (N/µm)", "said of it"]
+    heads = ["when", "tool", "in", "frequency (Hz)", "damping (%)", "stiffness (N/µm)", "bearings (N/µm)", "said of it"]
     numbers = Numbers(NUMBER_HEADS, [_tap_numbers(row) for row in history])
     table = DataTable(heads, [_tap_row(row) for row in reversed(history)], "words taps", numbers=numbers, key="taps")
     return [Section("Tap tests", [Paragraph(f"{COUNTING}.", is_small=True), table], is_framed=False)]

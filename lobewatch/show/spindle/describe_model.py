@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from dsm import Calibration, DampingCalibration, StiffnessFit
+from dsm import Calibration, DampingCalibration, StiffnessFit, rounded
 from lobewatch.measuring import ModelCalibration, ModelSummary
 from lobewatch.show.terminal.output import table
+
+AT_REST = 1e4
+"""Times the static stiffness at the tip: where that of a mode is higher, the tip is a node of it."""
 
 
 def calibration_json(calibration: Calibration) -> dict[str, Any]:
@@ -106,13 +109,17 @@ def model_json(model: ModelSummary) -> dict[str, Any]:
     }
 
 
+def _tip_stiffness(stiffness: float, model: ModelSummary) -> str:
+    return "at rest" if stiffness > AT_REST * model.static_stiffness else rounded(stiffness, scale=1e6, digits=4)
+
+
 def model_texts(model: ModelSummary) -> list[str | Table]:
     """A model for people."""
     spindle, critical = model.state.spindle, model.critical_speed
-    mode_table = table("mode", "f (Hz)", "K at the tip (N/um)", "energy in bearings (%)", "shaft (%)", "joints (%)")
+    mode_table = table("mode", "f (Hz)", "K at the tip\n(N/um)", "energy in\nbearings (%)", "shaft (%)", "joints (%)")
     for number, mode in enumerate(model.modes, 1):
         shares = (f"{100 * share:.1f}" for share in (mode.bearing_share, mode.segment_share, mode.joint_share))
-        mode_table.add_row(str(number), f"{mode.frequency:.2f}", f"{mode.tip_stiffness / 1e6:.4g}", *shares)
+        mode_table.add_row(str(number), f"{mode.frequency:.2f}", _tip_stiffness(mode.tip_stiffness, model), *shares)
     return [
         f"{model.state.title}: {spindle.theory}, {spindle.length * 1e3:.1f} mm, {spindle.mass:.2f} kg",
         f"bearings of {model.state.origin}",

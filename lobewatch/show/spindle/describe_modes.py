@@ -11,13 +11,15 @@ from typing import Any
 from rich.table import Table
 
 from acquisition import Fact, Remark, joined
-from dsm import plus_minus
+from dsm import plus_minus, rounded
 from lobewatch.measuring import FileModes
 from lobewatch.show.terminal.output import table
 from modal import Mode, Trust, trust_of, trust_rules
 
 ORDER = (Trust.TRUSTED, Trust.DOUBTFUL, Trust.REJECTED)
 """Order in which modes are shown."""
+MARKS = {Trust.TRUSTED: "", Trust.DOUBTFUL: "!", Trust.REJECTED: "✗"}
+"""Marks behind a mode."""
 LEAST_PHASE = 1.0
 """Phase of a modal constant worth a column (degrees)."""
 HIGH_CORRELATION = 0.5
@@ -70,27 +72,21 @@ def _is_by_hand(mode: Mode) -> bool:
 
 
 def mode_table(modes: Sequence[Mode]) -> Table:
-    """Modes, a line each, value ± standard error (in percent), the phase where there is any, and how far to believe."""
+    """Modes, a line each, value ± standard error, the phase where there is any, and a mark where one is doubtful."""
     with_phase = any(abs(mode.phase_deg) > LEAST_PHASE for mode in modes)
     rows = table("f_n (Hz)", "zeta (%)", "K (N/um)", *(["phase (deg)"] if with_phase else []), "<")
     for mode in modes:
         values = (mode.frequency, mode.damping_ratio, mode.stiffness)
         cells = [
-            "not known" if math.isnan(value) else plus_minus(value, std, scale, percent=scale == 1e6 or not with_phase)
+            "not known" if math.isnan(value) else plus_minus(value, std, scale, percent=scale == 1e6 and not with_phase)
             for value, std, scale in zip(values, mode.standard_error, (1.0, 0.01, 1e6), strict=True)
         ]
-        rows.add_row(*cells, *([_phase(mode)] if with_phase else []), _notes(mode))
+        rows.add_row(*cells, *([_phase(mode)] if with_phase else []), MARKS[trust_of(mode)])
     return rows
 
 
 def _phase(mode: Mode) -> str:
     return plus_minus(mode.phase_deg, mode.phase_deg_std or None) if mode.phase_deg else "0"
-
-
-def _notes(mode: Mode) -> str:
-    trust = trust_of(mode)
-    worth = [] if trust is Trust.TRUSTED else [str(trust)]
-    return "; ".join([*worth, *([] if mode.is_driving_point else ["not a driving point"])])
 
 
 def mode_lines(modes: Sequence[Mode]) -> list[str]:
@@ -135,15 +131,16 @@ def summary(modes: Sequence[Mode], *, everything: bool) -> str:
 
 
 def reasons(modes: Sequence[Mode]) -> list[str]:
-    """Which modes are doubtful and rejected by which rules, a line each verdict."""
-    lines = []
+    """Which modes have hammer and sensor apart, and which are doubtful and rejected by which rules, a line each."""
+    elsewhere = [f"{mode.frequency:.0f} Hz" for mode in modes if not mode.is_driving_point]
+    lines = [f"not a driving point: {', '.join(elsewhere)}"] if elsewhere else []
     for trust in ORDER[1:]:
         texts = [
             f"{mode.frequency:.0f} Hz ({', '.join(code for code, _ in trust_rules(mode))})"
             for mode in modes
             if trust_of(mode) is trust
         ]
-        lines += [f"{trust}: {', '.join(texts)}"] if texts else []
+        lines += [f"{MARKS[trust]} {trust}: {', '.join(texts)}"] if texts else []
     return lines
 
 
@@ -156,7 +153,7 @@ def picked_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
         rows.add_row(
             f"{mode.frequency:.5g}",
             f"{100 * mode.damping_ratio:.5g}",
-            f"{mode.stiffness / 1e6:.5g}",
+            rounded(mode.stiffness, scale=1e6),
             _difference(mode, near) if same and near is not None else "not fitted",
         )
     return rows

@@ -92,8 +92,7 @@ def dates_rows(outlook: Outlook) -> list[tuple[str, str, str]]:
         for name, fate in outlook.programs.items()
     ]
     return programs + [
-        (f"-{percent:g} % (fixed limit, as in the paper)", "", reach_text(reach, now))
-        for percent, reach in outlook.limits
+        (f"-{percent:g} % (fixed limit)", "", reach_text(reach, now)) for percent, reach in outlook.limits
     ]
 
 
@@ -115,7 +114,7 @@ def sentence(series: SeriesStanding) -> str:
     if trend is None:
         return f"{series.name}: unknown"
     n = len(trend.points)
-    text = f"{series.name}: {short_text(series)}{f' after {n} points' if n > 1 else ''}"
+    text = f"{series.name}: {short_text(series)}{f' ({n} points)' if n > 1 else ''}"
     if trend.forecast is None:
         known = trend.readings.known.alone
         least = f"5 points on (scatter of other series: {known.percent:.2f} %)" if known.freedom else "9 points on"
@@ -138,7 +137,7 @@ def short_text(series: SeriesStanding) -> str:
     """How far it has fallen since it started; of an only test, that there is nothing to compare it with."""
     if series.is_first:
         return "first test, nothing to compare it with yet"
-    return f"{change_text(series)} since it started" if series.fall.is_known else "unknown"
+    return f"frequency {change_text(series)} since the first tests" if series.fall.is_known else "unknown"
 
 
 def change_text(series: SeriesStanding) -> str:

@@ -198,21 +198,21 @@ HERE = Setting(12900.0, 1.95, (12160.0, 13150.0), 1.02, 0.0)
             BEST,
             None,
             "run this depth at 23 670 rpm "
-            "(23 320 to 24 000 rpm is safe; 55 % of depth to spare; f_n may fall by 10 % or more)",
+            "(23 320 to 24 000 rpm is safe; 55 % of depth to spare; the frequency may fall by 10 % or more)",
         ),
         (
             FEWER,
             HERE,
             "no safe speed for this depth in 3 000 to 24 000 rpm; most chips: 2.55 mm at 12 640 rpm "
-            "(12 510 to 12 880 rpm is safe; 50 % of depth to spare; f_n may fall by 2.5 %); at 12 900 rpm no "
-            "deeper than 1.95 mm (12 160 to 13 150 rpm is safe; 102 % of depth to spare; f_n may fall by less than "
-            "1 %)",
+            "(12 510 to 12 880 rpm is safe; 50 % of depth to spare; the frequency may fall by 2.5 %); at 12 900 rpm no "
+            "deeper than 1.95 mm (12 160 to 13 150 rpm is safe; 102 % of depth to spare; the frequency may fall by "
+            "less than 1 %)",
         ),
         (
             HERE,
             HERE,
             "no safe speed for this depth in 3 000 to 24 000 rpm; at 12 900 rpm no deeper than 1.95 mm "
-            "(12 160 to 13 150 rpm is safe; 102 % of depth to spare; f_n may fall by less than 1 %)",
+            "(12 160 to 13 150 rpm is safe; 102 % of depth to spare; the frequency may fall by less than 1 %)",
         ),
         (None, None, "no safe speed in 3 000 to 24 000 rpm; choose another tool"),
     ],
@@ -255,13 +255,13 @@ def test_a_doubtful_program_says_what_would_settle_it(shop: Shop, check: Check, 
 
 def test_the_doubt_is_told_with_its_sources_and_once(shop: Shop, check: Check, no_search: None) -> None:
     shop.tap_both()
-    default = "f_n ±0.3 %, zeta ±10 %, K ±3 % from tap to tap (default until 8 tests)"
+    default = "frequency ±0.3 %, damping ±10 %, stiffness ±3 % from tap to tap (default until 8 tests)"
     said = check().out
     assert f"doubt: {default}; speed ±1 %; Kt and Kr/Kt ±20 % (docs/lobes.md)\n" in said
     assert said.count("The words hold for the spindle as tapped, at rest") == 1
     assert said.count("turning: chance of chatter") == 1
     shop.edit("[speed]", "[doubt]\nfrequency_percent = 0.5\nspeed_percent = 2\ncoefficients_percent = 7\n\n[speed]")
-    given = "f_n ±0.5 %, zeta ±10 %, K ±3 % from tap to tap (default until 8 tests, machine.toml)"
+    given = "frequency ±0.5 %, damping ±10 %, stiffness ±3 % from tap to tap (default until 8 tests, machine.toml)"
     said = check().out
     assert f"doubt: {given}; speed ±2 % (machine.toml); Kt and Kr/Kt ±7 % (machine.toml) (docs/lobes.md)\n" in said
 
@@ -278,9 +278,12 @@ def test_other_doubts_are_told_by_program(shop: Shop, check: Check, no_search: N
     shop.tap(0, 1713.0)
     said = check().out
     assert re.search(
-        r"^doubt of Al: .*; f_n ±5 %, K ±30 % in y, not tapped; .*; Kt .*\(published for Al 7075\)", said, re.MULTILINE
+        r"^doubt of Al: .*; frequency ±5 %, stiffness ±30 % in y, not tapped; .*; Kt .*\(published for Al 7075\)",
+        said,
+        re.MULTILINE,
     )
-    predicted = "f_n ±3 %, zeta ±30 %, K ±15 % by the prediction; f_n ±5 %, K ±30 % in y, not tapped; speed ±1 %"
+    predicted = "frequency ±3 %, damping ±30 %, stiffness ±15 % by the prediction"
+    predicted += "; frequency ±5 %, stiffness ±30 % in y, not tapped; speed ±1 %"
     assert f"doubt of long: {predicted}" in said
     assert check("--json").programs["long"]["doubt"]["prediction"]["damping_ratio"] == [0.3] * 2
     assert "tool 'long end mill': predicted by the model" in said

@@ -30,7 +30,7 @@ def test_people_read_that_the_stiffness_is_not_known(run: Run, decays: str) -> N
     said = run("modes", decays, "--hammer", "none", "--figure", "modes.png").out
     assert "5 free decay(s) fitted together" in said
     assert "not known" in said
-    assert "no force was measured: f_n and zeta are known, K is not" in said
+    assert "no force was measured: frequency and damping are known, stiffness is not" in said
     assert "nan" not in said
     assert "peak picking" not in said
     assert Path("modes.png").stat().st_size > 10_000

@@ -94,7 +94,7 @@ def test_a_beam_is_stored_and_never_the_baseline_of_a_mill(shop: Shop, beam: Pat
 
 def test_a_beam_with_a_mode_in_the_band_is_never_silently_the_first_tap(shop: Shop, beam: Path) -> None:
     said = run("replay", shop.path, beam, "--date", "2026-01-10")
-    assert "question (stiffness-off-model): K 304 N/um is 8.5 times that of the model, 35.9 N/um" in said.stdout
+    assert "question (stiffness-off-model): stiffness 304 N/um is 8.5 times that of the model, 35.9 N/um" in said.stdout
     shop.tap_both()
     found = standing(shop)
     assert (found.light, codes(found)) == ("warn", ["stiffness-off-model"])

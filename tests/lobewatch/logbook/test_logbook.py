@@ -233,7 +233,7 @@ def test_an_older_direction_falls_with_the_newer_one(shop: Shop) -> None:
     assert assembly.y[0].frequency == pytest.approx(1690.0 * 0.95, rel=1e-4)
     assert assembly.y[0].stiffness == pytest.approx(3.5e7, rel=1e-3)
     (remark,) = [one for one in assembly.remarks if one.code == "older-direction"]
-    assert remark.text.endswith("300 days older, its f_n moved by -5.0 % as that of x since")
+    assert remark.text.endswith("300 days older, its frequency moved by -5.0 % as that of x since")
     both_tapped = shop.logbook.verdicts()[0].limit
     shop.tap(300.1, 1690.0 * 0.95, "y")
     assert shop.logbook.verdicts()[0].limit == pytest.approx(both_tapped, rel=1e-3)

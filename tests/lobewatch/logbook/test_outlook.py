@@ -220,7 +220,7 @@ def test_the_report_says_until_when_and_draws_the_line(worn: Shop) -> None:
     assert "<h2>Until when</h2>" in html
     assert html.count("falling since 2026-01-30") > 1
     assert "falling steadily since" not in html
-    assert "-5 % (fixed limit, as in the paper)" in html
+    assert "-5 % (fixed limit)" in html
     assert "Line: fitted; band: where it goes, 80 %." in html
 
 
@@ -318,4 +318,4 @@ def test_a_program_without_a_word_is_not_put_down_to_the_history(worn: Shop) -> 
     worn.run(("A", 12900, 1.5), tool="D99")
     rows = {name: cells for name, *cells in dates_rows(outlook(worn.logbook))}
     assert rows["A"] == ["unknown now, see check"] * 2
-    assert rows["-10 % (fixed limit, as in the paper)"][1] != "history too short or too old"
+    assert rows["-10 % (fixed limit)"][1] != "history too short or too old"

@@ -120,7 +120,7 @@ def test_of_a_file_the_mass_is_an_option(tmp_path: Any) -> None:
     text = "".join(f"{f:.6g},{a.real:.9e},{a.imag:.9e}\n" for f, a in rows)
     path.write_text(f"Freq (Hz),Real (m/s^2/N),Imag (m/s^2/N)\n{text}", encoding="utf-8")
     said = CliRunner().invoke(app, ["modes", str(path)]).stdout
-    assert "an accelerometer of 10 g would change f_n" in said
+    assert "an accelerometer of 10 g would change the frequency" in said
     taken = CliRunner().invoke(app, ["modes", str(path), "--sensor-mass", "10"]).stdout
     assert "10 ± 0.2 g of accelerometer and cable are taken off" in taken
     assert "1500" in taken

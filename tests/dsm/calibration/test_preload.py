@@ -25,7 +25,7 @@ def first(spindle: Spindle) -> float:
 def test_preload_left_is_the_range_of_the_radial_exponents(factor: float, low: float, high: float) -> None:
     found = calibrate(SPINDLE, first(scaled(factor)))
     assert found.preload_left == pytest.approx((low, high), abs=1e-3)
-    assert "if balls roll: (k/k0)^3.7 and (k/k0)^3.1 of radial stiffness" in str(found.preload_left)
+    assert "if the bearings have balls (by stiffness to the power of 3.1 to 3.7)" in str(found.preload_left)
 
 
 def jones(angle: float, deflection: float) -> tuple[float, float, float]:

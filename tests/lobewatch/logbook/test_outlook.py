@@ -256,7 +256,9 @@ def test_trend_and_report_state_the_preload_left(shop: Shop) -> None:
     new, worn = (calibrate(model, 1713.0 * share).bearing_stiffness for share in (1.0, 0.98))
     left = [(worn / new) ** (1 / exponent) for exponent in (0.27, 0.32)]
     assert preload_in_trend(shop) == pytest.approx(left, rel=1e-3)
-    said = f"preload left: {left[0]:.2g} to {left[1]:.2g} of that at the start, if balls roll"
+    said = (
+        f"preload left: {100 * left[0]:.2g} to {100 * left[1]:.2g} % of that at the start, if the bearings have balls"
+    )
     assert said in " ".join(run("trend", shop.path).stdout.split())
     run("report", shop.path)
     assert f"P{said[1:]}" in (shop.path / "report.html").read_text("utf-8")
@@ -273,7 +275,7 @@ def test_a_tap_test_compares_preload_with_the_first_one_as_trend_does(shop: Shop
     assert "preload" not in printed_of(shop, first)
     low, high = preload_in_trend(shop) or (math.nan, math.nan)
     assert high < 1
-    assert f"preload left: {low:.2g} to {high:.2g} of that at the start" in printed_of(shop, last)
+    assert f"preload left: {100 * low:.2g} to {100 * high:.2g} % of that at the start" in printed_of(shop, last)
     logbook = shop.logbook
     assert measurement_json(logbook.measurement(last), logbook)["preload_left"] == pytest.approx([low, high])
     assert measurement_json(logbook.measurement(first), logbook)["preload_left"] is None

@@ -153,7 +153,7 @@ def picked_table(picked: Sequence[Mode], fitted: Sequence[Mode]) -> Table:
         rows.add_row(
             f"{mode.frequency:.5g}",
             f"{100 * mode.damping_ratio:.5g}",
-            rounded(mode.stiffness, scale=1e6),
+            rounded(mode.stiffness, scale=1e6, digits=5),
             _difference(mode, near) if same and near is not None else "not fitted",
         )
     return rows

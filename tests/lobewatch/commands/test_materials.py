@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -30,7 +31,9 @@ def materials(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str
 def test_a_material_is_shown_with_range_other_names_and_sources(materials: Materials) -> None:
     code, out, _ = materials("1.0503")
     assert code == 0
-    assert out.splitlines()[1].split()[:7] == ["C45", "P", "2237", "1667..2904", "0.27", "0.13..0.54", "56"]
+    table = out.splitlines()[:3]
+    assert table[2].split()[:7] == ["C45", "P", "2237", "1667..2904", "0.27", "0.13..0.54", "56"]
+    assert max(map(len, table)) <= 80
     assert "AISI" in out
     assert "kc1.1 2220, mc 0.14: Kienzle & Victor 1957" in out
     assert "h = 0.1 mm" in out
@@ -39,7 +42,8 @@ def test_a_material_is_shown_with_range_other_names_and_sources(materials: Mater
 def test_all_are_listed_without_their_sources(materials: Materials) -> None:
     code, out, _ = materials()
     assert code == 0
-    assert "Al 7075 (HSS; dry)" in out
+    assert re.search(r"^Al 7075 \(HSS; dry\) +N +951 +600..1319 +0.28$", out, re.MULTILINE)
+    assert max(len(line) for line in out.splitlines() if "  " in line) <= 80
     assert "Kienzle" not in out
     assert "sources: lobewatch materials NAME, or --json" in out
 

@@ -57,7 +57,9 @@ def _speed_itself(
 ) -> NDArray[np.float64] | None:
     """factor: rpm per unit."""
     if description.pulses is not None:
-        ledger.faults.append(f"--pulses {description.pulses}: {signal.name} is the speed itself ({signal.unit})")
+        ledger.faults.append(
+            f"--pulses {description.pulses}: {signal.name} is the speed itself ({signal.unit}); leave it out"
+        )
         return None
     speed = np.abs(values) * factor
     if not np.any(speed > 0):

@@ -20,6 +20,7 @@ from modal.bands.look_closer import look_closer
 from modal.bands.noise_by_height import weights_by_residual
 from modal.bands.one_thread import one_thread
 from modal.bands.settle import settle
+from modal.bands.suspected_pair import with_suspects
 from modal.bands.usable_lines import usable_lines
 
 ROUNDS = 4
@@ -61,7 +62,7 @@ def _extract(lines: tuple[Frf, ...]) -> Extraction:
     if np.any(stray):
         state = settle(replace(state, weight=np.where(stray, 0.0, state.weight)))
     state = _reweighted(state)
-    return replace(state, bands=tuple(fit_real(band) for band in state.bands))
+    return replace(state, bands=tuple(fit_real(with_suspects(band)) for band in state.bands))
 
 
 def _reweighted(state: Extraction) -> Extraction:

@@ -7,22 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from modal.bands.compare_fits import is_better, is_likelier, is_white
 from modal.bands.extraction import Array, FittedBand
 from modal.bands.fit_peaks import LEAST_SHARE, are_modes
+from modal.bands.suspected_pair import halved
 from modal.bands.systematic import leaves_rounding, systematic
-from modal.fitting import MOST_TERMS, BandFit, fit_band, gain_of_a_term
+from modal.fitting import MOST_TERMS, fit_band, gain_of_a_term
 from modal.poles import physical_poles
 
-BLOCKS = 48
-"""Runs of lines that the means of what a fit leaves are looked at in."""
-WHITE = 1.0
-"""Standard deviations that their size may lie above what independent errors have."""
 HIDDEN_F = 40.0
 """A mode without a peak of its own lowers the sum of squares by this many times what its unknowns do by chance."""
 TERM_F = 6.0
 """A further residual term lowers it by this many times what two unknowns do by chance."""
-SPLIT = 0.35
-"""Half the distance at which two modes in place of one are tried (half-power half-widths)."""
 HIDDEN_ERROR = 1 / 6
 """Relative standard error that damping ratio and stiffness of a mode without a peak have at most."""
 
@@ -32,31 +28,21 @@ def look_closer(band: FittedBand) -> FittedBand:
 
     The same where its fit leaves nothing but independent errors, or rounding.
     """
-    if _is_white(band.fit) or leaves_rounding(band):
+    if is_white(band.fit) or leaves_rounding(band):
         return band
     bent = _with_terms(band)
     for starts in _more_modes(band, split=bent.terms > band.terms):
         height = np.full(starts.shape[1], np.max(band.height))
         fit = fit_band(band.data.frequency, band.data.own, band.data.weight, starts, band.terms)
-        if fit is None or not _is_better(fit, band.fit, TERM_F) or not _is_likelier(fit, bent.fit):
+        if fit is None or not is_better(fit, band.fit, TERM_F) or not is_likelier(fit, bent.fit):
             continue
-        if _is_better(fit, band.fit, HIDDEN_F) and np.all(are_modes(fit, band.data.frequency, height, HIDDEN_ERROR)):
+        if is_better(fit, band.fit, HIDDEN_F) and np.all(are_modes(fit, band.data.frequency, height, HIDDEN_ERROR)):
             refitted = _with_terms(replace(band, fit=fit, height=height))
             if _is_sure(refitted):
                 return refitted
-        if _is_white(fit) and np.all(are_modes(fit, band.data.frequency, height, np.inf)):
+        if is_white(fit) and np.all(are_modes(fit, band.data.frequency, height, np.inf)):
             bent = replace(bent, suspects=tuple(sorted(fit.frequency.tolist())))
     return bent
-
-
-def _is_white(fit: BandFit) -> bool:
-    """Whether the means of neighbouring lines are as small as those of independent errors."""
-    left = fit.complex_residual
-    length = max(2, left.shape[1] // BLOCKS)
-    blocks = left[:, : left.shape[1] // length * length].reshape(len(left), -1, length)
-    size = np.sum(np.abs(blocks.mean(axis=2)) ** 2) * length
-    expected = fit.sum_of_squares / left.size * blocks[..., 0].size
-    return bool(size < expected * (1 + WHITE / np.sqrt(blocks[..., 0].size)))
 
 
 def _is_sure(band: FittedBand) -> bool:
@@ -79,10 +65,7 @@ def _more_modes(band: FittedBand, split: bool) -> Iterator[Array]:
     for n in range(size.size, band.height.size, -1):
         yield starts[:, np.argsort(-size)[:n]]
     if split:
-        i = int(np.argmax(fit.mobility_peak))
-        apart = SPLIT * fitted[1, i] * fitted[0, i]
-        halves = [[fitted[0, i] - apart, fitted[0, i] + apart], 2 * [fitted[1, i]]]
-        yield np.hstack([np.delete(fitted, i, axis=1), halves])
+        yield halved(fitted, int(np.argmax(fit.mobility_peak)))
 
 
 def _with_terms(band: FittedBand) -> FittedBand:
@@ -95,21 +78,9 @@ def _with_terms(band: FittedBand) -> FittedBand:
         fit = fit_band(data.frequency, data.own, data.weight, band.fit.poles, terms)
         if (
             fit is None
-            or not _is_better(fit, band.fit, TERM_F)
+            or not is_better(fit, band.fit, TERM_F)
             or not np.all(are_modes(fit, data.frequency, band.height))
         ):
             break
         band = replace(band, fit=fit, terms=terms)
     return band
-
-
-def _is_better(more: BandFit, fewer: BandFit, least: float) -> bool:
-    """Whether the sum of squares falls by more than `least` times what the further unknowns take off by chance."""
-    gain = (fewer.sum_of_squares - more.sum_of_squares) / max(fewer.freedom - more.freedom, 1)
-    return gain > least * more.sum_of_squares / more.freedom
-
-
-def _is_likelier(fit: BandFit, other: BandFit) -> bool:
-    """By the information criterion of Akaike (sum of squares and number of unknowns)."""
-    variance = min(candidate.sum_of_squares / candidate.freedom for candidate in (fit, other))
-    return fit.sum_of_squares - 2 * variance * fit.freedom < other.sum_of_squares - 2 * variance * other.freedom

@@ -2,7 +2,7 @@
 
 from modal.fitting.band_fit import BandFit
 from modal.fitting.fit_band import fit_band, values_nearby, with_real_constants
-from modal.fitting.projected_band import beyond_terms, gain_of_a_term
+from modal.fitting.projected_band import beyond_terms, gain_of_a_pair, gain_of_a_term
 from modal.fitting.residual_terms import LEAST_TERMS, MOST_TERMS
 
 __all__ = [
@@ -11,6 +11,7 @@ __all__ = [
     "BandFit",
     "beyond_terms",
     "fit_band",
+    "gain_of_a_pair",
     "gain_of_a_term",
     "values_nearby",
     "with_real_constants",

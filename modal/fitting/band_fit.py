@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -80,6 +80,12 @@ class BandFit:
     def influence_of(self, i: int) -> Array:
         """The part of the influence that belongs to FRF i, shape (2 m + 2 p m, 2 n)."""
         return np.hsplit(self.influence, len(self.constant))[i]
+
+    def of_mode(self, i: int, frequency: Array) -> ComplexArray:
+        """Mode i alone (m/N) at these frequencies (Hz), shape (p, n)."""
+        return replace(
+            self, frequency=self.frequency[[i]], damping_ratio=self.damping_ratio[[i]], constant=self.constant[:, [i]]
+        ).receptance(frequency)
 
     def receptance(self, frequency: Array) -> ComplexArray:
         """Sum of these modes alone (m/N) at these frequencies (Hz), shape (p, n)."""

@@ -81,7 +81,23 @@ def beyond_terms(frequency: Array, receptance: ComplexArray, weight: Array, term
 def gain_of_a_term(fit: BandFit, frequency: Array, weight: Array, terms: int) -> float:
     """Fall of the sum of squares, to first order, that one residual term more than these in each FRF would bring."""
     power = residual_powers(frequency, terms + 1)[-1]
-    rows = np.tile(weight, 2)[:, np.newaxis] * split(np.stack([power, 1j * power]))
+    return _gain(fit, frequency, weight, terms, np.stack([power, 1j * power]))
+
+
+def gain_of_a_pair(fit: BandFit, frequency: Array, weight: Array, terms: int, i: int) -> float:
+    """Fall of the sum of squares, to first order, that two modes close together in place of mode i would bring.
+
+    Two poles at lambda - d and lambda + d add the second derivative of R / (i w - lambda) by lambda, which goes with
+    its third power; what is odd in d the pole of the one mode follows.
+    """
+    fn, zeta = fit.poles[:, i]
+    pole, r = complex(-zeta, np.sqrt(1 - zeta**2)), 1j * frequency / fn
+    here, conjugate = 1 / (r - pole) ** 3, 1 / (r - pole.conjugate()) ** 3
+    return _gain(fit, frequency, weight, terms, np.stack([here + conjugate, 1j * (here - conjugate)]))
+
+
+def _gain(fit: BandFit, frequency: Array, weight: Array, terms: int, columns: ComplexArray) -> float:
+    rows = np.tile(weight, 2)[:, np.newaxis] * split(columns)
     return fit.with_phases.gain(_without(_bases(frequency, weight, terms), rows))
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition import Frf, from_accelerance
 from modal import Mode, fit_modes, pick_peaks, synthesize
+from modal.fitting import LEAST_TERMS, fit_band, gain_of_a_pair
 
 LINES = np.arange(5.0, 6000.0, 5.0)
 NEIGHBOURS = [Mode(900.0, 0.03, 4e7), Mode(2900.0, 0.03, 3e7)]
@@ -26,6 +27,10 @@ def noisy(modes: list[Mode], level: float, seed: int) -> Frf:
 
 def between(modes: list[Mode]) -> list[Mode]:
     return [mode for mode in modes if 1600 < mode.frequency < 2100]
+
+
+def codes_between(frf: Frf) -> set[str]:
+    return {remark.code for mode in between(fit_modes(frf)) for remark in mode.remarks}
 
 
 def values(modes: list[Mode]) -> NDArray[np.float64]:
@@ -63,6 +68,34 @@ def test_what_is_too_noisy_to_tell_is_said() -> None:
             assert np.all(np.abs(values(found) - values(pair(1.02))) < 5 * errors)
             said += 1
     assert said >= 11
+
+
+def test_two_modes_in_noise_of_a_percent_are_said_to_be_several() -> None:
+    codes = [codes_between(noisy(pair(1.02), 1e-2, seed)) for seed in range(12)]
+    assert sum("several-modes" in said for said in codes) >= 10
+
+
+@pytest.mark.parametrize("damping", [0.005, 0.03, 0.1])
+@pytest.mark.parametrize("level", [1e-3, 1e-2, 3e-2])
+def test_a_mode_alone_is_never_said_to_be_several(level: float, damping: float) -> None:
+    for seed in range(4):
+        frf = noisy([Mode(1722.0, damping, 2e7, phase_deg=10.0 * seed)], level, seed)
+        assert "several-modes" not in {remark.code for mode in fit_modes(frf) for remark in mode.remarks}
+
+
+def test_a_satellite_that_takes_nothing_from_its_neighbour_is_not_said() -> None:
+    """The larger has the stiffness that is told; a hundredth of its size beside it is a trifle."""
+    modes = [Mode(1722.0, 0.03, 3.5e7), Mode(1722.0 * 1.02, 0.03, 3.5e9)]
+    assert "several-modes" not in codes_between(noisy(modes, 1e-3, 0))
+
+
+@pytest.mark.parametrize("turn", [1.0, 1j])
+def test_the_gain_of_a_pair_is_what_a_mode_leaves_of_two_near_each_other(turn: complex) -> None:
+    line, weight = np.arange(1300.0, 2200.0, 5.0), np.ones((1, 180))
+    own = turn * synthesize([Mode(1740.0, 0.03, 4e7), Mode(1756.0, 0.033, 3e7)], line).receptance[np.newaxis] * 1e9
+    fit = fit_band(line, own, weight, np.array([[1745.0], [0.03]]))
+    assert fit is not None
+    assert 0.95 < gain_of_a_pair(fit, line, weight, LEAST_TERMS, 0) / fit.sum_of_squares <= 1
 
 
 def test_opposite_constants_are_told_apart_too() -> None:

@@ -195,17 +195,17 @@ def _values(measurement: Measurement, series: SeriesStanding | None) -> list[str
     if mode is None:
         return []
     f_std, zeta_std, k_std = mode.standard_error.tolist()
-    against = "the first test of this tool and direction"
+    against = "first test of this tool and direction"
     if open_questions(measurement.remarks):
         against = "in question"
     elif series is not None and not series.is_first:
         sign = "+" if series.fall.value < 0 else ""
         against = f"{sign}{plus_minus(-series.fall.value, series.fall.std)} % against the first test"
     damping = plus_minus(mode.damping_ratio, zeta_std, 0.01)
-    stiffness = f"stiffness {plus_minus(mode.stiffness, k_std, 1e6)} N/um, damping {damping} %."
+    stiffness = f"Stiffness {plus_minus(mode.stiffness, k_std, 1e6)} N/um, damping {damping} %."
     if not mode.has_stiffness:
-        stiffness = f"damping {damping} %; stiffness is not known, for no force was measured."
-    return [f"frequency {plus_minus(mode.frequency, f_std)} Hz, {against}.", stiffness]
+        stiffness = f"Damping {damping} %; stiffness is not known, for no force was measured."
+    return [f"Frequency {plus_minus(mode.frequency, f_std)} Hz, {against}.", stiffness]
 
 
 def plan_session(

@@ -1,5 +1,6 @@
 import { ask } from "./link.js";
 import { drawCourse } from "./course.js";
+import { unbroken } from "./unbroken.js";
 
 const REFRESH_MS = 5000;
 const WORDS = { alarm: "✗ ALARM", unknown: "? UNKNOWN", warn: "! WARNING", good: "✓ GOOD" };
@@ -86,10 +87,10 @@ function row(machine) {
   part("light").textContent = machine.word;
   showSize(part("size"), machine);
   part("name").textContent = machine.name;
-  part("reason").textContent = machine.why || fallText(machine);
-  part("fall").textContent = fallText(machine);
-  part("note").textContent = machine.note;
-  part("next").textContent = machine.next_step;
+  part("reason").textContent = unbroken(machine.why || fallText(machine));
+  part("fall").textContent = unbroken(fallText(machine));
+  part("note").textContent = unbroken(machine.note);
+  part("next").textContent = unbroken(machine.next_step);
   part("port").textContent = machine.has_port || machine.light === "unknown" ? "" : "START needs the port of the DAQ: port in [daq] of machine.toml.";
   part("limit").textContent = machine.limit;
   part("due").textContent = dueText(machine);

@@ -1,8 +1,7 @@
+import { unbroken } from "./unbroken.js";
+
 // The word in its panel, and the parts of a page by their ids.
 export const at = (id) => document.getElementById(id);
-// No line ends within a date (a word joiner behind its hyphens) or before a unit.
-const unbroken = (text) => text?.replace(/(\d{4}-)(\d\d-)(?=\d\d)/g, "$1\u2060$2\u2060").replace(/(?<=\d) (?=%|±|mm\b|rpm\b|Hz\b|N\b)/g, "\u00a0");
-
 export function put(id, text) {
   const whole = unbroken(text);
   if (at(id).textContent !== whole) at(id).textContent = whole;

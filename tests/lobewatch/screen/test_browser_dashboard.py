@@ -22,7 +22,7 @@ Browser = Any
 """Chromium on one page: Browser of conftest.py."""
 BAR = """const { backgroundSize, backgroundPosition } = getComputedStyle(arguments[0], "::after");
 return [backgroundSize, backgroundPosition];"""
-"""Widths and places of what the bar below a light is made of: the fall, the line of the alarm, what is below them."""
+"""Widths and places of what the bar below a light is made of: the line of the alarm, the fall, what is below them."""
 LINES = [4.0 * line for line in range(1, 1000)]
 
 
@@ -96,9 +96,9 @@ def test_a_bar_shows_how_far_each_has_fallen_on_the_way_to_its_alarm(
     browser.wait(lambda: len(keys(browser)) == 12)
     sizes = {key: row(browser, key).find_element(By.CLASS_NAME, "size") for key in keys(browser)}
     assert {key: size.text for key, size in sizes.items() if size.is_displayed()} == {"worn": "-7.00 %"}
-    fallen, limit = (layers.split(", ") for layers in browser.driver.execute_script(BAR, sizes["worn"]))
-    assert fallen[0] == "56% 100%"
-    assert limit[1] == "80% 0px"
+    wide, places = (layers.split(", ") for layers in browser.driver.execute_script(BAR, sizes["worn"]))
+    assert wide[1] == "56% 100%"
+    assert places[0] == "80% 0px"  # on top of the fall
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

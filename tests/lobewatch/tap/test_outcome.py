@@ -64,7 +64,7 @@ def test_the_light_follows_the_fall_of_the_frequency(folder: MachineFolder) -> N
     first = tapped(folder, 0, 1720.0)
     assert first.light == "warn"
     assert "1720" in first.texts[0]
-    assert "the first test of this tool and direction" in first.texts[0]
+    assert "first test of this tool and direction" in first.texts[0]
     assert first.next_step.startswith("Tap direction y of the same tool too")
     (doubtful,) = (text for text in first.texts if "doubtful" in text)
     assert all(f"{letter}: slot at" in doubtful for letter in "ABC")

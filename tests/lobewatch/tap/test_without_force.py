@@ -74,7 +74,7 @@ def test_a_test_without_force_gives_frequency_and_damping(tapped: TapSession, wi
     assert calibration is not None
     assert calibration.bearing_stiffness == pytest.approx(1.28e9, rel=1e-3)
     assert tapped.state.outcome is not None
-    assert "K is not known, for no force was measured" in " ".join(tapped.state.outcome.texts)
+    assert "stiffness is not known, for no force was measured" in " ".join(tapped.state.outcome.texts)
     assert all(hit.peak.endswith("m/s²") for hit in tapped.state.hits)
 
 

@@ -40,8 +40,9 @@ def check(
     """Every cutting program against the newest tap tests of its tool; exit code 1 unless all are stable.
 
     By semi-discretisation, over all that is not known: stable, doubtful, not stable or unknown. Says for each that is
-    not stable what decides and where to go. fall left: how far the frequency may fall before it chatters. A cut that is
-    no program is judged alike; what is not said of it is taken from the programs of its tool where they agree.
+    not stable what decides and where to go. fall left: how far the frequency may fall before it chatters, in the middle
+    of what is not known; beside a setting that is recommended: how far it may fall and all of that stays stable. A cut
+    that is no program is judged alike; what is not said of it is taken from the programs of its tool where they agree.
     A program of machine.toml without a speed or a depth is recommended what it has not.
     A number of machine.toml that is not plausible makes its programs unknown until it is corrected, or accepted.
 

@@ -38,6 +38,8 @@ FORCE_MIDDLE, FORCE_SPREAD = 1.0, 0.30
 begins 10 % higher (`priors.FORCE`), since cuts then correct it; nothing corrects the chance made here."""
 BESIDE, LOOKS = 0.003, 7
 """Relative distance of the frequency that is looked at beside the doubt of the speed, and number of looks."""
+SAMPLE, SPREAD = 24, 3.0
+"""Number of draws, the hardest and as many others, that say how far growth differs between cuts; and factor on it."""
 LEAST_FACTOR = 0.1
 """Least share of its middle that a factor has."""
 
@@ -68,6 +70,27 @@ class ProgramDraws:
         depths = np.broadcast_to(wanted, (len(self.rows), wanted.shape[1]))
         cut, row = np.divmod(np.arange(len(self.cuts) * len(self.rows)), len(self.rows))
         return np.asarray(np.max(self.growth_of(cut, row, depths[row]).reshape(len(self.cuts), *depths.shape), axis=0))
+
+    def growth_that_counts(self, depth: float) -> Floats:
+        """Growth at a depth (m) in the worst of its cuts, (draws,); of those that surely do not grow that in the first.
+
+        Some draws say how much more there is in each other cut: passed over are those that die away so much faster.
+        """
+        places = np.arange(len(self.rows))
+        grown = self._growth_in(np.zeros_like(places), places, depth)
+        order = np.argsort(-grown)
+        sample = np.union1d(order[:SAMPLE], order[:: max(order.size // SAMPLE, 1)])
+        cut, row = np.divmod(np.arange((len(self.cuts) - 1) * sample.size), sample.size)
+        others = self._growth_in(cut + 1, sample[row], depth).reshape(-1, sample.size)
+        more = np.max(others - grown[sample], axis=1, initial=0.0)[:, np.newaxis]
+        cut, row = np.nonzero((grown >= -SPREAD * more - BESIDE) & ~np.isin(places, sample))
+        np.maximum.at(grown, row, self._growth_in(cut + 1, row, depth))
+        grown[sample] = np.max(np.vstack((grown[sample], others)), axis=0)
+        return grown
+
+    def _growth_in(self, cut: NDArray[np.intp], row: NDArray[np.intp], depth: float) -> Floats:
+        """Growth of some draws, each in one of the cuts (k,), at a depth (m), shape (k,)."""
+        return self.growth_of(cut, row, np.full((cut.size, 1), depth))[:, 0]
 
     def growth_of(self, cut: NDArray[np.intp], row: NDArray[np.intp], depths: Floats) -> Floats:
         """Growth of some draws, each in one of the cuts (k,), at depths (k, d) in m, shape (k, d)."""
@@ -168,6 +191,13 @@ def likely_axes(program: Program, assembly: Assembly, cuts: Sequence[Cut], doubt
     rows = reduce(joined_rows, (middle_row(program, assembly, axes) for axes in patterns))
     middles = ProgramDraws(rows, tuple(cuts), np.full(len(cuts), np.inf), 1, doubt)
     return patterns[int(np.argmax(middles.growth(program.depth)))]
+
+
+def draw_likely(program: Program, cuts: Sequence[Cut], assembly: Assembly, doubt: Doubt) -> ProgramDraws:
+    """The draws of a program whose limit nobody knows yet, with `likely_axes`, its cuts in no order."""
+    middle = middle_row(program, assembly, likely_axes(program, assembly, cuts, doubt))
+    rows = joined_rows(middle, doubt.draw(middle, DRAWS))
+    return ProgramDraws(rows, tuple(cuts), np.full(len(cuts), np.inf), 1, doubt)
 
 
 def draw(

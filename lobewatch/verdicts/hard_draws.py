@@ -3,29 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from lobes import Cut, Program, program_limit
+from lobes import Cut, Program, joined_rows
 from lobewatch.tool.assembly import Assembly
 from lobewatch.verdicts.aging import StiffnessAt
 from lobewatch.verdicts.doubt import Doubt
-from lobewatch.verdicts.draws import ProgramDraws, draw, likely_axes
-from lobewatch.verdicts.mean_force import MeanForce
-from lobewatch.verdicts.room import APART, at_ends
+from lobewatch.verdicts.draws import ProgramDraws, draw_likely
+from lobewatch.verdicts.room import APART, DEEPER, at_ends
 
 FIRST = 24
-"""Number of draws that zero order has as the first to chatter ..."""
+"""Number of draws that grow most at the depth that is likely ..."""
 HARDEST = 8
-"""... and of those with the largest force on the most flexible mode, whatever zero order says of them."""
+"""... and of those with the largest force on the most flexible mode, whatever grows there."""
 FEEDS = 2
 """Number of directions of feed, the worst around the speed, in which they are looked at."""
 SHARES = np.array([0.4, 0.6, 0.8, 1.0])
 """Shares of a depth at which they are."""
 BETWEEN = np.array([0.3, 0.6])
 """Shares of the step between two of these, one calm and one not, at which they are once more."""
+FURTHER, NEARER = 1.5, 0.15
+"""Factor of the depth up to which is looked, where all of it is calm, and where hardly any of it is ..."""
+LEAST = 1e-5
+"""... down to this (m)."""
 
 Floats = NDArray[np.float64]
 
@@ -34,36 +37,64 @@ Floats = NDArray[np.float64]
 class HardDraws:
     """A cut at one speed."""
 
-    limit: float
-    """Deepest stable depth in the middle of the doubt (m)."""
+    likely: float
+    """Depth that is likely (m): the scale of what is looked at."""
     draws: ProgramDraws
-    """All draws at both ends of what must be safe (`at_ends`)."""
+    """All draws at both ends of what must be safe (`at_ends`), last the middle, pushed for its depth to spare."""
     first: NDArray[np.intp]
     """Places of the few that are likely the first to chatter."""
     chattered: frozenset[int] = frozenset()
     """Draws that count too since they have chattered elsewhere."""
 
-    def deepest(self, most: float) -> float:
-        """The deepest up to a depth (m) at which, and below which, all that count are stable (m)."""
+    @property
+    def few(self) -> ProgramDraws:
+        """Those that count."""
         more = np.add.outer([0, len(self.draws.rows) // 2], sorted(self.chattered)).ravel().astype(np.intp)
-        return deepest_calm(self.draws[np.union1d(self.first, more)], most)
+        return self.draws[np.union1d(self.first, more)]
+
+    def deepest(self, most: float) -> float:
+        """The deepest up to a depth at which, and below which, all that count are stable with depth to spare (m)."""
+        few, depth = self.few, DEEPER * min(self.likely, most)
+        calm = deepest_calm(few, depth)
+        while calm == depth < DEEPER * most:
+            depth = min(FURTHER * depth, DEEPER * most)
+            calm = deepest_calm(few, depth)
+        while calm == 0 and depth > LEAST:
+            depth *= NEARER
+            calm = deepest_calm(few, depth)
+        return calm / DEEPER
+
+    def growth_beside(self, speeds: Floats, depths: Floats) -> Floats:
+        """Largest growth, with room, of all that count at speeds over the present one and depths (m) there (k,)."""
+        few = self.few
+        wanted = np.repeat(DEEPER * depths, len(few.rows))[:, np.newaxis]
+        return np.asarray(np.max(few.swept(speeds).growth(wanted).reshape(speeds.size, -1), axis=1))
 
 
 def hard_draws(
-    program: Program, cuts: Sequence[Cut], spindle: Assembly, doubt: Doubt, fall: float, stiffness_at: StiffnessAt
+    program: Program,
+    cuts: Sequence[Cut],
+    spindle: Assembly,
+    doubt: Doubt,
+    fall: float,
+    stiffness_at: StiffnessAt,
+    spare: float,
 ) -> HardDraws:
-    """Those of a program (SI), with all cuts on its way, at its speed; its depth is the scale of what is looked at."""
-    axes = likely_axes(program, spindle, cuts, doubt)
-    middle = program_limit(program, spindle.x, spindle.y, cuts, axes)
-    drawn = draw(program, middle, cuts, spindle, doubt, axes)
-    if len(cuts) > 1:
-        grown = drawn.around(program.depth, fall, APART)
-        drawn = drawn.fed_where(np.isin(np.arange(grown.size), np.argsort(-grown)[:FEEDS]))
+    """Those of a program (SI), with all cuts on its way, at its speed; its depth is what is likely.
+
+    spare: depth to spare in the middle of the doubt, relative.
+    """
+    drawn = draw_likely(program, cuts, spindle, doubt)
+    order = np.argsort(-drawn.around(program.depth, fall, APART))[:FEEDS]
+    drawn = replace(drawn, cuts=tuple(cuts[place] for place in order), limits=drawn.limits[order])
     aged = at_ends(drawn, fall, stiffness_at)
-    rows = aged.rows
-    mean = MeanForce.of(rows.making(drawn.cuts[0])).limits(rows.speed_rpm[:, np.newaxis])[0][:, 0]
-    hard = np.max(rows.tangential[:, np.newaxis] / (rows.stiffness * rows.damping_ratio), axis=1)
-    return HardDraws(middle.limit, aged, np.union1d(np.argsort(mean)[:FIRST], np.argsort(-hard)[:HARDEST]))
+    grown = aged.fed(0.0).growth(program.depth)[:, 0]
+    force = np.max(aged.rows.tangential[:, np.newaxis] / (aged.rows.stiffness * aged.rows.damping_ratio), axis=1)
+    middle = drawn.rows[np.zeros(1, dtype=np.intp)]
+    push = (1 + spare) / DEEPER
+    middle = replace(middle, tangential=push * middle.tangential, radial=push * middle.radial)
+    first = np.concatenate((np.argsort(-grown)[:FIRST], np.argsort(-force)[:HARDEST], [grown.size]))
+    return HardDraws(program.depth, replace(aged, rows=joined_rows(aged.rows, middle)), np.unique(first))
 
 
 def deepest_calm(draws: ProgramDraws, most: float) -> float:

@@ -60,8 +60,8 @@ class LikelyDepths:
         """The middle (rpm) of each window of speeds at which a depth (mm) is likely."""
         return [float(self.speeds[run[run.size // 2]]) for run in _runs(self.depths >= depth_mm)]
 
-    def tops(self, count: int) -> list[int]:
-        """Places with more chips than beside them, the most first; then others with many chips apart from these."""
+    def tops(self, count: int) -> list[tuple[float, float]]:
+        """Speeds (rpm) and depths (mm) with more chips than beside them, the most first; then others apart."""
         chips = np.pad(self.depths * self.speeds, 1)
         tops = np.flatnonzero((chips[1:-1] >= chips[:-2]) & (chips[1:-1] >= chips[2:]))
         order = np.argsort(-chips[1:-1], kind="stable")
@@ -70,7 +70,7 @@ class LikelyDepths:
             for place in places.tolist():
                 if all(abs(place - top) * GRID > apart for top in taken):
                     taken.append(place)
-        return taken[:count]
+        return [(float(self.speeds[place]), float(self.depths[place])) for place in taken[:count]]
 
     def is_joined(self, first: float, second: float) -> bool:
         """Whether nearly as much is likely all the way between two speeds (rpm): they lie in one pocket."""

@@ -56,14 +56,14 @@ def window_rpm(
 
 def frequency_left(hardest: ProgramDraws, depth: float, stiffness_at: StiffnessAt) -> float:
     """Fall of the frequency, relative, up to which a depth (m) is safe on these draws."""
-    grown = _moved(hardest, [1.0] * LEFT.size, LEFT.tolist(), stiffness_at).growth(depth).reshape(LEFT.size, -1)
-    return float(LEFT[_calm_from_the_first(grown)])
+    grown = _moved(hardest, [1.0] * LEFT.size, LEFT.tolist(), stiffness_at).growth_that_counts(depth)
+    return float(LEFT[_calm_from_the_first(grown.reshape(LEFT.size, -1))])
 
 
 def _last_calm(near: ProgramDraws, hardest: ProgramDraws, ratio: Floats, depth: float) -> float:
     """The last of these speeds, over the present one, up to which all draws are stable."""
-    last = _calm_from_the_first(hardest.swept(ratio).growth(depth).reshape(ratio.size, -1))
-    while last > 0 and np.any(near.at(speed=float(ratio[last])).growth(depth) >= 0):
+    last = _calm_from_the_first(hardest.swept(ratio).growth_that_counts(depth).reshape(ratio.size, -1))
+    while last > 0 and np.any(near.at(speed=float(ratio[last])).growth_that_counts(depth) >= 0):
         last //= 2
     return float(ratio[last])
 

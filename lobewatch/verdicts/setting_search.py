@@ -12,10 +12,10 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import islice
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from lobes import Cut, Program
 from lobewatch.machine import Machine, ProgramTable
@@ -24,6 +24,7 @@ from lobewatch.tool.assembly import Assembly
 from lobewatch.tool.series import fall_in
 from lobewatch.verdicts.aging import StiffnessAt, softening
 from lobewatch.verdicts.doubt import Doubt, doubt_of
+from lobewatch.verdicts.draws import DRAWS, ProgramDraws
 from lobewatch.verdicts.hard_draws import HardDraws, deepest_calm, hard_draws
 from lobewatch.verdicts.judgement import SURELY, Judgement, weigh
 from lobewatch.verdicts.likely_depths import LikelyDepths, likely_depths
@@ -39,14 +40,17 @@ INTERVALS = 2
 """Number of tap intervals that it must last ..."""
 UNKNOWN_FALL = 0.02
 """... or fall of the frequency that it must stand where no rate is known; chosen."""
-PLACES = 4
-"""Number of speeds that few draws are looked at at before one is judged ..."""
 MOST_PLACES = 12
-"""... and of those that are before it is said that there is none."""
+"""Number of speeds that few draws are looked at at before it is said that there is none."""
+HOPE = 1.1
+"""A speed is looked at where the depth that is likely times this, and times the largest share of such a depth that few
+draws have left elsewhere, would be more chips than are known of."""
+NEAR = np.concatenate([sign * np.array([0.003, 0.006, 0.01, 0.015, 0.02, 0.03, 0.04]) for sign in (-1, 1)])
+"""Relative distances of speeds that are looked at beside that of most chips ..."""
+CLIMBS = 2
+"""... and number of times that they are."""
 TRIES, MOST_TRIES = 4, 12
 """Number of depths that are judged at one speed, and at all of them."""
-DISAPPOINTING = 0.95
-"""Share of a depth, less than which is left where it is judged, has one more speed looked at."""
 NEARLY = 0.85
 """Share of a depth that is wanted, where so much is likely it may be safe too."""
 REMEMBERED = 8
@@ -55,6 +59,8 @@ LESS = 0.98
 """Share of a depth, at least as much less of which is looked at where draws chatter."""
 FEW = 24
 """Number of draws, the hardest, that bound a window before all of them decide."""
+
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -184,22 +190,35 @@ class SettingSearch:
         """
         if self.reach.is_empty:
             return
-        tops = iter([_rounded(float(self.likely.speeds[top])) for top in self.likely.tops(MOST_PLACES)])
-        depths = {speed: floored_mm(self._calm(speed)) for speed in islice(tops, PLACES)}
+        tops = [(_rounded(speed), depth) for speed, depth in self.likely.tops(MOST_PLACES)][::-1]
+        depths: dict[float, float] = {}
+        looked, left = set[float](), 0.0
         for _ in range(MOST_TRIES):
-            while not any(depths.values()) and (speed := next(tops, None)):
-                depths[speed] = floored_mm(self._calm(speed))
             speed = self._most_chips(depths)
+            while tops and HOPE * left * math.prod(tops[-1]) >= speed * depths.get(speed, 0.0):
+                top, likely = tops.pop()
+                depths[top] = floored_mm(self._calm(top))
+                left, speed = max(left, depths[top] / likely), self._most_chips(depths)
             if not depths.get(speed):
                 return
+            speed = self._climbed(speed, depths, looked)
             setting = self.verified(speed, depths[speed])
             if isinstance(setting, Setting):
                 del depths[speed]
                 yield setting
-                continue
-            if setting < DISAPPOINTING * depths[speed] and (other := next(tops, None)):
-                depths[other] = floored_mm(self._calm(other))
-            depths[speed] = floored_mm(setting)
+            else:
+                depths[speed] = floored_mm(setting)
+
+    def _climbed(self, speed: float, depths: dict[float, float], looked: set[float]) -> float:
+        """The speed (rpm) of most chips when those beside it have joined these with a depth (mm), each once."""
+        looked.update(depths)
+        for _ in range(CLIMBS):
+            if (beside := self._beside(speed, depths[speed])) in looked:
+                break
+            looked.add(beside)
+            depths[beside] = floored_mm(self._calm(beside))
+            speed = self._most_chips(depths)
+        return speed
 
     def _most_chips(self, depths: dict[float, float]) -> float:
         """The speed (rpm) of most chips, of these with the depth (mm) that few draws allow; 0 where there is none."""
@@ -209,15 +228,30 @@ class SettingSearch:
                 return speed
             depths[speed] = min(depths[speed], floored_mm(self._calm(speed)))
 
+    def _beside(self, speed: float, depth_mm: float) -> float:
+        """A speed (rpm) near one at which few draws let pass more chips than at a depth (mm) there; itself else."""
+        speeds = np.round(speed * (1 + NEAR) / RPM) * RPM
+        depths = (np.floor(speed * depth_mm / speeds / MM) + 1) * MM
+        held = [self.reach.holds(*place) for place in zip(speeds.tolist(), depths.tolist(), strict=True)]
+        if not any(held):
+            return speed
+        grown = self.hard[speed].growth_beside(speeds[held] / speed, depths[held] / 1e3)
+        return float(speeds[held][np.argmin(grown)]) if np.min(grown) < 0 else speed
+
     def _calm(self, speed: float) -> float:
         """The deepest (mm) at a speed (rpm) at which few draws are stable now and later, with depth to spare."""
         most = float(self.reach.depths(np.array([speed]))[0]) / 1e3
-        if speed not in self.hard:
-            likely = float(np.interp(speed, self.likely.speeds, self.likely.depths)) / 1e3
-            program = Program(self.machine.build_cut(self.table), speed, max(likely, MM / 1e3))
-            self.hard[speed] = hard_draws(program, self.cuts, self.spindle, self.doubt, self.fall, self.stiffness_at)
-        hard = self.hard[speed] = replace(self.hard[speed], chattered=frozenset(self.chattered))
-        return 1e3 * hard.deepest(DEEPER * min(most, hard.limit / (1 + SPARE))) / DEEPER
+        hard = self.hard[speed] = replace(self._hard(speed), chattered=frozenset(self.chattered))
+        return 1e3 * hard.deepest(most)
+
+    def _hard(self, speed: float) -> HardDraws:
+        """The few draws at a speed (rpm)."""
+        if speed in self.hard:
+            return self.hard[speed]
+        likely = float(np.interp(speed, self.likely.speeds, self.likely.depths)) / 1e3
+        program = Program(self.machine.build_cut(self.table), speed, max(likely, MM / 1e3))
+        spindle = self.spindle, self.doubt, self.fall, self.stiffness_at
+        return hard_draws(program, self.cuts, *spindle, SPARE)
 
     def _deepest(self, speed: float, depth_mm: float) -> Setting | None:
         """The deepest setting up to a depth (mm)."""
@@ -233,11 +267,13 @@ class SettingSearch:
     def verified(self, speed: float, depth_mm: float) -> Setting | float:
         """The setting where it is stable throughout now and when it is tapped again; else a depth (mm) that may be."""
         table, depth = msgspec.structs.replace(self.table, speed_rpm=speed, depth_mm=depth_mm), depth_mm / 1e3
+        deep, ends = DEEPER * depth, self._hard(speed).draws
+        if np.any((grown := ends.growth_that_counts(deep)) >= 0):
+            return self._less(ends, grown, depth_mm)
         judgement = weigh(table, self.assembly, self.machine, self.at_speed, self.either)
         limit = judgement.middle.limit
         if limit < depth * (1 + SPARE):
             return 1e3 * limit / (1 + SPARE)
-        deep = DEEPER * depth
         near = judgement.draws.fed_where(judgement.draws.around(SURELY * deep, self.fall, APART) >= 0)
         if not judgement.is_stable_throughout:
             places = 1 + np.flatnonzero(judgement.chatters)
@@ -245,16 +281,20 @@ class SettingSearch:
             calm = 1e3 * min(deepest_calm(near[places[:FEW]], depth), judgement.low)
             return min(calm, LESS * depth_mm, depth_mm - MM)
         around = all_around(near, self.fall, self.stiffness_at)
-        grown = around.growth(deep)[:, 0]
+        grown = around.growth_that_counts(deep)
         if np.any(grown >= 0):
-            places = np.argsort(-grown)[:FEW]
-            self.chattered.update((places[grown[places] >= 0] % len(near.rows))[:REMEMBERED].tolist())
-            return min(1e3 * deepest_calm(around[places], deep) / DEEPER, depth_mm - MM)
+            return self._less(around, grown, depth_mm)
         hardest = near[np.argsort(np.max(grown.reshape(-1, len(near.rows)), axis=0))[-FEW:]]
         window = window_rpm(near, hardest, speed, depth, self.reach)
         left = frequency_left(hardest, depth, self.stiffness_at)
         self.judged[speed, depth_mm] = judgement
         return Setting(speed, depth_mm, window, min(limit / depth - 1, MOST_SPARE), left)
+
+    def _less(self, draws: ProgramDraws, grown: Floats, depth_mm: float) -> float:
+        """A depth (mm) that these draws may let pass, which grow by so much at one (mm) with room (n,)."""
+        places = np.argsort(-grown)[:FEW]
+        self.chattered.update((places[grown[places] >= 0] % (DRAWS + 1))[:REMEMBERED].tolist())
+        return min(1e3 * deepest_calm(draws[places], DEEPER * depth_mm / 1e3) / DEEPER, depth_mm - MM)
 
 
 def _rounded(speed: float) -> float:

@@ -119,7 +119,7 @@ TOOL = SetUpQuestion(
 MATERIAL = SetUpQuestion(
     "material",
     "What does it cut? A material (lobewatch materials lists them), or Kt and Kr (N/mm2)",
-    "42CrMo4, 1.7225, 6061, 700 250",
+    "42CrMo4, 1.7225, AA 6061, 700 250",
     _material,
     _set_material,
 )

@@ -1,0 +1,74 @@
+"""The search for settings: what it passes over to be fast is not what decides, and it looks beside what is likely."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+
+from lobewatch.machine import Machine, ProgramTable
+from lobewatch.machine.settings.machine_file import parse_machine
+from lobewatch.tool.assembly import Assembly
+from lobewatch.verdicts.draws import as_program
+from lobewatch.verdicts.hard_draws import hard_draws
+from lobewatch.verdicts.judgement import weigh
+from lobewatch.verdicts.room import all_around
+from lobewatch.verdicts.setting_search import SPARE, Setting, SettingSearch
+from lobewatch.verdicts.spindle_at_speed import AT_REST
+from modal import Mode
+
+MACHINE: Machine = parse_machine('[machine]\nname = "m"\n[speed]\nlow_rpm = 5000\nhigh_rpm = 15000\n')
+
+
+def tool(apart: float = 1.06) -> Assembly:
+    """One mode in x, and one in y whose frequency is so many times as high."""
+    x, y = ([Mode(700.0 * share, 0.03, 4e7)] for share in (1.0, apart))
+    return Assembly("reference", datetime(2026, 1, 1, tzinfo=UTC), "t", x, y, ("x", "y"), None, {}, False, ())
+
+
+def cut(immersion: float = 1.0, depth: float = 1.0, speed: float = 9000.0) -> ProgramTable:
+    return ProgramTable(
+        name="a",
+        teeth=4,
+        radial_depth_mm=20 * immersion,
+        tool_diameter_mm=20,
+        direction="down",
+        tangential_n_per_mm2=1600,
+        radial_n_per_mm2=600,
+        helix_deg=30,
+        speed_rpm=speed,
+        depth_mm=depth,
+    )
+
+
+@pytest.mark.parametrize(("immersion", "depth"), [(1.0, 0.9), (0.2, 4.5)])
+def test_draws_that_are_passed_over_in_other_cuts_are_stable_there(immersion: float, depth: float) -> None:
+    judgement = weigh(cut(immersion, depth), tool(1.3), MACHINE, AT_REST)
+    draws = all_around(judgement.draws, 0.02, lambda fall: 1 - fall)
+    every, counted = draws.growth(depth / 1e3)[:, 0], draws.growth_that_counts(depth / 1e3)
+    assert np.array_equal(counted >= 0, every >= 0)
+    assert np.all(counted <= every + 1e-6)
+    assert counted[np.argmax(every)] == pytest.approx(np.max(every), abs=1e-4)
+
+
+def test_a_narrow_pocket_is_climbed_from_where_it_is_likely() -> None:
+    search = SettingSearch(cut(), tool(), MACHINE)
+    best = search.best
+    assert best is not None
+    top, likely = search.likely.tops(1)[0]
+    beside = search.verified(round(top, -1), round(0.97 * likely * 20) / 20)
+    chips = beside.speed_rpm * beside.depth_mm if isinstance(beside, Setting) else 0.0
+    assert best.speed_rpm > 1.005 * top
+    assert best.speed_rpm * best.depth_mm > 1.05 * chips > 0
+    again = SettingSearch(cut(), tool(), MACHINE).verified(best.speed_rpm, best.depth_mm)
+    assert again == best
+
+
+def test_few_draws_let_no_deeper_pass_than_the_middle_has_to_spare() -> None:
+    search = SettingSearch(cut(), tool(), MACHINE)
+    judgement = weigh(cut(depth=0.5), tool(), MACHINE, AT_REST)
+    program = as_program(cut(depth=0.5), MACHINE)
+    few = hard_draws(program, search.cuts, search.spindle, search.doubt, 0.02, search.stiffness_at, SPARE)
+    assert 0 < few.deepest(20e-3) <= 1.01 * judgement.middle.limit / (1 + SPARE)
+    assert few.deepest(1e-4) == pytest.approx(1e-4)

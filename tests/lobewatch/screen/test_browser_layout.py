@@ -77,6 +77,18 @@ def test_a_dark_screen_breaks_no_rule_of_accessibility_before_between_and_after_
     assert contrast(paper, "rgb(0, 0, 0)") < 1.5  # it is dark
 
 
+def test_no_caption_of_a_curve_is_cut_off_on_a_telephone(
+    browser: Browser, session: Session, server: ScreenServer
+) -> None:
+    browser.open(server.url, (390, 844))
+    session.hit()
+    browser.wait(lambda: browser.part("plots").is_displayed())
+    wide = "[...document.querySelectorAll('#plots figcaption')].map((one) => [one.scrollWidth, one.clientWidth])"
+    captions = browser.ask(wide)
+    assert len(captions) == 5
+    assert all(needed <= given for needed, given in captions)
+
+
 def contrast(*colours: str) -> float:
     """Of WCAG 2.2, from two CSS colours rgb(r, g, b)."""
     lights = []

@@ -31,7 +31,7 @@ def softening(assembly: Assembly) -> tuple[StiffnessAt, Remark]:
     it stays.
     """
     ratios = np.ones(1) if assembly.calibration is None else _stiffness_ratios(assembly.calibration)
-    clause = "K does not (no model)"
+    clause = "stiffness does not (no model)"
     if ratios.size > 1:
         fall, change = 100 * FALLS[ratios.size - 1], 100 * (ratios[-1] - 1)
         clause = f"stiffness changes as in the model ({change:+.1f} % when the frequency has fallen by {fall:.0f} %)"

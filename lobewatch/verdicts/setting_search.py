@@ -9,7 +9,7 @@ nothing is recommended.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -150,9 +150,8 @@ class SettingSearch:
     def pockets(self, count: int) -> list[Setting]:
         """The best setting, and the next best of other pockets."""
         taken: list[Setting] = []
-        for setting in self._settings():
-            if not any(self.likely.is_joined(setting.speed_rpm, other.speed_rpm) for other in taken):
-                taken.append(setting)
+        for setting in self._settings(taken):
+            taken.append(setting)
             if len(taken) == count:
                 break
         return taken
@@ -183,10 +182,11 @@ class SettingSearch:
                     return setting
         return None
 
-    def _settings(self) -> Iterator[Setting]:
+    def _settings(self, taken: Sequence[Setting] = ()) -> Iterator[Setting]:
         """The deepest at speeds of the grid, the most chips first as far as few draws tell.
 
-        What was judged in vain comes back with less depth, and the draws that chattered count from then on.
+        What was judged in vain comes back with less depth, and the draws that chattered count from then on. Pockets
+        that are taken while it goes on are passed over.
         """
         if self.reach.is_empty:
             return
@@ -194,6 +194,8 @@ class SettingSearch:
         depths: dict[float, float] = {}
         looked, left = set[float](), 0.0
         for _ in range(MOST_TRIES):
+            tops = [top for top in tops if self._is_free(top[0], taken)]
+            depths = {speed: depth for speed, depth in depths.items() if self._is_free(speed, taken)}
             speed = self._most_chips(depths)
             while tops and HOPE * left * math.prod(tops[-1]) >= speed * depths.get(speed, 0.0):
                 top, likely = tops.pop()
@@ -202,12 +204,18 @@ class SettingSearch:
             if not depths.get(speed):
                 return
             speed = self._climbed(speed, depths, looked)
+            if not self._is_free(speed, taken):
+                continue
             setting = self.verified(speed, depths[speed])
             if isinstance(setting, Setting):
                 del depths[speed]
                 yield setting
             else:
                 depths[speed] = floored_mm(setting)
+
+    def _is_free(self, speed: float, taken: Sequence[Setting]) -> bool:
+        """Whether a speed (rpm) lies in none of the pockets that are taken."""
+        return not any(self.likely.is_joined(speed, setting.speed_rpm) for setting in taken)
 
     def _climbed(self, speed: float, depths: dict[float, float], looked: set[float]) -> float:
         """The speed (rpm) of most chips when those beside it have joined these with a depth (mm), each once."""

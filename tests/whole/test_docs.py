@@ -156,4 +156,4 @@ def test_packages_are_ours_and_their_names_are_sorted_and_documented(package: ob
 def test_the_changelog_knows_the_version() -> None:
     version = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["version"]
     changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
-    assert f"## [{version}]" in changelog or "## [Unreleased]" in changelog
+    assert f"## [{version}] - 20" in changelog

@@ -309,7 +309,7 @@ def test_wrong_use(run: Run) -> None:
         said = run(*arguments)
         assert said.code == 2
         assert "Traceback" not in said.err
-    assert run("--version").out == "lobewatch 0.1.0\n"
+    assert run("--version").out == "lobewatch 1.0.0\n"
 
 
 @pytest.mark.parametrize("name", [".", "./mill", "/tmp", "_", "", "\u202estatus", "\U0001f642"])

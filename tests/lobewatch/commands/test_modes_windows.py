@@ -181,9 +181,10 @@ def test_doubtful_modes_stand_below_the_trusted_ones_with_the_reason(
     assert code == 0
     rows = said.splitlines()
     assert rows[2].split(".")[0].strip() == "1722"
-    assert rows[3].rstrip().endswith("doubtful")
+    assert rows[3].startswith("   899.97")
+    assert rows[3].rstrip().endswith("!")
     assert rows[4].startswith("1 trusted, 1 doubtful, 0 rejected (--all")
-    assert rows[5].startswith("doubtful: 9")
+    assert rows[5].startswith("! doubtful: 9")
     assert "cut-by-edge" in rows[5]
 
 

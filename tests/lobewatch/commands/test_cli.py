@@ -112,6 +112,8 @@ def test_who_must_wait_for_a_tap_test_too_long_is_told_so(run: Run, trial: Machi
     table = trial.machine.spindle
     assert table is not None
     structure = emulated_structure(table.build(), table.damping_ratio)
+    many = trial.toml.read_text("utf-8").replace("hits = 10 ", "hits = 99 ", 1)  # it is not done before it is stopped
+    trial.toml.write_text(many, "utf-8")
     with emulator(structure, np.random.default_rng(1), realtime=True) as slow:
         command = [sys.executable, "-c", TAP, "tap", "trial", "--port", slow.port]
         with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:

@@ -62,8 +62,9 @@ def stiffness_jump(last: Mode, now: Mode) -> Remark | None:
     stiffer, faster = now.stiffness / last.stiffness, now.frequency / last.frequency
     if not all(max(ratio, 1 / ratio) > LARGEST_STEP for ratio in (stiffer, stiffer / faster**2)):
         return None
-    text = f"K {now.stiffness / 1e6:.3g} N/um is {stiffer:.2g} times that of the newest test of the series"
-    text += f" ({last.stiffness / 1e6:.3g} N/um), f_n moved by {round(100 * (faster - 1), 1) + 0.0:g} %"
+    here, there = (rounded(stiffness, scale=1e6, digits=3) for stiffness in (now.stiffness, last.stiffness))
+    text = f"stiffness {here} N/um is {stiffer:.2g} times that of the newest test of the series ({there} N/um), the "
+    text += f"frequency moved by {round(100 * (faster - 1), 1) + 0.0:g} %"
     text += ": has a gain, a range or a sensitivity changed, or the place that is tapped?"
     return Remark("stiffness-jump", f"{now.frequency:.0f} Hz", text)
 

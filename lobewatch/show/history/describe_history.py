@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields
 from datetime import UTC, datetime
@@ -107,11 +108,17 @@ def short_names(ids: Sequence[str]) -> list[str]:
 
     Commands take it in place of the identity.
     """
-    joined = "\n".join(ids)
-    return [
-        next((name[-size:] for size in range(SHORTEST, len(name)) if joined.count(name[-size:]) == 1), name)
-        for name in ids
-    ]
+    names, size = dict(zip(ids, ids, strict=True)), SHORTEST
+    left = [name for name in names if len(name) > size]
+    while left:
+        ends = {name[-size:] for name in left}
+        parts = Counter(
+            part for name in ids for i in range(len(name) - size + 1) if (part := name[i : i + size]) in ends
+        )
+        names |= {name: name[-size:] for name in left if parts[name[-size:]] == 1}
+        size += 1
+        left = [name for name in left if names[name] == name and len(name) > size]
+    return [names[name] for name in ids]
 
 
 def _placed(row: Sequence[str], widths: Sequence[int]) -> Iterator[str]:

@@ -20,6 +20,7 @@ import pytest
 
 from lobewatch.cli import main
 from lobewatch.machine.folder import MachineFolder
+from lobewatch.verdicts import Advice
 
 
 class Said(NamedTuple):
@@ -60,6 +61,51 @@ def trial(run: Run) -> MachineFolder:
     """A machine folder with the example spindle."""
     assert run("init", "trial", "--example").code == 0
     return MachineFolder("trial")
+
+
+class Checked(Said):
+    """What `lobewatch check` ends with."""
+
+    @property
+    def programs(self) -> dict[str, dict[str, Any]]:
+        """Objects on stdout, by the names of programs."""
+        return {one["name"]: one for one in self.json["programs"]}
+
+    @property
+    def last(self) -> str:
+        """Last line on stdout."""
+        return self.out.splitlines()[-1]
+
+    def line(self, name: str) -> str:
+        """What is said of a program below the table."""
+        (found,) = (line for line in self.out.splitlines() if line.startswith(f"{name}: "))
+        return found
+
+
+Check = Callable[..., Checked]
+
+
+@pytest.fixture
+def check(shop: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Check:
+    """Runs `lobewatch check` on the shop, or on another folder."""
+
+    def command(*options: str, folder: Path | None = None) -> Checked:
+        monkeypatch.setattr(sys, "argv", ["lobewatch", "check", str(folder or shop.path), *options])
+        capsys.readouterr()
+        code: Any = 0
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code or 0
+        return Checked(code, *capsys.readouterr())
+
+    return command
+
+
+@pytest.fixture
+def no_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Takes the search for settings out of tests that are not about it."""
+    monkeypatch.setattr("lobewatch.logbook.analysis.advise", lambda *_: Advice())
 
 
 def refused(said: Said, *words: str) -> None:

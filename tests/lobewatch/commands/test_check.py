@@ -2,74 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import re
-import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
 
 from lobes import Program, program_limit
-from lobewatch.cli import main
 from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.verdicts import Advice, Setting
 from lobewatch.verdicts.ways import ways
+from tests.lobewatch.commands.conftest import Check
 
 Shop = Any
 """Of tests/lobewatch/conftest.py."""
-
-
-class Said(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-    @property
-    def json(self) -> dict[str, Any]:
-        parsed: dict[str, Any] = json.loads(self.out)
-        return parsed
-
-    @property
-    def programs(self) -> dict[str, dict[str, Any]]:
-        return {one["name"]: one for one in self.json["programs"]}
-
-    @property
-    def last(self) -> str:
-        return self.out.splitlines()[-1]
-
-    def line(self, name: str) -> str:
-        """What is said of a program below the table."""
-        (found,) = (line for line in self.out.splitlines() if line.startswith(f"{name}: "))
-        return found
-
-
-Check = Callable[..., Said]
-
-
-@pytest.fixture
-def check(shop: Shop, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Check:
-    """Runs `lobewatch check` on the shop, or on another folder."""
-
-    def command(*options: str, folder: Path | None = None) -> Said:
-        monkeypatch.setattr(sys, "argv", ["lobewatch", "check", str(folder or shop.path), *options])
-        capsys.readouterr()
-        code: Any = 0
-        try:
-            main()
-        except SystemExit as end:
-            code = end.code or 0
-        return Said(code, *capsys.readouterr())
-
-    return command
-
-
-@pytest.fixture
-def no_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Takes the search for settings out of tests that are not about it."""
-    monkeypatch.setattr("lobewatch.logbook.analysis.advise", lambda *_: Advice())
 
 
 def advised_to(monkeypatch: pytest.MonkeyPatch, best: Setting | None, here: Setting | None) -> None:
@@ -479,85 +426,3 @@ def test_a_program_that_is_not_there_is_refused_with_those_that_are(shop: Shop, 
     assert "program 'D' is not in machine.toml; there are 'A', 'B', 'C'" in said.err
     said = check("--program", "B", "--depth", "1")
     assert (said.code, "--program has its own speed, depth and tool" in said.err) == (2, True)
-
-
-def test_a_cut_is_judged_without_a_program_as_one(shop: Shop, check: Check, no_search: None) -> None:
-    shop.tap_both()
-    text = (shop.path / "machine.toml").read_bytes()
-    said = check("--speed", "8700", "--depth", "0.4", "--json")
-    asked, program = said.programs["8700 rpm, 0.4 mm"], check("--program", "B", "--json").programs["B"]
-    assert said.code == 0
-    assert asked.keys() == program.keys()
-    same = ("speed_rpm", "depth_mm", "feed", "verdict", "limit_mm", "limit_low_mm", "limit_high_mm", "doubt", "tap_id")
-    assert {key: asked[key] for key in same} == {key: program[key] for key in same}
-    assert (asked["was_stable_at_first"], (shop.path / "machine.toml").read_bytes()) == (None, text)
-    assert check("--speed", "12900", "--depth", "6").code == 1
-
-
-def test_a_material_and_a_geometry_may_be_said_of_a_cut(shop: Shop, check: Check, no_search: None) -> None:
-    shop.tap_both()
-    cut = ("--speed", "8700", "--depth", "0.2", "--material", "1.0503")
-    assert "Kt -25..+30 %, Kr/Kt -52..+100 % (published for C45)" in check(*cut).out
-    geometry = ("--radial", "10", "--direction", "up", "--teeth", "3", "--diameter", "25")
-    asked = check(*cut, *geometry, "--json").programs["8700 rpm, 0.2 mm"]
-    shop.run(("A", 8700, 0.2))
-    shop.edit("tangential_n_per_mm2 = 1400\nradial_n_per_mm2 = 500\nspeed", 'material = "C45"\nspeed')
-    slot = 'teeth = 4\ntool_diameter_mm = 20\nradial_depth_mm = 20\ndirection = "down"\nmaterial'
-    shop.edit(slot, 'teeth = 3\ntool_diameter_mm = 25\nradial_depth_mm = 10\ndirection = "up"\nmaterial')
-    written = check("--json").programs["A"]
-    assert [remark["code"] for remark in asked["remarks"]] == [remark["code"] for remark in written["remarks"]]
-    alike = {"name": "A", "was_stable_at_first": None, "remarks": written["remarks"]}  # they name the cut
-    assert asked | alike == written
-
-
-def test_what_is_missing_of_a_cut_is_asked_for_in_one_message(shop: Shop, check: Check) -> None:
-    shop.tap_both()
-    said = check("--tool", "long end mill", "--speed", "8700", "--teeth", "2")
-    assert (said.code, said.out) == (2, "")
-    missing = "--depth, --material, --diameter, --radial, --direction: missing, and no program runs with tool"
-    assert f"{missing} 'long end mill'; give them" in said.err
-    shop.edit('name = "B"\ntool = "reference"\nteeth = 4', 'name = "B"\ntool = "reference"\nteeth = 3')
-    said = check("--speed", "8700", "--depth", "1")
-    assert "--teeth: missing, and the programs of tool 'reference' do not agree on them" in said.err
-    shop.edit('name = "B"\ntool = "reference"', 'name = "B"\ntool = "another"')
-    said = check("--speed", "8700", "--depth", "1")
-    assert (
-        said.err.count("--tool, --material, --teeth, --diameter, --radial, --direction: missing, and no tool is") == 1
-    )
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (("--speed", "0", "--depth", "1"), "--speed 0: is not above 0"),
-        (("--speed", "nan", "--depth", "1"), "--speed nan: is not above 0"),
-        (("--speed", "90000", "--depth", "1"), "--speed 90000: is outside [speed] 3000..24000 rpm"),
-        (("--speed", "9000", "--depth", "-1"), "--depth -1: is not above 0"),
-        (("--speed", "9000", "--depth", "1", "--teeth", "0"), "--teeth 0: is not above 0"),
-        (
-            ("--speed", "9000", "--depth", "1", "--diameter", "10"),
-            "radial_depth_mm=20 is larger than tool_diameter_mm=10",
-        ),
-        (("--speed", "9000", "--depth", "1", "--material", "42CrMo5"), "is '42CrMo4' meant?"),
-        (("--speed", "9000", "--depth", "0,5"), "Invalid value for '--depth'"),
-    ],
-)
-def test_bad_numbers_of_a_cut_are_refused(shop: Shop, check: Check, options: tuple[str, ...], message: str) -> None:
-    shop.tap_both()
-    said = check(*options)
-    assert (said.code, said.out) == (2, "")
-    assert message in re.sub(r"[\s│]+", " ", said.err)
-
-
-def test_a_machine_without_programs_judges_a_cut_that_is_said_in_full(
-    shop: Shop, check: Check, no_search: None
-) -> None:
-    shop.put("")
-    shop.tap_both()
-    said = check("--speed", "8700")
-    assert "--depth, --material, --teeth, --diameter, --radial, --direction: missing" in said.err
-    cut = ("--tool", "reference", "--material", "aisi 4140", "--teeth", "4", "--diameter", "20", "--radial", "20")
-    said = check("--speed", "8700", "--depth", "0.05", *cut, "--direction", "up", "--json")
-    assert (said.code, [one["verdict"] for one in said.json["programs"]]) == (0, ["stable"])
-    said = check("--speed", "8700", "--depth", "0.05", *cut[2:], "--direction", "up", "--tool", "never seen")
-    assert (said.code, said.last) == (1, "1 program: 1 unknown")

@@ -21,61 +21,22 @@ from lobewatch.machine.new_folder import make_machine_folder
 from lobewatch.tap.plug import open_source
 
 RATE = 10_000.0
-DAQ = """[daq]
-driver = "lines"
-sample_rate_hz = 10000
-anti_alias = true
+FORCE, ACCELERATION = "sensitivity_mv_per_n = 2.25\nrange_v = 5", "sensitivity_mv_per_g = 10\nrange_v = 5"
+DIGITAL = "sensitivity_mv_per_g = 100\nrange_v = 1.6"
 
-[[daq.channel]]
-input = 0
-quantity = "force"
-sensitivity_mv_per_n = 2.25
-range_v = 5
 
-[[daq.channel]]
-input = 1
-quantity = "acceleration"
-sensitivity_mv_per_g = 10
-range_v = 5
+def daq(sample_rate: int, *sensors: str, more: str = "") -> str:
+    """[daq] of a board that prints what these sensors say, in this order; more: keys."""
+    channels = (
+        f'[[daq.channel]]\ninput = {i}\nquantity = "{"force" if "per_n" in sensor else "acceleration"}"\n{sensor}\n'
+        for i, sensor in enumerate(sensors)
+    )
+    return "\n".join([f'[daq]\ndriver = "lines"\nsample_rate_hz = {sample_rate}\n{more}', *channels])
 
-[daq.printing]
-baud_rate = 921600
-"""
-ALONE = """[daq]
-driver = "lines"
-sample_rate_hz = 10000
 
-[[daq.channel]]
-input = 0
-quantity = "acceleration"
-sensitivity_mv_per_g = 10
-range_v = 5
-"""
-ADXL345 = """[daq]
-driver = "lines"
-sample_rate_hz = 3200
-
-[[daq.channel]]
-input = 0
-quantity = "acceleration"
-sensitivity_mv_per_g = 100
-range_v = 1.6
-"""
-THREE_AXES = """[daq]
-driver = "lines"
-sample_rate_hz = 3200
-
-""" + "".join(
-    f"""[[daq.channel]]
-input = {number}
-quantity = "acceleration"
-sensitivity_mv_per_g = 100
-range_v = 1.6
-{direction}
-
-"""
-    for number, direction in enumerate(('direction = "x"', 'direction = "y"', ""))
-)
+TWO_SENSORS = daq(10_000, FORCE, ACCELERATION, more="anti_alias = true\n") + "\n[daq.printing]\nbaud_rate = 921600\n"
+ALONE, ADXL345 = daq(10_000, ACCELERATION), daq(3200, DIGITAL)
+THREE_AXES = daq(3200, f'{DIGITAL}\ndirection = "x"', f'{DIGITAL}\ndirection = "y"', DIGITAL)
 PER_N, PER_ACCELERATION = 2.25e-3, 10e-3 / 9.80665
 
 
@@ -90,7 +51,7 @@ def test_a_whole_tap_test(
     monkeypatch.chdir(tmp_path)
     make_machine_folder(Path("trial"), "new_machine.toml")
     toml = Path("trial/machine.toml")
-    text = toml.read_text("utf-8").replace("[daq]\n", DAQ if force else ALONE, 1)
+    text = toml.read_text("utf-8").replace("[daq]\n", TWO_SENSORS if force else ALONE, 1)
     toml.write_text(text if force else text.replace("[tap]\n", '[tap]\nhammer = "none"\n'), "utf-8")
     folder = MachineFolder("trial")
     hammered = HammeredStructure(structure, RATE, np.random.default_rng(1), Hammering())

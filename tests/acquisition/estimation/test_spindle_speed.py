@@ -56,3 +56,11 @@ def test_a_pulse_that_is_missing_leaves_the_speed_unknown_not_halved() -> None:
 def test_what_is_no_tachometer_is_refused(signal: np.ndarray, each: int, text: str) -> None:
     with pytest.raises(ValueError, match=text):
         speed_of_pulses(signal, RATE, each)
+
+
+def test_a_pulse_begins_between_samples() -> None:
+    turns, rate = 37.3, 2000.0  # 53.6 samples a turn: by whole samples turns differ by 1.9 %
+    speed = speed_of_pulses(np.sin(2 * np.pi * turns * np.arange(4000) / rate), rate)
+    known = speed[np.isfinite(speed)]
+    assert known.size > 3800
+    assert np.max(np.abs(known / (60 * turns) - 1)) < 2e-3

@@ -8,7 +8,10 @@ from acquisition.files.contents.contents import Role
 from acquisition.files.contents.units import VOLTS, unit_of
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.+?)\s*[\])]")
-_SPLIT_OFF = re.compile(r"^(.+?)_(.+)$")
+_PART_OF_FRF = re.compile(
+    r"((?:re|im|abs|arg|mag|phase|angle)\w*\s*[\[(]\s*(?:h|frf)\w*(?:\(\w+\))?\s*[\])])\s*(.*)", re.I
+)
+"""Such as Re(H), or imag(FRF) [m/N]."""
 ANGLES = {"deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "grad": "deg", "rad": "rad", "radians": "rad"}
 """Units of a phase as they are written in lower case."""
 _BY_NAME: tuple[tuple[str, Role], ...] = (
@@ -50,7 +53,10 @@ ROLES: dict[str, tuple[Role, str]] = {
 
 
 def name_and_unit(heading: str) -> tuple[str, str]:
-    """Of "Force [N]", "Force (N)" or "force_N"; no unit where there is none that stands apart."""
+    """Of "Force [N]", "Force (N)", "force_N" or "Re(H) [m/N]"; no unit where there is none that stands apart."""
+    part = _PART_OF_FRF.fullmatch(heading)
+    if part:
+        return part[1], name_and_unit(part[2])[1]
     bracketed = _BRACKETS.fullmatch(heading)
     if bracketed:
         return bracketed[1], bracketed[2]

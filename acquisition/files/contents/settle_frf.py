@@ -31,6 +31,10 @@ class Candidate:
     partner: Signal | None = None
     """The imaginary part or the phase."""
 
+    def as_columns(self) -> str:
+        """Its columns as `--columns` names them."""
+        return ",".join(f"{part.role}={part.name}" for part in (self.signal, self.partner) if part is not None)
+
 
 def candidates(signals: Sequence[Signal]) -> list[Candidate]:
     """The FRFs among signals: complex ones, and pairs in their order."""
@@ -52,7 +56,7 @@ def settle_frf(contents: Contents, description: Description, ledger: Ledger) -> 
     candidate = next((candidate for candidate in listed if candidate.signal is signal), listed[0])
     values = _values(candidate, ledger)
     unit = frf_unit(candidate.signal, description, ledger)
-    frequency = _frequency(contents, candidate.signal, description, ledger)
+    frequency = _frequency(contents, candidate, description, ledger)
     coherence = _coherence(contents, listed.index(candidate), candidate.signal, ledger)
     if frequency is None or values is None or unit is None or not ledger.is_clean:
         return None
@@ -114,13 +118,13 @@ def _is_same_unit(one: str, other: str) -> bool:
 
 
 def _by_spacing(
-    signals: Sequence[Signal], frf: Signal, description: Description, ledger: Ledger
+    signals: Sequence[Signal], frf: Candidate, description: Description, ledger: Ledger
 ) -> NDArray[np.float64] | None:
     """Frequencies of the lines of an FRF (Hz), as a person says."""
-    n, step, start = frf.values.size, description.spacing, description.start or 0.0
+    n, step, start = frf.signal.values.size, description.spacing, description.start or 0.0
     if step is None:
         axis = next((signal.name for signal in signals if signal.role == "" and _may_be_axis(signal, n)), None)
-        by_name = f'--columns "frequency [Hz]={axis},frf={frf.name}", or [rad/s]; or ' if axis else ""
+        by_name = f'--columns "frequency [Hz]={axis},{frf.as_columns()}", or [rad/s]; or ' if axis else ""
         ledger.ask("the frequencies of its lines", f"{by_name}--spacing 0.5 --start 0 in Hz")
         return None
     if not (np.isfinite(step) and step > 0 and np.isfinite(start) and start >= 0):
@@ -136,10 +140,12 @@ def _may_be_axis(signal: Signal, n: int) -> bool:
     )
 
 
-def _frequency(contents: Contents, frf: Signal, description: Description, ledger: Ledger) -> NDArray[np.float64] | None:
+def _frequency(
+    contents: Contents, frf: Candidate, description: Description, ledger: Ledger
+) -> NDArray[np.float64] | None:
     """Of an FRF (Hz)."""
-    axes = [signal for signal in contents.signals if signal.role == "frequency" and signal.record == frf.record]
-    axis = next((signal for signal in axes if signal.values.size == frf.values.size), None)
+    axes = [signal for signal in contents.signals if signal.role == "frequency" and signal.record == frf.signal.record]
+    axis = next((signal for signal in axes if signal.values.size == frf.signal.values.size), None)
     if axis is None:
         return _by_spacing(contents.signals, frf, description, ledger)
     if description.spacing is not None or description.start is not None:

@@ -20,7 +20,9 @@ FEW = 3
 _COMMA_NUMBER = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?")
 _POSITIVE = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _PAIR = re.compile(rf"\(\s*([+-]?{_POSITIVE})\s*,\s*([+-]?{_POSITIVE})\s*\)")
-_SUM = re.compile(rf"({_POSITIVE})\s*([+-])\s*({_POSITIVE})\s*[ij]\b")
+_EITHER = _POSITIVE.replace(r"\.", "[.,]")
+"""With a decimal point or comma."""
+_SUM = re.compile(rf"({_EITHER})\s*([+-])\s*({_EITHER})\s*[ij]\b")
 _IMAGINARY = re.compile(r"\(?[^a-df-zA-DF-Z]*[\d.]j\)?")
 _TIMESTAMP = re.compile(r"\d{1,4}([-/.:])\d{1,2}\1\d{1,4}")
 _NOT_FINITE = {"nan", "inf", "-inf", "+inf"}

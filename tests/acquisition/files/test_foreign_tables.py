@@ -216,6 +216,30 @@ def test_complex_numbers_as_text(tmp_path: Path, spelling: str, separator: str) 
     assert is_h(read_frf(put(path, lines), Description(columns=("frequency", "frf [m/N]"))))
 
 
+@pytest.mark.parametrize("separator", ["\t", ";"])
+@pytest.mark.parametrize("spelling", ["numpy", "python", "matlab", "spaced"])
+def test_complex_numbers_as_text_with_decimal_commas(tmp_path: Path, spelling: str, separator: str) -> None:
+    lines = "".join(f"{f:g}{separator}{SPELLINGS[spelling](h)}\n" for f, h in zip(F, H, strict=True))
+    path = put(tmp_path / "a.txt", f"Freq (Hz){separator}H(m/N)\n{lines.replace('.', ',')}")
+    assert is_h(read_frf(path))
+
+
+@pytest.mark.parametrize("heading", ["Freq,Re(H),Im(H)", "f_Hz,real(FRF1),imag(FRF1)", "f (Hz),Re [H(f)],Im [H(f)]"])
+@pytest.mark.parametrize("unit", ["", " [m/N]", "(m/N)"])
+def test_headings_that_name_the_frf_in_brackets(tmp_path: Path, heading: str, unit: str) -> None:
+    first, real, imag = heading.split(",")
+    text = f"{first},{real}{unit},{imag}{unit}\n" + rows(F, H.real, H.imag, separator=",")
+    path = put(tmp_path / "a.csv", text)
+    assert is_h(read_frf(path, Description(unit="" if unit else "m/N")))
+
+
+def test_the_advice_for_an_axis_that_has_no_name_names_both_parts(tmp_path: Path) -> None:
+    path = put(tmp_path / "a.csv", "w,re,im\n" + rows(2 * np.pi * F, H.real, H.imag, separator=","))
+    assert '--columns "frequency [Hz]=w,real=re,imag=im", or [rad/s]' in complaint(path)
+    answer = ("frequency [rad/s]=w", "real=re", "imag=im")
+    assert is_h(read_frf(path, Description(columns=answer, unit="m/N")))
+
+
 def test_an_frf_without_its_frequencies_asks_for_their_spacing(tmp_path: Path) -> None:
     path = put(tmp_path / "a.txt", "".join(SPELLINGS["numpy"](h) + "\n" for h in H))
     said = complaint(path)
